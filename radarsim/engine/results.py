@@ -1,0 +1,45 @@
+"""What a finished case hands to the report: its sums, and the axes that say what each of them is."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Labels of the error sums, (F filters, K scans, C components).
+
+    k (K,) counts scans from 1, t_s (K,) is the time from the first plot. available (F, K, C) says where a filter has an
+    estimate. baseline is the filter that gains are against. exact_sigma and exact_bias (F, K, C) are not-a-number where
+    no exact value is known. extra holds what the study's own tables need.
+    """
+
+    filters: tuple[str, ...]
+    components: tuple[tuple[str, str], ...]
+    k: np.ndarray
+    t_s: np.ndarray
+    available: np.ndarray
+    baseline: int
+    exact_sigma: np.ndarray
+    exact_bias: np.ndarray
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CaseResult:
+    """A case, how many realisations of it are done, and the named arrays of their sums.
+
+    `error` (F, K, C, 4) holds the sums of e, e², e³, e⁴; `paired` (F, K, C) those of e²·e² with the baseline's error; a study
+    adds its own.
+    """
+
+    name: str
+    study: str
+    spec: Any
+    swept: tuple[tuple[str, Any], ...]
+    count: int
+    sums: Mapping[str, np.ndarray]
+    axes: Axes
+    seconds: float = 0.0

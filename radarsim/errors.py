@@ -1,0 +1,50 @@
+"""The exceptions that a user meets, each with the exit code of the command that met it."""
+
+
+class RadarsimError(Exception):
+    """Any fault that is told to the user in words; `lines` are printed one to a line."""
+
+    exit_code = 1
+
+    def __init__(self, *lines: str):
+        super().__init__("\n".join(lines))
+        self.lines = lines
+
+    def __reduce__(self):
+        return type(self), self.lines
+
+
+class ConfigError(RadarsimError):
+    """The user's input is wrong: a config, an override, an argument, a file of plots."""
+
+    exit_code = 2
+
+
+class TargetUnmet(RadarsimError):
+    """A precision or time limit ended the run before its target was met."""
+
+    exit_code = 3
+
+
+class StoreError(RadarsimError):
+    """The disk, or results on it, are damaged or cannot be written."""
+
+    exit_code = 4
+
+
+class NonFiniteError(RadarsimError):
+    """A filter gave numbers that are not finite."""
+
+    exit_code = 5
+
+
+class Interrupted(RadarsimError):
+    """A signal stopped the run; what was done is stored."""
+
+    def __init__(self, signal_number: int):
+        super().__init__(f"stopped by signal {signal_number}; run the same command again to continue")
+        self.signal_number = signal_number
+        self.exit_code = 128 + signal_number
+
+    def __reduce__(self):
+        return type(self), (self.signal_number,)
