@@ -1,0 +1,1 @@
+"""What is known without sampling: error covariances, generalised least squares, Fisher bounds."""

@@ -1,0 +1,66 @@
+"""Range, radial velocity and radial acceleration of a target over time: those that fit a polynomial, and those that break it.
+
+All functions take times t (K,) in seconds from the first plot and give (K, 3): range in m, radial velocity in m/s, radial
+acceleration in m/s².
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+STANDARD_GRAVITY_MPS2 = 9.80665  # ISO 80000-3
+
+
+def polynomial(coefficients: Sequence[float], t: np.ndarray) -> np.ndarray:
+    """Σ cᵢ tⁱ / i! with its first two derivatives; the coefficients are the derivatives at t = 0 (m, m/s, m/s², …)."""
+    series = np.polynomial.Polynomial([c / math.factorial(i) for i, c in enumerate(coefficients)])
+    return np.stack([series(t), series.deriv(1)(t), series.deriv(2)(t)], axis=1)
+
+
+def acceleration_start(coefficients: Sequence[float], acceleration: float, start: float, t: np.ndarray) -> np.ndarray:
+    """A polynomial whose acceleration grows by `acceleration` (m/s²) from `start` (s) on."""
+    since = np.maximum(t - start, 0.0)
+    step = np.stack([since**2 / 2, since, np.where(t >= start, 1.0, 0.0)], axis=1)
+    return polynomial(coefficients, t) + acceleration * step
+
+
+def jerk_pulse(coefficients: Sequence[float], jerk: float, start: float, duration: float, t: np.ndarray) -> np.ndarray:
+    """A polynomial with a constant jerk (m/s³) added from `start` for `duration` (s); the acceleration it built up stays."""
+
+    def ramp(onset):
+        since = np.maximum(t - onset, 0.0)
+        return np.stack([since**3 / 6, since**2 / 2, since], axis=1)
+
+    return polynomial(coefficients, t) + jerk * (ramp(start) - ramp(start + duration))
+
+
+def turn(
+    range_0: float, speed: float, aspect: float, acceleration_g: float, start: float, duration: float, t: np.ndarray
+) -> np.ndarray:
+    """Radial motion of a target that flies straight in a plane through the radar, turns at constant g, and flies straight on.
+
+    range_0 (m) at t = 0; speed (m/s); aspect (rad) of the velocity from the direction away from the radar (pi: straight
+    in); acceleration_g the lateral acceleration in standard gravities, positive to the left; start and duration in s.
+    """
+    rate = acceleration_g * STANDARD_GRAVITY_MPS2 / speed
+    turned = rate * np.clip(t - start, 0.0, duration)
+    heading = aspect + turned
+    velocity = speed * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    turning = (t >= start) & (t < start + duration)
+    acceleration = np.where(turning, speed * rate, 0.0)[:, None] * np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    # Position: the straight parts before and after, and the arc, whose chord is integrated in closed form.
+    before = np.minimum(t, start)[:, None] * speed * np.array([math.cos(aspect), math.sin(aspect)])
+    after = np.maximum(t - start - duration, 0.0)[:, None] * velocity
+    position = np.array([range_0, 0.0]) + before + _arc(speed, rate, aspect, np.clip(t - start, 0.0, duration)) + after
+    r = np.hypot(position[:, 0], position[:, 1])
+    radial_velocity = np.sum(position * velocity, axis=1) / r
+    radial_acceleration = (speed**2 - radial_velocity**2 + np.sum(position * acceleration, axis=1)) / r
+    return np.stack([r, radial_velocity, radial_acceleration], axis=1)
+
+
+def _arc(speed: float, rate: float, aspect: float, elapsed: np.ndarray) -> np.ndarray:
+    """Displacement (K, 2) after `elapsed` seconds of turning; the chord of angle x has length speed·elapsed·sinc(x/2)."""
+    half = rate * elapsed / 2
+    chord = speed * elapsed * np.sinc(half / np.pi)
+    return chord[:, None] * np.stack([np.cos(aspect + half), np.sin(aspect + half)], axis=1)
