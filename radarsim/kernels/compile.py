@@ -1,7 +1,8 @@
 """How every kernel is compiled, and where its machine code is kept.
 
 Numba's cache on disk looks at the file of the compiled function alone: an edit of a function that it calls, in another
-file, goes unnoticed and gives silently wrong results. So the cache directory is named after a hash of all kernel sources.
+file, goes unnoticed and gives silently wrong results. So the cache directory is named after a hash of all kernel
+sources.
 """
 
 import hashlib
@@ -26,7 +27,7 @@ def sources_hash() -> str:
 
 
 def cache_root() -> Path:
-    """The first writable of $RADARSIM_CACHE_DIR, $XDG_CACHE_HOME/radarsim, ~/.cache/radarsim and the temporary directory."""
+    """The first writable of $RADARSIM_CACHE_DIR, $XDG_CACHE_HOME/radarsim, ~/.cache/radarsim, the temporary directory."""
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     candidates = [os.environ.get("RADARSIM_CACHE_DIR"), os.path.join(home, "radarsim")]
     for candidate in filter(None, candidates):
@@ -43,7 +44,7 @@ CACHE_DIRECTORY = cache_root() / f"kernels-{sources_hash()[:16]}"
 
 
 def compiler(**options) -> Callable:
-    """A decorator that compiles with `options`, cached in CACHE_DIRECTORY; other users of Numba keep their own cache."""
+    """A decorator that compiles with `options`, cached in CACHE_DIRECTORY; other users of Numba keep their own."""
 
     def decorate(function):
         before = config.CACHE_DIR
@@ -58,5 +59,5 @@ def compiler(**options) -> Callable:
 
 inline = njit(fastmath=set(FLAGS), error_model="numpy", forceinline=True)
 kernel = compiler(fastmath=set(FLAGS), nogil=True)
-# Reassociation is allowed only where it lets independent sums run in vector registers; the order stays fixed by the code.
+# Reassociation is allowed only where it lets independent sums run in vector registers; the code fixes their order.
 summing = compiler(fastmath=set(FLAGS | {"reassoc"}), nogil=True)

@@ -1,4 +1,4 @@
-"""Random numbers by counter: word = f(seed, stream, realisation, draw), so realisation i is itself in any block or thread.
+"""Random numbers by counter: word = f(seed, stream, realisation, draw), so realisation i is the same in any block.
 
 Threefry2x64-20 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11) and a Box-Muller
 transform with polynomials for log, sin and cos, because nothing vectorises the library's. The key is (seed, hash of the
@@ -14,6 +14,8 @@ import numpy as np
 from radarsim.kernels.compile import inline, kernel
 
 LAYOUT = 1
+LANE_BITS = 3
+LANES = 1 << LANE_BITS  # realisations side by side in the strips, as many as a register of 512 bits holds
 U = np.uint64
 
 
@@ -59,7 +61,7 @@ def threefry(x0, x1, k0, k1):
 
 @inline
 def log_polynomial(x):
-    """Natural logarithm of a positive normal number, to 2 units in the last place: atanh series around sqrt(1/2) … sqrt(2)."""
+    """Natural logarithm of a positive normal number: atanh series on sqrt(1/2) … sqrt(2), to 2 units in the last place."""
     b = np.float64(x).view(np.int64)
     e = (b - np.int64(0x3FE6A09E667F3BCD)) >> np.int64(52)
     m = np.int64(b - (e << np.int64(52))).view(np.float64)
@@ -113,19 +115,51 @@ def normal_pair(x, y):
     return radius * U(a ^ sign).view(np.float64), radius * U(b ^ sign).view(np.float64)
 
 
+@inline
+def normals(k0, k1, realisation, pair):
+    """The two unit normals of draw pair `pair` of one realisation, under the key (k0, k1)."""
+    x, y = threefry(U(realisation), U(pair), k0, k1)
+    return normal_pair(x, y)
+
+
+@inline
+def uniforms(k0, k1, realisation, pair):
+    """The two uniform numbers in (0, 1) of draw pair `pair` of one realisation, under the key (k0, k1)."""
+    x, y = threefry(U(realisation), U(pair), k0, k1)
+    return uniform(x), uniform(y)
+
+
 @kernel
 def fill_normal_pairs(key, first, pair, a, b):
     """Unit normals of realisations first, first + 1, … into a (n,) and b (n,): the two numbers of draw pair `pair`."""
-    k0, k1, j = key[0], key[1], U(pair)
+    k0, k1, start = key[0], key[1], U(first)
     for i in range(a.size):
-        x, y = threefry(U(first) + U(i), j, k0, k1)
-        a[i], b[i] = normal_pair(x, y)
+        a[i], b[i] = normals(k0, k1, start + U(i), pair)
 
 
 @kernel
 def fill_uniform_pairs(key, first, pair, a, b):
     """Uniform numbers in (0, 1), as `fill_normal_pairs`."""
-    k0, k1, j = key[0], key[1], U(pair)
+    k0, k1, start = key[0], key[1], U(first)
     for i in range(a.size):
-        x, y = threefry(U(first) + U(i), j, k0, k1)
-        a[i], b[i] = uniform(x), uniform(y)
+        a[i], b[i] = uniforms(k0, k1, start + U(i), pair)
+
+
+@kernel
+def fill_normal_strip(key, first, pair, a, b):
+    """Unit normals of LANES realisations over several draw pairs, into flat a and b of pairs × LANES numbers.
+
+    Element j * LANES + l belongs to realisation first + l and draw pair `pair` + j. One loop over the whole strip (16
+    pairs are enough) vectorises; a loop over eight lanes alone does not.
+    """
+    k0, k1, start, origin = key[0], key[1], U(first), U(pair)
+    for i in range(a.size):
+        a[i], b[i] = normals(k0, k1, start + (U(i) & U(LANES - 1)), origin + (U(i) >> U(LANE_BITS)))
+
+
+@kernel
+def fill_uniform_strip(key, first, pair, a, b):
+    """Uniform numbers in (0, 1), as `fill_normal_strip`."""
+    k0, k1, start, origin = key[0], key[1], U(first), U(pair)
+    for i in range(a.size):
+        a[i], b[i] = uniforms(k0, k1, start + (U(i) & U(LANES - 1)), origin + (U(i) >> U(LANE_BITS)))
