@@ -1,0 +1,48 @@
+# `make run` and `make test` are all a newcomer needs; everything else lives in .venv as well.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RADARSIM := $(BIN)/radarsim
+# Smoke runs keep out of results/, which holds what was made at full size.
+SMOKE := $(VENV)/smoke
+
+.PHONY: run test slow lint smoke reproduce-figures bench schema clean
+
+run: $(VENV)/installed
+	$(RADARSIM) run configs/rls2.yaml
+
+test: $(VENV)/tested
+	$(BIN)/python -m pytest
+
+slow: $(VENV)/tested
+	$(BIN)/python -m pytest -m slow
+
+lint: $(VENV)/tested
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+smoke: $(VENV)/installed
+	$(RADARSIM) run configs/*.yaml -n 200 --out $(SMOKE) --quiet
+	@echo "every config ran with 200 realisations; results in $(SMOKE)"
+
+reproduce-figures: $(VENV)/installed
+	$(RADARSIM) run configs/*.yaml --out results
+	$(RADARSIM) claims --out results
+
+bench: $(VENV)/installed
+	$(BIN)/python benchmarks/w1.py
+
+schema: $(VENV)/installed
+	$(RADARSIM) schema > docs/schema.json
+
+clean:
+	rm -rf $(VENV) build *.egg-info .pytest_cache .ruff_cache .hypothesis
+
+$(VENV)/installed: pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	touch $@
+
+$(VENV)/tested: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	touch $@

@@ -1,0 +1,5 @@
+"""`python -m radarsim` is the command `radarsim`."""
+
+from radarsim.cli import main
+
+main()

@@ -1,0 +1,186 @@
+"""The command `radarsim`: parse, call one function, print. Heavy imports wait inside the commands."""
+
+import sys
+
+import click
+
+import radarsim
+from radarsim.errors import RadarsimError
+
+SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
+
+
+class Commands(click.Group):
+    """Commands in the order of their definition; our own errors become lines on stderr and an exit code."""
+
+    def list_commands(self, ctx):
+        return list(self.commands)
+
+    def invoke(self, ctx):
+        try:
+            return super().invoke(ctx)
+        except RadarsimError as error:
+            for line in error.lines:
+                click.echo(line, err=True)
+            sys.exit(error.exit_code)
+
+
+class Count(click.ParamType):
+    """A whole number that may be written 1e5."""
+
+    name = "N"
+
+    def convert(self, value, param, ctx):
+        try:
+            number = float(value)
+        except ValueError:
+            number = float("nan")
+        if not number.is_integer() or number < 0:
+            self.fail(f"must be a whole number such as 1000 or 1e5, got {value!r}", param, ctx)
+        return int(value) if str(value).isdigit() else int(number)
+
+
+@click.group(cls=Commands, context_settings=SETTINGS)
+@click.version_option(radarsim.__version__, prog_name="radarsim")
+def main():
+    """Monte-Carlo experiments on radar and sonar track processing.
+
+    An experiment is a YAML file: a sensor, a target, the filters compared. radarsim runs 10⁵ and more realisations of it
+    and writes σ(k), relative gains with 95 % intervals, figures, a report, and a verdict on the papers' claims.
+
+    \b
+    Examples
+      radarsim run rls2                          the first paper's decimetre radar
+      radarsim run rls2 --set radar.sigma_velocity_mps=5 -n 1e6
+      radarsim claims                            what the papers claim, and what came out
+    """
+
+
+configs_argument = click.argument("configs", nargs=-1, required=True, metavar="CONFIG…")
+out_option = click.option("--out", default="results", show_default=True, metavar="DIR", help="Where results are kept.")
+set_option = click.option(
+    "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key by its dotted path; repeatable."
+)
+realisations_option = click.option(
+    "-n", "--realisations", type=Count(), metavar="N", help="Realisations, overrides the config; 1e5 is a number."
+)
+seed_option = click.option("--seed", type=Count(), metavar="S", help="Seed, overrides the config.")
+figures_option = click.option("--no-figures", is_flag=True, help="Draw no figures; tables and report only.")
+
+
+def merged(overrides, realisations, seed):
+    """--set, -n and --seed as one list of overrides."""
+    given = {"realisations": realisations, "seed": seed}
+    return (*overrides, *(f"{key}={value}" for key, value in given.items() if value is not None))
+
+
+@main.command()
+@configs_argument
+@realisations_option
+@seed_option
+@set_option
+@click.option("--threads", type=click.IntRange(1, 1024), metavar="T", help="Threads; default: all cores.")
+@out_option
+@figures_option
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+def run(configs, realisations, seed, overrides, threads, out, no_figures, quiet):
+    """Run experiments; resumes by itself.
+
+    CONFIG is a YAML file, or the name of a shipped experiment (`radarsim list`). Finished blocks are kept under
+    DIR/.blocks: a run that was stopped continues, a larger N continues, an edited config starts anew.
+
+    \b
+    Examples
+      radarsim run configs/rls2.yaml
+      radarsim run range_doppler -n 1e6 --threads 2
+      radarsim run rls2 --set radar.sigma_range_m=300 --set filters.0.manoeuvre_variance=1e-4
+    """
+    from radarsim import console, experiment
+
+    loaded = experiment.load_all(configs, merged(overrides, realisations, seed))
+    for one in loaded:
+        with console.Progress(one, quiet=quiet) as progress:
+            result = experiment.run(one, threads=threads, out=out, figures=not no_figures, progress=progress.update)
+        if not quiet:
+            console.print_result(result, out)
+
+
+@main.command()
+@configs_argument
+@realisations_option
+@seed_option
+@set_option
+def check(configs, realisations, seed, overrides):
+    """Validate configs; say what would run: cases, filters, realisations, time, memory.
+
+    \b
+    Example
+      radarsim check configs/range_doppler.yaml -n 1e7
+    """
+    from radarsim import console, experiment
+
+    for one in experiment.load_all(configs, merged(overrides, realisations, seed)):
+        console.print_outlook(one, experiment.outlook(one))
+
+
+@main.command()
+@configs_argument
+@realisations_option
+@seed_option
+@set_option
+@out_option
+@figures_option
+def report(configs, realisations, seed, overrides, out, no_figures):
+    """Tables, figures and report from what is stored; computes nothing.
+
+    \b
+    Example
+      radarsim report rls2
+    """
+    from radarsim import console, experiment
+
+    for one in experiment.load_all(configs, merged(overrides, realisations, seed)):
+        console.print_result(experiment.report(one, out=out, figures=not no_figures), out)
+
+
+@main.command()
+@click.argument("configs", nargs=-1, metavar="[CONFIG…]")
+@out_option
+def claims(configs, out):
+    """The papers' claims: stated, measured with interval, verdict; computes nothing.
+
+    Without CONFIG all claims of all papers; those without stored results are listed as not run, with the command that
+    would judge them.
+
+    \b
+    Example
+      radarsim claims range_doppler
+    """
+    from radarsim import console, experiment
+
+    console.print_claims(experiment.claims(configs, out))
+
+
+@main.command(name="list")
+def list_():
+    """Configs, scenarios, studies and filters at hand."""
+    from radarsim import console, experiment
+
+    console.print_inventory(experiment.inventory())
+
+
+@main.command()
+def schema():
+    """JSON Schema of the YAML, for editors and other programs.
+
+    \b
+    Example
+      radarsim schema > schema.json
+    """
+    from radarsim.config import load
+
+    click.echo(load.schema_json())
+
+
+if __name__ == "__main__":
+    main()
