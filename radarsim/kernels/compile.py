@@ -13,9 +13,16 @@ from pathlib import Path
 
 import numba
 from numba import config, njit
+from numba.core.codegen import get_host_cpu_features
 
 # No `reassoc` (part of fastmath=True): it folds rounding tricks such as (x + M) - M and changes the order of sums.
 FLAGS = frozenset({"contract", "arcp", "nsz", "nnan", "ninf"})
+
+
+# LLVM prefers 256-bit vectors on Intel machines that have 512-bit ones. Measured on a Cascade Lake: 0.58 of the hand-written
+# AVX-512 C with its preference, 1.00 without. A machine without AVX-512, or a user's own setting, is left as it is.
+if config.CPU_FEATURES is None and "+avx512f" in get_host_cpu_features():
+    config.CPU_FEATURES = get_host_cpu_features() + ",-prefer-256-bit"
 
 
 def sources_hash() -> str:
