@@ -1,0 +1,233 @@
+"""Realisations cut into blocks, blocks gathered in a fixed binary tree.
+
+Block b holds the realisations [b·size, (b+1)·size); the last one of a run may be cut short. A node is an aligned run of
+2^level blocks, and its sums are always those of its two halves added. The total of N realisations is the sum of the
+largest nodes that fill the full blocks, from left to right, and of the cut block at the end. So the bytes of a total
+depend on N and on the block alone: not on threads, on the order in which work was finished, or on where a run was
+interrupted.
+"""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from radarsim.engine.moments import Sums
+from radarsim.errors import NonFiniteError
+
+
+class Work(Protocol):
+    """What is simulated. `identity` (hex digits) names all that changes a number, `block` is how many realisations make
+    a block, `size` the length of the vector of sums.
+
+    A work may also have `explain(first, count)`, which gives lines saying where numbers that are not finite came from.
+    """
+
+    identity: str
+    block: int
+    size: int
+
+    def simulate(self, first: int, count: int) -> np.ndarray:
+        """Sums (size,), float64, over realisations first … first+count-1; called from several threads at once."""
+
+
+@dataclass(frozen=True, order=True, slots=True)
+class Node:
+    """Blocks index·2^level … (index+1)·2^level - 1."""
+
+    level: int
+    index: int
+
+    @property
+    def first(self) -> int:
+        """Its first block."""
+        return self.index << self.level
+
+    @property
+    def stop(self) -> int:
+        """The block after its last."""
+        return (self.index + 1) << self.level
+
+    @property
+    def name(self) -> str:
+        return f"L{self.level:02d}-{self.index}"
+
+    def realisations(self, block: int) -> tuple[int, int]:
+        """First realisation and how many, for blocks of `block`."""
+        return self.first * block, block << self.level
+
+    def above(self, highest: int) -> Iterator["Node"]:
+        """The nodes that contain it, itself left out, up to the given level."""
+        for level in range(self.level + 1, highest + 1):
+            yield Node(level, self.index >> (level - self.level))
+
+
+@dataclass(frozen=True, slots=True)
+class Partial:
+    """The first `count` realisations of a block: the end of a run whose N is no multiple of the block."""
+
+    index: int
+    count: int
+
+    @property
+    def first(self) -> int:
+        """Its block."""
+        return self.index
+
+    @property
+    def name(self) -> str:
+        return f"P{self.index}-{self.count}"
+
+    def realisations(self, block: int) -> tuple[int, int]:
+        """First realisation and how many, for blocks of `block`."""
+        return self.index * block, self.count
+
+    def above(self, highest: int) -> Iterator[Node]:
+        """The nodes that contain its block, up to the given level."""
+        for level in range(highest + 1):
+            yield Node(level, self.index >> level)
+
+
+@dataclass(frozen=True, slots=True)
+class Total:
+    """Realisations 0 … count-1, in the order of addition that the module describes."""
+
+    count: int
+
+    @property
+    def name(self) -> str:
+        return f"T{self.count}"
+
+    def realisations(self, block: int) -> tuple[int, int]:
+        """First realisation and how many; the block does not matter."""
+        return 0, self.count
+
+    def above(self, highest: int) -> Iterator[Node]:
+        """Nothing contains a total."""
+        return iter(())
+
+
+Piece = Node | Partial | Total
+
+
+def decomposition(blocks: int) -> list[Node]:
+    """The largest nodes that fill blocks 0 … blocks-1, from left to right.
+
+    >>> decomposition(6)
+    [Node(level=2, index=0), Node(level=1, index=2)]
+    """
+    nodes, first = [], 0
+    while first < blocks:
+        nodes.append(widest(first, blocks, blocks.bit_length()))
+        first = nodes[-1].stop
+    return nodes
+
+
+def widest(first: int, stop: int, highest: int) -> Node:
+    """The largest node of at most level `highest` that starts at block `first` and ends by block `stop`."""
+    level = min(highest, (stop - first).bit_length() - 1)
+    if first:
+        level = min(level, (first & -first).bit_length() - 1)
+    return Node(level, first >> level)
+
+
+def maximal(nodes: Collection[Node], stop: int) -> list[Node]:
+    """Those of the nodes that end by block `stop` and lie inside no other such node, from left to right."""
+    inside = {node for node in nodes if node.stop <= stop}
+    highest = max((node.level for node in inside), default=0)
+    top = (node for node in inside if not any(other in inside for other in node.above(highest)))
+    return sorted(top, key=lambda node: node.first)
+
+
+def added(left: Sums, right: Sums, first: int) -> Sums:
+    """left + right; NonFiniteError if that overflows. `first` is the first realisation of left, for the message."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        both = left + right
+    if not np.isfinite(both.values).all():
+        raise NonFiniteError(f"{_span(first, both.count)}: the sums overflow")
+    return both
+
+
+def simulated(work: Work, piece: Node | Partial) -> Sums:
+    """The sums of a node or of a cut block. ValueError if the work gives a vector of another shape or type,
+    NonFiniteError naming the realisations if it gives numbers that are not finite."""
+    first, count = piece.realisations(work.block)
+    with np.errstate(over="ignore", invalid="ignore"):
+        values = _halved(work, first, count)
+    if np.isfinite(values).all():
+        return Sums(count, values)
+    for start in range(first, first + count, work.block):
+        size = min(work.block, first + count - start)
+        if not np.isfinite(work.simulate(start, size)).all():
+            raise NonFiniteError(f"{_span(start, size)}: the sums are not finite", *_explained(work, start, size))
+    raise NonFiniteError(f"{_span(first, count)}: the sums overflow")
+
+
+def _halved(work: Work, first: int, count: int) -> np.ndarray:
+    """Sums of a block or less, or of the two halves of 2^q blocks.
+
+    NaN and infinity survive addition, so that one look at the result sees them all.
+    """
+    if count > work.block:
+        half = count // 2
+        return _halved(work, first, half) + _halved(work, first + half, half)
+    values = work.simulate(first, count)
+    if not isinstance(values, np.ndarray) or values.dtype != np.float64 or values.shape != (work.size,):
+        given = f"{values.dtype} {values.shape}" if isinstance(values, np.ndarray) else type(values).__name__
+        raise ValueError(f"simulate({first}, {count}): expected sums float64 ({work.size},), got {given}")
+    return values
+
+
+def _explained(work: Work, first: int, count: int) -> tuple[str, ...]:
+    explain = getattr(work, "explain", None)
+    return tuple(explain(first, count)) if explain else ()
+
+
+def _span(first: int, count: int) -> str:
+    return f"realisations {first} to {first + count - 1}"
+
+
+class Forest:
+    """Nodes that are done, merged with their siblings as soon as both are there; so it holds few, however many came."""
+
+    def __init__(self, block: int, size: int):
+        self.nodes: dict[Node, Sums] = {}
+        self._block, self._size = block, size
+
+    def add(self, node: Node, sums: Sums) -> None:
+        """Take a node that overlaps no other, and merge upwards as far as siblings reach."""
+        while (sibling := self.nodes.pop(Node(node.level, node.index ^ 1), None)) is not None:
+            left, right = (sibling, sums) if node.index & 1 else (sums, sibling)
+            node = Node(node.level + 1, node.index >> 1)
+            sums = added(left, right, node.first * self._block)
+        self.nodes[node] = sums
+
+    def prefix(self) -> list[Node]:
+        """The nodes that follow one another from block 0 without a gap; they are decomposition(their blocks)."""
+        nodes, stop = [], 0
+        for node in sorted(self.nodes, key=lambda node: node.first):
+            if node.first != stop:
+                break
+            nodes.append(node)
+            stop = node.stop
+        return nodes
+
+    def gaps(self, stop: int) -> list[tuple[int, int]]:
+        """Runs (first, stop) of blocks below `stop` that no node holds."""
+        gaps, first = [], 0
+        for node in sorted(self.nodes, key=lambda node: node.first):
+            if node.first > first:
+                gaps.append((first, node.first))
+            first = node.stop
+        return [*gaps, (first, stop)] if first < stop else gaps
+
+    def total(self) -> Sums:
+        """The sums of the prefix, added from left to right; zeros if block 0 is not done."""
+        nodes = self.prefix()
+        if not nodes:
+            return Sums(0, np.zeros(self._size))
+        sums = self.nodes[nodes[0]]
+        for node in nodes[1:]:
+            sums = added(sums, self.nodes[node], 0)
+        return sums

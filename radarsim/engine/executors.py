@@ -1,0 +1,137 @@
+"""Where tasks run. An executor takes (work, piece) and gives back outcomes in any order; how is its own affair."""
+
+import os
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from typing import Protocol
+
+from radarsim.engine.blocks import Node, Partial, Work, simulated
+from radarsim.engine.moments import Sums
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finished task: its sums or the exception it ended in, and the seconds it took where it ran."""
+
+    piece: Node | Partial
+    sums: Sums | None
+    error: Exception | None
+    seconds: float
+
+
+class Executor(Protocol):
+    """`workers` tasks run at once, `depth` are worth handing over in advance, and one should last `shortest_s` or more.
+
+    Tasks must be started in the order of submit, so that what is done when a run is stopped is all from the left.
+    """
+
+    workers: int
+    depth: int
+    shortest_s: float
+
+    def submit(self, work: Work, piece: Node | Partial) -> None:
+        """Hand over a task; returns at once."""
+
+    def finished(self, timeout_s: float) -> list[Outcome]:
+        """What has finished since the last call, waiting at most timeout_s for the first."""
+
+    def cancel(self) -> int:
+        """Drop the tasks that are not yet started; how many those were."""
+
+    def close(self) -> None:
+        """Let the workers go, without waiting for tasks that still run."""
+
+
+def attempted(work: Work, piece: Node | Partial) -> Outcome:
+    """Run one task; a top-level function of small arguments, so that it also travels to other processes."""
+    started = time.perf_counter()
+    try:
+        sums, error = simulated(work, piece), None
+    except Exception as raised:
+        sums, error = None, raised
+    return Outcome(piece, sums, error, time.perf_counter() - started)
+
+
+def available_cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Threads:
+    """Pool threads of this process; kernels release the interpreter's lock.
+
+    One thread is a pool thread too: on the main thread the time of a kernel depends on where its stack happens to lie.
+    They are daemons, so that a task which overruns its time at a stop does not keep the process alive.
+    """
+
+    shortest_s = 3e-3
+
+    def __init__(self, workers: int | None = None):
+        self.workers = workers or available_cores()
+        self.depth = 2 * self.workers
+        self._tasks: SimpleQueue = SimpleQueue()
+        self._outcomes: SimpleQueue = SimpleQueue()
+        for number in range(self.workers):
+            threading.Thread(target=self._serve, name=f"block worker {number}", daemon=True).start()
+
+    def _serve(self) -> None:
+        while (task := self._tasks.get()) is not None:
+            self._outcomes.put(attempted(*task))
+
+    def submit(self, work: Work, piece: Node | Partial) -> None:
+        """Hand over a task; returns at once."""
+        self._tasks.put((work, piece))
+
+    def finished(self, timeout_s: float) -> list[Outcome]:
+        """What has finished since the last call, waiting at most timeout_s for the first."""
+        outcomes = []
+        try:
+            outcomes.append(self._outcomes.get(timeout=timeout_s))
+            while True:
+                outcomes.append(self._outcomes.get_nowait())
+        except Empty:
+            return outcomes
+
+    def cancel(self) -> int:
+        """Drop the tasks that are not yet started; how many those were."""
+        dropped = 0
+        try:
+            while True:
+                self._tasks.get_nowait()
+                dropped += 1
+        except Empty:
+            return dropped
+
+    def close(self) -> None:
+        """Let the threads end after their present task, without waiting for them."""
+        for _ in range(self.workers):
+            self._tasks.put(None)
+
+
+class Serial:
+    """Everything in the calling thread, a task at a time: for debuggers and profilers."""
+
+    workers, depth, shortest_s = 1, 1, Threads.shortest_s
+
+    def __init__(self) -> None:
+        self._tasks: deque = deque()
+
+    def submit(self, work: Work, piece: Node | Partial) -> None:
+        """Keep a task until the next call of finished."""
+        self._tasks.append((work, piece))
+
+    def finished(self, timeout_s: float) -> list[Outcome]:
+        """Run the oldest task; the timeout has no say."""
+        return [attempted(*self._tasks.popleft())] if self._tasks else []
+
+    def cancel(self) -> int:
+        """Drop the tasks that are kept; how many those were."""
+        dropped = len(self._tasks)
+        self._tasks.clear()
+        return dropped
+
+    def close(self) -> None:
+        """Nothing is held."""
