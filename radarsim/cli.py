@@ -99,7 +99,7 @@ def run(configs, realisations, seed, overrides, threads, out, no_figures, quiet)
 
     loaded = experiment.load_all(configs, merged(overrides, realisations, seed))
     for one in loaded:
-        with console.Progress(one, quiet=quiet) as progress:
+        with console.Progress(one.stem, quiet=quiet) as progress:
             result = experiment.run(one, threads=threads, out=out, figures=not no_figures, progress=progress.update)
         if not quiet:
             console.print_result(result, out)

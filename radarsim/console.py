@@ -1,0 +1,132 @@
+"""What the terminal shows: progress with rate and time left, tables of the answer, where things were written."""
+
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+SILENT_S = 2.0  # a run shorter than this shows no progress
+PIPED_WIDTH = 160
+
+
+def console(stderr: bool = False):
+    """A rich console; plain text of a fixed width where the stream is no terminal."""
+    from rich.console import Console
+
+    stream = sys.stderr if stderr else sys.stdout
+    width = None if stream.isatty() else PIPED_WIDTH
+    return Console(file=stream, width=width, highlight=False, markup=False, emoji=False, soft_wrap=not stream.isatty())
+
+
+class Progress:
+    """Realisations done, rate and time left, on stderr, once a run has lasted two seconds."""
+
+    def __init__(self, title: str, quiet: bool):
+        self.title, self.quiet = title, quiet
+        self.started, self.bar = time.monotonic(), None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.bar is not None:
+            self.bar.stop()
+
+    def update(self, done: int, total: int, from_store: int) -> None:
+        """Realisations done, of how many, and how many of them were read from the store, over all cases."""
+        elapsed = time.monotonic() - self.started
+        if self.quiet or elapsed < SILENT_S:
+            return
+        if self.bar is None:
+            self._begin(total)
+        rate = (done - from_store) / elapsed
+        left = clock((total - done) / rate) if rate > 0 else "–"
+        self.bar.update(self.task, completed=done, rate=rate, left=left)
+
+    def _begin(self, total: int) -> None:
+        from rich.progress import BarColumn, TextColumn
+        from rich.progress import Progress as Bar
+
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:5.1f} %  {task.fields[rate]:,.0f} realisations/s  {task.fields[left]} left"),
+        )
+        self.bar = Bar(*columns, console=console(stderr=True), transient=True)
+        self.task = self.bar.add_task(self.title, total=total, rate=0.0, left="–")
+        self.bar.start()
+
+
+def clock(seconds: float) -> str:
+    """Seconds as h:mm:ss."""
+    whole = round(seconds)
+    return f"{whole // 3600}:{whole // 60 % 60:02}:{whole % 60:02}"
+
+
+def show(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], right: Sequence[str] = ()) -> None:
+    """Print one table; the columns named in `right` are aligned right."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    terminal = sys.stdout.isatty()
+    table = Table(title=title or None, title_justify="left", box=box.SIMPLE_HEAD if terminal else None, pad_edge=False)
+    for column in columns:
+        table.add_column(column, justify="right" if column in right else "left", no_wrap=not terminal)
+    for row in rows:
+        table.add_row(*(Text(printable(str(cell))) for cell in row))
+    console().print(table)
+
+
+def printable(text: str) -> str:
+    """Text without control characters: what a config names must not steer the terminal."""
+    return "".join(c if c.isprintable() else "�" for c in text)
+
+
+def say(line: str) -> None:
+    """Print one line, never wrapped."""
+    sys.stdout.write(printable(line) + "\n")
+
+
+def print_result(result, out: str) -> None:
+    """The answer of a run, the verdicts, and where everything lies."""
+    columns, rows, right = result.summary()
+    show(f"{result.experiment.stem}: {result.question()}", columns, rows, right)
+    for line in result.answer():
+        say(line)
+    counts = result.verdict_counts()
+    if counts:
+        say("claims: " + ", ".join(f"{n} {verdict}" for verdict, n in counts.items()))
+    folder = Path(out) / result.experiment.stem
+    say(f"tables   {folder / 'curves.csv'} and {len(result.tables) - 1} more beside it")
+    if result.drawn:
+        say(f"figures  {folder / 'figures'} ({len(result.drawn)} figures, SVG and PNG)")
+    say(f"report   {folder / 'report.html'}")
+    for warning in result.warnings:
+        sys.stderr.write(f"warning: {printable(warning)}\n")
+
+
+def print_outlook(experiment, outlook) -> None:
+    """What a run would do."""
+    say(f"{experiment.path or experiment.stem}: valid")
+    rows = [
+        (case.name, case.filters, f"{case.scans}", f"{case.realisations:,}", f"{case.seconds:.3g} s") for case in outlook.cases
+    ]
+    show("", ("case", "filters", "scans", "realisations", "time"), rows, right=("scans", "realisations", "time"))
+    say(
+        f"total    {len(outlook.cases)} cases, {sum(c.realisations for c in outlook.cases):,} realisations, "
+        f"about {outlook.seconds:.2g} s on {outlook.threads} threads, {outlook.memory_mb:.0f} MB"
+    )
+
+
+def print_claims(rows: Sequence[Sequence[object]]) -> None:
+    """All claims asked for, one row a measured part."""
+    columns = ("claim", "statement", "case", "measured", "expected", "verdict")
+    show("", columns, rows)
+
+
+def print_inventory(inventory) -> None:
+    """Configs, scenarios, studies and filters, with a line of what each is."""
+    for title, columns, rows in inventory:
+        show(title, columns, rows)
+        say("")
