@@ -1,0 +1,148 @@
+"""Statistics from sums: exact algebra on hand cases, and the coverage of every interval by simulation."""
+
+import math
+
+import numpy as np
+import pytest
+
+from radarsim.report import statistics
+
+REPETITIONS = 600
+
+
+def moments(e):
+    """Sums of e … e⁴ over the last axis."""
+    return np.stack([(e**p).sum(axis=-1) for p in (1, 2, 3, 4)], axis=-1)
+
+
+def covered(of, truth):
+    return float(np.mean((of.lo <= truth) & (truth <= of.hi)))
+
+
+def binomial_slack(repetitions=REPETITIONS):
+    """Four standard errors of a coverage of 95 %."""
+    return 4 * math.sqrt(0.95 * 0.05 / repetitions)
+
+
+def test_by_hand():
+    of = statistics.errors(moments(np.array([1.0, 3.0])), 2)
+    assert of.sigma.value == pytest.approx(math.sqrt(5))
+    assert of.bias == 2
+    assert of.spread == 1
+    assert of.bias_se == 1  # sample deviation √2 over √2
+    assert of.sigma.value**2 == pytest.approx(of.bias**2 + of.spread**2)
+
+
+def test_student_against_the_library():
+    from scipy.special import stdtrit
+
+    freedom = np.array([4, 5, 9, 29, 999, 1e6])
+    np.testing.assert_allclose(statistics.student(freedom), stdtrit(freedom, 0.975), rtol=4e-4)
+    assert statistics.student(0) == np.inf
+
+
+def test_gaussian_interval_is_the_chi_square_one():
+    from scipy.special import chdtri
+
+    n = 100_000.0
+    of = statistics.root_mean_square(n, n * (1 + 2 * (n - 1) / (n + 2)), n)
+    assert of.lo == pytest.approx(math.sqrt(n / chdtri(n, 0.025)), rel=1e-6)
+    assert of.hi == pytest.approx(math.sqrt(n / chdtri(n, 0.975)), rel=1e-6)
+    assert (of.hi - of.lo) / 2 == pytest.approx(statistics.Z95 / math.sqrt(2 * n), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("draw", "sigma"),
+    [
+        (lambda rng, shape: rng.normal(size=shape), 1.0),
+        (lambda rng, shape: 3 + rng.normal(size=shape), math.sqrt(10)),
+        (lambda rng, shape: rng.uniform(-1, 1, size=shape), 1 / math.sqrt(3)),
+        (lambda rng, shape: rng.laplace(size=shape), math.sqrt(2)),
+    ],
+    ids=["gaussian", "biased", "uniform", "laplace"],
+)
+@pytest.mark.parametrize("n", [30, 1000])
+def test_sigma_is_covered(draw, sigma, n):
+    e = draw(np.random.default_rng(n), (REPETITIONS, n))
+    short = 0.04 if n == 30 else 0.01  # heavy tails are learnt late
+    got = covered(statistics.errors(moments(e), n).sigma, sigma)
+    assert 0.95 - short - binomial_slack() <= got <= 1
+
+
+def test_bias_is_covered():
+    e = 2 + np.random.default_rng(1).normal(size=(REPETITIONS, 200))
+    of = statistics.errors(moments(e), 200)
+    assert abs(np.mean(np.abs(of.bias - 2) < statistics.Z95 * of.bias_se) - 0.95) < binomial_slack()
+
+
+def correlated(n, rho=0.8, ratio=0.7):
+    base = np.random.default_rng(2).normal(size=(2, REPETITIONS, n))
+    return base[0], ratio * (rho * base[0] + math.sqrt(1 - rho**2) * base[1])
+
+
+def test_paired_gain_is_covered_and_narrower():
+    n = 400
+    base, own = correlated(n)
+    a, b, cross = moments(own), moments(base), (own**2 * base**2).sum(axis=-1)
+    paired = statistics.gain(a[:, 1], a[:, 3], b[:, 1], b[:, 3], cross, n)
+    loose = statistics.gain_unpaired(a[:, 1], a[:, 3], n, b[:, 1], b[:, 3], n)
+    assert abs(covered(paired, 30.0) - 0.95) < binomial_slack()
+    assert covered(loose, 30.0) > 0.98
+    np.testing.assert_array_equal(paired.value, loose.value)
+    assert np.all(paired.hi - paired.lo < loose.hi - loose.lo)
+
+
+def test_unpaired_gain_is_covered():
+    rng = np.random.default_rng(3)
+    a = moments(0.7 * rng.normal(size=(REPETITIONS, 300)))
+    b = moments(rng.normal(size=(REPETITIONS, 500)))
+    of = statistics.gain_unpaired(a[:, 1], a[:, 3], 300, b[:, 1], b[:, 3], 500)
+    assert abs(covered(of, 30.0) - 0.95) < binomial_slack()
+
+
+def test_the_same_error_gains_nothing_for_certain():
+    e = moments(np.random.default_rng(4).normal(size=50))
+    of = statistics.gain(e[1], e[3], e[1], e[3], e[3], 50)
+    np.testing.assert_allclose([of.value, of.lo, of.hi], 0, atol=1e-6)
+
+
+@pytest.mark.parametrize("p", [0.02, 0.5, 0.98])
+def test_rates_are_covered(p):
+    counts = np.random.default_rng(5).binomial(400, p, size=REPETITIONS)
+    assert abs(covered(statistics.rate(counts, 400), p) - 0.95) < binomial_slack() + 0.01
+
+
+def test_rate_is_wilsons():
+    of = statistics.rate(np.array([0, 5, 10]), 10)
+    np.testing.assert_allclose(of.lo, [0, 0.2366, 0.7225], atol=1e-4)
+    np.testing.assert_allclose(of.hi, [0.2775, 0.7634, 1], atol=1e-4)
+
+
+def test_mean_probability_is_covered():
+    p = np.random.default_rng(6).beta(2, 5, size=(REPETITIONS, 200))
+    of = statistics.probability(p.sum(axis=-1), (p**2).sum(axis=-1), 200)
+    assert abs(covered(of, 2 / 7) - 0.95) < binomial_slack()
+    assert np.all(of.hi - of.lo < np.diff(statistics.rate(2 / 7 * 200, 200)[1:]))
+
+
+def test_difference_adds_in_squares():
+    one, other = statistics.Estimate(10.0, 7.0, 14.0), statistics.Estimate(1.0, -2.0, 5.0)
+    assert statistics.difference(one, other) == (9.0, 9.0 - 5.0, 9.0 + 5.0)
+
+
+def test_bias_far_over_spread():
+    e = 1e6 + np.random.default_rng(7).normal(size=10_000)
+    of = statistics.errors(moments(e), e.size)
+    assert of.spread == pytest.approx(e.std(), rel=0.01)
+    assert of.sigma.lo <= of.sigma.value <= of.sigma.hi
+    assert of.sigma.hi - of.sigma.lo == pytest.approx(2 * statistics.Z95 * e.std() / 100, rel=0.1)
+
+
+def test_empty_and_degenerate_samples():
+    none = statistics.errors(np.zeros(4), 0)
+    assert np.isnan([none.sigma.value, none.sigma.lo, none.sigma.hi, none.bias, none.spread]).all()
+    still = statistics.errors(np.zeros(4), 7)
+    assert tuple(still.sigma) == (0, 0, 0)
+    one = statistics.errors(np.array([2.0, 4.0, 8.0, 16.0]), 1)
+    assert (one.sigma.lo, one.sigma.value, one.sigma.hi) == (0, 2, np.inf)
+    assert np.isnan(one.bias_se)
