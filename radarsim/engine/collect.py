@@ -6,9 +6,13 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from radarsim.engine.blocks import Forest, Node, Partial, Work, added, widest
+from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, Work, added, widest
 from radarsim.engine.executors import Executor, Outcome, Serial, Threads
+from radarsim.engine.keeper import Keeper
 from radarsim.engine.moments import Sums
+from radarsim.engine.stopping import Stop
+from radarsim.engine.store import Store
+from radarsim.errors import StoreError
 
 LONGEST_TASK_S = 0.05
 TASKS_A_WORKER = 50
@@ -40,25 +44,44 @@ def collect(
     store: str | os.PathLike | None = None,
     threads: int | None = None,
     progress: Callable[[int, int, int], None] | None = None,
-    stop: Callable[[], str | None] | None = None,
+    stop: Stop | None = None,
     executor: Executor | None = None,
 ) -> Collected:
-    """Sums over realisations 0 … realisations-1 of the work.
+    """Sums over realisations 0 … realisations-1 of the work; the same bytes however they are come by.
 
-    threads defaults to all cores; 0 runs everything in the calling thread. progress(done, total, from_store) is called
-    at most ten times a second, and at the end. stop() is asked between tasks; once it gives a reason, no task starts,
-    those that run are finished (for at most stop.grace_s, if it has that) and the result is of the blocks done without
-    a gap.
+    store is the results directory: what it holds of this work is used, what is computed is kept there. threads defaults
+    to all cores; 0 runs everything in the calling thread. progress(done, total, from_store) is called at most ten times
+    a second, and at the end. stop() is asked between tasks; once it gives a reason, no task starts, those that run are
+    finished (for at most stop.grace_s, if it has that), and the result is of the blocks done without a gap.
+
+    Whatever ends a run, what it has done is stored. NonFiniteError names the first realisations whose sums are
+    not finite, which are not stored; StoreError the file that cannot be written.
     """
-    run = _Run(work, realisations, progress)
+    run = _Run(work, realisations, store, progress)
+    if run.restored():
+        return run.finished(None)
     pool = executor or (Serial() if threads == 0 else Threads(threads))
     try:
         stopped = run.compute(pool, stop)
+    except StoreError:
+        raise
+    except BaseException:
+        run.keep(run.pieces())
+        raise
     finally:
         pool.cancel()
         if executor is None:
             pool.close()
-    return run.result(stopped)
+    return run.finished(stopped)
+
+
+def stored(work: Work, realisations: int, store: str | os.PathLike) -> Collected | None:
+    """What collect would give, if all of it is stored; else None. Computes and writes nothing, but sets damage aside.
+
+    Every N that collect has returned, in whatever way it ended, is there to be read, also after larger runs.
+    """
+    run = _Run(work, realisations, store, None)
+    return run.result(None) if run.restored() else None
 
 
 class _Pace:
@@ -84,18 +107,40 @@ class _Pace:
 class _Run:
     """One call of collect."""
 
-    def __init__(self, work: Work, realisations: int, progress: Callable[[int, int, int], None] | None):
+    def __init__(
+        self,
+        work: Work,
+        realisations: int,
+        store: str | os.PathLike | None,
+        progress: Callable[[int, int, int], None] | None,
+    ):
         self.work, self.asked = work, realisations
         self.full, self.rest = divmod(realisations, work.block)
         self.forest = Forest(work.block, work.size)
         self.partial: Sums | None = None
+        self.total: Sums | None = None
         self.from_store = self.computed = 0
         self.kernel_seconds = 0.0
         self.started = time.perf_counter()
+        self._keeper = None if store is None else Keeper(Store(store, work))
         self._progress, self._progress_due = progress, 0.0
         self._fault: Outcome | None = None
 
-    def compute(self, executor: Executor, stop: Callable[[], str | None] | None) -> str | None:
+    def restored(self) -> bool:
+        """Read what is stored; whether that is all."""
+        if self._keeper is None:
+            return False
+        self.total = self._keeper.store.read(Total(self.asked))
+        if self.total is None:
+            self.forest = self._keeper.store.forest(self.full)
+            self._keeper.found(self.forest.nodes)
+            if self.rest:
+                self.partial = self._keeper.store.read(Partial(self.full, self.rest))
+        held = [self.total] if self.total is not None else self.pieces().values()
+        self.from_store = sum(sums.count for sums in held)
+        return self.from_store == self.asked
+
+    def compute(self, executor: Executor, stop: Stop | None) -> str | None:
         """Hand out what is missing and take it in; the reason, if stop gave one."""
         pace = _Pace(executor)
         tasks = self._tasks(pace)
@@ -115,6 +160,8 @@ class _Run:
                 waiting -= 1
                 self._take(outcome, pace)
             self._report()
+            if self._keeper is not None:
+                self._keeper.offer(self.forest.nodes)
         if self._fault is not None:
             raise self._fault.error
         return stopped
@@ -138,6 +185,8 @@ class _Run:
                 self._fault = outcome
             return
         self.computed += outcome.sums.count
+        if self._keeper is not None:
+            self._keeper.store.platforms.add(outcome.instruction_set)
         if isinstance(outcome.piece, Partial):
             self.partial = outcome.sums
         else:
@@ -150,23 +199,47 @@ class _Run:
             self._progress(self.from_store + self.computed, self.asked, self.from_store)
             self._progress_due = now + PROGRESS_S
 
+    def pieces(self) -> dict[Piece, Sums]:
+        """What is done, as it is stored."""
+        cut = {} if self.partial is None else {Partial(self.full, self.rest): self.partial}
+        return self.forest.nodes | cut
+
+    def keep(self, pieces: dict[Piece, Sums]) -> None:
+        """Put these into the store, if there is one."""
+        if self._keeper is not None:
+            self._keeper.finish(pieces)
+
+    def finished(self, stopped: str | None) -> Collected:
+        """The result, once all that it rests on is stored, and itself as a total."""
+        result = self.result(stopped)
+        if self.total is None:
+            reported = {Total(result.count): Sums(result.count, result.values)} if result.count else {}
+            self.keep(self.pieces() | reported)
+        self._report(last=True)
+        return result
+
     def result(self, stopped: str | None) -> Collected:
         """The sums of what is done from realisation 0 on without a gap."""
-        sums = self.forest.total()
-        if self.partial is not None and sums.count == self.full * self.work.block:
-            sums = added(sums, self.partial, 0) if sums.count else self.partial
-        self._report(last=True)
-        seconds = time.perf_counter() - self.started
-        if sums.count == self.asked:
-            stopped = None
+        sums = self.total or self.forest.total()
+        if self.total is None and self.partial is not None and sums.count == self.full * self.work.block:
+            sums = added(sums, self.partial, 0) if self.full else self.partial
         return Collected(
-            sums.count,
-            sums.values,
-            self.asked,
-            self.from_store,
-            self.computed,
-            seconds,
-            self.kernel_seconds,
-            stopped,
-            (),
+            count=sums.count,
+            values=sums.values,
+            asked=self.asked,
+            from_store=self.from_store,
+            computed=self.computed,
+            seconds=time.perf_counter() - self.started,
+            kernel_seconds=self.kernel_seconds,
+            stopped=stopped if sums.count < self.asked else None,
+            warnings=self._warnings(),
         )
+
+    def _warnings(self) -> tuple[str, ...]:
+        if self._keeper is None:
+            return ()
+        store = self._keeper.store
+        if len(store.platforms) < 2:
+            return tuple(store.warnings)
+        mixed = "; ".join(sorted(store.platforms))
+        return (*store.warnings, f"{store.path}: sums from several instruction sets, equal to 1e-12 only: {mixed}")

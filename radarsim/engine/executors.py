@@ -9,17 +9,19 @@ from queue import Empty, SimpleQueue
 from typing import Protocol
 
 from radarsim.engine.blocks import Node, Partial, Work, simulated
+from radarsim.engine.machine import instruction_set
 from radarsim.engine.moments import Sums
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A finished task: its sums or the exception it ended in, and the seconds it took where it ran."""
+    """A finished task: its sums or the exception it ended in, and where it ran, the seconds and the instruction set."""
 
     piece: Node | Partial
     sums: Sums | None
     error: Exception | None
     seconds: float
+    instruction_set: str
 
 
 class Executor(Protocol):
@@ -52,7 +54,7 @@ def attempted(work: Work, piece: Node | Partial) -> Outcome:
         sums, error = simulated(work, piece), None
     except Exception as raised:
         sums, error = None, raised
-    return Outcome(piece, sums, error, time.perf_counter() - started)
+    return Outcome(piece, sums, error, time.perf_counter() - started, instruction_set())
 
 
 def available_cores() -> int:

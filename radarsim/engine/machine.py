@@ -1,0 +1,37 @@
+"""What made the sums: the instruction set that decides their last bits, and versions for the record."""
+
+import functools
+import os
+import platform
+import sys
+
+# Those that change which fused or vector instructions a compiler chooses, from the widest.
+_DECIDING = ("avx512f", "avx2", "fma", "avx", "sse4_2", "asimd")
+
+
+@functools.cache
+def instruction_set() -> str:
+    """Instruction set in words, like `x86_64 avx512f avx2 fma`; sums from equal ones are equal to the last bit.
+
+    A compiler told to aim at another processor (NUMBA_CPU_NAME) is named, since that decides instead.
+    """
+    aimed_at = os.environ.get("NUMBA_CPU_NAME")
+    found = set(_flags())
+    parts = [platform.machine(), *(flag for flag in _DECIDING if flag in found)]
+    return " ".join([*parts, f"aiming at {aimed_at}"] if aimed_at else parts)
+
+
+def _flags() -> list[str]:
+    """Features of the first processor, as Linux lists them; none elsewhere."""
+    try:
+        with open("/proc/cpuinfo", encoding="ascii", errors="replace") as file:
+            lines = file.read(8192).splitlines()
+    except OSError:
+        return []
+    return next((line.split() for line in lines if line.startswith(("flags", "Features"))), [])
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the libraries that compute, as far as they are loaded."""
+    libraries = {name: sys.modules[name].__version__ for name in ("numpy", "numba") if name in sys.modules}
+    return {"python": platform.python_version()} | libraries
