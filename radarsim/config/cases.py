@@ -1,0 +1,312 @@
+"""From a config to its cases: includes, overrides, sweeps and scenarios put in place, then checked case by case."""
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from pathlib import Path as FilePath
+
+from radarsim.config.check import check, unknown_key
+from radarsim.config.document import Document
+from radarsim.config.faults import Faults, Origin, one_line, short
+from radarsim.config.fields import Model
+from radarsim.config.identity import complete
+from radarsim.config.lookup import config_file, did_you_mean, is_stem, stems
+from radarsim.config.place import NoSuchKey, key_paths, place, scenarios_inlined
+from radarsim.config.schema import COMMON_KEYS, STUDIES, Common, study_model
+
+MOST_CASES = 10_000
+DEEPEST_INCLUDE = 5
+
+
+@dataclass(frozen=True)
+class Case:
+    """One configuration to be run: a study's checked keys, how often, and with which seed.
+
+    name is the stem of its config with ` key=value` for each swept key.
+    """
+
+    name: str
+    stem: str
+    study: str
+    spec: Model
+    swept: tuple[tuple[str, object], ...]
+    realisations: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What a config asks for.
+
+    figures holds, for a figure, names or patterns of the cases that it shows; resolved is the whole experiment as plain
+    JSON-able data, defaults filled and in SI units.
+    """
+
+    stem: str
+    study: str
+    path: str | None
+    cases: tuple[Case, ...]
+    realisations: int
+    seed: int
+    figures: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    resolved: dict = field(default_factory=dict)
+
+    def shown_in(self, figure: str) -> tuple[Case, ...]:
+        """The cases that a figure shows: all of them, where the config does not say."""
+        if figure not in self.figures:
+            return self.cases
+        return tuple(case for case in self.cases if any(matches(case.name, p) for p in self.figures[figure]))
+
+
+def matches(name: str, pattern: str) -> bool:
+    """Whether a pattern of `figures` means a case: its very name, or with * and ? for what may differ."""
+    return name == pattern or fnmatchcase(name, pattern.replace("[", "[[]"))
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value to be put at a key, from an override or a sweep."""
+
+    key: str
+    value: object
+    origin: Origin
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A case on its way: the document as far as it is put together."""
+
+    document: Document
+    stem: str
+    study: str
+    swept: tuple[tuple[str, object], ...]
+    realisations: int | None
+    seed: int | None
+
+
+class Expander:
+    """Expands configs into drafts, each config once.
+
+    `read(file, faults)` gives the document in a file, or notes a fault and gives None.
+    """
+
+    def __init__(self, read: Callable, settings: Iterable[Setting], faults: Faults):
+        self.read, self.faults = read, faults
+        settings = list(settings)
+        self.common = [s for s in settings if s.key.split(".")[0] in COMMON_KEYS]
+        self.settings = [s for s in settings if s.key.split(".")[0] not in COMMON_KEYS]
+        self.expanded: dict[FilePath, list[Draft]] = {}
+
+    def experiment(self, document: Document) -> Experiment | None:
+        """The whole experiment of the top config; None if faults were noted."""
+        for setting in self.common:
+            first, *rest = setting.key.split(".", 1)
+            document = document.graft((first, *rest), setting.value, setting.origin)
+        common, drafts = self._expand(document, ())
+        cases = [case for draft in drafts if (case := self._case(draft))]
+        if not self.faults and not cases:
+            raise AssertionError("a config without faults has cases")
+        self._refuse_twins(cases, document)
+        self._check_figures(common, cases, document)
+        if self.faults or len({case.study for case in cases}) != 1:
+            self._refuse_mixture(drafts, document)
+            return None
+        stem = document.file.stem if document.file else "config"
+        return Experiment(
+            stem=stem,
+            study=cases[0].study,
+            path=str(document.file) if document.file else None,
+            cases=tuple(cases),
+            realisations=common.realisations or max(case.realisations for case in cases),
+            seed=cases[0].seed if common.seed is None else common.seed,
+            figures=dict(common.figures),
+            resolved=resolved(stem, cases, common),
+        )
+
+    def _expand(self, document: Document, chain: tuple[FilePath, ...]) -> tuple[Common, list[Draft]]:
+        """The common keys of a config, and the drafts it stands for."""
+        common = self._common(document.only(COMMON_KEYS))
+        inside = self._included(document, common, chain) if "include" in document.data else self._own(document, common)
+        drafts = self._swept(document, common, inside)
+        given = {key: getattr(common, key) for key in ("realisations", "seed") if getattr(common, key) is not None}
+        return common, [replace(draft, **given) for draft in drafts]
+
+    def _common(self, document: Document) -> Common:
+        """The common keys; where some have faults, the others, so that the rest is checked as well."""
+        common = check(Common, document, self.faults)
+        if common:
+            return common
+        good = {key: v for key, v in document.data.items() if check(Common, document.only((key,)), Faults())}
+        return Common.model_validate(good)
+
+    def _own(self, document: Document, common: Common) -> list[Draft]:
+        """The one draft of a config with a study of its own."""
+        if common.study not in STUDIES:
+            if "study" not in document.data:
+                self.faults.add(
+                    document.origin(()), ("study",), f"required key is missing: one of {', '.join(STUDIES)}"
+                )
+            elif common.study is not None:
+                message = f"must be one of {', '.join(STUDIES)}{did_you_mean(common.study, STUDIES)}"
+                self.faults.add(document.origin(("study",)), ("study",), message, common.study)
+            return []
+        own = document.without(COMMON_KEYS)
+        for setting in self.settings:
+            own = self._placed(own, common.study, setting)
+        stem = document.file.stem if document.file else "config"
+        return [Draft(own, stem, common.study, (), common.realisations, common.seed)]
+
+    def _included(self, document: Document, common: Common, chain: tuple[FilePath, ...]) -> list[Draft]:
+        """The drafts of all included configs."""
+        for key in document.data:
+            if key not in COMMON_KEYS:
+                message = "a config with include has no keys of a study; " + unknown_key(key, COMMON_KEYS)
+                self.faults.add(document.key_origin((key,)), (key,), message)
+        chain = (*chain, document.file.resolve()) if document.file else chain
+        drafts: list[Draft] = []
+        for i, name in enumerate(common.include or ()):
+            origin = document.origin(("include", i))
+            drafts += self._include(name, origin, ("include", i), document.file, chain)
+            if len(drafts) > MOST_CASES:
+                self.faults.add(origin, ("include",), f"more than {MOST_CASES} cases")
+                return []
+        return drafts
+
+    def _include(self, name: str, origin: Origin, path: tuple, beside: FilePath | None, chain: tuple) -> list[Draft]:
+        """The drafts of one included config."""
+        file = config_file(name, beside) if is_stem(name) else None
+        if not is_stem(name):
+            self.faults.add(origin, path, "must be the stem of a config, without folder or suffix", name)
+        elif file is None:
+            self.faults.add(origin, path, f"no such config{did_you_mean(name, stems('configs'))}", name)
+        elif file.resolve() in chain:
+            self.faults.add(origin, path, "a config cannot include itself", name)
+        elif len(chain) > DEEPEST_INCLUDE:
+            self.faults.add(origin, path, f"includes nested more than {DEEPEST_INCLUDE} deep", name)
+        elif file.resolve() in self.expanded:
+            return self.expanded[file.resolve()]
+        elif included := self.read(file, self.faults):
+            _, drafts = self._expand(included, chain)
+            return self.expanded.setdefault(file.resolve(), drafts)
+        return []
+
+    def _swept(self, document: Document, common: Common, drafts: list[Draft]) -> list[Draft]:
+        """Each draft once for each combination of swept values; the last key changes fastest."""
+        if not common.sweep or not drafts:
+            return drafts
+        if math.prod(len(values) for values in common.sweep.values()) * len(drafts) > MOST_CASES:
+            self.faults.add(document.origin(("sweep",)), ("sweep",), f"more than {MOST_CASES} cases")
+            return []
+        axes = []
+        for key in common.sweep:
+            if not self._may_be_swept(document, key, drafts):
+                continue
+            values = document.data["sweep"][key]
+            axes.append([Setting(key, v, document.origin(("sweep", key, i))) for i, v in enumerate(values)])
+        return [self._with(draft, settings) for draft in drafts for settings in itertools.product(*axes)]
+
+    def _may_be_swept(self, document: Document, key: str, drafts: list[Draft]) -> bool:
+        """Whether a swept key is one that a sweep, and no override, decides."""
+        origin = document.key_origin(("sweep", key))
+        if key.split(".")[0] in COMMON_KEYS:
+            self.faults.add(origin, ("sweep", key), "cannot be swept")
+            return False
+        try:
+            swept = {path for draft in drafts for path in key_paths(draft.document, study_model(draft.study), key)}
+        except NoSuchKey as error:
+            self.faults.add(origin, ("sweep", key), str(error))
+            return False
+        for setting in self.settings:
+            for draft in drafts:
+                set_here = key_paths(draft.document, study_model(draft.study), setting.key, missing_ok=True)
+                if any(path[: len(s)] == s for path in set_here for s in swept):
+                    self.faults.add(setting.origin, (), f"the config sweeps it: set sweep.{key}=[...] instead")
+                    return False
+        return True
+
+    def _with(self, draft: Draft, settings: tuple[Setting, ...]) -> Draft:
+        document = draft.document
+        for setting in settings:
+            document = self._placed(document, draft.study, setting)
+        swept = (*draft.swept, *((s.key, s.value) for s in settings))
+        return replace(draft, document=document, swept=swept)
+
+    def _placed(self, document: Document, study: str, setting: Setting) -> Document:
+        try:
+            return place(document, study_model(study), setting, self.read, self.faults)
+        except NoSuchKey as error:
+            self.faults.add(setting.origin, (), str(error))
+            return document
+
+    def _case(self, draft: Draft) -> Case | None:
+        """The checked case of a draft; None if faults were noted."""
+        model = study_model(draft.study)
+        document = scenarios_inlined(draft.document, model, self.read, self.faults)
+        spec = check(model, document, self.faults, also=COMMON_KEYS)
+        if draft.realisations is None:
+            self.faults.add(document.origin(()), ("realisations",), "required key is missing")
+        if spec is None or draft.realisations is None:
+            return None
+        name = " ".join([draft.stem, *(f"{key}={in_name(value)}" for key, value in draft.swept)])
+        seed = 1 if draft.seed is None else draft.seed
+        return Case(name, draft.stem, draft.study, spec, draft.swept, draft.realisations, seed)
+
+    def _refuse_twins(self, cases: list[Case], document: Document) -> None:
+        seen: set[str] = set()
+        key = ("include",) if "include" in document.data else ("sweep",)
+        for case in cases:
+            if case.name in seen:
+                self.faults.add(document.origin(key), key, f"makes the case {one_line(case.name)!r} twice")
+            seen.add(case.name)
+
+    def _refuse_mixture(self, drafts: list[Draft], document: Document) -> None:
+        studies = sorted({draft.study for draft in drafts})
+        if len(studies) > 1:
+            message = f"one study a run, these are of {', '.join(studies)}"
+            self.faults.add(document.origin(("include",)), ("include",), message)
+
+    def _check_figures(self, common: Common, cases: list[Case], document: Document) -> None:
+        """Every pattern must mean a case, else a figure would be empty without a word; judged once the cases are known."""
+        if self.faults:
+            return
+        for figure, patterns in common.figures.items():
+            for i, pattern in enumerate(patterns):
+                if not any(matches(case.name, pattern) for case in cases):
+                    path = ("figures", figure, i)
+                    near = did_you_mean(pattern, [case.name for case in cases])
+                    self.faults.add(document.origin(path), path, f"no case has this name{near}", pattern)
+
+
+def in_name(value: object) -> str:
+    """A swept value as it stands in a case's name: numbers at their shortest, text plain, lists without blanks."""
+    match value:
+        case bool():
+            return str(value).lower()
+        case int() | float():
+            return short(value)
+        case list():
+            return "[" + ",".join(map(in_name, value)) + "]"
+        case dict():
+            return "{" + ",".join(f"{key}:{in_name(item)}" for key, item in value.items()) + "}"
+    return one_line(str(value))
+
+
+def resolved(stem: str, cases: list[Case], common: Common) -> dict:
+    """The experiment as plain data, for the record."""
+    return {
+        "config": stem,
+        "study": cases[0].study,
+        "figures": {figure: list(patterns) for figure, patterns in common.figures.items()},
+        "cases": [
+            {
+                "case": case.name,
+                "swept": dict(case.swept),
+                "realisations": case.realisations,
+                "seed": case.seed,
+                **complete(case.spec),
+            }
+            for case in cases
+        ],
+    }

@@ -1,0 +1,167 @@
+"""A document against a schema: what pydantic finds, told in the user's words at the place where the value stands."""
+
+import math
+from collections.abc import Iterable
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from radarsim.config.document import Document, child
+from radarsim.config.faults import ABSENT, Faults, Path, short
+from radarsim.config.lookup import did_you_mean
+
+WORDS = {
+    "missing": "required key is missing",
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "bool_type": "must be true or false",
+    "string_type": "must be text",
+    "tuple_type": "must be a list",
+    "list_type": "must be a list",
+    "dict_type": "must be a mapping of keys",
+    "model_type": "must be a mapping of keys",
+    "model_attributes_type": "must be a mapping of keys",
+    "finite_number": "must be a finite number",
+    "string_too_short": "must not be empty",
+    "string_too_long": "must have at most {max_length} characters",
+    "too_short": "must hold at least {min_length}",
+    "too_long": "must hold at most {max_length}",
+    "literal_error": "must be one of {expected}",
+    "union_tag_invalid": "must be one of {expected_tags}",
+    "greater_than": "must be > {gt}",
+    "greater_than_equal": "must be >= {ge}",
+    "less_than": "must be < {lt}",
+    "less_than_equal": "must be <= {le}",
+}
+BOUNDS = ("gt", "ge", "lt", "le")
+WITHOUT_VALUE = ("missing", "extra_forbidden", "unique", "union_tag_not_found")
+
+
+def check(model: type[BaseModel], document: Document, faults: Faults, also: Iterable[str] = ()) -> BaseModel | None:
+    """The document as a checked object; None, and faults noted, if it is not one.
+
+    `also` are top-level keys that are checked elsewhere and are named among the allowed ones.
+    """
+    try:
+        return model.model_validate(document.data)
+    except ValidationError as error:
+        for found in error.errors(include_url=False, include_input=False):
+            _tell(model, document, found, faults, also)
+        return None
+
+
+def _tell(model: type[BaseModel], document: Document, found: dict, faults: Faults, also: Iterable[str]) -> None:
+    """Note one of pydantic's errors as a fault."""
+    kind, context = found["type"], dict(found.get("ctx", {}))
+    path = path_in(document.data, found["loc"], keep_last=kind in ("missing", "extra_forbidden"))
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        path = (*path, context["discriminator"].strip("'"))
+        kind = kind if document.get(path) is not ABSENT else "missing"
+    if kind == "at":
+        path = twin(document.data, path, context["key"])
+    if faults.spoiled(document.origin(path), path):
+        return
+    if kind == "extra_forbidden":
+        holder = model_at(model, document.data, path[:-1])
+        known = allowed_keys(holder) if holder else ()
+        message = unknown_key(path[-1], [*known, *(also if len(path) == 1 else ())])
+        faults.add(document.key_origin(path), path, message)
+        return
+    message = _message(kind, context, found["msg"], str(path[-1]) if path else "")
+    value = document.get(path)
+    if kind == "too_short" and isinstance(value, list | dict) and len(value) >= context["min_length"]:
+        return  # pydantic counts the good members alone; the bad ones are told one by one
+    if kind in WITHOUT_VALUE or value is ABSENT:
+        faults.add(document.origin(path), path, message)
+    else:
+        faults.add(document.origin(path), path, message, value)
+
+
+def _message(kind: str, context: dict, original: str, key: str) -> str:
+    """What must be, in words; bounds of a `_deg` key in degrees."""
+    if kind == "at":
+        return context["message"]
+    if kind == "value_error":
+        return str(context["error"])
+    for bound in BOUNDS:
+        if bound in context:
+            in_degrees = math.degrees(context[bound]) if key.endswith("_deg") else context[bound]
+            context[bound] = short(float(f"{in_degrees:.12g}") if isinstance(in_degrees, float) else in_degrees)
+    if "expected" in context:
+        context["expected"] = context["expected"].replace("'", "").replace(" or ", ", ")
+    if "expected_tags" in context:
+        context["expected_tags"] = context["expected_tags"].replace("'", "")
+    if kind in WORDS:
+        return WORDS[kind].format(**context)
+    if kind.startswith("int_"):  # a whole number is due: a fraction, or more digits than there are
+        return "must be a whole number"
+    return original
+
+
+def unknown_key(key: object, known: Iterable[str]) -> str:
+    """The message for a key that nobody knows."""
+    known = list(known)
+    near = did_you_mean(str(key), known) or ";"
+    return f"unknown key{near} allowed: {', '.join(known)}"
+
+
+def path_in(data: Any, location: tuple, keep_last: bool) -> Path:
+    """The keys of pydantic's location as they stand in the data: no names of a union's members, `_deg` twins as written."""
+    path: Path = ()
+    for i, step in enumerate(location):
+        if child(data, step) is ABSENT and isinstance(data, dict) and isinstance(step, str):
+            step = twin(data, (), step)[0]
+        below = child(data, step)
+        if below is ABSENT and not (keep_last and i == len(location) - 1):
+            continue
+        path, data = (*path, step), below
+    return path
+
+
+def twin(data: Any, path: Path, key: str) -> Path:
+    """The path of a key below a path, under its `_deg` name where the user wrote that."""
+    for step in path:
+        data = child(data, step)
+    in_degrees = f"{key.removesuffix('_rad')}_deg"
+    written = key.endswith("_rad") and child(data, key) is ABSENT and child(data, in_degrees) is not ABSENT
+    return (*path, in_degrees if written else key)
+
+
+def allowed_keys(model: type[BaseModel]) -> list[str]:
+    """The keys of a mapping, with the `_deg` twins."""
+    keys = []
+    for name in model.model_fields:
+        keys += [name, f"{name[:-4]}_deg"] if name.endswith("_rad") else [name]
+    return keys
+
+
+def model_at(model: type[BaseModel], data: Any, path: Path) -> type[BaseModel] | None:
+    """The schema of the mapping at a path; of a choice, the member that the data's kind names."""
+    current: type[BaseModel] | None = model
+    candidates = [model]
+    for step in path:
+        data = child(data, step)
+        if isinstance(step, str):
+            if current is None or step not in current.model_fields:
+                return None
+            candidates = models_in(current.model_fields[step].annotation)
+        current = _chosen(candidates, data)
+    return current
+
+
+def models_in(annotation: Any) -> list[type[BaseModel]]:
+    """All schemas named in an annotation: of a choice, a list, an optional."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for argument in get_args(annotation) for model in models_in(argument)]
+
+
+def _chosen(candidates: list[type[BaseModel]], data: Any) -> type[BaseModel] | None:
+    fitting = [model for model in candidates if _fits(model, data)] if len(candidates) > 1 else candidates
+    return fitting[0] if fitting else None
+
+
+def _fits(model: type[BaseModel], data: Any) -> bool:
+    """Whether the words that tell a choice's members apart are the data's."""
+    tags = [(name, i.annotation) for name, i in model.model_fields.items() if get_origin(i.annotation) is Literal]
+    return isinstance(data, dict) and all(data.get(name) in get_args(a) for name, a in tags if name in ("kind", "type"))

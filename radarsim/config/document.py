@@ -1,0 +1,90 @@
+"""A config as plain data in which every value still knows where it was written."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path as FilePath
+
+from radarsim.config.faults import ABSENT, Origin, Path
+
+
+@dataclass(frozen=True)
+class Document:
+    """Plain data, and the origins of values and keys by key path.
+
+    source is the file as the user named it; file is where it lies (None for a dictionary).
+    """
+
+    data: dict
+    source: str
+    file: FilePath | None = None
+    values: Mapping[Path, Origin] = field(default_factory=dict)
+    keys: Mapping[Path, Origin] = field(default_factory=dict)
+
+    def origin(self, path: Path) -> Origin:
+        """Where the value at a path was written; of a value that is not there, the nearest one around it."""
+        while path and path not in self.values:
+            path = path[:-1]
+        return self.values.get(path, Origin(self.source))
+
+    def key_origin(self, path: Path) -> Origin:
+        """Where the key of a path was written."""
+        return self.keys.get(path) or self.origin(path)
+
+    def get(self, path: Path) -> object:
+        """The value at a path, or ABSENT."""
+        value: object = self.data
+        for step in path:
+            value = child(value, step)
+        return value
+
+    def only(self, keys) -> "Document":
+        """The document with some of its top-level keys."""
+        return self.with_data((), {key: value for key, value in self.data.items() if key in keys})
+
+    def without(self, keys) -> "Document":
+        """The document without some of its top-level keys."""
+        return self.with_data((), {key: value for key, value in self.data.items() if key not in keys})
+
+    def with_data(self, path: Path, value: object) -> "Document":
+        """The document with other data at a path, where every value still has the origin it had."""
+        return replace(self, data=_with(self.data, path, value))
+
+    def graft(self, path: Path, value: object, origin: Origin) -> "Document":
+        """A document with another value at a path; containers on the way must exist, or become mappings."""
+        return self._replaced(path, value, {path: origin}, {})
+
+    def graft_document(self, path: Path, other: "Document") -> "Document":
+        """A document with another file's content at a path; faults below it are told in that file's own keys."""
+
+        def moved(origins: Mapping[Path, Origin]) -> dict[Path, Origin]:
+            return {(*path, *below): origin._replace(prefix=len(path)) for below, origin in origins.items()}
+
+        whole = {path: Origin(other.source, prefix=len(path))}
+        return self._replaced(path, other.data, whole | moved(other.values), moved(other.keys))
+
+    def _replaced(self, path: Path, value: object, values: dict, keys: dict) -> "Document":
+        depth = len(path)
+        made = {path[:n]: values[path] for n in range(1, depth) if self.get(path[:n]) is ABSENT}
+        kept = {p: o for p, o in self.values.items() if p[:depth] != path}
+        kept_keys = {p: o for p, o in self.keys.items() if p[:depth] != path}
+        data = _with(self.data, path, value)
+        return replace(self, data=data, values=kept | made | values, keys=kept_keys | keys)
+
+
+def child(value: object, step: str | int) -> object:
+    """What stands under a key or an index, or ABSENT."""
+    if isinstance(value, dict):
+        return value.get(step, ABSENT)
+    if isinstance(value, list) and isinstance(step, int) and 0 <= step < len(value):
+        return value[step]
+    return ABSENT
+
+
+def _with(container: object, path: Path, value: object) -> object:
+    """A copy of a container with another value at a path; only the containers on the way are copied."""
+    if not path:
+        return value
+    copy = list(container) if isinstance(container, list) else dict(container if isinstance(container, dict) else {})
+    below = child(container, path[0])
+    copy[path[0]] = _with({} if below is ABSENT else below, path[1:], value)
+    return copy

@@ -1,0 +1,44 @@
+"""What of a checked configuration changes its numbers, as plain JSON-able data."""
+
+from pydantic import BaseModel
+
+from radarsim.config.fields import Design, Display, NameIn
+
+
+def canonical(spec: BaseModel) -> dict:
+    """All that changes a number, defaults filled, in SI units; display names are left out."""
+    return _plain(spec, (Display,))
+
+
+def world(spec: BaseModel) -> dict:
+    """What is observed, without the filters and the number of scans: cases of one world share their noise."""
+    return _plain(spec, (Display, Design))
+
+
+def complete(spec: BaseModel) -> dict:
+    """Every key that has a value, names too: reads back as the same configuration."""
+    return _plain(spec, ())
+
+
+def _plain(value: object, leave_out: tuple[type, ...]) -> object:
+    if isinstance(value, BaseModel):
+        return {
+            name: _plain(_place(value, name, info) if leave_out else getattr(value, name), leave_out)
+            for name, info in type(value).model_fields.items()
+            if not any(isinstance(mark, leave_out) for mark in info.metadata)
+            and (leave_out or getattr(value, name) is not None)
+        }
+    if isinstance(value, tuple | list):
+        return [_plain(item, leave_out) for item in value]
+    if isinstance(value, dict):
+        return {str(key): _plain(item, leave_out) for key, item in value.items()}
+    return value
+
+
+def _place(model: BaseModel, name: str, info) -> object:
+    """The value of a field; of one that names a member of a list, the member's place, 0 where it names none."""
+    value = getattr(model, name)
+    lists = [mark.field for mark in info.metadata if isinstance(mark, NameIn)]
+    if not lists:
+        return value
+    return 0 if value is None else [member.name for member in getattr(model, lists[0])].index(value)

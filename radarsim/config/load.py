@@ -1,0 +1,217 @@
+"""YAML to checked experiments. The only file that imports yaml: it reads text, with line and column of every value."""
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path as FilePath
+
+import yaml
+
+from radarsim.config.cases import Case, Expander, Experiment, Setting
+from radarsim.config.document import Document
+from radarsim.config.faults import Faults, Origin, Path
+from radarsim.config.identity import canonical, world
+from radarsim.config.lookup import config_file, did_you_mean, is_stem, stems
+from radarsim.config.values import DEEPEST, NotFinite, from_python, from_text
+
+__all__ = ["Case", "Experiment", "canonical", "load", "world"]
+
+LARGEST_FILE = 256_000  # bytes
+LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same events and marks, ten times faster
+
+
+def load(source: str | os.PathLike | Mapping, overrides: Iterable[str] = ()) -> Experiment:
+    """The experiment that a config describes, all of it checked.
+
+    source is a path, the stem of a config (here, in ./configs, or shipped), or a mapping as YAML would give it;
+    overrides are texts `dotted.key=value`, the value in YAML. Raises ConfigError, one line for each fault of the whole.
+    """
+    faults = Faults()
+    settings = [setting for text in overrides if (setting := _setting(str(text), faults))]
+    document = _from_mapping(source, faults) if isinstance(source, Mapping) else _from_user(source, faults)
+    experiment = document and Expander(read, settings, faults).experiment(document)
+    faults.raise_if_any()
+    return experiment
+
+
+def _from_mapping(source: Mapping, faults: Faults) -> Document:
+    origin = Origin("config")
+    return Document(from_python(source, (), origin, faults), "config", None, {(): origin})
+
+
+def _from_user(source: str | os.PathLike, faults: Faults) -> Document | None:
+    """The config that the user named by path or stem."""
+    name = os.fsdecode(source)
+    file = config_file(name) if is_stem(name) and not FilePath(name).is_file() else None
+    if file is None and is_stem(name) and not FilePath(name).suffix:
+        known = stems("configs")
+        faults.add(Origin(name), (), f"no such config{did_you_mean(name, known)}; there are: {', '.join(known)}")
+        return None
+    file = file or FilePath(name)
+    if not is_stem(file.stem):
+        faults.add(
+            Origin(name), (), "the name of a config must be of letters, digits and . _ + = -, not begin with a dot"
+        )
+        return None
+    return read(file, faults)
+
+
+def _setting(text: str, faults: Faults) -> Setting | None:
+    """An override `key=value`, its value read as YAML."""
+    key, equals, value = text.partition("=")
+    key = key.strip()
+    origin = Origin(f"--set {key}")
+    if not equals or not key or not all(key.split(".")):
+        faults.add(Origin(f"--set {text}"), (), "must be KEY=VALUE, with a dotted KEY")
+        return None
+    read_value = parse(value, origin.source, faults, plain_origin=origin)
+    return None if read_value is None else Setting(key, read_value.data, origin)
+
+
+def read(file: FilePath, faults: Faults) -> Document | None:
+    """The document in a file; None, and a fault noted, if there is none."""
+    shown = str(file)
+    try:
+        if not file.is_file():
+            missing = (
+                "is a directory" if file.is_dir() else "is not a regular file" if file.exists() else "no such file"
+            )
+            faults.add(Origin(shown), (), missing)
+            return None
+        with file.open("rb") as stream:
+            content = stream.read(LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        faults.add(Origin(shown), (), f"cannot be read: {getattr(error, 'strerror', None) or error}")
+        return None
+    if len(content) > LARGEST_FILE:
+        faults.add(Origin(shown), (), f"larger than {LARGEST_FILE // 1000} kB")
+        return None
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        column = error.start - content.rfind(b"\n", 0, error.start)
+        faults.add(Origin(shown, line, column), (), "is not UTF-8 text")
+        return None
+    document = parse(text, shown, faults)
+    if document is None:
+        return None
+    if not isinstance(document.data, dict):
+        faults.add(document.origin(()), (), "must be a mapping of keys", document.data)
+        return None
+    return Document(document.data, shown, file, document.values, document.keys)
+
+
+def parse(text: str, source: str, faults: Faults, plain_origin: Origin | None = None) -> Document | None:
+    """YAML text as a document; None, and a fault noted, if it is not YAML of the plain kind that is read here."""
+    reader = _Reader(source, faults, plain_origin)
+    before = len(faults)
+    try:
+        data = reader.document(yaml.parse(text, Loader=LOADER))
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        what = " ".join(filter(None, (error.context, error.problem)))
+        faults.add(reader.origin(mark), (), f"not valid YAML: {what}")
+    except yaml.reader.ReaderError as error:
+        position = min(error.position, len(text))
+        line = text.count("\n", 0, position)
+        column = position - (text.rfind("\n", 0, position) + 1)
+        faults.add(plain_origin or Origin(source, line + 1, column + 1), (), f"not valid YAML: {error.reason}")
+    except _Refused:
+        pass  # what was refused is noted; nothing after it can be understood
+    else:
+        return Document(data, source, None, reader.values, reader.keys)
+    assert len(faults) > before
+    return None
+
+
+class _Refused(Exception):
+    """The text cannot be read on."""
+
+
+class _Reader:
+    """Builds plain data from the events of the YAML parser, no deeper than allowed, and notes the origins."""
+
+    def __init__(self, source: str, faults: Faults, plain_origin: Origin | None):
+        self.source, self.faults, self.plain_origin = source, faults, plain_origin
+        self.values: dict[Path, Origin] = {}
+        self.keys: dict[Path, Origin] = {}
+
+    def origin(self, mark) -> Origin:
+        """Where a mark is; in an override, the override."""
+        if self.plain_origin or mark is None:
+            return self.plain_origin or Origin(self.source)
+        return Origin(self.source, mark.line + 1, mark.column + 1)
+
+    def document(self, events) -> object:
+        """The data of the one document that there must be."""
+        self.events = (e for e in events if not isinstance(e, yaml.StreamStartEvent | yaml.DocumentEndEvent))
+        if isinstance(next(self.events), yaml.StreamEndEvent):
+            self.faults.add(self.plain_origin or Origin(self.source), (), "is empty")
+            raise _Refused
+        data = self._node(next(self.events), ())
+        extra = next(self.events)
+        if not isinstance(extra, yaml.StreamEndEvent):
+            self.faults.add(self.origin(extra.start_mark), (), "there must be one YAML document, here begins another")
+        return data
+
+    def _node(self, event, path: Path) -> object:
+        origin = self.values[path] = self.origin(event.start_mark)
+        if len(path) > DEEPEST:
+            self.faults.add(origin, (), f"nested more than {DEEPEST} deep")
+            raise _Refused
+        if isinstance(event, yaml.AliasEvent):
+            self.faults.spoil(origin, path, f"aliases (*{event.anchor}) are not read: write the value out")
+            return None
+        if event.anchor is not None:
+            self.faults.add(origin, path, f"anchors (&{event.anchor}) are not read")
+        if event.tag is not None:
+            self.faults.spoil(origin, path, f"tags ({event.tag}) are not read")
+        if isinstance(event, yaml.SequenceStartEvent):
+            return self._sequence(path)
+        if isinstance(event, yaml.MappingStartEvent):
+            return self._mapping(path)
+        return self._scalar(event, path, origin)
+
+    def _sequence(self, path: Path) -> list:
+        items: list = []
+        while not isinstance(event := next(self.events), yaml.SequenceEndEvent):
+            items.append(self._node(event, (*path, len(items))))
+        return items
+
+    def _mapping(self, path: Path) -> dict:
+        mapping: dict = {}
+        while not isinstance(event := next(self.events), yaml.MappingEndEvent):
+            origin = self.origin(event.start_mark)
+            if not isinstance(event, yaml.ScalarEvent) or event.anchor or event.tag:
+                self.faults.add(origin, path, "a key must be a plain word")
+                raise _Refused
+            key = event.value
+            if key in mapping:
+                first = self.keys[(*path, key)]
+                where = f", first in line {first.line}" if first.line else ""
+                self.faults.add(origin, (*path, key), f"duplicate key{where}")
+                self._skip(path, key)
+                continue
+            mapping[key] = None
+            self.keys[(*path, key)] = origin
+            mapping[key] = self._node(next(self.events), (*path, key))
+        return mapping
+
+    def _skip(self, path: Path, key: str) -> None:
+        """Read a value that is not wanted, without touching the origins of the one that is."""
+        values, keys = self.values, self.keys
+        self.values, self.keys = {}, {}
+        self._node(next(self.events), (*path, key))
+        self.values, self.keys = values, keys
+
+    def _scalar(self, event, path: Path, origin: Origin) -> object:
+        if not event.implicit[0]:  # quoted, or a block of text
+            return event.value
+        try:
+            value = from_text(event.value)
+        except NotFinite:
+            self.faults.spoil(origin, path, "must be a finite number", event.value)
+            return None
+        if value is None:
+            self.faults.spoil(origin, path, "has no value")
+        return value

@@ -1,0 +1,49 @@
+"""Where configs and scenarios are found by their stem, and what is suggested when they are not."""
+
+import difflib
+import re
+from pathlib import Path
+
+SHIPPED = Path(__file__).parent.parent / "shipped"
+STEM = re.compile(r"\w[\w+=-]*(?:\.[\w+=-]+)*")
+
+
+def config_file(name: str, beside: Path | None = None) -> Path | None:
+    """The file of a config: beside the including one (or here), in ./configs, among the shipped; None if nowhere."""
+    folders = [Path(), Path("configs")] if beside is None else [beside.parent, Path("configs")]
+    return _first(name, [*folders, SHIPPED / "configs"], beside)
+
+
+def scenario_file(name: str, config: Path | None) -> Path | None:
+    """The file of a scenario: beside the config, in scenarios/ next to its folder or here, among the shipped; or None."""
+    folders = [] if config is None else [config.parent, next_to(config.parent) / "scenarios"]
+    return _first(name, [*folders, Path("scenarios"), SHIPPED / "scenarios"], config)
+
+
+def next_to(folder: Path) -> Path:
+    """The folder around a folder, in the user's own notation where that has one."""
+    return folder.parent if folder.name not in ("", "..") else folder / ".."
+
+
+def _first(name: str, folders: list[Path], but: Path | None) -> Path | None:
+    for folder in folders:
+        file = folder / f"{name}.yaml"
+        if file != but and file.is_file():
+            return file
+    return None
+
+
+def stems(kind: str) -> tuple[str, ...]:
+    """Stems of the configs or scenarios that can be named here: those of the working directory and the shipped ones."""
+    return tuple(sorted({file.stem for folder in (Path(kind), SHIPPED / kind) for file in folder.glob("*.yaml")}))
+
+
+def is_stem(name: str) -> bool:
+    """Whether a name is a plain file stem: no separators, no drive, no `..`, no leading dot."""
+    return len(name) <= 100 and STEM.fullmatch(name) is not None
+
+
+def did_you_mean(name: str, known) -> str:
+    """`; did you mean X?` for the known name nearest to a mistaken one, or nothing."""
+    near = difflib.get_close_matches(str(name)[:100], list(known), n=1, cutoff=0.6)
+    return f"; did you mean {near[0]}?" if near else ""

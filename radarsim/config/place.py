@@ -1,0 +1,107 @@
+"""Values put at the keys that overrides and sweeps name, and scenarios put in the place of their stems."""
+
+from collections.abc import Callable
+
+from radarsim.config.check import allowed_keys, model_at, unknown_key
+from radarsim.config.document import Document
+from radarsim.config.faults import ABSENT, Faults, Path
+from radarsim.config.fields import Scenario, Study
+from radarsim.config.lookup import did_you_mean, is_stem, scenario_file, stems
+
+
+class NoSuchKey(ValueError):
+    """A key that the config has no place for; its text is the message."""
+
+
+def place(document: Document, model: type[Study], setting, read: Callable, faults: Faults) -> Document:
+    """The document with a setting's value at the places its key means. Raises NoSuchKey."""
+    first = setting.key.split(".")[0]
+    if "." in setting.key and isinstance(document.data.get(first), str):
+        document = scenarios_inlined(document, model, read, faults, only=first)
+    for path in key_paths(document, model, setting.key):
+        document = _without_twin(document, path).graft(path, setting.value, setting.origin)
+    return document
+
+
+def key_paths(document: Document, model: type[Study], key: str, missing_ok: bool = False) -> list[Path]:
+    """The places that a key of `sweep` or `--set` means: one, or for a bare filter key one in every filter that has it.
+
+    Raises NoSuchKey, or gives none at all with missing_ok.
+    """
+    try:
+        if "." in key or key in allowed_keys(model):
+            return [_dotted(document, key)]
+        return _in_every_member(document, model, key)
+    except NoSuchKey:
+        if missing_ok:
+            return []
+        raise
+
+
+def _dotted(document: Document, key: str) -> Path:
+    path: Path = ()
+    for text in key.split("."):
+        holder = document.get(path)
+        if isinstance(holder, list):
+            if not text.isdecimal() or int(text) >= len(holder):
+                raise NoSuchKey(f"{'.'.join(map(str, path))} is a list: its items are 0 to {len(holder) - 1}")
+            path = (*path, int(text))
+        elif isinstance(holder, dict) or holder is ABSENT:
+            path = (*path, text)
+        elif isinstance(holder, str) and len(path) == 1:  # a scenario's stem; inlined before anything is put there
+            return tuple(key.split("."))
+        else:
+            raise NoSuchKey(f"{'.'.join(map(str, path))} has no keys of its own")
+    return path
+
+
+def _in_every_member(document: Document, model: type[Study], key: str) -> list[Path]:
+    members = document.data.get(model.bare_keys)
+    known: list[str] = []
+    paths: list[Path] = []
+    for i in range(len(members) if isinstance(members, list) else 0):
+        schema = model_at(model, document.data, (model.bare_keys, i))
+        keys = allowed_keys(schema) if schema else []
+        known += [k for k in keys if k not in known]
+        if key in keys:
+            paths.append((model.bare_keys, i, key))
+    if not paths:
+        raise NoSuchKey(unknown_key(key, [*allowed_keys(model), *known]))
+    return paths
+
+
+def _without_twin(document: Document, path: Path) -> Document:
+    """The document without the same quantity in the other unit, which the new value replaces."""
+    key = str(path[-1])
+    for unit, other in (("_rad", "_deg"), ("_deg", "_rad")):
+        twin = (*path[:-1], key.removesuffix(unit) + other)
+        if key.endswith(unit) and document.get(twin) is not ABSENT:
+            holder = {k: v for k, v in document.get(path[:-1]).items() if k != twin[-1]}
+            return document.with_data(path[:-1], holder)
+    return document
+
+
+def scenarios_inlined(
+    document: Document, model: type[Study], read: Callable, faults: Faults, only: str | None = None
+) -> Document:
+    """The document with the content of scenario files in place of their stems."""
+    for field, info in model.model_fields.items():
+        stem = document.data.get(field)
+        wanted = only in (None, field) and any(isinstance(mark, Scenario) for mark in info.metadata)
+        if not wanted or not isinstance(stem, str):
+            continue
+        origin, path = document.origin((field,)), (field,)
+        if faults.spoiled(origin, path):
+            continue
+        file = scenario_file(stem, document.file) if is_stem(stem) else None
+        if not is_stem(stem):
+            faults.spoil(origin, path, "must be the stem of a scenario, without folder or suffix", stem)
+        elif file is None:
+            known = stems("scenarios")
+            near = did_you_mean(stem, known) or f"; there are: {', '.join(known)}"
+            faults.spoil(origin, path, f"no such scenario{near}", stem)
+        elif scenario := read(file, faults):
+            document = document.graft_document(path, scenario)
+        else:
+            faults.spoil(origin, path, "the scenario cannot be read", stem)
+    return document

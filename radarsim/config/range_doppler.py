@@ -1,0 +1,154 @@
+"""Keys of the range_doppler study (P1): a radar, a target in range, linear filters with and without the velocity."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from radarsim.config.fields import (
+    Design,
+    Display,
+    Model,
+    Name,
+    NameIn,
+    NonNegative,
+    Number,
+    Positive,
+    Scenario,
+    Study,
+    Whole,
+    at,
+    unique_names,
+)
+
+PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
+
+
+class Radar(Model):
+    """A surveillance radar: accuracies of one plot and the period of its scans."""
+
+    name: Annotated[Name | None, Display()] = Field(None, description="display name")
+    band: Annotated[Literal["metre", "decimetre", "centimetre"] | None, Display()] = Field(
+        None, description="wave band, for display"
+    )
+    wavelength_m: Positive = Field(description="wavelength, m: gives the Doppler frequency of a velocity")
+    sigma_range_m: Positive = Field(description="standard deviation of a measured range, m")
+    sigma_velocity_mps: Positive = Field(description="standard deviation of a measured radial velocity, m/s")
+    scan_period_s: Positive = Field(description="time between two plots, s")
+    repetition_rate_hz: Positive = Field(
+        1000.0, description="pulse repetition rate, Hz: gives the unambiguous velocity"
+    )
+
+
+Coefficients = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
+COEFFICIENTS = "derivatives of range at the first plot: m, m/s, m/s², … (the sum of c_i t^i / i!)"
+
+
+class Polynomial(Model):
+    """A range that is a polynomial of time; up to the second degree it fits the filters' model exactly."""
+
+    kind: Literal["polynomial"] = Field(description="a polynomial of any degree up to 11")
+    coefficients: Coefficients = Field(description=COEFFICIENTS)
+
+
+class Starting(Model):
+    """What targets that break the model share: a moment, in seconds or as a scan, at which they do."""
+
+    start_s: NonNegative | None = Field(None, description="time from the first plot at which it begins, s")
+    start_scan: Annotated[Whole, Field(ge=1, le=100_000)] | None = Field(
+        None, description="scan, counted from 1, at which it begins; in place of start_s"
+    )
+
+    @model_validator(mode="after")
+    def _one_start(self):
+        if (self.start_s is None) == (self.start_scan is None):
+            raise at("start_s", "give either start_s or start_scan")
+        return self
+
+    def timed(self, period: float):
+        """The same target with its start in seconds."""
+        if self.start_scan is None:
+            return self
+        return self.model_copy(update={"start_s": (self.start_scan - 1) * period, "start_scan": None})
+
+
+class AccelerationStart(Starting):
+    """A polynomial that begins to accelerate (or brake) at a moment."""
+
+    kind: Literal["acceleration_start"] = Field(description="a constant acceleration that sets in at a moment")
+    coefficients: Coefficients = Field(description=COEFFICIENTS)
+    acceleration_mps2: Number = Field(description="radial acceleration added from then on, m/s²")
+
+
+class JerkPulse(Starting):
+    """A polynomial with a jerk for a while; the acceleration it has built up stays."""
+
+    kind: Literal["jerk_pulse"] = Field(description="a constant jerk for a while")
+    coefficients: Coefficients = Field(description=COEFFICIENTS)
+    jerk_mps3: Number = Field(description="radial jerk added during the pulse, m/s³")
+    duration_s: Positive = Field(description="length of the pulse, s")
+
+
+class Turn(Starting):
+    """Straight flight in a plane through the radar, a turn of constant load, straight flight again."""
+
+    kind: Literal["turn"] = Field(description="a turn of given g between two straight legs")
+    range_m: Positive = Field(description="range at the first plot, m")
+    speed_mps: Positive = Field(description="speed, constant, m/s")
+    aspect_rad: Number = Field(description="direction of flight from the line of sight outwards, rad (pi: straight in)")
+    acceleration_g: Number = Field(
+        description="lateral acceleration of the turn, standard gravities; positive: to the left"
+    )
+    duration_s: Positive = Field(description="length of the turn, s")
+
+
+Target = Annotated[Polynomial | AccelerationStart | JerkPulse | Turn, Field(discriminator="kind")]
+
+
+class Filter(Model):
+    """A second-order Kalman filter started by least squares."""
+
+    name: Annotated[Name, Display()] = Field(description="label, unlike that of any other filter")
+    observes: tuple[Literal["range", "velocity"], ...] = Field(
+        description="what it measures: [range] or [range, velocity]"
+    )
+    manoeuvre_variance: Positive = Field(description="variance of the random jerk it allows for, (m/s³)²: D_M")
+    initial_scans: Annotated[Whole, Field(ge=2, le=100_000)] | None = Field(
+        None, description="scans in its least-squares start; default and least: 3 for range, 2 with velocity"
+    )
+
+    @model_validator(mode="after")
+    def _start(self):
+        if self.observes not in (("range",), ("range", "velocity")):
+            raise at("observes", "must be [range] or [range, velocity]")
+        least = PLOTS_NEEDED[len(self.observes)]
+        if self.initial_scans is None:
+            return self.model_copy(update={"initial_scans": least})
+        if self.initial_scans < least:
+            raise at("initial_scans", f"must be >= {least} for a filter that observes {' and '.join(self.observes)}")
+        return self
+
+
+class RangeDoppler(Study):
+    """Range alone against range and radial velocity."""
+
+    radar: Radar = Field(description="the radar")
+    target: Annotated[Target, Scenario()] = Field(description="the target: a scenario's stem, or inline")
+    filters: Annotated[
+        tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
+    ] = Field(description="the filters; all see the same plots")
+    baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
+        None, description="name of the filter that gains are against; default: the first"
+    )
+    scans: Annotated[Whole, Field(ge=2, le=100_000), Design()] = Field(description="number of plots")
+
+    @model_validator(mode="after")
+    def _fits_together(self):
+        names = [f.name for f in self.filters]
+        if self.baseline is not None and self.baseline not in names:
+            raise at("baseline", f"must be the name of a filter: {', '.join(names)}")
+        slowest = max(self.filters, key=lambda f: f.initial_scans)
+        if self.scans < slowest.initial_scans:
+            raise at("scans", f"must be >= {slowest.initial_scans} for the initialisation of filter {slowest.name}")
+        if isinstance(self.target, Starting):
+            return self.model_copy(update={"target": self.target.timed(self.radar.scan_period_s)})
+        return self
