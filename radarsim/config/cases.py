@@ -2,67 +2,20 @@
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
-from fnmatch import fnmatchcase
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 
 from radarsim.config.check import check, unknown_key
 from radarsim.config.document import Document
-from radarsim.config.faults import Faults, Origin, one_line, short
-from radarsim.config.fields import Model
-from radarsim.config.identity import complete
+from radarsim.config.experiment import Case, Experiment, in_name, matches, resolved
+from radarsim.config.faults import Faults, Origin, one_line
 from radarsim.config.lookup import config_file, did_you_mean, is_stem, stems
 from radarsim.config.place import NoSuchKey, key_paths, place, scenarios_inlined
 from radarsim.config.schema import COMMON_KEYS, STUDIES, Common, study_model
 
 MOST_CASES = 10_000
 DEEPEST_INCLUDE = 5
-
-
-@dataclass(frozen=True)
-class Case:
-    """One configuration to be run: a study's checked keys, how often, and with which seed.
-
-    name is the stem of its config with ` key=value` for each swept key.
-    """
-
-    name: str
-    stem: str
-    study: str
-    spec: Model
-    swept: tuple[tuple[str, object], ...]
-    realisations: int
-    seed: int
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """What a config asks for.
-
-    figures holds, for a figure, names or patterns of the cases that it shows; resolved is the whole experiment as plain
-    JSON-able data, defaults filled and in SI units.
-    """
-
-    stem: str
-    study: str
-    path: str | None
-    cases: tuple[Case, ...]
-    realisations: int
-    seed: int
-    figures: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    resolved: dict = field(default_factory=dict)
-
-    def shown_in(self, figure: str) -> tuple[Case, ...]:
-        """The cases that a figure shows: all of them, where the config does not say."""
-        if figure not in self.figures:
-            return self.cases
-        return tuple(case for case in self.cases if any(matches(case.name, p) for p in self.figures[figure]))
-
-
-def matches(name: str, pattern: str) -> bool:
-    """Whether a pattern of `figures` means a case: its very name, or with * and ? for what may differ."""
-    return name == pattern or fnmatchcase(name, pattern.replace("[", "[[]"))
 
 
 @dataclass(frozen=True)
@@ -122,7 +75,7 @@ class Expander:
             realisations=common.realisations or max(case.realisations for case in cases),
             seed=cases[0].seed if common.seed is None else common.seed,
             figures=dict(common.figures),
-            resolved=resolved(stem, cases, common),
+            resolved=resolved(stem, cases, common.figures),
         )
 
     def _expand(self, document: Document, chain: tuple[FilePath, ...]) -> tuple[Common, list[Draft]]:
@@ -268,7 +221,7 @@ class Expander:
             self.faults.add(document.origin(("include",)), ("include",), message)
 
     def _check_figures(self, common: Common, cases: list[Case], document: Document) -> None:
-        """Every pattern must mean a case, else a figure would be empty without a word; judged once the cases are known."""
+        """Every pattern must mean a case, else a figure would be empty without a word."""
         if self.faults:
             return
         for figure, patterns in common.figures.items():
@@ -277,36 +230,3 @@ class Expander:
                     path = ("figures", figure, i)
                     near = did_you_mean(pattern, [case.name for case in cases])
                     self.faults.add(document.origin(path), path, f"no case has this name{near}", pattern)
-
-
-def in_name(value: object) -> str:
-    """A swept value as it stands in a case's name: numbers at their shortest, text plain, lists without blanks."""
-    match value:
-        case bool():
-            return str(value).lower()
-        case int() | float():
-            return short(value)
-        case list():
-            return "[" + ",".join(map(in_name, value)) + "]"
-        case dict():
-            return "{" + ",".join(f"{key}:{in_name(item)}" for key, item in value.items()) + "}"
-    return one_line(str(value))
-
-
-def resolved(stem: str, cases: list[Case], common: Common) -> dict:
-    """The experiment as plain data, for the record."""
-    return {
-        "config": stem,
-        "study": cases[0].study,
-        "figures": {figure: list(patterns) for figure, patterns in common.figures.items()},
-        "cases": [
-            {
-                "case": case.name,
-                "swept": dict(case.swept),
-                "realisations": case.realisations,
-                "seed": case.seed,
-                **complete(case.spec),
-            }
-            for case in cases
-        ],
-    }

@@ -106,7 +106,7 @@ def unknown_key(key: object, known: Iterable[str]) -> str:
 
 
 def path_in(data: Any, location: tuple, keep_last: bool) -> Path:
-    """The keys of pydantic's location as they stand in the data: no names of a union's members, `_deg` twins as written."""
+    """The keys of pydantic's location as they stand in the data: without names of union members, `_deg` as written."""
     path: Path = ()
     for i, step in enumerate(location):
         if child(data, step) is ABSENT and isinstance(data, dict) and isinstance(step, str):

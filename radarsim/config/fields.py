@@ -31,7 +31,7 @@ class Display:
 
 
 class Design:
-    """Mark of a field that designs filters or says how long to look: no part of the world, nor of the key of the noise."""
+    """Mark of a field that designs filters or says how long to look: no part of the world nor of its noise's key."""
 
 
 @dataclass(frozen=True)

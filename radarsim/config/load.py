@@ -6,8 +6,9 @@ from pathlib import Path as FilePath
 
 import yaml
 
-from radarsim.config.cases import Case, Expander, Experiment, Setting
+from radarsim.config.cases import Expander, Setting
 from radarsim.config.document import Document
+from radarsim.config.experiment import Case, Experiment
 from radarsim.config.faults import Faults, Origin, Path
 from radarsim.config.identity import canonical, world
 from radarsim.config.lookup import config_file, did_you_mean, is_stem, stems

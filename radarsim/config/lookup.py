@@ -15,7 +15,7 @@ def config_file(name: str, beside: Path | None = None) -> Path | None:
 
 
 def scenario_file(name: str, config: Path | None) -> Path | None:
-    """The file of a scenario: beside the config, in scenarios/ next to its folder or here, among the shipped; or None."""
+    """The file of a scenario: beside the config, in scenarios/ next to its folder or here, among the shipped."""
     folders = [] if config is None else [config.parent, next_to(config.parent) / "scenarios"]
     return _first(name, [*folders, Path("scenarios"), SHIPPED / "scenarios"], config)
 
