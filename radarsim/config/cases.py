@@ -4,14 +4,15 @@ import itertools
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path as FilePath
 
 from radarsim.config.check import check, unknown_key
 from radarsim.config.document import Document
-from radarsim.config.experiment import Case, Experiment, in_name, matches, resolved
+from radarsim.config.experiment import Case, Experiment, in_name, matches
 from radarsim.config.faults import Faults, Origin, one_line
 from radarsim.config.lookup import config_file, did_you_mean, is_stem, stems
-from radarsim.config.place import NoSuchKey, key_paths, place, scenarios_inlined
+from radarsim.config.place import NoSuchKey, data_files_found, key_paths, place, scenarios_inlined
 from radarsim.config.schema import COMMON_KEYS, STUDIES, Common, study_model
 
 MOST_CASES = 10_000
@@ -46,7 +47,7 @@ class Expander:
     """
 
     def __init__(self, read: Callable, settings: Iterable[Setting], faults: Faults):
-        self.read, self.faults = read, faults
+        self.read, self.faults = cache(read), faults
         settings = list(settings)
         self.common = [s for s in settings if s.key.split(".")[0] in COMMON_KEYS]
         self.settings = [s for s in settings if s.key.split(".")[0] not in COMMON_KEYS]
@@ -75,7 +76,6 @@ class Expander:
             realisations=common.realisations or max(case.realisations for case in cases),
             seed=cases[0].seed if common.seed is None else common.seed,
             figures=dict(common.figures),
-            resolved=resolved(stem, cases, common.figures),
         )
 
     def _expand(self, document: Document, chain: tuple[FilePath, ...]) -> tuple[Common, list[Draft]]:
@@ -197,6 +197,7 @@ class Expander:
         """The checked case of a draft; None if faults were noted."""
         model = study_model(draft.study)
         document = scenarios_inlined(draft.document, model, self.read, self.faults)
+        document = data_files_found(document, model, self.faults)
         spec = check(model, document, self.faults, also=COMMON_KEYS)
         if draft.realisations is None:
             self.faults.add(document.origin(()), ("realisations",), "required key is missing")

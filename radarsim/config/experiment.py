@@ -1,8 +1,9 @@
 """What a checked config is: an experiment of cases."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from functools import cached_property
 
 from radarsim.config.faults import one_line, short
 from radarsim.config.fields import Model
@@ -24,13 +25,17 @@ class Case:
     realisations: int
     seed: int
 
+    def resolved(self) -> dict:
+        """The case as plain JSON-able data, names included."""
+        common = {"case": self.name, "swept": dict(self.swept), "realisations": self.realisations, "seed": self.seed}
+        return common | complete(self.spec)
+
 
 @dataclass(frozen=True)
 class Experiment:
     """What a config asks for.
 
-    figures holds, for a figure, names or patterns of the cases that it shows; resolved is the whole experiment as plain
-    JSON-able data, defaults filled and in SI units.
+    figures holds, for a figure, names or patterns of the cases that it shows.
     """
 
     stem: str
@@ -40,7 +45,16 @@ class Experiment:
     realisations: int
     seed: int
     figures: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    resolved: dict = field(default_factory=dict)
+
+    @cached_property
+    def resolved(self) -> dict:
+        """The whole experiment as plain JSON-able data, defaults filled and in SI units, for the record."""
+        return {
+            "config": self.stem,
+            "study": self.study,
+            "figures": {figure: list(patterns) for figure, patterns in self.figures.items()},
+            "cases": [case.resolved() for case in self.cases],
+        }
 
     def shown_in(self, figure: str) -> tuple[Case, ...]:
         """The cases that a figure shows: all of them, where the config does not say."""
@@ -66,22 +80,3 @@ def in_name(value: object) -> str:
         case dict():
             return "{" + ",".join(f"{key}:{in_name(item)}" for key, item in value.items()) + "}"
     return one_line(str(value))
-
-
-def resolved(stem: str, cases: Sequence[Case], figures: Mapping[str, tuple[str, ...]]) -> dict:
-    """The experiment as plain data, for the record."""
-    return {
-        "config": stem,
-        "study": cases[0].study,
-        "figures": {figure: list(patterns) for figure, patterns in figures.items()},
-        "cases": [
-            {
-                "case": case.name,
-                "swept": dict(case.swept),
-                "realisations": case.realisations,
-                "seed": case.seed,
-                **complete(case.spec),
-            }
-            for case in cases
-        ],
-    }

@@ -41,6 +41,13 @@ class NameIn:
     field: str
 
 
+class DataFile:
+    """Mark of a text field that names a file of data, from the folder of the YAML file in which it stands.
+
+    The checked object holds a path that can be opened; in a case's identity the file's content stands for it.
+    """
+
+
 class Scenario:
     """Mark of a study's field that may name a file in scenarios/ by its stem."""
 
@@ -115,11 +122,15 @@ Positive = Annotated[float, Strict(), Field(gt=0), AfterValidator(_moderate)]
 NonNegative = Annotated[float, Strict(), Field(ge=0), AfterValidator(_moderate)]
 Probability = Annotated[float, Strict(), Field(ge=0, le=1), AfterValidator(_moderate)]
 Correlation = Annotated[float, Strict(), Field(gt=-1, lt=1), AfterValidator(_moderate)]
-Whole = Annotated[int, BeforeValidator(_whole), Strict()]
 Flag = Annotated[bool, Strict()]
 Name = Annotated[str, Strict(), StringConstraints(min_length=1, max_length=64), AfterValidator(_printable)]
 Stem = Annotated[str, Strict(), StringConstraints(min_length=1, max_length=100)]
 Anything = Annotated[Any, WithJsonSchema({})]
+
+
+def whole(least: int, most: int) -> Any:
+    """A whole number between bounds; 1e5 is one."""
+    return Annotated[int, Strict(), Field(ge=least, le=most), BeforeValidator(_whole)]
 
 
 class Study(Model):

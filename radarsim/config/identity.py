@@ -1,8 +1,12 @@
 """What of a checked configuration changes its numbers, as plain JSON-able data."""
 
-from pydantic import BaseModel
+import hashlib
+from pathlib import Path
 
-from radarsim.config.fields import Design, Display, NameIn
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from radarsim.config.fields import DataFile, Design, Display, NameIn
 
 
 def canonical(spec: BaseModel) -> dict:
@@ -23,7 +27,7 @@ def complete(spec: BaseModel) -> dict:
 def _plain(value: object, leave_out: tuple[type, ...]) -> object:
     if isinstance(value, BaseModel):
         return {
-            name: _plain(_place(value, name, info) if leave_out else getattr(value, name), leave_out)
+            name: _plain(_told(value, name, info) if leave_out else getattr(value, name), leave_out)
             for name, info in type(value).model_fields.items()
             if not any(isinstance(mark, leave_out) for mark in info.metadata)
             and (leave_out or getattr(value, name) is not None)
@@ -35,10 +39,15 @@ def _plain(value: object, leave_out: tuple[type, ...]) -> object:
     return value
 
 
-def _place(model: BaseModel, name: str, info) -> object:
-    """The value of a field; of one that names a member of a list, the member's place, 0 where it names none."""
+def _told(model: BaseModel, name: str, info: FieldInfo) -> object:
+    """The value of a field, without the names that stand in it.
+
+    For the name of a member of a list the member's place, 0 where none is named; for a file of data its content's hash.
+    """
     value = getattr(model, name)
-    lists = [mark.field for mark in info.metadata if isinstance(mark, NameIn)]
-    if not lists:
-        return value
-    return 0 if value is None else [member.name for member in getattr(model, lists[0])].index(value)
+    for mark in info.metadata:
+        if isinstance(mark, NameIn):
+            return 0 if value is None else [member.name for member in getattr(model, mark.field)].index(value)
+        if isinstance(mark, DataFile) and value is not None:
+            return hashlib.sha256(Path(value).read_bytes()).hexdigest()
+    return value

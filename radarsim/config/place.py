@@ -1,11 +1,12 @@
 """Values put at the keys that overrides and sweeps name, and scenarios put in the place of their stems."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path as FilePath
 
 from radarsim.config.check import allowed_keys, model_at, unknown_key
 from radarsim.config.document import Document
-from radarsim.config.faults import ABSENT, Faults, Path
-from radarsim.config.fields import Scenario, Study
+from radarsim.config.faults import ABSENT, Faults, Path, shown
+from radarsim.config.fields import DataFile, Scenario, Study
 from radarsim.config.lookup import did_you_mean, is_stem, scenario_file, stems
 
 
@@ -105,3 +106,28 @@ def scenarios_inlined(
         else:
             faults.spoil(origin, path, "the scenario cannot be read", stem)
     return document
+
+
+def data_files_found(document: Document, model: type[Study], faults: Faults) -> Document:
+    """The document with a path that can be opened for each file of data, named from the folder of its own YAML file."""
+    for path, value in list(_texts(document.data, ())):
+        holder = model_at(model, document.data, path[:-1])
+        info = holder.model_fields.get(path[-1]) if holder else None
+        if info is None or not any(isinstance(mark, DataFile) for mark in info.metadata):
+            continue
+        origin = document.origin(path)
+        file = (FilePath(origin.source).parent if origin.line else FilePath()) / value
+        if file.is_file():
+            document = document.with_data(path, str(file))
+        else:
+            faults.spoil(origin, path, f"no such file: {shown(str(file))}")
+    return document
+
+
+def _texts(data: object, path: Path) -> Iterator[tuple[Path, str]]:
+    """All texts under a key of their own, with their paths."""
+    if isinstance(data, dict | list):
+        for step, value in data.items() if isinstance(data, dict) else enumerate(data):
+            yield from _texts(value, (*path, step))
+    elif isinstance(data, str) and path and isinstance(path[-1], str):
+        yield path, data

@@ -15,11 +15,12 @@ from radarsim.config.fields import (
     Positive,
     Scenario,
     Study,
-    Whole,
     at,
     unique_names,
+    whole,
 )
 
+MOST_SCANS = 100_000
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
 
 
@@ -54,7 +55,7 @@ class Starting(Model):
     """What targets that break the model share: a moment, in seconds or as a scan, at which they do."""
 
     start_s: NonNegative | None = Field(None, description="time from the first plot at which it begins, s")
-    start_scan: Annotated[Whole, Field(ge=1, le=100_000)] | None = Field(
+    start_scan: whole(1, MOST_SCANS) | None = Field(
         None, description="scan, counted from 1, at which it begins; in place of start_s"
     )
 
@@ -112,7 +113,7 @@ class Filter(Model):
         description="what it measures: [range] or [range, velocity]"
     )
     manoeuvre_variance: Positive = Field(description="variance of the random jerk it allows for, (m/s³)²: D_M")
-    initial_scans: Annotated[Whole, Field(ge=2, le=100_000)] | None = Field(
+    initial_scans: whole(2, MOST_SCANS) | None = Field(
         None, description="scans in its least-squares start; default and least: 3 for range, 2 with velocity"
     )
 
@@ -139,7 +140,7 @@ class RangeDoppler(Study):
     baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
         None, description="name of the filter that gains are against; default: the first"
     )
-    scans: Annotated[Whole, Field(ge=2, le=100_000), Design()] = Field(description="number of plots")
+    scans: Annotated[whole(2, MOST_SCANS), Design()] = Field(description="number of plots")
 
     @model_validator(mode="after")
     def _fits_together(self):

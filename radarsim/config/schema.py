@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from radarsim.config.fields import Anything, Model, Name, Stem, Study, Whole
+from radarsim.config.fields import Anything, Model, Name, Stem, Study, whole
 
 STUDIES = {
     "range_doppler": "radarsim.config.range_doppler:RangeDoppler",
@@ -28,12 +28,10 @@ class Common(Model):
     sweep: Annotated[dict[str, Annotated[tuple[Anything, ...], Field(min_length=1)]], Field(min_length=1)] | None = (
         Field(None, description="a case for each combination of values: key or dotted path, and its list of values")
     )
-    realisations: Annotated[Whole, Field(ge=1, le=LARGEST_REALISATIONS)] | None = Field(
+    realisations: whole(1, LARGEST_REALISATIONS) | None = Field(
         None, description="how often the experiment is repeated"
     )
-    seed: Annotated[Whole, Field(ge=0, le=LARGEST_SEED)] | None = Field(
-        None, description="seed of the noise; default 1"
-    )
+    seed: whole(0, LARGEST_SEED) | None = Field(None, description="seed of the noise; default 1")
     figures: dict[Name, Annotated[tuple[Name, ...], Field(min_length=1)]] = Field(
         {}, description="for a figure the cases it shows: names, or patterns with * and ?"
     )

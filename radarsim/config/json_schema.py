@@ -1,0 +1,87 @@
+"""The schema of the YAML as JSON Schema, for editors and for `radarsim schema`."""
+
+import json
+import sys
+
+from pydantic.json_schema import models_json_schema
+
+from radarsim.config.schema import STUDIES, Common, study_model
+
+TITLE = "radarsim experiment"
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def schema_json() -> dict:
+    """JSON Schema of a config: one of the studies, told apart by `study`, or an `include` of other configs."""
+    models = {name: study_model(name) for name in STUDIES}
+    wanted = [(model, "validation") for model in (Common, *models.values())]
+    references, whole = models_json_schema(wanted, ref_template="#/$defs/{model}")
+    definitions = tidy(whole["$defs"])
+
+    def taken(model: type) -> dict:
+        return definitions.pop(references[(model, "validation")]["$ref"].removeprefix("#/$defs/"))
+
+    common = taken(Common)["properties"]
+    kinds = {name: _experiment(name, taken(model), common) for name, model in models.items()}
+    return {
+        "$schema": DIALECT,
+        "title": TITLE,
+        "oneOf": [{"$ref": f"#/$defs/{name}"} for name in (*kinds, "include")],
+        "$defs": {**kinds, "include": _comparison(common, list(models)), **definitions},
+    }
+
+
+def _experiment(name: str, study: dict, common: dict) -> dict:
+    """A config of one study: the common keys and its own."""
+    kept = {key: value for key, value in common.items() if key not in ("study", "include")}
+    about = {"const": name, "description": study["description"]}
+    return {
+        **study,
+        "title": name,
+        "properties": {"study": about, **study["properties"], **kept},
+        "required": ["study", *study.get("required", []), "realisations"],
+    }
+
+
+def _comparison(common: dict, studies: list[str]) -> dict:
+    """A config that includes others."""
+    return {
+        "title": "include",
+        "description": "Several configs compared in one run.",
+        "type": "object",
+        "properties": {**common, "study": {"enum": studies, "description": common["study"]["description"]}},
+        "required": ["include"],
+        "additionalProperties": False,
+    }
+
+
+def tidy(schema: object) -> object:
+    """A schema without what says nothing here: made-up titles, and null, which stands for a key that is not there."""
+    if isinstance(schema, list):
+        return [tidy(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    kept = {key: tidy(value) for key, value in schema.items() if not _idle(key, value)}
+    choices = [choice for choice in kept.get("anyOf", ()) if choice != {"type": "null"}]
+    if len(choices) == 1:
+        del kept["anyOf"]
+        kept = choices[0] | kept
+    elif choices:
+        kept["anyOf"] = choices
+    return kept
+
+
+def _idle(key: str, value: object) -> bool:
+    """Whether a keyword (and no property that happens to have its name) says nothing."""
+    if key == "title":
+        return isinstance(value, str)
+    return key == "discriminator" or (key == "default" and value in (None, {}))
+
+
+def schema_text() -> str:
+    """The schema as docs/schema.json holds it."""
+    return json.dumps(schema_json(), indent=1, ensure_ascii=False) + "\n"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(schema_text())
