@@ -208,4 +208,10 @@ def decoded(raw: bytes) -> tuple[dict, np.ndarray]:
     if hashlib.sha256(body).digest() != digest:
         raise Damage("truncated or altered")
     line, _, payload = body[len(MAGIC) :].partition(b"\n")
-    return json.loads(line), np.frombuffer(payload, dtype="<f8").astype(np.float64)
+    try:
+        header, values = json.loads(line), np.frombuffer(payload, dtype="<f8").astype(np.float64)
+    except ValueError as error:
+        raise Damage(f"not as this program writes: {error}") from error
+    if not isinstance(header, dict):
+        raise Damage("not as this program writes: no header")
+    return header, values

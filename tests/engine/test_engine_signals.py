@@ -1,0 +1,176 @@
+"""Real processes, really interrupted: signals answered in time, kills that cost about a second of work, and no byte."""
+
+import hashlib
+import random
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from radarsim.engine.blocks import Node
+from radarsim.engine.collect import collect, stored
+from radarsim.engine.store import Store
+from tests.engine.fake import Fake, textbook
+
+ROOT = Path(__file__).parents[2]
+WORK = Fake()
+LONG = 10**9
+
+
+@contextmanager
+def started(store, realisations, *options):
+    """A process that runs the fake work, once it says that it is under way."""
+    command = [sys.executable, "-m", "tests.engine.fake", str(store), str(realisations), *map(str, options)]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "running\n"
+            yield process
+        finally:
+            process.kill()
+
+
+def ended(process):
+    """Seconds until the process is gone, and its exit status."""
+    since = time.perf_counter()
+    status = process.wait(timeout=10)
+    return time.perf_counter() - since, status
+
+
+def whole(store, realisations):
+    """A run with this store gives the textbook's bytes; how much of it was found there."""
+    result = collect(WORK, realisations, store=store)
+    assert result.count == realisations
+    assert result.values.tobytes() == textbook(WORK, realisations).tobytes()
+    assert result.warnings == ()
+    return result.from_store
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_stops_the_run_within_two_seconds_and_all_it_did_is_stored(tmp_path, number):
+    with started(tmp_path, 16 * 4_000, "--pause", 1e-3) as process:
+        time.sleep(0.3)
+        process.send_signal(number)
+        seconds, status = ended(process)
+        said = process.stdout.read().split()
+    assert (seconds < 2, status) == (True, 128 + number)
+    count = int(said[0])
+    assert 0 < count < 16 * 4_000
+    assert said[1] == hashlib.sha256(textbook(WORK, count).tobytes()).hexdigest()
+    assert stored(WORK, count, tmp_path).from_store == count
+    assert whole(tmp_path, 16 * 4_000) == count
+
+
+def test_a_stuck_task_does_not_hold_up_the_stop(tmp_path):
+    with started(tmp_path, 16 * 4_000, "--pause", 1e-3, "--stuck-at", 16 * 900) as process:
+        time.sleep(1)
+        process.send_signal(signal.SIGINT)
+        seconds, status = ended(process)
+    assert (seconds < 2, status) == (True, 130)
+    assert whole(tmp_path, 16 * 4_000) >= 16 * 400
+
+
+def test_a_main_thread_that_never_asks_is_ended_within_two_seconds(tmp_path):
+    with started(tmp_path, 1, "--linger") as process:
+        process.send_signal(signal.SIGTERM)
+        seconds, status = ended(process)
+        assert "stopped by signal 15" in process.stderr.read()
+    assert (1 < seconds < 2, status) == (True, 143)
+
+
+@pytest.mark.parametrize("options", [["--linger"], ["--pause", 1e-3, "--stuck-at", 16 * 900]])
+def test_a_second_signal_ends_it_within_half_a_second(tmp_path, options):
+    with started(tmp_path, 16 * 4_000, *options) as process:
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.1)
+        process.send_signal(signal.SIGTERM)
+        seconds, status = ended(process)
+    assert (seconds < 0.5, status) == (True, 143)
+
+
+def killed_until_done(store, realisations, pause, period, draw, kills):
+    """SIGKILL at random moments, each run on the store that the last one left; how much was stored after each."""
+    found = []
+    for _ in range(kills):
+        with started(store, realisations, "--pause", pause, "--period", period) as process:
+            time.sleep(draw.uniform(0.0, 0.6))
+            process.kill()
+        nodes = [piece for piece in Store(store, WORK).pieces() if isinstance(piece, Node)]
+        found.append(sum(16 << node.level for node in nodes))
+    return found
+
+
+def test_kills_at_random_moments_lose_no_byte(tmp_path):
+    found = killed_until_done(tmp_path, 16 * 2_500 + 5, 1e-3, 0.05, random.Random(1), kills=2)
+    assert found[-1] > 0
+    assert whole(tmp_path, 16 * 2_500 + 5) > 0
+
+
+@pytest.mark.parametrize("copies", [2])
+def test_processes_on_one_store_at_once(tmp_path, copies):
+    sizes = [16 * 600 + copy for copy in range(copies)]
+    command = [sys.executable, "-m", "tests.engine.fake", "--pause", "1e-3", "--period", "0.0", str(tmp_path)]
+    running = [subprocess.Popen([*command, str(size)], cwd=ROOT, stdout=subprocess.PIPE, text=True) for size in sizes]
+    for process, size in zip(running, sizes, strict=True):
+        said, _ = process.communicate(timeout=60)
+        digest = hashlib.sha256(textbook(WORK, size).tobytes()).hexdigest()
+        assert said.split() == ["running", str(size), digest]
+    for size in sizes:
+        assert stored(WORK, size, tmp_path).count == size
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_twenty_kills_lose_no_byte(tmp_path, seed):
+    """Five each, at a rate of writing where most kills fall into it."""
+    killed_until_done(tmp_path, 16 * 6_000 + 5, 1e-3, 0.0, random.Random(seed), kills=5)
+    assert whole(tmp_path, 16 * 6_000 + 5) > 0
+
+
+@pytest.mark.slow
+def test_a_kill_loses_about_a_second_of_work(tmp_path):
+    """At the period that is shipped: 1 s, and what the disk took."""
+    with started(tmp_path, LONG, "--pause", 1e-3, "--period", 1.0) as process:
+        time.sleep(5.3)
+        process.kill()
+    nodes = [piece for piece in Store(tmp_path, WORK).pieces() if isinstance(piece, Node)]
+    assert sum(1 << node.level for node in nodes) > 2 * 0.6 * 3.3 / 1.2e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(25))
+def test_fifty_of_fifty_signals_are_answered_in_time(tmp_path, seed):
+    draw = random.Random(seed)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        with started(tmp_path, 16 * 100_000, "--pause", 1e-3, "--period", 0.0) as process:
+            time.sleep(draw.uniform(0.0, 0.5))
+            process.send_signal(number)
+            seconds, status = ended(process)
+        assert (seconds < 2, status) == (True, 128 + number)
+
+
+@pytest.mark.slow
+def test_a_real_full_disk_in_a_file_system_of_its_own(tmp_path):
+    """Needs the right to mount; a disk of 64 kB on which a run of 1 MB vectors does not fit, and a small one stays."""
+    script = f"""set -e
+        mount -t tmpfs -o size=64k tmpfs {tmp_path}
+        {sys.executable} -m tests.engine.fake {tmp_path} 1000
+        sha256sum {tmp_path}/.blocks/ab12/* > /tmp/before.$$
+        head -c 1M /dev/zero > {tmp_path}/filler || true
+        {sys.executable} -m tests.engine.fake {tmp_path} 100000 2> /tmp/error.$$ && exit 1
+        grep -q 'StoreError: {tmp_path}/.blocks/ab12/.*No space left on device' /tmp/error.$$
+        sha256sum --check --quiet /tmp/before.$$
+        rm {tmp_path}/filler /tmp/before.$$ /tmp/error.$$
+        {sys.executable} -m tests.engine.fake {tmp_path} 100000
+    """
+    if subprocess.run(["unshare", "--mount", "true"], check=False, capture_output=True).returncode:
+        pytest.skip("no right to mount")
+    done = subprocess.run(
+        ["unshare", "--mount", "bash", "-c", script], cwd=ROOT, check=True, capture_output=True, text=True
+    )
+    digest = hashlib.sha256(textbook(WORK, 100_000).tobytes()).hexdigest()
+    assert done.stdout.split()[-3:] == ["running", "100000", digest]

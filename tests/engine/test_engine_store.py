@@ -1,0 +1,444 @@
+"""The store: nothing is computed twice, nothing damaged is believed, a full disk or a second run loses nothing."""
+
+import errno
+import hashlib
+import json
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from radarsim.engine import executors, keeper, store
+from radarsim.engine.blocks import Node, Partial, Total, decomposition
+from radarsim.engine.collect import collect, stored
+from radarsim.engine.moments import Sums
+from radarsim.engine.store import Store, decoded, encoded, piece_named
+from radarsim.errors import NonFiniteError, StoreError
+from tests.engine.fake import Fake, textbook
+
+WORK = Fake()
+N = 5_005  # 312 blocks of 16, in nodes of 256, 32, 16 and 8, and 13 realisations
+NAMES = ["L03-38.sums", "L04-18.sums", "L05-8.sums", "L08-0.sums", "P312-13.sums", "T5005.sums"]
+
+
+@pytest.fixture
+def blocks(tmp_path):
+    """The directory of the finished blocks of WORK under the results directory tmp_path."""
+    return tmp_path / ".blocks" / WORK.identity
+
+
+def names(directory):
+    return sorted(path.name for path in directory.iterdir())
+
+
+def contents(directory):
+    return {path.name: path.read_bytes() for path in directory.iterdir()}
+
+
+def same(result, realisations=N):
+    return result.count == realisations and result.values.tobytes() == textbook(WORK, realisations).tobytes()
+
+
+def test_what_is_stored_is_not_computed_again(tmp_path, blocks):
+    first = collect(WORK, N, store=tmp_path)
+    assert (first.computed, first.from_store, first.warnings) == (N, 0, ())
+    assert names(blocks) == NAMES
+    for name in [None, *NAMES]:
+        if name:
+            (blocks / name).unlink()
+        again = collect(WORK, N, store=tmp_path)
+        assert same(again)
+        assert (again.computed, again.from_store) == ((N, 0) if name == "T5005.sums" else (0, N))
+
+
+def test_nodes_alone_make_the_total_which_is_then_stored(tmp_path, blocks):
+    collect(WORK, N, store=tmp_path)
+    (blocks / "T5005.sums").unlink()
+    assert same(stored(WORK, N, tmp_path))
+    assert "T5005.sums" not in names(blocks)
+    again = collect(WORK, N, store=tmp_path)
+    assert same(again)
+    assert again.computed == 0
+    assert names(blocks) == NAMES
+
+
+@pytest.mark.parametrize(("name", "lost"), [("L03-38", 8 * 16), ("L08-0", 256 * 16), ("P312-13", 13)])
+def test_only_what_is_lost_is_computed(tmp_path, blocks, name, lost):
+    collect(WORK, N, store=tmp_path)
+    for gone in (name, "T5005"):
+        (blocks / f"{gone}.sums").unlink()
+    assert stored(WORK, N, tmp_path) is None
+    again = collect(WORK, N, store=tmp_path)
+    assert same(again)
+    assert again.computed == lost
+    assert names(blocks) == NAMES
+
+
+def test_any_history_of_n_gives_the_bytes_of_each_n_at_once(tmp_path, blocks):
+    sizes = [10_000, 100_000, 50_000, 7, 100_000, 16, 99_999, 10_000]
+    for realisations in sizes:
+        assert same(collect(WORK, realisations, store=tmp_path), realisations)
+    for realisations in sizes:
+        before = contents(blocks)
+        assert same(stored(WORK, realisations, tmp_path), realisations)
+        assert contents(blocks) == before
+    assert stored(WORK, 4_321, tmp_path) is None
+
+
+def test_a_larger_run_computes_only_what_is_new_and_the_cut_block_again(tmp_path, blocks):
+    collect(WORK, 10_001, store=tmp_path)
+    larger = collect(WORK, 100_000, store=tmp_path)
+    assert same(larger, 100_000)
+    assert larger.from_store == 10_000
+    assert larger.computed == 90_000
+    nodes = {piece for piece in Store(tmp_path, WORK).pieces() if isinstance(piece, Node)}
+    assert nodes == set(decomposition(100_000 // 16))
+    assert not [name for name in names(blocks) if name.startswith("P")]
+
+
+def test_what_lies_inside_a_stored_node_is_removed_and_nothing_else(tmp_path, blocks):
+    collect(WORK, 16 * 16, store=tmp_path)
+    collect(WORK, 16 * 12, store=tmp_path)
+    assert names(blocks) == ["L02-2.sums", "L03-0.sums", "L04-0.sums", "T192.sums", "T256.sums"]
+    collect(WORK, 16 * 32, store=tmp_path)
+    assert names(blocks) == ["L05-0.sums", "T192.sums", "T256.sums", "T512.sums"]
+
+
+def test_other_identities_and_block_sizes_share_nothing(tmp_path):
+    collect(WORK, N, store=tmp_path)
+    assert collect(Fake(identity="cd"), N, store=tmp_path).from_store == 0
+    changed = collect(Fake(block=32), N, store=tmp_path)
+    assert changed.from_store == 0
+    assert len(changed.warnings) > 0
+
+
+@pytest.mark.parametrize("identity", ["", "../x", "AB", "a/b", "ab\n"])
+def test_an_identity_is_no_path(tmp_path, identity):
+    with pytest.raises(ValueError, match="identity"):
+        Store(tmp_path, Fake(identity=identity))
+
+
+def test_names_are_read_back_and_foreign_files_left_alone(tmp_path, blocks):
+    for piece in (Node(0, 0), Node(12, 3456789), Partial(0, 1), Partial(99, 4095), Total(10**12)):
+        assert piece_named(f"{piece.name}.sums") == piece
+    for name in ("L1-2.sums", "L01-2.sum", ".L01-2.sums.abc.tmp", "T.sums", "L01--2.sums", "L01-2.sums.damaged", "x"):
+        assert piece_named(name) is None
+    collect(WORK, 32, store=tmp_path)
+    (blocks / "notes.txt").write_text("mine")
+    collect(WORK, 64, store=tmp_path)
+    assert (blocks / "notes.txt").read_text() == "mine"
+
+
+def test_temporary_files_of_a_killed_run_are_removed_once_they_are_old(tmp_path, blocks):
+    collect(WORK, 32, store=tmp_path)
+    fresh, old = blocks / ".L00-9.sums.aa.tmp", blocks / ".L00-9.sums.bb.tmp"
+    fresh.write_bytes(b"half")
+    old.write_bytes(b"half")
+    os.utime(old, (time.time() - 3600,) * 2)
+    collect(WORK, 64, store=tmp_path)
+    assert fresh.exists()
+    assert not old.exists()
+
+
+def reforged(path, **changes):
+    """A file with a right checksum and a changed header or sums."""
+    header, values = decoded(path.read_bytes())
+    values = changes.pop("values", values)
+    path.write_bytes(encoded(header | changes, values))
+
+
+DAMAGE = {
+    "empty": lambda path: path.write_bytes(b""),
+    "one byte": lambda path: path.write_bytes(b"r"),
+    "magic only": lambda path: path.write_bytes(store.MAGIC),
+    "text": lambda path: path.write_bytes(b"hello\n" * 100),
+    "half": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
+    "without its last byte": lambda path: path.write_bytes(path.read_bytes()[:-1]),
+    "a byte more": lambda path: path.write_bytes(path.read_bytes() + b"\0"),
+    "zeros": lambda path: path.write_bytes(bytes(path.stat().st_size)),
+    "another identity": lambda path: reforged(path, identity="cd34"),
+    "another piece": lambda path: reforged(path, piece="L00-0"),
+    "another place": lambda path: reforged(path, first=1),
+    "another count": lambda path: reforged(path, count=1),
+    "another block": lambda path: reforged(path, block=32),
+    "another size": lambda path: reforged(path, size=6),
+    "fewer numbers": lambda path: reforged(path, values=np.ones(4)),
+    "not a number": lambda path: reforged(path, values=np.array([1.0, 2.0, np.nan, 4.0, 5.0])),
+    "no JSON": lambda path: path.write_bytes(signed(store.MAGIC + b"{]\n" + bytes(40))),
+    "JSON of another kind": lambda path: path.write_bytes(signed(store.MAGIC + b"[]\n" + bytes(40))),
+    "part of a number": lambda path: path.write_bytes(signed(store.MAGIC + b"{}\n" + bytes(43))),
+}
+
+
+def signed(body):
+    return body + hashlib.sha256(body).digest()
+
+
+@pytest.mark.parametrize("name", ["L08-0.sums", "P312-13.sums", "T5005.sums"])
+@pytest.mark.parametrize("kind", DAMAGE)
+def test_damage_is_found_named_and_computed_again(tmp_path, blocks, kind, name):
+    collect(WORK, N, store=tmp_path)
+    DAMAGE[kind](blocks / name)
+    if not name.startswith("T"):
+        (blocks / "T5005.sums").unlink()
+    result = collect(WORK, N, store=tmp_path)
+    assert same(result)
+    assert [warning.split(":")[0] for warning in result.warnings] == [str(blocks / name)]
+    assert result.computed == {"L08-0.sums": 4096, "P312-13.sums": 13, "T5005.sums": 0}[name]
+    assert names(blocks) == sorted([*NAMES, f"{name}.damaged"])
+    clean = collect(WORK, N, store=tmp_path)
+    assert same(clean)
+    assert (clean.warnings, clean.computed) == ((), 0)
+
+
+def test_a_hundred_of_a_hundred_flipped_bits_are_found(tmp_path, blocks):
+    collect(WORK, N, store=tmp_path)
+    good, draw = contents(blocks), random.Random(7)
+    for _ in range(100):
+        name = draw.choice(NAMES)
+        raw = bytearray(good[name])
+        raw[draw.randrange(len(raw))] ^= 1 << draw.randrange(8)
+        (blocks / name).write_bytes(raw)
+        reader = Store(tmp_path, WORK)
+        assert reader.read(piece_named(name)) is None
+        assert len(reader.warnings) == 1
+        (blocks / name).write_bytes(good[name])
+
+
+def test_every_truncation_is_found(tmp_path, blocks):
+    collect(WORK, 16, store=tmp_path)
+    good = (blocks / "L00-0.sums").read_bytes()
+    for length in range(len(good)):
+        (blocks / "L00-0.sums").write_bytes(good[:length])
+        assert Store(tmp_path, WORK).read(Node(0, 0)) is None
+
+
+def test_damage_that_cannot_be_moved_aside_is_not_believed_either(tmp_path, blocks, monkeypatch):
+    collect(WORK, N, store=tmp_path)
+    (blocks / "T5005.sums").unlink()
+    (blocks / "L08-0.sums").write_bytes(b"bad")
+
+    def refuse(*_):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", refuse)
+        assert stored(WORK, N, tmp_path) is None
+    result = collect(WORK, N, store=tmp_path)
+    assert same(result)
+    assert len(result.warnings) == 1
+
+
+def full_disk(monkeypatch, calls_that_work):
+    """From some call of fsync on, there is no space left."""
+    left = iter(range(calls_that_work))
+    fsync = os.fsync
+
+    def limited(descriptor):
+        if next(left, None) is None:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", limited)
+
+
+@pytest.mark.parametrize("calls_that_work", [0, 1, 2, 5])
+def test_a_full_disk_names_the_file_and_leaves_the_old_ones(tmp_path, blocks, monkeypatch, calls_that_work):
+    collect(WORK, N, store=tmp_path)
+    before = contents(blocks)
+    with monkeypatch.context() as patch:
+        full_disk(patch, calls_that_work)
+        with pytest.raises(StoreError, match=r"\.blocks/ab12/.*: cannot be written: No space left on device") as caught:
+            collect(WORK, 100_000, store=tmp_path)
+    assert caught.value.exit_code == 4
+    after = contents(blocks)
+    assert before.items() <= after.items()
+    assert not [name for name in after if name.endswith(".tmp")]
+    assert len(after) == len(before) + calls_that_work
+    resumed = collect(WORK, 100_000, store=tmp_path)
+    assert same(resumed, 100_000)
+    assert resumed.from_store >= 4_992
+
+
+def test_a_disk_that_fills_up_while_running_ends_the_run_at_once(tmp_path, blocks, monkeypatch):
+    monkeypatch.setattr(keeper, "PERIOD_S", 0.05)
+    full_disk(monkeypatch, 3)
+    started = time.perf_counter()
+    with pytest.raises(StoreError, match="No space left"):
+        collect(Fake(pause_s=1e-3), 10**9, store=tmp_path, threads=2)
+    assert time.perf_counter() - started < 3
+    assert not [name for name in names(blocks) if name.endswith(".tmp")]
+
+
+LIMITED = """if True:
+    import resource, signal
+    from radarsim.engine.collect import collect
+    from radarsim.errors import StoreError
+    from tests.engine.fake import Fake
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200, 200))
+    try:
+        collect(Fake(), 1_000, store={store!r})
+    except StoreError as error:
+        raise SystemExit(error.exit_code)
+"""
+
+
+def test_a_file_that_may_not_grow_is_never_seen_cut_off(tmp_path, blocks):
+    """The kernel itself cuts the write short, as a quota does."""
+    program = [sys.executable, "-c", LIMITED.format(store=str(tmp_path))]
+    assert subprocess.run(program, cwd=Path(__file__).parents[2], check=False).returncode == 4
+    assert names(blocks) == []
+
+
+@pytest.mark.parametrize("obstacle", ["", ".blocks", ".blocks/ab12"])
+def test_a_directory_that_cannot_be_made_is_named(tmp_path, obstacle):
+    path = tmp_path / "results" / obstacle
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("a file")
+    with pytest.raises(StoreError, match=re.escape(str(path))):
+        collect(WORK, 100, store=tmp_path / "results")
+
+
+def test_numbers_that_are_not_finite_are_not_stored_and_the_rest_is(tmp_path, blocks):
+    with pytest.raises(NonFiniteError, match="realisations 992 to 1007"):
+        collect(Fake(bad=1_000), 10_000, store=tmp_path, threads=2)
+    kept = [piece for piece in Store(tmp_path, WORK).pieces() if isinstance(piece, Node)]
+    assert kept
+    assert not any(node.first <= 62 < node.stop for node in kept)
+    mended = collect(WORK, 10_000, store=tmp_path)
+    assert same(mended, 10_000)
+    assert mended.from_store > 0
+
+
+def test_an_interruption_in_somebodys_own_program_keeps_what_is_done(tmp_path):
+    asked = iter([None] * 8)
+
+    def stop():
+        if next(asked, "end") == "end":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        collect(Fake(pause_s=1e-3), 16 * 200, store=tmp_path, threads=2, stop=stop)
+    resumed = collect(WORK, 16 * 200, store=tmp_path)
+    assert same(resumed, 16 * 200)
+    assert resumed.from_store > 0
+
+
+def test_a_stopped_run_can_be_reported_after_a_longer_one(tmp_path):
+    asked = iter([None] * 8)
+    cut = collect(Fake(pause_s=1e-3), 16 * 200, store=tmp_path, threads=2, stop=lambda: next(asked, "enough"))
+    assert 0 < cut.count < 16 * 200
+    longer = collect(WORK, 16 * 200, store=tmp_path)
+    assert same(longer, 16 * 200)
+    assert longer.from_store == cut.count
+    assert same(stored(WORK, cut.count, tmp_path), cut.count)
+
+
+def test_instruction_sets_are_recorded_and_mixing_warns(tmp_path, blocks, monkeypatch):
+    collect(WORK, N, store=tmp_path)
+    header, _ = decoded((blocks / "L08-0.sums").read_bytes())
+    assert header["platforms"] == [executors.instruction_set()]
+    assert header["versions"].keys() >= {"python", "numpy"}
+    monkeypatch.setattr(executors, "instruction_set", lambda: "abacus")
+    assert collect(WORK, N, store=tmp_path).warnings == ()
+    mixed = collect(WORK, 2 * N, store=tmp_path)
+    assert len(mixed.warnings) == 1
+    assert "abacus; " in mixed.warnings[0]
+    assert collect(WORK, 2 * N, store=tmp_path).warnings == mixed.warnings
+
+
+def test_what_is_new_is_written_about_once_a_period(tmp_path, monkeypatch):
+    monkeypatch.setattr(keeper, "PERIOD_S", 0.2)
+    written = []
+    write = Store.write
+
+    def noted(self, pieces):
+        written.append((time.perf_counter(), sum(sums.count for sums in pieces.values())))
+        write(self, pieces)
+
+    monkeypatch.setattr(Store, "write", noted)
+    result = collect(Fake(pause_s=1e-3), 16 * 2_000, store=tmp_path, threads=2)
+    assert same(result, 16 * 2_000)
+    times = [moment for moment, _ in written]
+    assert len(written) >= 4
+    assert all(later - earlier >= 0.19 for earlier, later in pairwise(times[:-1]))
+
+
+class Slow(Store):
+    """A disk that takes its time."""
+
+    def write(self, pieces):
+        time.sleep(0.3)
+        super().write(pieces)
+
+
+def test_workers_do_not_wait_for_the_disk(tmp_path, monkeypatch):
+    monkeypatch.setattr(keeper, "PERIOD_S", 0.05)
+    slow = keeper.Keeper(Slow(tmp_path, WORK))
+    time.sleep(0.06)
+    started = time.perf_counter()
+    slow.offer({Node(0, 0): Sums(16, np.ones(5))})
+    slow.offer({Node(0, 0): Sums(16, np.ones(5))})
+    assert time.perf_counter() - started < 0.1
+    slow.finish({Node(0, 0): Sums(16, np.ones(5)), Total(16): Sums(16, np.ones(5))})
+    assert Store(tmp_path, WORK).pieces() == {Node(0, 0), Total(16)}
+
+
+@pytest.mark.parametrize("sizes", [(20_000, 20_000), (20_000, 9_999, 33_333)])
+def test_several_runs_on_one_store_at_once(tmp_path, monkeypatch, sizes):
+    monkeypatch.setattr(keeper, "PERIOD_S", 0.0)
+    results = {}
+
+    def run(place, realisations):
+        results[place] = collect(WORK, realisations, store=tmp_path, threads=2)
+
+    for _ in range(2):
+        runs = [threading.Thread(target=run, args=pair) for pair in enumerate(sizes)]
+        for thread in runs:
+            thread.start()
+        for thread in runs:
+            thread.join()
+        for place, realisations in enumerate(sizes):
+            assert same(results[place], realisations)
+            assert results[place].warnings == ()
+            assert same(stored(WORK, realisations, tmp_path), realisations)
+
+
+def test_a_node_merged_away_between_listing_and_reading_is_found_in_its_parent(tmp_path, monkeypatch):
+    collect(WORK, 16 * 24, store=tmp_path)
+    before = Store(tmp_path, WORK).pieces()
+    collect(WORK, 16 * 32, store=tmp_path)
+    after = Store(tmp_path, WORK).pieces()
+    listings = iter([before, after])
+    monkeypatch.setattr(Store, "pieces", lambda self: next(listings))
+    reader = Store(tmp_path, WORK)
+    assert list(reader.forest(32).nodes) == [Node(5, 0)]
+    assert reader.warnings == []
+
+
+def test_stores_are_united_by_copying(tmp_path):
+    asked = iter([None] * 6)
+    collect(Fake(pause_s=1e-3), 16 * 200, store=tmp_path / "a", threads=2, stop=lambda: next(asked, "enough"))
+    collect(WORK, 16 * 100, store=tmp_path / "b")
+    shutil.copytree(tmp_path / "a", tmp_path / "b", dirs_exist_ok=True)
+    assert same(collect(WORK, 16 * 200, store=tmp_path / "b"), 16 * 200)
+
+
+def test_the_file_is_what_the_description_says(tmp_path, blocks):
+    collect(WORK, 16, store=tmp_path)
+    raw = (blocks / "L00-0.sums").read_bytes()
+    magic, header, rest = raw.split(b"\n", 2)
+    assert magic == b"radarsim sums 1"
+    assert json.loads(header)["count"] == 16
+    assert np.frombuffer(rest[:40], "<f8").tobytes() == WORK.simulate(0, 16).tobytes()
+    assert rest[40:] == hashlib.sha256(raw[:-32]).digest()
