@@ -3,6 +3,11 @@
 Numba's cache on disk looks at the file of the compiled function alone: an edit of a function that it calls, in another
 file, goes unnoticed and gives silently wrong results. So the cache directory is named after a hash of all kernel
 sources.
+
+LLVM prefers registers of 256 bits on Intel processors that have 512, for the sake of programs that seldom use vectors.
+Kernels ask for 512 one by one, in an attribute of the LLVM function; elsewhere it changes nothing. Measured on a Cascade
+Lake: sums over samples 1.7 times faster, normals 1.3 times. Numba's CPU_FEATURES would do the same for the whole process,
+but only where no other user of Numba was there first, and then the order of sums would depend on who was.
 """
 
 import hashlib
@@ -13,16 +18,40 @@ from pathlib import Path
 
 import numba
 from numba import config, njit
-from numba.core.codegen import get_host_cpu_features
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.lowering import Lower
+from numba.core.typed_passes import NativeLowering
 
 # No `reassoc` (part of fastmath=True): it folds rounding tricks such as (x + M) - M and changes the order of sums.
 FLAGS = frozenset({"contract", "arcp", "nsz", "nnan", "ninf"})
 
 
-# LLVM prefers 256-bit vectors on Intel machines that have 512-bit ones. Measured on a Cascade Lake: 0.58 of the hand-written
-# AVX-512 C with its preference, 1.00 without. A machine without AVX-512, or a user's own setting, is left as it is.
-if config.CPU_FEATURES is None and "+avx512f" in get_host_cpu_features():
-    config.CPU_FEATURES = get_host_cpu_features() + ",-prefer-256-bit"
+class WideLower(Lower):
+    """Numba's translation to LLVM, with the attribute that lets loops use registers of 512 bits."""
+
+    def setup_function(self, fndesc):
+        super().setup_function(fndesc)
+        # llvmlite's attribute set admits only the names it knows, but prints all it holds.
+        set.add(self.function.attributes, '"prefer-vector-width"="512"')
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class WideLowering(NativeLowering):
+    """The pass that runs it."""
+
+    _name = "wide_native_lowering"
+    lowering_class = WideLower
+
+
+class WideCompiler(CompilerBase):
+    """Numba's ordinary pipeline but for that pass."""
+
+    def define_pipelines(self):
+        manager = DefaultPassBuilder.define_nopython_pipeline(self.state, "wide")
+        manager.passes = [(WideLowering if step is NativeLowering else step, name) for step, name in manager.passes]
+        manager.finalize()
+        return [manager]
 
 
 def sources_hash() -> str:
@@ -34,7 +63,7 @@ def sources_hash() -> str:
 
 
 def cache_root() -> Path:
-    """The first writable of $RADARSIM_CACHE_DIR, $XDG_CACHE_HOME/radarsim, ~/.cache/radarsim, the temporary directory."""
+    """The first writable of $RADARSIM_CACHE_DIR, $XDG_CACHE_HOME/radarsim, ~/.cache/radarsim, temporary directory."""
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     candidates = [os.environ.get("RADARSIM_CACHE_DIR"), os.path.join(home, "radarsim")]
     for candidate in filter(None, candidates):
@@ -57,14 +86,14 @@ def compiler(**options) -> Callable:
         before = config.CACHE_DIR
         config.CACHE_DIR = str(CACHE_DIRECTORY)
         try:
-            return njit(error_model="numpy", cache=True, **options)(function)
+            return njit(error_model="numpy", cache=True, pipeline_class=WideCompiler, **options)(function)
         finally:
             config.CACHE_DIR = before
 
     return decorate
 
 
-inline = njit(fastmath=set(FLAGS), error_model="numpy", forceinline=True)
+inline = njit(fastmath=set(FLAGS), error_model="numpy", forceinline=True, pipeline_class=WideCompiler)
 kernel = compiler(fastmath=set(FLAGS), nogil=True)
 # Reassociation is allowed only where it lets independent sums run in vector registers; the code fixes their order.
 summing = compiler(fastmath=set(FLAGS | {"reassoc"}), nogil=True)
