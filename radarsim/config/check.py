@@ -58,7 +58,8 @@ def _tell(model: type[BaseModel], document: Document, found: dict, faults: Fault
         path = (*path, context["discriminator"].strip("'"))
         kind = kind if document.get(path) is not ABSENT else "missing"
     if kind == "at":
-        path = twin(document.data, path, context["key"])
+        *outer, key = context["key"].split(".")
+        path = twin(document.data, (*path, *outer), key)
     if faults.spoiled(document.origin(path), path):
         return
     if kind == "extra_forbidden":

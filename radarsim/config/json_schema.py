@@ -11,7 +11,7 @@ TITLE = "radarsim experiment"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def schema_json() -> dict:
+def schema() -> dict:
     """JSON Schema of a config: one of the studies, told apart by `study`, or an `include` of other configs."""
     models = {name: study_model(name) for name in STUDIES}
     wanted = [(model, "validation") for model in (Common, *models.values())]
@@ -55,13 +55,13 @@ def _comparison(common: dict, studies: list[str]) -> dict:
     }
 
 
-def tidy(schema: object) -> object:
+def tidy(part: object) -> object:
     """A schema without what says nothing here: made-up titles, and null, which stands for a key that is not there."""
-    if isinstance(schema, list):
-        return [tidy(item) for item in schema]
-    if not isinstance(schema, dict):
-        return schema
-    kept = {key: tidy(value) for key, value in schema.items() if not _idle(key, value)}
+    if isinstance(part, list):
+        return [tidy(item) for item in part]
+    if not isinstance(part, dict):
+        return part
+    kept = {key: tidy(value) for key, value in part.items() if not _idle(key, value)}
     choices = [choice for choice in kept.get("anyOf", ()) if choice != {"type": "null"}]
     if len(choices) == 1:
         del kept["anyOf"]
@@ -78,10 +78,10 @@ def _idle(key: str, value: object) -> bool:
     return key == "discriminator" or (key == "default" and value in (None, {}))
 
 
-def schema_text() -> str:
-    """The schema as docs/schema.json holds it."""
-    return json.dumps(schema_json(), indent=1, ensure_ascii=False) + "\n"
+def schema_json() -> str:
+    """The schema as text; docs/schema.json holds it."""
+    return json.dumps(schema(), indent=1, ensure_ascii=False)
 
 
 if __name__ == "__main__":
-    sys.stdout.write(schema_text())
+    sys.stdout.write(schema_json() + "\n")

@@ -14,7 +14,7 @@ from radarsim.config.identity import canonical, world
 from radarsim.config.lookup import config_file, did_you_mean, is_stem, stems
 from radarsim.config.values import DEEPEST, NotFinite, from_python, from_text
 
-__all__ = ["Case", "Experiment", "canonical", "load", "world"]
+__all__ = ["Case", "Experiment", "canonical", "load", "schema_json", "world"]
 
 LARGEST_FILE = 256_000  # bytes
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same events and marks, ten times faster
@@ -32,6 +32,13 @@ def load(source: str | os.PathLike | Mapping, overrides: Iterable[str] = ()) -> 
     experiment = document and Expander(read, settings, faults).experiment(document)
     faults.raise_if_any()
     return experiment
+
+
+def schema_json() -> str:
+    """JSON Schema of the YAML, as text."""
+    from radarsim.config import json_schema  # here, because a run has no use for it
+
+    return json_schema.schema_json()
 
 
 def _from_mapping(source: Mapping, faults: Faults) -> Document:

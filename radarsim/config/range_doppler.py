@@ -1,9 +1,11 @@
 """Keys of the range_doppler study (P1): a radar, a target in range, linear filters with and without the velocity."""
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from radarsim.config.faults import short
 from radarsim.config.fields import (
     Design,
     Display,
@@ -21,6 +23,11 @@ from radarsim.config.fields import (
 )
 
 MOST_SCANS = 100_000
+FARTHEST_M = 1e12  # a range that still resolves a millimetre in double precision
+NEAREST_M = 100.0  # a target that flies over the radar has no radial motion that a filter could follow
+FASTEST_MPS = 12_000.0  # escape from the Earth
+HARDEST_MPS2 = 1000.0  # about 100 g, more than any missile's
+STANDARD_GRAVITY_MPS2 = 9.80665  # ISO 80000-3
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
 
 
@@ -50,6 +57,15 @@ class Polynomial(Model):
     kind: Literal["polynomial"] = Field(description="a polynomial of any degree up to 11")
     coefficients: Coefficients = Field(description=COEFFICIENTS)
 
+    def reach_m(self, t: float) -> float:
+        """A bound on the range up to a time t (s)."""
+        return polynomial_reach_m(self.coefficients, t)
+
+
+def polynomial_reach_m(coefficients: tuple[float, ...], t: float) -> float:
+    """A bound on the size of a polynomial up to a time t (s)."""
+    return sum(abs(c) * t**i / math.factorial(i) for i, c in enumerate(coefficients))
+
 
 class Starting(Model):
     """What targets that break the model share: a moment, in seconds or as a scan, at which they do."""
@@ -77,7 +93,13 @@ class AccelerationStart(Starting):
 
     kind: Literal["acceleration_start"] = Field(description="a constant acceleration that sets in at a moment")
     coefficients: Coefficients = Field(description=COEFFICIENTS)
-    acceleration_mps2: Number = Field(description="radial acceleration added from then on, m/s²")
+    acceleration_mps2: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = Field(
+        description="radial acceleration added from then on, m/s²"
+    )
+
+    def reach_m(self, t: float) -> float:
+        """A bound on the range up to a time t (s)."""
+        return polynomial_reach_m(self.coefficients, t) + abs(self.acceleration_mps2) * t**2 / 2
 
 
 class JerkPulse(Starting):
@@ -85,8 +107,14 @@ class JerkPulse(Starting):
 
     kind: Literal["jerk_pulse"] = Field(description="a constant jerk for a while")
     coefficients: Coefficients = Field(description=COEFFICIENTS)
-    jerk_mps3: Number = Field(description="radial jerk added during the pulse, m/s³")
+    jerk_mps3: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = Field(
+        description="radial jerk added during the pulse, m/s³"
+    )
     duration_s: Positive = Field(description="length of the pulse, s")
+
+    def reach_m(self, t: float) -> float:
+        """A bound on the range up to a time t (s)."""
+        return polynomial_reach_m(self.coefficients, t) + abs(self.jerk_mps3) * t**3 / 6
 
 
 class Turn(Starting):
@@ -94,12 +122,41 @@ class Turn(Starting):
 
     kind: Literal["turn"] = Field(description="a turn of given g between two straight legs")
     range_m: Positive = Field(description="range at the first plot, m")
-    speed_mps: Positive = Field(description="speed, constant, m/s")
+    speed_mps: Annotated[Positive, Field(le=FASTEST_MPS)] = Field(description="speed, constant, m/s")
     aspect_rad: Number = Field(description="direction of flight from the line of sight outwards, rad (pi: straight in)")
-    acceleration_g: Number = Field(
+    acceleration_g: Annotated[Number, Field(ge=-100, le=100)] = Field(
         description="lateral acceleration of the turn, standard gravities; positive: to the left"
     )
     duration_s: Positive = Field(description="length of the turn, s")
+
+    def reach_m(self, t: float) -> float:
+        """A bound on the range up to a time t (s)."""
+        return self.range_m + self.speed_mps * t
+
+    def closest_m(self, t: float) -> float:
+        """The least distance from the radar up to a time t (s): of two straight legs and of the arc between them."""
+        begin, end = min(self.start_s, t), min(self.start_s + self.duration_s, t)
+        rate = self.acceleration_g * STANDARD_GRAVITY_MPS2 / self.speed_mps
+        x, y, heading = self.range_m, 0.0, self.aspect_rad
+        nearest, x, y = straight_leg(x, y, heading, self.speed_mps * begin)
+        if rate == 0:
+            return min(nearest, straight_leg(x, y, heading, self.speed_mps * (t - begin))[0])
+        radius = self.speed_mps / rate
+        centre = (x - radius * math.sin(heading), y + radius * math.cos(heading))
+        towards = math.atan2(-centre[1] / radius, -centre[0] / radius)  # of the point of the circle nearest the radar
+        turned = (math.copysign(1.0, rate) * (towards + math.pi / 2 - heading)) % (2 * math.pi)
+        if turned <= abs(rate) * (end - begin):
+            nearest = min(nearest, abs(math.hypot(*centre) - abs(radius)))
+        heading += rate * (end - begin)
+        x, y = centre[0] + radius * math.sin(heading), centre[1] - radius * math.cos(heading)
+        return min(nearest, straight_leg(x, y, heading, self.speed_mps * (t - end))[0])
+
+
+def straight_leg(x: float, y: float, heading: float, length: float) -> tuple[float, float, float]:
+    """The least distance from the origin along a straight leg from (x, y), and the point where it ends."""
+    along = min(max(-(x * math.cos(heading) + y * math.sin(heading)), 0.0), length)
+    nearest = math.hypot(x + along * math.cos(heading), y + along * math.sin(heading))
+    return nearest, x + length * math.cos(heading), y + length * math.sin(heading)
 
 
 Target = Annotated[Polynomial | AccelerationStart | JerkPulse | Turn, Field(discriminator="kind")]
@@ -150,6 +207,12 @@ class RangeDoppler(Study):
         slowest = max(self.filters, key=lambda f: f.initial_scans)
         if self.scans < slowest.initial_scans:
             raise at("scans", f"must be >= {slowest.initial_scans} for the initialisation of filter {slowest.name}")
-        if isinstance(self.target, Starting):
-            return self.model_copy(update={"target": self.target.timed(self.radar.scan_period_s)})
-        return self
+        last = (self.scans - 1) * self.radar.scan_period_s
+        if self.target.reach_m(last) > FARTHEST_M:
+            raise at("target", f"must stay within 1e12 m of the radar up to the last plot, at {short(last)} s")
+        if not isinstance(self.target, Starting):
+            return self
+        target = self.target.timed(self.radar.scan_period_s)
+        if isinstance(target, Turn) and target.closest_m(last) < NEAREST_M:
+            raise at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")
+        return self.model_copy(update={"target": target})
