@@ -45,8 +45,8 @@ class Count(click.ParamType):
 def main():
     """Monte-Carlo experiments on radar and sonar track processing.
 
-    An experiment is a YAML file: a sensor, a target, the filters compared. radarsim runs 10⁵ and more realisations of it
-    and writes σ(k), relative gains with 95 % intervals, figures, a report, and a verdict on the papers' claims.
+    An experiment is a YAML file: a sensor, a target, the filters compared. radarsim runs 10⁵ and more realisations
+    of it and writes σ(k), relative gains with 95 % intervals, figures, a report, and a verdict on the papers' claims.
 
     \b
     Examples
@@ -96,13 +96,16 @@ def run(configs, realisations, seed, overrides, threads, out, no_figures, quiet)
       radarsim run rls2 --set radar.sigma_range_m=300 --set filters.0.manoeuvre_variance=1e-4
     """
     from radarsim import console, experiment
+    from radarsim.engine.stopping import Signals
 
-    loaded = experiment.load_all(configs, merged(overrides, realisations, seed))
-    for one in loaded:
-        with console.Progress(one.stem, quiet=quiet) as progress:
-            result = experiment.run(one, threads=threads, out=out, figures=not no_figures, progress=progress.update)
-        if not quiet:
-            console.print_result(result, out)
+    with Signals() as stop:
+        for one in experiment.load_all(configs, merged(overrides, realisations, seed)):
+            with console.Progress(one.stem, quiet=quiet) as progress:
+                result = experiment.run(
+                    one, threads=threads, out=out, figures=not no_figures, progress=progress.update, stop=stop
+                )
+            if not quiet:
+                console.print_result(result, out)
 
 
 @main.command()

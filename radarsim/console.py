@@ -110,7 +110,8 @@ def print_outlook(experiment, outlook) -> None:
     """What a run would do."""
     say(f"{experiment.path or experiment.stem}: valid")
     rows = [
-        (case.name, case.filters, f"{case.scans}", f"{case.realisations:,}", f"{case.seconds:.3g} s") for case in outlook.cases
+        (case.name, case.filters, f"{case.scans}", f"{case.realisations:,}", f"{case.seconds:.3g} s")
+        for case in outlook.cases
     ]
     show("", ("case", "filters", "scans", "realisations", "time"), rows, right=("scans", "realisations", "time"))
     say(

@@ -2,14 +2,18 @@
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from radarsim import studies
+from radarsim.config import lookup
 from radarsim.config.load import Case, Experiment, load
-from radarsim.engine.collect import collect
-from radarsim.engine.store import Store
+from radarsim.engine.collect import Collected, collect, stored
+from radarsim.engine.executors import available_cores
+from radarsim.engine.results import CaseResult
+from radarsim.engine.stopping import Signals
 from radarsim.errors import ConfigError
 
 
@@ -49,7 +53,7 @@ class Outlook:
 
 def outlook(experiment: Experiment, threads: int | None = None) -> Outlook:
     """Time one block of every case, compiled beforehand, and say what the whole would take."""
-    threads = threads or os.cpu_count() or 1
+    threads = threads or available_cores()
     cases, largest = [], 0
     for case in experiment.cases:
         work = studies.CaseWork(case)
@@ -61,6 +65,202 @@ def outlook(experiment: Experiment, threads: int | None = None) -> Outlook:
         axes = work.plan.axes
         cases.append(CaseOutlook(case.name, ", ".join(axes.filters), len(axes.k), case.realisations, seconds))
         largest = max(largest, work.size)
-    # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter with NumPy, Numba and pandas.
+    # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter and its libraries.
     memory = 200 + 8e-6 * largest * (2 * threads + 32)
     return Outlook(tuple(cases), threads, sum(c.seconds for c in cases) / threads, memory)
+
+
+def simulated(
+    experiment: Experiment,
+    *,
+    out: str | os.PathLike | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
+    stop: Signals | None = None,
+) -> list[tuple[Case, studies.CaseWork, Collected]]:
+    """Collect every case in turn, cases of one identity once; progress(done, total, from_store) is over all of them."""
+    total = sum(case.realisations for case in experiment.cases)
+    made: dict[tuple[str, int], tuple[studies.CaseWork, Collected]] = {}
+    gathered, done, held = [], 0, 0
+
+    def over_all(case_done: int, _: int, case_held: int) -> None:
+        if progress is not None:
+            progress(done + case_done, total, held + case_held)
+
+    for case in experiment.cases:
+        work = studies.CaseWork(case)
+        key = (work.identity, case.realisations)
+        if key not in made:
+            made[key] = work, collect(work, case.realisations, store=out, threads=threads, progress=over_all, stop=stop)
+        work, collected = made[key]
+        gathered.append((case, work, collected))
+        done += collected.count
+        held += collected.from_store
+        if collected.stopped:
+            break
+    return gathered
+
+
+class Result:
+    """A finished experiment: its cases, tables (pandas), figures (Matplotlib). Nothing is written unless asked for."""
+
+    def __init__(self, experiment: Experiment, cases: Sequence[CaseResult], facts: Mapping):
+        self.experiment, self.cases, self.facts = experiment, tuple(cases), dict(facts)
+
+    @cached_property
+    def tables(self) -> dict:
+        """Every table by the stem of its file: `curves`, `gains`, `claims`, and the study's own."""
+        from radarsim.report import output
+
+        return output.tables(self.cases)
+
+    @property
+    def curves(self):
+        """sigma(k), bias and spread of every case, filter and component: a DataFrame with the columns of curves.csv."""
+        return self.tables["curves"]
+
+    @property
+    def gains(self):
+        """Gains against the baseline filter: a DataFrame with the columns of gains.csv."""
+        return self.tables["gains"]
+
+    @cached_property
+    def _described(self) -> dict:
+        from radarsim.report import output
+
+        return output.figures(self.cases, self.tables, self.experiment)
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """The names that `figure` takes."""
+        return tuple(self._described)
+
+    def figure(self, name: str):
+        """A Matplotlib figure by its name; KeyError names those there are."""
+        from radarsim.report import figures
+
+        if name not in self._described:
+            raise KeyError(f"no figure {name!r}; there are: {', '.join(self._described)}")
+        return figures.render(self._described[name])
+
+    def write(self, out: str | os.PathLike, figures: bool = True):
+        """Write tables, figures, claims, run.json and report.html into out/<stem>/; what was written."""
+        from radarsim.report import output
+
+        return output.write(self.experiment, self.cases, self.folder(out), self.facts, draw=figures)
+
+    def folder(self, out: str | os.PathLike) -> Path:
+        """Where `write` puts them."""
+        return Path(out) / self.experiment.stem
+
+
+def run(
+    config,
+    *,
+    realisations: float | None = None,
+    seed: int | None = None,
+    overrides: Sequence[str] = (),
+    threads: int | None = None,
+    out: str | os.PathLike | None = None,
+    figures: bool = True,
+    progress: Callable[[int, int, int], None] | None = None,
+    stop: Signals | None = None,
+) -> Result:
+    """Run an experiment and give its result; nothing is written unless `out` names a directory.
+
+    config is a path, the name of a shipped config, a dict as YAML would give it, or a loaded Experiment. overrides are
+    texts `key=value` with dotted keys. Raises ConfigError for a wrong config, StoreError for a bad disk, NonFiniteError
+    for a filter that diverged, and Interrupted, with all that was done stored, if `stop` saw a signal.
+
+    >>> result = run("rls2", realisations=2000)
+    >>> len(result.curves) > 50
+    True
+    """
+    given = {"realisations": realisations, "seed": seed}
+    overrides = (*overrides, *(f"{key}={value!r}" for key, value in given.items() if value is not None))
+    experiment = config if isinstance(config, Experiment) else load(config, overrides)
+    threads = threads or available_cores()
+    started = time.perf_counter()
+    collected = simulated(experiment, out=out, threads=threads, progress=progress, stop=stop)
+    if stop is not None:
+        stop.raise_if_received()
+    result = Result(experiment, finished(collected), facts_of(collected, threads, time.perf_counter() - started))
+    if out is not None:
+        result.write(out, figures)
+    return result
+
+
+def report(experiment: Experiment, *, out: str | os.PathLike, figures: bool = True) -> Result:
+    """Tables, figures and report of a config from what is stored; raises ConfigError where something is missing."""
+    held, missing = [], []
+    for case in experiment.cases:
+        work = studies.CaseWork(case)
+        collected = stored(work, case.realisations, out)
+        if collected is None:
+            missing.append(f"{case.name}: {case.realisations} realisations are not stored in {out}")
+        else:
+            held.append((case, work, collected))
+    if missing:
+        again = experiment.path or experiment.stem
+        raise ConfigError(*missing, f"`radarsim run {again} --out {out}` computes them")
+    result = Result(experiment, finished(held), facts_of(held, 0, 0.0))
+    result.write(out, figures)
+    return result
+
+
+Gathered = Sequence[tuple[Case, studies.CaseWork, Collected]]
+
+
+def finished(gathered: Gathered) -> list[CaseResult]:
+    """Cases with their sums and the labels that say what these are; display names are each case's own."""
+    results = []
+    for case, work, collected in gathered:
+        plan = work.plan if work.case == case else studies.study(case.study).prepare(case)
+        sums = plan.layout.unpack(collected.values)
+        results.append(
+            CaseResult(
+                case.name, case.study, case.spec, case.swept, collected.count, sums, plan.axes, collected.kernel_seconds
+            )
+        )
+    return results
+
+
+def facts_of(gathered: Gathered, threads: int, seconds: float) -> dict:
+    """The facts of a run for run.json: stop reason, threads, times, warnings, identities."""
+    collected = [c for _, _, c in gathered]
+    return {
+        "stop": next((c.stopped for c in collected if c.stopped), "done"),
+        "threads": threads,
+        "seconds": seconds,
+        "kernel_seconds": sum(c.kernel_seconds for c in collected),
+        "realisations_computed": sum(c.computed for c in collected),
+        "realisations_from_store": sum(c.from_store for c in collected),
+        "warnings": list(dict.fromkeys(warning for c in collected for warning in c.warnings)),
+        "identities": {case.name: work.identity for case, work, _ in gathered},
+    }
+
+
+def described(file: Path) -> str:
+    """The first words of a YAML file's leading comment, without its own name."""
+    with file.open(encoding="utf-8") as lines:
+        for line in lines:
+            words = line.lstrip("#").strip()
+            if not line.startswith("#"):
+                break
+            if not words.startswith("yaml-language-server"):
+                return words.partition(" — ")[2] or words
+    return ""
+
+
+def inventory() -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
+    """What `radarsim list` shows: title, columns and rows of each kind of thing at hand."""
+    configs = [(stem, described(lookup.config_file(stem))) for stem in lookup.stems("configs")]
+    scenarios = [(stem, described(lookup.scenario_file(stem, None))) for stem in lookup.stems("scenarios")]
+    about = [(name, (studies.study(name).__doc__ or "").split("\n")[0]) for name in studies.STUDIES]
+    filters = [(name, key, words) for name in studies.STUDIES for key, words in studies.study(name).FILTERS.items()]
+    return [
+        ("Configs (radarsim run NAME)", ("name", "what it is"), configs),
+        ("Scenarios (target: NAME)", ("name", "what it is"), scenarios),
+        ("Studies (study: NAME)", ("name", "paper and question"), about),
+        ("Filters", ("study", "keys", "what it is"), filters),
+    ]

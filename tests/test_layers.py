@@ -57,7 +57,9 @@ def test_arrows_point_downwards(path):
             continue
         name = ".".join(parts[1:])
         is_ours = (PACKAGE / parts[1]).is_dir() or (PACKAGE / f"{parts[1]}.py").is_file()
-        assert not is_ours or any(f"{name}.".startswith(f"{home}.") for home in ALLOWED[floor]), f"{path.name}: {module}"
+        assert not is_ours or any(f"{name}.".startswith(f"{home}.") for home in ALLOWED[floor]), (
+            f"{path.name}: {module}"
+        )
 
 
 @pytest.mark.parametrize("library", FENCED)
@@ -67,7 +69,9 @@ def test_foreign_libraries_are_fenced(library):
         for path in FILES
         if any(module.split(".")[0] == library for module in imports(path) if module)
     }
-    outside = {user for user in users if not any(user == home or user.startswith(f"{home}/") for home in FENCED[library])}
+    outside = {
+        user for user in users if not any(user == home or user.startswith(f"{home}/") for home in FENCED[library])
+    }
     assert not outside
 
 

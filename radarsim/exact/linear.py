@@ -44,7 +44,9 @@ def error_recursion(
     return bias, covariance
 
 
-def steady_state(observes: int, manoeuvre_variance: float, sigma: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+def steady_state(
+    observes: int, manoeuvre_variance: float, sigma: np.ndarray, dt: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Steady covariances (3, 3): the one the filter believes, and the true one on a truth without manoeuvre.
 
     The believed one solves the discrete algebraic Riccati equation; the true one is the fixed point of the error recursion

@@ -39,7 +39,9 @@ def least_squares_start(observes: int, start: int, sigma: np.ndarray, dt: float)
     period, rows per sigma) so that periods of milliseconds and of hours are equally well conditioned.
     """
     scale = np.array([1.0, 1.0 / dt, 1.0 / dt**2])
-    rows = [observation(observes) @ transition((k - start + 1) * dt) * scale / sigma[:observes, None] for k in range(start)]
+    rows = [
+        observation(observes) @ transition((k - start + 1) * dt) * scale / sigma[:observes, None] for k in range(start)
+    ]
     A = np.concatenate(rows)
     solution = scale[:, None] * np.linalg.pinv(A)
     weights = np.zeros((3, 2, start))

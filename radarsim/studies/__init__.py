@@ -1,8 +1,8 @@
-"""One file a paper. A study is `prepare(case) -> plan` (once, NumPy) and `simulate(plan, first, count) -> sums` (one block).
+"""One file a paper. A study is `prepare(case) -> plan` (once, NumPy) and `simulate(plan, first, count) -> sums` (a block).
 
-A plan has `.block` (realisations a block), `.layout` (engine.moments.Layout) and `.axes` (engine.results.Axes). What is common
-to all studies stands here: the registry, the identity of a case, the names of its noise streams, and the work that the
-engine runs.
+A plan has `.block` (realisations a block), `.layout` (engine.moments.Layout) and `.axes` (engine.results.Axes). What is
+common to all studies stands here: the registry, the identity of a case, the names of its noise streams, and the work that
+the engine runs.
 """
 
 import ast
@@ -29,7 +29,8 @@ def study(name: str) -> ModuleType:
 
 def digest(value: object) -> str:
     """SHA-256 in hexadecimal of a JSON-able value; numbers by their shortest exact form, keys sorted."""
-    return hashlib.sha256(json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()).hexdigest()
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 @cache
@@ -44,7 +45,7 @@ def computing_sources(name: str) -> str:
         if module in seen or not path.is_file():
             continue
         seen[module] = path.read_bytes()
-        waiting += [found for found in _imports(seen[module]) if found.split(".")[1:2] and found.split(".")[1] in COMPUTING]
+        waiting += [found for found in _imports(seen[module]) if f"{found}.".split(".")[1] in COMPUTING]
     return digest({module: hashlib.sha256(source).hexdigest() for module, source in seen.items()})
 
 
@@ -125,6 +126,7 @@ class CaseWork:
             error = layout.unpack(self.simulate(i, 1))["error"]
             bad += ~np.isfinite(error).all(axis=(2, 3))
         return [
-            f"{self.case.name}: filter {axes.filters[f]!r}, scan {axes.k[k]}: {bad[f, k]} of {count} realisations not finite"
+            f"{self.case.name}: filter {axes.filters[f]!r}, scan {axes.k[k]}: "
+            f"{bad[f, k]} of {count} realisations not finite"
             for f, k in np.argwhere(bad)[:20]
         ]

@@ -14,6 +14,10 @@ from radarsim.models import targets
 from radarsim.studies import noise_key
 
 COMPONENTS = (("r", "m"), ("Vr", "m/s"), ("ar", "m/s2"))
+FILTERS = {
+    "observes: [range]": "Kalman filter of the second order on range, started by least squares on three scans",
+    "observes: [range, velocity]": "the same on range and radial velocity, started on two scans",
+}
 BLOCK = 4096  # 8 chunks of 512; 0.4 ms with two filters and 15 scans
 
 
