@@ -58,8 +58,8 @@ def root_mean_square(square, fourth, n) -> Estimate:
 
     The mean of e² is taken as a chi-square variable of 2/CV² degrees of freedom, CV² = (m₄/m₂² − 1)/n: exact for
     Gaussian e (n degrees), right to first order for any other, biased errors too. Its quantiles are Wilson and
-    Hilferty's, with Student's t for the normal quantile; m₄/m₂² − 1 is freed of its Gaussian bias (n−1)/(n+2). The upper
-    end is infinite where n is too small to bound σ.
+    Hilferty's, with Student's t for the normal quantile; m₄/m₂² − 1 is freed of its Gaussian bias (n−1)/(n+2).
+    The upper end is infinite where n is too small to bound σ.
     """
     n = np.asarray(n, dtype=float)
     m2, m4 = _per_one(square, n), _per_one(fourth, n)

@@ -148,3 +148,8 @@ def _quoted(text: str) -> str:
     if any(mark in text for mark in ',"\n\r'):
         return '"' + text.replace('"', '""') + '"'
     return text
+
+
+def groups(table, *columns: str) -> dict:
+    """The rows of a table by the values of some columns, in the order of the table: {(case, filter, …): rows}."""
+    return dict(iter(table.groupby(list(columns), sort=False)))

@@ -1,0 +1,130 @@
+"""What a figure shows, as data: figures of panels of marks.
+
+Nothing here knows how it is drawn (report/figures.py does).
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+COLUMN_MM = 85.0  # one column of a journal page
+PAGE_MM = 175.0  # two columns
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Label with unit, "linear" or "log", limits (either end None: fitted to the data), ticks where not automatic."""
+
+    label: str
+    scale: str = "linear"
+    limits: tuple[float | None, float | None] = (None, None)
+    ticks: tuple[tuple[float, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a mark is told apart, in grey too: each number picks from a list of its own.
+
+    colour: an int picks a distinct colour, a float from 0 to 1 a shade of an ordered scale. dash and marker: ints,
+    None for no line or no marker.
+    """
+
+    colour: int | float = 0
+    dash: int | None = 0
+    marker: int | None = None
+    width_pt: float = 1.1
+    size_pt: float = 3.2
+
+
+@dataclass(frozen=True)
+class Line:
+    """A series y (n,) over x (n,), with its 95 % band lo … hi and its exact values (small crosses) where known.
+
+    The label is written at the line's end where labels fit, else into a legend. dash None leaves markers alone
+    (scatter), with whiskers for lo … hi.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    label: str = ""
+    style: Style = field(default_factory=Style)
+    lo: np.ndarray | None = None
+    hi: np.ndarray | None = None
+    exact: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A thin line across the panel at a value of x or y ("across" says which), with words beside it."""
+
+    value: float
+    across: str = "y"
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Bars of values (n,) with whiskers lo … hi, one for each name."""
+
+    names: tuple[str, ...]
+    values: np.ndarray
+    lo: np.ndarray | None = None
+    hi: np.ndarray | None = None
+    style: Style = field(default_factory=Style)
+
+
+@dataclass(frozen=True)
+class Heat:
+    """A map of values (len(y), len(x)) over the cells' centres, with its colour bar's label.
+
+    Values are written in if few.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    values: np.ndarray
+    label: str
+
+
+@dataclass(frozen=True)
+class Note:
+    """Words at a point of the data, to the right above it, or below."""
+
+    x: float
+    y: float
+    text: str
+    below: bool = False
+
+
+Mark = Line | Reference | Bars | Heat | Note
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes. keys explain styles (not single lines) in a small legend: (words, style).
+
+    direct: lines are named at their ends where the names fit; else always in the legend.
+    """
+
+    x: Axis
+    y: Axis
+    marks: tuple[Mark, ...]
+    title: str = ""
+    keys: tuple[tuple[str, Style], ...] = ()
+    key_title: str = ""
+    direct: bool = True
+    legend: str = "best"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of one or more panels in rows of `columns`; the caption says what is drawn and what the marks mean."""
+
+    name: str
+    title: str
+    caption: str
+    panels: tuple[Panel, ...]
+    columns: int = 1
+    width_mm: float = COLUMN_MM
+    panel_height_mm: float = 62.0
+    share_y: bool = False

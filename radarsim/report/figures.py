@@ -1,0 +1,255 @@
+"""Draws report/drawing.py's figures in the one style of this project. The only file that knows Matplotlib.
+
+Legible in grey: colours fall in lightness, and dash and marker tell the same apart. The bytes of an SVG depend on the
+data and on the versions of Matplotlib and its fonts alone.
+"""
+
+import io
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure as Canvas
+from matplotlib.lines import Line2D
+
+from radarsim.report.drawing import Bars, Figure, Heat, Line, Note, Panel, Reference, Style
+
+MM = 1 / 25.4
+PNG_DPI = 200
+COLOURS = ("#14213d", "#0a6ebd", "#c8440b", "#1b8a5a", "#a65fa8", "#c98a00", "#4aa3c7", "#8a8a8a")
+DASHES = ("-", (0, (5, 1.8)), (0, (1.3, 1.3)), (0, (6, 1.6, 1.3, 1.6)), (0, (9, 2.5)), (0, (3, 1.2, 1, 1.2, 1, 1.2)))
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+MARKED = 16  # at most about so many markers or crosses a line
+STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": 7.5,
+    "axes.titlesize": 8,
+    "axes.labelsize": 7.5,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+    "legend.title_fontsize": 7,
+    "legend.handlelength": 2.6,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.4,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "lines.markersize": 3.2,
+    "lines.markeredgewidth": 0.7,
+    "axes.formatter.useoffset": False,
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,
+}
+
+
+def render(figure: Figure) -> Canvas:
+    """A Matplotlib figure of the described one, laid out at its size in millimetres."""
+    rows = -(-len(figure.panels) // figure.columns)
+    size = (figure.width_mm * MM, rows * figure.panel_height_mm * MM)
+    with matplotlib.rc_context(STYLE):
+        canvas = Canvas(figsize=size, dpi=PNG_DPI, layout="constrained")
+        FigureCanvasAgg(canvas)
+        canvas.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.05)
+        grid = canvas.subplots(rows, figure.columns, squeeze=False, sharey=figure.share_y)
+        ended = []
+        for axes, panel in zip(grid.flat, figure.panels, strict=False):
+            ended.append(_draw(axes, panel))
+        for axes in grid.flat[len(figure.panels) :]:
+            axes.set_visible(False)
+        canvas.draw_without_rendering()
+        canvas.set_layout_engine("none")
+        for texts in ended:
+            _spread(texts)
+    return canvas
+
+
+def save(figure: Figure, formats=("svg", "png")) -> dict[str, bytes]:
+    """The bytes of the figure in each format ("svg", "png" at 200 dpi, "pdf"), the same for the same data."""
+    canvas = render(figure)
+    return {kind: _bytes(canvas, kind, figure.name) for kind in formats}
+
+
+def _bytes(canvas: Canvas, kind: str, name: str) -> bytes:
+    undated = {"svg": {"Date": None, "Creator": None}, "pdf": {"CreationDate": None}, "png": {"Software": None}}
+    out = io.BytesIO()
+    with matplotlib.rc_context({**STYLE, "svg.hashsalt": name}):
+        canvas.savefig(out, format=kind, dpi=PNG_DPI, metadata=undated[kind])
+    return out.getvalue()
+
+
+def _draw(axes, panel: Panel) -> list:
+    """Draw a panel; the texts written at line ends come back, to be moved apart once the layout stands."""
+    axes.set_xscale(panel.x.scale)
+    axes.set_yscale(panel.y.scale)
+    axes.margins(x=0.02)
+    for mark in panel.marks:
+        DRAWN[type(mark)](axes, mark)
+    axes.set_xlabel(panel.x.label)
+    axes.set_ylabel(panel.y.label)
+    axes.set_title(panel.title, loc="left", fontweight="bold")
+    for limits, axis, put in ((panel.x.limits, panel.x, axes.set_xlim), (panel.y.limits, panel.y, axes.set_ylim)):
+        if limits != (None, None):
+            put(*limits)
+        if axis.ticks:
+            where, words = zip(*axis.ticks, strict=True)
+            (axes.set_xticks if axis is panel.x else axes.set_yticks)(where, words)
+    return _name(axes, panel)
+
+
+def _colour(style: Style):
+    if isinstance(style.colour, float):
+        return matplotlib.colormaps["viridis"](0.8 * style.colour)
+    return COLOURS[style.colour % len(COLOURS)]
+
+
+def _look(style: Style) -> dict:
+    """Matplotlib's words for a style."""
+    marker = None if style.marker is None else MARKERS[style.marker % len(MARKERS)]
+    dash = "none" if style.dash is None else DASHES[style.dash % len(DASHES)]
+    colour = _colour(style)
+    return {
+        **{"color": colour, "linestyle": dash, "linewidth": style.width_pt},
+        **{"marker": marker, "markersize": style.size_pt, "mfc": colour if style.dash is None else "white"},
+    }
+
+
+def _line(axes, line: Line) -> None:
+    step = max(1, -(-len(line.x) // MARKED))
+    every = step if line.exact is None else 2 * step  # markers and crosses by turns
+    axes.plot(line.x, line.y, markevery=every, zorder=3, **_look(line.style))
+    if line.lo is not None and line.hi is not None:
+        if line.style.dash is None:
+            axes.vlines(line.x, line.lo, line.hi, color=_colour(line.style), linewidth=0.8, zorder=2.8)
+        else:
+            axes.fill_between(line.x, line.lo, line.hi, color=_colour(line.style), alpha=0.25, linewidth=0, zorder=2)
+    if line.exact is not None:
+        look = {"linestyle": "none", "marker": "+", "color": "black", "markersize": 4.2, "markeredgewidth": 0.6}
+        axes.plot(line.x[step::every], line.exact[step::every], zorder=4, **look)
+
+
+def _reference(axes, mark: Reference) -> None:
+    look = {"color": "#555555", "linewidth": 0.7, "linestyle": (0, (2, 2)), "zorder": 1.5}
+    if mark.across == "y":
+        axes.axhline(mark.value, **look)
+        axes.text(
+            0.99, mark.value, mark.label, transform=axes.get_yaxis_transform(), ha="right", va="bottom", color="#555555"
+        )
+    else:
+        axes.axvline(mark.value, **look)
+        axes.text(
+            mark.value,
+            0.98,
+            " " + mark.label,
+            transform=axes.get_xaxis_transform(),
+            ha="left",
+            va="top",
+            color="#555555",
+        )
+
+
+def _bars(axes, bars: Bars) -> None:
+    where = np.arange(len(bars.names))
+    axes.bar(where, bars.values, color=_colour(bars.style), alpha=0.75, width=0.65, zorder=2)
+    if bars.lo is not None and bars.hi is not None:
+        axes.vlines(where, bars.lo, bars.hi, color="black", linewidth=0.9, zorder=3)
+    axes.set_xticks(where, bars.names)
+    axes.grid(False, axis="x")
+
+
+def _heat(axes, heat: Heat) -> None:
+    drawn = axes.pcolormesh(
+        np.arange(len(heat.x)), np.arange(len(heat.y)), heat.values, cmap="viridis", shading="nearest"
+    )
+    axes.set_xticks(np.arange(len(heat.x)), [f"{v:g}" for v in heat.x])
+    axes.set_yticks(np.arange(len(heat.y)), [f"{v:g}" for v in heat.y])
+    axes.grid(False)
+    axes.figure.colorbar(drawn, ax=axes, label=heat.label)
+    if heat.values.size <= 100:
+        middle = (np.nanmin(heat.values) + np.nanmax(heat.values)) / 2
+        for (i, j), value in np.ndenumerate(heat.values):
+            axes.text(j, i, f"{value:.3g}", ha="center", va="center", color="white" if value < middle else "black")
+
+
+def _note(axes, note: Note) -> None:
+    shift, side = ((3, -3), "top") if note.below else ((3, 3), "bottom")
+    axes.annotate(note.text, (note.x, note.y), xytext=shift, textcoords="offset points", fontsize=7, va=side)
+
+
+DRAWN = {Line: _line, Reference: _reference, Bars: _bars, Heat: _heat, Note: _note}
+
+
+def _name(axes, panel: Panel) -> list:
+    """Name the lines: at their ends where there are few enough, else in a legend.
+
+    And the keys of styles in a legend.
+    """
+    lines = [m for m in panel.marks if isinstance(m, Line) and m.label and np.isfinite(m.y).any()]
+    handles = [(words, style) for words, style in panel.keys]
+    direct = panel.direct and all(m.style.dash is not None for m in lines) and len(lines) <= _fitting(axes)
+    if not direct:
+        handles = [(m.label, m.style) for m in lines] + handles
+    if handles:
+        look = [Line2D([], [], **_look(style)) for _, style in handles]
+        words = [words for words, _ in handles]
+        title = panel.key_title or None
+        axes.legend(look, words, loc=panel.legend, title=title, borderaxespad=0.3, labelspacing=0.3, alignment="left")
+    if not direct:
+        return []
+    texts = []
+    for m in lines:
+        last = np.flatnonzero(np.isfinite(m.y))[-1]
+        texts.append(
+            axes.annotate(
+                m.label,
+                (m.x[last], m.y[last]),
+                xytext=(1.015, m.y[last]),
+                textcoords=axes.get_yaxis_transform(),
+                va="center",
+                color=_colour(m.style),
+                annotation_clip=False,
+            )
+        )
+    return texts
+
+
+def _fitting(axes) -> int:
+    """How many labels of one line fit one below the other beside a panel."""
+    height = axes.figure.get_size_inches()[1] / axes.get_subplotspec().get_gridspec().nrows
+    return int(0.75 * height * 72 / (1.25 * STYLE["font.size"]))
+
+
+def _spread(texts: list) -> None:
+    """Move labels at line ends apart, up and down, keeping their order; within the panel where they fit."""
+    if not texts:
+        return
+    axes = texts[0].axes
+    box = axes.get_window_extent()
+    step = 1.2 * STYLE["font.size"] * axes.figure.dpi / 72
+    wanted = [axes.transData.transform(text.xy)[1] for text in texts]
+    order = np.argsort(wanted, kind="stable")
+    placed = separated(np.array(wanted)[order], step, box.y0 + step / 2, box.y1 - step / 2)
+    for i, y in zip(order, placed, strict=True):
+        texts[i].set_position((1.015, axes.transAxes.inverted().transform((0, y))[1]))
+        texts[i].xyann = (1.015, axes.transAxes.inverted().transform((0, y))[1])
+        texts[i].anncoords = "axes fraction"
+
+
+def separated(wanted: np.ndarray, step: float, low: float, high: float) -> np.ndarray:
+    """Rising positions at least `step` apart, nearest to the wanted ones (rising) in squares, inside low … high.
+
+    Pool-adjacent-violators on positions less their own multiple of the step.
+    """
+    offsets = step * np.arange(len(wanted))
+    groups: list[list[float]] = []
+    for value in np.clip(wanted, low, high) - offsets:
+        groups.append([value])
+        while len(groups) > 1 and np.mean(groups[-2]) > np.mean(groups[-1]):
+            groups[-2:] = [groups[-2] + groups[-1]]
+    free = np.concatenate([np.full(len(group), np.mean(group)) for group in groups])
+    return np.clip(free, low, max(low, high - offsets[-1])) + offsets

@@ -1,0 +1,185 @@
+"""Figures that every study needs, made from the tables alone: σ against time, gain against time."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+
+WIDE_MM = 120.0  # one panel of many lines
+MOST = 8  # cases a figure shows; more are told in its caption
+TIME = "time from the first plot, s"
+SYMBOLS = {"manoeuvre_variance": "$D_M$"}
+UNITS = {"m/s2": "m/s²", "m/s3": "m/s³", "hz": "Hz"}
+
+
+class Quantity(NamedTuple):
+    """A component in figures: its letter (mathematical text) and its name."""
+
+    symbol: str
+    name: str
+
+
+def number(value) -> str:
+    """A number for people: 0.001 as 10⁻³, others at four digits; text as it is."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return str(value)
+    power = f"{value:.0e}".partition("e")[2]
+    if value != 0 and float(f"1e{power}") == value and abs(int(power)) > 1:
+        return "10" + str(int(power)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{value:.4g}"
+
+
+def stem(result: CaseResult) -> str:
+    """The config that a case is of: its name without the swept keys."""
+    return result.name.split(" ", 1)[0]
+
+
+def device(result: CaseResult) -> str:
+    """What a case's sensor is called: the display name, else the config's stem."""
+    for part in ("radar", "sensor", "sonar"):
+        name = getattr(getattr(result.spec, part, None), "name", None)
+        if name:
+            return name
+    return stem(result)
+
+
+def swept(result: CaseResult) -> str:
+    """The swept keys of a case in short: "D_M = 10⁻³"."""
+    return ", ".join(f"{symbol_of(key)} = {number(value)}" for key, value in result.swept)
+
+
+def symbol_of(key: str) -> str:
+    """A swept key as a figure names it: its letter where it has one."""
+    return SYMBOLS.get(key, key)
+
+
+def label(result: CaseResult) -> str:
+    """Device and swept keys, for a line or a panel."""
+    return " ".join(filter(None, (device(result), swept(result))))
+
+
+def families(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
+    """Cases by config, in order: one panel each."""
+    found: dict[str, list[CaseResult]] = {}
+    for result in results:
+        found.setdefault(stem(result), []).append(result)
+    return found
+
+
+def shown(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
+    """The results that a figure shows, of the cases named, at most eight; and words on those left out."""
+    wanted = [result for result in results if result.name in set(names)]
+    left = len(wanted) - MOST
+    return wanted[:MOST], f" {left} further cases are in the tables alone." if left > 0 else ""
+
+
+def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity) -> Figure:
+    """σ(t) of one component: a panel for each config, a line for each filter and swept value.
+
+    curves is tables.groups(table, "case", "filter", "component").
+    """
+    panels = [_sigma_panel(members, curves, component, of) for members in families(results).values()]
+    panels = [panel for panel in panels if panel.marks]
+    single = len(panels) == 1
+    if single:
+        panels = [replace(panels[0], title="")]
+    count = results[0].count if results else 0
+    caption = (
+        f"Root-mean-square error of the {of.name} about the truth against time, of {count:,} realisations. "
+        "Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact values."
+    )
+    title = f"σ of the {of.name}"
+    shape = {"width_mm": COLUMN_MM} if single else {"columns": min(3, len(panels)), "width_mm": PAGE_MM}
+    return Figure(name, title, caption, tuple(panels), **shape, panel_height_mm=64 if single else 56)
+
+
+def _sigma_panel(members: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity) -> Panel:
+    filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
+    marks: list[Mark] = []
+    one_key = len({tuple(key for key, _ in result.swept) for result in members}) == 1 == len(members[0].swept)
+    unit = ""
+    for i, result in enumerate(members):
+        for f in result.axes.filters:
+            rows = curves.get((result.name, f, component))
+            if rows is None:
+                continue
+            unit = rows["unit"].iloc[0]
+            style = look(filters.index(f), i, len(members))
+            words = number(result.swept[0][1]) if one_key else swept(result)
+            marks.append(_sigma_line(rows, f if len(members) == 1 else words, style))
+    y = Axis(f"$\\sigma$ of {of.symbol}, {UNITS.get(unit, unit)}", limits=(0, None))
+    panel = Panel(Axis(TIME, limits=(0, None)), y, tuple(marks), device(members[0]))
+    if len(members) == 1:
+        return panel
+    title = f"at the lines: {symbol_of(members[0].swept[0][0])}" if one_key else ""
+    return replace(panel, keys=tuple((f, Style(0, n, n)) for n, f in enumerate(filters)), key_title=title)
+
+
+def _sigma_line(rows, words: str, style: Style) -> Line:
+    values = {
+        name: rows[name].to_numpy(dtype=float) for name in ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")
+    }
+    exact = values["exact_sigma"] if np.isfinite(values["exact_sigma"]).any() else None
+    return Line(values["t_s"], values["sigma"], words, style, values["sigma_lo"], values["sigma_hi"], exact)
+
+
+def look(nth_filter: int, nth_case: int, cases: int) -> Style:
+    """Filters differ by dash and marker; cases by shade, and where there is but one, filters by colour too."""
+    colour = nth_filter if cases == 1 else nth_case / (cases - 1)
+    return Style(colour, nth_filter, nth_filter)
+
+
+def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, component: str, of: Quantity) -> Figure:
+    """Relative gain of one component against time: one panel, a line for each case and filter.
+
+    gains is tables.groups(table, "case", "filter", "component").
+    """
+    marks: list[Mark] = [Reference(0)]
+    family = len(families(results)) == 1 and len(results) > 1
+    several = any(len(result.axes.filters) > 2 for result in results)
+    for i, result in enumerate(results):
+        for n, f in enumerate(result.axes.filters):
+            rows = gains.get((result.name, f, component))
+            if rows is None:
+                continue
+            t, value, lo, hi, exact = (
+                rows[key].to_numpy(dtype=float)
+                for key in ("t_s", "gain_percent", "gain_lo", "gain_hi", "exact_percent")
+            )
+            case = swept(result) if family else label(result)
+            words = ", ".join(
+                filter(None, (case if len(results) > 1 else "", f if several or len(results) == 1 else ""))
+            )
+            style = Style(i / (len(results) - 1) if family else i, n if several else i, n if several else i)
+            marks.append(Line(t, value, words, style, lo, hi, exact if np.isfinite(exact).any() else None))
+    base = results[0].axes.filters[results[0].axes.baseline]
+    caption = (
+        f"Relative gain in σ of the {of.name} against filter {base!r}, paired on common noise, of "
+        f"{results[0].count:,} realisations. Bands: 95 % intervals. Crosses: exact values. Below zero: a loss."
+    )
+    panel = Panel(Axis(TIME, limits=(0, None)), Axis(f"gain in $\\sigma$ of {of.symbol}, %"), tuple(marks))
+    return Figure(
+        name, f"Gain in σ of the {of.name}", caption, (panel,), width_mm=COLUMN_MM if len(results) < 3 else 120.0
+    )
+
+
+def per_component(
+    results: Sequence[CaseResult], curves: Mapping, gains: Mapping, quantities: Mapping[str, Quantity], chosen
+) -> dict[str, Figure]:
+    """sigma_<component> and gain_<component> of every component.
+
+    Chosen(name) gives the case names that a figure shows.
+    """
+    made = {}
+    for component, of in quantities.items():
+        for kind, draw, rows in (("sigma", sigma_figure, curves), ("gain", gain_figure, gains)):
+            name = f"{kind}_{component}"
+            some, left_out = shown(results, chosen(name))
+            figure = draw(name, some, rows, component, of) if some else None
+            if figure and any(isinstance(mark, Line) for panel in figure.panels for mark in panel.marks):
+                made[name] = replace(figure, caption=figure.caption + left_out)
+    return made

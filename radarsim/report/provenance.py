@@ -1,0 +1,102 @@
+"""run.json: what was run, with what, and what came out. Times stand here and in the report, never in a CSV."""
+
+import hashlib
+import json
+import os
+import platform
+import sys
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+
+from radarsim.engine.results import CaseResult
+from radarsim.report.statistics import FEW
+
+PACKAGES = ("radarsim", "numpy", "numba", "llvmlite", "scipy", "pandas", "matplotlib", "pydantic", "pyyaml")
+
+
+def record(
+    experiment, results: Sequence[CaseResult], run: Mapping, contents: Mapping[str, bytes], answer: Sequence[str]
+) -> dict:
+    """All of run.json but the report's own hash.
+
+    run gives the facts of the run (stop reason, threads, times, warnings, identities …), kept as they are; contents
+    are the outputs, by path.
+    """
+    facts = dict(run)
+    stop = facts.pop("stop", "done")
+    warnings = [*facts.pop("warnings", ()), *few(results)]
+    done = {result.name: result.count for result in results}
+    return {
+        "config": experiment.stem,
+        "study": experiment.study,
+        "answer": list(answer),
+        "realisations_asked": experiment.realisations,
+        "realisations_done": min(done.values(), default=0),
+        "cases": {
+            case.name: {"asked": case.realisations, "done": done.get(case.name, 0), "seed": case.seed}
+            for case in experiment.cases
+        },
+        "stop": stop,
+        "seed": experiment.seed,
+        "resolved": experiment.resolved,
+        "resolved_sha256": hashlib.sha256(to_json(experiment.resolved)).hexdigest(),
+        **facts,
+        "warnings": warnings,
+        "versions": versions(),
+        "machine": machine(),
+        "outputs": {path: hashlib.sha256(data).hexdigest() for path, data in sorted(contents.items())},
+    }
+
+
+def with_output(made: dict, path: str, data: bytes) -> dict:
+    """The record with one more output."""
+    return {**made, "outputs": {**made["outputs"], path: hashlib.sha256(data).hexdigest()}}
+
+
+def few(results: Sequence[CaseResult]) -> list[str]:
+    """Warnings on cases whose intervals rest on too few realisations."""
+    return [
+        f"{result.name}: intervals of {result.count} realisations are rough, use at least {FEW}"
+        for result in results
+        if result.count < FEW
+    ]
+
+
+def to_json(value: object) -> bytes:
+    """JSON as it is written: readable, keys in their order, no not-a-number."""
+    return (json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that shape a number or a figure."""
+    found = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+@cache
+def machine() -> dict[str, object]:
+    """The machine in words: system, processor, cores."""
+    return {
+        "system": platform.platform(),
+        "processor": _processor(),
+        "architecture": platform.machine(),
+        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "byteorder": sys.byteorder,
+    }
+
+
+def _processor() -> str:
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as lines:
+            for line in lines:
+                if line.startswith("model name"):
+                    return line.partition(":")[2].strip()
+    except OSError:
+        return platform.processor()
+    return platform.processor()

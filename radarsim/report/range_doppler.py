@@ -1,0 +1,227 @@
+"""P1's own tables (steady state, consistency, radar) and the words of its report.
+
+Its figures stand in figures' data.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import panels, statistics
+from radarsim.report import tables as common
+from radarsim.report.drawing import Axis, Figure, Line, Note, Panel, Reference, Style
+
+SETTLED = 0.05  # within this share of the steady value, for good; the paper gives no tolerance
+PERIODS = 10  # the paper: a manoeuvre variance is good when the error settles in under ten scan periods
+TARGET_SPEED = 300.0  # m/s, the paper's example of an ambiguous Doppler frequency
+
+
+def tables(results: Sequence[CaseResult]) -> dict:
+    """The tables beyond curves and gains: steady, consistency, radar."""
+    return {"steady": steady(results), "consistency": consistency(results), "radar": radar(results)}
+
+
+STEADY = (
+    *("case", "filter", "manoeuvre_variance", "component", "unit", "steady_sigma", "last_sigma", "last_lo", "last_hi"),
+    *("settling_periods", "settling_s", "settling_lo_s", "settling_hi_s", "under_10_periods", "best"),
+)
+
+
+def steady(results: Sequence[CaseResult]):
+    """Steady σ (exact) against settling, of every case, filter and component.
+
+    Settled is the first scan from which σ(k) stays within 5 % of the exact steady value to the end of the run; the
+    interval takes σ at the kind and at the unkind end of its own. Empty where it does not settle within the run.
+    `best` marks, among the cases of one config that differ in D_M, the least steady σ of those that settle in under
+    ten periods.
+    """
+    rows = [row for result in results for row in _steady(result)]
+    table = common.frame({name: [row[i] for row in rows] for i, name in enumerate(STEADY[:-1])})
+    stem = table["case"].str.split(" ").str[0]
+    family = table.groupby([stem, table["filter"], table["component"]], sort=False)
+    several = family["manoeuvre_variance"].transform("nunique") > 1
+    good = table["steady_sigma"].where(table["under_10_periods"] & several)
+    least = good.groupby([stem, table["filter"], table["component"]], sort=False).transform("min")
+    table["best"] = good.eq(least)
+    return table
+
+
+def _steady(result: CaseResult) -> list[tuple]:
+    axes, extra = result.axes, result.axes.extra
+    of = statistics.errors(result.sums["error"], common.realisations(result)).sigma
+    t, period, rows = np.asarray(axes.t_s, dtype=float), extra["scan_period_s"], []
+    for f, name in enumerate(axes.filters):
+        for c, (component, unit) in enumerate(axes.components):
+            at = np.flatnonzero(axes.available[f, :, c])
+            if not at.size:
+                continue
+            value, lo, hi = (part[f, at, c] for part in of)
+            last = extra["steady_sigma"][f, c]
+            when = settling(statistics.Estimate(value, lo, hi), t[at], last)
+            rows.append(
+                (
+                    *(result.name, name, float(extra["manoeuvre_variance"][f]), component, unit, float(last)),
+                    *(value[-1], lo[-1], hi[-1], when.value / period, when.value, when.lo, when.hi),
+                    bool(when.value < PERIODS * period * (1 - 1e-9)),
+                )
+            )
+    return rows
+
+
+def settling(sigma: statistics.Estimate, t: np.ndarray, last: float) -> statistics.Estimate:
+    """Time from which σ over t (K,) stays within 5 % of the steady value `last`; infinite where it does not."""
+    low, high = last * (1 - SETTLED), last * (1 + SETTLED)
+    touches = (sigma.hi >= low) & (sigma.lo <= high)
+    inside = (sigma.lo >= low) & (sigma.hi <= high)
+    middle = (sigma.value >= low) & (sigma.value <= high)
+    return statistics.Estimate(*(_for_good(settled, t) for settled in (middle, touches, inside)))
+
+
+def _for_good(settled: np.ndarray, t: np.ndarray) -> float:
+    wrong = np.flatnonzero(~settled)
+    first = wrong[-1] + 1 if wrong.size else 0
+    return float(t[first]) if first < len(t) else np.inf
+
+
+CONSISTENCY = (
+    *("case", "filter", "component", "unit", "k", "t_s", "sigma", "believed_sigma", "ratio", "ratio_lo", "ratio_hi"),
+    *("nees", "nees_bound_lo", "nees_bound_hi", "verdict"),
+)
+
+
+def consistency(results: Sequence[CaseResult]):
+    """What a filter believes of its σ against what it is (ratio over 1: pessimistic), and its normalised error squared.
+
+    `nees` is the mean of eᵀP⁻¹e per estimated component, 1 for a filter that is right about itself; the bounds hold
+    95 % of such filters' means over as many realisations.
+    """
+    return common.joined([_consistency(result) for result in results], CONSISTENCY)
+
+
+def _consistency(result: CaseResult) -> dict[str, np.ndarray]:
+    axes, at = result.axes, common.shown(result)
+    f, k, c = at
+    of = statistics.errors(np.asarray(result.sums["error"])[at], result.count).sigma
+    believed = np.sqrt(np.diagonal(axes.extra["believed"], axis1=2, axis2=3))[at]
+    nees, lo, hi = (part[f, k] for part in normalised_error(result))
+    with np.errstate(divide="ignore"):
+        ratio = [believed / part for part in (of.value, of.hi, of.lo)]
+    return {
+        "case": np.full(f.size, result.name, dtype=object),
+        "filter": common.names(axes.filters, f),
+        "component": common.names([name for name, _ in axes.components], c),
+        "unit": common.names([unit for _, unit in axes.components], c),
+        "k": np.asarray(axes.k)[k],
+        "t_s": np.asarray(axes.t_s, dtype=float)[k],
+        "sigma": of.value,
+        "believed_sigma": believed,
+        **dict(zip(("ratio", "ratio_lo", "ratio_hi"), ratio, strict=True)),
+        "nees": nees,
+        "nees_bound_lo": lo,
+        "nees_bound_hi": hi,
+        "verdict": np.select([nees < lo, nees > hi], ["pessimistic", "optimistic"], "consistent").astype(object),
+    }
+
+
+def normalised_error(result: CaseResult) -> statistics.Estimate:
+    """Mean of eᵀP⁻¹e per estimated component (F, K), P the believed covariance, and the 95 % bounds of a right filter.
+
+    From Σe² and Σ of the products of two components; N·d times the mean is then chi-square of N·d degrees of freedom.
+    """
+    axes, P = result.axes, result.axes.extra["believed"]
+    second = np.zeros(P.shape)
+    for (i, j), crossed in zip(((0, 1), (0, 2), (1, 2)), np.moveaxis(result.sums["cross"], -1, 0), strict=True):
+        second[..., i, j] = second[..., j, i] = crossed / result.count
+    for i in range(3):
+        second[..., i, i] = result.sums["error"][..., i, 1] / result.count
+    variance = np.diagonal(P, axis1=2, axis2=3)
+    scale = np.where(variance > 0, variance, np.inf) ** -0.5  # m, m/s and m/s² brought to one size before solving
+    unit = scale[..., :, None] * scale[..., None, :]
+    mean, ninth = np.full(P.shape[:2], np.nan), np.full(P.shape[:2], np.nan)
+    for pattern in np.unique(axes.available.reshape(-1, 3), axis=0):
+        known, where = np.flatnonzero(pattern), np.all(axes.available == pattern, axis=2)
+        if known.size:
+            one, other = ((part * unit)[where][:, known][:, :, known] for part in (P, second))
+            mean[where] = np.trace(np.linalg.solve(one, other), axis1=1, axis2=2) / known.size
+            ninth[where] = 2 / (9 * known.size * result.count)
+    step = statistics.Z95 * np.sqrt(ninth)
+    return statistics.Estimate(mean, (1 - ninth - step) ** 3, (1 - ninth + step) ** 3)
+
+
+RADAR = ("case", "C_theta", "doppler_hz", "doppler_per_repetition_rate", "unambiguous_velocity_mps")
+
+
+def radar(results: Sequence[CaseResult]):
+    """C_θ = σ_r²/(Δt²σ_V²) (eq. 11), the Doppler frequency of 300 m/s, and the unambiguous span of velocity λF/2."""
+    rows = []
+    for result in results:
+        extra = result.axes.extra
+        doppler = 2 * TARGET_SPEED / extra["wavelength_m"]
+        rate = extra["repetition_rate_hz"]
+        rows.append((result.name, extra["C_theta"], doppler, doppler / rate, extra["wavelength_m"] * rate / 2))
+    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(RADAR)})
+
+
+QUANTITIES = {
+    "r": panels.Quantity("$r$", "range"),
+    "Vr": panels.Quantity("$V_r$", "radial velocity"),
+    "ar": panels.Quantity("$a_r$", "radial acceleration"),
+}
+
+
+def figures(results: Sequence[CaseResult], made: dict, experiment) -> dict[str, Figure]:
+    """sigma_r … gain_ar (the paper's figures 1a … 3b), and `settling` where the manoeuvre variance is swept."""
+    curves = common.groups(made["curves"], "case", "filter", "component")
+    gains = common.groups(made["gains"], "case", "filter", "component")
+
+    def chosen(name: str) -> list[str]:
+        return [case.name for case in experiment.shown_in(name)]
+
+    drawn = panels.per_component(results, curves, gains, QUANTITIES, chosen)
+    some, _ = panels.shown(results, chosen("settling"))
+    figure = settling_figure(some, made["steady"])
+    return drawn | ({"settling": figure} if figure else {})
+
+
+def settling_figure(results: Sequence[CaseResult], table) -> Figure | None:
+    """Steady σ of the range against its settling time over D_M, with the ten-period line and the best D_M named."""
+    families = {
+        stem: members
+        for stem, members in panels.families(results).items()
+        if len({tuple(r.axes.extra["manoeuvre_variance"]) for r in members}) > 1
+    }
+    if not families:
+        return None
+    rows = table[table["component"] == "r"]
+    drawn = tuple(_settling_panel(members, rows) for members in families.values())
+    caption = (
+        "Exact steady σ of the range against the settling time of the measured σ (within 5 % of the steady value, for "
+        "good), one mark for each manoeuvre variance, written beside it in m²/s⁶. Dotted: ten scan periods, the "
+        "paper's limit; star: the least steady error under it. Variances that do not settle within the run are left out."
+    )
+    return Figure(
+        "settling", "Steady error against settling time", caption, drawn, min(2, len(drawn)), 85.0 * min(2, len(drawn))
+    )
+
+
+def _settling_panel(members: Sequence[CaseResult], rows) -> Panel:
+    period = members[0].axes.extra["scan_period_s"]
+    marks: list = [Reference(PERIODS * period, "x", "10 periods")]
+    for n, name in enumerate(members[0].axes.filters):
+        own = rows[rows["case"].isin([r.name for r in members]) & (rows["filter"] == name)]
+        own = own[np.isfinite(own["settling_s"])].sort_values("manoeuvre_variance")
+        if own.empty:
+            continue
+        t, sigma = own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy()
+        marks.append(Line(t, sigma, name, Style(n, n, n)))
+        for when, same in own.groupby("settling_s"):
+            words = ", ".join(panels.number(float(v)) for v in same["manoeuvre_variance"])
+            edge = same["steady_sigma"].min() if n else same["steady_sigma"].max()
+            marks.append(Note(float(when), float(edge), words, below=bool(n)))
+        best = own[own["best"]]
+        if not best.empty:
+            star = Style(n, None, 7, size_pt=8)
+            marks.append(Line(best["settling_s"].to_numpy(), best["steady_sigma"].to_numpy(), "", star))
+    x, y = Axis("settling time of $\\sigma$ of $r$, s", limits=(0, None)), Axis("steady $\\sigma$ of $r$, m")
+    return Panel(x, y, tuple(marks), panels.device(members[0]), direct=False)
