@@ -61,7 +61,7 @@ def threefry(x0, x1, k0, k1):
 
 @inline
 def log_polynomial(x):
-    """Natural logarithm of a positive normal number: atanh series on sqrt(1/2) … sqrt(2), to 2 units in the last digit."""
+    """Natural logarithm of a positive normal number, to 2 units in the last place: atanh series on √½ … √2."""
     b = np.float64(x).view(np.int64)
     e = (b - np.int64(0x3FE6A09E667F3BCD)) >> np.int64(52)
     m = np.int64(b - (e << np.int64(52))).view(np.float64)

@@ -1,0 +1,254 @@
+"""Linear filters of the second order over many realisations: plots, least-squares start, Kalman scans, sums of errors.
+
+The gains do not depend on the data, so a filter is a schedule of gains that all realisations share. Realisations lie in
+chunks that stay in cache, scans outermost, one plain loop over the chunk per formula. The rows of a state are value,
+rate and second rate of one coordinate (range, radial velocity, acceleration); a filter of the first order is one whose
+third gains and weights are zero, and a further coordinate is a further call.
+
+A schedule is four arrays, F filters over K scans:
+
+    observes (F,)           1: the filter observes the value alone; 2: value and rate
+    start    (F,)           scan, counted from 1, at which its least-squares start ends
+    weights  (F, 3, 2, S)   that start is the sum of weights times plots over the first `start` scans; S >= all starts
+    gains    (F, K, 3, 2)   of every scan after the start; not read up to it
+
+Before the start the estimates are the plots themselves, of what the filter observes.
+
+The work array x (F + 1, 3, n) holds the filters' states and, last, the plots (its third row stays zero).
+"""
+
+import numpy as np
+
+from radarsim.kernels.compile import aligned_zeros, inline, kernel, summing
+from radarsim.kernels.random import U, normals
+
+CHUNK = 512  # realisations; a row is 4 KB, so that two filters and the plots just fill a first-level cache
+
+
+@inline
+def extrapolated(r, v, a, dt):
+    """B x of P1 eq. (3): value, rate and second rate after a time dt."""
+    return r + dt * (v + 0.5 * dt * a), v + dt * a, a
+
+
+@kernel
+def fill_plots(key, first, scan, mean, sigma, z, w):
+    """Plots of one scan: values z (n,) and rates w (n,) of realisations first, first + 1, …
+
+    mean (>= 2,) holds the true ones, sigma (2,) their standard deviations. The first normal of draw pair `scan` goes to
+    the value, the second to the rate, whether or not any filter observes it.
+    """
+    k0, k1, start = key[0], key[1], U(first)
+    mean_z, mean_w, sigma_z, sigma_w = mean[0], mean[1], sigma[0], sigma[1]
+    for i in range(z.size):
+        a, b = normals(k0, k1, start + U(i), scan)
+        z[i] = mean_z + sigma_z * a
+        w[i] = mean_w + sigma_w * b
+
+
+@kernel
+def add_weighted(x, z, w, weight):
+    """One scan's share of the least-squares start: x (3, n) += weight (3, 2) of the plots z (n,), w (n,)."""
+    for j in range(3):
+        row, of_value, of_rate = x[j], weight[j, 0], weight[j, 1]
+        for i in range(z.size):
+            row[i] += of_value * z[i] + of_rate * w[i]
+
+
+@kernel
+def scan_value(x, z, dt, gain):
+    """One scan, in place, of a filter that observes the value: x (3, n) estimates, z (n,) plots, gain (3, >= 1)."""
+    r, v, a = x[0], x[1], x[2]
+    g0, g1, g2 = gain[0, 0], gain[1, 0], gain[2, 0]
+    for i in range(z.size):
+        p, q, s = extrapolated(r[i], v[i], a[i], dt)
+        residual = z[i] - p
+        r[i], v[i], a[i] = p + g0 * residual, q + g1 * residual, s + g2 * residual
+
+
+@kernel
+def scan_value_rate(x, z, w, dt, gain):
+    """One scan, in place, of a filter that observes value z (n,) and rate w (n,): x (3, n) estimates, gain (3, 2)."""
+    r, v, a = x[0], x[1], x[2]
+    g0, g1, g2 = gain[0, 0], gain[1, 0], gain[2, 0]
+    h0, h1, h2 = gain[0, 1], gain[1, 1], gain[2, 1]
+    for i in range(z.size):
+        p, q, s = extrapolated(r[i], v[i], a[i], dt)
+        e, f = z[i] - p, w[i] - q
+        r[i], v[i], a[i] = p + g0 * e + h0 * f, q + g1 * e + h1 * f, s + g2 * e + h2 * f
+
+
+@kernel
+def advance(x, k, dt, observes, start, weights, gains):
+    """Scan k, counted from 0, of all filters, in place: x as above, its plots of scan k; dt is the time since k - 1."""
+    plots = x.shape[0] - 1
+    z, w = x[plots, 0], x[plots, 1]
+    for f in range(plots):
+        if k < start[f]:
+            add_weighted(x[f], z, w, weights[f, :, :, k])
+        elif observes[f] == 1:
+            scan_value(x[f], z, dt, gains[f, k])
+        else:
+            scan_value_rate(x[f], z, w, dt, gains[f, k])
+
+
+@inline
+def source(x, f, k, observes, start):
+    """Which row of x holds the estimates of filter f at scan k, and how many components of it are estimates."""
+    if k >= start[f] - 1:
+        return f, 3
+    return x.shape[0] - 1, observes[f]
+
+
+@summing
+def moments(x, f, c, n, truth):
+    """Sums of e, e², e³, e⁴ over the first n realisations; the errors are e = x[f, c] - truth."""
+    s1 = s2 = s3 = s4 = 0.0
+    for i in range(n):
+        e = x[f, c, i] - truth
+        ee = e * e
+        s1 += e
+        s2 += ee
+        s3 += e * ee
+        s4 += ee * ee
+    return s1, s2, s3, s4
+
+
+@summing
+def product(x, f, c, d, n, truth):
+    """Sum over the first n realisations of e_c e_d, the errors of two components of row f; truth (3,)."""
+    s, true_c, true_d = 0.0, truth[c], truth[d]
+    for i in range(n):
+        s += (x[f, c, i] - true_c) * (x[f, d, i] - true_d)
+    return s
+
+
+@summing
+def product_of_squares(x, f, g, c, n, truth):
+    """Sum over the first n realisations of e_f² e_g², the errors of component c in rows f and g."""
+    s = 0.0
+    for i in range(n):
+        e, h = x[f, c, i] - truth, x[g, c, i] - truth
+        s += (e * e) * (h * h)
+    return s
+
+
+@kernel
+def add_sums(x, n, k, truth, observes, start, baseline, error, paired, cross):
+    """Add the sums of scan k over the first n realisations of x; truth (3,), the rest as in `simulate_block`."""
+    beside, compared = source(x, baseline, k, observes, start)
+    for f in range(x.shape[0] - 1):
+        row, known = source(x, f, k, observes, start)
+        for c in range(known):
+            s1, s2, s3, s4 = moments(x, row, c, n, truth[c])
+            error[f, k, c, 0] += s1
+            error[f, k, c, 1] += s2
+            error[f, k, c, 2] += s3
+            error[f, k, c, 3] += s4
+            if row == beside:
+                paired[f, k, c] += s4
+            elif c < compared:
+                paired[f, k, c] += product_of_squares(x, row, beside, c, n, truth[c])
+            for d in range(c):
+                cross[f, k, c + d - 1] += product(x, row, c, d, n, truth)
+
+
+@kernel
+def add_block(key, first, count, truth, sigma, dt, observes, start, weights, gains, baseline, error, paired, cross):
+    """`simulate_block` for arguments of the one type that is compiled."""
+    filters, scans = gains.shape[0], gains.shape[1]
+    x = aligned_zeros((filters + 1) * 3 * CHUNK).reshape((filters + 1, 3, CHUNK))
+    for done in range(0, count, CHUNK):
+        x[:] = 0.0
+        # A partial chunk is computed whole and summed in part, so each realisation goes through the same instructions.
+        n = min(CHUNK, count - done)
+        for k in range(scans):
+            fill_plots(key, first + done, k, truth[k], sigma[k], x[filters, 0], x[filters, 1])
+            advance(x, k, dt[k], observes, start, weights, gains)
+            add_sums(x, n, k, truth[k], observes, start, baseline, error, paired, cross)
+
+
+@kernel
+def fill_simulated(key, first, truth, sigma, plots):
+    """`simulate_plots` for arguments of the one type that is compiled; plots (n, K, 2) is written."""
+    x = aligned_zeros(2 * CHUNK).reshape((2, CHUNK))
+    for done in range(0, plots.shape[0], CHUNK):
+        n = min(CHUNK, plots.shape[0] - done)
+        for k in range(plots.shape[1]):
+            fill_plots(key, first + done, k, truth[k], sigma[k], x[0], x[1])
+            plots[done : done + n, k] = x[:, :n].T
+
+
+@kernel
+def fill_estimates(plots, dt, observes, start, weights, gains, estimates):
+    """`estimate` for arguments of the one type that is compiled; estimates (n, F, K, 3) are written."""
+    filters, scans = gains.shape[0], gains.shape[1]
+    x = aligned_zeros((filters + 1) * 3 * CHUNK).reshape((filters + 1, 3, CHUNK))
+    for done in range(0, plots.shape[0], CHUNK):
+        x[:] = 0.0
+        n = min(CHUNK, plots.shape[0] - done)
+        for k in range(scans):
+            x[filters, :2, :n] = plots[done : done + n, k].T
+            advance(x, k, dt[k], observes, start, weights, gains)
+            for f in range(filters):
+                row, known = source(x, f, k, observes, start)
+                estimates[done : done + n, f, k, :known] = x[row, :known, :n].T
+
+
+def plain(array, *shape, dtype=np.float64):
+    """The array as the kernels take it: of one type, contiguous, broadcast to a shape. Itself where it is so already."""
+    if type(array) is np.ndarray and array.shape == shape and array.dtype == dtype and array.flags.c_contiguous:
+        return array
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(array, dtype=dtype), shape))
+
+
+def schedule(dt, observes, start, weights, gains) -> tuple[np.ndarray, ...]:
+    """Interval and schedule arrays as the kernels take them; dt a number or (K,), the rest as above."""
+    filters, scans = gains.shape[:2]
+    return (
+        plain(dt, scans),
+        plain(observes, filters, dtype=np.int64),
+        plain(start, filters, dtype=np.int64),
+        plain(weights, *weights.shape),
+        plain(gains, *gains.shape),
+    )
+
+
+def simulate_block(
+    key, first, count, truth, sigma, dt, observes, start, weights, gains, baseline, error, paired, cross
+) -> None:
+    """Simulate realisations first … first + count - 1 (any count > 0) and add the sums of all filters' errors.
+
+    key (2,) of the noise's stream; truth (K, 3); sigma (2,) or (K, 2), standard deviations of the plots' value and
+    rate; dt a number or (K,), the time since the scan before (the first is not read); observes, start, weights, gains
+    the schedule of F filters; baseline the filter that others are compared with. Added to, float64 and contiguous, over
+    the components that a filter estimates at that scan:
+
+        error  (F, K, 3, 4)   sums of e, e², e³, e⁴, the errors e = estimate - truth
+        paired (F, K, 3)      sums of e² times the baseline's e², where both have an estimate
+        cross  (F, K, 3)      sums of e_r e_V, e_r e_a, e_V e_a
+
+    Realisation i has the same plots and estimates in any block. Memory does not grow with count or scans.
+    """
+    scans = gains.shape[1]
+    arrays = plain(key, 2, dtype=np.uint64), int(first), int(count), plain(truth, scans, 3), plain(sigma, scans, 2)
+    add_block(*arrays, *schedule(dt, observes, start, weights, gains), int(baseline), error, paired, cross)
+
+
+def simulate_plots(key, first, count, truth, sigma) -> np.ndarray:
+    """The plots (count, K, 2) that `simulate_block` draws for realisations first … first + count - 1."""
+    scans = len(truth)
+    plots = np.empty((count, scans, 2))
+    fill_simulated(plain(key, 2, dtype=np.uint64), int(first), plain(truth, scans, 3), plain(sigma, scans, 2), plots)
+    return plots
+
+
+def estimate(plots, dt, observes, start, weights, gains) -> np.ndarray:
+    """Estimates (n, F, K, 3) of F filters over plots (n, K, 2) of n tracks; NaN where a filter has none yet.
+
+    dt and the schedule as for `simulate_block`, by the same instructions. For a missing plot give any finite number,
+    with zero gains.
+    """
+    estimates = np.full((len(plots), *gains.shape[:3]), np.nan)
+    fill_estimates(plain(plots, *np.shape(plots)), *schedule(dt, observes, start, weights, gains), estimates)
+    return estimates
