@@ -145,10 +145,9 @@ def add_sums(x, n, k, truth, observes, start, baseline, error, paired, cross):
             error[f, k, c, 1] += s2
             error[f, k, c, 2] += s3
             error[f, k, c, 3] += s4
-            if row == beside:
-                paired[f, k, c] += s4
-            elif c < compared:
-                paired[f, k, c] += product_of_squares(x, row, beside, c, n, truth[c])
+            if c < compared:
+                same = row == beside
+                paired[f, k, c] += s4 if same else product_of_squares(x, row, beside, c, n, truth[c])
             for d in range(c):
                 cross[f, k, c + d - 1] += product(x, row, c, d, n, truth)
 
@@ -196,7 +195,7 @@ def fill_estimates(plots, dt, observes, start, weights, gains, estimates):
 
 
 def plain(array, *shape, dtype=np.float64):
-    """The array as the kernels take it: of one type, contiguous, broadcast to a shape. Itself where it is so already."""
+    """The array as the kernels take it: of one type, contiguous, broadcast to a shape. Itself where that is so."""
     if type(array) is np.ndarray and array.shape == shape and array.dtype == dtype and array.flags.c_contiguous:
         return array
     return np.ascontiguousarray(np.broadcast_to(np.asarray(array, dtype=dtype), shape))
