@@ -1,0 +1,77 @@
+"""How accurately a burst can be measured at all: Fisher matrices, potential spreads, what they mean for the motion.
+
+Uss, Baryshev, Djavad 2010: the Fisher matrix below (6), the potential accuracy after (7), T_min (17). Matrices are in
+the units of θ = (φ₀, f₀, …), rad, Hz, Hz/s, ….
+"""
+
+import math
+
+import numpy as np
+
+from radarsim.models.burst import Burst, balanced_inverse, phase_turns, sample_times
+
+
+def energy_ratio(burst: Burst, duration_s: float) -> float:
+    """μ = A² T t_p / (4 σ² Δt T_p); twice that for complex samples, each of which is two numbers."""
+    samples = burst.samples_per_pulse * duration_s / burst.pulse_period_s
+    return (2 if burst.complex_samples else 1) * burst.amplitude**2 * samples / (4.0 * burst.noise_variance)
+
+
+def shortest_window(burst: Burst, least_ratio: float = 5.0) -> float:
+    """T_min (17) in s: where μ reaches μ_min."""
+    return least_ratio * burst.pulse_period_s / energy_ratio(burst, burst.pulse_period_s)
+
+
+def sensitivities(size: int, duration_s: float) -> np.ndarray:
+    """k(t) at the end of a window, (size,): its value at τT is this times τ^j."""
+    factors = np.array([2.0 * math.pi * duration_s**j / math.factorial(j) for j in range(size)])
+    factors[0] = 1.0
+    return factors
+
+
+def fisher(burst: Burst, size: int, duration_s: float) -> np.ndarray:
+    """Fisher matrix (size, size) in closed form, 2μ c_i c_j T^{i+j} / (i + j + 1)."""
+    c, order = sensitivities(size, duration_s), np.arange(size)
+    return 2.0 * energy_ratio(burst, duration_s) * np.outer(c, c) / (order[:, None] + order + 1.0)
+
+
+def fisher_sum(burst: Burst, size: int, pulses: int, theta: np.ndarray | None = None) -> np.ndarray:
+    """Fisher matrix of the samples of the first `pulses` pulses as a sum.
+
+    With the true θ the sum is exact; without, sin² of the phase is replaced by its mean ½, as in the closed form.
+    """
+    t = sample_times(burst, pulses)
+    duration = pulses * burst.pulse_period_s
+    k = sensitivities(size, duration) * (t.ravel()[:, None] / duration) ** np.arange(size)
+    if burst.complex_samples:
+        weight = 1.0
+    elif theta is None:
+        weight = 0.5
+    else:
+        weight = np.sin(2.0 * math.pi * phase_turns(theta, t).ravel())[:, None] ** 2
+    return burst.amplitude**2 / burst.noise_variance * (weight * k).T @ k
+
+
+def spreads(information: np.ndarray) -> np.ndarray:
+    """Potential standard deviations (size,) that an information matrix allows."""
+    return np.sqrt(np.diag(balanced_inverse(information)))
+
+
+def prior_information(sigma: np.ndarray) -> np.ndarray:
+    """R_pr⁻¹ of independent prior errors with standard deviations sigma (size,)."""
+    return np.diag(np.asarray(sigma, dtype=float) ** -2.0)
+
+
+def radial_motion(sigma: np.ndarray, wavelength_m: float) -> np.ndarray:
+    """Spreads of radial velocity (m/s), acceleration (m/s²), … from those of f₀, f₁, … : v = λ f / 2."""
+    return 0.5 * wavelength_m * np.asarray(sigma)[1:]
+
+
+def derivative_spread(covariance: np.ndarray, order: int, t_s: float) -> float:
+    """Spread of the frequency's derivative of this order at time t within the burst, from the covariance of θ.
+
+    The beginning of the burst, where θ is defined, is the worst place: in the middle it is known many times better.
+    """
+    size = len(covariance)
+    row = np.array([t_s ** (j - 1 - order) / math.factorial(j - 1 - order) if j > order else 0.0 for j in range(size)])
+    return float(np.sqrt(row @ covariance @ row))

@@ -1,0 +1,120 @@
+"""Arrays for the discriminator's kernels: the burst cut into blocks, each estimator's windows and step matrices."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from radarsim.filters.discriminator import Designer, handover_directions
+from radarsim.kernels.discriminator import OPTIONS, WINDOW
+from radarsim.kernels.discriminator_data import PHYSICS, block_table
+from radarsim.kernels.discriminator_scoring import SIZE
+from radarsim.models.burst import Burst, balanced_inverse, signal, turns_per_parameter
+
+IMAGE_SHARE = 0.02  # of a window's samples: below it the sum at twice the frequency is left out of the likelihood
+
+
+@dataclass(frozen=True)
+class Design:
+    """One estimator: window lengths in pulses, and how it starts, steps and searches; see `kernels.Estimators`."""
+
+    windows: tuple[int, ...]
+    phases: int = 0
+    steps: int = 40
+    tolerance: float = 1e-3
+    coherent: bool = False
+    search: int = 0
+    spacing: float = 0.8
+    margin: float = 3.0
+    from_truth: bool = False
+    amplitude: int = 0
+
+
+def block_edges(windows: list[int], per_window: int) -> np.ndarray:
+    """Pulses where blocks begin and end: every window ends one, and none is longer than its time over per_window."""
+    edges = [0]
+    for end in sorted(set(windows)):
+        begin = edges[-1]
+        while begin < end:
+            longest = max(1, max(begin, windows[0]) // per_window)
+            # Equal parts of what is left, so that no sliver remains before the window's end.
+            begin += math.ceil((end - begin) / math.ceil((end - begin) / longest))
+            edges.append(begin)
+    return np.array(edges)
+
+
+@dataclass(frozen=True)
+class World:
+    """The burst for the kernels, see `kernels.discriminator.estimate_block`."""
+
+    physics: np.void
+    edges: np.ndarray
+    clean: np.ndarray
+    mean: np.ndarray
+    factor: np.ndarray
+
+
+def world(
+    burst: Burst, mode: int, edges: np.ndarray, windows: list[int], truth_turns: np.ndarray, reference_turns: np.ndarray
+) -> World:
+    """Arrays of a burst; phases (samples per pulse, pulses) in turns, the same unless the truth is no polynomial."""
+    ends = np.array(windows)
+    doubled = np.cumsum(np.exp(-4j * math.pi * (truth_turns - np.rint(truth_turns))).sum(axis=0))[ends - 1]
+    image = not burst.complex_samples and np.any(np.abs(doubled) > IMAGE_SHARE * burst.samples_per_pulse * ends)
+    physics = np.zeros(1, PHYSICS)
+    physics[0] = (
+        mode,
+        burst.complex_samples,
+        image,
+        burst.pulses,
+        burst.samples_per_pulse,
+        burst.amplitude,
+        math.sqrt(burst.noise_variance),
+        1.0 / burst.pulses,
+        burst.sampling_period_s / burst.duration_s,
+    )
+    clean = signal(burst, truth_turns)
+    mean, factor = block_table(physics[0], edges, reference_turns, clean)
+    rows = [clean.real.ravel(), clean.imag.ravel()] if burst.complex_samples else [clean.ravel()]
+    return World(physics[0], edges.astype(np.int64), np.stack(rows), mean, factor)
+
+
+def phase_prior(sigma: np.ndarray) -> np.ndarray:
+    """Prior precisions (size,) of θ as the estimator uses them: a phase known no better than π is not known at all."""
+    precision = np.asarray(sigma, dtype=float) ** -2.0
+    if sigma[0] > math.pi:
+        precision[0] = 0.0
+    return precision
+
+
+def estimators(
+    designs: list[Design],
+    edges: np.ndarray,
+    burst: Burst,
+    sigma: np.ndarray,
+    fisher: Callable[[int], np.ndarray],
+    designer: Designer,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Records of the windows (F, K) and options (F,) of a case's estimators.
+
+    fisher gives Φ_θ of so many pulses in the units of θ, sigma (size,) is the prior. Unused windows stay zero.
+    """
+    size, whole = len(sigma), turns_per_parameter(len(sigma), burst.duration_s)
+    windows = np.zeros((len(designs), max(len(d.windows) for d in designs)), WINDOW)
+    options = np.zeros(len(designs), OPTIONS)
+    for e, design in enumerate(designs):
+        for name in OPTIONS.names:
+            options[e][name] = len(design.windows) if name == "windows" else getattr(design, name)
+        directions = handover_directions(designer, list(design.windows)) if design.search else None
+        for k, pulses in enumerate(design.windows):
+            window = windows[e, k]
+            window["pulses"], window["blocks"] = pulses, np.searchsorted(edges, pulses)
+            window["powers"] = (pulses / burst.pulses) ** np.arange(SIZE)
+            turns = whole * window["powers"][:size]
+            window["precision"][:size] = phase_prior(sigma) / turns**2
+            information = fisher(pulses) / np.outer(turns, turns) + np.diag(window["precision"][:size])
+            window["step"][:size, :size] = balanced_inverse(information)
+            if directions is not None:
+                window["direction"][:size] = directions[k] * whole
+    return windows, options

@@ -1,0 +1,205 @@
+"""A burst as drawn: its samples, its samples demodulated into block sums, or block sums from their own exact law."""
+
+import numpy as np
+
+from radarsim.kernels.compile import kernel, summing
+from radarsim.kernels.discriminator_scoring import (
+    CENTRE,
+    REF,
+    ROWS,
+    SLOPE,
+    TURN,
+    W0,
+    W1,
+    W2,
+    Z0,
+    Z1,
+    Z2,
+    derivative,
+    polynomial,
+    sincos_turns,
+)
+from radarsim.kernels.random import U, normal_pair, threefry
+
+PHYSICS = np.dtype(
+    [
+        ("mode", np.int64),  # BLOCK_SUMS, SAMPLES or DEMODULATED
+        ("complex_samples", np.int64),
+        ("image", np.int64),  # whether the sums at twice the frequency matter
+        ("pulses", np.int64),
+        ("samples_per_pulse", np.int64),
+        ("amplitude", np.float64),
+        ("sigma", np.float64),  # of the noise
+        ("step", np.float64),  # pulse period in bursts
+        ("offset", np.float64),  # sampling period in bursts
+    ],
+    align=True,
+)
+BLOCK_SUMS, SAMPLES, DEMODULATED = 0, 1, 2
+
+
+@kernel
+def draw_samples(physics, key, realisation, clean, samples):
+    """Samples (1 or 2, n) of a burst: clean (1 or 2, n) and noise; row 1 is the imaginary part.
+
+    The columns are all pulses' first samples, then all second ones, …. Draw j makes the noise of column j and of the
+    one half of them later; those of the imaginary part follow.
+    """
+    k0, k1, n, sigma = key[0], key[1], samples.shape[1], physics.sigma
+    half = (n + 1) // 2
+    for row in range(samples.shape[0]):
+        for j in range(n - half):
+            a, b = threefry(U(realisation), U(row * half + j), k0, k1)
+            a, b = normal_pair(a, b)
+            samples[row, j], samples[row, j + half] = clean[row, j] + sigma * a, clean[row, j + half] + sigma * b
+        if n % 2:
+            a, b = threefry(U(realisation), U(row * half + half - 1), k0, k1)
+            samples[row, half - 1] = clean[row, half - 1] + sigma * normal_pair(a, b)[0]
+
+
+@kernel
+def draw_sums(key, realisation, mean, factor, sums):
+    """Block sums (ROWS, blocks padded) of a burst about the true phase: draws 2i and 2i + 1 make block i."""
+    k0, k1, f = key[0], key[1], factor
+    for i in range(sums.shape[1]):
+        x, y = threefry(U(realisation), U(2 * i), k0, k1)
+        n0, n1 = normal_pair(x, y)
+        x, y = threefry(U(realisation), U(2 * i + 1), k0, k1)
+        n2, n3 = normal_pair(x, y)
+        sums[Z0, i] = mean[Z0, i] + f[0, i] * n0
+        sums[Z0 + 1, i] = mean[Z0 + 1, i] + f[1, i] * n0 + f[2, i] * n1
+        sums[Z1, i] = mean[Z1, i] + f[3, i] * n0 + f[4, i] * n1 + f[5, i] * n2
+        sums[Z1 + 1, i] = mean[Z1 + 1, i] + f[6, i] * n0 + f[7, i] * n1 + f[8, i] * n2 + f[9, i] * n3
+
+
+@kernel
+def demodulate(physics, edges, samples, x, first, last, sums):
+    """Block sums of blocks first … last − 1 from the samples, about the phase of x (6,), turns over the burst.
+
+    edges (blocks + 1,) are the pulses where blocks begin and end.
+    """
+    for i in range(first, last):
+        centre = sums[CENTRE, i]
+        for row in range(Z0, ROWS):
+            sums[row, i] = 0.0
+        sums[REF, i] = polynomial(x[0], x[1], x[2], x[3], x[4], x[5], centre)
+        sums[SLOPE, i] = derivative(x[1], x[2], x[3], x[4], x[5], centre)
+        for j in range(physics.samples_per_pulse):
+            place, count = j * physics.pulses + edges[i], edges[i + 1] - edges[i]
+            time = edges[i] * physics.step + j * physics.offset
+            if physics.complex_samples:
+                demodulate_complex(samples, place, count, time, physics.step, centre, x, sums, i)
+            else:
+                demodulate_real(samples, place, count, time, physics.step, centre, x, sums, i)
+                if physics.image:
+                    reference_image(count, time, physics.step, centre, x, sums, i)
+
+
+@summing
+def demodulate_real(samples, place, count, time, step, centre, x, sums, i):
+    """Adds the samples from column `place`, the first at `time`, to Z₀, Z₁, Z₂ of block i."""
+    x0, x1, x2, x3, x4, x5 = x[0], x[1], x[2], x[3], x[4], x[5]
+    a = b = p = q = v = w = 0.0
+    for m in range(count):
+        t = time + m * step
+        s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))
+        u, t = samples[0, place + m], t - centre
+        c, s = u * c, u * s
+        a += c
+        b += s
+        c, s = c * t, s * t
+        p += c
+        q += s
+        v += c * t
+        w += s * t
+    sums[Z0, i] += a
+    sums[Z0 + 1, i] -= b
+    sums[Z1, i] += p
+    sums[Z1 + 1, i] -= q
+    sums[Z2, i] += v
+    sums[Z2 + 1, i] -= w
+
+
+@summing
+def demodulate_complex(samples, place, count, time, step, centre, x, sums, i):
+    """As `demodulate_real` for complex samples."""
+    x0, x1, x2, x3, x4, x5 = x[0], x[1], x[2], x[3], x[4], x[5]
+    a = b = p = q = v = w = 0.0
+    for m in range(count):
+        t = time + m * step
+        s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))
+        re, im, t = samples[0, place + m], samples[1, place + m], t - centre
+        c, s = re * c + im * s, im * c - re * s
+        a += c
+        b += s
+        c, s = c * t, s * t
+        p += c
+        q += s
+        v += c * t
+        w += s * t
+    sums[Z0, i] += a
+    sums[Z0 + 1, i] += b
+    sums[Z1, i] += p
+    sums[Z1 + 1, i] += q
+    sums[Z2, i] += v
+    sums[Z2 + 1, i] += w
+
+
+@summing
+def reference_image(count, time, step, centre, x, sums, i):
+    """Adds Σ e^{-2jψ_ref} sⁱ to W₀, W₁, W₂ of block i."""
+    x0, x1, x2, x3, x4, x5 = 2.0 * x[0], 2.0 * x[1], 2.0 * x[2], 2.0 * x[3], 2.0 * x[4], 2.0 * x[5]
+    a = b = p = q = v = w = 0.0
+    for m in range(count):
+        t = time + m * step
+        s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))
+        a += c
+        b += s
+        t -= centre
+        p += c * t
+        q += s * t
+        t *= t
+        v += c * t
+        w += s * t
+    sums[W0, i] += a
+    sums[W0 + 1, i] -= b
+    sums[W1, i] += p
+    sums[W1 + 1, i] -= q
+    sums[W2, i] += v
+    sums[W2 + 1, i] -= w
+
+
+def block_table(
+    physics: np.void, edges: np.ndarray, reference: np.ndarray, clean: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Exact mean (ROWS, blocks padded to eights) and covariance root (10, …) of block sums about a reference phase.
+
+    reference (samples per pulse, pulses) in turns; clean alike, the noise-free samples. Z₂ is put at its mean: its
+    noise meets only the square of a small slope. The root holds the lower triangle by rows for Re and Im of Z₀ and Z₁;
+    where a block has fewer than four samples the covariance is singular, so the root is that of the eigenvalues, made
+    triangular.
+    """
+    blocks = len(edges) - 1
+    padded = -(-blocks // 8) * 8  # so that loops over blocks have no remainder
+    mean, factor = np.zeros((ROWS, padded)), np.zeros((10, padded))
+    t = np.arange(physics["pulses"]) * physics["step"]
+    t = t + np.arange(physics["samples_per_pulse"])[:, None] * physics["offset"]
+    turn = np.exp(-1j * TURN * (reference - np.rint(reference)))
+    for i in range(blocks):
+        part = slice(edges[i], edges[i + 1])
+        mean[CENTRE, i] = t[:, part].mean()
+        s, e = (t[:, part] - mean[CENTRE, i]).ravel(), turn[:, part].ravel()
+        received = clean[:, part].ravel() * e
+        for n, (z, w) in enumerate(((Z0, W0), (Z1, W1), (Z2, W2))):
+            mean[z, i], mean[z + 1, i] = np.sum(received * s**n).real, np.sum(received * s**n).imag
+            if not physics["complex_samples"]:
+                mean[w, i], mean[w + 1, i] = np.sum(e**2 * s**n).real, np.sum(e**2 * s**n).imag
+        rows = np.stack([e.real, e.imag, e.real * s, e.imag * s])
+        covariance = rows @ rows.T
+        if physics["complex_samples"]:
+            rows = np.stack([-e.imag, e.real, -e.imag * s, e.real * s])
+            covariance = covariance + rows @ rows.T
+        values, vectors = np.linalg.eigh(covariance)
+        root = np.linalg.qr((vectors * np.sqrt(np.maximum(values, 0.0))).T)[1].T
+        factor[:, i] = physics["sigma"] * root[np.tril_indices(4)]
+    return mean, factor
