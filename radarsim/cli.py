@@ -105,7 +105,7 @@ def run(configs, realisations, seed, overrides, threads, out, no_figures, quiet)
                     one, threads=threads, out=out, figures=not no_figures, progress=progress.update, stop=stop
                 )
             if not quiet:
-                console.print_result(result, out)
+                console.print_result(result)
 
 
 @main.command()
@@ -143,7 +143,7 @@ def report(configs, realisations, seed, overrides, out, no_figures):
     from radarsim import console, experiment
 
     for one in experiment.load_all(configs, merged(overrides, realisations, seed)):
-        console.print_result(experiment.report(one, out=out, figures=not no_figures), out)
+        console.print_result(experiment.report(one, out=out, figures=not no_figures))
 
 
 @main.command()
@@ -180,9 +180,9 @@ def schema():
     Example
       radarsim schema > schema.json
     """
-    from radarsim.config import load
+    from radarsim.config.json_schema import schema_json
 
-    click.echo(load.schema_json())
+    click.echo(schema_json(), nl=False)
 
 
 if __name__ == "__main__":

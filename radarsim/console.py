@@ -2,11 +2,12 @@
 
 import sys
 import time
+from collections import Counter
 from collections.abc import Sequence
-from pathlib import Path
 
 SILENT_S = 2.0  # a run shorter than this shows no progress
 PIPED_WIDTH = 160
+MOST_ROWS = 36  # of the last scan's table; a larger experiment speaks by its answer and files
 
 
 def console(stderr: bool = False):
@@ -75,7 +76,11 @@ def show(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], r
         table.add_column(column, justify="right" if column in right else "left", no_wrap=not terminal)
     for row in rows:
         table.add_row(*(Text(printable(str(cell))) for cell in row))
-    console().print(table)
+    screen = console()
+    with screen.capture() as captured:
+        screen.print(table)
+    for line in captured.get().rstrip("\n").split("\n"):
+        sys.stdout.write(line.rstrip() + "\n")
 
 
 def printable(text: str) -> str:
@@ -88,22 +93,49 @@ def say(line: str) -> None:
     sys.stdout.write(printable(line) + "\n")
 
 
-def print_result(result, out: str) -> None:
-    """The answer of a run, the verdicts, and where everything lies."""
-    columns, rows, right = result.summary()
-    show(f"{result.experiment.stem}: {result.question()}", columns, rows, right)
-    for line in result.answer():
+def print_result(result) -> None:
+    """The answer of a run, σ at the last scan, the verdicts, and where everything lies."""
+    written = result.written
+    for line in written.answer:
         say(line)
-    counts = result.verdict_counts()
-    if counts:
-        say("claims: " + ", ".join(f"{n} {verdict}" for verdict, n in counts.items()))
-    folder = Path(out) / result.experiment.stem
-    say(f"tables   {folder / 'curves.csv'} and {len(result.tables) - 1} more beside it")
-    if result.drawn:
-        say(f"figures  {folder / 'figures'} ({len(result.drawn)} figures, SVG and PNG)")
-    say(f"report   {folder / 'report.html'}")
+    show_last_scan(written.tables["curves"], written.tables["gains"])
+    verdicts = result.verdicts()
+    if verdicts:
+        say("claims   " + ", ".join(f"{count} {verdict}" for verdict, count in verdicts.items()))
+    drawn = sum(name.endswith(".svg") for name in written.files)
+    say(f"tables   {written.folder / 'curves.csv'} and {sum(n.endswith('.csv') for n in written.files) - 1} more there")
+    if drawn:
+        say(f"figures  {written.folder / 'figures'} ({drawn}, each as SVG and PNG)")
+    say(f"report   {written.folder / 'report.html'}")
     for warning in result.warnings:
         sys.stderr.write(f"warning: {printable(warning)}\n")
+
+
+def show_last_scan(curves, gains) -> None:
+    """σ with interval, exact σ and gain of each case, filter and component at the last scan, unless too many."""
+    keys = ["case", "filter", "component"]
+    last = curves.groupby(keys, sort=False).tail(1)
+    if not 0 < len(last) <= MOST_ROWS:
+        return
+    last = last.merge(gains.groupby(keys, sort=False).tail(1), on=[*keys, "k", "t_s"], how="left")
+    rows = [
+        (
+            *(row.case, row.filter, row.component, f"{row.t_s:g} s"),
+            f"{row.sigma:.4g} {row.unit}",
+            f"{row.sigma_lo:.4g} … {row.sigma_hi:.4g}",
+            known(row.exact_sigma, "{:.4g}"),
+            known(row.gain_percent, "{:.2f} %"),
+            known(row.gain_lo, "{:.2f} … ") + known(row.gain_hi, "{:.2f}"),
+        )
+        for row in last.itertuples()
+    ]
+    columns = ("case", "filter", "", "at", "sigma", "95 %", "exact", "gain", "95 % of gain")
+    show("", columns, rows, right=columns[3:])
+
+
+def known(value: float, form: str) -> str:
+    """A number in a form, or nothing for not-a-number."""
+    return form.format(value) if value == value else ""
 
 
 def print_outlook(experiment, outlook) -> None:
@@ -120,10 +152,20 @@ def print_outlook(experiment, outlook) -> None:
     )
 
 
-def print_claims(rows: Sequence[Sequence[object]]) -> None:
-    """All claims asked for, one row a measured part."""
-    columns = ("claim", "statement", "case", "measured", "expected", "verdict")
-    show("", columns, rows)
+def print_claims(rows: Sequence[dict]) -> None:
+    """Each claim with its verdict, and below it what was measured, or the command that would judge it."""
+    last = None
+    for row in rows:
+        if row["claim"] != last:
+            last = row["claim"]
+            say(f"{last:<6} {row['overall']:<20} {row['statement']}  [{row['paper']}, {row['place']}]")
+            if row["overall"] == "not run":
+                say(f"       radarsim run {row['config']}")
+        if row["overall"] != "not run":
+            measured = f"{row['measured']:.4g} [{row['lo']:.4g}, {row['hi']:.4g}] {row['unit']}"
+            say(f"       {row['verdict']:<20} {row['case']}: {row['what']} {measured}; expected {row['expected']}")
+    overall = {row["claim"]: row["overall"] for row in rows}
+    say(", ".join(f"{count} {verdict}" for verdict, count in Counter(overall.values()).items()) or "no claims")
 
 
 def print_inventory(inventory) -> None:

@@ -14,7 +14,7 @@ from radarsim.engine.collect import Collected, collect, stored
 from radarsim.engine.executors import available_cores
 from radarsim.engine.results import CaseResult
 from radarsim.engine.stopping import Signals
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, StoreError
 
 
 def load_all(sources: Sequence, overrides: Sequence[str] = ()) -> list[Experiment]:
@@ -59,15 +59,20 @@ def outlook(experiment: Experiment, threads: int | None = None) -> Outlook:
         work = studies.CaseWork(case)
         count = min(work.block, case.realisations)
         work.simulate(0, count)
-        started = time.perf_counter()
-        work.simulate(0, count)
-        seconds = (time.perf_counter() - started) / count * case.realisations
+        seconds = min(timed(work, count) for _ in range(3)) / count * case.realisations
         axes = work.plan.axes
         cases.append(CaseOutlook(case.name, ", ".join(axes.filters), len(axes.k), case.realisations, seconds))
         largest = max(largest, work.size)
     # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter and its libraries.
     memory = 200 + 8e-6 * largest * (2 * threads + 32)
     return Outlook(tuple(cases), threads, sum(c.seconds for c in cases) / threads, memory)
+
+
+def timed(work: studies.CaseWork, count: int) -> float:
+    """Seconds that `count` realisations take."""
+    started = time.perf_counter()
+    work.simulate(0, count)
+    return time.perf_counter() - started
 
 
 def simulated(
@@ -147,11 +152,19 @@ class Result:
         """Write tables, figures, claims, run.json and report.html into out/<stem>/; what was written."""
         from radarsim.report import output
 
-        return output.write(self.experiment, self.cases, self.folder(out), self.facts, draw=figures)
+        folder = Path(out) / self.experiment.stem
+        self.written = output.write(self.experiment, self.cases, folder, self.facts, draw=figures)
+        return self.written
 
-    def folder(self, out: str | os.PathLike) -> Path:
-        """Where `write` puts them."""
-        return Path(out) / self.experiment.stem
+    def verdicts(self) -> dict[str, int]:
+        """How many claims came out how; empty where this experiment judges none."""
+        overall = self.tables["claims"].drop_duplicates("claim")["overall"]
+        return overall.value_counts(sort=False).to_dict()
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader of the numbers must know: damaged or mixed blocks."""
+        return self.facts["warnings"]
 
 
 def run(
@@ -264,3 +277,33 @@ def inventory() -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
         ("Studies (study: NAME)", ("name", "paper and question"), about),
         ("Filters", ("study", "keys", "what it is"), filters),
     ]
+
+
+def claims(configs: Sequence[str], out: str | os.PathLike) -> list[dict]:
+    """Rows of the claims, as stored under `out` or as not run; of some configs only if any are given.
+
+    Each row has the columns of claims.csv and `config`. Raises ConfigError for a config that does not exist.
+    """
+    from radarsim.report import claims as papers
+
+    stems = [one.stem for one in load_all(configs)] or sorted({claim.config for claim in papers.all_claims()})
+    held = {stem: table for stem in stems if (table := _stored_claims(Path(out) / stem / "claims.csv")) is not None}
+    if not configs:
+        return papers.listed(held)
+    rows = [row for row in papers.listed(held) if row["config"] in stems]
+    judged = {row["claim"] for row in rows}
+    for stem, table in held.items():
+        rows += [row | {"config": stem} for row in table.to_dict("records") if row["claim"] not in judged]
+    return rows
+
+
+def _stored_claims(path: Path):
+    """A stored claims.csv as a DataFrame; None if there is none."""
+    import pandas as pd
+
+    try:
+        return pd.read_csv(path, keep_default_na=False)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{path}: cannot be read: {error}") from error

@@ -1,10 +1,11 @@
-"""P1's study: every σ within its statistical error of the exact value, and the same check failing for planted faults."""
+"""P1's study: every σ within its statistical error of the exact value; the same check fails for planted faults."""
 
 import types
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numba import njit
 
 from radarsim.config.load import load
 from radarsim.engine.collect import collect
@@ -56,25 +57,17 @@ def designed(radar, variance_factor=1.0, velocity_factor=1.0):
 
 
 def with_shared_noise(monkeypatch):
-    """The block kernel recompiled with plots whose velocity noise is the range noise."""
-    pair = kernels.fill_plots.py_func
+    """The block kernel compiled anew, with plots whose velocity noise is the range noise."""
+    fill_plots = kernels.fill_plots
 
     def reused(key, first, scan, mean, sigma, z, w):
-        pair_compiled(key, first, scan, mean, sigma, z, w)
+        fill_plots(key, first, scan, mean, sigma, z, w)
         for i in range(z.size):
             w[i] = mean[1] + sigma[1] * (z[i] - mean[0]) / sigma[0]
 
-    names = dict(kernels.__dict__)
-    pair_compiled = kernels.kernel(pair)
-    names["fill_plots"] = kernels.kernel.__wrapped__(reused) if hasattr(kernels.kernel, "__wrapped__") else _jit(reused)
-    block = kernels.simulate_block.py_func
-    monkeypatch.setattr(kernels, "simulate_block", _jit(types.FunctionType(block.__code__, names, block.__name__)))
-
-
-def _jit(function):
-    from numba import njit
-
-    return njit(nogil=True)(function)
+    code = kernels.add_block.py_func.__code__
+    names = {**vars(kernels), "fill_plots": njit(reused)}
+    monkeypatch.setattr(kernels, "add_block", njit(types.FunctionType(code, names)))
 
 
 def test_the_check_finds_a_manoeuvre_variance_five_per_cent_off():
@@ -104,7 +97,7 @@ def test_the_check_finds_noise_shared_by_range_and_velocity(monkeypatch):
 
 
 def test_bias_of_a_turning_target_is_the_exact_one():
-    work = CaseWork(load("manoeuvring_turn").cases[0])
+    work = CaseWork(load("rls2", ["target=turn"]).cases[0])
     sums = collect(work, N)
     axes = work.plan.axes
     moments = work.plan.layout.unpack(sums.values)["error"] / sums.count
@@ -132,7 +125,7 @@ def test_identity_ignores_names_and_realisations():
     plain = load("rls2").cases[0]
     for change in ("realisations=7", "radar.name=other", "filters.0.name=mine"):
         assert identity(load("rls2", [change]).cases[0]) == identity(plain)
-    for change in ("seed=3", "scans=14", "radar.scan_period_s=9", "target=manoeuvring_turn"):
+    for change in ("seed=3", "scans=14", "radar.scan_period_s=9", "target=turn"):
         assert identity(load("rls2", [change]).cases[0]) != identity(plain)
 
 

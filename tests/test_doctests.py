@@ -1,0 +1,22 @@
+"""The examples in docstrings run and give what they say."""
+
+import doctest
+import pkgutil
+from importlib import import_module
+
+import pytest
+
+import radarsim
+
+MODULES = sorted(
+    {"radarsim", *(m.name for m in pkgutil.walk_packages(radarsim.__path__, "radarsim."))} - {"radarsim.__main__"}
+)
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples(name):
+    assert doctest.testmod(import_module(name)).failed == 0
+
+
+def test_there_are_examples():
+    assert sum(doctest.testmod(import_module(name)).attempted for name in ("radarsim", "radarsim.experiment")) >= 4

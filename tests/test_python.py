@@ -1,0 +1,71 @@
+"""radarsim from Python, as the contract promises it."""
+
+import copy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import radarsim
+
+CONFIG = {
+    "study": "range_doppler",
+    "radar": {"wavelength_m": 0.15, "sigma_range_m": 250, "sigma_velocity_mps": 15, "scan_period_s": 10},
+    "target": {"kind": "polynomial", "coefficients": [100e3, -250, 4]},
+    "filters": [
+        {"name": "r", "observes": ["range"], "manoeuvre_variance": 1e-3},
+        {"name": "r+Vr", "observes": ["range", "velocity"], "manoeuvre_variance": 1e-3},
+    ],
+    "scans": 15,
+    "realisations": 4000,
+}
+
+
+def test_runs_a_path_and_writes_nothing(tmp_path, monkeypatch):
+    config = Path("configs/rls2.yaml").resolve()
+    monkeypatch.chdir(tmp_path)
+    result = radarsim.run(config, realisations=1e4)
+    assert list(result.gains.columns)[:2] == ["case", "filter"]
+    assert set(result.curves["n"]) == {10_000}
+    assert not list(tmp_path.iterdir())
+
+
+def test_runs_a_dict_and_leaves_it_alone():
+    before = copy.deepcopy(CONFIG)
+    result = radarsim.run(CONFIG)
+    assert before == CONFIG
+    assert set(result.curves["case"]) == {"config"}
+
+
+def test_the_same_numbers_with_and_without_a_store(tmp_path):
+    one, other = radarsim.run(CONFIG), radarsim.run(CONFIG, out=tmp_path, figures=False, threads=1)
+    np.testing.assert_array_equal(one.curves["sigma"], other.curves["sigma"])
+    assert (tmp_path / "config" / "curves.csv").exists()
+
+
+def test_figures_by_the_names_of_their_files():
+    from matplotlib.figure import Figure
+
+    result = radarsim.run(CONFIG)
+    assert isinstance(result.figure("gain_r"), Figure)
+    assert {"sigma_r", "sigma_Vr", "sigma_ar", "gain_r", "gain_Vr", "gain_ar"} <= set(result.figures)
+    with pytest.raises(KeyError, match="gain_r"):
+        result.figure("gain_x")
+
+
+def test_a_wrong_config_raises_the_lines_of_the_command():
+    wrong = copy.deepcopy(CONFIG)
+    wrong["radar"]["sigma_range_m"] = -250
+    with pytest.raises(radarsim.ConfigError) as caught:
+        radarsim.run(wrong)
+    assert caught.value.lines == ("config: radar.sigma_range_m: must be > 0, got -250",)
+
+
+def test_realisation_i_is_the_same_in_any_run():
+    """Sums over the first 5000 of 5000 and of 9000 agree: the difference is the sum over the others."""
+    from radarsim.config.load import load
+    from radarsim.studies import CaseWork
+
+    work = CaseWork(load(CONFIG).cases[0])
+    whole, parts = work.simulate(0, 9000), work.simulate(0, 5000) + work.simulate(5000, 4000)
+    np.testing.assert_allclose(parts, whole, rtol=1e-9, atol=1e-6 * np.abs(whole).max())
