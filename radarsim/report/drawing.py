@@ -88,12 +88,12 @@ class Heat:
 
 @dataclass(frozen=True)
 class Note:
-    """Words at a point of the data, to the right above it, or below."""
+    """Words near a point of the data: above or below it ("n", "s"), to its right or left ("e", "w")."""
 
     x: float
     y: float
     text: str
-    below: bool = False
+    place: str = "ne"
 
 
 Mark = Line | Reference | Bars | Heat | Note

@@ -177,8 +177,10 @@ def _heat(axes, heat: Heat) -> None:
 
 
 def _note(axes, note: Note) -> None:
-    shift, side = ((3, -3), "top") if note.below else ((3, 3), "bottom")
-    axes.annotate(note.text, (note.x, note.y), xytext=shift, textcoords="offset points", fontsize=7, va=side)
+    up, right = "n" in note.place, "e" in note.place
+    look = {"ha": "left" if right else "right", "va": "bottom" if up else "top", "fontsize": 7}
+    shift = (3 if right else -3, 3 if up else -3)
+    axes.annotate(note.text, (note.x, note.y), xytext=shift, textcoords="offset points", **look)
 
 
 DRAWN = {Line: _line, Reference: _reference, Bars: _bars, Heat: _heat, Note: _note}

@@ -62,6 +62,11 @@ def label(result: CaseResult) -> str:
     return " ".join(filter(None, (device(result), swept(result))))
 
 
+def plain_label(result: CaseResult) -> str:
+    """`label` for text: letters plain."""
+    return label(result).replace("$", "")
+
+
 def families(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
     """Cases by config, in order: one panel each."""
     found: dict[str, list[CaseResult]] = {}

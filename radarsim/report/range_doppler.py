@@ -198,7 +198,7 @@ def settling_figure(results: Sequence[CaseResult], table) -> Figure | None:
     caption = (
         "Exact steady σ of the range against the settling time of the measured σ (within 5 % of the steady value, for "
         "good), one mark for each manoeuvre variance, written beside it in m²/s⁶. Dotted: ten scan periods, the "
-        "paper's limit; star: the least steady error under it. Variances that do not settle within the run are left out."
+        "paper's limit; star: the least steady error under it. What does not settle within the run is left out."
     )
     return Figure(
         "settling", "Steady error against settling time", caption, drawn, min(2, len(drawn)), 85.0 * min(2, len(drawn))
@@ -218,10 +218,66 @@ def _settling_panel(members: Sequence[CaseResult], rows) -> Panel:
         for when, same in own.groupby("settling_s"):
             words = ", ".join(panels.number(float(v)) for v in same["manoeuvre_variance"])
             edge = same["steady_sigma"].min() if n else same["steady_sigma"].max()
-            marks.append(Note(float(when), float(edge), words, below=bool(n)))
+            place = "ne" if n == 0 else "sw" if when == t.min() else "se"
+            marks.append(Note(float(when), float(edge), words, place))
         best = own[own["best"]]
         if not best.empty:
             star = Style(n, None, 7, size_pt=8)
             marks.append(Line(best["settling_s"].to_numpy(), best["steady_sigma"].to_numpy(), "", star))
     x, y = Axis("settling time of $\\sigma$ of $r$, s", limits=(0, None)), Axis("steady $\\sigma$ of $r$, m")
     return Panel(x, y, tuple(marks), panels.device(members[0]), direct=False)
+
+
+def question(experiment) -> str:
+    """What the experiment asks, in one sentence."""
+    filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
+    names = list(dict.fromkeys(getattr(case.spec.radar, "name", None) or case.stem for case in experiment.cases))
+    if any("velocity" in f.observes for case in experiment.cases for f in case.spec.filters):
+        return f"How much does observing the radial velocity lower the errors of {listed(names)}?"
+    return f"How large are the errors of {listed(names)} with {listed(filters)}?"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a sentence: a, b and c."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+
+
+def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
+    """Sentences with numbers and 95 % intervals: the gains at the end of the run, component by component."""
+    gains = common.groups(made["gains"], "component")
+    told = [_gain_sentence(results, gains[(c,)], of.name) for c, of in QUANTITIES.items() if (c,) in gains]
+    return told or [_sigma_sentence(results[0], made["curves"])]
+
+
+def _gain_sentence(results: Sequence[CaseResult], rows, quantity: str) -> str:
+    labels = {result.name: panels.plain_label(result) for result in results}
+    last = rows.loc[rows.groupby(["case", "filter"], sort=False)["k"].idxmax()]
+    several = rows["filter"].nunique() > 1
+    if len(last) > 1:
+        low, high = (last.loc[last["gain_percent"].agg(pick)] for pick in ("idxmin", "idxmax"))
+        ends = " to ".join(f"{_gain(row)} ({_who(row, labels, several)})" for row in (low, high))
+        return f"{quantity.capitalize()}: at the end of the run σ changes by {ends}."
+    row = last.iloc[0]
+    best = rows.loc[rows["gain_percent"].idxmax()]
+    peak = "" if best["k"] == row["k"] else f", at best by {_gain(best)} at {best['t_s']:g} s"
+    return f"{quantity.capitalize()}: at the end of the run ({row['t_s']:g} s) σ changes by {_gain(row)}{peak}."
+
+
+def _gain(row) -> str:
+    """A gain as the change of σ that it is: a gain of 18 % is −18 %."""
+    value, lo, hi = (-row[name] for name in ("gain_percent", "gain_hi", "gain_lo"))
+    return f"{value:+.1f} % [{lo:+.1f}, {hi:+.1f}]".replace("-", "−")
+
+
+def _who(row, labels: dict[str, str], several: bool) -> str:
+    return labels[row["case"]] + (f", {row['filter']}" if several else "")
+
+
+def _sigma_sentence(result: CaseResult, curves) -> str:
+    """For experiments without a second filter: σ of the range at the end."""
+    rows = curves[(curves["case"] == result.name) & (curves["component"] == "r")]
+    row = rows.iloc[-1]
+    return (
+        f"{panels.plain_label(result)}, {row['filter']}: σ of the range at {row['t_s']:g} s is {row['sigma']:.4g} m "
+        f"[{row['sigma_lo']:.4g}, {row['sigma_hi']:.4g}]."
+    )

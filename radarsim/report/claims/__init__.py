@@ -1,0 +1,297 @@
+"""The papers' claims as data, and verdicts on them from measured values and their intervals.
+
+A claim says what the paper says, where, and how it was read; a part of it says what is measured and the range that the
+paper's words leave to it. The ranges come from the words alone and were written down before anything was measured:
+
+* a printed number holds when the measured value rounds to its last digit; "a to b" is that range so widened;
+* "about" means within 10 %;
+* confirmed: the whole 95 % interval lies inside; refuted: wholly outside; else not distinguishable.
+
+Exact values, where known, never enter a verdict.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import NamedTuple
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import tables as common
+from radarsim.report.statistics import Estimate, difference
+
+PAPERS = {
+    "P1": "Gorshkov & Zavizhenets 2017",
+    "P2": "Sychev & Osipov 2023",
+    "P3": "Butyrskiy",
+    "P4": "Uss, Baryshev & Djavad 2010",
+}
+STUDIES = ("range_doppler",)  # those with claims, in the order of the papers
+
+CONFIRMED, REFUTED, UNCLEAR, NOT_RUN = "confirmed", "refuted", "not distinguishable", "not run"
+
+
+class Missing(KeyError):
+    """The experiment does not hold a case that a claim needs; the claim is then not judged by it."""
+
+
+class Range(NamedTuple):
+    """The values that the paper's words leave, ends included, and the words."""
+
+    lo: float
+    hi: float
+    words: str
+
+
+def printed(text: str) -> Range:
+    """A printed number: values that round to its last digit."""
+    half = 0.5 * 10.0 ** -(len(text.partition(".")[2]))
+    return Range(float(text) - half, float(text) + half, text)
+
+
+def between(low: str, high: str) -> Range:
+    """A printed range, each end with its rounding."""
+    return Range(printed(low).lo, printed(high).hi, f"{low} to {high}")
+
+
+def about(low: str, high: str | None = None) -> Range:
+    """A positive number or range with "about": 10 % beyond it."""
+    return Range(0.9 * float(low), 1.1 * float(high or low), f"about {low}" + (f" to {high}" if high else ""))
+
+
+def above(value: float) -> Range:
+    """More than a value."""
+    return Range(math.nextafter(value, math.inf), math.inf, f"> {value:g}")
+
+
+def below(value: float) -> Range:
+    """Less than a value."""
+    return Range(-math.inf, math.nextafter(value, -math.inf), f"< {value:g}")
+
+
+def at_most(value: float) -> Range:
+    """No more than a value."""
+    return Range(-math.inf, value, f"≤ {value:g}")
+
+
+def within(low: float, high: float) -> Range:
+    """From low to high as they stand: counts of scans, shares."""
+    return Range(low, high, f"{low:g}" if low == high else f"{low:g} to {high:g}")
+
+
+@dataclass(frozen=True)
+class Part:
+    """One measurement of a claim: its cases (the study's keys), what is measured, the unit, how, and the range."""
+
+    cases: tuple
+    what: str
+    unit: str
+    measure: Callable[["Evidence"], Estimate]
+    expected: Range
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of a paper: where it stands, how it was read, the parts that judge it, the config that holds them."""
+
+    id: str
+    place: str
+    statement: str
+    parts: tuple[Part, ...]
+    reading: str = ""
+    config: str = ""
+
+    @property
+    def paper(self) -> str:
+        """The key of the paper: P1 … P4."""
+        return self.id.partition(".")[0]
+
+
+@dataclass(frozen=True)
+class Series:
+    """A measured curve: scans k, times t, values and the ends of their intervals, arrays of one length."""
+
+    k: np.ndarray
+    t: np.ndarray
+    value: np.ndarray
+    lo: np.ndarray
+    hi: np.ndarray
+
+    def point(self, i: int) -> Estimate:
+        """The i-th point."""
+        return Estimate(float(self.value[i]), float(self.lo[i]), float(self.hi[i]))
+
+    def where(self, mask: np.ndarray) -> "Series":
+        """The points that a mask or indices pick; raises Missing where there is none."""
+        if not np.asarray(self.k)[mask].size:
+            raise Missing("no such scans")
+        return Series(*(np.asarray(part)[mask] for part in (self.k, self.t, self.value, self.lo, self.hi)))
+
+    def since(self, k: int) -> "Series":
+        """From scan k on."""
+        return self.where(self.k >= k)
+
+    def at(self, k: int) -> Estimate:
+        """The point at scan k."""
+        return self.where(self.k == k).point(0)
+
+    def first(self) -> Estimate:
+        """The first point."""
+        return self.point(0)
+
+    def last(self) -> Estimate:
+        """The last point."""
+        return self.point(-1)
+
+    def largest(self) -> Estimate:
+        """The largest value, with the interval of its own scan."""
+        return self.point(int(np.nanargmax(self.value)))
+
+    def least(self) -> Estimate:
+        """The least value, with the interval of its own scan."""
+        return self.point(int(np.nanargmin(self.value)))
+
+    def when_largest(self, of: str = "t") -> Estimate:
+        """Time (or scan, of="k") of the largest value; the interval spans all that cannot be told from it."""
+        axis = getattr(self, of)
+        top = int(np.nanargmax(self.value))
+        near = axis[self.hi >= self.lo[top]]
+        return Estimate(float(axis[top]), float(near.min()), float(near.max()))
+
+
+def common_times(a: Series, b: Series) -> tuple[Series, Series]:
+    """The points of both at the times that both have."""
+    _, i, j = np.intersect1d(np.round(a.t, 6), np.round(b.t, 6), return_indices=True)
+    return a.where(i), b.where(j)
+
+
+def minus(a: Series, b: Series) -> Series:
+    """a − b, point by point, of independent noise: half-widths add in squares."""
+    of = difference(Estimate(a.value, a.lo, a.hi), Estimate(b.value, b.lo, b.hi))
+    return Series(a.k, a.t, *of)
+
+
+def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
+    """scale · a / b of independent positive estimates: relative half-widths add in squares."""
+    value = scale * a.value / b.value
+    down = np.hypot(1 - a.lo / a.value, b.hi / b.value - 1)
+    up = np.hypot(a.hi / a.value - 1, 1 - b.lo / b.value)
+    return Estimate(value, value * (1 - down), value * (1 + up))
+
+
+def certain(value: float) -> Estimate:
+    """A number without noise: algebra, a count."""
+    return Estimate(float(value), float(value), float(value))
+
+
+class Evidence:
+    """What an experiment measured, as the claims of its study ask for it. Studies say in `case` what a key means."""
+
+    def __init__(self, results: Sequence[CaseResult], made: Mapping):
+        self.results, self.tables = list(results), made
+        self._curves = common.groups(made["curves"], "case", "filter", "component")
+        self._gains = common.groups(made["gains"], "case", "filter", "component")
+
+    def case(self, key) -> CaseResult:
+        """The case that a key means; raises Missing where the experiment does not hold it. Here: by name."""
+        for result in self.results:
+            if result.name == key:
+                return result
+        raise Missing(key)
+
+    def curve(self, key, filter_name: str, component: str) -> Series:
+        """σ(k) of a filter of a case."""
+        return self._series(self._curves, key, filter_name, component, ("sigma", "sigma_lo", "sigma_hi"))
+
+    def gain(self, key, filter_name: str, component: str) -> Series:
+        """Relative gain of a filter of a case against its baseline, %."""
+        return self._series(self._gains, key, filter_name, component, ("gain_percent", "gain_lo", "gain_hi"))
+
+    def _series(self, groups: Mapping, key, filter_name: str, component: str, values: tuple[str, ...]) -> Series:
+        rows = groups.get((self.case(key).name, filter_name, component))
+        if rows is None:
+            raise Missing(key)
+        return Series(*(rows[name].to_numpy() for name in ("k", "t_s", *values)))
+
+    def row(self, table: str, **equal) -> Mapping:
+        """The one row of a table with these values; raises Missing."""
+        rows = self.tables[table]
+        for name, value in equal.items():
+            rows = rows[rows[name] == value]
+        if not len(rows):
+            raise Missing(equal)
+        return rows.iloc[0]
+
+
+def verdict(of: Estimate, expected: Range) -> str:
+    """Whether an interval lies inside a range, outside, or neither."""
+    if not (of.lo <= of.hi):
+        return UNCLEAR
+    if expected.lo <= of.lo and of.hi <= expected.hi:
+        return CONFIRMED
+    if of.hi < expected.lo or of.lo > expected.hi:
+        return REFUTED
+    return UNCLEAR
+
+
+def overall(verdicts: Sequence[str]) -> str:
+    """Of a claim with several parts: refuted with any of them, confirmed with all."""
+    if REFUTED in verdicts:
+        return REFUTED
+    return CONFIRMED if set(verdicts) == {CONFIRMED} else UNCLEAR
+
+
+CLAIMED = (
+    *("claim", "paper", "statement", "case", "measured", "lo", "hi", "expected", "verdict"),
+    *("what", "unit", "place", "overall"),
+)
+
+
+def judged(study: str, results: Sequence[CaseResult], made: Mapping):
+    """claims.csv: a row for each part of each claim that these results can judge, those of whole claims only."""
+    rows: list[tuple] = []
+    if study in STUDIES:
+        module = import_module(f"radarsim.report.claims.{study}")
+        evidence = module.Evidence(results, made)
+        for claim in module.CLAIMS:
+            rows += _rows(claim, evidence)
+    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(CLAIMED)})
+
+
+def _rows(claim: Claim, evidence: Evidence) -> list[tuple]:
+    try:
+        measured = [part.measure(evidence) for part in claim.parts]
+        cases = [", ".join(evidence.case(key).name for key in part.cases) for part in claim.parts]
+    except Missing:
+        return []
+    verdicts = [verdict(of, part.expected) for of, part in zip(measured, claim.parts, strict=True)]
+    return [
+        (
+            *(claim.id, PAPERS[claim.paper], claim.statement, case, float(of.value), float(of.lo), float(of.hi)),
+            *(part.expected.words, said, part.what, part.unit, claim.place, overall(verdicts)),
+        )
+        for part, case, of, said in zip(claim.parts, cases, measured, verdicts, strict=True)
+    ]
+
+
+def all_claims() -> list[Claim]:
+    """Every claim of every paper, in order."""
+    return [claim for study in STUDIES for claim in import_module(f"radarsim.report.claims.{study}").CLAIMS]
+
+
+def listed(stored: Mapping[str, object]) -> list[dict]:
+    """Rows of all claims with the columns of claims.csv and `config`: as stored, or once as not run.
+
+    stored: config stem → its claims.csv as a DataFrame (read with keep_default_na=False for text).
+    """
+    rows = []
+    for claim in all_claims():
+        table = stored.get(claim.config)
+        own = [] if table is None else table[table["claim"] == claim.id].to_dict("records")
+        blank = dict.fromkeys(CLAIMED, "") | {"claim": claim.id, "paper": PAPERS[claim.paper], "place": claim.place}
+        rows += own or [blank | {"statement": claim.statement, "verdict": NOT_RUN, "overall": NOT_RUN}]
+        for row in rows[-max(1, len(own)) :]:
+            row["config"] = claim.config
+    return rows

@@ -1,0 +1,241 @@
+"""How P1's claims are measured: which case is which of the paper's radars, and the numbers taken from the tables.
+
+Radars are keyed by their number; a case counts as the paper's radar when its accuracies, period, filters and manoeuvre
+variance are the paper's, whatever its name.
+"""
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import claims
+from radarsim.report.claims import Part, Range, Series, certain, common_times, minus, ratio
+from radarsim.report.statistics import Estimate, difference
+
+RADARS = {1: (25, 5, 10), 2: (250, 15, 10), 3: (250, 15, 5), 4: (50, 1, 10), 5: (50, 1, 5)}  # σ_r, σ_V, Δt
+VARIANCE = 1e-3  # the paper's D_M, (m/s³)²
+DURATION = 140.0  # s: fifteen points at Δt = 10 s
+R, RV = ("range",), ("range", "velocity")
+COMPONENTS = {"r": "range", "Vr": "velocity", "ar": "acceleration"}
+
+
+class Evidence(claims.Evidence):
+    """Finds the paper's radars, and its two filters, by what they are."""
+
+    def case(self, key) -> CaseResult:
+        """key: the number of a radar (at D_M = 10⁻³), or (number, D_M)."""
+        radar, variance = key if isinstance(key, tuple) else (key, VARIANCE)
+        for result in self.results:
+            if self._radar(result) == radar and np.isclose(variance, self._variance(result), rtol=1e-9):
+                return result
+        raise claims.Missing(key)
+
+    @staticmethod
+    def _radar(result: CaseResult) -> int | None:
+        """The number of the paper's radar that a case is; None for any other, or another target, or a shorter run."""
+        radar, target = result.spec.radar, result.spec.target
+        own = (radar.sigma_range_m, radar.sigma_velocity_mps, radar.scan_period_s)
+        fits = target.kind == "polynomial" and not any(target.coefficients[3:])
+        long_enough = result.axes.t_s[-1] >= DURATION - 1e-6
+        found = [number for number, row in RADARS.items() if np.allclose(own, row, rtol=1e-9)]
+        return found[0] if found and fits and long_enough else None
+
+    @staticmethod
+    def _variance(result: CaseResult) -> float:
+        """The manoeuvre variance of the paper's two filters; not-a-number where they are not these two."""
+        filters = result.spec.filters
+        plain = all(f.initial_scans == (3 if f.observes == R else 2) for f in filters)
+        alike = len({f.manoeuvre_variance for f in filters}) == 1
+        if [f.observes for f in filters] != [R, RV] or not (plain and alike) or result.axes.baseline != 0:
+            return float("nan")
+        return filters[0].manoeuvre_variance
+
+    def sigma(self, key, observes: tuple[str, ...], component: str) -> Series:
+        """σ(k) of the filter that observes these."""
+        return self.curve(key, self.filter(key, observes), component)
+
+    def filter(self, key, observes: tuple[str, ...]) -> str:
+        """The name of the filter that observes these."""
+        return next(f.name for f in self.case(key).spec.filters if f.observes == observes)
+
+    def k_gain(self, radar, component: str) -> Series:
+        """The relative gain K (eq. 17), from the scan at which the filter with velocity has filtered, k ≥ 2.
+
+        At k = 1 both filters give the same measured range, and no gain is spoken of.
+        """
+        return self.gain(radar, self.filter(radar, RV), component).since(2)
+
+    def settling(self, key, observes: tuple[str, ...], component: str = "r") -> Estimate:
+        """Scan periods from the first plot to settling (5 % of the steady value, for good)."""
+        row = self.row("steady", case=self.case(key).name, filter=self.filter(key, observes), component=component)
+        period = self.case(key).axes.extra["scan_period_s"]
+        return Estimate(*(row[name] / period for name in ("settling_s", "settling_lo_s", "settling_hi_s")))
+
+    def variances(self, radar: int) -> list[float]:
+        """The manoeuvre variances at hand for a radar; raises Missing where there are fewer than two."""
+        found = {self._variance(result) for result in self.results if self._radar(result) == radar}
+        found = sorted(v for v in found if not np.isnan(v))
+        if len(found) < 2:
+            raise claims.Missing(radar)
+        return found
+
+
+def gain_part(radar: int, component: str, pick: str, what: str, expected: Range, first: int = 2) -> Part:
+    """A part on one radar's gain: largest, least, first or last of it from scan `first` on."""
+    return Part(
+        (radar,),
+        f"{what} {COMPONENTS[component]} gain",
+        "%",
+        lambda seen: getattr(seen.k_gain(radar, component).since(first), pick)(),
+        expected,
+    )
+
+
+def faster_part(slow: int, fast: int, what: str, unit: str, measure, expected: Range) -> Part:
+    """A part that compares two radars differing only in their period: measure(evidence, slow, fast)."""
+    return Part((slow, fast), what, unit, lambda seen: measure(seen, slow, fast), expected)
+
+
+def gain_raised(seen: Evidence, slow: int, fast: int) -> Estimate:
+    """The least difference of range gains, fast − slow, at common times."""
+    return minus(*common_times(seen.k_gain(fast, "r"), seen.k_gain(slow, "r"))).least()
+
+
+def peak_times(seen: Evidence, slow: int, fast: int) -> Estimate:
+    """Time of the largest range gain, fast : slow; the interval spans all times that cannot be told from it."""
+    a, b = seen.k_gain(fast, "r").when_largest(), seen.k_gain(slow, "r").when_largest()
+    return Estimate(a.value / b.value, a.lo / b.hi, a.hi / b.lo)
+
+
+def apart(component: str):
+    """How far two radars' gains lie apart at most, in % of the larger curve's height, over common times."""
+
+    def measure(seen: Evidence, slow: int, fast: int) -> Estimate:
+        a, b = common_times(seen.k_gain(fast, component), seen.k_gain(slow, component))
+        gap = minus(a, b)
+        sign = np.sign(gap.value)
+        size = Series(
+            gap.k, gap.t, abs(gap.value), np.where(sign < 0, -gap.hi, gap.lo), np.where(sign < 0, -gap.lo, gap.hi)
+        )
+        height = max(a.largest().value, b.largest().value)
+        worst = size.largest()
+        return Estimate(*(100 * max(part, 0.0) / height for part in worst))
+
+    return measure
+
+
+def sigma_change(observes: tuple[str, ...], component: str, pick: str):
+    """σ fast − σ slow of two radars, first or last of each."""
+
+    def measure(seen: Evidence, slow: int, fast: int) -> Estimate:
+        a, b = (getattr(seen.sigma(radar, observes, component), pick)() for radar in (fast, slow))
+        return difference(a, b)
+
+    return measure
+
+
+def ineffective_from(radar: int):
+    """The first time at which the acceleration gain is gone (zero or a loss)."""
+
+    def measure(seen: Evidence) -> Estimate:
+        gain = seen.k_gain(radar, "ar")
+        times = []
+        for part in (gain.value, gain.lo, gain.hi):
+            gone = np.flatnonzero(part <= 0)
+            times.append(float(gain.t[gone[0]]) if gone.size else np.inf)
+        return Estimate(times[0], times[1], times[2])
+
+    return measure
+
+
+def least_minus_largest(component: str, high: tuple[int, ...], low: tuple[int, ...], pick: str, strict: bool):
+    """Gain of radars `high` less the largest of radars `low`: the least of high (strict), or its largest."""
+
+    def measure(seen: Evidence) -> Estimate:
+        upper = [getattr(seen.k_gain(radar, component), pick)() for radar in high]
+        lower = [getattr(seen.k_gain(radar, component), pick)() for radar in low]
+        return difference((min if strict else max)(upper), max(lower))
+
+    return measure
+
+
+def final_share(seen: Evidence) -> Estimate:
+    """Δσ_r at the end in % of its largest value, RLS 2."""
+    return ratio(*(getattr(range_difference(seen), pick)() for pick in ("last", "largest")), scale=100)
+
+
+def range_difference(seen: Evidence) -> Series:
+    """Δσ_r(k) = σ_r(r) − σ_r(r,V_r) of RLS 2, from k = 2.
+
+    Taken as independent: the common noise makes the two errors alike, so the interval is too wide, never too narrow.
+    """
+    return minus(seen.sigma(2, R, "r").since(2), seen.sigma(2, RV, "r").since(2))
+
+
+def final_to_fourth(seen: Evidence, observes: tuple[str, ...]) -> Estimate:
+    """σ of range of RLS 2 at the end in % of that at the 4th scan."""
+    sigma = seen.sigma(2, observes, "r")
+    return ratio(sigma.last(), sigma.at(4), scale=100)
+
+
+def by_variance(measure):
+    """measure(evidence, key) at the least D_M at hand less that at the greatest, RLS 2."""
+
+    def compared(seen: Evidence) -> Estimate:
+        found = seen.variances(2)
+        small, large = (measure(seen, (2, v)) for v in (found[0], found[-1]))
+        if not np.isfinite(small.value):  # not settled within the run: later than its end
+            end = float(seen.case((2, found[0])).axes.k[-1] - 1)
+            low = min(small.lo, end)
+            return Estimate(np.inf, low - large.hi, np.inf)
+        return difference(small, large)
+
+    return compared
+
+
+def loss_scans(seen: Evidence) -> Estimate:
+    """Scans at which RLS 2 loses in acceleration; the interval counts the sure ones, and the possible ones."""
+    gain = seen.k_gain(2, "ar")
+    return Estimate(*(float(np.sum(part < 0)) for part in (gain.value, gain.hi, gain.lo)))
+
+
+def after_loss(seen: Evidence) -> Estimate:
+    """The largest acceleration gain of RLS 2 after its first scan with a loss."""
+    gain = seen.k_gain(2, "ar")
+    lost = np.flatnonzero(gain.value < 0)
+    return gain.where(slice(int(lost[0]) + 1 if lost.size else len(gain.k) - 1, None)).largest()
+
+
+def rise(radar: int):
+    """The largest rise of the velocity gain over an earlier scan's."""
+
+    def measure(seen: Evidence) -> Estimate:
+        gain = seen.k_gain(radar, "Vr")
+        later = [difference(gain.point(j), gain.where(slice(0, j)).least()) for j in range(1, len(gain.k))]
+        return max(later)
+
+    return measure
+
+
+def fall(radar: int):
+    """The velocity gain at the end less that at its first scan."""
+
+    def measure(seen: Evidence) -> Estimate:
+        gain = seen.k_gain(radar, "Vr")
+        return difference(gain.last(), gain.first())
+
+    return measure
+
+
+def earlier(radar: int, unit: str):
+    """How much earlier the filter with velocity has a velocity: in scans, or in seconds."""
+
+    def measure(seen: Evidence) -> Estimate:
+        a, b = (seen.sigma(radar, observes, "Vr") for observes in (R, RV))
+        return certain(float(a.k[0] - b.k[0]) if unit == "scans" else float(a.t[0] - b.t[0]))
+
+    return measure
+
+
+def doppler(radar: int):
+    """Doppler frequency of 300 m/s in repetition rates."""
+    return lambda seen: certain(seen.row("radar", case=seen.case(radar).name)["doppler_per_repetition_rate"])

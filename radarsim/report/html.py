@@ -1,0 +1,113 @@
+"""report.html: one self-contained page of an experiment. All text from configs and tables is escaped by the template."""
+
+import math
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import provenance
+from radarsim.report.drawing import Figure
+
+ROWS = 300  # of a table shown in the page
+SHOWN_FACTS = ("threads", "seconds", "kernel_seconds", "realisations_computed", "realisations_from_store")
+
+
+def page(
+    experiment,
+    results: Sequence[CaseResult],
+    made: Mapping,
+    drawn: Mapping[str, tuple[Figure, str]],
+    record: Mapping,
+    answer: Sequence[str],
+    question: str,
+) -> str:
+    """The page of an experiment: question, answer, claims, figures, tables, provenance.
+
+    drawn gives the figures and their SVG by name (none with --no-figures); record is run.json's.
+    """
+    claims = _claims(made["claims"])
+    counts: dict[str, int] = {}
+    for claim in claims:
+        counts[claim["overall"]] = counts.get(claim["overall"], 0) + 1
+    return _template().render(
+        experiment=experiment,
+        question=question,
+        answer=answer,
+        record=record,
+        claims=claims,
+        verdicts=list(counts.items()),
+        figures=[_figure(figure, svg) for figure, svg in drawn.values()],
+        tables=[_table(name, table) for name, table in made.items() if name != "claims" and len(table)],
+        facts=[(name.replace("_", " "), number(record[name])) for name in SHOWN_FACTS if name in record],
+        command=command(experiment, record),
+        resolved=provenance.to_json(record["resolved"]).decode(),
+    )
+
+
+def command(experiment, record: Mapping) -> str:
+    """The command that repeats the run."""
+    asked = f"-n {record['realisations_asked']} --seed {record['seed']}"
+    return f"radarsim run {shlex.quote(str(experiment.path or experiment.stem))} {asked}"
+
+
+def number(value: object) -> str:
+    """A number for people, at four digits; text as it is, nothing for not-a-number."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return str(value)
+    if isinstance(value, int) or math.isinf(value):
+        return str(value).replace("inf", "∞").replace("-", "−")
+    if math.isnan(value):
+        return ""
+    return f"{value:.4g}".replace("-", "−")
+
+
+@cache
+def _template():
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    loader = PackageLoader("radarsim.report")
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    environment.filters |= {"number": number, "thousands": lambda n: f"{n:,}", "css": _css}
+    return environment.get_template("report.html.j2")
+
+
+def _css(verdict: str) -> str:
+    return verdict if verdict in ("confirmed", "refuted") else "unclear"
+
+
+def _claims(table) -> list[dict]:
+    """Claims with their parts, from claims.csv's rows."""
+    found: dict[str, dict] = {}
+    for row in table.to_dict("records"):
+        same = {key: row[key] for key in ("statement", "paper", "place", "overall")}
+        found.setdefault(row["claim"], {"id": row["claim"], **same, "parts": []})["parts"].append(row)
+    return list(found.values())
+
+
+def _table(name: str, table) -> dict:
+    rows = table.head(ROWS)
+    columns = [{"name": column, "numeric": table[column].dtype.kind in "iuf"} for column in table.columns]
+    cells = [[number(value) for value in row] for row in rows.astype(object).itertuples(index=False, name=None)]
+    return {"name": name, "columns": columns, "rows": cells, "count": len(table), "cut": len(table) > ROWS}
+
+
+def _figure(figure: Figure, svg: str) -> dict:
+    return {"name": figure.name, "title": figure.title, "caption": figure.caption, "svg": inline(svg, figure)}
+
+
+def inline(svg: str, figure: Figure):
+    """An SVG for the page: without prologue, its ids apart from other figures', named for those who cannot see it.
+
+    Marked safe: it is Matplotlib's own output, which escapes all text; title and caption are escaped here.
+    """
+    from markupsafe import Markup
+
+    body = svg[svg.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+    body = re.sub(r'\bid="', f'id="{figure.name}-', body)
+    body = re.sub(r'(href="#|url\(#)', rf"\1{figure.name}-", body)
+    body = re.sub(r"(\d\.\d\d)\d+", r"\1", body)  # hundredths of a point
+    named = Markup('<svg role="img" aria-label="{}" ').format(f"{figure.title}. {figure.caption}")
+    return named + Markup(body[len("<svg ") :])

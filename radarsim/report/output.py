@@ -1,0 +1,70 @@
+"""From finished cases to files: tables, figures, claims, run.json and report.html of one experiment.
+
+A study adds to this by report/<study>.py (`tables`, `figures`, `question`, `answer`) and report/claims/<study>.py, both
+found by the study's name.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import claims, files, provenance
+from radarsim.report import tables as common
+from radarsim.report.drawing import Figure
+
+
+def study(name: str):
+    """The report module of a study."""
+    return import_module(f"radarsim.report.{name}")
+
+
+def tables(results: Sequence[CaseResult]) -> dict:
+    """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims."""
+    made = {"curves": common.curves(results), "gains": common.gains(results)}
+    made |= study(results[0].study).tables(results)
+    made["claims"] = claims.judged(results[0].study, results, made)
+    return made
+
+
+def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
+    """The figures of an experiment, described, by the stem of their file."""
+    return study(results[0].study).figures(results, made, experiment)
+
+
+@dataclass(frozen=True)
+class Written:
+    """What was written: the folder, its files by their path in it, the tables, and the answer in words."""
+
+    folder: Path
+    files: tuple[str, ...]
+    tables: Mapping = field(repr=False)
+    answer: tuple[str, ...]
+
+
+def write(experiment, results: Sequence[CaseResult], folder: Path, run: Mapping, *, draw: bool = True) -> Written:
+    """Write all of an experiment's outputs into folder; every file at once, none half.
+
+    run holds the facts of the run for run.json: see provenance.record. Files of an earlier run that this one does not
+    write (figures without `draw`) are removed, so that nothing stale stands beside new numbers.
+    """
+    from radarsim.report import html
+
+    made = tables(results)
+    contents = {f"{name}.csv": common.to_csv(table) for name, table in made.items() if len(table.columns)}
+    drawn = {}
+    if draw:
+        from radarsim.report import figures as drawing  # Matplotlib
+
+        for name, figure in figures(results, made, experiment).items():
+            saved = drawing.save(figure)
+            drawn[name] = (figure, saved["svg"].decode())
+            contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
+    answer = tuple(study(experiment.study).answer(results, made))
+    record = provenance.record(experiment, results, run, contents, answer)
+    question = study(experiment.study).question(experiment)
+    contents["report.html"] = html.page(experiment, results, made, drawn, record, answer, question).encode()
+    contents["run.json"] = provenance.to_json(provenance.with_output(record, "report.html", contents["report.html"]))
+    files.replace_all(folder, contents, stale=("*.csv", "figures/*.svg", "figures/*.png"))
+    return Written(folder, tuple(sorted(contents)), made, answer)
