@@ -1,4 +1,4 @@
-"""report.html: one self-contained page of an experiment. All text from configs and tables is escaped by the template."""
+"""report.html: one self-contained page of an experiment; the template escapes all text from configs and tables."""
 
 import math
 import re

@@ -222,26 +222,27 @@ CLAIMS = (
         "A smaller D_M lowers the steady error and lengthens the settling",
         *(
             Part(
-                (2,),
+                (n,),
                 f"σ of range at the end, least D_M − greatest, {words}",
                 "m",
-                measured.by_variance(lambda seen, key, observes=observes: seen.sigma(key, observes, "r").last()),
+                measured.by_variance(n, lambda seen, key, observes=observes: seen.sigma(key, observes, "r").last()),
                 below(0),
             )
+            for n in RADARS
             for observes, words in BOTH
         ),
         *(
             Part(
-                (2,),
+                (n,),
                 f"settling of σ of range, least D_M − greatest, {words}",
                 "Δt",
-                measured.by_variance(lambda seen, key, observes=observes: seen.settling(key, observes)),
+                measured.by_variance(n, lambda seen, key, observes=observes: seen.settling(key, observes)),
                 above(0),
             )
+            for n in RADARS
             for observes, words in BOTH
         ),
-        reading="of RLS 2 (figure 1a): the least against the greatest D_M of the sweep",
-        config="rls2_manoeuvre_variance",
+        reading="said of the filter, so of each radar: the least against the greatest D_M of the sweep",
     ),
     _claim(
         16,

@@ -177,14 +177,14 @@ def final_to_fourth(seen: Evidence, observes: tuple[str, ...]) -> Estimate:
     return ratio(sigma.last(), sigma.at(4), scale=100)
 
 
-def by_variance(measure):
-    """measure(evidence, key) at the least D_M at hand less that at the greatest, RLS 2."""
+def by_variance(radar: int, measure):
+    """measure(evidence, key) at the least D_M at hand less that at the greatest."""
 
     def compared(seen: Evidence) -> Estimate:
-        found = seen.variances(2)
-        small, large = (measure(seen, (2, v)) for v in (found[0], found[-1]))
+        found = seen.variances(radar)
+        small, large = (measure(seen, (radar, v)) for v in (found[0], found[-1]))
         if not np.isfinite(small.value):  # not settled within the run: later than its end
-            end = float(seen.case((2, found[0])).axes.k[-1] - 1)
+            end = float(seen.case((radar, found[0])).axes.k[-1] - 1)
             low = min(small.lo, end)
             return Estimate(np.inf, low - large.hi, np.inf)
         return difference(small, large)
