@@ -89,10 +89,12 @@ class Expander:
     def _common(self, document: Document) -> Common:
         """The common keys; where some have faults, the others, so that the rest is checked as well."""
         common = check(Common, document, self.faults)
-        if common:
-            return common
-        good = {key: v for key, v in document.data.items() if check(Common, document.only((key,)), Faults())}
-        return Common.model_validate(good)
+        if not common:
+            good = {key: v for key, v in document.data.items() if check(Common, document.only((key,)), Faults())}
+            common = Common.model_validate(good)
+        if common.realisations is None and "realisations" in document.data:
+            return common.model_copy(update={"realisations": 1})  # its fault is noted; it must not be called missing
+        return common
 
     def _own(self, document: Document, common: Common) -> list[Draft]:
         """The one draft of a config with a study of its own."""
@@ -108,6 +110,7 @@ class Expander:
         own = document.without(COMMON_KEYS)
         for setting in self.settings:
             own = self._placed(own, common.study, setting)
+        own = scenarios_inlined(own, study_model(common.study), self.read, self.faults)
         stem = document.file.stem if document.file else "config"
         return [Draft(own, stem, common.study, (), common.realisations, common.seed)]
 

@@ -42,6 +42,7 @@ def check(model: type[BaseModel], document: Document, faults: Faults, also: Iter
 
     `also` are top-level keys that are checked elsewhere and are named among the allowed ones.
     """
+    refuse_both_units(document, faults)
     try:
         return model.model_validate(document.data)
     except ValidationError as error:
@@ -163,6 +164,19 @@ def _chosen(candidates: list[type[BaseModel]], data: Any) -> type[BaseModel] | N
 
 
 def _fits(model: type[BaseModel], data: Any) -> bool:
-    """Whether the words that tell a choice's members apart are the data's."""
-    tags = [(name, i.annotation) for name, i in model.model_fields.items() if get_origin(i.annotation) is Literal]
-    return isinstance(data, dict) and all(data.get(name) in get_args(a) for name, a in tags if name in ("kind", "type"))
+    """Whether the words that tell a choice's members apart, fields with one allowed value, are the data's."""
+    fields = [(name, info.annotation) for name, info in model.model_fields.items()]
+    tags = [(name, get_args(a)[0]) for name, a in fields if get_origin(a) is Literal and len(get_args(a)) == 1]
+    return isinstance(data, dict) and all(data.get(name) == tag for name, tag in tags)
+
+
+def refuse_both_units(document: Document, faults: Faults, path: Path = ()) -> None:
+    """Note every quantity that is given in radians and in degrees at once."""
+    data = document.get(path)
+    if isinstance(data, list):
+        data = dict(enumerate(data))
+    for key, value in data.items() if isinstance(data, dict) else ():
+        if isinstance(value, dict | list):
+            refuse_both_units(document, faults, (*path, key))
+        elif str(key).endswith("_deg") and (other := f"{key[:-4]}_rad") in data:
+            faults.add(document.key_origin((*path, key)), (*path, key), f"given as {other} too")

@@ -64,7 +64,7 @@ class Document:
 
     def _replaced(self, path: Path, value: object, values: dict, keys: dict) -> "Document":
         depth = len(path)
-        made = {path[:n]: values[path] for n in range(1, depth) if self.get(path[:n]) is ABSENT}
+        made = {path[:n]: values[path] for n in range(1, depth) if not isinstance(self.get(path[:n]), dict | list)}
         kept = {p: o for p, o in self.values.items() if p[:depth] != path}
         kept_keys = {p: o for p, o in self.keys.items() if p[:depth] != path}
         data = _with(self.data, path, value)

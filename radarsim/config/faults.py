@@ -1,6 +1,5 @@
 """Faults of a config: where, what, what is allowed; gathered, so that the user sees all of them at once."""
 
-import math
 from typing import NamedTuple
 
 from radarsim.errors import ConfigError
@@ -8,6 +7,8 @@ from radarsim.errors import ConfigError
 Path = tuple[str | int, ...]
 ABSENT = object()
 LONGEST = 60  # characters of a value shown in a message
+ZEROS = 7  # at the end of a whole number, from which on they are counted
+LONGEST_SOURCE = 500  # characters of the place
 
 
 class Origin(NamedTuple):
@@ -39,7 +40,7 @@ class Faults:
     def add(self, origin: Origin, path: Path, message: str, got: object = ABSENT) -> None:
         """Note a fault at a key path; `got` is the value as the user wrote it."""
         key = dotted(path[origin.prefix :])
-        parts = [one_line(str(origin))]
+        parts = [one_line(str(origin))[-LONGEST_SOURCE:]]
         if key and not _names(origin, key):
             parts.append(one_line(key))
         parts.append(message if got is ABSENT else f"{message}, got {shown(got)}")
@@ -110,13 +111,13 @@ def _until(parts, room: int):
 
 
 def short(number: float | int) -> str:
-    """The shortest text that reads back as the same number: 0.001, 1e-5, 100000."""
-    if isinstance(number, int):
-        return str(number) if abs(number) < 10**30 else "a number of more than 30 digits"
-    if not math.isfinite(number):
-        return str(number)
-    text = repr(number).replace("e-0", "e-").replace("e+", "e")
-    return text.removesuffix(".0")
+    """A short text that reads back as the same number: 0.001, 1e-5, 100000, 1e12."""
+    if isinstance(number, int) and abs(number) >= 10**30:
+        return "a number of more than 30 digits"
+    text = repr(number).replace("e-0", "e-").replace("e+", "e").removesuffix(".0")
+    digits = text.rstrip("0")
+    zeros = len(text) - len(digits)
+    return f"{digits}e{zeros}" if zeros >= ZEROS and digits.lstrip("-").isdigit() else text
 
 
 def one_line(text: str) -> str:

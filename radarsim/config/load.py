@@ -55,12 +55,13 @@ def _from_user(source: str | os.PathLike, faults: Faults) -> Document | None:
         faults.add(Origin(name), (), f"no such config{did_you_mean(name, known)}; there are: {', '.join(known)}")
         return None
     file = file or FilePath(name)
-    if not is_stem(file.stem):
+    document = read(file, faults)
+    if document and not is_stem(file.stem):  # it names the folder of results
         faults.add(
-            Origin(name), (), "the name of a config must be of letters, digits and . _ + = -, not begin with a dot"
+            Origin(name), (), "a config's name must be of letters, digits and _ + = - . and not begin with a dot"
         )
         return None
-    return read(file, faults)
+    return document
 
 
 def _setting(text: str, faults: Faults) -> Setting | None:
@@ -104,7 +105,8 @@ def read(file: FilePath, faults: Faults) -> Document | None:
     if document is None:
         return None
     if not isinstance(document.data, dict):
-        faults.add(document.origin(()), (), "must be a mapping of keys", document.data)
+        if not faults.spoiled(document.origin(()), ()):
+            faults.add(document.origin(()), (), "must be a mapping of keys", document.data)
         return None
     return Document(document.data, shown, file, document.values, document.keys)
 
@@ -112,7 +114,6 @@ def read(file: FilePath, faults: Faults) -> Document | None:
 def parse(text: str, source: str, faults: Faults, plain_origin: Origin | None = None) -> Document | None:
     """YAML text as a document; None, and a fault noted, if it is not YAML of the plain kind that is read here."""
     reader = _Reader(source, faults, plain_origin)
-    before = len(faults)
     try:
         data = reader.document(yaml.parse(text, Loader=LOADER))
     except yaml.MarkedYAMLError as error:
@@ -128,7 +129,6 @@ def parse(text: str, source: str, faults: Faults, plain_origin: Origin | None = 
         pass  # what was refused is noted; nothing after it can be understood
     else:
         return Document(data, source, None, reader.values, reader.keys)
-    assert len(faults) > before
     return None
 
 

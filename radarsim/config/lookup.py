@@ -11,13 +11,13 @@ STEM = re.compile(r"\w[\w+=-]*(?:\.[\w+=-]+)*")
 def config_file(name: str, beside: Path | None = None) -> Path | None:
     """The file of a config: beside the including one (or here), in ./configs, among the shipped; None if nowhere."""
     folders = [Path(), Path("configs")] if beside is None else [beside.parent, Path("configs")]
-    return _first(name, [*folders, SHIPPED / "configs"], beside)
+    return _first(name, [*folders, SHIPPED / "configs"])
 
 
 def scenario_file(name: str, config: Path | None) -> Path | None:
     """The file of a scenario: beside the config, in scenarios/ next to its folder or here, among the shipped."""
     folders = [] if config is None else [config.parent, next_to(config.parent) / "scenarios"]
-    return _first(name, [*folders, Path("scenarios"), SHIPPED / "scenarios"], config)
+    return _first(name, [*folders, Path("scenarios"), SHIPPED / "scenarios"], but=config)
 
 
 def next_to(folder: Path) -> Path:
@@ -25,7 +25,7 @@ def next_to(folder: Path) -> Path:
     return folder.parent if folder.name not in ("", "..") else folder / ".."
 
 
-def _first(name: str, folders: list[Path], but: Path | None) -> Path | None:
+def _first(name: str, folders: list[Path], but: Path | None = None) -> Path | None:
     for folder in folders:
         file = folder / f"{name}.yaml"
         if file != but and file.is_file():
@@ -45,5 +45,7 @@ def is_stem(name: str) -> bool:
 
 def did_you_mean(name: str, known) -> str:
     """`; did you mean X?` for the known name nearest to a mistaken one, or nothing."""
-    near = difflib.get_close_matches(str(name)[:100], list(known), n=1, cutoff=0.6)
+    name, known = str(name)[:100], list(known)
+    begun = [full for full in known if len(name) > 2 and full.startswith(name)]
+    near = begun or difflib.get_close_matches(name, known, n=1, cutoff=0.6)
     return f"; did you mean {near[0]}?" if near else ""

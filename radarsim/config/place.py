@@ -1,12 +1,13 @@
 """Values put at the keys that overrides and sweeps name, and scenarios put in the place of their stems."""
 
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path as FilePath
 
-from radarsim.config.check import allowed_keys, model_at, unknown_key
+from radarsim.config.check import allowed_keys, model_at, models_in, unknown_key
 from radarsim.config.document import Document
 from radarsim.config.faults import ABSENT, Faults, Path, shown
-from radarsim.config.fields import DataFile, Scenario, Study
+from radarsim.config.fields import DataFile, Model, Scenario, Study
 from radarsim.config.lookup import did_you_mean, is_stem, scenario_file, stems
 
 
@@ -19,6 +20,8 @@ def place(document: Document, model: type[Study], setting, read: Callable, fault
     first = setting.key.split(".")[0]
     if "." in setting.key and isinstance(document.data.get(first), str):
         document = scenarios_inlined(document, model, read, faults, only=first)
+        if isinstance(document.data.get(first), str):
+            return document  # no scenario, as noted, or a key without scenarios, as the check will say
     for path in key_paths(document, model, setting.key):
         document = _without_twin(document, path).graft(path, setting.value, setting.origin)
     return document
@@ -110,7 +113,7 @@ def scenarios_inlined(
 
 def data_files_found(document: Document, model: type[Study], faults: Faults) -> Document:
     """The document with a path that can be opened for each file of data, named from the folder of its own YAML file."""
-    for path, value in list(_texts(document.data, ())):
+    for path, value in list(_texts(document.data, ())) if _has_data_files(model) else ():
         holder = model_at(model, document.data, path[:-1])
         info = holder.model_fields.get(path[-1]) if holder else None
         if info is None or not any(isinstance(mark, DataFile) for mark in info.metadata):
@@ -122,6 +125,14 @@ def data_files_found(document: Document, model: type[Study], faults: Faults) -> 
         else:
             faults.spoil(origin, path, f"no such file: {shown(str(file))}")
     return document
+
+
+@cache
+def _has_data_files(model: type[Model]) -> bool:
+    """Whether any field of a schema, or of those within it, names a file of data."""
+    fields = model.model_fields.values()
+    own = any(isinstance(mark, DataFile) for info in fields for mark in info.metadata)
+    return own or any(_has_data_files(inner) for info in fields for inner in models_in(info.annotation))
 
 
 def _texts(data: object, path: Path) -> Iterator[tuple[Path, str]]:

@@ -23,7 +23,7 @@ from radarsim.config.fields import (
 )
 
 MOST_SCANS = 100_000
-FARTHEST_M = 1e12  # a range that still resolves a millimetre in double precision
+FARTHEST_M = 1e15  # a range that still resolves a metre in double precision
 NEAREST_M = 100.0  # a target that flies over the radar has no radial motion that a filter could follow
 FASTEST_MPS = 12_000.0  # escape from the Earth
 HARDEST_MPS2 = 1000.0  # about 100 g, more than any missile's
@@ -209,7 +209,7 @@ class RangeDoppler(Study):
             raise at("scans", f"must be >= {slowest.initial_scans} for the initialisation of filter {slowest.name}")
         last = (self.scans - 1) * self.radar.scan_period_s
         if self.target.reach_m(last) > FARTHEST_M:
-            raise at("target", f"must stay within 1e12 m of the radar up to the last plot, at {short(last)} s")
+            raise at("target", f"must stay within 1e15 m of the radar up to the last plot, at {short(last)} s")
         if not isinstance(self.target, Starting):
             return self
         target = self.target.timed(self.radar.scan_period_s)
