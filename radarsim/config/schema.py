@@ -13,6 +13,7 @@ from radarsim.config.fields import Anything, Model, Name, Stem, Study, whole
 
 STUDIES = {
     "range_doppler": "radarsim.config.range_doppler:RangeDoppler",
+    "sonar": "radarsim.config.sonar:Sonar",
 }
 LARGEST_REALISATIONS = 10**12
 LARGEST_SEED = 2**64 - 1

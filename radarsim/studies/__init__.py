@@ -17,7 +17,7 @@ import numpy as np
 
 from radarsim.config.load import Case, canonical, world
 
-STUDIES = ("range_doppler",)
+STUDIES = ("range_doppler", "sonar")
 COMPUTING = ("models", "kernels", "filters", "exact", "studies")
 PACKAGE = Path(__file__).parent.parent
 

@@ -1,0 +1,245 @@
+"""Keys of the sonar study (P3): a sonar of range and bearing, what it observes, and filters of degree 1 and 2."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from radarsim.config.fields import (
+    Correlation,
+    Design,
+    Display,
+    Model,
+    Name,
+    NameIn,
+    NonNegative,
+    Number,
+    Positive,
+    Probability,
+    Scenario,
+    Study,
+    at,
+    unique_names,
+    whole,
+)
+
+MOST_SCANS = 100_000
+Wide = Annotated[Positive, Field(le=0.5)]  # rad: beyond some 30 degrees an angle's error is no longer Gaussian
+Derivatives = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
+
+
+class Correlations(Model):
+    """A correlation for each coordinate; one that is not named has none."""
+
+    range: Correlation = Field(0.0, description="of the range")
+    bearing: Correlation = Field(0.0, description="of the bearing")
+    third: Correlation = Field(0.0, description="of depth or elevation")
+
+    def of(self, index: int) -> float:
+        """Of the coordinate of that number."""
+        return (self.range, self.bearing, self.third)[index]
+
+
+def correlation_of(value: "float | Correlations", index: int) -> float:
+    """A scalar applies to every coordinate."""
+    return value.of(index) if isinstance(value, Correlations) else value
+
+
+class FurtherSensor(Model):
+    """A second sonar that looks at the same target at times of its own, and may see the bearing alone."""
+
+    sigma_range_m: Positive | None = Field(
+        None, description="standard deviation of a measured range, m; none: not seen"
+    )
+    sigma_bearing_rad: Wide | None = Field(None, description="standard deviation of a measured bearing, rad")
+    scan_period_s: Positive = Field(description="time between two of its plots, s")
+    first_s: NonNegative = Field(description="time of its first plot after that of the first sonar, s")
+
+
+class Sensor(Model):
+    """A sonar: accuracies of a plot, period, and how plots fail."""
+
+    name: Annotated[Name | None, Display()] = Field(None, description="display name")
+    sigma_range_m: Positive = Field(description="standard deviation of a measured range, m")
+    sigma_bearing_rad: Wide = Field(description="standard deviation of a measured bearing, rad")
+    sigma_depth_m: Positive | None = Field(
+        None, description="standard deviation of a measured depth, m; none: not measured"
+    )
+    sigma_elevation_rad: Wide | None = Field(None, description="of a measured elevation, rad, in place of the depth")
+    scan_period_s: Positive = Field(description="time between two plots, s: T0 of the paper")
+    error_correlation: Correlation | Correlations = Field(
+        0.0, description="correlation ρ of the errors of neighbouring plots, eq. (15); one number, or by coordinate"
+    )
+    detection_probability: Annotated[Probability, Field(gt=0)] = Field(
+        1.0, description="probability that the plot of a scan comes; that of the first scan always does"
+    )
+    missed_scans: tuple[whole(2, MOST_SCANS), ...] = Field(
+        (), description="scans, counted from 1, whose plots never come"
+    )
+    further: tuple[FurtherSensor, ...] = Field((), max_length=4, description="further sonars on the same target")
+
+    @model_validator(mode="after")
+    def _consistent(self):
+        if self.sigma_depth_m is not None and self.sigma_elevation_rad is not None:
+            raise at("sigma_elevation_rad", "give either the depth or the elevation")
+        if self.further and self.error_correlation != 0.0:
+            raise at(
+                "error_correlation", "must be 0 where there are further sonars: their errors have nothing in common"
+            )
+        return self
+
+
+class Polynomial(Model):
+    """Coordinates that are polynomials of time, in the polar or in the cartesian frame (eq. 1)."""
+
+    kind: Literal["polynomial"] = Field(description="each coordinate a polynomial of time")
+    frame: Literal["polar", "cartesian"] = Field(description="which coordinates are polynomials")
+    range_m: Derivatives | None = Field(
+        None, description="range and its derivatives at the first plot: m, m/s, m/s², …"
+    )
+    bearing_rad: Derivatives | None = Field(None, description="bearing and its derivatives, from north to east: rad, …")
+    x_m: Derivatives | None = Field(None, description="way north and its derivatives: m, m/s, m/s², …")
+    y_m: Derivatives | None = Field(None, description="way east and its derivatives: m, m/s, m/s², …")
+    depth_m: Derivatives | None = Field(None, description="depth and its derivatives: m, m/s, …")
+    elevation_rad: Derivatives | None = Field(None, description="elevation and its derivatives: rad, rad/s, …")
+    fluctuation_mps2: NonNegative = Field(
+        0.0,
+        description="standard deviation of a random acceleration, new at every scan: velocity walks at random, m/s²",
+    )
+
+    @model_validator(mode="after")
+    def _coordinates(self):
+        wanted = ("range_m", "bearing_rad") if self.frame == "polar" else ("x_m", "y_m")
+        other = ("x_m", "y_m") if self.frame == "polar" else ("range_m", "bearing_rad")
+        for key in wanted:
+            if getattr(self, key) is None:
+                raise at(key, f"is needed in the {self.frame} frame")
+        for key in other:
+            if getattr(self, key) is not None:
+                raise at(key, f"does not belong to the {self.frame} frame")
+        if self.frame == "polar" and self.range_m[0] <= 0:
+            raise at("range_m", "must begin with a positive range")
+        if self.frame == "cartesian" and self.fluctuation_mps2:
+            raise at("fluctuation_mps2", "needs the polar frame")
+        return self
+
+    def range_0(self) -> float:
+        """Range at the first plot, m: scales what is lateral to an angle."""
+        if self.frame == "polar":
+            return self.range_m[0]
+        return max((self.x_m[0] ** 2 + self.y_m[0] ** 2) ** 0.5, 1.0)
+
+
+class Leg(Model):
+    """A turn between two moments."""
+
+    start_s: NonNegative = Field(description="when the turn begins, s from the first plot")
+    end_s: Positive = Field(description="when it ends, s")
+    rate_radps: Number = Field(description="turn rate, rad/s, positive to starboard")
+
+    @model_validator(mode="after")
+    def _order(self):
+        if self.end_s <= self.start_s:
+            raise at("end_s", "must come after start_s")
+        return self
+
+
+class Turning(Model):
+    """A vessel at constant speed on straight legs and turns."""
+
+    kind: Literal["turning"] = Field(description="straight legs and turns at constant speed")
+    x_m: Number = Field(description="way north of the sonar at the first plot, m")
+    y_m: Number = Field(description="way east of the sonar at the first plot, m")
+    speed_mps: Positive = Field(description="speed, m/s")
+    course_rad: Number = Field(description="course at first, from north to east, rad")
+    turns: Annotated[tuple[Leg, ...], Field(min_length=1, max_length=16)] = Field(description="the turns, in order")
+
+    @model_validator(mode="after")
+    def _in_order(self):
+        if any(later.start_s < earlier.end_s for earlier, later in zip(self.turns, self.turns[1:], strict=False)):
+            raise at("turns", "must follow one another without overlap")
+        return self
+
+    def range_0(self) -> float:
+        """Range at the first plot, m."""
+        return max((self.x_m**2 + self.y_m**2) ** 0.5, 1.0)
+
+
+Target = Annotated[Polynomial | Turning, Field(discriminator="kind")]
+CORRELATED = ("kalman_augmented", "kalman_differenced")
+
+
+class Filter(Model):
+    """A filter of each coordinate by itself."""
+
+    name: Annotated[Name, Display()] = Field(description="label, unlike that of any other filter")
+    kind: Literal["growing_memory", "window", "kalman", "fixed_gain", "kalman_augmented", "kalman_differenced"] = Field(
+        description="least squares on all plots or on the last few, Kalman, fixed gains, or one that knows of ρ"
+    )
+    degree: Literal[1, 2] = Field(1, description="degree of the polynomial: 1 a straight line, 2 a parabola")
+    plots: whole(2, 1000) | None = Field(None, description="length of a window, in plots")
+    manoeuvre_variance: NonNegative | None = Field(
+        None,
+        description="variance of a random acceleration, (m/s²)², of degree 2 of a random jerk, (m/s³)²; "
+        "for angles divided by the square of the target's range at the start",
+    )
+    error_correlation: Correlation | Correlations | None = Field(
+        None, description="correlation that the filter assumes; default: the sonar's own"
+    )
+
+    @model_validator(mode="after")
+    def _fits_kind(self):
+        if (self.plots is None) == (self.kind == "window"):
+            raise at("plots", "is needed by a window, and only there")
+        if self.plots is not None and self.plots < self.degree + 1:
+            raise at("plots", f"must be >= {self.degree + 1} for degree {self.degree}")
+        if self.kind == "fixed_gain" and not self.manoeuvre_variance:
+            raise at("manoeuvre_variance", "must be > 0 for fixed_gain: it decides the steady gains")
+        if self.manoeuvre_variance and self.kind not in ("fixed_gain", "kalman", "kalman_augmented"):
+            raise at("manoeuvre_variance", f"{self.kind} allows for no manoeuvre; take kalman or kalman_augmented")
+        if self.error_correlation is not None and self.kind not in CORRELATED:
+            raise at("error_correlation", f"only {' and '.join(CORRELATED)} know of it")
+        return self
+
+
+class Sonar(Study):
+    """Sonar plots smoothed and extrapolated."""
+
+    sensor: Sensor = Field(description="the sonar")
+    target: Annotated[Target, Scenario()] = Field(description="the target: a scenario's stem, or inline")
+    frame: Annotated[Literal["polar", "cartesian", "cartesian_unbiased"], Design()] = Field(
+        "polar", description="frame that the filters work in; plots are converted to x, y plainly, or without bias"
+    )
+    filters: Annotated[
+        tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
+    ] = Field(description="the filters; all see the same plots")
+    baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
+        None, description="name of the filter that gains are against; default: the first"
+    )
+    scans: Annotated[whole(2, MOST_SCANS), Design()] = Field(description="number of scans of the first sonar")
+
+    @model_validator(mode="after")
+    def _fits_together(self):
+        names = [f.name for f in self.filters]
+        if self.baseline is not None and self.baseline not in names:
+            raise at("baseline", f"must be the name of a filter: {', '.join(names)}")
+        most = max(f.degree for f in self.filters) + 1
+        if self.scans < most:
+            raise at("scans", f"must be >= {most} for a filter of degree {most - 1}")
+        for key, unit in (("depth", "m"), ("elevation", "rad")):
+            measured = getattr(self.sensor, f"sigma_{key}_{unit}") is not None
+            if measured and getattr(self.target, f"{key}_{unit}", None) is None:
+                raise at("target", f"needs {key}_{unit}, which the sonar measures")
+        if self.frame != "polar":
+            self._check_cartesian()
+        return self
+
+    def _check_cartesian(self):
+        if self.sensor.sigma_elevation_rad is not None:
+            raise at("frame", "must be polar where the elevation is measured")
+        if self.sensor.further:
+            raise at("frame", "must be polar where there are further sonars")
+        if getattr(self.target, "fluctuation_mps2", 0.0):
+            raise at("frame", "must be polar for a fluctuating target")
+        for i, f in enumerate(self.filters):
+            if f.kind in CORRELATED:
+                raise at(f"filters.{i}.kind", f"{f.kind} works in the polar frame alone")

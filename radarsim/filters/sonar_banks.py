@@ -1,0 +1,143 @@
+"""Sonar filters as the arrays that the kernels take: a choice of filter, its design, banks of many."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from radarsim.filters import sonar as filters
+from radarsim.kernels import sonar as kernels
+from radarsim.kernels import sonar_patterns as patterns
+from radarsim.models.sonar import step_correlations
+
+KINDS = {
+    "growing_memory": patterns.INFORMATION,
+    "kalman_differenced": patterns.INFORMATION,
+    "kalman": patterns.COVARIANCE,
+    "kalman_augmented": patterns.COVARIANCE,
+    "fixed_gain": patterns.FIXED,
+    "window": patterns.WINDOW,
+}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A filter as chosen: kind, size of the state, length of a window.
+
+    By coordinate the manoeuvre variance (C,) and ρ (C,).
+    """
+
+    kind: str
+    size: int
+    length: int
+    variance: np.ndarray
+    rho: np.ndarray
+
+
+def designed(choice: Choice, c: int, plots: filters.Plots) -> filters.Design:
+    """The design of a recursive filter in coordinate c."""
+    size = choice.size
+    match choice.kind:
+        case "growing_memory":
+            return filters.line(plots) if size == 2 else filters.differenced(plots, size, 0.0)
+        case "kalman":
+            return filters.kalman(plots, size, choice.variance[c])
+        case "fixed_gain":
+            return filters.fixed_gain(plots, size, choice.variance[c])
+        case "kalman_augmented":
+            return filters.augmented(plots, size, choice.rho[c], choice.variance[c])
+        case "kalman_differenced":
+            return filters.differenced(plots, size, choice.rho[c])
+    raise ValueError(f"no recursive filter: {choice.kind}")
+
+
+def believed(choice: Choice, c: int, plots: filters.Plots) -> np.ndarray:
+    """The covariance (M, K, 3, 3) that a filter claims in coordinate c."""
+    if choice.kind != "window":
+        return designed(choice, c, plots).believed
+    scans = len(plots.t)
+    return np.stack([filters.window_weights(plots, k, choice.length, choice.size)[2] for k in range(scans)], axis=1)
+
+
+def all_believed(choices: list[Choice], plots: list[filters.Plots]) -> np.ndarray:
+    """Variances (F, K, C, 3) that the filters claim, one pattern of plots in each coordinate."""
+    return np.stack(
+        [
+            np.stack([np.diagonal(believed(f, c, p)[0], axis1=1, axis2=2) for c, p in enumerate(plots)], axis=1)
+            for f in choices
+        ]
+    )
+
+
+def packed_inverse(P: np.ndarray, ready: np.ndarray, size: int) -> np.ndarray:
+    """Inverses (K, 6), packed by rows, of P (K, 3, 3) in its leading block, where `ready` (K,); zeros elsewhere."""
+    out = np.zeros((len(P), 6))
+    block = P[ready][:, :size, :size]
+    unit = np.sqrt(np.diagonal(block, axis1=1, axis2=2))  # m, m/s and m/s² brought to one size before inverting
+    scale = unit[:, :, None] * unit[:, None, :]
+    full = np.zeros((len(block), 3, 3))
+    full[:, :size, :size] = np.linalg.inv(block / scale) / scale
+    out[ready] = full[:, *np.triu_indices(3)]
+    return out
+
+
+def shared(choices: list[Choice], plots: list[filters.Plots]) -> kernels.Shared:
+    """Filters whose gains all realisations share; plots of each coordinate, of one pattern."""
+    F, K, C = len(choices), len(plots[0].t), len(plots)
+    longest = max(f.length for f in choices)
+    gain, carry = np.zeros((F, K, C, 4)), np.zeros((F, K, C))
+    weights, inverse = np.zeros((F, K, C, 3, longest)), np.zeros((F, K, C, 6))
+    order = np.stack([np.cumsum(p.weight[0] > 0) - 1 for p in plots], axis=1)
+    came = np.stack([p.weight[0] > 0 for p in plots], axis=1)
+    times = np.stack([p.moments()[0] for p in plots], axis=1)
+    for f, choice in enumerate(choices):
+        for c, p in enumerate(plots):
+            if choice.kind == "window":
+                weights[f, :, c] = ring_weights(choice, p, order[:, c], longest)
+            else:
+                design = designed(choice, c, p)
+                gain[f, :, c], carry[f, :, c] = design.gain[0], design.carry
+            inverse[f, :, c] = packed_inverse(believed(choice, c, p)[0], times[:, c] >= choice.size, choice.size)
+    size = np.array([f.size for f in choices])
+    return kernels.Shared(
+        gain=gain,
+        carry=carry,
+        carries=gain[..., 3].any(axis=(1, 2)),
+        length=np.array([f.length for f in choices]),
+        weights=weights,
+        slot=np.where(came, order % max(longest, 1), -1),
+        known=np.minimum(times[None], size[:, None, None]),
+        size=size,
+        inverse=inverse,
+    )
+
+
+def ring_weights(choice: Choice, plots: filters.Plots, order: np.ndarray, longest: int) -> np.ndarray:
+    """Weights (K, 3, longest) of a window by the places of its plots in the kernel's ring: number modulo its length."""
+    out = np.zeros((len(plots.t), 3, longest))
+    for k in range(len(plots.t)):
+        first, weights, _ = filters.window_weights(plots, k, choice.length, choice.size)
+        for j in np.flatnonzero(weights[0].any(axis=0)):
+            out[k, :, order[first + j] % longest] = weights[0, :, j]
+    return out
+
+
+def own(choices: list[Choice], t: np.ndarray, period: float, nominal: np.ndarray) -> patterns.Bank:
+    """Filters that go along with each realisation's plots; nominal (C,) σ of a plot."""
+    F, C = len(choices), len(nominal)
+    manoeuvre, settled = np.zeros((F, C)), np.zeros((F, C, 3))
+    carry = np.zeros((F, len(t), C))
+    for f, choice in enumerate(choices):
+        for c, sigma in enumerate(nominal):
+            manoeuvre[f, c] = choice.variance[c] * period ** (2 * choice.size) / sigma**2
+            carry[f, :, c] = step_correlations(choice.rho[c], t, period)
+            if choice.kind == "fixed_gain":
+                gain = filters.steady_gain(period, sigma, choice.size, choice.variance[c])
+                settled[f, c, : choice.size] = gain * period ** np.arange(choice.size)
+    return patterns.Bank(
+        kind=np.array([KINDS[f.kind] for f in choices]),
+        size=np.array([f.size for f in choices]),
+        length=np.array([f.length for f in choices]),
+        carry=carry,
+        manoeuvre=manoeuvre,
+        settled=settled,
+    )

@@ -1,0 +1,269 @@
+"""Sonar filters whose gains all realisations share (P3, fixed pattern of plots), and the world that they look at.
+
+As in `linear`: chunks that stay in cache, scans outermost, one plain loop per formula. A state has four rows, value,
+rate, acceleration and the carried error of the last plot; coordinates (range, bearing, depth) are filtered apart,
+each by its own schedule of gains. A window is weights on a ring of the last plots instead. Where the pattern of plots
+differs between realisations, `patterns` takes the place of the filters here.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from radarsim.kernels.compile import inline, kernel, summing
+from radarsim.kernels.linear import extrapolated
+from radarsim.kernels.random import U, normals
+
+CHUNK = 512
+
+
+class World(NamedTuple):
+    """Targets and plots of K scans in C coordinates.
+
+    plots and motion (2,) are the keys of two noise streams; dt (K,) the interval before a scan; truth (K, C, 3);
+    steps (K, C) the correlation of an error with that of the scan
+    before, fresh (K, C) the standard deviation of what is new in it; walk (C,) that of a random acceleration,
+    constant over each interval. C is even: an unused coordinate is all zeros.
+    """
+
+    plots: np.ndarray
+    motion: np.ndarray
+    dt: np.ndarray
+    truth: np.ndarray
+    steps: np.ndarray
+    fresh: np.ndarray
+    walk: np.ndarray
+
+
+class Shared(NamedTuple):
+    """Schedules of F filters, the same for all realisations.
+
+    gain (F, K, C, 4), carry (F, K, C), and whether it carries at all (F,); length (F,) plots of a window, 0 for a
+    recursive filter, whose weights (F, K, C, 3, L) belong to the places of a ring that plot number n enters at n
+    modulo L, slot (K, C), -1 where there is none; known (F, K, C) components that are estimated; size (F,) of the
+    state; inverse (F, K, C, 6) of the believed covariance.
+    """
+
+    gain: np.ndarray
+    carry: np.ndarray
+    carries: np.ndarray
+    length: np.ndarray
+    weights: np.ndarray
+    slot: np.ndarray
+    known: np.ndarray
+    size: np.ndarray
+    inverse: np.ndarray
+
+
+class Sums(NamedTuple):
+    """What is added up, over realisations; see `studies.sonar` for the meaning.
+
+    error (F, K, C, 3, 4), paired (F, K, C, 3), nees (F, K, C, 2), ahead (F, K, C, 4), believed and estimates (F, K,
+    C, 3).
+    """
+
+    error: np.ndarray
+    paired: np.ndarray
+    nees: np.ndarray
+    ahead: np.ndarray
+    believed: np.ndarray
+    estimates: np.ndarray
+
+
+# ---- the world ----------------------------------------------------------------------------------------------------
+@kernel
+def push(key, first, pair, dt, walk, one, two):
+    """Deviations one and two (2, n) of value and rate from the course, over an interval of random acceleration walk
+    (2,).
+    """
+    k0, k1, start, walk_one, walk_two = key[0], key[1], U(first), walk[0], walk[1]
+    for i in range(one.shape[1]):
+        a, b = normals(k0, k1, start + U(i), pair)
+        a, b = walk_one * a, walk_two * b
+        one[0, i] += dt * (one[1, i] + 0.5 * dt * a)
+        one[1, i] += dt * a
+        two[0, i] += dt * (two[1, i] + 0.5 * dt * b)
+        two[1, i] += dt * b
+
+
+@kernel
+def measure(key, first, pair, step, fresh, mean, one, two):
+    """Plots of two coordinates: rows 0 of one and two (3, n) from rows 1, their errors, and rows 2, the deviations.
+
+    An error goes to step · error + fresh · normal (P3 eq. 15), stationary from the first plot on; step, fresh and
+    mean (2,).
+    """
+    k0, k1, start = key[0], key[1], U(first)
+    step_one, step_two, fresh_one, fresh_two = step[0], step[1], fresh[0], fresh[1]
+    mean_one, mean_two = mean[0], mean[1]
+    for i in range(one.shape[1]):
+        a, b = normals(k0, k1, start + U(i), pair)
+        a, b = step_one * one[1, i] + fresh_one * a, step_two * two[1, i] + fresh_two * b
+        one[1, i], two[1, i] = a, b
+        one[0, i] = mean_one + one[2, i] + a
+        two[0, i] = mean_two + two[2, i] + b
+
+
+@kernel
+def move_and_measure(world, first, k, plots):
+    """Scan k of all coordinates in place: plots (C, 4, n) holds plot, error, and deviation of value and rate.
+
+    C is even.
+    """
+    pairs = plots.shape[0] // 2
+    for p in range(pairs):
+        one, two = plots[2 * p], plots[2 * p + 1]
+        if k > 0 and (world.walk[2 * p] > 0.0 or world.walk[2 * p + 1] > 0.0):
+            push(world.motion, first, k * pairs + p, world.dt[k], world.walk[2 * p : 2 * p + 2], one[2:], two[2:])
+        step, fresh = world.steps[k, 2 * p : 2 * p + 2], world.fresh[k, 2 * p : 2 * p + 2]
+        measure(world.plots, first, k * pairs + p, step, fresh, world.truth[k, 2 * p : 2 * p + 2, 0], one, two)
+
+
+# ---- one scan of a filter -----------------------------------------------------------------------------------------
+@kernel
+def scan_value(x, z, dt, gain):
+    """One scan, in place, of a filter that takes errors as white: x (>= 3, n), plots z (n,), gain (>= 3,)."""
+    r, v, a = x[0], x[1], x[2]
+    g0, g1, g2 = gain[0], gain[1], gain[2]
+    for i in range(z.size):
+        p, q, s = extrapolated(r[i], v[i], a[i], dt)
+        residual = z[i] - p
+        r[i], v[i], a[i] = p + g0 * residual, q + g1 * residual, s + g2 * residual
+
+
+@kernel
+def scan_carried(x, z, dt, carry, gain):
+    """One scan, in place, of a filter that takes errors as correlated: x (4, n), its last row the carried error."""
+    r, v, a, e = x[0], x[1], x[2], x[3]
+    g0, g1, g2, g3 = gain[0], gain[1], gain[2], gain[3]
+    for i in range(z.size):
+        p, q, s = extrapolated(r[i], v[i], a[i], dt)
+        foreseen = carry * e[i]
+        residual = z[i] - p - foreseen
+        r[i], v[i], a[i] = p + g0 * residual, q + g1 * residual, s + g2 * residual
+        e[i] = foreseen + g3 * residual
+
+
+@kernel
+def window(x, ring, weights):
+    """Estimates x (>= 3, n) as weights (3, L) of the plots in the ring (L, n)."""
+    for j in range(3):
+        x[j, :] = 0.0
+        for q in range(ring.shape[0]):
+            weight = weights[j, q]
+            if weight != 0.0:
+                for i in range(x.shape[1]):
+                    x[j, i] += weight * ring[q, i]
+
+
+@kernel
+def advance(bank, x, ring, plots, k, dt):
+    """Scan k of all filters and coordinates in place: x (F, C, 4, n) zero before scan 0, ring (C, L, n), plots (C, 4,
+    n).
+    """
+    for c in range(x.shape[1]):
+        if bank.slot[k, c] >= 0 and ring.shape[1] > 0:
+            ring[c, bank.slot[k, c]] = plots[c, 0]
+    for f in range(x.shape[0]):
+        for c in range(x.shape[1]):
+            if bank.length[f] > 0:
+                window(x[f, c], ring[c], bank.weights[f, k, c])
+            elif bank.carries[f]:
+                scan_carried(x[f, c], plots[c, 0], dt, bank.carry[f, k, c], bank.gain[f, k, c])
+            else:
+                scan_value(x[f, c], plots[c, 0], dt, bank.gain[f, k, c])
+
+
+# ---- sums ---------------------------------------------------------------------------------------------------------
+@inline
+def powers(e):
+    """e, e², e³, e⁴."""
+    ee = e * e
+    return e, ee, e * ee, ee * ee
+
+
+@summing
+def error_sums(x, y, shift, truth, inverse, n):
+    """Sums over the first n of the errors of a state x (>= 3, n): of value, rate and acceleration, and all together.
+
+    Seventeen: e, e², e³, e⁴ of each; e² f² of each, f the error of the filter y beside it; q and q², q = eᵀ P⁻¹ e
+    with the inverse (6,) packed by rows. shift (2, n) is the deviation of value and rate from the truth (3,).
+    """
+    t0, t1, t2 = truth[0], truth[1], truth[2]
+    y00, y01, y02, y11, y12, y22 = inverse[0], inverse[1], inverse[2], inverse[3], inverse[4], inverse[5]
+    a1 = a2 = a3 = a4 = b1 = b2 = b3 = b4 = c1 = c2 = c3 = c4 = 0.0
+    p0 = p1 = p2 = q1 = q2 = 0.0
+    for i in range(n):
+        m0, m1 = t0 + shift[0, i], t1 + shift[1, i]
+        e0, e1, e2 = x[0, i] - m0, x[1, i] - m1, x[2, i] - t2
+        f0, f1, f2 = y[0, i] - m0, y[1, i] - m1, y[2, i] - t2
+        _, aa, aaa, aaaa = powers(e0)
+        _, bb, bbb, bbbb = powers(e1)
+        _, cc, ccc, cccc = powers(e2)
+        a1, a2, a3, a4 = a1 + e0, a2 + aa, a3 + aaa, a4 + aaaa
+        b1, b2, b3, b4 = b1 + e1, b2 + bb, b3 + bbb, b4 + bbbb
+        c1, c2, c3, c4 = c1 + e2, c2 + cc, c3 + ccc, c4 + cccc
+        p0, p1, p2 = p0 + aa * (f0 * f0), p1 + bb * (f1 * f1), p2 + cc * (f2 * f2)
+        q = y00 * aa + y11 * bb + y22 * cc + 2.0 * (y01 * e0 * e1 + y02 * e0 * e2 + y12 * e1 * e2)
+        q1, q2 = q1 + q, q2 + q * q
+    return (a1, a2, a3, a4, b1, b2, b3, b4, c1, c2, c3, c4), (p0, p1, p2), (q1, q2)
+
+
+@summing
+def ahead_sums(x, shift, truth, dt, n):
+    """Sums of e, e², e³, e⁴ over the first n of the value extrapolated by dt, against the truth then."""
+    half = 0.5 * dt * dt
+    s1 = s2 = s3 = s4 = 0.0
+    for i in range(n):
+        e, ee, eee, eeee = powers(x[0, i] + dt * x[1, i] + half * x[2, i] - truth - shift[0, i])
+        s1, s2, s3, s4 = s1 + e, s2 + ee, s3 + eee, s4 + eeee
+    return s1, s2, s3, s4
+
+
+@kernel
+def add_sums(bank, x, plots, truth, k, n, baseline, sums):
+    """Add the errors of scan k: x (F, C, 4, CHUNK), plots (C, 4, CHUNK), truth (C, 3)."""
+    for f in range(x.shape[0]):
+        for c in range(x.shape[1]):
+            own, both, normal = error_sums(x[f, c], x[baseline, c], plots[c, 2:], truth[c], bank.inverse[f, k, c], n)
+            known = bank.known[f, k, c]
+            for j in range(known):
+                for q in range(4):
+                    sums.error[f, k, c, j, q] += own[4 * j + q]
+                if j < bank.known[baseline, k, c]:
+                    sums.paired[f, k, c, j] += both[j]
+            if known == bank.size[f]:
+                sums.nees[f, k, c, 0] += normal[0]
+                sums.nees[f, k, c, 1] += normal[1]
+
+
+@kernel
+def add_ahead(bank, x, plots, truth, k, dt, n, sums):
+    """Add the errors at scan k of what was extrapolated from scan k - 1, where the state was complete."""
+    for f in range(x.shape[0]):
+        for c in range(x.shape[1]):
+            if bank.known[f, k - 1, c] == bank.size[f]:
+                found = ahead_sums(x[f, c], plots[c, 2:], truth[c, 0], dt, n)
+                for q in range(4):
+                    sums.ahead[f, k - 1, c, q] += found[q]
+
+
+@kernel
+def simulate_block(world, bank, first, count, baseline, sums):
+    """Add the sums of realisations first … first + count - 1.
+
+    A partial chunk is computed in full and summed in part.
+    """
+    filters, scans, coordinates = bank.gain.shape[:3]
+    x = np.empty((filters, coordinates, 4, CHUNK))
+    ring = np.empty((coordinates, bank.weights.shape[4], CHUNK))
+    plots = np.empty((world.walk.size, 4, CHUNK))
+    for done in range(0, count, CHUNK):
+        x[:], ring[:], plots[:] = 0.0, 0.0, 0.0
+        n = min(CHUNK, count - done)
+        for k in range(scans):
+            move_and_measure(world, first + done, k, plots)
+            if k > 0:
+                add_ahead(bank, x, plots, world.truth[k], k, world.dt[k], n, sums)
+            advance(bank, x, ring, plots, k, world.dt[k])
+            add_sums(bank, x, plots, world.truth[k], k, n, baseline, sums)
