@@ -135,22 +135,13 @@ def _line(axes, line: Line) -> None:
 
 def _reference(axes, mark: Reference) -> None:
     look = {"color": "#555555", "linewidth": 0.7, "linestyle": (0, (2, 2)), "zorder": 1.5}
+    words = {"s": f" {mark.label} ", "ha": "right", "va": "bottom", "color": "#555555"}
     if mark.across == "y":
         axes.axhline(mark.value, **look)
-        axes.text(
-            0.99, mark.value, mark.label, transform=axes.get_yaxis_transform(), ha="right", va="bottom", color="#555555"
-        )
+        axes.text(0.99, mark.value, transform=axes.get_yaxis_transform(), **words)
     else:
         axes.axvline(mark.value, **look)
-        axes.text(
-            mark.value,
-            0.98,
-            " " + mark.label,
-            transform=axes.get_xaxis_transform(),
-            ha="left",
-            va="top",
-            color="#555555",
-        )
+        axes.text(mark.value, 0.02, transform=axes.get_xaxis_transform(), **words)
 
 
 def _bars(axes, bars: Bars) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels, statistics
 from radarsim.report import tables as common
-from radarsim.report.drawing import Axis, Figure, Line, Note, Panel, Reference, Style
+from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
 
 SETTLED = 0.05  # within this share of the steady value, for good; the paper gives no tolerance
 PERIODS = 10  # the paper: a manoeuvre variance is good when the error settles in under ten scan periods
@@ -179,53 +179,48 @@ def figures(results: Sequence[CaseResult], made: dict, experiment) -> dict[str, 
         return [case.name for case in experiment.shown_in(name)]
 
     drawn = panels.per_component(results, curves, gains, QUANTITIES, chosen)
-    some, _ = panels.shown(results, chosen("settling"))
+    some = [result for result in results if result.name in set(chosen("settling"))]
     figure = settling_figure(some, made["steady"])
     return drawn | ({"settling": figure} if figure else {})
 
 
 def settling_figure(results: Sequence[CaseResult], table) -> Figure | None:
     """Steady σ of the range against its settling time over D_M, with the ten-period line and the best D_M named."""
-    families = {
-        stem: members
-        for stem, members in panels.families(results).items()
-        if len({tuple(r.axes.extra["manoeuvre_variance"]) for r in members}) > 1
-    }
-    if not families:
+    rows = table[(table["component"] == "r") & np.isfinite(table["settling_s"])]
+    drawn = []
+    for members in panels.families(results).values():
+        own = rows[rows["case"].isin([r.name for r in members])].drop_duplicates(["filter", "manoeuvre_variance"])
+        if own["manoeuvre_variance"].nunique() > 1:
+            drawn.append(_settling_panel(members[0], own))
+    if not drawn:
         return None
-    rows = table[table["component"] == "r"]
-    drawn = tuple(_settling_panel(members, rows) for members in families.values())
     caption = (
         "Exact steady σ of the range against the settling time of the measured σ (within 5 % of the steady value, for "
-        "good), one mark for each manoeuvre variance, written beside it in m²/s⁶. Dotted: ten scan periods, the "
-        "paper's limit; star: the least steady error under it. What does not settle within the run is left out."
+        "good); grey lines join equal manoeuvre variances, named in m²/s⁶. Dotted: ten scan periods, the paper's "
+        "limit; star: the least steady error under it. What does not settle within the run is left out."
     )
+    columns = min(3, len(drawn))
+    width = COLUMN_MM if columns == 1 else PAGE_MM
     return Figure(
-        "settling", "Steady error against settling time", caption, drawn, min(2, len(drawn)), 85.0 * min(2, len(drawn))
+        "settling", "Steady error against settling time", caption, tuple(drawn[: panels.MOST]), columns, width
     )
 
 
-def _settling_panel(members: Sequence[CaseResult], rows) -> Panel:
-    period = members[0].axes.extra["scan_period_s"]
-    marks: list = [Reference(PERIODS * period, "x", "10 periods")]
-    for n, name in enumerate(members[0].axes.filters):
-        own = rows[rows["case"].isin([r.name for r in members]) & (rows["filter"] == name)]
-        own = own[np.isfinite(own["settling_s"])].sort_values("manoeuvre_variance")
-        if own.empty:
-            continue
-        t, sigma = own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy()
-        marks.append(Line(t, sigma, name, Style(n, n, n)))
-        for when, same in own.groupby("settling_s"):
-            words = ", ".join(panels.number(float(v)) for v in same["manoeuvre_variance"])
-            edge = same["steady_sigma"].min() if n else same["steady_sigma"].max()
-            place = "ne" if n == 0 else "sw" if when == t.min() else "se"
-            marks.append(Note(float(when), float(edge), words, place))
+def _settling_panel(result: CaseResult, rows) -> Panel:
+    """rows: of one radar and the range, one for each filter and manoeuvre variance."""
+    marks: list = [Reference(PERIODS * result.axes.extra["scan_period_s"], "x", "10 periods")]
+    for variance, same in rows.sort_values("steady_sigma").groupby("manoeuvre_variance"):
+        t, sigma = same["settling_s"].to_numpy(), same["steady_sigma"].to_numpy()
+        marks.append(Line(t, sigma, "", Style(7, 2, width_pt=0.6)))
+        marks.append(Note(float(t[-1]), float(sigma[-1]), panels.number(float(variance))))
+    for n, name in enumerate(result.axes.filters):
+        own = rows[rows["filter"] == name].sort_values("manoeuvre_variance")
         best = own[own["best"]]
-        if not best.empty:
-            star = Style(n, None, 7, size_pt=8)
-            marks.append(Line(best["settling_s"].to_numpy(), best["steady_sigma"].to_numpy(), "", star))
+        marks.append(Line(own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy(), name, Style(n, n, n)))
+        star = Style(n, None, 7, size_pt=8)
+        marks.append(Line(best["settling_s"].to_numpy(), best["steady_sigma"].to_numpy(), "", star))
     x, y = Axis("settling time of $\\sigma$ of $r$, s", limits=(0, None)), Axis("steady $\\sigma$ of $r$, m")
-    return Panel(x, y, tuple(marks), panels.device(members[0]), direct=False)
+    return Panel(x, y, tuple(marks), panels.device(result), direct=False)
 
 
 def question(experiment) -> str:
@@ -243,9 +238,14 @@ def listed(names: Sequence[str]) -> str:
 
 
 def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
-    """Sentences with numbers and 95 % intervals: the gains at the end of the run, component by component."""
-    gains = common.groups(made["gains"], "component")
-    told = [_gain_sentence(results, gains[(c,)], of.name) for c, of in QUANTITIES.items() if (c,) in gains]
+    """Sentences with numbers and 95 % intervals: the gains at the end of the run, component by component.
+
+    Of cases that nothing is swept in, where there are such.
+    """
+    plain = [result for result in results if not result.swept] or results
+    rows = made["gains"][made["gains"]["case"].isin([result.name for result in plain])]
+    gains = common.groups(rows, "component")
+    told = [_gain_sentence(plain, gains[(c,)], of.name) for c, of in QUANTITIES.items() if (c,) in gains]
     return told or [_sigma_sentence(results[0], made["curves"])]
 
 
@@ -253,20 +253,26 @@ def _gain_sentence(results: Sequence[CaseResult], rows, quantity: str) -> str:
     labels = {result.name: panels.plain_label(result) for result in results}
     last = rows.loc[rows.groupby(["case", "filter"], sort=False)["k"].idxmax()]
     several = rows["filter"].nunique() > 1
+    base = f"than with {rows['baseline'].iloc[0]} alone" if rows["baseline"].nunique() == 1 else "than the baseline's"
     if len(last) > 1:
         low, high = (last.loc[last["gain_percent"].agg(pick)] for pick in ("idxmin", "idxmax"))
         ends = " to ".join(f"{_gain(row)} ({_who(row, labels, several)})" for row in (low, high))
-        return f"{quantity.capitalize()}: at the end of the run σ changes by {ends}."
+        return f"{quantity.capitalize()}: at the end of the run σ is {ends} {base}."
     row = last.iloc[0]
     best = rows.loc[rows["gain_percent"].idxmax()]
-    peak = "" if best["k"] == row["k"] else f", at best by {_gain(best)} at {best['t_s']:g} s"
-    return f"{quantity.capitalize()}: at the end of the run ({row['t_s']:g} s) σ changes by {_gain(row)}{peak}."
+    peak = "" if best["k"] == row["k"] else f"; at best {_gain(best)}, at {best['t_s']:g} s"
+    return f"{quantity.capitalize()}: at the end of the run ({row['t_s']:g} s) σ is {_gain(row)} {base}{peak}."
 
 
 def _gain(row) -> str:
-    """A gain as the change of σ that it is: a gain of 18 % is −18 %."""
-    value, lo, hi = (-row[name] for name in ("gain_percent", "gain_hi", "gain_lo"))
-    return f"{value:+.1f} % [{lo:+.1f}, {hi:+.1f}]".replace("-", "−")
+    """A gain in words: lower, higher, or neither for certain."""
+    value, lo, hi = (row[name] for name in ("gain_percent", "gain_lo", "gain_hi"))
+    if lo <= 0 <= hi:
+        return f"neither lower nor higher (gain {value:.1f} % [{lo:.1f}, {hi:.1f}])".replace("-", "−")
+    if value < 0:
+        value, lo, hi = -value, -hi, -lo
+        return f"{value:.1f} % [{lo:.1f}, {hi:.1f}] higher"
+    return f"{value:.1f} % [{lo:.1f}, {hi:.1f}] lower"
 
 
 def _who(row, labels: dict[str, str], several: bool) -> str:
