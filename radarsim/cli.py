@@ -166,7 +166,12 @@ def claims(configs, out):
 
 @main.command(name="list")
 def list_():
-    """Configs, scenarios, studies and filters at hand."""
+    """Configs, scenarios, studies and filters at hand.
+
+    \b
+    Example
+      radarsim list
+    """
     from radarsim import console, experiment
 
     console.print_inventory(experiment.inventory())
