@@ -106,4 +106,3 @@ def shrunk_cross(c, g, h):
         shrunk(c[7], g[2], h[1]),
         shrunk(c[8], g[2], h[2]),
     )
-

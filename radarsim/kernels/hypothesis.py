@@ -18,7 +18,7 @@ from radarsim.kernels.blocks import (
     times_symmetric,
 )
 from radarsim.kernels.compile import inline, kernel
-from radarsim.kernels.lanes import full, get, put, rows, where_greater
+from radarsim.kernels.lanes import full, get, put, row, rows, where_greater
 
 MOST = 5  # models in a bank
 MEAN, OWN, CROSS, PROBABILITY = 0, 9, 27, 54  # rows within a hypothesis; mean and own blocks by axis, cross: xy, xz, yz
@@ -28,14 +28,14 @@ SPARE = 2 * BANK  # hypotheses before they are merged (GPB2), and the merged out
 WEIGHT = 3 * BANK
 SHARE = WEIGHT + MOST
 RESULT = SHARE + MOST  # normalised innovation squared and determinant of S, of each model
-GROUP = RESULT + 2 * MOST  # the smallest normalised innovation squared of each group (GPB2)
-MODEL = GROUP + MOST  # F and Q of each model over the present interval
+RESULT_GROUP = RESULT + 2 * MOST  # the same of each group (GPB2)
+MODEL = RESULT_GROUP + 2 * MOST  # F and Q of each model over the present interval
 TRANSITION = MODEL + 11 * MOST
 WAIT = TRANSITION + MOST * MOST  # seconds since the last plot
 ESTIMATE = WAIT + 1  # the last output mean
 NOISE = ESTIMATE + 9  # measurement covariance at the prediction
-MAIN = NOISE + 6  # the most probable model after the last plot (GPB1)
-WORK = MAIN + 2
+SURPRISE = NOISE + 6  # normalised innovation squared of the hypothesis that was thought most probable before the plot
+WORK = SURPRISE + 1
 
 PLOT = 10  # rows of a plot: position x, y, z; covariance xx, xy, xz, yy, yz, zz; 1 where detected, else 0
 VARIANCE, POSITION, MODELS, INNOVATION = 9, 18, 21, 26  # rows of an output after the mean: see `output`
@@ -43,68 +43,67 @@ OUTPUT = 28
 
 
 def work_arrays() -> tuple[np.ndarray, np.ndarray]:
-    """Empty memory of one filter for eight realisations: rows, and whole numbers (bank in use, interval held, settled, list)."""
-    return rows(WORK), np.zeros(4 + MOST, dtype=np.int64)
+    """Memory of one filter for eight realisations: rows, and whole numbers (see `multimodel.filter_strip`)."""
+    return rows(WORK), np.array([0, -1, 1, 0])
 
 
 @inline
-def get3(work, row):
-    return get(work, row), get(work, row + 1), get(work, row + 2)
+def get3(pointer, first):
+    return get(pointer, first), get(pointer, first + 1), get(pointer, first + 2)
 
 
 @inline
-def get6(work, row):
-    return get3(work, row) + get3(work, row + 3)
+def get6(pointer, first):
+    return get3(pointer, first) + get3(pointer, first + 3)
 
 
 @inline
-def put3(work, row, x):
-    put(work, row, x[0])
-    put(work, row + 1, x[1])
-    put(work, row + 2, x[2])
+def put3(pointer, first, x):
+    put(pointer, first, x[0])
+    put(pointer, first + 1, x[1])
+    put(pointer, first + 2, x[2])
 
 
 @inline
-def put6(work, row, x):
-    put3(work, row, (x[0], x[1], x[2]))
-    put3(work, row + 3, (x[3], x[4], x[5]))
+def put6(pointer, first, x):
+    put3(pointer, first, (x[0], x[1], x[2]))
+    put3(pointer, first + 3, (x[3], x[4], x[5]))
 
 
 @inline
-def put9(work, row, x):
-    put6(work, row, (x[0], x[1], x[2], x[3], x[4], x[5]))
-    put3(work, row + 6, (x[6], x[7], x[8]))
+def put9(pointer, first, x):
+    put6(pointer, first, (x[0], x[1], x[2], x[3], x[4], x[5]))
+    put3(pointer, first + 6, (x[6], x[7], x[8]))
 
 
-# ---- merging: eq. (4) with the shares of any rule -----------------------------------------------------------------------------
+# ---- merging: eq. (4) with the shares of any rule ----------------------------------------------------------------------
+# Addresses say which axis and block is meant: a number in the call would be compiled anew for each of its values.
 @inline
-def mixed_mean(work, listed, count, axis):
-    """Share-weighted mean of one axis over the listed hypotheses."""
+def mixed_mean(listed, count, shares, means):
+    """Share-weighted mean of one axis over the listed hypotheses; means: row of that axis."""
     if count == 1:
-        return get3(work, listed[0] + MEAN + 3 * axis)
+        return get3(means, listed[0])
     a, b, c = full(0.0), full(0.0), full(0.0)
     for n in range(count):
-        w, x = get(work, SHARE + n), get3(work, listed[n] + MEAN + 3 * axis)
+        w, x = get(shares, n), get3(means, listed[n])
         a, b, c = a + w * x[0], b + w * x[1], c + w * x[2]
     return a, b, c
 
 
 @inline
-def offset(work, row, mean):
-    x = get3(work, row)
+def offset(means, hypothesis, mean):
+    x = get3(means, hypothesis)
     return x[0] - mean[0], x[1] - mean[1], x[2] - mean[2]
 
 
 @inline
-def mixed_own(work, listed, count, axis, mean):
+def mixed_own(listed, count, shares, block, means, mean):
     """Share-weighted own block of one axis, with the spread of the means."""
-    first = OWN + 6 * axis
     if count == 1:
-        return get6(work, listed[0] + first)
+        return get6(block, listed[0])
     p = full(0.0), full(0.0), full(0.0), full(0.0), full(0.0), full(0.0)
     for n in range(count):
-        w, q = get(work, SHARE + n), get6(work, listed[n] + first)
-        d = offset(work, listed[n] + MEAN + 3 * axis, mean)
+        w, q, d = get(shares, n), get6(block, listed[n]), offset(means, listed[n], mean)
         p = (
             p[0] + w * (q[0] + d[0] * d[0]),
             p[1] + w * (q[1] + d[0] * d[1]),
@@ -117,16 +116,14 @@ def mixed_own(work, listed, count, axis, mean):
 
 
 @inline
-def mixed_cross(work, listed, count, pair, axis, mean, other, other_mean):
+def mixed_cross(listed, count, shares, block, means, mean, others, other):
     """Share-weighted block between two axes, with the spread of the means."""
-    first = CROSS + 9 * pair
     if count == 1:
-        return get6(work, listed[0] + first) + get3(work, listed[0] + first + 6)
+        return get6(block, listed[0]) + get3(block, listed[0] + 6)
     c = full(0.0), full(0.0), full(0.0), full(0.0), full(0.0), full(0.0), full(0.0), full(0.0), full(0.0)
     for n in range(count):
-        w, q, r = get(work, SHARE + n), get6(work, listed[n] + first), get3(work, listed[n] + first + 6)
-        d = offset(work, listed[n] + MEAN + 3 * axis, mean)
-        e = offset(work, listed[n] + MEAN + 3 * other, other_mean)
+        w, q, r = get(shares, n), get6(block, listed[n]), get3(block, listed[n] + 6)
+        d, e = offset(means, listed[n], mean), offset(others, listed[n], other)
         c = (
             c[0] + w * (q[0] + d[0] * e[0]),
             c[1] + w * (q[1] + d[0] * e[1]),
@@ -141,54 +138,68 @@ def mixed_cross(work, listed, count, pair, axis, mean, other, other_mean):
     return c
 
 
-@kernel
-def merged(work, listed, count, target):
-    """Write the merge of the listed hypotheses, by shares, to row `target`."""
-    x, y, z = mixed_mean(work, listed, count, 0), mixed_mean(work, listed, count, 1), mixed_mean(work, listed, count, 2)
-    a, b, c = mixed_own(work, listed, count, 0, x), mixed_own(work, listed, count, 1, y), mixed_own(work, listed, count, 2, z)
-    d = mixed_cross(work, listed, count, 0, 0, x, 1, y)
-    e = mixed_cross(work, listed, count, 1, 0, x, 2, z)
-    f = mixed_cross(work, listed, count, 2, 1, y, 2, z)
-    written(work, target, x, y, z, a, b, c, d, e, f)
+@inline
+def mixed(work, listed, count):
+    """Means of the three axes, own blocks, blocks between axes: of the listed hypotheses, by the shares."""
+    shares, p, q, r = row(work, SHARE), row(work, MEAN), row(work, MEAN + 3), row(work, MEAN + 6)
+    x, y, z = (
+        mixed_mean(listed, count, shares, p),
+        mixed_mean(listed, count, shares, q),
+        mixed_mean(listed, count, shares, r),
+    )
+    return (
+        (x, y, z),
+        (
+            mixed_own(listed, count, shares, row(work, OWN), p, x),
+            mixed_own(listed, count, shares, row(work, OWN + 6), q, y),
+            mixed_own(listed, count, shares, row(work, OWN + 12), r, z),
+        ),
+        (
+            mixed_cross(listed, count, shares, row(work, CROSS), p, x, q, y),
+            mixed_cross(listed, count, shares, row(work, CROSS + 9), p, x, r, z),
+            mixed_cross(listed, count, shares, row(work, CROSS + 18), q, y, r, z),
+        ),
+    )
 
 
 @inline
-def written(work, target, x, y, z, a, b, c, d, e, f):
-    put3(work, target + MEAN, x)
-    put3(work, target + MEAN + 3, y)
-    put3(work, target + MEAN + 6, z)
-    put6(work, target + OWN, a)
-    put6(work, target + OWN + 6, b)
-    put6(work, target + OWN + 12, c)
-    put9(work, target + CROSS, d)
-    put9(work, target + CROSS + 9, e)
-    put9(work, target + CROSS + 18, f)
+def written(target, means, own, cross):
+    put9(target, MEAN, means[0] + means[1] + means[2])
+    put6(target, OWN, own[0])
+    put6(target, OWN + 6, own[1])
+    put6(target, OWN + 12, own[2])
+    put9(target, CROSS, cross[0])
+    put9(target, CROSS + 9, cross[1])
+    put9(target, CROSS + 18, cross[2])
 
 
-# ---- prediction and update: eqs. (6) and (9) -----------------------------------------------------------------------------------
 @kernel
-def advanced(work, listed, count, target, model, result, plots, plot, noises, noise):
-    """Merge the listed hypotheses, predict with the model in row `model`, update with a plot, write to row `target`.
+def merged(work, listed, count, target):
+    """Write the merge of the listed hypotheses, by the shares, to the address `target`."""
+    means, own, cross = mixed(work, listed, count)
+    written(target, means, own, cross)
 
-    plots, plot: the plot's array and row; noises, noise: array and row of its covariance (6). Rows result, result + 1 take
-    the normalised innovation squared and the determinant of its covariance (0 and 1 where the plot is missed).
+
+# ---- prediction and update: eqs. (6) and (9) ---------------------------------------------------------------------------
+@kernel
+def advanced(work, listed, count, target, model, result, plot, noise):
+    """Merge the listed hypotheses, predict with the model in row `model`, update with a plot, write to `target`.
+
+    target, plot, noise: addresses of a hypothesis, of the plot (PLOT rows) and of its covariance (6 rows). Rows result and
+    result + 1 take the normalised innovation squared and the determinant of its covariance (0, 1 where the plot is missed).
     """
     f = get(work, model), get(work, model + 1), get(work, model + 2), get(work, model + 3), get(work, model + 4)
     q = get6(work, model + 5)
-    mx, my, mz = mixed_mean(work, listed, count, 0), mixed_mean(work, listed, count, 1), mixed_mean(work, listed, count, 2)
-    a = predicted_own(mixed_own(work, listed, count, 0, mx), f, q)
-    b = predicted_own(mixed_own(work, listed, count, 1, my), f, q)
-    c = predicted_own(mixed_own(work, listed, count, 2, mz), f, q)
-    d = predicted_cross(mixed_cross(work, listed, count, 0, 0, mx, 1, my), f)
-    e = predicted_cross(mixed_cross(work, listed, count, 1, 0, mx, 2, mz), f)
-    g = predicted_cross(mixed_cross(work, listed, count, 2, 1, my, 2, mz), f)
-    x, y, z = predicted_axis(mx, f), predicted_axis(my, f), predicted_axis(mz, f)
+    means, own, cross = mixed(work, listed, count)
+    a, b, c = predicted_own(own[0], f, q), predicted_own(own[1], f, q), predicted_own(own[2], f, q)
+    d, e, g = predicted_cross(cross[0], f), predicted_cross(cross[1], f), predicted_cross(cross[2], f)
+    x, y, z = predicted_axis(means[0], f), predicted_axis(means[1], f), predicted_axis(means[2], f)
 
-    r = get6(noises, noise)
+    r = get6(noise, 0)
     i, determinant = inverse((a[0] + r[0], d[0] + r[1], e[0] + r[2], b[0] + r[3], g[0] + r[4], c[0] + r[5]))
-    detected = get(plots, plot + 9)
+    detected = get(plot, 9)
     i = i[0] * detected, i[1] * detected, i[2] * detected, i[3] * detected, i[4] * detected, i[5] * detected
-    innovation = get(plots, plot) - x[0], get(plots, plot + 1) - y[0], get(plots, plot + 2) - z[0]
+    innovation = get(plot, 0) - x[0], get(plot, 1) - y[0], get(plot, 2) - z[0]
     v = times_symmetric(innovation, i)
     put(work, result, dot(innovation, v))
     put(work, result + 1, where_greater(detected, full(0.5), determinant, full(1.0)))
@@ -201,15 +212,12 @@ def advanced(work, listed, count, target, model, result, plots, plot, noises, no
     gy = times_symmetric(hy[0], i), times_symmetric(hy[1], i), times_symmetric(hy[2], i)
     gz = times_symmetric(hz[0], i), times_symmetric(hz[1], i), times_symmetric(hz[2], i)
     written(
-        work,
         target,
-        (x[0] + dot(hx[0], v), x[1] + dot(hx[1], v), x[2] + dot(hx[2], v)),
-        (y[0] + dot(hy[0], v), y[1] + dot(hy[1], v), y[2] + dot(hy[2], v)),
-        (z[0] + dot(hz[0], v), z[1] + dot(hz[1], v), z[2] + dot(hz[2], v)),
-        shrunk_own(a, gx, hx),
-        shrunk_own(b, gy, hy),
-        shrunk_own(c, gz, hz),
-        shrunk_cross(d, gx, hy),
-        shrunk_cross(e, gx, hz),
-        shrunk_cross(g, gy, hz),
+        (
+            (x[0] + dot(hx[0], v), x[1] + dot(hx[1], v), x[2] + dot(hx[2], v)),
+            (y[0] + dot(hy[0], v), y[1] + dot(hy[1], v), y[2] + dot(hy[2], v)),
+            (z[0] + dot(hz[0], v), z[1] + dot(hz[1], v), z[2] + dot(hz[2], v)),
+        ),
+        (shrunk_own(a, gx, hx), shrunk_own(b, gy, hy), shrunk_own(c, gz, hz)),
+        (shrunk_cross(d, gx, hy), shrunk_cross(e, gx, hz), shrunk_cross(g, gy, hz)),
     )

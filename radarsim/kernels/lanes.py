@@ -167,33 +167,56 @@ def total(typingctx, x):
     return types.float64(lanes), generate
 
 
-def _row_pointer(context, builder, array_type, array, row):
-    data = make_array(array_type)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [builder.mul(row, ir.Constant(row.type, WIDTH))]), VECTOR.as_pointer())
+@intrinsic
+def address(typingctx, array):
+    """Where a contiguous array begins, for `get`, `put` and plain indexing: the array must outlive every use.
+
+    Passed on to functions instead of the array: Numba counts references to arrays, with locked instructions, at every
+    call; that alone took a third of a filter step.
+    """
+
+    def generate(context, builder, sig, args):
+        return make_array(sig.args[0])(context, builder, args[0]).data
+
+    return types.CPointer(array.dtype)(array), generate
 
 
 @intrinsic
-def get(typingctx, array, row):
-    """The lanes in one row of a flat float64 array."""
+def row(typingctx, pointer, number):
+    """The address of a row, counted from another."""
 
     def generate(context, builder, sig, args):
-        value = builder.load(_row_pointer(context, builder, sig.args[0], args[0], args[1]))
+        return builder.gep(args[0], [builder.mul(args[1], ir.Constant(args[1].type, WIDTH))])
+
+    return pointer(pointer, types.intp), generate
+
+
+def _row_pointer(builder, pointer, row):
+    return builder.bitcast(builder.gep(pointer, [builder.mul(row, ir.Constant(row.type, WIDTH))]), VECTOR.as_pointer())
+
+
+@intrinsic
+def get(typingctx, pointer, row):
+    """The lanes in one row, counted from the address of a float64 array."""
+
+    def generate(context, builder, sig, args):
+        value = builder.load(_row_pointer(builder, *args))
         value.align = 8
         return value
 
-    return lanes(array, types.intp), generate
+    return lanes(pointer, types.intp), generate
 
 
 @intrinsic
-def put(typingctx, array, row, value):
+def put(typingctx, pointer, row, value):
     """Write the lanes of one row."""
 
     def generate(context, builder, sig, args):
-        store = builder.store(args[2], _row_pointer(context, builder, sig.args[0], args[0], args[1]))
+        store = builder.store(args[2], _row_pointer(builder, *args[:2]))
         store.align = 8
         return context.get_dummy_value()
 
-    return types.none(array, types.intp, lanes), generate
+    return types.none(pointer, types.intp, lanes), generate
 
 
 @inline

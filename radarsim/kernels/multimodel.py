@@ -5,15 +5,15 @@ others by shares (`merged`), and one is merged, predicted with a model and updat
 Family, rule and number of models are run-time values: one copy of machine code serves all.
 """
 
+import numpy as np
+
 from radarsim.kernels.compile import inline, kernel
 from radarsim.kernels.hypothesis import (
     BANK,
     CROSS,
     ESTIMATE,
-    GROUP,
     HYPOTHESIS,
     INNOVATION,
-    MAIN,
     MEAN,
     MODEL,
     MODELS,
@@ -25,21 +25,22 @@ from radarsim.kernels.hypothesis import (
     POSITION,
     PROBABILITY,
     RESULT,
+    RESULT_GROUP,
     SHARE,
     SPARE,
+    SURPRISE,
     TRANSITION,
     VARIANCE,
     WAIT,
     WEIGHT,
     advanced,
     get3,
-    get6,
     merged,
     mixed_mean,
     put3,
-    put6,
 )
-from radarsim.kernels.lanes import any_greater, exponential, full, get, put, root, where_greater
+from radarsim.kernels.lanes import address, any_greater, exponential, full, get, put, root, row, where_greater
+from radarsim.kernels.multimodel_plots import noise_at_prediction
 
 KALMAN, GPB1, IMM, GPB2 = range(4)
 MOMENT, BEST, COMBINED, MODIFIED = range(4)
@@ -54,39 +55,34 @@ def is_number(x, number):
 
 
 @kernel
-def shared(work, listed, first, stride, size, main, rule):
-    """Map the rows WEIGHT … to shares by a rule; list the hypotheses whose share is not zero in all lanes.
+def shared(work, listed, first, size, group, main, rule):
+    """Map the rows WEIGHT … of a group to shares by a rule; list the hypotheses whose share is not zero in all lanes.
 
-    Hypothesis j lies at row first + j * stride; `main` (lanes) is the number of the main one. A group whose weights are all
-    zero is its main hypothesis. The rows SHARE … belong to `listed`, in order; returns their number.
+    Hypothesis j lies at row first + j * HYPOTHESIS; `group` is the sum of the weights and `main` (lanes) the number of the
+    main one. A group whose weights are all zero is its main hypothesis. The rows SHARE … belong to `listed`, in order;
+    returns their number.
     """
-    nothing, one = full(0.0), full(1.0)
-    weight = nothing
-    for j in range(size):
-        weight = weight + get(work, WEIGHT + j)
-    if any_greater(full(1e-300), weight):
+    nothing, least = full(0.0), full(1e-300)
+    if any_greater(least, group):
         for j in range(size):
             alone = is_number(main, float(j))
-            put(work, WEIGHT + j, where_greater(full(1e-300), weight, alone, get(work, WEIGHT + j)))
+            put(work, WEIGHT + j, where_greater(least, group, alone, get(work, WEIGHT + j)))
+        group = where_greater(least, group, full(1.0), group)
     if rule != MOMENT:
-        kept_only(work, size, main, rule)
-    weight = nothing
-    for j in range(size):
-        weight = weight + get(work, WEIGHT + j)
-    scale = one / weight
-    count = 0
+        group = kept_only(work, size, main, rule)
+    scale, count = 1.0 / group, 0
     for j in range(size):
         w = get(work, WEIGHT + j)
         if any_greater(w, nothing):
             put(work, SHARE + count, w * scale)
-            listed[count] = first + j * stride
+            listed[count] = first + j * HYPOTHESIS
             count += 1
     return count
 
 
 @inline
 def kept_only(work, size, main, rule):
-    """Set to zero the weights that a rule other than `moment` leaves out; ties go to the lower number."""
+    """Set to zero the weights that a rule other than `moment` leaves out, and sum the rest; ties go to the lower number."""
     nothing = full(0.0)
     top, best, of_main, others = get(work, WEIGHT), nothing, nothing, nothing
     for j in range(size):
@@ -95,6 +91,7 @@ def kept_only(work, size, main, rule):
         of_main = where_greater(is_main, nothing, w, of_main)
         other = where_greater(is_main, nothing, nothing, w)
         others = where_greater(other, others, other, others)
+    group = nothing
     for j in range(size):
         w, is_main, is_best = get(work, WEIGHT + j), is_number(main, float(j)), is_number(best, float(j))
         if rule == BEST:
@@ -103,7 +100,10 @@ def kept_only(work, size, main, rule):
             kept = where_greater(of_main, others, is_main, full(1.0))
         else:
             kept = where_greater(of_main, others, is_main, where_greater(is_main, nothing, is_main, is_best))
-        put(work, WEIGHT + j, where_greater(kept, nothing, w, nothing))
+        w = where_greater(kept, nothing, w, nothing)
+        put(work, WEIGHT + j, w)
+        group = group + w
+    return group
 
 
 # ---- families ------------------------------------------------------------------------------------------------------------------
@@ -130,35 +130,56 @@ def likelihood(work, least, result):
 
 
 @kernel
-def step_imm(work, listed, old, new, size, rule, plots, plot, noises, noise):
-    """IMM: for each model merge, predict and update once; with one model a Kalman filter."""
-    nothing, least = full(0.0), full(1e300)
+def step(work, listed, old, new, size, family, rule, plot, noise):
+    """From the old bank to the new one by one plot.
+
+    IMM: for each model merge the bank, predict and update once; with one model a Kalman filter. GPB1: predict and update
+    the one merged hypothesis, the first of the old bank, with each model. GPB2: predict and update every pair of models,
+    then merge those that end in the same model.
+    """
+    nothing, overall, top, surprise = full(0.0), full(1e300), full(-1.0), full(0.0)
+    source = SPARE if family == GPB2 else old
     for i in range(size):
-        target = new + i * HYPOTHESIS
-        c = foretold(work, old, size, i)
-        count = shared(work, listed, old, HYPOTHESIS, size, full(float(i)), rule)
-        advanced(work, listed, count, target, MODEL + 11 * i, RESULT + 2 * i, plots, plot, noises, noise)
-        put(work, target + PROBABILITY, c)
-        least = where_greater(c, nothing, smaller(least, get(work, RESULT + 2 * i)), least)
-    weighed(work, new, size, least)
+        model, main = MODEL + 11 * i, full(float(i))
+        c, least = foretold(work, old, size, i), full(1e300)
+        for j in range(size if family == GPB2 else 1):
+            w, count, to, result = c, 1, new + i * HYPOTHESIS, RESULT_GROUP + 2 * i
+            if family == GPB2:
+                w, to, result = get(work, WEIGHT + j), SPARE + j * HYPOTHESIS, RESULT + 2 * j
+                if not any_greater(w, nothing):
+                    continue
+                listed[0] = old + j * HYPOTHESIS
+            elif family == GPB1:
+                listed[0] = old
+            else:
+                count = shared(work, listed, source, size, c, main, rule)
+            advanced(work, listed, count, row(work, to), model, result, plot, noise)
+            q = get(work, result)
+            surprise, top = where_greater(w, top, q, surprise), where_greater(w, top, w, top)
+            least = where_greater(w, nothing, smaller(least, q), least)
+        if family == GPB2:
+            c = group_likelihood(work, size, least)
+            put(work, RESULT_GROUP + 2 * i, least)
+            put(work, RESULT_GROUP + 2 * i + 1, full(1.0))
+            count = shared(work, listed, source, size, c, main, rule)
+            merged(work, listed, count, row(work, new + i * HYPOTHESIS))
+        put(work, new + i * HYPOTHESIS + PROBABILITY, c)
+        overall = smaller(overall, least)
+    put(work, SURPRISE, surprise)
+    weighed(work, new, size, overall)
 
 
-@kernel
-def step_gpb1(work, listed, old, new, size, rule, plots, plot, noises, noise):
-    """GPB1: predict and update the one merged hypothesis with each model, then merge them over the old bank's first."""
-    nothing, least, top, main = full(0.0), full(1e300), full(-1.0), full(0.0)
+@inline
+def group_likelihood(work, size, least):
+    """Multiply the rows WEIGHT … by the likelihoods of their updates, relative to exp(-least / 2); return their sum."""
+    c = full(0.0)
     for j in range(size):
-        p = get(work, old + j * HYPOTHESIS + PROBABILITY)
-        main, top = where_greater(p, top, full(float(j)), main), where_greater(p, top, p, top)
-    for i in range(size):
-        target = new + i * HYPOTHESIS
-        c = foretold(work, old, size, i)
-        listed[0] = old
-        advanced(work, listed, 1, target, MODEL + 11 * i, RESULT + 2 * i, plots, plot, noises, noise)
-        put(work, target + PROBABILITY, c)
-        least = where_greater(c, nothing, smaller(least, get(work, RESULT + 2 * i)), least)
-    weighed(work, new, size, least)
-    put(work, MAIN, main)
+        w = get(work, WEIGHT + j)
+        if any_greater(w, full(0.0)):
+            w = w * likelihood(work, least, RESULT + 2 * j)
+            put(work, WEIGHT + j, w)
+            c = c + w
+    return c
 
 
 @inline
@@ -166,173 +187,226 @@ def weighed(work, bank, size, least):
     """Posterior probabilities of a bank, from the foretold ones and the likelihoods (eq. 9)."""
     weight = full(0.0)
     for i in range(size):
-        row = bank + i * HYPOTHESIS + PROBABILITY
-        p = get(work, row) * likelihood(work, least, RESULT + 2 * i)
-        put(work, row, p)
+        at = bank + i * HYPOTHESIS + PROBABILITY
+        p = get(work, at) * likelihood(work, least, RESULT_GROUP + 2 * i)
+        put(work, at, p)
         weight = weight + p
     scale = 1.0 / weight
     for i in range(size):
-        row = bank + i * HYPOTHESIS + PROBABILITY
-        put(work, row, get(work, row) * scale)
+        at = bank + i * HYPOTHESIS + PROBABILITY
+        put(work, at, get(work, at) * scale)
 
 
 @kernel
-def step_gpb2(work, listed, old, new, size, rule, plots, plot, noises, noise):
-    """GPB2: predict and update every pair of models, then merge those that end in the same model."""
-    nothing, overall = full(0.0), full(1e300)
-    for i in range(size):
-        foretold(work, old, size, i)
-        least = full(1e300)
-        for j in range(size):
-            w = get(work, WEIGHT + j)
-            if any_greater(w, nothing):
-                listed[0] = old + j * HYPOTHESIS
-                result = RESULT + 2 * j
-                advanced(work, listed, 1, SPARE + j * HYPOTHESIS, MODEL + 11 * i, result, plots, plot, noises, noise)
-                least = where_greater(w, nothing, smaller(least, get(work, result)), least)
-        c = full(0.0)
-        for j in range(size):
-            w = get(work, WEIGHT + j)
-            if any_greater(w, nothing):
-                w = w * likelihood(work, least, RESULT + 2 * j)
-                put(work, WEIGHT + j, w)
-                c = c + w
-        put(work, GROUP + i, least)
-        put(work, new + i * HYPOTHESIS + PROBABILITY, c)
-        overall = smaller(overall, least)
-        count = shared(work, listed, SPARE, HYPOTHESIS, size, full(float(i)), rule)
-        merged(work, listed, count, new + i * HYPOTHESIS)
-    weight = full(0.0)
-    for i in range(size):
-        row = new + i * HYPOTHESIS + PROBABILITY
-        p = get(work, row) * exponential(0.5 * (overall - get(work, GROUP + i)))
-        put(work, row, p)
-        weight = weight + p
-    scale = 1.0 / weight
-    for i in range(size):
-        row = new + i * HYPOTHESIS + PROBABILITY
-        put(work, row, get(work, row) * scale)
+def merge_gpb1(work, listed, old, new, size, rule):
+    """Merge the new bank over its own first hypothesis; the main one is of the model that was most probable before the plot."""
+    top, main = full(-1.0), full(0.0)
+    for j in range(size):
+        p = get(work, old + j * HYPOTHESIS + PROBABILITY)
+        main, top = where_greater(p, top, full(float(j)), main), where_greater(p, top, p, top)
+        put(work, WEIGHT + j, get(work, new + j * HYPOTHESIS + PROBABILITY))
+    count = shared(work, listed, new, size, full(1.0), main, rule)
+    merged(work, listed, count, row(work, new))
 
 
-# ---- a strip of scans ------------------------------------------------------------------------------------------------------------
+# ---- a strip of scans --------------------------------------------------------------------------------------------------
 @inline
-def prepare_model(work, row, model, dt):
-    """F and Q of eq. (11) over dt (lanes); model = (moves, accelerates, sigma of the acceleration per step)."""
-    moves, bends, half, variance = model[0], model[1], 0.5 * dt * dt, model[2] * model[2]
+def prepare_model(work, at, moves, bends, sigma, dt):
+    """F and Q of eq. (11) over dt (lanes); moves, bends (0 or 1): with velocity, acceleration; sigma of it per step."""
+    half, variance = 0.5 * dt * dt, sigma * sigma
     g0, g1 = half, moves * dt
-    put3(work, row, (g1, bends * half, full(moves)))
-    put(work, row + 3, bends * dt)
-    put(work, row + 4, full(bends))
-    put3(work, row + 5, (variance * (g0 * g0), variance * (g0 * g1), (variance * bends) * g0))
-    put3(work, row + 8, (variance * (g1 * g1), (variance * bends) * g1, full(variance * bends)))
+    put3(work, at, (g1, bends * half, full(moves)))
+    put3(work, at + 3, (bends * dt, full(bends), variance * (g0 * g0)))
+    put3(work, at + 6, (variance * (g0 * g1), (variance * bends) * g0, variance * (g1 * g1)))
+    put(work, at + 9, (variance * bends) * g1)
+    put(work, at + 10, full(variance * bends))
 
 
 @kernel
-def prepare_step(work, numbers, models, transition, dt, interval):
+def prepare_step(work, size, models, transitions, transition, dt, settled):
     """Models and transition probabilities over the time since each lane's last plot.
 
-    transition (M, M) over the interval dt since the last scan; where plots were missed since, P(a + b) = P(a) P(b), eq. (8).
+    The matrix at transitions[transition …] holds over the interval dt since the last scan; where plots were missed since
+    (not settled), P(a + b) = P(a) P(b), eq. (8).
     """
-    size = models.shape[0]
-    if numbers[2] == 1 and numbers[1] == interval:
-        return
-    wait = get(work, WAIT) + dt if numbers[2] == 0 else full(dt)
+    wait = full(dt)
+    if not settled:
+        wait = wait + get(work, WAIT)
     put(work, WAIT, wait)
     for i in range(size):
-        prepare_model(work, MODEL + 11 * i, models[i], wait)
-    if numbers[2] == 1:
+        prepare_model(work, MODEL + 11 * i, models[3 * i], models[3 * i + 1], models[3 * i + 2], wait)
+    for j in range(size):
         for i in range(size):
-            for j in range(size):
-                put(work, TRANSITION + i * MOST + j, full(transition[i, j]))
-    else:
-        for j in range(size):
-            for i in range(size):
+            c = full(transitions[transition + i * size + j])
+            if not settled:
                 c = full(0.0)
                 for n in range(size):
-                    c = c + transition[i, n] * get(work, TRANSITION + n * MOST + j)
-                put(work, WEIGHT + i, c)
-            for i in range(size):
-                put(work, TRANSITION + i * MOST + j, get(work, WEIGHT + i))
-    numbers[1] = interval
+                    c = c + transitions[transition + i * size + n] * get(work, TRANSITION + n * MOST + j)
+            put(work, WEIGHT + i, c)
+        for i in range(size):
+            put(work, TRANSITION + i * MOST + j, get(work, WEIGHT + i))
 
 
 @kernel
-def keep_missed(work, old, new, size, family, plots, plot):
-    """Where a plot was missed keep the old bank, so that the next prediction starts from the last plot again."""
-    detected, half = get(plots, plot + 9), full(0.5)
-    if family == GPB1:
-        for i in range(size):
-            row = i * HYPOTHESIS + PROBABILITY
-            put(work, old + row, where_greater(detected, half, get(work, new + row), get(work, old + row)))
-        for r in range(PROBABILITY):
-            put(work, old + r, where_greater(detected, half, get(work, SPARE + r), get(work, old + r)))
-    else:
-        for i in range(size):
-            for r in range(i * HYPOTHESIS, i * HYPOTHESIS + PROBABILITY + 1):
-                put(work, new + r, where_greater(detected, half, get(work, new + r), get(work, old + r)))
-
-
-@kernel
-def settle(work, size, detected):
-    """After a scan: lanes that were detected wait from now on, with nothing to catch up."""
-    half, nothing = full(0.5), full(0.0)
-    put(work, WAIT, where_greater(detected, half, nothing, get(work, WAIT)))
+def keep_missed(work, old, new, size, detected):
+    """Where the plot was missed keep the old bank, and its wait: the next prediction starts from the last plot again."""
+    half = full(0.5)
     for i in range(size):
+        for at in range(i * HYPOTHESIS, i * HYPOTHESIS + PROBABILITY + 1):
+            put(work, new + at, where_greater(detected, half, get(work, new + at), get(work, old + at)))
         for j in range(size):
-            row = TRANSITION + i * MOST + j
-            put(work, row, where_greater(detected, half, full(1.0 if i == j else 0.0), get(work, row)))
+            at = TRANSITION + i * MOST + j
+            put(work, at, where_greater(detected, half, full(1.0 if i == j else 0.0), get(work, at)))
+    put(work, WAIT, where_greater(detected, half, full(0.0), get(work, WAIT)))
 
 
-@inline
-def output(work, listed, bank, size, rule, everything, out, row):
-    """Merge a bank by the output rule into rows of `out`.
+@kernel
+def output(work, listed, bank, size, rule, everything, out):
+    """Merge a bank by the output rule into the rows at `out`.
 
     Mean (9); where `everything`: variances (9) from VARIANCE, position covariances xy, xz, yz from POSITION, probabilities
-    from MODELS.
+    from MODELS; at INNOVATION the normalised innovation squared of what was thought most probable before the plot.
     """
     for j in range(size):
         put(work, WEIGHT + j, get(work, bank + j * HYPOTHESIS + PROBABILITY))
-    count = shared(work, listed, bank, HYPOTHESIS, size, full(0.0), rule)
-    if everything:
-        target = SPARE + 4 * HYPOTHESIS
-        merged(work, listed, count, target)
+    count = shared(work, listed, bank, size, full(1.0), full(0.0), rule)
+    put(out, INNOVATION, get(work, SURPRISE))
+    if not everything:
         for axis in range(3):
-            put3(out, row + 3 * axis, get3(work, target + MEAN + 3 * axis))
-            for i in range(3):
-                put(out, row + VARIANCE + 3 * axis + i, get(work, target + OWN + 6 * axis + (0, 3, 5)[i]))
-            put(out, row + POSITION + axis, get(work, target + CROSS + 9 * axis))
-        for j in range(size):
-            put(out, row + MODELS + j, get(work, bank + j * HYPOTHESIS + PROBABILITY))
-    else:
-        for axis in range(3):
-            put3(out, row + 3 * axis, mixed_mean(work, listed, count, axis))
+            put3(out, 3 * axis, mixed_mean(listed, count, row(work, SHARE), row(work, MEAN + 3 * axis)))
+        return
+    merged(work, listed, count, row(work, SPARE))
+    for axis in range(3):
+        own = SPARE + OWN + 6 * axis
+        put3(out, 3 * axis, get3(work, SPARE + MEAN + 3 * axis))
+        put3(out, VARIANCE + 3 * axis, (get(work, own), get(work, own + 3), get(work, own + 5)))
+        put(out, POSITION + axis, get(work, SPARE + CROSS + 9 * axis))
+    for j in range(size):
+        put(out, MODELS + j, get(work, bank + j * HYPOTHESIS + PROBABILITY))
 
 
 @kernel
-def filter_strip(work, numbers, plots, scans, models, transitions, intervals, times, rules, everything, out):
-    """Run one filter over a strip of scans.
+def start(work, numbers, size, plots, weights, probabilities):
+    """The first bank, the same hypothesis for all models, from the plots of the first three scans.
 
-    work, numbers  its memory, see `work_arrays`; a bank of hypotheses is in it (`start`)
+    weights (9,): how the coordinate and the velocity at the third plot are made of the three coordinates, a (3) and b (3);
+    how an acceleration of one standard deviation would err the three states, g (3). probabilities (size,): to start with.
+    """
+    for e in range(6):
+        aa, ab, bb = full(0.0), full(0.0), full(0.0)
+        for k in range(3):
+            r = get(plots, k * PLOT + 3 + e)
+            aa = aa + (weights[k] * weights[k]) * r
+            ab = ab + (weights[k] * weights[3 + k]) * r
+            bb = bb + (weights[3 + k] * weights[3 + k]) * r
+        axis = 0 if e == 0 else (1 if e == 3 else 2)
+        if e == 0 or e == 3 or e == 5:
+            at, g, h, d = OWN + 6 * axis, weights[6], weights[7], weights[8]
+            put3(work, at, (aa + g * g, ab + g * h, full(g * d)))
+            put3(work, at + 3, (bb + h * h, full(h * d), full(d * d)))
+        else:
+            at, zero = CROSS + 9 * (e - 1 if e < 3 else 2), full(0.0)
+            put3(work, at, (aa, ab, zero))
+            put3(work, at + 3, (ab, bb, zero))
+            put3(work, at + 6, (zero, zero, zero))
+    for axis in range(3):
+        x, v = full(0.0), full(0.0)
+        for k in range(3):
+            z = get(plots, k * PLOT + axis)
+            x, v = x + weights[k] * z, v + weights[3 + k] * z
+        put3(work, MEAN + 3 * axis, (x, v, full(0.0)))
+    for i in range(size):
+        put(work, i * HYPOTHESIS + PROBABILITY, full(probabilities[i]))
+        for at in range(PROBABILITY):
+            put(work, i * HYPOTHESIS + at, get(work, at))
+    for at in range(9):
+        put(work, ESTIMATE + at, get(work, MEAN + at))
+    numbers[0], numbers[1], numbers[2] = 0, -1, 1
+
+
+@kernel
+def run_strip(
+    work,
+    numbers,
+    listed,
+    plots,
+    first,
+    stop,
+    size,
+    models,
+    transitions,
+    intervals,
+    times,
+    rules,
+    frame,
+    everything,
+    out,
+):
+    """Run one filter over the scans first … stop - 1 of a strip; all arrays by their addresses.
+
+    work, numbers  its memory, see `work_arrays`: numbers are the bank in use, the interval that the rows MODEL and
+                   TRANSITION hold for (-1: none), and 1 where no lane waits for a plot that it missed
+    listed         memory for MOST whole numbers
     plots          rows: PLOT of them a scan
-    scans          first and one past the last scan of the strip to filter, within the strip
-    models         (M, 3): moves, accelerates (0 or 1), sigma of the acceleration per step, m/s²
-    transitions    (U, M, M): over each different interval; intervals (strip,): number of a scan's; times (U,) seconds
-    rules          family, merging rule, output rule
-    everything     (strip,): 1 where covariances are wanted
+    models         (size * 3,): moves, accelerates (0 or 1), sigma of the acceleration per step in m/s²
+    transitions    (U * size * size,): over each different interval between scans, columns: from
+    intervals      (scans,) number of each scan's interval; times (U,) in s
+    rules          family, merging rule, output rule, 1 to evaluate the measurement covariance at the prediction
+    frame          antenna, for the latter: see `multimodel_plots.frame`
+    everything     (scans,): 1 where covariances are wanted
     out            rows: OUTPUT of them a scan
     """
-    size, family, rule, listed = models.shape[0], rules[0], rules[1], numbers[4:]
-    half = full(0.5)
-    for k in range(scans[0], scans[1]):
-        plot, row, u = k * PLOT, k * OUTPUT, intervals[k]
-        prepare_step(work, numbers, models, transitions[u], times[u], u)
+    family, rule = rules[0], rules[1]
+    for k in range(first, stop):
+        plot, interval, to = row(plots, k * PLOT), intervals[k], row(out, k * OUTPUT)
+        noise, detected = row(plot, 3), get(plot, 9)
+        if numbers[1] != interval or numbers[2] == 0:
+            prepare_step(work, size, models, transitions, interval * size * size, times[interval], numbers[2] == 1)
+            numbers[1] = interval
+        if rules[3] == 1:
+            noise = row(work, NOISE)
+            noise_at_prediction(frame, row(work, ESTIMATE), get(work, WAIT), noise)
         old, new = numbers[0] * BANK, (1 - numbers[0]) * BANK
-        missed = any_greater(half, get(plots, plot + 9))
-        if family == GPB2:
-            step_gpb2(work, listed, old, new, size, rule, plots, plot, plots, plot + 3)
-        elif family == GPB1:
-            step_gpb1(work, listed, old, new, size, rule, plots, plot, plots, plot + 3)
-        else:
-            step_imm(work, listed, old, new, size, rule, plots, plot, plots, plot + 3)
-        output(work, listed, new, size, rules[2], everything[k], out, row)
+        step(work, listed, old, new, size, family, rule, plot, noise)
+        output(work, listed, new, size, rules[2], everything[k] == 1, to)
+        if family == GPB1:
+            merge_gpb1(work, listed, old, new, size, rule)
+        if rules[3] == 1:
+            for i in range(9):
+                put(work, ESTIMATE + i, where_greater(detected, full(0.5), get(to, i), get(work, ESTIMATE + i)))
+        if any_greater(full(0.5), detected):
+            keep_missed(work, old, new, size, detected)
+            numbers[2] = 0
+        elif numbers[2] == 0:
+            numbers[1], numbers[2] = -1, 1
         numbers[0] = 1 - numbers[0]
+
+
+@kernel
+def filter_strip(
+    work, numbers, plots, first, stop, models, transitions, intervals, times, rules, frame, everything, out
+):
+    """`run_strip` of arrays."""
+    run_strip(
+        address(work),
+        address(numbers),
+        address(np.zeros(MOST, dtype=np.int64)),
+        address(plots),
+        first,
+        stop,
+        models.size // 3,
+        address(models),
+        address(transitions),
+        address(intervals),
+        address(times),
+        address(rules),
+        address(frame),
+        address(everything),
+        address(out),
+    )
+
+
+@kernel
+def start_strip(work, numbers, plots, weights, probabilities):
+    """`start` of arrays."""
+    start(address(work), address(numbers), probabilities.size, address(plots), address(weights), address(probabilities))
