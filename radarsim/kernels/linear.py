@@ -20,7 +20,7 @@ The work array x (F + 1, 3, n) holds the filters' states and, last, the plots (i
 import numpy as np
 
 from radarsim.kernels.compile import aligned_zeros, inline, kernel, summing
-from radarsim.kernels.random import U, normals
+from radarsim.kernels.random import fill_words, normal_pair
 
 CHUNK = 512  # realisations; a row is 4 KB, so that two filters and the plots just fill a first-level cache
 
@@ -38,12 +38,12 @@ def fill_plots(key, first, scan, mean, sigma, z, w):
     mean (>= 2,) holds the true ones, sigma (2,) their standard deviations. The first normal of draw pair `scan` goes to
     the value, the second to the rate, whether or not any filter observes it.
     """
-    k0, k1, start = key[0], key[1], U(first)
     mean_z, mean_w, sigma_z, sigma_w = mean[0], mean[1], sigma[0], sigma[1]
+    x, y = z.view(np.uint64), w.view(np.uint64)
+    fill_words(key, first, scan, x, y)
     for i in range(z.size):
-        a, b = normals(k0, k1, start + U(i), scan)
-        z[i] = mean_z + sigma_z * a
-        w[i] = mean_w + sigma_w * b
+        a, b = normal_pair(x[i], y[i])
+        z[i], w[i] = mean_z + sigma_z * a, mean_w + sigma_w * b
 
 
 @kernel
@@ -101,36 +101,35 @@ def source(x, f, k, observes, start):
 
 
 @summing
-def moments(x, f, c, n, truth):
-    """Sums of e, e², e³, e⁴ over the first n realisations; the errors are e = x[f, c] - truth."""
-    s1 = s2 = s3 = s4 = 0.0
+def moments(x, f, n, truth):
+    """Sums over the first n realisations of the errors r, v, a = x[f] - truth (3,) and of their products, in one pass.
+
+    Returns r, r², r³, r⁴, the same of v and of a, then r v, r a, v a: fifteen numbers.
+    """
+    r0, v0, a0 = truth[0], truth[1], truth[2]
+    r1 = r2 = r3 = r4 = v1 = v2 = v3 = v4 = a1 = a2 = a3 = a4 = rv = ra = va = 0.0
     for i in range(n):
-        e = x[f, c, i] - truth
-        ee = e * e
-        s1 += e
-        s2 += ee
-        s3 += e * ee
-        s4 += ee * ee
-    return s1, s2, s3, s4
+        r, v, a = x[f, 0, i] - r0, x[f, 1, i] - v0, x[f, 2, i] - a0
+        rr, vv, aa = r * r, v * v, a * a
+        r1, v1, a1 = r1 + r, v1 + v, a1 + a
+        r2, v2, a2 = r2 + rr, v2 + vv, a2 + aa
+        r3, v3, a3 = r3 + r * rr, v3 + v * vv, a3 + a * aa
+        r4, v4, a4 = r4 + rr * rr, v4 + vv * vv, a4 + aa * aa
+        rv, ra, va = rv + r * v, ra + r * a, va + v * a
+    return r1, r2, r3, r4, v1, v2, v3, v4, a1, a2, a3, a4, rv, ra, va
 
 
 @summing
-def product(x, f, c, d, n, truth):
-    """Sum over the first n realisations of e_c e_d, the errors of two components of row f; truth (3,)."""
-    s, true_c, true_d = 0.0, truth[c], truth[d]
+def products_of_squares(x, f, g, n, truth):
+    """Sums over the first n realisations of e² e'², the errors of rows f and g in each of the three components."""
+    r0, v0, a0 = truth[0], truth[1], truth[2]
+    r = v = a = 0.0
     for i in range(n):
-        s += (x[f, c, i] - true_c) * (x[f, d, i] - true_d)
-    return s
-
-
-@summing
-def product_of_squares(x, f, g, c, n, truth):
-    """Sum over the first n realisations of e_f² e_g², the errors of component c in rows f and g."""
-    s = 0.0
-    for i in range(n):
-        e, h = x[f, c, i] - truth, x[g, c, i] - truth
-        s += (e * e) * (h * h)
-    return s
+        rr = (x[f, 0, i] - r0) * (x[g, 0, i] - r0)
+        vv = (x[f, 1, i] - v0) * (x[g, 1, i] - v0)
+        aa = (x[f, 2, i] - a0) * (x[g, 2, i] - a0)
+        r, v, a = r + rr * rr, v + vv * vv, a + aa * aa
+    return r, v, a
 
 
 @kernel
@@ -139,17 +138,17 @@ def add_sums(x, n, k, truth, observes, start, baseline, error, paired, cross):
     beside, compared = source(x, baseline, k, observes, start)
     for f in range(x.shape[0] - 1):
         row, known = source(x, f, k, observes, start)
+        sums = moments(x, row, n, truth)
+        squares = sums[3], sums[7], sums[11]
+        if row != beside:
+            squares = products_of_squares(x, row, beside, n, truth)
         for c in range(known):
-            s1, s2, s3, s4 = moments(x, row, c, n, truth[c])
-            error[f, k, c, 0] += s1
-            error[f, k, c, 1] += s2
-            error[f, k, c, 2] += s3
-            error[f, k, c, 3] += s4
+            for power in range(4):
+                error[f, k, c, power] += sums[4 * c + power]
             if c < compared:
-                same = row == beside
-                paired[f, k, c] += s4 if same else product_of_squares(x, row, beside, c, n, truth[c])
+                paired[f, k, c] += squares[c]
             for d in range(c):
-                cross[f, k, c + d - 1] += product(x, row, c, d, n, truth)
+                cross[f, k, c + d - 1] += sums[12 + c + d - 1]
 
 
 @kernel
