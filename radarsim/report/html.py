@@ -108,6 +108,8 @@ def inline(svg: str, figure: Figure):
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
     body = re.sub(r'\bid="', f'id="{figure.name}-', body)
     body = re.sub(r'(href="#|url\(#)', rf"\1{figure.name}-", body)
-    body = re.sub(r"(\d\.\d\d)\d+", r"\1", body)  # hundredths of a point
-    named = Markup('<svg role="img" aria-label="{}" ').format(f"{figure.title}. {figure.caption}")
+    body = re.sub(r'\bd="[^"]*"', lambda path: re.sub(r"(\d\.\d\d)\d+", r"\1", path[0]), body)  # hundredths of a point
+    width = 0.36 * figure.width_mm
+    look = f"max-width: {width:.0f}rem; min-width: {min(width, 18) if width < 50 else 36:.0f}rem"
+    named = Markup('<svg role="img" aria-label="{}" style="{}" ').format(f"{figure.title}. {figure.caption}", look)
     return named + Markup(body[len("<svg ") :])

@@ -8,6 +8,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.report.statistics import Z95
 
 WIDE_MM = 120.0  # one panel of many lines
 MOST = 8  # cases a figure shows; more are told in its caption
@@ -181,10 +182,56 @@ def per_component(
     """
     made = {}
     for component, of in quantities.items():
-        for kind, draw, rows in (("sigma", sigma_figure, curves), ("gain", gain_figure, gains)):
+        for kind, draw, rows in (
+            ("sigma", sigma_figure, curves),
+            ("gain", gain_figure, gains),
+            ("dynamic", dynamic_figure, curves),
+        ):
             name = f"{kind}_{component}"
             some, left_out = shown(results, chosen(name))
             figure = draw(name, some, rows, component, of) if some else None
             if figure and any(isinstance(mark, Line) for panel in figure.panels for mark in panel.marks):
                 made[name] = replace(figure, caption=figure.caption + left_out)
     return made
+
+
+def dynamic_figure(
+    name: str, results: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity
+) -> Figure | None:
+    """Dynamic error (bias) and fluctuation error (spread) of one component apart, a panel for each case that has both.
+
+    None where no case's bias exceeds its spread anywhere: then σ says it all.
+    """
+    drawn = []
+    for result in results:
+        found = [
+            (f, curves[(result.name, f, component)])
+            for f in result.axes.filters
+            if (result.name, f, component) in curves
+        ]
+        if any((abs(rows["bias"]) > rows["spread"]).any() for _, rows in found):
+            panel = _dynamic_panel(result, found, of)
+            drawn.append(replace(panel, keys=()) if drawn else panel)
+    if not drawn:
+        return None
+    caption = (
+        f"Errors of the {of.name} where the target leaves the filters' model: mean error (dynamic, bias) and standard "
+        f"deviation (fluctuation, spread) of {results[0].count:,} realisations; σ² is the sum of their squares."
+    )
+    columns = min(3, len(drawn))
+    width = COLUMN_MM if columns == 1 else PAGE_MM
+    return Figure(name, f"Dynamic and fluctuation error of the {of.name}", caption, tuple(drawn), columns, width, 56)
+
+
+def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Quantity) -> Panel:
+    marks: list[Mark] = [Reference(0)]
+    for n, (_, rows) in enumerate(found):
+        t, unit = rows["t_s"].to_numpy(), rows["unit"].iloc[0]
+        bias, half = rows["bias"].to_numpy(), Z95 * rows["bias_se"].to_numpy()
+        marks.append(Line(t, bias, "", Style(n, 0, n), bias - half, bias + half))
+        marks.append(Line(t, rows["spread"].to_numpy(), "", Style(n, 1, n)))
+    keys = [(f, Style(n, None, n)) for n, (f, _) in enumerate(found)]
+    keys += [("bias", Style(0, 0)), ("spread", Style(0, 1))]
+    title = ", ".join(number(value) for _, value in result.swept) or device(result)
+    y = Axis(f"error of {of.symbol}, {UNITS.get(unit, unit)}")
+    return Panel(Axis(TIME, limits=(0, None)), y, tuple(marks), title, tuple(keys))

@@ -208,7 +208,7 @@ def settling_figure(results: Sequence[CaseResult], table) -> Figure | None:
 
 def _settling_panel(result: CaseResult, rows) -> Panel:
     """rows: of one radar and the range, one for each filter and manoeuvre variance."""
-    marks: list = [Reference(PERIODS * result.axes.extra["scan_period_s"], "x", "10 periods")]
+    marks: list = [Reference(PERIODS * result.axes.extra["scan_period_s"], "x")]
     for variance, same in rows.sort_values("steady_sigma").groupby("manoeuvre_variance"):
         t, sigma = same["settling_s"].to_numpy(), same["steady_sigma"].to_numpy()
         marks.append(Line(t, sigma, "", Style(7, 2, width_pt=0.6)))
@@ -220,7 +220,8 @@ def _settling_panel(result: CaseResult, rows) -> Panel:
         star = Style(n, None, 7, size_pt=8)
         marks.append(Line(best["settling_s"].to_numpy(), best["steady_sigma"].to_numpy(), "", star))
     x, y = Axis("settling time of $\\sigma$ of $r$, s", limits=(0, None)), Axis("steady $\\sigma$ of $r$, m")
-    return Panel(x, y, tuple(marks), panels.device(result), direct=False)
+    keys = ((f"{PERIODS} scan periods", Style(7, 2, width_pt=0.7)),)
+    return Panel(x, y, tuple(marks), panels.device(result), keys, direct=False)
 
 
 def question(experiment) -> str:
