@@ -15,6 +15,7 @@ from radarsim.config.lookup import config_file, did_you_mean, is_stem, stems
 from radarsim.config.place import NoSuchKey, data_files_found, key_paths, place, scenarios_inlined
 from radarsim.config.schema import COMMON_KEYS, STUDIES, Common, study_model
 
+DOTTED = ("sweep", "figures")  # the common keys that are mappings; what follows the first dot is one key of theirs
 MOST_CASES = 10_000
 DEEPEST_INCLUDE = 5
 
@@ -57,7 +58,10 @@ class Expander:
         """The whole experiment of the top config; None if faults were noted."""
         for setting in self.common:
             first, *rest = setting.key.split(".", 1)
-            document = document.graft((first, *rest), setting.value, setting.origin)
+            if rest and first not in DOTTED:
+                self.faults.add(setting.origin, (), f"{first} has no keys of its own")
+            else:
+                document = document.graft((first, *rest), setting.value, setting.origin)
         common, drafts = self._expand(document, ())
         cases = [case for draft in drafts if (case := self._case(draft))]
         if not self.faults and not cases:

@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
 from radarsim.config.document import Document, child
 from radarsim.config.faults import ABSENT, Faults, Path, short
+from radarsim.config.fields import in_degrees, in_radians
 from radarsim.config.lookup import did_you_mean
 
 WORDS = {
@@ -33,6 +35,9 @@ WORDS = {
     "less_than": "must be < {lt}",
     "less_than_equal": "must be <= {le}",
 }
+MAPPING = {"model_type", "model_attributes_type", "dict_type"}
+LIST = {"tuple_type", "list_type"}
+SCALAR = {"float_type", "int_type", "bool_type", "string_type", "literal_error"}
 BOUNDS = ("gt", "ge", "lt", "le")
 WITHOUT_VALUE = ("missing", "extra_forbidden", "unique", "union_tag_not_found")
 
@@ -46,21 +51,49 @@ def check(model: type[BaseModel], document: Document, faults: Faults, also: Iter
     try:
         return model.model_validate(document.data)
     except ValidationError as error:
-        for found in error.errors(include_url=False, include_input=False):
-            _tell(model, document, found, faults, also)
+        found = [_Found.of(each, document) for each in error.errors(include_url=False, include_input=False)]
+        for each in found:
+            if not _beside_the_point(each, found, document):
+                _tell(model, document, each, faults, also)
         return None
 
 
-def _tell(model: type[BaseModel], document: Document, found: dict, faults: Faults, also: Iterable[str]) -> None:
+@dataclass(frozen=True)
+class _Found:
+    """One of pydantic's errors: its kind, the path of the value as the user wrote it, and what its words need."""
+
+    kind: str
+    path: Path
+    context: dict
+    text: str
+
+    @classmethod
+    def of(cls, error: dict, document: Document) -> "_Found":
+        kind, context = error["type"], dict(error.get("ctx", {}))
+        path = path_in(document.data, error["loc"], keep_last=kind in ("missing", "extra_forbidden"))
+        if kind in ("union_tag_invalid", "union_tag_not_found"):
+            path = (*path, context["discriminator"].strip("'"))
+            kind = kind if document.get(path) is not ABSENT else "missing"
+        if kind == "at":
+            *outer, key = context["key"].split(".")
+            path = twin(document.data, (*path, *outer), key)
+        return cls(kind, path, context, error["msg"])
+
+
+def _beside_the_point(one: _Found, found: list[_Found], document: Document) -> bool:
+    """Whether an error is of a choice's member that the value, by its form, was not meant to be."""
+    value = document.get(one.path)
+    form = MAPPING if isinstance(value, dict) else LIST if isinstance(value, list) else SCALAR
+    if one.kind not in (MAPPING | LIST | SCALAR) - form:
+        return False
+    depth = len(one.path)
+    others = [other for other in found if other.path[:depth] == one.path and other is not one]
+    return any(len(other.path) > depth or other.kind not in (MAPPING | LIST | SCALAR) - form for other in others)
+
+
+def _tell(model: type[BaseModel], document: Document, found: _Found, faults: Faults, also: Iterable[str]) -> None:
     """Note one of pydantic's errors as a fault."""
-    kind, context = found["type"], dict(found.get("ctx", {}))
-    path = path_in(document.data, found["loc"], keep_last=kind in ("missing", "extra_forbidden"))
-    if kind in ("union_tag_invalid", "union_tag_not_found"):
-        path = (*path, context["discriminator"].strip("'"))
-        kind = kind if document.get(path) is not ABSENT else "missing"
-    if kind == "at":
-        *outer, key = context["key"].split(".")
-        path = twin(document.data, (*path, *outer), key)
+    kind, path, context = found.kind, found.path, found.context
     if faults.spoiled(document.origin(path), path):
         return
     if kind == "extra_forbidden":
@@ -69,7 +102,7 @@ def _tell(model: type[BaseModel], document: Document, found: dict, faults: Fault
         message = unknown_key(path[-1], [*known, *(also if len(path) == 1 else ())])
         faults.add(document.key_origin(path), path, message)
         return
-    message = _message(kind, context, found["msg"], str(path[-1]) if path else "")
+    message = _message(kind, context, found.text, str(path[-1]) if path else "")
     value = document.get(path)
     if kind == "too_short" and isinstance(value, list | dict) and len(value) >= context["min_length"]:
         return  # pydantic counts the good members alone; the bad ones are told one by one
@@ -87,8 +120,8 @@ def _message(kind: str, context: dict, original: str, key: str) -> str:
         return str(context["error"])
     for bound in BOUNDS:
         if bound in context:
-            in_degrees = math.degrees(context[bound]) if key.endswith("_deg") else context[bound]
-            context[bound] = short(float(f"{in_degrees:.12g}") if isinstance(in_degrees, float) else in_degrees)
+            limit = math.degrees(context[bound]) if in_radians(key) else context[bound]
+            context[bound] = short(float(f"{limit:.12g}") if isinstance(limit, float) else limit)
     if "expected" in context:
         context["expected"] = context["expected"].replace("'", "").replace(" or ", ", ")
     if "expected_tags" in context:
@@ -124,17 +157,14 @@ def twin(data: Any, path: Path, key: str) -> Path:
     """The path of a key below a path, under its `_deg` name where the user wrote that."""
     for step in path:
         data = child(data, step)
-    in_degrees = f"{key.removesuffix('_rad')}_deg"
-    written = key.endswith("_rad") and child(data, key) is ABSENT and child(data, in_degrees) is not ABSENT
-    return (*path, in_degrees if written else key)
+    other = in_degrees(key)
+    written = other and child(data, key) is ABSENT and child(data, other) is not ABSENT
+    return (*path, other if written else key)
 
 
 def allowed_keys(model: type[BaseModel]) -> list[str]:
     """The keys of a mapping, with the `_deg` twins."""
-    keys = []
-    for name in model.model_fields:
-        keys += [name, f"{name[:-4]}_deg"] if name.endswith("_rad") else [name]
-    return keys
+    return [key for name in model.model_fields for key in (name, in_degrees(name)) if key]
 
 
 def model_at(model: type[BaseModel], data: Any, path: Path) -> type[BaseModel] | None:
@@ -178,5 +208,5 @@ def refuse_both_units(document: Document, faults: Faults, path: Path = ()) -> No
     for key, value in data.items() if isinstance(data, dict) else ():
         if isinstance(value, dict | list):
             refuse_both_units(document, faults, (*path, key))
-        elif str(key).endswith("_deg") and (other := f"{key[:-4]}_rad") in data:
+        elif (other := in_radians(str(key))) in data and other:
             faults.add(document.key_origin((*path, key)), (*path, key), f"given as {other} too")

@@ -84,7 +84,9 @@ def _with(container: object, path: Path, value: object) -> object:
     """A copy of a container with another value at a path; only the containers on the way are copied."""
     if not path:
         return value
-    copy = list(container) if isinstance(container, list) else dict(container if isinstance(container, dict) else {})
+    copy: dict | list = dict(container) if isinstance(container, dict) else {}
+    if isinstance(container, list) and isinstance(path[0], int):
+        copy = list(container)
     below = child(container, path[0])
     copy[path[0]] = _with({} if below is ABSENT else below, path[1:], value)
     return copy

@@ -1,10 +1,11 @@
 """Parts that the schemas of all studies are made of: the frozen model, numbers with their limits, and marks on fields.
 
 A key carries its unit (`_m`, `_s`, `_mps`, `_mps2`, `_hz`, `_rad`). Wherever a key ends in `_rad`, its twin in `_deg`
-is understood as well; the checked object holds radians only.
+is understood as well (and `_degps` for `_radps`); the checked object holds radians only.
 """
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
@@ -71,7 +72,7 @@ class Model(BaseModel):
     def _radians(cls, data: Any) -> Any:
         if not isinstance(data, dict):
             return data
-        twins = {f"{name[:-4]}_deg": name for name in cls.model_fields if name.endswith("_rad")}
+        twins = {in_degrees(name): name for name in cls.model_fields if in_degrees(name)}
         if not any(key in twins for key in data):
             return data
         return {twins.get(key, key): radians(value) if key in twins else value for key, value in data.items()}
@@ -79,14 +80,29 @@ class Model(BaseModel):
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> dict:
         schema = handler.resolve_ref_schema(handler(core_schema))
-        for name in [name for name in schema.get("properties", {}) if name.endswith("_rad")]:
-            twin = f"{name[:-4]}_deg"
+        for name in [name for name in schema.get("properties", {}) if in_degrees(name)]:
+            twin = in_degrees(name)
             about = schema["properties"][name].get("description", "")
             schema["properties"][twin] = {"description": f"in degrees, in place of {name}: {about}"}
             if name in schema.get("required", ()):
                 schema["required"].remove(name)
                 schema.setdefault("allOf", []).append({"oneOf": [{"required": [name]}, {"required": [twin]}]})
         return schema
+
+
+def in_degrees(key: str) -> str | None:
+    """The twin in degrees of a key in radians; None for any other key."""
+    return _unit_changed(key, "rad", "deg")
+
+
+def in_radians(key: str) -> str | None:
+    """The twin in radians of a key in degrees; None for any other key."""
+    return _unit_changed(key, "deg", "rad")
+
+
+def _unit_changed(key: str, unit: str, other: str) -> str | None:
+    found = re.fullmatch(rf"(.*)_{unit}(|ps|ps2)", key)
+    return f"{found[1]}_{other}{found[2]}" if found else None
 
 
 def radians(value: Any) -> Any:

@@ -5,6 +5,7 @@ import sys
 
 from pydantic.json_schema import models_json_schema
 
+from radarsim.config.fields import Scenario
 from radarsim.config.schema import STUDIES, Common, study_model
 
 TITLE = "radarsim experiment"
@@ -12,7 +13,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def schema() -> dict:
-    """JSON Schema of a config: one of the studies, told apart by `study`, or an `include` of other configs."""
+    """JSON Schema of a config, of one of the studies or an `include` of others, and of a scenario."""
     models = {name: study_model(name) for name in STUDIES}
     wanted = [(model, "validation") for model in (Common, *models.values())]
     references, whole = models_json_schema(wanted, ref_template="#/$defs/{model}")
@@ -26,8 +27,13 @@ def schema() -> dict:
     return {
         "$schema": DIALECT,
         "title": TITLE,
-        "oneOf": [{"$ref": f"#/$defs/{name}"} for name in (*kinds, "include")],
-        "$defs": {**kinds, "include": _comparison(common, list(models)), **definitions},
+        "oneOf": [{"$ref": f"#/$defs/{name}"} for name in (*kinds, "include", "scenario")],
+        "$defs": {
+            **kinds,
+            "include": _comparison(common, list(models)),
+            "scenario": _scenario(models, kinds),
+            **definitions,
+        },
     }
 
 
@@ -53,6 +59,16 @@ def _comparison(common: dict, studies: list[str]) -> dict:
         "required": ["include"],
         "additionalProperties": False,
     }
+
+
+def _scenario(models: dict[str, type], kinds: dict[str, dict]) -> dict:
+    """A file in scenarios/: whatever may stand inline where a config names one."""
+    inline: list[dict] = []
+    for name, model in models.items():
+        for field, info in model.model_fields.items():
+            if any(isinstance(mark, Scenario) for mark in info.metadata):
+                inline += kinds[name]["properties"][field]["anyOf"][1:]
+    return {"title": "scenario", "description": "What is observed.", "anyOf": inline}
 
 
 def tidy(part: object) -> object:

@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 from radarsim.config.check import allowed_keys, model_at, models_in, unknown_key
 from radarsim.config.document import Document
 from radarsim.config.faults import ABSENT, Faults, Path, shown
-from radarsim.config.fields import DataFile, Model, Scenario, Study
+from radarsim.config.fields import DataFile, Model, Scenario, Study, in_degrees, in_radians
 from radarsim.config.lookup import did_you_mean, is_stem, scenario_file, stems
 
 
@@ -76,13 +76,11 @@ def _in_every_member(document: Document, model: type[Study], key: str) -> list[P
 
 def _without_twin(document: Document, path: Path) -> Document:
     """The document without the same quantity in the other unit, which the new value replaces."""
-    key = str(path[-1])
-    for unit, other in (("_rad", "_deg"), ("_deg", "_rad")):
-        twin = (*path[:-1], key.removesuffix(unit) + other)
-        if key.endswith(unit) and document.get(twin) is not ABSENT:
-            holder = {k: v for k, v in document.get(path[:-1]).items() if k != twin[-1]}
-            return document.with_data(path[:-1], holder)
-    return document
+    twin = in_degrees(str(path[-1])) or in_radians(str(path[-1]))
+    if twin is None or document.get((*path[:-1], twin)) is ABSENT:
+        return document
+    holder = {key: value for key, value in document.get(path[:-1]).items() if key != twin}
+    return document.with_data(path[:-1], holder)
 
 
 def scenarios_inlined(

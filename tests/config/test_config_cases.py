@@ -156,7 +156,7 @@ OVERRIDES = [
         "target.kind=trun",
         "--set target.kind: must be one of polynomial, acceleration_start, jerk_pulse, turn, got 'trun'",
     ),
-    ("seed.x=3", "--set seed.x: seed: must be a whole number, got {x: 3}"),
+    ("seed.x=3", "--set seed.x: seed has no keys of its own"),
     (
         "radar.sigma_rnge_m=3",
         "--set radar.sigma_rnge_m: unknown key; did you mean sigma_range_m? allowed: name, band, ",

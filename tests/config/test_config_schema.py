@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,7 +13,7 @@ from radarsim.config import schema
 from radarsim.config.check import check, models_in
 from radarsim.config.document import Document
 from radarsim.config.faults import Faults, Origin
-from radarsim.config.fields import Model, Number, Study
+from radarsim.config.fields import Model, Number, Positive, Study
 from radarsim.config.json_schema import schema as json_schema
 from radarsim.config.json_schema import schema_json
 from radarsim.config.load import load
@@ -46,21 +47,23 @@ def test_the_copy_for_editors_is_fresh():
 
 @pytest.mark.parametrize("file", sorted((ROOT / "configs").glob("*.yaml")), ids=lambda file: file.stem)
 def test_shipped_configs_name_themselves_their_paper_and_their_schema(file):
-    first, *rest = file.read_text(encoding="utf-8").splitlines()
-    assert first.startswith(f"# configs/{file.name} — ")
-    assert "20" in first or "paper" in first
-    assert "# yaml-language-server: $schema=../docs/schema.json" in rest
+    comments = [line for line in file.read_text(encoding="utf-8").splitlines() if line.startswith("#")]
+    assert any(line.startswith(f"# configs/{file.name} — ") for line in comments)
+    assert re.search("Gorshkov|Sychev|Butyrskiy|Uss|P[1-4]", "".join(comments)), "which paper"
+    assert "# yaml-language-server: $schema=../docs/schema.json" in comments
 
 
 @pytest.mark.parametrize("file", sorted((ROOT / "scenarios").glob("*.yaml")), ids=lambda file: file.stem)
 def test_shipped_scenarios_name_themselves(file):
-    assert file.read_text(encoding="utf-8").startswith(f"# scenarios/{file.name} — ")
+    comments = [line for line in file.read_text(encoding="utf-8").splitlines() if line.startswith("#")]
+    assert any(line.startswith(f"# scenarios/{file.name} — ") for line in comments)
+    assert "# yaml-language-server: $schema=../docs/schema.json" in comments
 
 
 def test_json_schema_tells_studies_apart_and_says_nothing_idle():
     whole = json.loads(schema_json())
     kinds = [choice["$ref"].removeprefix("#/$defs/") for choice in whole["oneOf"]]
-    assert kinds == [*schema.STUDIES, "include"]
+    assert kinds == [*schema.STUDIES, "include", "scenario"]
     for study in schema.STUDIES:
         part = whole["$defs"][study]
         assert part["properties"]["study"]["const"] == study
@@ -86,11 +89,20 @@ class Beam(Model):
     bearings_rad: tuple[Number, ...] = Field((), description="bearings")
 
 
+class Noise(Model):
+    """Noise by coordinate."""
+
+    x: Positive = Field(description="of x")
+
+
 class Fan(Study):
     """A study with angles in all places."""
 
     tilt_rad: Number = Field(description="tilt")
     course_rad: Number | None = Field(None, description="course")
+    turn_radps: Number = Field(0.0, description="rate of turn")
+    steps: Literal["designed", "dense"] | tuple[Positive, ...] = Field("designed", description="steps")
+    noise: Positive | Noise = Field(1.0, description="noise, one number or by coordinate")
     rays: tuple[Annotated[Ray | Beam, Field(discriminator="kind")], ...] = Field((), description="rays")
 
 
@@ -105,17 +117,20 @@ def test_degrees_wherever_radians_are():
     checked = fan(
         tilt_deg=180,
         course_deg=90.0,
+        turn_degps=-18,
         rays=[{"kind": "ray", "spread_deg": 45}, {"kind": "beam", "bearings_deg": [0, 90]}],
     )
     assert checked == fan(
         tilt_rad=math.pi,
         course_rad=math.pi / 2,
+        turn_radps=-math.pi / 10,
         rays=[{"kind": "ray", "spread_rad": math.pi / 4}, {"kind": "beam", "bearings_rad": [0, math.pi / 2]}],
     )
 
 
 RAY, BEAM = {"kind": "ray"}, {"kind": "beam"}
-UNKNOWN = "unknown key; did you mean course_deg? allowed: tilt_rad, tilt_deg, course_rad, course_deg, rays"
+KEYS = "tilt_rad, tilt_deg, course_rad, course_deg, turn_radps, turn_degps, steps, noise, rays"
+UNKNOWN = f"unknown key; did you mean course_deg? allowed: {KEYS}"
 FAULTS = [
     ({"tilt_deg": "x"}, "tilt_deg: must be a number, got 'x'"),
     ({"tilt_deg": True}, "tilt_deg: must be a number, got true"),
@@ -129,6 +144,14 @@ FAULTS = [
         {"tilt_rad": 1, "rays": [BEAM | {"spread": 1}]},
         "rays.0.spread: unknown key; allowed: kind, bearings_rad, bearings_deg",
     ),
+    ({"tilt_rad": 1, "noise": "x"}, "noise: must be a number, got 'x'"),
+    ({"tilt_rad": 1, "noise": -1}, "noise: must be > 0, got -1"),
+    ({"tilt_rad": 1, "noise": {}}, "noise.x: required key is missing"),
+    ({"tilt_rad": 1, "noise": {"x": -1}}, "noise.x: must be > 0, got -1"),
+    ({"tilt_rad": 1, "noise": {"x": 1, "y": 1}}, "noise.y: unknown key; allowed: x"),
+    ({"tilt_rad": 1, "steps": "desgned"}, "steps: must be one of designed, dense, got 'desgned'"),
+    ({"tilt_rad": 1, "steps": [1, -1]}, "steps.1: must be > 0, got -1"),
+    ({"tilt_rad": 1, "steps": 3}, "steps: must be one of designed, dense, got 3"),
     ({"tilt_rad": 1, "rays": [{"spread_deg": 1}]}, "rays.0.kind: required key is missing"),
 ]
 
