@@ -154,29 +154,30 @@ def simulated(work: Work, piece: Node | Partial) -> Sums:
     NonFiniteError naming the realisations if it gives numbers that are not finite."""
     first, count = piece.realisations(work.block)
     with np.errstate(over="ignore", invalid="ignore"):
-        values = _halved(work, first, count)
-    if np.isfinite(values).all():
-        return Sums(count, values)
-    for start in range(first, first + count, work.block):
-        size = min(work.block, first + count - start)
-        if not np.isfinite(work.simulate(start, size)).all():
-            raise NonFiniteError(f"{_span(start, size)}: the sums are not finite", *_explained(work, start, size))
+        values = _merged(work, first, count)
+        # NaN and infinity survive addition, so that one look at the end sees them all.
+        if np.isfinite(values).all():
+            return Sums(count, values)
+        for start in range(first, first + count, work.block):
+            size = min(work.block, first + count - start)
+            if not np.isfinite(work.simulate(start, size)).all():
+                raise NonFiniteError(f"{_span(start, size)}: the sums are not finite", *_explained(work, start, size))
     raise NonFiniteError(f"{_span(first, count)}: the sums overflow")
 
 
-def _halved(work: Work, first: int, count: int) -> np.ndarray:
-    """Sums of a block or less, or of the two halves of 2^q blocks.
-
-    NaN and infinity survive addition, so that one look at the result sees them all.
-    """
-    if count > work.block:
-        half = count // 2
-        return _halved(work, first, half) + _halved(work, first + half, half)
-    values = work.simulate(first, count)
-    if not isinstance(values, np.ndarray) or values.dtype != np.float64 or values.shape != (work.size,):
-        given = f"{values.dtype} {values.shape}" if isinstance(values, np.ndarray) else type(values).__name__
-        raise ValueError(f"simulate({first}, {count}): expected sums float64 ({work.size},), got {given}")
-    return values
+def _merged(work: Work, first: int, count: int) -> np.ndarray:
+    """Sums of one block or less, or of 2^q blocks, of which the odd one of each level meets the even one that waits."""
+    block, shape, waiting = work.block, (work.size,), []
+    for number, start in enumerate(range(first, first + count, block)):
+        values = work.simulate(start, min(block, count))
+        if not isinstance(values, np.ndarray) or values.dtype != np.float64 or values.shape != shape:
+            given = f"{values.dtype} {values.shape}" if isinstance(values, np.ndarray) else type(values).__name__
+            raise ValueError(f"simulate({start}, …): expected sums float64 {shape}, got {given}")
+        while number & 1:
+            values = waiting.pop() + values
+            number >>= 1
+        waiting.append(values)
+    return waiting[0]
 
 
 def _explained(work: Work, first: int, count: int) -> tuple[str, ...]:
@@ -198,9 +199,8 @@ class Forest:
     def add(self, node: Node, sums: Sums) -> None:
         """Take a node that overlaps no other, and merge upwards as far as siblings reach."""
         while (sibling := self.nodes.pop(Node(node.level, node.index ^ 1), None)) is not None:
-            left, right = (sibling, sums) if node.index & 1 else (sums, sibling)
             node = Node(node.level + 1, node.index >> 1)
-            sums = added(left, right, node.first * self._block)
+            sums = added(sibling, sums, node.first * self._block)
         self.nodes[node] = sums
 
     def prefix(self) -> list[Node]:

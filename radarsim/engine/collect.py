@@ -14,8 +14,8 @@ from radarsim.engine.stopping import Stop
 from radarsim.engine.store import Store
 from radarsim.errors import StoreError
 
-LONGEST_TASK_S = 0.05
-TASKS_A_WORKER = 50
+LONGEST_TASK_S = 0.1
+SHARES = 8
 POLL_S = 0.05
 PROGRESS_S = 0.1
 
@@ -99,9 +99,10 @@ class _Pace:
         """log2 of the blocks of the next task: long enough to be worth handing over, short enough to end together."""
         if math.isinf(self._block_s):
             return 0
-        share = self._block_s * blocks_left / (self._executor.workers * TASKS_A_WORKER)
-        goal = max(self._executor.shortest_s, min(share, LONGEST_TASK_S))
-        return max(0, math.ceil(math.log2(goal / self._block_s)))
+        share = self._block_s * blocks_left / (self._executor.workers * SHARES)
+        fair = math.floor(math.log2(min(share, LONGEST_TASK_S) / self._block_s))
+        worthwhile = math.ceil(math.log2(self._executor.shortest_s / self._block_s))
+        return max(0, fair, worthwhile)
 
 
 class _Run:

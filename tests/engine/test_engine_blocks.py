@@ -114,7 +114,7 @@ def test_sums_of_another_shape_or_type_are_refused(given_back):
         def simulate(self, first, count):
             return given_back
 
-    with pytest.raises(ValueError, match=r"simulate\(48, 16\): expected sums float64 \(5,\)"):
+    with pytest.raises(ValueError, match=r"simulate\(48, …\): expected sums float64 \(5,\)"):
         simulated(Wrong(), Node(0, 3))
 
 

@@ -344,6 +344,15 @@ def test_a_stopped_run_can_be_reported_after_a_longer_one(tmp_path):
     assert same(stored(WORK, cut.count, tmp_path), cut.count)
 
 
+def test_a_stored_cut_block_counts_only_once_all_before_it_is_done(tmp_path, blocks):
+    collect(WORK, N, store=tmp_path)
+    for name in NAMES:
+        if not name.startswith("P"):
+            (blocks / name).unlink()
+    result = collect(WORK, N, store=tmp_path, stop=lambda: "at once")
+    assert (result.count, result.from_store, result.stopped) == (0, 13, "at once")
+
+
 def test_instruction_sets_are_recorded_and_mixing_warns(tmp_path, blocks, monkeypatch):
     collect(WORK, N, store=tmp_path)
     header, _ = decoded((blocks / "L08-0.sums").read_bytes())
