@@ -5,6 +5,9 @@ data and on the versions of Matplotlib and its fonts alone.
 """
 
 import io
+import warnings
+from contextlib import contextmanager
+from dataclasses import replace
 
 import matplotlib
 import numpy as np
@@ -19,6 +22,7 @@ PNG_DPI = 200
 COLOURS = ("#14213d", "#0a6ebd", "#c8440b", "#1b8a5a", "#a65fa8", "#c98a00", "#4aa3c7", "#8a8a8a")
 DASHES = ("-", (0, (5, 1.8)), (0, (1.3, 1.3)), (0, (6, 1.6, 1.3, 1.6)), (0, (9, 2.5)), (0, (3, 1.2, 1, 1.2, 1, 1.2)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+POINTS = 2000  # of a line; longer ones are drawn at every n-th scan
 MARKED = 16  # at most about so many markers or crosses a line
 STYLE = {
     "font.family": "DejaVu Sans",
@@ -50,22 +54,34 @@ STYLE = {
 
 def render(figure: Figure) -> Canvas:
     """A Matplotlib figure of the described one, laid out at its size in millimetres."""
+    with matplotlib.rc_context(STYLE), _unknown_letters_pass():
+        return _laid_out(figure)
+
+
+@contextmanager
+def _unknown_letters_pass():
+    """Letters that the font lacks are drawn as boxes, without a warning for each."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
+        yield
+
+
+def _laid_out(figure: Figure) -> Canvas:
     rows = -(-len(figure.panels) // figure.columns)
     size = (figure.width_mm * MM, rows * figure.panel_height_mm * MM)
-    with matplotlib.rc_context(STYLE):
-        canvas = Canvas(figsize=size, dpi=PNG_DPI, layout="constrained")
-        FigureCanvasAgg(canvas)
-        canvas.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.05)
-        grid = canvas.subplots(rows, figure.columns, squeeze=False, sharey=figure.share_y)
-        ended = []
-        for axes, panel in zip(grid.flat, figure.panels, strict=False):
-            ended.append(_draw(axes, panel))
-        for axes in grid.flat[len(figure.panels) :]:
-            axes.set_visible(False)
-        canvas.draw_without_rendering()
-        canvas.set_layout_engine("none")
-        for texts in ended:
-            _spread(texts)
+    canvas = Canvas(figsize=size, dpi=PNG_DPI, layout="constrained")
+    FigureCanvasAgg(canvas)
+    canvas.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.05)
+    grid = canvas.subplots(rows, figure.columns, squeeze=False, sharey=figure.share_y)
+    ended = []
+    for axes, panel in zip(grid.flat, figure.panels, strict=False):
+        ended.append(_draw(axes, panel))
+    for axes in grid.flat[len(figure.panels) :]:
+        axes.set_visible(False)
+    canvas.draw_without_rendering()
+    canvas.set_layout_engine("none")
+    for texts in ended:
+        _spread(texts)
     return canvas
 
 
@@ -78,7 +94,7 @@ def save(figure: Figure, formats=("svg", "png")) -> dict[str, bytes]:
 def _bytes(canvas: Canvas, kind: str, name: str) -> bytes:
     undated = {"svg": {"Date": None, "Creator": None}, "pdf": {"CreationDate": None}, "png": {"Software": None}}
     out = io.BytesIO()
-    with matplotlib.rc_context({**STYLE, "svg.hashsalt": name}):
+    with matplotlib.rc_context({**STYLE, "svg.hashsalt": name}), _unknown_letters_pass():
         canvas.savefig(out, format=kind, dpi=PNG_DPI, metadata=undated[kind])
     return out.getvalue()
 
@@ -120,6 +136,7 @@ def _look(style: Style) -> dict:
 
 
 def _line(axes, line: Line) -> None:
+    line = _thinned(line)
     step = max(1, -(-len(line.x) // MARKED))
     every = step if line.exact is None else 2 * step  # markers and crosses by turns
     axes.plot(line.x, line.y, markevery=every, zorder=3, **_look(line.style))
@@ -131,6 +148,14 @@ def _line(axes, line: Line) -> None:
     if line.exact is not None:
         look = {"linestyle": "none", "marker": "+", "color": "black", "markersize": 4.2, "markeredgewidth": 0.6}
         axes.plot(line.x[step::every], line.exact[step::every], zorder=4, **look)
+
+
+def _thinned(line: Line) -> Line:
+    stride = -(-len(line.x) // POINTS)
+    if stride <= 1:
+        return line
+    parts = {name: getattr(line, name) for name in ("x", "y", "lo", "hi", "exact")}
+    return replace(line, **{name: part[::stride] for name, part in parts.items() if part is not None})
 
 
 def _reference(axes, mark: Reference) -> None:

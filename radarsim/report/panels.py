@@ -27,11 +27,16 @@ class Quantity(NamedTuple):
 def number(value) -> str:
     """A number for people: 0.001 as 10⁻³, others at four digits; text as it is."""
     if not isinstance(value, int | float) or isinstance(value, bool):
-        return str(value)
+        return literal(str(value))
     power = f"{value:.0e}".partition("e")[2]
     if value != 0 and float(f"1e{power}") == value and abs(int(power)) > 1:
         return "10" + str(int(power)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"{value:.4g}"
+
+
+def literal(text: str) -> str:
+    """Text of a user's for a figure: a dollar is a dollar."""
+    return text.replace("$", r"\$")
 
 
 def stem(result: CaseResult) -> str:
@@ -44,7 +49,7 @@ def device(result: CaseResult) -> str:
     for part in ("radar", "sensor", "sonar"):
         name = getattr(getattr(result.spec, part, None), "name", None)
         if name:
-            return name
+            return literal(name)
     return stem(result)
 
 
@@ -65,7 +70,7 @@ def label(result: CaseResult) -> str:
 
 def plain_label(result: CaseResult) -> str:
     """`label` for text: letters plain."""
-    return label(result).replace("$", "")
+    return label(result).replace(r"\$", "\0").replace("$", "").replace("\0", "$")
 
 
 def families(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
@@ -116,13 +121,13 @@ def _sigma_panel(members: Sequence[CaseResult], curves: Mapping, component: str,
             unit = rows["unit"].iloc[0]
             style = look(filters.index(f), i, len(members))
             words = number(result.swept[0][1]) if one_key else swept(result)
-            marks.append(_sigma_line(rows, f if len(members) == 1 else words, style))
+            marks.append(_sigma_line(rows, literal(f) if len(members) == 1 else words, style))
     y = Axis(f"$\\sigma$ of {of.symbol}, {UNITS.get(unit, unit)}", limits=(0, None))
     panel = Panel(Axis(TIME, limits=(0, None)), y, tuple(marks), device(members[0]))
     if len(members) == 1:
         return panel
     title = f"at the lines: {symbol_of(members[0].swept[0][0])}" if one_key else ""
-    return replace(panel, keys=tuple((f, Style(0, n, n)) for n, f in enumerate(filters)), key_title=title)
+    return replace(panel, keys=tuple((literal(f), Style(0, n, n)) for n, f in enumerate(filters)), key_title=title)
 
 
 def _sigma_line(rows, words: str, style: Style) -> Line:
@@ -230,7 +235,7 @@ def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Quantity) -> 
         bias, half = rows["bias"].to_numpy(), Z95 * rows["bias_se"].to_numpy()
         marks.append(Line(t, bias, "", Style(n, 0, n), bias - half, bias + half))
         marks.append(Line(t, rows["spread"].to_numpy(), "", Style(n, 1, n)))
-    keys = [(f, Style(n, None, n)) for n, (f, _) in enumerate(found)]
+    keys = [(literal(f), Style(n, None, n)) for n, (f, _) in enumerate(found)]
     keys += [("bias", Style(0, 0)), ("spread", Style(0, 1))]
     title = ", ".join(number(value) for _, value in result.swept) or device(result)
     y = Axis(f"error of {of.symbol}, {UNITS.get(unit, unit)}")

@@ -216,7 +216,9 @@ def _settling_panel(result: CaseResult, rows) -> Panel:
     for n, name in enumerate(result.axes.filters):
         own = rows[rows["filter"] == name].sort_values("manoeuvre_variance")
         best = own[own["best"]]
-        marks.append(Line(own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy(), name, Style(n, n, n)))
+        marks.append(
+            Line(own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy(), panels.literal(name), Style(n, n, n))
+        )
         star = Style(n, None, 7, size_pt=8)
         marks.append(Line(best["settling_s"].to_numpy(), best["steady_sigma"].to_numpy(), "", star))
     x, y = Axis("settling time of $\\sigma$ of $r$, s", limits=(0, None)), Axis("steady $\\sigma$ of $r$, m")

@@ -70,14 +70,15 @@ def expected(case, name=None, count=100_000):
     return CaseResult(name or case.name, case.study, case.spec, case.swept, count, sums, axes)
 
 
-def expected_radar(stem, variance=1e-3, name=None, count=100_000, **changes):
+def made_radar(stem, variance=1e-3, name=None, count=100_000, **changes):
+    """A radar of the paper with some keys of its config changed."""
     return expected(load(config(stem, variance, **changes)).cases[0], name or stem, count)
 
 
 @pytest.fixture(scope="session")
 def paper():
     """The five radars at the paper's D_M = 10⁻³."""
-    return [expected_radar(stem) for stem in RADARS]
+    return [made_radar(stem) for stem in RADARS]
 
 
 @pytest.fixture(scope="session")
@@ -85,3 +86,9 @@ def swept():
     """RLS 2 over the manoeuvre variance."""
     source = {**config("rls2"), "sweep": {"manoeuvre_variance": [1e-5, 1e-4, 1e-3, 1e-2, 1e-1]}, "scans": 40}
     return [expected(case, case.name.replace("config", "rls2")) for case in load(source).cases]
+
+
+@pytest.fixture
+def expected_radar():
+    """`made_radar`."""
+    return made_radar

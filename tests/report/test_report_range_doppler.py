@@ -1,0 +1,168 @@
+"""P1's own tables against what is known, and its figures against the tables."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from radarsim.report import range_doppler, statistics, tables
+from radarsim.report.drawing import Line
+
+
+def made_of(results):
+    return {"curves": tables.curves(results), "gains": tables.gains(results), **range_doppler.tables(results)}
+
+
+def drawn_of(results, made=None):
+    """Its figures, each showing every case."""
+    everything = SimpleNamespace(shown_in=lambda name: [SimpleNamespace(name=r.name) for r in results])
+    return range_doppler.figures(results, made or made_of(results), everything)
+
+
+def steady_row(table, case, name, component="r"):
+    rows = table[(table["case"] == case) & (table["filter"] == name) & (table["component"] == component)]
+    return rows.iloc[0]
+
+
+# The paper's own D_M: settling of σ_r in scan periods, range only and with Doppler.
+@pytest.mark.parametrize(
+    ("case", "name", "periods"),
+    [
+        ("rls1", "r", 4),
+        ("rls2", "r", 9),
+        ("rls3", "r", 19),
+        ("rls5", "r", 11),
+        ("rls4", "r+Vr", 7),
+        ("rls5", "r+Vr", 15),
+    ],
+)
+def test_settling_of_the_papers_radars(paper, case, name, periods):
+    row = steady_row(range_doppler.steady(paper), case, name)
+    assert row["settling_periods"] == periods
+    assert row["settling_lo_s"] <= row["settling_s"] <= row["settling_hi_s"]
+    assert row["under_10_periods"] == (periods < 10)
+
+
+def test_steady_values_over_the_manoeuvre_variance(swept):
+    table = range_doppler.steady(swept)
+    rows = table[table["component"] == "r"]
+    for name, values in (("r", (142, 165, 189, 211, 229)), ("r+Vr", (134, 147, 155, 157, 158.5))):
+        np.testing.assert_allclose(rows[rows["filter"] == name]["steady_sigma"], values, atol=0.51)
+    best = rows[rows["best"]].set_index("filter")["manoeuvre_variance"]
+    assert best["r"] == 1e-3
+    assert best["r+Vr"] == 1e-3
+
+
+def test_no_best_where_nothing_is_compared(paper):
+    assert not range_doppler.steady(paper)["best"].any()
+
+
+def test_settling_for_good():
+    t = np.arange(6) * 10.0
+    value = np.array([2.0, 1.02, 1.2, 1.04, 1.0, 1.0])
+    exact = statistics.Estimate(value, value, value)
+    assert range_doppler.settling(exact, t, 1.0) == (30.0, 30.0, 30.0)
+    wide = statistics.Estimate(value, value - 0.02, value + 0.02)
+    assert range_doppler.settling(wide, t, 1.0) == (30.0, 30.0, 40.0)
+    never = statistics.Estimate(value + 1, value + 1, value + 1)
+    assert range_doppler.settling(never, t, 1.0).value == np.inf
+
+
+def test_radar_table(paper):
+    table = range_doppler.radar(paper)
+    np.testing.assert_allclose(table["C_theta"], [0.25, 25 / 9, 100 / 9, 25, 100])
+    np.testing.assert_allclose(table["doppler_hz"], [1000 / 3, 4000, 4000, 20000, 20000])
+    np.testing.assert_allclose(table["unambiguous_velocity_mps"], [900, 75, 75, 15, 15])
+
+
+def test_consistency_before_the_filter_adds_manoeuvre(paper):
+    """At its least-squares start a filter is right about itself; later it allows for manoeuvres that are not there."""
+    table = range_doppler.consistency(paper)
+    start = table[(table["filter"] == "r") & (table["k"] <= 3)]
+    np.testing.assert_allclose(start["nees"], 1, rtol=1e-9)
+    np.testing.assert_allclose(start["ratio"], 1, rtol=1e-9)
+    assert set(start["verdict"]) == {"consistent"}
+    late = table[table["k"] >= 6]
+    assert set(late["verdict"]) == {"pessimistic"}
+    assert (late["ratio"] >= 1 - 1e-9).all()
+
+
+def test_bounds_of_the_normalised_error(paper):
+    from scipy.special import chdtri
+
+    of = range_doppler.normalised_error(paper[0])
+    freedom = 3 * paper[0].count
+    assert of.lo[0, 5] == pytest.approx(chdtri(freedom, 0.975) / freedom, rel=1e-7)
+    assert of.hi[0, 5] == pytest.approx(chdtri(freedom, 0.025) / freedom, rel=1e-7)
+
+
+def test_figures_have_the_contracts_names(paper, swept):
+    names = {f"{kind}_{component}" for kind in ("sigma", "gain") for component in ("r", "Vr", "ar")}
+    assert set(drawn_of(paper)) == names
+    assert set(drawn_of(swept)) == names | {"settling"}
+
+
+def test_sigma_figures_draw_the_table(paper):
+    made = made_of(paper)
+    rows = tables.groups(made["curves"], "case", "filter", "component")
+    figure = drawn_of(paper, made)["sigma_Vr"]
+    assert [panel.title for panel in figure.panels] == [f"RLS {n}" for n in range(1, 6)]
+    for panel, result in zip(figure.panels, paper, strict=True):
+        lines = [mark for mark in panel.marks if isinstance(mark, Line)]
+        assert [line.label for line in lines] == list(result.axes.filters)
+        for line in lines:
+            own = rows[result.name, line.label, "Vr"]
+            for drawn, column in (
+                *((line.x, "t_s"), (line.y, "sigma"), (line.lo, "sigma_lo"), (line.hi, "sigma_hi")),
+                (line.exact, "exact_sigma"),
+            ):
+                np.testing.assert_array_equal(drawn, own[column])
+
+
+def test_gain_figures_draw_the_table(paper):
+    made = made_of(paper)
+    rows = tables.groups(made["gains"], "case", "component")
+    (panel,) = drawn_of(paper, made)["gain_ar"].panels
+    lines = [mark for mark in panel.marks if isinstance(mark, Line)]
+    assert [line.label for line in lines] == [f"RLS {n}" for n in range(1, 6)]
+    for line, result in zip(lines, paper, strict=True):
+        np.testing.assert_array_equal(line.y, rows[result.name, "ar"]["gain_percent"])
+        np.testing.assert_array_equal(line.x, rows[result.name, "ar"]["t_s"])
+
+
+def test_settling_figure_draws_the_table(swept):
+    made = made_of(swept)
+    (panel,) = drawn_of(swept, made)["settling"].panels
+    (line,) = [mark for mark in panel.marks if isinstance(mark, Line) and mark.label == "r+Vr"]
+    rows = made["steady"][(made["steady"]["filter"] == "r+Vr") & (made["steady"]["component"] == "r")]
+    np.testing.assert_array_equal(line.y, rows["steady_sigma"])
+    np.testing.assert_array_equal(line.x, rows["settling_s"])
+
+
+def test_dynamic_error_is_drawn_where_there_is_one(expected_radar):
+    target = {"kind": "jerk_pulse", "coefficients": [1e5, -250], "start_s": 50, "jerk_mps3": 1, "duration_s": 20}
+    results = [expected_radar("rls2", target=target)]
+    made = made_of(results)
+    (panel,) = drawn_of(results, made)["dynamic_r"].panels
+    rows = tables.groups(made["curves"], "filter", "component")["r", "r"]
+    bias, spread = [mark for mark in panel.marks if isinstance(mark, Line)][:2]
+    np.testing.assert_array_equal(bias.y, rows["bias"])
+    np.testing.assert_array_equal(spread.y, rows["spread"])
+    np.testing.assert_allclose(rows["bias"], results[0].axes.exact_bias[0, :, 0], atol=1e-6)
+
+
+def test_answer_tells_the_last_gain_of_each_component(paper):
+    made = made_of(paper[1:2])
+    told = range_doppler.answer(paper[1:2], made)
+    assert len(told) == 3
+    assert "(140 s) σ is 18.3 % [" in told[0]
+    assert "at best 34.6 % [" in told[0]
+    assert "RLS 1" in range_doppler.answer(paper, made_of(paper))[2]
+    assert "higher (RLS 1)" in range_doppler.answer(paper, made_of(paper))[2]
+
+
+def test_answer_of_a_single_filter(expected_radar):
+    one = {"name": "only", "observes": ["range"], "manoeuvre_variance": 1e-3}
+    results = [expected_radar("rls2", filters=[one])]
+    (sentence,) = range_doppler.answer(results, made_of(results))
+    assert "only: σ of the range at 140 s is 189.3 m" in sentence

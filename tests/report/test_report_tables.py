@@ -1,0 +1,92 @@
+"""Tables: the contract's columns and order, and the bytes of the CSV."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from radarsim.report import tables
+
+CURVES = "case,filter,component,unit,k,t_s,n,sigma,sigma_lo,sigma_hi,bias,bias_se,spread,exact_sigma"
+GAINS = "case,filter,baseline,component,k,t_s,gain_percent,gain_lo,gain_hi,exact_percent"
+
+
+def read(table):
+    return pd.read_csv(io.BytesIO(tables.to_csv(table)))
+
+
+def test_columns_as_in_the_contract(paper):
+    assert ",".join(tables.curves(paper).columns) == CURVES
+    assert ",".join(tables.gains(paper).columns) == GAINS
+    assert ",".join(tables.curves([]).columns) == CURVES
+
+
+def test_rows_in_order_and_only_where_there_is_an_estimate(paper):
+    table = tables.curves(paper[:2])
+    keys = list(zip(table["case"], table["filter"], table["component"], table["k"], strict=True))
+    order = {name: i for i, name in enumerate(("rls1", "rls2", "r", "r+Vr", "Vr", "ar"))}
+    components = {"r": 0, "Vr": 1, "ar": 2}
+    assert keys == sorted(keys, key=lambda row: (order[row[0]], order[row[1]], components[row[2]], row[3]))
+    first = table.groupby(["case", "filter", "component"])["k"].min()
+    assert first["rls1", "r", "r"] == 1
+    assert first["rls1", "r", "Vr"] == first["rls1", "r", "ar"] == 3
+    assert first["rls1", "r+Vr", "Vr"] == 1
+    assert first["rls1", "r+Vr", "ar"] == 2
+    assert len(table) == 2 * (15 + 13 + 13 + 15 + 15 + 14)
+
+
+def test_values_of_expected_sums_are_exact(paper):
+    table = tables.curves(paper)
+    np.testing.assert_allclose(table["sigma"], table["exact_sigma"], rtol=1e-12)
+    assert (table["sigma_lo"] < table["sigma"]).all()
+    assert (table["sigma"] < table["sigma_hi"]).all()
+    half = (table["sigma_hi"] - table["sigma_lo"]) / 2 / table["sigma"]
+    np.testing.assert_allclose(half, 1.96 / np.sqrt(2e5), rtol=1e-3)
+
+
+def test_gains_are_against_the_baseline(paper):
+    table = tables.gains(paper)
+    assert set(table["filter"]) == {"r+Vr"}
+    assert set(table["baseline"]) == {"r"}
+    np.testing.assert_allclose(table["gain_percent"], table["exact_percent"], atol=1e-9)
+    other = replace(paper[0], axes=replace(paper[0].axes, baseline=1))
+    assert set(tables.gains([other])["filter"]) == {"r"}
+
+
+def test_fewer_estimates_than_realisations(paper):
+    one = paper[0]
+    half = replace(one, sums={**one.sums, "estimates": np.full(one.axes.available.shape, one.count / 2)})
+    table = tables.curves([half])
+    assert set(table["n"]) == {one.count // 2}
+    np.testing.assert_allclose(table["sigma"], np.sqrt(2) * table["exact_sigma"], rtol=1e-12)
+
+
+def test_csv_reads_back_the_same(paper):
+    table = tables.curves(paper[:1])
+    table.loc[3, "exact_sigma"] = np.nan
+    text = tables.to_csv(table).decode()
+    again = pd.read_csv(io.StringIO(text))
+    pd.testing.assert_frame_equal(again, table, check_exact=True, check_dtype=False)
+    assert text.splitlines()[4].endswith(",")
+    assert text.endswith("\n")
+    assert "\r" not in text
+    assert tables.to_csv(tables.curves(paper[:1])) == tables.to_csv(tables.curves(paper[:1]))
+
+
+def test_csv_equals_the_librarys(paper):
+    table = tables.gains(paper)
+    assert tables.to_csv(table) == table.to_csv(index=False, lineterminator="\n").encode()
+
+
+@pytest.mark.parametrize("name", ["a,b", 'say "x"', "two\nlines", "plain", "<b>", "Δ"])
+def test_csv_quotes_what_needs_it(name, paper):
+    table = tables.curves([replace(paper[0], name=name)])
+    assert set(read(table)["case"]) == {name}
+
+
+def test_csv_of_flags_counts_and_nothing():
+    table = tables.frame({"good": [True, False], "k": [1, 2], "x": [np.inf, np.nan], "word": ["a", None]})
+    assert tables.to_csv(table) == b"good,k,x,word\ntrue,1,inf,a\nfalse,2,,\n"
+    assert tables.to_csv(tables.frame({"a": [], "b": []})) == b"a,b\n"
