@@ -11,6 +11,7 @@ whole process, but only where no other user of Numba came first, and the order o
 """
 
 import hashlib
+import math
 import os
 import tempfile
 from collections.abc import Callable
@@ -100,9 +101,8 @@ kernel = compiler(fastmath=set(FLAGS), nogil=True)
 summing = compiler(fastmath=set(FLAGS | {"reassoc"}), nogil=True)
 
 
-@inline
-def aligned_zeros(size):
-    """A work array (size,) of zeros on a 64-byte boundary: no vector of eight numbers lies across two cache lines."""
-    room = np.zeros(size + 8)
-    skip = -(room.ctypes.data >> 3) & 7
-    return room[skip : skip + size]
+def aligned_zeros(*shape: int) -> np.ndarray:
+    """A work array of zeros on a 64-byte boundary: no eight numbers of a register lie across two cache lines."""
+    room = np.zeros(math.prod(shape) + 8)
+    skip = -(room.ctypes.data // room.itemsize) % 8
+    return room[skip : skip + math.prod(shape)].reshape(shape)

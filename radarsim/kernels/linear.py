@@ -152,10 +152,9 @@ def add_sums(x, n, k, truth, observes, start, baseline, error, paired, cross):
 
 
 @kernel
-def add_block(key, first, count, truth, sigma, dt, observes, start, weights, gains, baseline, error, paired, cross):
-    """`simulate_block` for arguments of the one type that is compiled."""
+def add_block(x, key, first, count, truth, sigma, dt, observes, start, weights, gains, baseline, error, paired, cross):
+    """`simulate_block` for arguments of the one type that is compiled, with a work array x (F + 1, 3, CHUNK)."""
     filters, scans = gains.shape[0], gains.shape[1]
-    x = aligned_zeros((filters + 1) * 3 * CHUNK).reshape((filters + 1, 3, CHUNK))
     for done in range(0, count, CHUNK):
         x[:] = 0.0
         # A partial chunk is computed whole and summed in part, so each realisation goes through the same instructions.
@@ -167,9 +166,8 @@ def add_block(key, first, count, truth, sigma, dt, observes, start, weights, gai
 
 
 @kernel
-def fill_simulated(key, first, truth, sigma, plots):
-    """`simulate_plots` for arguments of the one type that is compiled; plots (n, K, 2) is written."""
-    x = aligned_zeros(2 * CHUNK).reshape((2, CHUNK))
+def fill_simulated(x, key, first, truth, sigma, plots):
+    """`simulate_plots` into plots (n, K, 2), with a work array x (2, CHUNK)."""
     for done in range(0, plots.shape[0], CHUNK):
         n = min(CHUNK, plots.shape[0] - done)
         for k in range(plots.shape[1]):
@@ -178,10 +176,9 @@ def fill_simulated(key, first, truth, sigma, plots):
 
 
 @kernel
-def fill_estimates(plots, dt, observes, start, weights, gains, estimates):
-    """`estimate` for arguments of the one type that is compiled; estimates (n, F, K, 3) are written."""
+def fill_estimates(x, plots, dt, observes, start, weights, gains, estimates):
+    """`estimate` into estimates (n, F, K, 3), with a work array x (F + 1, 3, CHUNK)."""
     filters, scans = gains.shape[0], gains.shape[1]
-    x = aligned_zeros((filters + 1) * 3 * CHUNK).reshape((filters + 1, 3, CHUNK))
     for done in range(0, plots.shape[0], CHUNK):
         x[:] = 0.0
         n = min(CHUNK, plots.shape[0] - done)
@@ -228,16 +225,17 @@ def simulate_block(
 
     Realisation i has the same plots and estimates in any block. Memory does not grow with count or scans.
     """
-    scans = gains.shape[1]
-    arrays = plain(key, 2, dtype=np.uint64), int(first), int(count), plain(truth, scans, 3), plain(sigma, scans, 2)
-    add_block(*arrays, *schedule(dt, observes, start, weights, gains), int(baseline), error, paired, cross)
+    filters, scans = gains.shape[:2]
+    x = aligned_zeros(filters + 1, 3, CHUNK)
+    world = plain(key, 2, dtype=np.uint64), int(first), int(count), plain(truth, scans, 3), plain(sigma, scans, 2)
+    add_block(x, *world, *schedule(dt, observes, start, weights, gains), int(baseline), error, paired, cross)
 
 
 def simulate_plots(key, first, count, truth, sigma) -> np.ndarray:
     """The plots (count, K, 2) that `simulate_block` draws for realisations first … first + count - 1."""
     scans = len(truth)
-    plots = np.empty((count, scans, 2))
-    fill_simulated(plain(key, 2, dtype=np.uint64), int(first), plain(truth, scans, 3), plain(sigma, scans, 2), plots)
+    x, plots = aligned_zeros(2, CHUNK), np.empty((count, scans, 2))
+    fill_simulated(x, plain(key, 2, dtype=np.uint64), int(first), plain(truth, scans, 3), plain(sigma, scans, 2), plots)
     return plots
 
 
@@ -247,6 +245,7 @@ def estimate(plots, dt, observes, start, weights, gains) -> np.ndarray:
     dt and the schedule as for `simulate_block`, by the same instructions. For a missing plot give any finite number,
     with zero gains.
     """
-    estimates = np.full((len(plots), *gains.shape[:3]), np.nan)
-    fill_estimates(plain(plots, *np.shape(plots)), *schedule(dt, observes, start, weights, gains), estimates)
+    filters, scans = gains.shape[:2]
+    x, estimates = aligned_zeros(filters + 1, 3, CHUNK), np.full((len(plots), filters, scans, 3), np.nan)
+    fill_estimates(x, plain(plots, *np.shape(plots)), *schedule(dt, observes, start, weights, gains), estimates)
     return estimates

@@ -26,7 +26,7 @@ def stream(seed: int, name: str) -> np.ndarray:
 
 @inline
 def rotated(x, n):
-    return (x << U(n)) | (x >> U(64 - n))
+    return (x << n) | (x >> (U(64) - n))
 
 
 @inline
@@ -47,15 +47,15 @@ def threefry(x0, x1, k0, k1):
     """Threefry2x64 with 20 rounds: counter (x0, x1) and key (k0, k1) to two words, all uint64."""
     k2 = U(0x1BD11BDAA9FC1A22) ^ k0 ^ k1  # Skein's parity constant
     x0, x1 = x0 + k0, x1 + k1
-    x0, x1 = four_rounds(x0, x1, 16, 42, 12, 31)
+    x0, x1 = four_rounds(x0, x1, U(16), U(42), U(12), U(31))
     x0, x1 = x0 + k1, x1 + k2 + U(1)
-    x0, x1 = four_rounds(x0, x1, 16, 32, 24, 21)
+    x0, x1 = four_rounds(x0, x1, U(16), U(32), U(24), U(21))
     x0, x1 = x0 + k2, x1 + k0 + U(2)
-    x0, x1 = four_rounds(x0, x1, 16, 42, 12, 31)
+    x0, x1 = four_rounds(x0, x1, U(16), U(42), U(12), U(31))
     x0, x1 = x0 + k0, x1 + k1 + U(3)
-    x0, x1 = four_rounds(x0, x1, 16, 32, 24, 21)
+    x0, x1 = four_rounds(x0, x1, U(16), U(32), U(24), U(21))
     x0, x1 = x0 + k1, x1 + k2 + U(4)
-    x0, x1 = four_rounds(x0, x1, 16, 42, 12, 31)
+    x0, x1 = four_rounds(x0, x1, U(16), U(42), U(12), U(31))
     return x0 + k2, x1 + k0 + U(5)
 
 
