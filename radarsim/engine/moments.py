@@ -1,4 +1,4 @@
-"""What a block of realisations leaves behind: a count and one vector of sums. Sums add; that is all the engine needs."""
+"""What a block of realisations leaves behind: a count and a vector of sums. Sums add; the engine needs no more."""
 
 import math
 from dataclasses import dataclass

@@ -31,8 +31,8 @@ class Axes:
 class CaseResult:
     """A case, how many realisations of it are done, and the named arrays of their sums.
 
-    `error` (F, K, C, 4) holds the sums of e, e², e³, e⁴; `paired` (F, K, C) those of e²·e² with the baseline's error; a study
-    adds its own.
+    `error` (F, K, C, 4) holds the sums of e, e², e³, e⁴; `paired` (F, K, C) those of e²·e² with the baseline's error; a
+    study adds its own.
     """
 
     name: str

@@ -26,7 +26,7 @@ def error_recursion(
     """Bias (K, 3) and covariance (K, 3, 3) of the error at every scan.
 
     S⁺ = (I - KH) B S Bᵀ (I - KH)ᵀ + K R Kᵀ, and the bias likewise with the model's defect B x - x⁺ of the truth added.
-    Before the start the estimates are the plots themselves. weights (3, 2, n), gains (K, 3, 2), truth (K, 3), sigma (2,).
+    Before the start the estimates are the plots. weights (3, 2, n), gains (K, 3, 2), truth (K, 3), sigma (2,).
     """
     scans, start = len(gains), weights.shape[2]
     F, H = transition(dt), np.eye(3)[:observes]
@@ -49,8 +49,8 @@ def steady_state(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Steady covariances (3, 3): the one the filter believes, and the true one on a truth without manoeuvre.
 
-    The believed one solves the discrete algebraic Riccati equation; the true one is the fixed point of the error recursion
-    under the steady gain (a Lyapunov equation). Scaled to unit period and unit range error for the solvers' sake.
+    The believed one solves the discrete algebraic Riccati equation; the true one is the fixed point of the error
+    recursion under the steady gain (a Lyapunov equation). Scaled to unit period and range error for the solvers' sake.
     """
     from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 

@@ -1,6 +1,6 @@
-"""Kalman filters of the second order whose gains do not depend on the data: designed once, applied to every realisation.
+"""Kalman filters of the second order whose gains do not depend on the data: designed once, applied N times.
 
-The state is x = (r, V_r, a_r), the plot of a scan z = (range, radial velocity); a filter observes the range alone or both.
+The state is x = (r, V_r, a_r), a plot z = (range, radial velocity); a filter observes the range alone or both.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from radarsim.models.motion import manoeuvre_covariance, transition
 class LinearFilter:
     """One designed filter over K scans.
 
-    observes is 1 (range) or 2 (range and velocity); start is the scan, counted from 1, of the first least-squares estimate;
+    observes is 1 (range) or 2 (range and velocity); start is the scan, from 1, of the first least-squares estimate;
     weights (3, 2, start) make it from the plots so far; gains (K, 3, 2) are zero up to it. believed (K, 3, 3) is the
     covariance that the filter claims, and available (K, 3) says which components it estimates.
     """
@@ -33,10 +33,10 @@ def observation(observes: int) -> np.ndarray:
 
 
 def least_squares_start(observes: int, start: int, sigma: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
-    """Weighted least squares on the first `start` scans: weights (3, 2, start) and covariance (3, 3) at the last of them.
+    """Weighted least squares on the first `start` scans: weights (3, 2, start), covariance (3, 3) at the last of them.
 
-    sigma (2,) holds the standard deviations of range (m) and radial velocity (m/s). Solved in scaled units (state per scan
-    period, rows per sigma) so that periods of milliseconds and of hours are equally well conditioned.
+    sigma (2,) holds the standard deviations of range (m) and radial velocity (m/s). Solved in scaled units (state per
+    scan period, rows per sigma) so that periods of milliseconds and of hours are equally well conditioned.
     """
     scale = np.array([1.0, 1.0 / dt, 1.0 / dt**2])
     rows = [

@@ -1,1 +1,1 @@
-"""The world in formulas: motion, targets, frames, sensors, signals. NumPy, no randomness, nothing of the other packages."""
+"""The world in formulas: motion, targets, frames, sensors, signals. NumPy, no randomness, no other package."""

@@ -35,7 +35,9 @@ def normal_cosine(biconical: np.ndarray) -> np.ndarray:
     square = 1.0 - np.sin(biconical[..., 1]) ** 2 - np.sin(biconical[..., 2]) ** 2
     # |e| + |a| >= 90° is no direction in front of the antenna.
     if not np.all((square > 0) & (np.abs(biconical[..., 1:]).sum(axis=-1) < math.pi / 2)):
-        raise OutsideSector("|elevation| + |azimuth| must be under 90 degrees: the point is not in front of the antenna")
+        raise OutsideSector(
+            "|elevation| + |azimuth| must be under 90 degrees: the point is not in front of the antenna"
+        )
     return np.sqrt(square)
 
 

@@ -1,7 +1,7 @@
-"""Range, radial velocity and radial acceleration of a target over time: those that fit a polynomial, and those that break it.
+"""Range, radial velocity and radial acceleration of a target of targets that fit a polynomial or break it.
 
-All functions take times t (K,) in seconds from the first plot and give (K, 3): range in m, radial velocity in m/s, radial
-acceleration in m/s².
+All functions take times t (K,) in seconds from the first plot and give (K, 3): range in m, radial velocity in m/s,
+radial acceleration in m/s².
 """
 
 import math
@@ -26,7 +26,7 @@ def acceleration_start(coefficients: Sequence[float], acceleration: float, start
 
 
 def jerk_pulse(coefficients: Sequence[float], jerk: float, start: float, duration: float, t: np.ndarray) -> np.ndarray:
-    """A polynomial with a constant jerk (m/s³) added from `start` for `duration` (s); the acceleration it built up stays."""
+    """A polynomial with a constant jerk (m/s³) from `start` for `duration` (s); the acceleration built up stays."""
 
     def ramp(onset):
         since = np.maximum(t - onset, 0.0)
@@ -38,7 +38,7 @@ def jerk_pulse(coefficients: Sequence[float], jerk: float, start: float, duratio
 def turn(
     range_0: float, speed: float, aspect: float, acceleration_g: float, start: float, duration: float, t: np.ndarray
 ) -> np.ndarray:
-    """Radial motion of a target that flies straight in a plane through the radar, turns at constant g, and flies straight on.
+    """Radial motion of a target that flies straight in a plane through the radar, turns at constant g, flies straight.
 
     range_0 (m) at t = 0; speed (m/s); aspect (rad) of the velocity from the direction away from the radar (pi: straight
     in); acceleration_g the lateral acceleration in standard gravities, positive to the left; start and duration in s.
@@ -60,7 +60,7 @@ def turn(
 
 
 def _arc(speed: float, rate: float, aspect: float, elapsed: np.ndarray) -> np.ndarray:
-    """Displacement (K, 2) after `elapsed` seconds of turning; the chord of angle x has length speed·elapsed·sinc(x/2)."""
+    """Displacement (K, 2) after `elapsed` seconds of turning; a chord of angle x is speed·elapsed·sinc(x/2) long."""
     half = rate * elapsed / 2
     chord = speed * elapsed * np.sinc(half / np.pi)
     return chord[:, None] * np.stack([np.cos(aspect + half), np.sin(aspect + half)], axis=1)
