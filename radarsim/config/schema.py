@@ -13,7 +13,9 @@ from radarsim.config.fields import Anything, Model, Name, Stem, Study, whole
 
 STUDIES = {
     "range_doppler": "radarsim.config.range_doppler:RangeDoppler",
+    "multimodel": "radarsim.config.multimodel:Multimodel",
     "sonar": "radarsim.config.sonar:Sonar",
+    "discriminator": "radarsim.config.discriminator:Discriminator",
 }
 LARGEST_REALISATIONS = 10**12
 LARGEST_SEED = 2**64 - 1

@@ -50,12 +50,13 @@ def tail_probability(weights: np.ndarray, threshold: float) -> float:
     edge = 0.5 / weights.max()
     # The start balances the pole against the edge: near the edge for a small tail.
     start = edge * max(0.5, 1.0 - 1.0 / (1.0 + threshold * edge))
-    reach = math.sqrt(40.0 / (threshold * start))
-    v = (np.arange(NODES) + 0.5) * (reach / NODES)
+    reach = math.asinh(math.sqrt(40.0 / (threshold * start)))
+    w = (np.arange(NODES) + 0.5) * (reach / NODES)
+    v = np.sinh(w)  # fine near the poles, far out to where the integrand has vanished
     s = start * (1.0 + v**2) + 1j * start * v
-    ds = start * (2.0 * v + 1j)
+    ds = start * (2.0 * v + 1j) * np.cosh(w)
     logarithm = -0.5 * np.log(1.0 - 2.0 * weights[:, None] * s).sum(axis=0) - s * threshold
-    return float(np.sum((np.exp(logarithm) / s * ds).imag) * (v[1] - v[0]) / math.pi)
+    return float(np.sum((np.exp(logarithm) / s * ds).imag) * (w[1] - w[0]) / math.pi)
 
 
 def excess(weights: np.ndarray, condition: Condition) -> float:

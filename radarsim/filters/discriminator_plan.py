@@ -29,6 +29,7 @@ class Design:
     margin: float = 3.0
     from_truth: bool = False
     amplitude: int = 0
+    forecast: bool = True  # whether the prior is used
 
 
 def block_edges(windows: list[int], per_window: int) -> np.ndarray:
@@ -112,7 +113,8 @@ def estimators(
             window["pulses"], window["blocks"] = pulses, np.searchsorted(edges, pulses)
             window["powers"] = (pulses / burst.pulses) ** np.arange(SIZE)
             turns = whole * window["powers"][:size]
-            window["precision"][:size] = phase_prior(sigma) / turns**2
+            if design.forecast:
+                window["precision"][:size] = phase_prior(sigma) / turns**2
             information = fisher(pulses) / np.outer(turns, turns) + np.diag(window["precision"][:size])
             window["step"][:size, :size] = balanced_inverse(information)
             if directions is not None:

@@ -5,6 +5,7 @@ import numpy as np
 from radarsim.kernels.compile import kernel, summing
 from radarsim.kernels.discriminator_scoring import (
     CENTRE,
+    LIMIT,
     REF,
     ROWS,
     SLOPE,
@@ -189,6 +190,7 @@ def block_table(
         part = slice(edges[i], edges[i + 1])
         mean[CENTRE, i] = t[:, part].mean()
         s, e = (t[:, part] - mean[CENTRE, i]).ravel(), turn[:, part].ravel()
+        mean[LIMIT, i] = 1.0 / max(np.sqrt(np.mean(s**2)), 1e-9)
         received = clean[:, part].ravel() * e
         for n, (z, w) in enumerate(((Z0, W0), (Z1, W1), (Z2, W2))):
             mean[z, i], mean[z + 1, i] = np.sum(received * s**n).real, np.sum(received * s**n).imag

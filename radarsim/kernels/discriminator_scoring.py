@@ -8,7 +8,8 @@ the second sum, the image at twice the frequency, is absent for complex samples.
 
 Block sums are those of u e^{-jψ_ref} sⁱ and e^{-2jψ_ref} sⁱ, i = 0, 1, 2, over a few samples, s the time from the
 block's centre: with d = ψ − ψ_ref and D its slope at the centre, Σ u e^{-jψ} ≈ e^{-jd} (Z₀ − jD Z₁ − ½D² Z₂). Without
-the terms in D 32 blocks to a window are off by 0.11 potential σ; with them 16 are within 0.02.
+the terms in D 32 blocks to a window are off by 0.11 potential σ; with them 16 are within 0.02. D is cut where the phase
+turns by one radian rms within a block: beyond it the expansion is void, and unbounded it drives lost estimates away.
 """
 
 import math
@@ -21,22 +22,14 @@ from radarsim.kernels.random import sine_cosine_polynomial
 SIZE = 6  # coefficients of the phase; unused ones have a zero row in the step matrix
 TURN = 2.0 * math.pi
 ROUND = 6755399441055744.0  # 1.5 · 2**52: adding it rounds to a whole number
-# Rows of the array of block sums: the block's central time in bursts, ψ_ref there in turns, its slope in turns a burst;
-# then Z₀, Z₁, Z₂, W₀, W₁, W₂, each a real and an imaginary part.
-CENTRE, REF, SLOPE, Z0, Z1, Z2, W0, W1, W2, ROWS = 0, 1, 2, 3, 5, 7, 9, 11, 13, 15
+# Rows of the array of block sums: the block's central time in bursts; the slope D in radians a burst that is one radian
+# rms over the block; ψ_ref at the centre in turns and its slope in turns a burst; then Z₀, Z₁, Z₂, W₀, W₁, W₂, each a
+# real and an imaginary part.
+CENTRE, LIMIT, REF, SLOPE, Z0, Z1, Z2, W0, W1, W2, ROWS = 0, 1, 2, 3, 4, 6, 8, 10, 12, 14, 16
 
+SIZE = 6  # coefficients of the phase; unused ones have a zero row in the step matrix
 # What a function is given to work on. A record is passed as one pointer; six arrays, which are some fifty words, made a
 # scoring step twice as slow, and a tuple of arrays, which has its references counted, eight times.
-SIZE = 6  # coefficients of the phase; unused ones have a zero row in the step matrix
-TURN = 2.0 * math.pi
-ROUND = 6755399441055744.0  # 1.5 · 2**52: adding it rounds to a whole number
-# Rows of the array of block sums: the block's central time in bursts, ψ_ref there in turns, its slope in turns a burst;
-# then Z₀, Z₁, Z₂, W₀, W₁, W₂, each a real and an imaginary part.
-CENTRE, REF, SLOPE, Z0, Z1, Z2, W0, W1, W2, ROWS = 0, 1, 2, 3, 5, 7, 9, 11, 13, 15
-
-# What a function is given to work on. A record is passed as one pointer; six arrays, which are some fifty words, or a tuple
-# of arrays, which has its references counted, made a scoring step two and eight times slower.
-SIZE = 6  # coefficients of the phase; unused ones have a zero row in the step matrix
 STATE = np.dtype(
     [
         ("x", np.float64, SIZE),  # estimate in turns over the burst
@@ -157,6 +150,7 @@ def score_blocks(sums, blocks, per_window, state):
         t = sums[CENTRE, i] * per_window
         s, c = sincos_turns(polynomial(b0, b1, b2, b3, b4, b5, t) - sums[REF, i])
         D = TURN * (derivative(b1, b2, b3, b4, b5, t) * per_window - sums[SLOPE, i])
+        D = min(max(D, -sums[LIMIT, i]), sums[LIMIT, i])
         z1r, z1i, z2r, z2i = sums[Z1, i], sums[Z1 + 1, i], sums[Z2, i], sums[Z2 + 1, i]
         zr = sums[Z0, i] + D * (z1i - 0.5 * D * z2r)
         zi = sums[Z0 + 1, i] - D * (z1r + 0.5 * D * z2i)
@@ -188,6 +182,7 @@ def score_image(sums, blocks, per_window, amplitude, state):
         t = sums[CENTRE, i] * per_window
         s, c = sincos_turns(2.0 * (polynomial(b0, b1, b2, b3, b4, b5, t) - sums[REF, i]))
         D = 2.0 * TURN * (derivative(b1, b2, b3, b4, b5, t) * per_window - sums[SLOPE, i])
+        D = min(max(D, -sums[LIMIT, i]), sums[LIMIT, i])
         w1r, w1i, w2r, w2i = sums[W1, i], sums[W1 + 1, i], sums[W2, i], sums[W2 + 1, i]
         wr = sums[W0, i] + D * (w1i - 0.5 * D * w2r)
         wi = sums[W0 + 1, i] - D * (w1r + 0.5 * D * w2i)

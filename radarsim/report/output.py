@@ -21,9 +21,13 @@ def study(name: str):
 
 
 def tables(results: Sequence[CaseResult]) -> dict:
-    """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims."""
-    made = {"curves": common.curves(results), "gains": common.gains(results)}
-    made |= study(results[0].study).tables(results)
+    """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims.
+
+    A study whose errors are not of all realisations at common scans makes its own curves and gains.
+    """
+    own = study(results[0].study).tables(results)
+    shared = {"curves": common.curves, "gains": common.gains}
+    made = {name: own[name] if name in own else table(results) for name, table in shared.items()} | own
     made["claims"] = claims.judged(results[0].study, results, made)
     return made
 

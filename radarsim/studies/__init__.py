@@ -1,8 +1,8 @@
-"""One file a paper. A study is `prepare(case) -> plan` (once, NumPy) and `simulate(plan, first, count) -> sums` (a block).
+"""One file a paper. A study is `prepare(case) -> plan` (once) and `simulate(plan, first, count) -> sums` (a block).
 
 A plan has `.block` (realisations a block), `.layout` (engine.moments.Layout) and `.axes` (engine.results.Axes). What is
-common to all studies stands here: the registry, the identity of a case, the names of its noise streams, and the work that
-the engine runs.
+common to all studies stands here: the registry, the identity of a case, the names of its noise streams, and the work
+that the engine runs.
 """
 
 import ast
@@ -17,7 +17,7 @@ import numpy as np
 
 from radarsim.config.load import Case, canonical, world
 
-STUDIES = ("range_doppler", "sonar")
+STUDIES = ("range_doppler", "multimodel", "sonar", "discriminator")
 COMPUTING = ("models", "kernels", "filters", "exact", "studies")
 PACKAGE = Path(__file__).parent.parent
 

@@ -1,0 +1,202 @@
+"""Keys of the discriminator study (P4): a burst, its echo, a forecast, estimators of Doppler and its derivatives."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from radarsim.config.fields import (
+    Design,
+    Display,
+    Flag,
+    Model,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    Scenario,
+    Study,
+    at,
+    unique_names,
+    whole,
+)
+
+MOST_SAMPLES = 1_000_000
+MOST_DERIVATIVES = 4
+FEWEST_PULSES = 16
+MOST_WINDOWS = 200
+Share = Annotated[float, Field(gt=0.5, lt=1)]
+
+
+class Burst(Model):
+    """A coherent burst, sampled inside its pulses."""
+
+    carrier_hz: Positive = Field(description="carrier frequency, Hz")
+    pulse_period_s: Positive = Field(description="time from pulse to pulse, s")
+    pulse_length_s: Positive = Field(description="length of a pulse, s")
+    sampling_period_s: Positive = Field(description="time from sample to sample inside a pulse, s")
+    pulses: whole(FEWEST_PULSES, MOST_SAMPLES) = Field(description="number of pulses")
+    amplitude: Positive = Field(description="amplitude of the echo")
+    noise_variance: Positive = Field(description="variance of the white noise in each real number sampled")
+    samples: Literal["real", "complex"] = Field("real", description="what the receiver gives")
+
+    @model_validator(mode="after")
+    def _pulses_fit(self):
+        if self.pulse_length_s > self.pulse_period_s:
+            raise at("pulse_length_s", "must be at most the pulse period")
+        if self.pulses * self.pulse_length_s / self.sampling_period_s > MOST_SAMPLES:
+            raise at("sampling_period_s", f"the burst has over {MOST_SAMPLES} samples")
+        return self
+
+
+class Truth(Model):
+    """The echo's phase: from its derivatives, or from a radial velocity that is straight between given instants."""
+
+    phase_rad: Number = Field(0.0, description="phase at the start of the burst, rad")
+    doppler_derivatives: Annotated[tuple[Number, ...], Field(min_length=1, max_length=MOST_DERIVATIVES + 1)] | None = (
+        Field(None, description="Doppler frequency and its derivatives at the start: Hz, Hz/s, Hz/s², …")
+    )
+    times_s: Annotated[tuple[NonNegative, ...], Field(min_length=2, max_length=100)] | None = Field(
+        None, description="instants of the velocity profile from the start of the burst, s; the first is 0"
+    )
+    velocities_mps: Annotated[tuple[Number, ...], Field(min_length=2, max_length=100)] | None = Field(
+        None, description="radial velocity at these instants, towards the radar positive, m/s"
+    )
+    derivatives: whole(0, MOST_DERIVATIVES) = Field(
+        3, description="with a velocity profile: derivatives of the Doppler frequency that are estimated"
+    )
+
+    @model_validator(mode="after")
+    def _one_kind(self):
+        profile = self.times_s is not None and self.velocities_mps is not None
+        if profile == (self.doppler_derivatives is not None):
+            raise at("doppler_derivatives", "give either doppler_derivatives or times_s and velocities_mps")
+        if profile and len(self.times_s) != len(self.velocities_mps):
+            raise at("velocities_mps", "must have as many values as times_s")
+        if profile and (
+            self.times_s[0] != 0 or any(b <= a for a, b in zip(self.times_s, self.times_s[1:], strict=False))
+        ):
+            raise at("times_s", "must begin with 0 and rise")
+        return self
+
+    @property
+    def parameters(self) -> int:
+        """Length of θ: the phase, the Doppler frequency and its derivatives."""
+        return 1 + (self.derivatives + 1 if self.doppler_derivatives is None else len(self.doppler_derivatives))
+
+
+Spreads = Annotated[tuple[Positive, ...], Field(min_length=2, max_length=MOST_DERIVATIVES + 2)]
+
+
+class Prior(Model):
+    """The forecast: independent Gaussian errors about the truth."""
+
+    spread_over_potential: Spreads | None = Field(
+        None, description="standard deviations over the potential ones of the whole burst: phase, frequency, …"
+    )
+    sigma: Spreads | None = Field(None, description="standard deviations: rad, Hz, Hz/s, …; in place of the former")
+    scale: Positive = Field(1.0, description="factor on all standard deviations")
+    error_scale: Positive = Field(
+        1.0, description="factor between the forecast's true errors and those that the estimators believe in"
+    )
+
+    @model_validator(mode="after")
+    def _one_kind(self):
+        if (self.spread_over_potential is None) == (self.sigma is None):
+            raise at("spread_over_potential", "give either spread_over_potential or sigma")
+        return self
+
+    @property
+    def given(self) -> tuple[float, ...]:
+        """Whichever is given."""
+        return self.spread_over_potential if self.sigma is None else self.sigma
+
+
+class Estimator(Model):
+    """A sequence of windows that grow to the whole burst, Fisher scoring in each; or the classical rival."""
+
+    name: Annotated[Name, Display()] = Field(description="label, unlike that of any other estimator")
+    method: Literal["sequence", "ridge"] = Field(
+        "sequence", description="sequence of discriminators, or short-time spectrum, robust fit, unwrapping, scoring"
+    )
+    schedule: Literal["designed"] | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_WINDOWS)] = (
+        Field("designed", description="designed by (14)–(16), or a list of rising window lengths, s")
+    )
+    lock_probability: Share = Field(0.99, description="P_Δ of a hand-over")
+    main_lobe_threshold: Positive = Field(1.0, description="c: 1 as in (10) and (14), 0.5 as in (11)")
+    tail: Literal["gaussian", "exact"] = Field(
+        "gaussian", description="law of the quadratic form: the paper's Gaussian, or the weighted sum of χ² itself"
+    )
+    minimum_energy_ratio: NonNegative = Field(0.0, description="μ_min of (17), below which no window begins; 0: none")
+    density: whole(1, 10) = Field(1, description="windows for each designed one; 2: one at each geometric mean between")
+    first_windows: whole(1, MOST_WINDOWS) | None = Field(None, description="stop after so many windows; default: all")
+    start: Literal["prior", "truth"] = Field("prior", description="where the first window starts")
+    phases: whole(0, 64) = Field(0, description="phases tried in the first window; 0: the phase in closed form")
+    steps: whole(1, 1000) = Field(40, description="scoring steps in a window, at most")
+    tolerance: Positive = Field(1e-3, description="ε: step, in standard deviations, that ends a window")
+    coherence_step: Flag = Field(
+        False, description="divide the steps by the coherence: they are too short away from it"
+    )
+    search_points: whole(0, 10) = Field(
+        0, description="cure at a hand-over: points on each side along the leading direction of R_Δ; 0: none"
+    )
+    search_spacing_rad: Positive = Field(0.8, description="distance of these points, rms over the window, rad")
+    search_margin: Number = Field(
+        2.0, description="standard errors by which the coherence must be short of 1 for a search"
+    )
+    amplitude: Literal["known", "estimated", "as_printed"] = Field(
+        "known", description="given, or estimated from the energy by (7) corrected, or as printed (its square)"
+    )
+
+    @model_validator(mode="after")
+    def _rises(self):
+        if self.schedule != "designed" and any(b <= a for a, b in zip(self.schedule, self.schedule[1:], strict=False)):
+            raise at("schedule", "window lengths must rise")
+        return self
+
+
+class Discriminator(Study):
+    """Doppler frequency and its derivatives from one burst."""
+
+    bare_keys = "estimators"
+
+    burst: Burst = Field(description="the burst")
+    truth: Annotated[Truth, Scenario()] = Field(description="the echo's phase: a scenario's stem, or inline")
+    prior: Prior = Field(description="the forecast")
+    estimators: Annotated[
+        tuple[Estimator, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
+    ] = Field(description="the estimators; all see the same bursts")
+    engine: Annotated[Literal["auto", "block_sums", "samples", "demodulated"], Design()] = Field(
+        "auto",
+        description="block_sums: exact sums over short blocks are drawn; samples: every step over every sample; "
+        "demodulated: samples drawn and demodulated once; auto: block_sums where it is valid, else samples",
+    )
+    blocks_per_window: Annotated[whole(4, 1000) | None, Design()] = Field(
+        None, description="a block is a window over this; default 16, and 32 for demodulated"
+    )
+
+    @model_validator(mode="after")
+    def _fits_together(self):
+        size = self.truth.parameters
+        if len(self.prior.given) != size:
+            key = "spread_over_potential" if self.prior.sigma is None else "sigma"
+            raise at(f"prior.{key}", f"must have {size} values: phase, Doppler frequency and {size - 2} derivatives")
+        duration = self.burst.pulses * self.burst.pulse_period_s
+        if self.truth.times_s is not None and self.truth.times_s[-1] < duration * (1 - 1e-9):
+            raise at("truth.times_s", "must reach the end of the burst")
+        for i, estimator in enumerate(self.estimators):
+            self._check(i, estimator, duration)
+        return self
+
+    def _check(self, i: int, estimator: Estimator, duration: float) -> None:
+        if estimator.schedule != "designed" and estimator.schedule[-1] > duration * (1 + 1e-9):
+            raise at(f"estimators.{i}.schedule", "must not reach beyond the burst")
+        if estimator.method == "ridge" and self.burst.pulse_length_s > 1.5 * self.burst.sampling_period_s:
+            raise at(f"estimators.{i}.method", "ridge needs one sample a pulse")
+        if estimator.method == "ridge" and self.burst.pulses < 1024:
+            raise at(f"estimators.{i}.method", "ridge needs at least 1024 pulses")
+        if self.engine == "block_sums" and self.needs_samples(estimator):
+            raise at("engine", f"block_sums cannot serve estimator {estimator.name}: it needs the samples")
+
+    def needs_samples(self, estimator: Estimator) -> bool:
+        """Whether an estimator looks at more than the block sums tell."""
+        return estimator.method == "ridge" or estimator.amplitude != "known" or self.truth.times_s is not None

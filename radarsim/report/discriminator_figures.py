@@ -1,0 +1,170 @@
+"""P4's figures: residuals against the window (figure 2), locks, accuracy, and the maps of where the sequence locks."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import tables as common
+from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
+
+SYMBOLS = {
+    "phi0": ("$|\\Delta\\varphi_0|$, rad", "phase"),
+    "f0": ("$|\\Delta f_0|$, Hz", "Doppler frequency"),
+    "f1": ("$|\\Delta f_1|$, Hz/s", "first derivative"),
+    "f2": ("$|\\Delta f_2|$, Hz/s²", "second derivative"),
+    "f3": ("$|\\Delta f_3|$, Hz/s³", "third derivative"),
+    "f4": ("$|\\Delta f_4|$, Hz/s⁴", "fourth derivative"),
+}
+KEYS = {
+    "burst.noise_variance": "noise variance $\\sigma^2$",
+    "prior.scale": "prior spread over the paper's",
+    "prior.error_scale": "true over believed prior error",
+    "lock_probability": "$P_\\Delta$",
+    "density": "density of windows",
+    "steps": "scoring steps a window",
+}
+WINDOW = "window length, s"
+MOST_LINES = 9
+
+
+def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
+    """residuals, locks and accuracy of the first case without a sweep; a figure for each family of swept cases."""
+    drawn: dict[str, Figure] = {}
+    plain = [result for result in results if not result.swept]
+    if plain:
+        drawn |= {"residuals": residuals(plain[0], made), "locks": locks(plain[0], made)}
+        drawn["accuracy"] = accuracy(plain[0], made)
+    for keys, members in swept_families(results).items():
+        name = "_".join(["lock", *(key.split(".")[-1] for key in keys)])
+        if len(keys) == 1:
+            drawn[name] = lock_against(name, keys[0], members, made)
+        elif len(keys) == 2:
+            drawn[name] = lock_map(name, keys, members, made)
+    return drawn
+
+
+def swept_families(results: Sequence[CaseResult]) -> dict[tuple[str, ...], list[CaseResult]]:
+    """Swept cases by the keys they differ in."""
+    found: dict[tuple[str, ...], list[CaseResult]] = {}
+    for result in results:
+        if result.swept:
+            found.setdefault(tuple(key for key, _ in result.swept), []).append(result)
+    return found
+
+
+def residuals(result: CaseResult, made: Mapping) -> Figure:
+    """The paper's figure 2 over all realisations: window lengths, and |error| of each component against them."""
+    name = result.axes.filters[0]
+    rows = common.groups(made["residuals"], "case", "filter", "component")
+    windows = common.groups(made["windows"], "case", "filter")[(result.name, name)]
+    k, t = windows["k"].to_numpy(float), windows["t_s"].to_numpy(float)
+    drawn = [Panel(Axis("window $k$"), Axis("$T_k$, s", "log"), (Line(k, t, "", Style(0, 0, 0)),), "a", direct=False)]
+    for letter, (component, _) in zip("bcdefg", result.axes.components, strict=False):
+        own = rows[(result.name, name, component)]
+        t, middle, low, high, bound = (
+            own[column].to_numpy(float) for column in ("t_s", "median", "q05", "q95", "posterior_sigma")
+        )
+        marks = (
+            Line(t, middle, "median", Style(0, 0, 0), low, high),
+            Line(t, 3.0 * bound, "3σ", Style(1, 1)),
+        )
+        drawn.append(
+            Panel(
+                Axis(WINDOW, "log"),
+                Axis(SYMBOLS[component][0], "log"),
+                marks,
+                letter,
+                direct=False,
+                legend="lower left",
+            )
+        )
+    caption = (
+        f"Windows of the estimator {name!r} and the absolute error of each component against the window's length: "
+        f"median and the band from 5 to 95 % of {result.count:,} bursts, locked or not. Dashed: three times the "
+        "potential spread of the window, prior included, the paper's limit."
+    )
+    return Figure("residuals", "Errors against the window (figure 2)", caption, tuple(drawn), 3, PAGE_MM, 52.0)
+
+
+def locks(result: CaseResult, made: Mapping) -> Figure:
+    """Share of locked bursts at each window of every estimator."""
+    rows = common.groups(made["locks"], "case", "filter")
+    marks = []
+    for n, name in enumerate(result.axes.filters[:MOST_LINES]):
+        own = rows[(result.name, name)]
+        t, value, lo, hi = (own[c].to_numpy(float) for c in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
+        marks.append(Line(t, value, name, Style(n, n % 4, n), lo, hi))
+    caption = (
+        "Share of bursts with every component within five potential spreads of the window (without prior; the phase to "
+        f"the nearest turn), of {result.count:,} bursts. Bands: 95 % intervals."
+    )
+    panel = Panel(
+        Axis(WINDOW, "log"), Axis("locked", limits=(0, 1.02)), tuple(marks), direct=False, legend="center left"
+    )
+    return Figure("locks", "Locked bursts against the window", caption, (panel,), width_mm=120.0, panel_height_mm=80.0)
+
+
+def accuracy(result: CaseResult, made: Mapping) -> Figure:
+    """σ of the locked over the bound with the prior, a panel for each estimator that locks."""
+    rows = common.groups(made["curves"], "case", "filter", "component")
+    drawn = []
+    for name in result.axes.filters:
+        marks: list = [Reference(1.0)]
+        for n, (component, _) in enumerate(result.axes.components):
+            own = rows.get((result.name, name, component))
+            if own is None or len(own) < 2:
+                continue
+            t, bound = own["t_s"].to_numpy(float), own["posterior_sigma"].to_numpy(float)
+            value, lo, hi = (own[c].to_numpy(float) / bound for c in ("sigma", "sigma_lo", "sigma_hi"))
+            marks.append(Line(t, value, component, Style(n, n % 4, n), lo, hi))
+        if len(marks) > 1:
+            axis = Axis("$\\sigma$ / bound", limits=(0.9, 1.3))
+            drawn.append(Panel(Axis(WINDOW, "log"), axis, tuple(marks), name, direct=False, legend="upper right"))
+    caption = (
+        "Root-mean-square error of the locked bursts over the potential spread of the window, prior included. "
+        f"Bands: 95 % intervals. {result.count:,} bursts; lock is judged at five spreads without prior."
+    )
+    columns = min(3, max(1, len(drawn)))
+    return Figure("accuracy", "Accuracy of the locked bursts", caption, tuple(drawn), columns, PAGE_MM, 52.0)
+
+
+def final(made: Mapping, result: CaseResult, name: str):
+    """The row of locks at the last window of an estimator."""
+    rows = made["locks"]
+    return rows[(rows["case"] == result.name) & (rows["filter"] == name)].iloc[-1]
+
+
+def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mapping) -> Figure:
+    """Lock at the end of the burst against one swept key, a line for each estimator."""
+    x = np.array([float(member.swept[0][1]) for member in members])
+    order, marks = np.argsort(x), [Reference(0.99, label="0.99")]
+    for n, estimator in enumerate(members[0].axes.filters):
+        ends = [final(made, members[i], estimator) for i in order]
+        value, lo, hi = (np.array([row[c] for row in ends], float) for c in ("lock_rate", "lock_lo", "lock_hi"))
+        marks.append(Line(x[order], value, estimator, Style(n, n % 4, n), lo, hi))
+    scale = "log" if x.min() > 0 and x.max() / x.min() > 8 else "linear"
+    caption = (
+        f"Share of bursts locked at the end of the burst against {key}, of {members[0].count:,} each. "
+        "Bands: 95 % intervals."
+    )
+    panel = Panel(
+        Axis(KEYS.get(key, key), scale), Axis("locked at the end", limits=(None, 1.02)), tuple(marks), direct=False
+    )
+    return Figure(name, f"Lock against {key}", caption, (panel,), width_mm=110.0, panel_height_mm=70.0)
+
+
+def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], made: Mapping) -> Figure:
+    """Lock at the end over two swept keys, a map for each estimator."""
+    x, y = (np.array(sorted({float(member.swept[i][1]) for member in members})) for i in (0, 1))
+    drawn = []
+    for estimator in members[0].axes.filters:
+        values = np.full((len(y), len(x)), np.nan)
+        for member in members:
+            column, row = (np.searchsorted(a, float(member.swept[i][1])) for i, a in ((0, x), (1, y)))
+            values[row, column] = final(made, member, estimator)["lock_rate"]
+        marks = (Heat(x, y, values, "locked at the end"),)
+        drawn.append(Panel(Axis(KEYS.get(keys[0], keys[0])), Axis(KEYS.get(keys[1], keys[1])), marks, estimator))
+    caption = f"Share of bursts locked at the end, over {keys[0]} and {keys[1]}, of {members[0].count:,} in each cell."
+    columns = min(2, len(drawn))
+    return Figure(name, "Where the sequence locks", caption, tuple(drawn), columns, PAGE_MM, 70.0)

@@ -1,0 +1,298 @@
+"""P4 (Uss, Baryshev & Djavad 2010): Doppler frequency and its derivatives from one burst, and how often they lock."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from radarsim.config.load import Case
+from radarsim.engine.moments import Layout
+from radarsim.engine.results import Axes
+from radarsim.exact import burst as exact
+from radarsim.filters import discriminator as schedules
+from radarsim.filters import discriminator_plan as plans
+from radarsim.kernels import discriminator as kernels
+from radarsim.kernels.discriminator_data import BLOCK_SUMS, DEMODULATED, SAMPLES
+from radarsim.kernels.discriminator_scoring import SIZE
+from radarsim.models import burst as model
+from radarsim.studies import noise_key
+
+COMPONENTS = (("phi0", "rad"), ("f0", "Hz"), ("f1", "Hz/s"), ("f2", "Hz/s2"), ("f3", "Hz/s3"), ("f4", "Hz/s4"))
+FILTERS = {
+    "method: sequence": "discriminators over windows that grow to the whole burst, Fisher scoring in each",
+    "method: ridge": "the classical rival: short-time spectrum, robust fit, unwrapping, then scoring; no prior",
+}
+BLOCK = 256  # 20 ms with nine estimators on block sums, some seconds on samples
+MODES = {"block_sums": BLOCK_SUMS, "samples": SAMPLES, "demodulated": DEMODULATED}
+BLOCKS_PER_WINDOW = {BLOCK_SUMS: 16, SAMPLES: 16, DEMODULATED: 32}  # 0.016 and 0.024 potential σ from every sample's
+LOCKS = 6  # see kernels.discriminator.accumulate
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that a block needs; arrays as in `kernels.discriminator.estimate_block` and `accumulate`."""
+
+    layout: Layout
+    axes: Axes
+    world: plans.World
+    windows: np.ndarray
+    options: np.ndarray
+    keys: np.ndarray
+    truth: np.ndarray
+    prior_sigma: np.ndarray
+    potential: np.ndarray
+    posterior: np.ndarray
+    ridges: tuple[int, ...]
+    block: int = BLOCK
+
+
+@dataclass(frozen=True)
+class Phase:
+    """The echo's phase: in turns at every sample, and its parameters θ, which for a profile are the best fit."""
+
+    turns: np.ndarray
+    reference: np.ndarray
+    theta: np.ndarray
+
+
+def burst_of(spec) -> model.Burst:
+    """The configured burst."""
+    b = spec.burst
+    return model.Burst(
+        b.carrier_hz,
+        b.pulse_period_s,
+        b.pulse_length_s,
+        b.sampling_period_s,
+        b.pulses,
+        b.amplitude,
+        b.noise_variance,
+        b.samples == "complex",
+    )
+
+
+def phase_of(spec, burst: model.Burst) -> Phase:
+    """The configured truth."""
+    t, truth = model.sample_times(burst, burst.pulses), spec.truth
+    if truth.doppler_derivatives is not None:
+        theta = np.array([truth.phase_rad, *truth.doppler_derivatives])
+        turns = model.phase_turns(theta, t)
+        return Phase(turns, turns, theta)
+    profile = model.VelocityProfile(truth.times_s, truth.velocities_mps)
+    turns = profile.phase_turns(t, burst.wavelength_m, truth.phase_rad)
+    theta = model.fitted_parameters(turns, t, truth.parameters)
+    return Phase(turns, model.phase_turns(theta, t), theta)
+
+
+def forecast(spec, burst: model.Burst) -> np.ndarray:
+    """Standard deviations (size,) of the forecast as the estimators believe them."""
+    given = np.array(spec.prior.given) * spec.prior.scale
+    if spec.prior.sigma is None:
+        given = given * exact.spreads(exact.fisher(burst, len(given), burst.duration_s))
+    return given
+
+
+def windows_of(estimator, designer: schedules.Designer, burst: model.Burst) -> list[int]:
+    """Window lengths of an estimator in pulses."""
+    if estimator.method == "ridge":
+        return [burst.pulses]
+    if estimator.schedule == "designed":
+        least = exact.shortest_window(burst, estimator.minimum_energy_ratio) if estimator.minimum_energy_ratio else 0.0
+        windows = designer.windows(least)
+    else:
+        windows = sorted({burst.pulses_in(duration) for duration in estimator.schedule})
+    return schedules.denser(windows, estimator.density)[: estimator.first_windows]
+
+
+def mode_of(spec) -> int:
+    """The engine: as configured, or block sums where every estimator can be served by them."""
+    if spec.engine != "auto":
+        return MODES[spec.engine]
+    return SAMPLES if any(spec.needs_samples(e) for e in spec.estimators) else BLOCK_SUMS
+
+
+def prepare(case: Case) -> Plan:
+    """Schedules, block sums' law, step matrices and bounds of a case."""
+    spec = case.spec
+    burst, mode = burst_of(spec), mode_of(spec)
+    phase, sigma = phase_of(spec, burst), forecast(spec, burst)
+    size = len(sigma)
+    designers = [
+        schedules.Designer(
+            burst,
+            sigma,
+            partial(exact.fisher, burst, size),
+            schedules.Condition(e.lock_probability, e.main_lobe_threshold, e.tail),
+        )
+        for e in spec.estimators
+    ]
+    windows = [windows_of(e, d, burst) for e, d in zip(spec.estimators, designers, strict=True)]
+    every = sorted({w for own in windows for w in own})
+    edges = plans.block_edges(every, spec.blocks_per_window or BLOCKS_PER_WINDOW[mode])
+    world = plans.world(burst, mode, edges, every, phase.turns, phase.reference)
+    designs = [design_of(e, w) for e, w in zip(spec.estimators, windows, strict=True)]
+    records, options = plans.estimators(
+        designs, edges, burst, sigma, partial(exact.fisher_sum, burst, size), designers[0]
+    )
+    whole = np.ones(SIZE)
+    whole[:size] = model.turns_per_parameter(size, burst.duration_s)
+    potential, posterior = bounds(burst, windows, phase.theta, sigma)
+    count, most = records.shape
+    return Plan(
+        layout=Layout(
+            error=(count, most, size, 4),
+            error_all=(count, most, size, 4),
+            locks=(count, most, LOCKS),
+            residuals=(count, most, size, kernels.BINS),
+            passes=(count, 2),
+        ),
+        axes=axes(spec, burst, windows, phase, sigma, potential, posterior),
+        world=world,
+        windows=records,
+        options=options,
+        keys=np.stack([noise_key(case, "noise"), noise_key(case, "prior")]),
+        truth=padded(phase.theta) * whole,
+        prior_sigma=padded(sigma) * whole * spec.prior.error_scale,
+        potential=padded(potential, 1.0) * whole,
+        posterior=padded(posterior, 1.0) * whole,
+        ridges=tuple(i for i, e in enumerate(spec.estimators) if e.method == "ridge"),
+    )
+
+
+def padded(values: np.ndarray, filling: float = 0.0) -> np.ndarray:
+    """The last axis filled up to the kernels' six coefficients."""
+    missing = SIZE - values.shape[-1]
+    return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, missing)], constant_values=filling)
+
+
+def design_of(estimator, windows: list[int]) -> plans.Design:
+    """An estimator as the kernels' options."""
+    return plans.Design(
+        windows=tuple(windows),
+        phases=estimator.phases,
+        steps=estimator.steps,
+        tolerance=estimator.tolerance,
+        coherent=estimator.coherence_step,
+        search=estimator.search_points,
+        spacing=estimator.search_spacing_rad,
+        margin=estimator.search_margin,
+        from_truth=estimator.start == "truth",
+        amplitude=("known", "estimated", "as_printed").index(estimator.amplitude),
+        forecast=estimator.method == "sequence",
+    )
+
+
+def bounds(burst, windows, theta, sigma) -> tuple[np.ndarray, np.ndarray]:
+    """Potential spreads (F, K, size) of each window without and with the prior; ones where there is no window."""
+    size, most = len(sigma), max(map(len, windows))
+    shape = (len(windows), most, size)
+    potential, posterior = np.ones(shape), np.ones(shape)
+    found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+    for f, own in enumerate(windows):
+        for k, window in enumerate(own):
+            if window not in found:
+                information = exact.fisher_sum(burst, size, window, theta)
+                known = np.diag(plans.phase_prior(sigma))
+                found[window] = exact.spreads(information), exact.spreads(information + known)
+            potential[f, k], posterior[f, k] = found[window]
+    return potential, posterior
+
+
+def axes(spec, burst, windows, phase: Phase, sigma, potential, posterior) -> Axes:
+    """Labels: filters are the estimators, scans their windows; each has window lengths of its own, in extra."""
+    names, size = tuple(e.name for e in spec.estimators), len(sigma)
+    most = max(map(len, windows))
+    durations = np.full((len(names), most), np.nan)
+    for f, own in enumerate(windows):
+        durations[f, : len(own)] = np.array(own) * burst.pulse_period_s
+    available = np.repeat(np.isfinite(durations)[..., None], size, axis=2)
+    whole = exact.fisher(burst, size, burst.duration_s)
+    return Axes(
+        filters=names,
+        components=COMPONENTS[:size],
+        k=np.arange(1, most + 1),
+        t_s=durations[int(np.argmax([len(own) for own in windows]))],
+        available=available,
+        baseline=0,
+        exact_sigma=np.where(available, potential, np.nan),
+        exact_bias=np.where(available, 0.0, np.nan),
+        extra={
+            "duration_s": durations,
+            "pulses": tuple(tuple(own) for own in windows),
+            "posterior_sigma": np.where(available, posterior, np.nan),
+            "prior_sigma": sigma,
+            "potential_closed_form": exact.spreads(whole),
+            "potential_covariance": model.balanced_inverse(whole),
+            "energy_ratio": exact.energy_ratio(burst, 1.0) * durations,
+            "bin_edges": kernels.bin_edges(),
+            "burst_s": burst.duration_s,
+            "shortest_window_s": exact.shortest_window(burst),
+            "model_error_turns": float(np.sqrt(np.mean((phase.turns - phase.reference) ** 2))),
+            "model_error_hz": doppler_error(burst, phase),
+        },
+    )
+
+
+def doppler_error(burst: model.Burst, phase: Phase) -> float:
+    """Root-mean-square difference in Hz between the true Doppler frequency and that of the fitted parameters."""
+    rest = (phase.turns - phase.reference)[0]
+    return float(np.sqrt(np.mean((np.diff(rest) / burst.pulse_period_s) ** 2)))
+
+
+def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
+    """Sums of one block, in the order of the plan's layout."""
+    errors, passes = estimate(plan, first, count)
+    sums = {name: np.zeros(shape) for name, shape in plan.layout.shapes.items()}
+    kernels.accumulate(
+        errors,
+        plan.layout.shapes["error"][2],
+        plan.options,
+        plan.potential,
+        plan.posterior,
+        sums["error"],
+        sums["error_all"],
+        sums["locks"],
+        sums["residuals"],
+    )
+    sums["passes"][:, 0], sums["passes"][:, 1] = passes.sum(axis=0), (passes**2).sum(axis=0)
+    return plan.layout.pack(**sums)
+
+
+def estimate(plan: Plan, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Errors (count, F, K, 6) in turns over the burst and passes (count, F) of bursts first, first + 1, …."""
+    shape = plan.windows.shape
+    errors, passes = np.zeros((count, *shape, SIZE)), np.zeros((count, shape[0]), np.int64)
+    world = plan.world
+    kernels.estimate_block(
+        world.physics,
+        world.edges,
+        world.clean,
+        world.mean,
+        world.factor,
+        plan.windows,
+        plan.options,
+        plan.keys,
+        first,
+        plan.truth,
+        plan.prior_sigma,
+        errors,
+        passes,
+    )
+    for f in plan.ridges:
+        _follow_ridges(plan, f, first, errors, passes)
+    return errors, passes
+
+
+def _follow_ridges(plan: Plan, f: int, first: int, errors: np.ndarray, passes: np.ndarray) -> None:
+    """The classical rival's errors and passes: its start is found outside the kernels, burst by burst."""
+    from radarsim.filters.ridge import Ridge
+
+    physics, clean = plan.world.physics, plan.world.clean
+    follow = Ridge(int(physics["pulses"]), plan.layout.shapes["error"][2])
+    samples = np.empty(clean.shape)
+    for i in range(len(errors)):
+        kernels.draw_samples(physics, plan.keys[0], first + i, clean, samples)
+        received = samples[0] + 1j * samples[1] if physics["complex_samples"] else samples[0]
+        start = padded(follow(received))
+        passes[i, f] = kernels.polish(
+            physics, samples, plan.windows[f], plan.options[f], start, plan.truth, errors[i, f]
+        )
