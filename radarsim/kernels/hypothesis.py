@@ -35,11 +35,12 @@ WAIT = TRANSITION + MOST * MOST  # seconds since the last plot
 ESTIMATE = WAIT + 1  # the last output mean
 NOISE = ESTIMATE + 9  # measurement covariance at the prediction
 SURPRISE = NOISE + 6  # normalised innovation squared of the hypothesis that was thought most probable before the plot
-WORK = SURPRISE + 1
+MERGED = SURPRISE + 1  # hypotheses that went into merges of more than one, and the number of such merges, in a scan
+WORK = MERGED + 2
 
 PLOT = 10  # rows of a plot: position x, y, z; covariance xx, xy, xz, yy, yz, zz; 1 where detected, else 0
-VARIANCE, POSITION, MODELS, INNOVATION = 9, 18, 21, 26  # rows of an output after the mean: see `output`
-OUTPUT = 28
+VARIANCE, POSITION, MODELS, INNOVATION, MERGES = 9, 18, 21, 26, 27  # rows of an output after the mean: see `output`
+OUTPUT = 29
 
 
 def work_arrays() -> tuple[np.ndarray, np.ndarray]:

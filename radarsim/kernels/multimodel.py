@@ -15,6 +15,8 @@ from radarsim.kernels.hypothesis import (
     HYPOTHESIS,
     INNOVATION,
     MEAN,
+    MERGED,
+    MERGES,
     MODEL,
     MODELS,
     MOST,
@@ -70,13 +72,17 @@ def shared(work, listed, first, size, group, main, rule):
         group = where_greater(least, group, full(1.0), group)
     if rule != MOMENT:
         group = kept_only(work, size, main, rule)
-    scale, count = 1.0 / group, 0
+    scale, count, one, inside = 1.0 / group, 0, full(1.0), nothing
     for j in range(size):
         w = get(work, WEIGHT + j)
         if any_greater(w, nothing):
             put(work, SHARE + count, w * scale)
             listed[count] = first + j * HYPOTHESIS
             count += 1
+            inside = inside + where_greater(w, nothing, one, nothing)
+    if count > 1:
+        put(work, MERGED, get(work, MERGED) + where_greater(inside, one, inside, nothing))
+        put(work, MERGED + 1, get(work, MERGED + 1) + where_greater(inside, one, one, nothing))
     return count
 
 
@@ -266,6 +272,7 @@ def output(work, listed, bank, size, rule, everything, out):
 
     Mean (9); where `everything`: variances (9) from VARIANCE, position covariances xy, xz, yz from POSITION, probabilities
     from MODELS; at INNOVATION the normalised innovation squared of what was thought most probable before the plot.
+    (The rows from MERGES on, hypotheses merged and merges, are written at the end of the scan.)
     """
     for j in range(size):
         put(work, WEIGHT + j, get(work, bank + j * HYPOTHESIS + PROBABILITY))
@@ -366,11 +373,15 @@ def run_strip(
         if rules[3] == 1:
             noise = row(work, NOISE)
             noise_at_prediction(frame, row(work, ESTIMATE), get(work, WAIT), noise)
+        put(work, MERGED, full(0.0))
+        put(work, MERGED + 1, full(0.0))
         old, new = numbers[0] * BANK, (1 - numbers[0]) * BANK
         step(work, listed, old, new, size, family, rule, plot, noise)
         output(work, listed, new, size, rules[2], everything[k] == 1, to)
         if family == GPB1:
             merge_gpb1(work, listed, old, new, size, rule)
+        put(to, MERGES, get(work, MERGED))
+        put(to, MERGES + 1, get(work, MERGED + 1))
         if rules[3] == 1:
             for i in range(9):
                 put(work, ESTIMATE + i, where_greater(detected, full(0.5), get(to, i), get(work, ESTIMATE + i)))

@@ -8,6 +8,7 @@ from radarsim.kernels.blocks import dot, inverse, times_symmetric
 from radarsim.kernels.compile import inline, kernel
 from radarsim.kernels.hypothesis import (
     INNOVATION,
+    MERGES,
     MODELS,
     MOST,
     OUTPUT,
@@ -21,7 +22,8 @@ from radarsim.kernels.multimodel import run_strip, start
 from radarsim.kernels.multimodel_plots import RANDOM, STRIP, draw_strip, make_plots
 
 START = 3  # plots that a track is started from
-STAGE = 12  # rows of a stage: sums of nine squared errors, of NEES, of NIS, number of plots; then the mean of each but the last
+STAGE = 14  # rows of a stage: sums of nine squared errors, NEES, NIS, hypotheses merged, merges; number of plots
+MEANS, NEES, NIS, PLOTS = 13, 9, 10, 13
 
 
 @inline
@@ -70,11 +72,13 @@ def add_to_stage(out, plot, truth, everything, stage):
         e = get(out, c) - truth[c]
         put(stage, c, get(stage, c) + e * e)
     detected = get(plot, 9)
-    put(stage, 10, get(stage, 10) + detected * get(out, INNOVATION))
-    put(stage, 11, get(stage, 11) + detected)
+    put(stage, NIS, get(stage, NIS) + detected * get(out, INNOVATION))
+    put(stage, PLOTS, get(stage, PLOTS) + detected)
+    for i in range(2):
+        put(stage, NIS + 1 + i, get(stage, NIS + 1 + i) + get(out, MERGES + i))
     if everything:
         e = get(out, 0) - truth[0], get(out, 3) - truth[3], get(out, 6) - truth[6]
-        put(stage, 9, get(stage, 9) + believed_error(out, e))
+        put(stage, NEES, get(stage, NEES) + believed_error(out, e))
 
 
 @kernel
@@ -82,23 +86,23 @@ def close_stages(stages, filters, count, lengths, baseline, counted, sums, pairs
     """Add each realisation's means over each stage to the sums, and the products with the baseline's.
 
     stages: rows of all filters, STAGE for each stage; lengths (count, 2): scans of a stage, and those with covariances;
-    sums (F, S, 11, 2): of nine squared errors, NEES, NIS; pairs (F, S, 9).
+    sums (F, S, MEANS, 2): of nine squared errors, NEES, NIS, hypotheses merged, merges; pairs (F, S, 9).
     """
     for s in range(count):
         for f in range(filters):
             own = row(stages, (f * count + s) * STAGE)
-            for c in range(11):
-                length = full(max(lengths[2 * s + (1 if c == 9 else 0)], 1.0))
-                if c == 10:
-                    length = where_greater(get(own, 11), full(0.5), get(own, 11), full(1.0))
+            for c in range(MEANS):
+                length = full(max(lengths[2 * s + (1 if c == NEES else 0)], 1.0))
+                if c == NIS:
+                    length = where_greater(get(own, PLOTS), full(0.5), get(own, PLOTS), full(1.0))
                 put(own, c, get(own, c) / length)
         base = row(stages, (baseline * count + s) * STAGE)
         for f in range(filters):
             own, at = row(stages, (f * count + s) * STAGE), f * count + s
-            for c in range(11):
+            for c in range(MEANS):
                 x = counted * get(own, c)
-                sums[(at * 11 + c) * 2] += total(x)
-                sums[(at * 11 + c) * 2 + 1] += total(x * x)
+                sums[(at * MEANS + c) * 2] += total(x)
+                sums[(at * MEANS + c) * 2 + 1] += total(x * x)
             for c in range(9):
                 pairs[at * 9 + c] += total(counted * get(own, c) * get(base, c))
 
@@ -164,7 +168,8 @@ class MultimodelSums(NamedTuple):
     """Sums over realisations, K' reported scans, S stages.
 
     error (F, K', 9, 4): e, e², e³, e⁴; paired (F, K', 9): with the baseline's e²; probability (F, K', MOST, 2); believed
-    (F, K', 2): NEES; stage (F, S, 11, 2): means over the stage of nine squared errors, NEES, NIS; pairs (F, S, 9).
+    (F, K', 2): NEES; stage (F, S, MEANS, 2): means over the stage of nine squared errors, NEES, NIS, hypotheses merged, merges; pairs
+    (F, S, 9).
     """
 
     error: np.ndarray

@@ -1,0 +1,228 @@
+"""Keys of the multimodel study (P2): a radar in biconical coordinates, a flight, filters with banks of motion models."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from radarsim.config.fields import (
+    DataFile,
+    Design,
+    Display,
+    Flag,
+    Model,
+    Name,
+    NameIn,
+    NonNegative,
+    Number,
+    Positive,
+    Probability,
+    Scenario,
+    Study,
+    at,
+    unique_names,
+    whole,
+)
+
+MOST_SCANS = 100_000
+MOST_MODELS = 5
+WIDEST_RAD = 0.0873  # 5 degrees: nine sigma stay within the 45 degrees up to which a plot's angle is turned exactly
+COLUMN_TOLERANCE = 1e-6  # of the sum of a column of the transition matrix: three printed figures fall short by less
+LONGEST_INTERVAL_S = 60.0
+MOST_DURATION_S = 3600.0
+Angle = Annotated[Number, Field(ge=-6.3, le=6.3)]
+Wide = Annotated[Positive, Field(le=WIDEST_RAD)]
+Point = Annotated[tuple[Number, Number, Number], Field()]
+Acceleration = Annotated[Number, Field(ge=-2000, le=2000)]
+
+
+class Sensor(Model):
+    """A radar with a flat antenna: accuracies of a plot, its period, where the antenna looks."""
+
+    name: Annotated[Name | None, Display()] = Field(None, description="display name")
+    sigma_range_m: Positive | None = Field(None, description="standard deviation of a measured range, m")
+    sigma_elevation_rad: Wide | None = Field(None, description="of the biconical elevation asin(y_A / r), rad")
+    sigma_azimuth_rad: Wide | None = Field(None, description="of the biconical azimuth asin(z_A / r), rad")
+    sigma_x_m: Positive | None = Field(None, description="of x (north), m: for plots measured in the local frame")
+    sigma_y_m: Positive | None = Field(None, description="of y (up), m")
+    sigma_z_m: Positive | None = Field(None, description="of z (east), m")
+    scan_period_s: Annotated[Positive, Field(le=LONGEST_INTERVAL_S)] = Field(description="time between two plots, s")
+    jitter_s: NonNegative = Field(0.0, description="each scan comes earlier or later by up to this, drawn once, s")
+    antenna_azimuth_rad: Angle = Field(0.0, description="of the antenna's normal, from north to east, rad")
+    antenna_elevation_rad: Angle = Field(0.0, description="of the antenna's normal above the horizon, rad")
+    antenna_height_m: Number = Field(0.0, description="of the phase centre above the origin, m")
+    detection_probability: Annotated[Probability, Field(gt=0)] = Field(
+        1.0, description="probability that the plot of a scan comes; the three that start the track always do"
+    )
+    conversion: Annotated[Literal["plain", "unbiased"], Design()] = Field(
+        "plain", description="of plots to the local frame: as in the paper, or with its mean error taken off"
+    )
+
+    @model_validator(mode="after")
+    def _one_frame(self):
+        biconical = [self.sigma_range_m, self.sigma_elevation_rad, self.sigma_azimuth_rad]
+        local = [self.sigma_x_m, self.sigma_y_m, self.sigma_z_m]
+        if biconical.count(None) + local.count(None) != 3 or None in biconical and None in local:
+            raise at(
+                "sigma_range_m",
+                "give sigma_range_m, sigma_elevation_rad, sigma_azimuth_rad, or else sigma_x_m, sigma_y_m, sigma_z_m",
+            )
+        if 2 * self.jitter_s >= self.scan_period_s:
+            raise at("jitter_s", "must be under half the scan period")
+        return self
+
+    @property
+    def sigma(self) -> tuple[float, float, float]:
+        """Of range (m), elevation and azimuth (rad), or of x, y, z (m)."""
+        if self.sigma_range_m is None:
+            return self.sigma_x_m, self.sigma_y_m, self.sigma_z_m
+        return self.sigma_range_m, self.sigma_elevation_rad, self.sigma_azimuth_rad
+
+
+class Stage(Model):
+    """A named part of the flight, up to a time."""
+
+    name: Name = Field(description="start, ballistic, steady, manoeuvre, after, …")
+    end_s: Positive | None = Field(None, description="when it ends, s from the first plot; only the last has no end")
+
+
+Stages = Annotated[tuple[Stage, ...], Field(min_length=1, max_length=12), AfterValidator(unique_names)]
+
+
+class Target(Model):
+    """What all targets share: the stages by which tables are made."""
+
+    stages: Stages = Field((Stage(name="all"),), description="stages in order, the last without an end")
+
+    @model_validator(mode="after")
+    def _in_order(self):
+        ends = [stage.end_s for stage in self.stages]
+        if None in ends[:-1] or ends[-1] is not None:
+            raise at("stages", "all but the last need end_s, and only they")
+        if any(b <= a for a, b in zip(ends[:-1], ends[1:-1], strict=False)):
+            raise at("stages", "must follow one another in time")
+        return self
+
+
+class Phase(Model):
+    """Accelerations commanded from a moment on, m/s²."""
+
+    start_s: NonNegative = Field(description="when it begins, s from the first plot")
+    lateral_mps2: Acceleration = Field(0.0, description="to the right of the velocity, level, m/s²")
+    normal_mps2: Acceleration = Field(0.0, description="upwards, normal to the velocity, m/s²")
+    axial_mps2: Acceleration = Field(0.0, description="along the velocity, m/s²")
+    period_s: Positive | None = Field(None, description="the commands follow a sine of this period, s; none: constant")
+    trimmed: Flag = Field(False, description="lift and thrust balance gravity and drag as well")
+
+
+class Flight(Target):
+    """A point mass with gravity, an exponential atmosphere, and accelerations commanded by phase."""
+
+    kind: Literal["flight"] = Field(description="an integrated flight")
+    duration_s: Annotated[Positive, Field(le=MOST_DURATION_S)] = Field(description="time from first to last plot, s")
+    position_m: Point = Field(description="north, up, east at the first plot, m")
+    velocity_mps: Point = Field(description="north, up, east at the first plot, m/s")
+    ballistic_coefficient_kgpm2: Positive = Field(1e4, description="mass / (drag coefficient · area), kg/m²")
+    lag_s: Positive = Field(1.0, description="time constant with which commands are followed, s")
+    phases: Annotated[tuple[Phase, ...], Field(min_length=1, max_length=64)] = Field(description="phases, in order")
+
+    @model_validator(mode="after")
+    def _phases_in_order(self):
+        starts = [phase.start_s for phase in self.phases]
+        if starts[0] != 0:
+            raise at("phases.0.start_s", "must be 0")
+        if any(b <= a for a, b in zip(starts, starts[1:], strict=False)):
+            raise at("phases", "must follow one another in time")
+        if self.velocity_mps == (0, 0, 0):
+            raise at("velocity_mps", "must not be zero")
+        return self
+
+
+class Recorded(Target):
+    """A flight recorded in a file, smoothed by a spline whose derivatives are the true velocity and acceleration."""
+
+    kind: Literal["recorded"] = Field(description="a flight from a CSV file with columns t_s, x_m, y_m, z_m")
+    file: Annotated[str, DataFile()] = Field(description="the file, from the folder of this one")
+
+
+AnyTarget = Annotated[Flight | Recorded, Field(discriminator="kind")]
+
+
+class MotionModel(Model):
+    """A hypothesis of how the target moves."""
+
+    motion: Literal["uniform", "accelerated", "still"] = Field(
+        description="straight at a constant velocity, with a constant acceleration, or at rest"
+    )
+    sigma_acceleration_mps2: NonNegative = Field(
+        description="standard deviation of the random acceleration of each step, m/s², whatever the step's length"
+    )
+
+
+Column = Annotated[tuple[Probability, ...], Field(min_length=1, max_length=MOST_MODELS)]
+
+
+class Filter(Model):
+    """A Kalman filter, or several that share what they know."""
+
+    name: Annotated[Name, Display()] = Field(description="label, unlike that of any other filter")
+    family: Literal["kalman", "gpb1", "imm", "gpb2"] = Field(
+        description="one model; or MMA1 (GPB1), MMA2 (IMM), MMA3 (GPB2) of the paper"
+    )
+    models: Annotated[tuple[MotionModel, ...], Field(min_length=1, max_length=MOST_MODELS)] = Field(
+        description="the bank of motion models, one to five; kalman has one"
+    )
+    transition: Annotated[tuple[Column, ...], Field(min_length=1, max_length=MOST_MODELS)] = Field(
+        ((1.0,),), description="transition probabilities: row i, column j from model j to model i; columns sum to one"
+    )
+    transition_interval_s: Positive = Field(0.05, description="time for which the matrix holds, s")
+    merge: Literal["moment", "best", "combined", "modified_combined"] = Field(
+        "combined", description="rule of the partial merges: eq. (4), eq. (5), or the paper's combinations of them"
+    )
+    output: Literal["moment", "best"] = Field("best", description="rule by which the estimate is made")
+    covariance_at: Literal["plot", "prediction"] = Field(
+        "plot",
+        description="where the plot's covariance is reckoned: at the plot, as in the paper, or at its prediction",
+    )
+
+    @model_validator(mode="after")
+    def _fits_together(self):
+        size = len(self.models)
+        if self.family == "kalman" and size != 1:
+            raise at("models", f"kalman has one model, got {size}; take imm, gpb1 or gpb2")
+        if len(self.transition) != size or any(len(row) != size for row in self.transition):
+            raise at("transition", f"must be {size} rows of {size} probabilities, one for each model")
+        columns = [sum(row[j] for row in self.transition) for j in range(size)]
+        if any(abs(total - 1) > COLUMN_TOLERANCE for total in columns):
+            by_rows = all(abs(sum(row) - 1) <= COLUMN_TOLERANCE for row in self.transition)
+            hint = "; its rows do: transpose it" if by_rows else ""
+            raise at("transition", f"its columns must sum to one (column j: from model j){hint}")
+        return self
+
+
+class Multimodel(Study):
+    """Multiple-model filters on an aeroballistic target."""
+
+    sensor: Sensor = Field(description="the radar")
+    target: Annotated[AnyTarget, Scenario()] = Field(description="the target: a scenario's stem, or inline")
+    filters: Annotated[
+        tuple[Filter, ...], Field(min_length=1, max_length=32), AfterValidator(unique_names), Design()
+    ] = Field(description="the filters; all see the same plots")
+    baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
+        None, description="name of the filter that gains are against; default: the first"
+    )
+    start_acceleration_mps2: Annotated[NonNegative, Design()] = Field(
+        30.0, description="spread of the acceleration that the start of a track allows for, m/s²"
+    )
+    scans: Annotated[whole(4, MOST_SCANS) | None, Design()] = Field(
+        None, description="number of plots; default: to the end of the flight"
+    )
+    report_every: Annotated[whole(1, MOST_SCANS), Design()] = Field(
+        1, description="tables and figures keep every such scan and the last; stages are made of all"
+    )
+
+    @model_validator(mode="after")
+    def _baseline_exists(self):
+        names = [f.name for f in self.filters]
+        if self.baseline is not None and self.baseline not in names:
+            raise at("baseline", f"must be the name of a filter: {', '.join(names)}")
+        return self

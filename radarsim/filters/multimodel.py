@@ -1,0 +1,88 @@
+"""Design of multiple-model filters: banks of motion models, transition probabilities over any interval, the track start."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import expm, logm
+
+MOTIONS = {"still": (0.0, 0.0), "uniform": (1.0, 0.0), "accelerated": (1.0, 1.0)}  # with velocity, with acceleration
+COLUMN_TOLERANCE = 1e-9  # of a column's sum from one
+
+# Additions, subtractions, multiplications, divisions, roots and exponentials of one step, all three axes, counted on
+# the formulas of `kernels.blocks` and `kernels.hypothesis` (a test counts them again).
+PREDICT, UPDATE, LIKELIHOOD, MERGE, MERGE_ONCE = 282, 518, 8, 208, -9
+
+
+def bank(motions: Sequence[str], sigmas: Sequence[float]) -> np.ndarray:
+    """The models (M, 3) as a kernel takes them: moves, accelerates (0 or 1), sigma of the acceleration per step (m/s²)."""
+    return np.array([(*MOTIONS[motion], sigma) for motion, sigma in zip(motions, sigmas, strict=True)])
+
+
+def stationary(transition: np.ndarray) -> np.ndarray:
+    """Probabilities (M,) that a column-stochastic matrix (M, M) leaves as they are.
+
+    Where there are several such (a matrix that falls apart), the one that equal probabilities tend to.
+    """
+    size = len(transition)
+    mixing = (transition + np.eye(size)) / 2  # the same stationary ones, without periodic chains
+    p = np.linalg.matrix_power(mixing, 2**40) @ np.full(size, 1.0 / size)
+    p = np.maximum(p, 0.0)
+    return p / p.sum()
+
+
+def generator(transition: np.ndarray) -> np.ndarray:
+    """Rates Q (M, M) of the Markov process nearest to log P: off-diagonal ones not negative, columns summing to zero.
+
+    The paper's three-model matrix has no exact one: its zeros make P**0.9 slightly negative (-4e-7).
+    """
+    Q = np.real(logm(transition))
+    Q = np.where(np.eye(len(Q), dtype=bool), 0.0, np.maximum(Q, 0.0))
+    return Q - np.diag(Q.sum(axis=0))
+
+
+def transition_powers(transition: np.ndarray, exponents: np.ndarray) -> np.ndarray:
+    """P(m Δt) = P(Δt)**m, eq. (8), for exponents m (n,): (n, M, M), column-stochastic.
+
+    m >= 1: the real power; m < 1: expm(m Q) with the generator above, so that no probability is negative.
+    """
+    exponents = np.asarray(exponents, dtype=float)
+    powers = np.empty((len(exponents), *transition.shape))
+    whole = exponents == np.round(exponents)
+    rates = None
+    for i, m in enumerate(exponents):
+        if whole[i]:
+            powers[i] = np.linalg.matrix_power(transition, int(m))
+            continue
+        rates = generator(transition) if rates is None else rates
+        if m > 1:
+            # The whole part exactly, the rest by the generator: continuous in m and never negative.
+            powers[i] = np.linalg.matrix_power(transition, int(m)) @ expm((m - int(m)) * rates)
+        else:
+            powers[i] = expm(m * rates)
+    powers = np.maximum(powers, 0.0)
+    return powers / powers.sum(axis=1, keepdims=True)
+
+
+def start_weights(t: np.ndarray, acceleration_spread: float) -> np.ndarray:
+    """Least squares of a straight line through three plots at times t (3,): (9,) numbers, see `kernels.multimodel.start`.
+
+    The estimate at the third plot is x = Σ aₖ zₖ, v = Σ bₖ zₖ, acceleration 0. An acceleration w of the target makes
+    errors (Σ aₖ τₖ²/2, Σ bₖ τₖ²/2, -1) w, τₖ = tₖ - t₃; with w of the stated spread they enter the covariance.
+    """
+    tau = np.asarray(t, dtype=float) - t[2]
+    a, b = np.linalg.pinv(np.stack([np.ones(3), tau / -tau[0]], axis=1))
+    b = b / -tau[0]
+    bent = tau**2 / 2
+    return np.concatenate([a, b, acceleration_spread * np.array([a @ bent, b @ bent, -1.0])])
+
+
+def operations(family: str, transition: np.ndarray) -> tuple[float, float, float]:
+    """Arithmetic operations of one scan: fixed ones, and those of each merged hypothesis and of each merge.
+
+    Merges of a single hypothesis are copies and cost nothing.
+    """
+    size = len(transition)
+    advanced = np.count_nonzero(transition) if family == "gpb2" else size
+    foretold = size * (2 * size - 1) if size > 1 else 0
+    likelihoods = advanced * LIKELIHOOD if size > 1 else 0
+    return advanced * (PREDICT + UPDATE) + likelihoods + foretold, MERGE, MERGE_ONCE

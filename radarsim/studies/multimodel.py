@@ -1,0 +1,257 @@
+"""P2 (Sychev & Osipov 2023): multiple-model filters on an aeroballistic target, families × merging rules."""
+
+import csv
+from dataclasses import dataclass
+
+import numpy as np
+
+from radarsim.config.load import Case
+from radarsim.engine.moments import Layout
+from radarsim.engine.results import Axes
+from radarsim.errors import ConfigError
+from radarsim.filters import multimodel as filters
+from radarsim.kernels import multimodel as kernels
+from radarsim.kernels import multimodel_plots as plots
+from radarsim.kernels import multimodel_sums as sums
+from radarsim.kernels import random
+from radarsim.kernels.hypothesis import MOST
+from radarsim.models import flight, frames
+from radarsim.studies import noise_key
+
+COMPONENTS = tuple(
+    (f"{prefix}{axis}", unit) for axis in "xyz" for prefix, unit in (("", "m"), ("v", "m/s"), ("a", "m/s2"))
+)
+BLOCK = 64  # eight groups of eight; 0.1 s with six filters and 3725 scans
+FAMILIES = {"kalman": kernels.KALMAN, "gpb1": kernels.GPB1, "imm": kernels.IMM, "gpb2": kernels.GPB2}
+RULES = {
+    "moment": kernels.MOMENT,
+    "best": kernels.BEST,
+    "combined": kernels.COMBINED,
+    "modified_combined": kernels.MODIFIED,
+}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that a block needs; see `kernels.multimodel_sums` for the arrays."""
+
+    layout: Layout
+    axes: Axes
+    world: sums.World
+    banks: sums.Banks
+    block: int = BLOCK
+
+
+def points(path: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n,) in s and positions (n, 3) in m of a CSV file t_s,x_m,y_m,z_m; raises ConfigError by line and column."""
+    columns = ("t_s", "x_m", "y_m", "z_m")
+    with open(path, newline="", encoding="utf-8") as file:
+        reader = csv.reader(file)
+        header = next(reader, [])
+        if missing := [name for name in columns if name not in header]:
+            raise ConfigError(f"{path}:1: no column {', '.join(missing)}; needed: {', '.join(columns)}")
+        at, rows, faults = [header.index(name) for name in columns], [], []
+        for line in reader:
+            try:
+                row = [float(line[i]) for i in at]
+            except (ValueError, IndexError):
+                faults.append(f"{path}:{reader.line_num}: must be four numbers, got {','.join(line)[:60]!r}")
+                continue
+            if not np.isfinite(row).all():
+                faults.append(f"{path}:{reader.line_num}: must be finite, got {','.join(line)[:60]!r}")
+            elif rows and row[0] <= rows[-1][0]:
+                faults.append(f"{path}:{reader.line_num}: t_s must increase, got {row[0]:g} after {rows[-1][0]:g}")
+            else:
+                rows.append(row)
+    if not faults and len(rows) < 5:
+        faults.append(f"{path}: needs at least 5 points, got {len(rows)}")
+    if faults:
+        raise ConfigError(*faults[:20])
+    table = np.array(rows)
+    return table[:, 0], table[:, 1:]
+
+
+def scan_times(spec, case: Case, duration: float) -> np.ndarray:
+    """Times (K,) of the scans, s from the first plot: regular, or with a jitter drawn once from the seed."""
+    period = spec.sensor.scan_period_s
+    count = int(np.floor(duration / period * (1 + 1e-12))) + 1
+    if spec.scans is not None:
+        count = min(spec.scans, count)
+    t = np.arange(count) * period
+    if spec.sensor.jitter_s > 0:
+        a, b = np.empty(count), np.empty(count)
+        random.fill_uniform_pairs(noise_key(case, "jitter"), 0, 0, a, b)
+        t = np.clip(t + spec.sensor.jitter_s * (2 * a - 1), 0.0, duration)
+        t -= t[0]
+    return t
+
+
+def truth(case: Case) -> tuple[np.ndarray, np.ndarray]:
+    """Times (K,) and true states (K, 9) at the scans; raises ConfigError where the target is no possible one."""
+    spec, target = case.spec, case.spec.target
+    try:
+        if target.kind == "recorded":
+            times, positions = points(target.file)
+            t = scan_times(spec, case, float(times[-1] - times[0]))
+            return t, flight.recorded(times, positions, t)
+        phases = [
+            flight.Phase(p.start_s, p.lateral_mps2, p.normal_mps2, p.axial_mps2, p.period_s or 0.0, p.trimmed)
+            for p in target.phases
+        ]
+        t = scan_times(spec, case, target.duration_s)
+        if len(t) < 4:
+            raise ConfigError(f"{case.name}: target: lasts only {len(t)} scans; at least 4 are needed")
+        coefficient = target.ballistic_coefficient_kgpm2
+        return t, flight.fly(target.position_m, target.velocity_mps, coefficient, target.lag_s, phases, t)
+    except flight.Unflyable as error:
+        raise ConfigError(f"{case.name}: target: {error}") from None
+
+
+def plot_truth(case: Case, t: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """What plots are made of (K, 8): range, sine and cosine of elevation and azimuth, x, y, z.
+
+    Raises ConfigError where the target leaves the antenna's sector.
+    """
+    sensor = case.spec.sensor
+    position = x[:, 0::3]
+    if sensor.sigma_range_m is None:
+        return np.concatenate([np.zeros((len(t), 5)), position], axis=1)
+    R = frames.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
+    antenna = frames.to_antenna(position, R, sensor.antenna_height_m)
+    r = np.linalg.norm(antenna, axis=1)
+    outside = antenna[:, 0] <= r * np.sqrt(2 * plots.LEAST)
+    if outside.any():
+        when = t[np.argmax(outside)]
+        raise ConfigError(
+            f"{case.name}: target: leaves the antenna's sector at {when:.6g} s: it must stay in front of it"
+        )
+    s_e, s_a = antenna[:, 1] / r, antenna[:, 2] / r
+    return np.stack([r, s_e, np.sqrt(1 - s_e**2), s_a, np.sqrt(1 - s_a**2), *position.T], axis=1)
+
+
+def sensor_frame(sensor) -> np.ndarray:
+    """The numbers of a sensor as the kernels take them."""
+    R = frames.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
+    form = plots.BICONICAL if sensor.sigma_range_m is not None else plots.CARTESIAN
+    unbiased = sensor.conversion == "unbiased"
+    return plots.frame(R, sensor.antenna_height_m, sensor.sigma, form, unbiased, sensor.detection_probability)
+
+
+def intervals(t: np.ndarray, tolerance: float = 1e-9) -> tuple[np.ndarray, np.ndarray]:
+    """For each scan the number of its interval since the last (K,), and the different intervals (U,), s."""
+    steps = np.diff(t, prepend=t[0] - (t[1] - t[0]))
+    rounded, index = np.unique(np.round(steps / tolerance), return_inverse=True)
+    times = (
+        np.array([steps[index == u].mean() for u in range(len(rounded))]) if len(rounded) < 50 else rounded * tolerance
+    )
+    return index.astype(np.int64), times
+
+
+def banks(spec, times: np.ndarray) -> sums.Banks:
+    """The filters' arrays, padded to eights, for the different intervals times (U,)."""
+    count = len(spec.filters)
+    numbers, models = np.zeros((count, 8), dtype=np.int64), np.zeros((count, 16))
+    transitions, probabilities = np.zeros((count, -(-len(times) * MOST**2 // 8) * 8)), np.zeros((count, 8))
+    for f, options in enumerate(spec.filters):
+        size, T = len(options.models), transition(options)
+        rules = FAMILIES[options.family], RULES[options.merge], RULES[options.output]
+        numbers[f, :5] = *rules, options.covariance_at == "prediction", size
+        bank = filters.bank([m.motion for m in options.models], [m.sigma_acceleration_mps2 for m in options.models])
+        models[f, : 3 * size] = bank.ravel()
+        powers = filters.transition_powers(T, times / options.transition_interval_s)
+        transitions[f, : powers.size] = powers.ravel()
+        probabilities[f, :size] = filters.stationary(T)
+    return sums.Banks(numbers, models, transitions, probabilities)
+
+
+def transition(options) -> np.ndarray:
+    """The transition matrix (M, M) of a filter, columns summing to one exactly."""
+    T = np.array(options.transition)
+    return T / T.sum(axis=0)
+
+
+def stages(spec, t: np.ndarray, everything: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    """Stage of each scan (K,), lengths (S, 2) in scans from the third on and in reported scans, and names."""
+    parts = spec.target.stages
+    ends = np.array([stage.end_s for stage in parts[:-1]])
+    stage = np.searchsorted(ends, t, side="right").astype(np.int64)
+    counted = np.arange(len(t)) >= sums.START
+    lengths = np.array(
+        [[np.sum(counted & (stage == s)), np.sum(counted & everything & (stage == s))] for s in range(len(parts))]
+    )
+    return stage, lengths.astype(float), tuple(part.name for part in parts)
+
+
+def prepare(case: Case) -> Plan:
+    """Truth, plots' frame and banks of a case."""
+    spec = case.spec
+    t, x = truth(case)
+    count = len(t)
+    reported = np.arange(count) >= sums.START
+    reported &= ((np.arange(count) + 1) % spec.report_every == 0) | (np.arange(count) == count - 1)
+    place = np.cumsum(reported) - 1
+    stage, lengths, names = stages(spec, t, reported)
+    index, times = intervals(t)
+    shape = (len(spec.filters), int(reported.sum()))
+    world = sums.World(
+        keys=np.stack([noise_key(case, "plots"), noise_key(case, "detections")]),
+        frame=sensor_frame(spec.sensor),
+        plot_truth=plot_truth(case, t, x),
+        truth=x,
+        intervals=index,
+        times=times,
+        everything=reported.astype(np.int64),
+        place=place.astype(np.int64),
+        stage=stage,
+        lengths=lengths,
+        weights=filters.start_weights(t[:3], spec.start_acceleration_mps2),
+    )
+    return Plan(
+        layout=Layout(
+            error=(*shape, 9, 4),
+            paired=(*shape, 9),
+            probability=(*shape, MOST, 2),
+            believed=(*shape, 2),
+            stage=(shape[0], len(names), sums.MEANS, 2),
+            pairs=(shape[0], len(names), 9),
+        ),
+        axes=axes(spec, t, x, reported, names, lengths),
+        world=world,
+        banks=banks(spec, times),
+    )
+
+
+def axes(spec, t: np.ndarray, x: np.ndarray, reported: np.ndarray, names: tuple[str, ...], lengths: np.ndarray) -> Axes:
+    """Labels of the sums; nothing of this study is known exactly."""
+    shape = (len(spec.filters), int(reported.sum()), 9)
+    labels = tuple(f.name for f in spec.filters)
+    unknown = np.full(shape, np.nan)
+    return Axes(
+        filters=labels,
+        components=COMPONENTS,
+        k=np.flatnonzero(reported) + 1,
+        t_s=t[reported],
+        available=np.ones(shape, dtype=bool),
+        baseline=labels.index(spec.baseline) if spec.baseline else 0,
+        exact_sigma=unknown,
+        exact_bias=unknown,
+        extra={
+            "truth": x[reported],
+            "stages": names,
+            "stage_ends_s": np.array([stage.end_s for stage in spec.target.stages[:-1]]),
+            "lengths": lengths,
+            "families": tuple(f.family for f in spec.filters),
+            "rules": tuple(f.merge for f in spec.filters),
+            "models": tuple(tuple(f"{m.motion} {m.sigma_acceleration_mps2:g}" for m in f.models) for f in spec.filters),
+            "transitions": tuple(transition(f) for f in spec.filters),
+            "operations": np.array([filters.operations(f.family, transition(f)) for f in spec.filters]),
+        },
+    )
+
+
+def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
+    """Sums of one block, in the order of the plan's layout."""
+    arrays = sums.MultimodelSums(*(np.zeros(plan.layout.shapes[name]) for name in sums.MultimodelSums._fields))
+    memory = sums.memory(len(plan.banks.numbers), len(plan.world.lengths))
+    sums.simulate_block(plan.world, plan.banks, memory, arrays, plan.axes.baseline, first, count)
+    return plan.layout.pack(**arrays._asdict())
