@@ -1,0 +1,141 @@
+"""All outputs of an experiment: what is written, whole or not at all, and what its report says."""
+
+import hashlib
+import json
+import re
+from html.parser import HTMLParser
+
+import pandas as pd
+import pytest
+from markupsafe import escape
+
+from radarsim.config.load import load
+from radarsim.errors import StoreError
+from radarsim.report import files, output
+
+TABLES = {"curves.csv", "gains.csv", "steady.csv", "consistency.csv", "radar.csv", "claims.csv"}
+FIGURES = {f"figures/{k}_{c}.{f}" for k in ("sigma", "gain") for c in ("r", "Vr", "ar") for f in ("svg", "png")}
+RUN = {"stop": "done", "threads": 2, "seconds": 1.5, "warnings": ["watch out"], "identities": {"rls2": "ab"}}
+
+
+HOSTILE = "<script>alert('x')</script> & \"{{ 1 }}\""
+
+
+@pytest.fixture(scope="module")
+def experiment(radar_config):
+    filters = radar_config("rls2")["filters"]
+    filters[0]["name"] = HOSTILE
+    return load(radar_config("rls2", filters=filters, radar={"name": HOSTILE}))
+
+
+@pytest.fixture(scope="module")
+def results(experiment, expected_case):
+    return [expected_case(case) for case in experiment.cases]
+
+
+@pytest.fixture(scope="module")
+def written(experiment, results, tmp_path_factory):
+    """All outputs, figures too, of an experiment whose names are hostile."""
+    return output.write(experiment, results, tmp_path_factory.mktemp("out") / "rls2", RUN)
+
+
+class Page(HTMLParser):
+    """Tags and addresses of a page; fails on a tag that is not closed."""
+
+    VOID = ("meta", "br", "link", "img")
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.addresses = [], [], []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.addresses += [value for name, value in attrs if name in ("src", "href", "xlink:href", "action")]
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags.append(tag)
+        self.addresses += [value for name, value in attrs if name in ("src", "href", "xlink:href", "action")]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_everything_is_written(written):
+    folder = written.folder
+    found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
+    assert found == TABLES | FIGURES | {"run.json", "report.html"} == set(written.files)
+    record = json.loads((folder / "run.json").read_bytes())
+    for path, digest in record["outputs"].items():
+        assert hashlib.sha256((folder / path).read_bytes()).hexdigest() == digest
+    assert set(record["outputs"]) == found - {"run.json"}
+    assert record["realisations_asked"] == record["realisations_done"] == 100_000
+    assert record["stop"] == "done"
+    assert record["warnings"] == ["watch out"]
+    assert record["identities"] == {"rls2": "ab"}
+    assert re.fullmatch("[0-9a-f]{64}", record["resolved_sha256"])
+    assert {"python", "numpy", "numba", "radarsim"} <= set(record["versions"])
+
+
+def test_tables_are_the_same_bytes_each_time(experiment, results, tmp_path):
+    for name in ("a", "b"):
+        output.write(experiment, results, tmp_path / name, RUN, draw=False)
+    for path in TABLES | {"report.html"}:
+        assert (tmp_path / "a" / path).read_bytes() == (tmp_path / "b" / path).read_bytes()
+
+
+def test_without_figures_old_ones_go(experiment, results, tmp_path):
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures/sigma_r.svg").write_text("old")
+    (tmp_path / "notes.txt").write_text("mine")
+    written = output.write(experiment, results, tmp_path, RUN, draw=False)
+    assert set(written.files) == TABLES | {"run.json", "report.html"}
+    assert not (tmp_path / "figures/sigma_r.svg").exists()
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+    page = (tmp_path / "report.html").read_text()
+    Page(page)
+    assert "<svg" not in page
+
+
+def test_page_is_whole_and_leads_nowhere(written):
+    text = (written.folder / "report.html").read_text()
+    page = Page(text)
+    assert all(address.startswith("#") for address in page.addresses)
+    assert "http://" not in re.sub(r'xmlns(:\w+)?="[^"]*"', "", text)
+    assert "script" not in page.tags
+    ids = re.findall(r'\bid="([^"]+)"', text)
+    assert len(ids) == len(set(ids))
+    assert page.tags.count("svg") == 6
+    assert str(escape(written.answer[0])) in text
+    assert "watch out" in text
+    assert "P1.18" in text
+
+
+def test_names_are_escaped(written):
+    text = (written.folder / "report.html").read_text()
+    assert "<script" not in text
+    assert "&lt;script&gt;" in text
+    assert set(pd.read_csv(written.folder / "gains.csv")["baseline"]) == {HOSTILE}
+
+
+def test_few_realisations_are_warned_of(experiment, expected_case, tmp_path):
+    output.write(experiment, [expected_case(experiment.cases[0], count=10)], tmp_path, RUN, draw=False)
+    record = json.loads((tmp_path / "run.json").read_bytes())
+    assert "intervals of 10 realisations are rough" in record["warnings"][-1]
+    assert record["realisations_done"] == 10
+
+
+def test_a_file_is_replaced_whole(tmp_path):
+    files.replace_all(tmp_path, {"a/b.txt": b"one"})
+    files.replace_all(tmp_path, {"a/b.txt": b"two"})
+    assert (tmp_path / "a/b.txt").read_bytes() == b"two"
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["b.txt"]
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(StoreError, match="cannot be written"):
+        files.replace_all(tmp_path / "taken", {"x.csv": b""})
