@@ -23,6 +23,8 @@ COLOURS = ("#14213d", "#0a6ebd", "#c8440b", "#1b8a5a", "#a65fa8", "#c98a00", "#4
 DASHES = ("-", (0, (5, 1.8)), (0, (1.3, 1.3)), (0, (6, 1.6, 1.3, 1.6)), (0, (9, 2.5)), (0, (3, 1.2, 1, 1.2, 1, 1.2)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 POINTS = 2000  # of a line; longer ones are drawn at every n-th scan
+LONGEST_AT_END = 28  # letters of a name that may stand at a line's end
+MOST_IN_COLUMN = 10  # names in one column of a legend
 MARKED = 16  # at most about so many markers or crosses a line
 STYLE = {
     "font.family": "DejaVu Sans",
@@ -209,14 +211,17 @@ def _name(axes, panel: Panel) -> list:
     """
     lines = [m for m in panel.marks if isinstance(m, Line) and m.label and np.isfinite(m.y).any()]
     handles = [(words, style) for words, style in panel.keys]
-    direct = panel.direct and all(m.style.dash is not None for m in lines) and len(lines) <= _fitting(axes)
+    short = all(len(m.label) <= LONGEST_AT_END for m in lines)
+    direct = panel.direct and short and all(m.style.dash is not None for m in lines) and len(lines) <= _fitting(axes)
     if not direct:
         handles = [(m.label, m.style) for m in lines] + handles
     if handles:
         look = [Line2D([], [], **_look(style)) for _, style in handles]
         words = [words for words, _ in handles]
         title = panel.key_title or None
-        axes.legend(look, words, loc=panel.legend, title=title, borderaxespad=0.3, labelspacing=0.3, alignment="left")
+        room = {"ncols": -(-len(words) // MOST_IN_COLUMN), "borderaxespad": 0.3, "labelspacing": 0.3}
+        legend = axes.legend(look, words, loc=panel.legend, title=title, alignment="left", **room)
+        legend.set_in_layout(False)  # it lies inside the panel, and may not push it to nothing
     if not direct:
         return []
     texts = []

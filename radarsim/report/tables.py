@@ -96,7 +96,7 @@ def _gains(result: CaseResult) -> dict[str, np.ndarray]:
     at = f, k, c = shown(result, both)
     error, exact = np.asarray(result.sums["error"]), np.asarray(axes.exact_sigma, dtype=float)
     own, base = error[at], error[b, k, c]
-    cross = np.asarray(result.sums["paired"])[at]
+    cross = np.asarray(result.sums["paired"])[at] if f.size else np.zeros(0)  # a lone filter pairs with none
     of = statistics.gain(own[:, 1], own[:, 3], base[:, 1], base[:, 3], cross, realisations(result)[at])
     with np.errstate(divide="ignore", invalid="ignore"):
         exact_percent = 100 * (1 - exact[at] / exact[b, k, c])

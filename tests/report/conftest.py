@@ -22,7 +22,7 @@ SHARED = 0.6  # correlation of the two filters' errors, where a number is needed
 def config(stem, variance=1e-3, **changes):
     """A radar of the paper as a config."""
     sigma_range, sigma_velocity, period, scans, wavelength = RADARS[stem]
-    return {
+    made = {
         "study": "range_doppler",
         "radar": {
             "name": stem.upper().replace("RLS", "RLS "),
@@ -39,8 +39,10 @@ def config(stem, variance=1e-3, **changes):
         ],
         "scans": scans,
         "realisations": 1e5,
-        **changes,
     }
+    for key, value in changes.items():  # of a mapping, the named keys alone
+        made[key] = made[key] | value if key == "radar" else value
+    return made
 
 
 def covariances(case):
@@ -88,7 +90,25 @@ def swept():
     return [expected(case, case.name.replace("config", "rls2")) for case in load(source).cases]
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
+def swept_all():
+    """The five radars at the ends of the D_M sweep, long enough to settle."""
+    return [made_radar(stem, v, f"{stem} D={v:g}", scans=60) for stem in RADARS for v in (1e-5, 1e-1)]
+
+
+@pytest.fixture(scope="session")
 def expected_radar():
     """`made_radar`."""
     return made_radar
+
+
+@pytest.fixture(scope="session")
+def radar_config():
+    """`config`."""
+    return config
+
+
+@pytest.fixture(scope="session")
+def expected_case():
+    """`expected`."""
+    return expected
