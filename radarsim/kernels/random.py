@@ -102,8 +102,8 @@ def sine_cosine_polynomial(x):
 
 @inline
 def uniform(word):
-    """A word as a number in (0, 1), never 0 or 1: the centre of one of 2**53 cells."""
-    return np.float64(word >> U(11)) * 2.0**-53 + 2.0**-54
+    """A word as a number in (0, 1), never 0 or 1: the centre of one of 2**52 cells (one of 2**53 would round to 1)."""
+    return np.float64(word >> U(12)) * 2.0**-52 + 2.0**-53
 
 
 @inline

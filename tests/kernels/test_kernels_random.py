@@ -1,0 +1,193 @@
+"""The counter-based generator: published vectors, accuracy of its polynomials, distribution, independence."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import special, stats
+
+from radarsim.kernels import random as kernels
+
+N = 10_000_000
+LAYOUT_1 = -1.5987325482687904, 0.054172804334912415, 1.1174759880703744, 0.22467050840342465
+Z = 5.0  # standard errors allowed to every statistic: one false alarm in two million
+
+
+def normals(seed=1, name="test", first=0, pair=0, count=N // 2):
+    a, b = np.empty(count), np.empty(count)
+    kernels.fill_normal_pairs(kernels.stream(seed, name), first, pair, a, b)
+    return a, b
+
+
+@pytest.fixture(scope="module")
+def sample():
+    return np.concatenate(normals())
+
+
+@pytest.mark.parametrize(
+    ("counter", "key", "words"),
+    [
+        ((0, 0), (0, 0), (0xC2B6E3A8C2C69865, 0x6F81ED42F350084D)),
+        ((2**64 - 1,) * 2, (2**64 - 1,) * 2, (0xE02CB7C4D95D277A, 0xD06633D0893B8B68)),
+        (
+            (0x243F6A8885A308D3, 0x13198A2E03707344),
+            (0xA4093822299F31D0, 0x082EFA98EC4E6C89),
+            (0x263C7D30BB0F0AF1, 0x56BE8361D3311526),
+        ),
+    ],
+    ids=["zeros", "ones", "pi"],
+)
+def test_published_vectors(counter, key, words):
+    """Threefry2x64 with 20 rounds in the file kat_vectors of Random123."""
+    assert kernels.threefry(*np.array([*counter, *key], dtype=np.uint64)) == words
+
+
+def test_words_are_counted_by_realisation_and_pair():
+    key = kernels.stream(5, "plots")
+    x, y = np.empty(3, dtype=np.uint64), np.empty(3, dtype=np.uint64)
+    kernels.fill_words(key, 2**40, 7, x, y)
+    for i in range(3):
+        assert kernels.threefry(np.uint64(2**40 + i), np.uint64(7), key[0], key[1]) == (x[i], y[i])
+
+
+def units_off(got, exact):
+    """Largest distance in units of the last place; exact in extended precision."""
+    return float((np.abs(np.asarray(got) - exact) / np.spacing(np.abs(exact.astype(float)))).max())
+
+
+@pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="no extended precision to compare with")
+def test_polynomials_against_the_library():
+    rng = np.random.default_rng(1)
+    for x in (rng.random(20_000), 1 - 1e-6 * rng.random(5000), 2.0 ** (-65 * rng.random(20_000))):
+        assert units_off([kernels.log_polynomial(v) for v in x], np.log(x.astype(np.longdouble))) < 3
+    x = (rng.random(40_000) - 0.5) * np.pi / 2
+    sine, cosine = np.array([kernels.sine_cosine_polynomial(v) for v in x]).T
+    assert units_off(sine, np.sin(x.astype(np.longdouble))) < 1.5
+    assert units_off(cosine, np.cos(x.astype(np.longdouble))) < 1.5
+
+
+def test_normals_are_box_and_muller_of_the_words():
+    """Radius and angle of each pair, by the library, from the words themselves."""
+    x, y = np.random.default_rng(2).integers(0, 2**64, (2, 2000), dtype=np.uint64)
+    pairs = np.array([kernels.normal_pair(u, v) for u, v in zip(x, y, strict=True)])
+    assert np.hypot(*pairs.T) == pytest.approx(np.sqrt(-2 * np.log(x.astype(float) * 2.0**-64)), rel=1e-13)
+    turn, quadrant = y.view(np.int64).astype(float) * 2.0**-64, y & np.uint64(3)
+    expected = np.pi / 2 * turn
+    expected = np.where(quadrant & np.uint64(1), np.pi / 2 - expected, expected)
+    expected = np.where(quadrant & np.uint64(2), expected + np.pi, expected)
+    off = np.arctan2(pairs[:, 1], pairs[:, 0]) - expected
+    assert np.abs(np.remainder(off + np.pi, 2 * np.pi) - np.pi).max() < 1e-13
+
+
+@pytest.mark.parametrize("x", [0, 1, 2**63, 2**64 - 1])
+@pytest.mark.parametrize("y", [0, 1, 2, 3, 2**63 - 1, 2**63, 2**64 - 1])
+def test_extreme_words_give_finite_normals(x, y):
+    pair = kernels.normal_pair(np.uint64(x), np.uint64(y))
+    assert np.isfinite(pair).all()
+    assert np.hypot(*pair) <= math.sqrt(2 * 65 * math.log(2)) + 1e-9
+    u = kernels.uniform(np.uint64(x))
+    assert 0.0 < u < 1.0
+
+
+def test_moments(sample):
+    power = np.ones(N)
+    for mean, variance in ((0, 1), (1, 2), (0, 15), (3, 96), (0, 945), (15, 10170)):
+        power *= sample
+        assert power.mean() == pytest.approx(mean, abs=Z * math.sqrt(variance / N))
+
+
+def test_distribution(sample):
+    """Kolmogorov and Smirnov's distance, and chi² over 1000 equally probable cells."""
+    u = np.sort(special.ndtr(sample))
+    steps = np.arange(N + 1) / N
+    distance = max((steps[1:] - u).max(), (u - steps[:-1]).max())
+    assert stats.kstwobign.sf(distance * math.sqrt(N)) > 1e-6
+    counts = np.diff(np.searchsorted(u, np.linspace(0, 1, 1001)))
+    assert 1e-6 < stats.chi2.sf(((counts - N / 1000) ** 2).sum() / (N / 1000), 999) < 1 - 1e-6
+
+
+@pytest.mark.parametrize("sigmas", [3.0, 4.0, 5.0])
+def test_tails(sample, sigmas):
+    for count in (np.count_nonzero(sample > sigmas), np.count_nonzero(sample < -sigmas)):
+        expected = N * special.ndtr(-sigmas)
+        assert stats.poisson.sf(count - 1, expected) > 1e-6
+        assert stats.poisson.cdf(count, expected) > 1e-6
+
+
+def assert_independent(a, b):
+    """Correlations of the numbers, of their squares and of their signs: all within Z / sqrt(n)."""
+    for f in (lambda x: x, lambda x: (x * x - 1) / math.sqrt(2), np.sign):
+        assert (f(a) * f(b)).mean() == pytest.approx(0, abs=Z / math.sqrt(a.size))
+
+
+def test_independence_within_a_pair(sample):
+    a, b = sample[: N // 2], sample[N // 2 :]
+    assert_independent(a, b)
+    angle = np.floor((np.arctan2(b, a) / (2 * np.pi) + 0.5) * 256).astype(int) % 256
+    counts = np.bincount(angle, minlength=256)
+    assert 1e-6 < stats.chi2.sf(((counts - a.size / 256) ** 2).sum() / (a.size / 256), 255) < 1 - 1e-6
+
+
+def test_independence_between_realisations(sample):
+    a = sample[: N // 2]
+    for lag in (1, 2, 3, 8, 512, 4096):
+        assert_independent(a[:-lag], a[lag:])
+
+
+@pytest.mark.parametrize(
+    "other",
+    [{"pair": 1}, {"pair": 2**32}, {"seed": 2}, {"seed": 2**64 - 1}, {"name": "tesu"}, {"first": 2**33}],
+    ids=["next pair", "far pair", "next seed", "last seed", "name", "far realisations"],
+)
+def test_independence_between_draws(sample, other):
+    count = 1_000_000
+    for fresh in normals(count=count, **other):
+        assert_independent(sample[:count], fresh)
+        assert_independent(sample[N // 2 : N // 2 + count], fresh)
+
+
+def test_uniforms():
+    a, b = np.empty(1_000_000), np.empty(1_000_000)
+    kernels.fill_uniform_pairs(kernels.stream(1, "test"), 0, 0, a, b)
+    for u in (a, b):
+        assert 0 < u.min() < u.max() < 1
+        assert u.mean() == pytest.approx(0.5, abs=Z / math.sqrt(12 * u.size))
+        counts = np.bincount((u * 1000).astype(int), minlength=1000)
+        assert 1e-6 < stats.chi2.sf(((counts - 1000) ** 2 / 1000).sum(), 999) < 1 - 1e-6
+    assert ((a - 0.5) * (b - 0.5)).mean() == pytest.approx(0, abs=Z / 12 / math.sqrt(a.size))
+
+
+def test_a_realisation_is_itself_in_any_block():
+    """Whatever the first of the block, its length and the place in it, so also vector or remainder loop."""
+    whole = np.stack(normals(count=1000, first=10**12, pair=3))
+    for first, count in ((0, 1), (1, 7), (8, 8), (3, 64), (500, 333), (999, 1)):
+        part = np.stack(normals(count=count, first=10**12 + first, pair=3))
+        np.testing.assert_array_equal(part, whole[:, first : first + count])
+
+
+@pytest.mark.parametrize("kind", ["normal", "uniform"])
+def test_strips_hold_the_same_numbers(kind):
+    key = kernels.stream(9, "strip")
+    a, b = np.empty((16, kernels.LANES)), np.empty((16, kernels.LANES))
+    getattr(kernels, f"fill_{kind}_strip")(key, 800, 30, a.reshape(-1), b.reshape(-1))
+    c, d = np.empty(kernels.LANES), np.empty(kernels.LANES)
+    for j in range(16):
+        getattr(kernels, f"fill_{kind}_pairs")(key, 800, 30 + j, c, d)
+        np.testing.assert_array_equal((a[j], b[j]), (c, d))
+    one = getattr(kernels, f"{kind}s")(key[0], key[1], 805, 32)
+    assert one == (a[2, 5], b[2, 5])
+
+
+def test_streams_by_name():
+    """The key is the seed and the first eight bytes of the name's SHA-256: part of the layout, so written out here."""
+    assert kernels.LAYOUT == 1
+    np.testing.assert_array_equal(
+        kernels.stream(7, "plots"), np.array([7, 0xDC5C1E13E6556996], dtype=np.uint64), strict=True
+    )
+    assert len({tuple(kernels.stream(s, n)) for s in (0, 1, 2**64 - 1) for n in ("", "a", "b", "ab")}) == 12
+
+
+def test_the_layout_is_unchanged():
+    """The very numbers of one counter: whoever changes them changes LAYOUT, so that stored results are not mixed."""
+    a, b = normals(seed=1, name="layout", first=123456789, pair=42, count=2)
+    assert (*a, *b) == pytest.approx(LAYOUT_1, rel=1e-13)
