@@ -122,7 +122,7 @@ def _draw(axes, panel: Panel) -> list:
 
 def _colour(style: Style):
     if isinstance(style.colour, float):
-        return matplotlib.colormaps["viridis"](0.8 * style.colour)
+        return matplotlib.colormaps["viridis"](0.72 * style.colour)
     return COLOURS[style.colour % len(COLOURS)]
 
 

@@ -96,8 +96,6 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
     panels = [_sigma_panel(members, curves, component, of) for members in families(results).values()]
     panels = [panel for panel in panels if panel.marks]
     single = len(panels) == 1
-    if single:
-        panels = [replace(panels[0], title="")]
     count = results[0].count if results else 0
     caption = (
         f"Root-mean-square error of the {of.name} about the truth against time, of {count:,} realisations. "
@@ -169,7 +167,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
             marks.append(Line(t, value, words, style, lo, hi, exact if np.isfinite(exact).any() else None))
     base = results[0].axes.filters[results[0].axes.baseline]
     caption = (
-        f"Relative gain in σ of the {of.name} against filter {base!r}, paired on common noise, of "
+        f"Relative gain in σ of the {of.name} against filter {base}, paired on common noise, of "
         f"{results[0].count:,} realisations. Bands: 95 % intervals. Crosses: exact values. Below zero: a loss."
     )
     panel = Panel(Axis(TIME, limits=(0, None)), Axis(f"gain in $\\sigma$ of {of.symbol}, %"), tuple(marks))
