@@ -1,7 +1,7 @@
 """Numbers with their 95 % intervals, from sums alone. NumPy only; every function takes arrays of any shape.
 
 The intervals treat what is estimated as a mean of independent realisations and nothing as Gaussian: the spread of
-e² comes from the fourth moment. docs/methods tells the reasons; tests/report simulates the coverage.
+e² comes from the fourth moment. tests/report simulates the coverage.
 """
 
 from typing import NamedTuple
