@@ -95,7 +95,7 @@ def read(file: FilePath, faults: Faults) -> Document | None:
         faults.add(Origin(shown), (), f"larger than {LARGEST_FILE // 1000} kB")
         return None
     try:
-        text = content.decode("utf-8-sig")
+        text = content.decode("utf-8")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         column = error.start - content.rfind(b"\n", 0, error.start)

@@ -207,6 +207,7 @@ class RangeDoppler(Study):
         slowest = max(self.filters, key=lambda f: f.initial_scans)
         if self.scans < slowest.initial_scans:
             raise at("scans", f"must be >= {slowest.initial_scans} for the initialisation of filter {slowest.name}")
+        self._in_proportion()
         last = (self.scans - 1) * self.radar.scan_period_s
         if self.target.reach_m(last) > FARTHEST_M:
             raise at("target", f"must stay within 1e15 m of the radar up to the last plot, at {short(last)} s")
@@ -216,3 +217,21 @@ class RangeDoppler(Study):
         if isinstance(target, Turn) and target.closest_m(last) < NEAREST_M:
             raise at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")
         return self.model_copy(update={"target": target})
+
+    def _in_proportion(self) -> None:
+        """Refuse accuracies and variances of which one makes the other meaningless.
+
+        Beyond these limits the steady covariance drowns in rounding (tried: SciPy's solver gives up at 1e15 and 1e-18).
+        """
+        radar, dt = self.radar, self.radar.scan_period_s
+        if not 1e-12 <= (radar.sigma_range_m / (dt * radar.sigma_velocity_mps)) ** 2 <= 1e12:
+            ratio = "(sigma_range_m / scan_period_s / sigma_velocity_mps)²"
+            raise at("radar.sigma_velocity_mps", f"out of proportion: {ratio} must be from 1e-12 to 1e12")
+        for i, one in enumerate(self.filters):
+            key = f"filters.{i}.manoeuvre_variance"
+            if not 1e-16 <= one.manoeuvre_variance * dt**6 / radar.sigma_range_m**2 <= 1e12:
+                ratio = "manoeuvre_variance scan_period_s⁶ / sigma_range_m²"
+                raise at(key, f"out of proportion: {ratio} must be from 1e-16 to 1e12")
+            if "velocity" in one.observes and one.manoeuvre_variance * dt**4 / radar.sigma_velocity_mps**2 > 1e12:
+                ratio = "manoeuvre_variance scan_period_s⁴ / sigma_velocity_mps²"
+                raise at(key, f"out of proportion: {ratio} must be <= 1e12")

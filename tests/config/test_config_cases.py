@@ -148,6 +148,7 @@ OVERRIDES = [
     ("scans=!!int 3", "--set scans: tags (tag:yaml.org,2002:int) are not read"),
     ("filters.2.name=x", "--set filters.2.name: filters is a list: its items are 0 to 1"),
     ("filters.r.name=x", "--set filters.r.name: filters is a list: its items are 0 to 1"),
+    ("radr.x=3", "--set radr.x: radr: unknown key; did you mean radar? allowed: "),
     ("scans.x=3", "--set scans.x: scans has no keys of its own"),
     ("filters.0.name.x=3", "--set filters.0.name.x: filters.0.name has no keys of its own"),
     ("radar={}", "--set radar: radar.scan_period_s: required key is missing"),

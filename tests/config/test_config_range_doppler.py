@@ -1,10 +1,12 @@
 """Every key of range_doppler, spoiled in every way, and the very words the user gets."""
 
 import math
+import random
 
 import pytest
 
 from radarsim.config.load import load
+from radarsim.errors import ConfigError
 
 NUMBER = "must be a number"
 SIZE = "must be at least 1e-18 in size"
@@ -238,6 +240,43 @@ def test_all_faults_at_once_each_at_its_place(house, said):
         "own.yaml:11:8: scans: must be a whole number, got 15.5",
         "own.yaml:12:15: realisations: must be a whole number, got true",
     ]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "at", "limit"),
+    [
+        ("radar.sigma_velocity_mps", 1e9, "radar.sigma_velocity_mps", "_velocity_mps)² must be from 1e-12 to 1e12"),
+        ("radar.sigma_velocity_mps", 1e-9, "radar.sigma_velocity_mps", "_velocity_mps)² must be from 1e-12 to 1e12"),
+        ("filters.0.manoeuvre_variance", 1e12, "filters.0.manoeuvre_variance", "range_m² must be from 1e-16 to 1e12"),
+        ("filters.1.manoeuvre_variance", 1e-18, "filters.1.manoeuvre_variance", "range_m² must be from 1e-16 to 1e12"),
+        ("radar.sigma_velocity_mps", 5e-5, "filters.1.manoeuvre_variance", "sigma_velocity_mps² must be <= 1e12"),
+    ],
+)
+def test_what_double_precision_cannot_hold_is_refused(good, said, key, value, at, limit):
+    good["filters"][1]["manoeuvre_variance"] = 1.0
+    (line,) = said(spoil(good, key, value))
+    assert line.startswith(f"config: {at}: out of proportion: ")
+    assert limit in line
+
+
+@pytest.mark.filterwarnings("error")
+def test_what_is_accepted_can_be_designed(good):
+    from radarsim import studies
+
+    rng = random.Random(1)
+    prepared = 0
+    for _ in range(100):
+        for key in ("sigma_range_m", "sigma_velocity_mps", "scan_period_s"):
+            good["radar"][key] = 10 ** rng.uniform(-3, 3)
+        for one in good["filters"]:
+            one["manoeuvre_variance"] = 10 ** rng.uniform(-9, 5)
+        try:
+            experiment = load(good)
+        except ConfigError:
+            continue
+        studies.study("range_doppler").prepare(experiment.cases[0])
+        prepared += 1
+    assert prepared > 30
 
 
 def test_filter_names_differ(good, said):

@@ -124,6 +124,8 @@ def test_pure_python_parser_gives_the_same(house, monkeypatch):
     assert fast.key_origin(("d", 0, "f"))[:3] == ("c.yaml", 5, 5)
 
 
-@pytest.mark.parametrize("text", ["0123456789"])
-def test_quoted_digits_are_text(text):
-    assert loading.parse(f"a: '{text}'\n", "c.yaml", Faults()).data == {"a": text}
+@pytest.mark.parametrize("text", ["1e5", "7", "true", "~", ".nan", ""])
+def test_what_stands_in_quotes_is_text(text):
+    faults = Faults()
+    assert loading.parse(f"a: '{text}'\nb: \"{text}\"\n", "c.yaml", faults).data == {"a": text, "b": text}
+    assert not faults
