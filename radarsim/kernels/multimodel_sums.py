@@ -82,11 +82,11 @@ def add_to_stage(out, plot, truth, everything, stage):
 
 
 @kernel
-def close_stages(stages, filters, count, lengths, baseline, counted, sums, pairs):
-    """Add each realisation's means over each stage to the sums, and the products with the baseline's.
+def close_stages(stages, filters, count, lengths, counted, sums, pairs):
+    """Add each realisation's means over each stage to the sums, and the products of all pairs of filters.
 
     stages: rows of all filters, STAGE for each stage; lengths (count, 2): scans of a stage, and those with covariances;
-    sums (F, S, MEANS, 2): of nine squared errors, NEES, NIS, hypotheses merged, merges; pairs (F, S, 9).
+    sums (F, S, MEANS, 2): of nine squared errors, NEES, NIS, hypotheses merged, merges; pairs (F, F, S, 9).
     """
     for s in range(count):
         for f in range(filters):
@@ -96,15 +96,16 @@ def close_stages(stages, filters, count, lengths, baseline, counted, sums, pairs
                 if c == NIS:
                     length = where_greater(get(own, PLOTS), full(0.5), get(own, PLOTS), full(1.0))
                 put(own, c, get(own, c) / length)
-        base = row(stages, (baseline * count + s) * STAGE)
         for f in range(filters):
             own, at = row(stages, (f * count + s) * STAGE), f * count + s
             for c in range(MEANS):
                 x = counted * get(own, c)
                 sums[(at * MEANS + c) * 2] += total(x)
                 sums[(at * MEANS + c) * 2 + 1] += total(x * x)
-            for c in range(9):
-                pairs[at * 9 + c] += total(counted * get(own, c) * get(base, c))
+            for g in range(filters):
+                other, at = row(stages, (g * count + s) * STAGE), (f * filters + g) * count + s
+                for c in range(9):
+                    pairs[at * 9 + c] += total(counted * get(own, c) * get(other, c))
 
 
 @inline
@@ -169,7 +170,7 @@ class MultimodelSums(NamedTuple):
 
     error (F, K', 9, 4): e, e², e³, e⁴; paired (F, K', 9): with the baseline's e²; probability (F, K', MOST, 2); believed
     (F, K', 2): NEES; stage (F, S, MEANS, 2): means over the stage of nine squared errors, NEES, NIS, hypotheses merged, merges; pairs
-    (F, S, 9).
+    (F, F, S, 9): of the mean squares of two filters.
     """
 
     error: np.ndarray
@@ -236,7 +237,6 @@ def simulate_block(world, banks, memory, sums, baseline, first, count):
             filters,
             stages,
             address(world.lengths),
-            baseline,
             get(address(memory.counted), 0),
             address(sums.stage),
             address(sums.pairs),

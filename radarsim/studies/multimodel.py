@@ -213,7 +213,7 @@ def prepare(case: Case) -> Plan:
             probability=(*shape, MOST, 2),
             believed=(*shape, 2),
             stage=(shape[0], len(names), sums.MEANS, 2),
-            pairs=(shape[0], len(names), 9),
+            pairs=(shape[0], shape[0], len(names), 9),
         ),
         axes=axes(spec, t, x, reported, names, lengths),
         world=world,
@@ -244,9 +244,22 @@ def axes(spec, t: np.ndarray, x: np.ndarray, reported: np.ndarray, names: tuple[
             "rules": tuple(f.merge for f in spec.filters),
             "models": tuple(tuple(f"{m.motion} {m.sigma_acceleration_mps2:g}" for m in f.models) for f in spec.filters),
             "transitions": tuple(transition(f) for f in spec.filters),
+            "intervals_s": np.array([f.transition_interval_s for f in spec.filters]),
+            "powers": powers_hold(spec),
             "operations": np.array([filters.operations(f.family, transition(f)) for f in spec.filters]),
         },
     )
+
+
+def powers_hold(spec) -> np.ndarray:
+    """How far P(t → 0) is from the unit matrix, at a millionth of the interval, and P(10 Δt) from P(Δt)¹⁰: (F, 2)."""
+    found = []
+    for f in spec.filters:
+        T = transition(f)
+        near, tenfold = filters.transition_powers(T, np.array([1e-6, 10.0]))
+        apart = np.linalg.multi_dot([T] * 10) if len(T) > 1 else T
+        found.append((np.abs(near - np.eye(len(T))).max(), np.abs(tenfold - apart).max()))
+    return np.array(found)
 
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:

@@ -1,0 +1,205 @@
+"""P2's figures: the flight (1-4), σ of height and its rate (5, 6), probabilities (7), families × rules, cost, consistency."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import panels
+from radarsim.report import tables as common
+from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
+
+TIME = Axis(panels.TIME, limits=(0, None))
+SIGMAS = {"y": ("height $y$", "m"), "vy": ("rate of climb $\\dot y$", "m/s")}
+RULES = ("moment", "best", "combined", "modified_combined")
+FAMILIES = {"gpb1": "MMA1", "imm": "MMA2", "gpb2": "MMA3"}
+
+
+def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
+    """All figures that these results can fill, by name; each shows the cases that the config names for it."""
+
+    def chosen(name: str) -> list[CaseResult]:
+        return panels.shown(results, [case.name for case in experiment.shown_in(name)])[0]
+
+    drawn = {"trajectory": trajectory(chosen("trajectory"))}
+    for component in SIGMAS:
+        drawn[f"sigma_{component}"] = sigma(chosen(f"sigma_{component}"), made["curves"], component)
+    drawn["probabilities"] = probabilities(chosen("probabilities"), made["probabilities"])
+    drawn["families"] = families(chosen("families"), made)
+    drawn["cost"] = cost(chosen("cost"), made)
+    drawn["consistency"] = consistency(chosen("consistency"), made["consistency"])
+    return {name: figure for name, figure in drawn.items() if figure is not None}
+
+
+def _several(name: str, title: str, caption: str, drawn: Sequence[Panel], height: float = 62.0) -> Figure | None:
+    """A figure of one panel, or of more in two columns."""
+    if not drawn:
+        return None
+    width = panels.WIDE_MM if len(drawn) == 1 else PAGE_MM
+    return Figure(name, title, caption, tuple(drawn), 1 if len(drawn) == 1 else 2, width, height)
+
+
+def trajectory(results: Sequence[CaseResult]) -> Figure | None:
+    """Ground track, height, speed and acceleration (the paper's figures 1 to 4), a line for each different flight."""
+    flights: dict[bytes, CaseResult] = {}
+    for result in results:
+        flights.setdefault(np.ascontiguousarray(result.axes.extra["truth"]).tobytes(), result)
+    lines: list[list[Line]] = [[], [], [], []]
+    for n, result in enumerate(flights.values()):
+        x, t = result.axes.extra["truth"], np.asarray(result.axes.t_s, dtype=float)
+        words, style = panels.label(result) if len(flights) > 1 else "", Style(n, n)
+        speed, acceleration = (np.linalg.norm(x[:, i::3], axis=1) for i in (1, 2))
+        lines[0].append(Line(x[:, 6] / 1e3, x[:, 0] / 1e3, words, style))
+        for place, values in ((1, x[:, 3] / 1e3), (2, speed), (3, acceleration)):
+            lines[place].append(Line(t, values, words, style))
+    ends = _stage_lines(list(flights.values()))
+    axes = (
+        (Axis("east $z$, km"), Axis("north $x$, km", limits=(0, None)), "1  ground track", ()),
+        (TIME, Axis("height $y$, km", limits=(0, None)), "2  height", ends),
+        (TIME, Axis("speed, m/s", limits=(0, None)), "3  speed", ends),
+        (TIME, Axis("acceleration, m/s²", limits=(0, None)), "4  acceleration", ends),
+    )
+    drawn = [
+        Panel(x, y, (*marks, *own), title, direct=False) for (x, y, title, marks), own in zip(axes, lines, strict=True)
+    ]
+    caption = (
+        "The true flight (the paper's figures 1 to 4); the radar stands at the origin. Dotted: ends of the stages."
+    )
+    return _several("trajectory", "Flight", caption, drawn, 56)
+
+
+def _stage_lines(results: Sequence[CaseResult]) -> tuple[Reference, ...]:
+    """The ends of the stages, where all cases have the same."""
+    ends = {tuple(result.axes.extra["stage_ends_s"]) for result in results}
+    return tuple(Reference(float(end), "x") for end in ends.pop()) if len(ends) == 1 else ()
+
+
+def sigma(results: Sequence[CaseResult], curves, component: str) -> Figure | None:
+    """σ of height or climb against time on a logarithmic scale (figures 5 and 6), a panel for each case."""
+    rows = common.groups(curves[curves["component"] == component], "case", "filter")
+    words, unit = SIGMAS[component]
+    drawn = []
+    for result in results:
+        marks: list = list(_stage_lines([result]))
+        for n, f in enumerate(result.axes.filters):
+            own = rows.get((result.name, f))
+            if own is not None:
+                t, value, lo, hi = (own[key].to_numpy(float) for key in ("t_s", "sigma", "sigma_lo", "sigma_hi"))
+                marks.append(Line(t, value, panels.literal(f), Style(n, n), lo, hi))
+        title = panels.label(result) if len(results) > 1 else ""
+        drawn.append(
+            Panel(TIME, Axis(f"$\\sigma$ of {words}, {unit}", "log"), tuple(marks), title, direct=len(results) == 1)
+        )
+    caption = (
+        f"Root-mean-square error of {words.split(' $')[0]} about the truth, of {results[0].count if results else 0:,} "
+        "realisations; bands: 95 % intervals. Dotted: ends of the stages."
+    )
+    number = {"y": 5, "vy": 6}[component]
+    return _several(f"sigma_{component}", f"σ of the {words.split(' $')[0]} (figure {number})", caption, drawn, 76)
+
+
+def probabilities(results: Sequence[CaseResult], table) -> Figure | None:
+    """Mean probabilities of the models against time (figure 7), a panel for each filter of two or more models."""
+    rows = common.groups(table, "case", "filter", "model")
+    drawn = []
+    for result in results:
+        for f, (name, models) in enumerate(zip(result.axes.filters, result.axes.extra["models"], strict=True)):
+            if len(models) < 2 or len(drawn) >= panels.MOST:
+                continue
+            marks: list = list(_stage_lines([result]))
+            for m, motion in enumerate(models):
+                own = rows[(result.name, name, m + 1)]
+                t, value, lo, hi = (
+                    own[key].to_numpy(float) for key in ("t_s", "probability", "probability_lo", "probability_hi")
+                )
+                marks.append(Line(t, value, f"{m + 1} {motion}", Style(m, m), lo, hi))
+            title = panels.literal(name) if len(results) == 1 else f"{panels.label(result)}: {panels.literal(name)}"
+            drawn.append(Panel(TIME, Axis("mean probability", limits=(0, 1)), tuple(marks), title, direct=False))
+    caption = (
+        "Mean posterior probabilities of the models (figure 7); the numbers behind the motions are the spreads of the "
+        "random acceleration, m/s². Dotted: ends of the stages."
+    )
+    return _several("probabilities", "Probabilities of the models", caption, drawn, 58)
+
+
+def families(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
+    """σ of the height by family and merging rule, a map for each stage; needs at least two of each."""
+    drawn = []
+    rows = common.groups(made["stages"][made["stages"]["component"] == "y"], "case", "stage")
+    for result in results:
+        found = {
+            (family, rule): name
+            for name, family, rule in zip(
+                result.axes.filters, result.axes.extra["families"], result.axes.extra["rules"], strict=True
+            )
+            if family in FAMILIES
+        }
+        names = [[found.get((family, rule)) for rule in RULES] for family in FAMILIES]
+        if sum(any(row) for row in names) < 2 or sum(any(column) for column in zip(*names, strict=True)) < 2:
+            continue
+        for (case, stage), own in rows.items():
+            if case != result.name:
+                continue
+            value = own.set_index("filter")["sigma"]
+            grid = np.array([[value.get(name, np.nan) for name in row] for row in names], dtype=float)
+            x = Axis("merging rule", ticks=tuple((i, rule.replace("_", "\n")) for i, rule in enumerate(RULES)))
+            y = Axis("family", ticks=tuple(enumerate(FAMILIES.values())))
+            title = stage if len(results) == 1 else f"{panels.label(result)}: {stage}"
+            drawn.append(Panel(x, y, (Heat(np.arange(4), np.arange(3), grid, "$\\sigma$ of $y$, m"),), title))
+    caption = "σ of the height over each stage, by family and rule of the partial merges; one bank, one set of plots."
+    return _several("families", "Families and merging rules", caption, drawn[: panels.MOST], 52)
+
+
+def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
+    """Operations per update against σ of the height, a panel for each stage of the first case shown."""
+    if not results:
+        return None
+    result = results[0]
+    operations = common.groups(made["operations"], "case", "stage", "filter")
+    rows = made["stages"]
+    rows = rows[(rows["case"] == result.name) & (rows["component"] == "y")]
+    drawn = []
+    for stage, own in rows.groupby("stage", sort=False):
+        marks = []
+        for n, (_, row) in enumerate(own.iterrows()):
+            count = operations[(result.name, stage, row["filter"])]["operations"].to_numpy(float)
+            lo, hi, value = (np.array([row[key]]) for key in ("sigma_lo", "sigma_hi", "sigma"))
+            marks.append(Line(count, value, panels.literal(row["filter"]), Style(n, None, n, size_pt=4.5), lo, hi))
+        x, y = Axis("operations per update", "log"), Axis("$\\sigma$ of $y$, m", "log")
+        drawn.append(Panel(x, y, tuple(marks) if not drawn else tuple(_unnamed(marks)), stage, direct=False))
+    caption = (
+        "Accuracy against cost: σ of the height over a stage (whiskers: 95 %) and the mean count of arithmetic "
+        f"operations of one update. {panels.plain_label(result)}."
+    )
+    return _several("cost", "Cost and accuracy", caption, drawn, 62)
+
+
+def _unnamed(lines: Sequence[Line]) -> list[Line]:
+    """The same lines without a legend of their own."""
+    return [Line(line.x, line.y, "", line.style, line.lo, line.hi) for line in lines]
+
+
+def consistency(results: Sequence[CaseResult], table) -> Figure | None:
+    """NEES and NIS per degree of freedom by stage of the first case shown, a line of points for each filter."""
+    if not results:
+        return None
+    result = results[0]
+    rows = common.groups(table[table["case"] == result.name], "filter")
+    drawn = []
+    for key, title in (("nees", "NEES of the position"), ("nis", "NIS of the plot")):
+        marks: list = [Reference(1.0, "y", "right about itself")]
+        stages: tuple = ()
+        for n, f in enumerate(result.axes.filters):
+            own = rows[(f,)]
+            stages = tuple(own["stage"])
+            x = np.arange(len(own)) + 0.08 * (n - (len(result.axes.filters) - 1) / 2)
+            value, lo, hi = (own[name].to_numpy(float) for name in (key, f"{key}_lo", f"{key}_hi"))
+            label = panels.literal(f) if key == "nees" else ""
+            marks.append(Line(x, value, label, Style(n, None, n), lo, hi))
+        axis = Axis("stage", ticks=tuple(enumerate(stages)))
+        drawn.append(Panel(axis, Axis("mean per degree of freedom", "log"), tuple(marks), title, direct=False))
+    caption = (
+        "Normalised errors squared, per degree of freedom, by stage: 1 where the filter's own covariance is right, more "
+        f"where it is too sure of itself. {panels.plain_label(result)}."
+    )
+    return _several("consistency", "What the filters believe of themselves", caption, drawn, 66)
