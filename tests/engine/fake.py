@@ -5,6 +5,7 @@ import hashlib
 import sys
 import time
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -35,6 +36,7 @@ class Fake:
         return np.add.reduce(numbers, axis=0)
 
 
+@cache
 def textbook(work: Fake, realisations: int) -> np.ndarray:
     """The total by the words of the contract: halves of a binary tree over block numbers, then the cut block."""
 

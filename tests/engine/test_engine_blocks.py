@@ -62,7 +62,7 @@ def shuffled_cuts(draw):
     return blocks, draw(st.permutations(nodes))
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=100)
 @given(shuffled_cuts())
 def test_any_cut_in_any_order_gives_the_bytes_of_the_textbook(case):
     blocks, nodes = case

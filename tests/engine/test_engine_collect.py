@@ -122,7 +122,7 @@ def test_progress_comes_at_most_ten_times_a_second_and_ends_at_all():
 
 @pytest.mark.parametrize("threads", [0, 1, 2, 5])
 def test_a_stopped_run_reports_exactly_what_is_done_without_a_gap(threads):
-    asked = iter([None] * 30)
+    asked = iter([None] * 12)
     result = collect(Fake(pause_s=1e-3), 10**9, threads=threads, stop=lambda: next(asked, "enough"))
     assert result.stopped == "enough"
     assert 0 < result.count == result.computed < 10**6

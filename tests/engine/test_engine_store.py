@@ -7,6 +7,7 @@ import os
 import random
 import re
 import shutil
+import stat
 import subprocess
 import sys
 import threading
@@ -236,6 +237,32 @@ def test_damage_that_cannot_be_moved_aside_is_not_believed_either(tmp_path, bloc
     result = collect(WORK, N, store=tmp_path)
     assert same(result)
     assert len(result.warnings) == 1
+
+
+def test_a_file_appears_whole_and_safe_before_what_it_replaces_goes(tmp_path, blocks, monkeypatch):
+    collect(WORK, 32, store=tmp_path)
+    events = []
+
+    def recorded(owner, name, describe):
+        original = getattr(owner, name)
+
+        def call(*given):
+            events.append(describe(*given))
+            return original(*given)
+
+        monkeypatch.setattr(owner, name, call)
+
+    def replaced(temporary, path):
+        assert decoded(Path(temporary).read_bytes())
+        assert not path.exists()
+        return f"rename {path.name}"
+
+    recorded(os, "fsync", lambda fd: "sync directory" if stat.S_ISDIR(os.fstat(fd).st_mode) else "sync file")
+    recorded(os, "replace", replaced)
+    recorded(Path, "unlink", lambda path: f"remove {path.name}")
+    writer = keeper.Keeper(Store(tmp_path, WORK))
+    writer.finish({Node(2, 0): Sums(64, np.ones(5))})
+    assert events == ["sync file", "rename L02-0.sums", "sync directory", "remove L01-0.sums"]
 
 
 def full_disk(monkeypatch, calls_that_work):
