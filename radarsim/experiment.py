@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from radarsim import studies
+from radarsim import plots, studies
 from radarsim.config import lookup
 from radarsim.config.load import Case, Experiment, load
 from radarsim.engine.collect import Collected, collect, stored
 from radarsim.engine.executors import available_cores
-from radarsim.engine.results import CaseResult
+from radarsim.engine.results import CaseResult, Track
 from radarsim.engine.stopping import Signals
 from radarsim.errors import ConfigError, StoreError
 
@@ -251,6 +251,21 @@ def facts_of(gathered: Gathered, threads: int, seconds: float) -> dict:
         "warnings": list(dict.fromkeys(warning for c in collected for warning in c.warnings)),
         "identities": {case.name: work.identity for case, work, _ in gathered},
     }
+
+
+def track(experiment: Experiment, source: str | os.PathLike) -> tuple[Case, Track]:
+    """The filters of an experiment's one case over the recorded plots in a CSV file.
+
+    Raises ConfigError for an experiment of several cases, a study without recorded plots, and faults in the file.
+    """
+    place = experiment.path or experiment.stem
+    if len(experiment.cases) > 1:
+        raise ConfigError(f"{place}: must be one case to track with, got {len(experiment.cases)}")
+    (case,) = experiment.cases
+    study = studies.study(case.study)
+    if not hasattr(study, "track"):
+        raise ConfigError(f"{place}: study: {case.study} has no filters for recorded plots")
+    return case, study.track(case, plots.read(source, study.PLOT_COLUMNS(case.spec)))
 
 
 def described(file: Path) -> str:

@@ -23,7 +23,7 @@ FENCED = {
     "matplotlib": {"report/figures.py"},
     "dask": {"engine/cluster.py"},
     "distributed": {"engine/cluster.py"},
-    "pandas": {"report", "experiment.py", "plots.py"},
+    "pandas": {"report", "experiment.py"},
     "rich": {"console.py"},
     "click": {"cli.py"},
     "jinja2": {"report/html.py"},

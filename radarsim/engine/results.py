@@ -43,3 +43,19 @@ class CaseResult:
     sums: Mapping[str, np.ndarray]
     axes: Axes
     seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Track:
+    """Estimates over recorded plots, F filters at n times: what `radarsim track` writes.
+
+    t_s (n,); estimate and sigma (F, n, C), not-a-number where a filter has none, in the components' units; probability
+    (F, n, M) of a filter's models, not-a-number beyond its own, or None where the study has no models.
+    """
+
+    filters: tuple[str, ...]
+    components: tuple[tuple[str, str], ...]
+    t_s: np.ndarray
+    estimate: np.ndarray
+    sigma: np.ndarray
+    probability: np.ndarray | None = None

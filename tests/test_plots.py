@@ -1,0 +1,98 @@
+"""Recorded plots: what is read, what is refused and where, what is written."""
+
+import numpy as np
+import pytest
+
+from radarsim import plots
+from radarsim.engine.results import Track
+from radarsim.errors import ConfigError, StoreError
+
+CHOICES = (("t_s", "range_m", "bearing_rad"), ("t_s", "x_m", "y_m"))
+
+
+def read(tmp_path, text):
+    path = tmp_path / "plots.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return plots.read(path, CHOICES)
+
+
+def faults(tmp_path, text):
+    with pytest.raises(ConfigError) as caught:
+        read(tmp_path, text)
+    return [line.replace(f"{tmp_path}/", "") for line in caught.value.lines]
+
+
+def test_columns_in_any_order_unknown_ones_ignored_empty_cells_missing(tmp_path):
+    columns = read(tmp_path, "\ufeffnote,bearing_rad,t_s,range_m\nfirst,0.5,0,1e3\n,,2.5,990\n\nlast,0.4,3,\n")
+    assert list(columns) == ["t_s", "range_m", "bearing_rad"]
+    np.testing.assert_array_equal(columns["t_s"], [0, 2.5, 3])
+    np.testing.assert_array_equal(columns["range_m"], [1000, 990, np.nan])
+    np.testing.assert_array_equal(columns["bearing_rad"], [0.5, np.nan, 0.4])
+
+
+def test_the_second_choice_of_columns(tmp_path):
+    assert list(read(tmp_path, "y_m,x_m,t_s\n1,2,3\n")) == ["t_s", "x_m", "y_m"]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", "plots.csv:1: must have the columns t_s, range_m, bearing_rad or t_s, x_m, y_m; got nothing"),
+        ("t_s,x_m\n", "plots.csv:1: must have the columns t_s, range_m, bearing_rad or t_s, x_m, y_m; got t_s, x_m"),
+        ("t_s,x_m,y_m\n", "plots.csv: has no rows"),
+        ("t_s,x_m,y_m,x_m\n", "plots.csv:1: the column x_m is there twice"),
+        ("t_s,x_m,y_m\n0,1,2\n1,abc,2\n", "plots.csv:3:2: x_m: must be a finite number, got 'abc'"),
+        ("t_s,x_m,y_m\n0,1,inf\n", "plots.csv:2:3: y_m: must be a finite number, got 'inf'"),
+        ("t_s,x_m,y_m\n0,1,nan\n", "plots.csv:2:3: y_m: must be a finite number, got 'nan'"),
+        ("t_s,x_m,y_m\n0,1_0,1\n", "plots.csv:2:2: x_m: must be a finite number, got '1_0'"),
+        ("t_s,x_m,y_m\n,1,1\n", "plots.csv:2:1: t_s: must be a finite number, got ''"),
+        ("t_s,x_m,y_m\n0,1\n", "plots.csv:2: must have 3 cells as the header, got 2"),
+        ("t_s,x_m,y_m\n0,1,1\n2,1,1\n1,1,1\n", "plots.csv:4:1: t_s: must be later than the row before, got 1 after 2"),
+        ("t_s,x_m,y_m\n5,1,1\n5,1,1\n", "plots.csv:3:1: t_s: must be later than the row before, got 5 after 5"),
+        ('t_s,x_m,y_m\n0,"1,1\n', "plots.csv:2: not a CSV row: unexpected end of data"),
+        (b"t_s,x_m,y_m\n0,\xff,1\n", "plots.csv: is not UTF-8 text"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_place(tmp_path, text, expected):
+    assert faults(tmp_path, text) == [expected]
+
+
+def test_all_faults_at_once_but_not_without_end(tmp_path):
+    assert len(faults(tmp_path, "t_s,x_m,y_m\na,1,1\n1,b,c\n")) == 3
+    many = faults(tmp_path, "t_s,x_m,y_m\n" + "a,b,c\n" * 1000)
+    assert len(many) <= 24
+    assert many[-1] == "plots.csv: more faults may follow"
+
+
+def test_a_missing_file(tmp_path):
+    with pytest.raises(ConfigError, match=r"nothing\.csv: cannot be read: No such file"):
+        plots.read(tmp_path / "nothing.csv", CHOICES)
+
+
+def test_a_track_is_written_row_by_row(tmp_path):
+    nan = np.nan
+    track = Track(
+        filters=("one", "two"),
+        components=(("r", "m"), ("vr", "m/s")),
+        t_s=np.array([0.0, 1.5]),
+        estimate=np.array([[[1.0, nan], [2.0, 0.1]], [[nan, nan], [3.0, 0.3]]]),
+        sigma=np.array([[[0.5, nan], [0.25, 1.0]], [[nan, nan], [0.125, 2.0]]]),
+        probability=np.array([[[0.25, 0.75], [0.5, 0.5]], [[1.0, nan], [1.0, nan]]]),
+    )
+    path = tmp_path / "track.csv"
+    plots.write(track, path)
+    assert path.read_text() == (
+        "t_s,filter,component,unit,estimate,sigma,probability_1,probability_2\n"
+        "0.0,one,r,m,1.0,0.5,0.25,0.75\n"
+        "1.5,one,r,m,2.0,0.25,0.5,0.5\n"
+        "1.5,one,vr,m/s,0.1,1.0,0.5,0.5\n"
+        "1.5,two,r,m,3.0,0.125,1.0,\n"
+        "1.5,two,vr,m/s,0.3,2.0,1.0,\n"
+    )
+    assert [file.name for file in tmp_path.iterdir()] == ["track.csv"]
+
+
+def test_an_unwritable_place(tmp_path):
+    track = Track(("one",), (("r", "m"),), np.zeros(1), np.zeros((1, 1, 1)), np.ones((1, 1, 1)))
+    with pytest.raises(StoreError, match="cannot be written"):
+        plots.write(track, tmp_path / "no folder" / "track.csv")
