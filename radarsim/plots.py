@@ -1,6 +1,6 @@
 """Recorded plots: one track from a CSV file, and the estimates over it back to one.
 
-A plots file has a header; `t_s` must rise from row to row, an empty cell is a missing value, unknown columns are ignored.
+A plots file has a header; `t_s` must rise from row to row, an empty cell means missing, other columns are ignored.
 """
 
 import csv
