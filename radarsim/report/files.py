@@ -10,17 +10,15 @@ from radarsim.errors import StoreError
 def replace_all(folder: Path, contents: Mapping[str, bytes], stale: Iterable[str] = ()) -> None:
     """Write contents (relative path: bytes) below folder, each by a temporary file and a rename.
 
-    Files that match a pattern of `stale` and are not among the contents are removed. Raises StoreError.
+    Of the paths in `stale`, those below folder and not among the contents are removed. Raises StoreError.
     """
     folder = Path(folder)
     try:
         for path, data in contents.items():
             write(folder / path, data)
-        kept = {folder / path for path in contents}
-        for pattern in stale:
-            for path in folder.glob(pattern):
-                if path not in kept:
-                    path.unlink()
+        for path in set(stale) - set(contents):
+            if not Path(path).is_absolute() and ".." not in Path(path).parts:
+                (folder / path).unlink(missing_ok=True)
     except OSError as error:
         raise StoreError(f"{error.filename or folder}: cannot be written: {error.strerror or error}") from error
 

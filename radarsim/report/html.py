@@ -47,7 +47,9 @@ def page(
 
 
 def command(experiment, record: Mapping) -> str:
-    """The command that repeats the run."""
+    """The command that repeats the run: as the run's facts give it, else by the config."""
+    if "command" in record:
+        return str(record["command"])
     asked = f"-n {record['realisations_asked']} --seed {record['seed']}"
     return f"radarsim run {shlex.quote(str(experiment.path or experiment.stem))} {asked}"
 

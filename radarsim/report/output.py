@@ -47,16 +47,28 @@ class Written:
     answer: tuple[str, ...]
 
 
-def write(experiment, results: Sequence[CaseResult], folder: Path, run: Mapping, *, draw: bool = True) -> Written:
+ALWAYS = ("curves", "gains")  # tables written without a row too; others only where they have one
+
+
+def write(
+    experiment,
+    results: Sequence[CaseResult],
+    folder: Path,
+    run: Mapping,
+    *,
+    draw: bool = True,
+    made: Mapping | None = None,
+) -> Written:
     """Write all of an experiment's outputs into folder; every file at once, none half.
 
-    run holds the facts of the run for run.json: see provenance.record. Files of an earlier run that this one does not
-    write (figures without `draw`) are removed, so that nothing stale stands beside new numbers.
+    run holds the facts of the run for run.json: see provenance.record; made the tables, where they are at hand. Outputs
+    of an earlier run that this one does not write (figures without `draw`) are removed, so that nothing stale stands
+    beside new numbers; nothing else is.
     """
     from radarsim.report import html
 
-    made = tables(results)
-    contents = {f"{name}.csv": common.to_csv(table) for name, table in made.items() if len(table.columns)}
+    made = tables(results) if made is None else made
+    contents = {f"{name}.csv": common.to_csv(table) for name, table in made.items() if len(table) or name in ALWAYS}
     drawn = {}
     if draw:
         from radarsim.report import figures as drawing  # Matplotlib
@@ -70,5 +82,5 @@ def write(experiment, results: Sequence[CaseResult], folder: Path, run: Mapping,
     question = study(experiment.study).question(experiment)
     contents["report.html"] = html.page(experiment, results, made, drawn, record, answer, question).encode()
     contents["run.json"] = provenance.to_json(provenance.with_output(record, "report.html", contents["report.html"]))
-    files.replace_all(folder, contents, stale=("*.csv", "figures/*.svg", "figures/*.png"))
+    files.replace_all(folder, contents, stale=provenance.outputs(folder))
     return Written(folder, tuple(sorted(contents)), made, answer)

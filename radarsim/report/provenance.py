@@ -8,6 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 from radarsim.engine.results import CaseResult
 from radarsim.report.statistics import FEW
@@ -52,6 +53,15 @@ def record(
 def with_output(made: dict, path: str, data: bytes) -> dict:
     """The record with one more output."""
     return {**made, "outputs": {**made["outputs"], path: hashlib.sha256(data).hexdigest()}}
+
+
+def outputs(folder: Path) -> list[str]:
+    """The outputs that an earlier run.json of the folder names; none where there is no such record."""
+    try:
+        named = json.loads((folder / "run.json").read_bytes())["outputs"]
+    except (OSError, ValueError, LookupError, TypeError):
+        return []
+    return [path for path in named if isinstance(path, str)] if isinstance(named, dict) else []
 
 
 def few(results: Sequence[CaseResult]) -> list[str]:

@@ -11,7 +11,7 @@ from markupsafe import escape
 
 from radarsim.config.load import load
 from radarsim.errors import StoreError
-from radarsim.report import files, output
+from radarsim.report import files, output, provenance
 
 TABLES = {"curves.csv", "gains.csv", "steady.csv", "consistency.csv", "radar.csv", "claims.csv"}
 FIGURES = {f"figures/{k}_{c}.{f}" for k in ("sigma", "gain") for c in ("r", "Vr", "ar") for f in ("svg", "png")}
@@ -87,17 +87,34 @@ def test_tables_are_the_same_bytes_each_time(experiment, results, tmp_path):
         assert (tmp_path / "a" / path).read_bytes() == (tmp_path / "b" / path).read_bytes()
 
 
-def test_without_figures_old_ones_go(experiment, results, tmp_path):
-    (tmp_path / "figures").mkdir()
-    (tmp_path / "figures/sigma_r.svg").write_text("old")
-    (tmp_path / "notes.txt").write_text("mine")
-    written = output.write(experiment, results, tmp_path, RUN, draw=False)
+def test_without_figures_old_ones_go_and_nothing_else(experiment, results, tmp_path):
+    folder = tmp_path / "rls2"
+    (folder / "figures").mkdir(parents=True)
+    for name in ("figures/sigma_r.svg", "track.csv", "figures/mine.svg", "../outside.csv"):
+        (folder / name).write_text("old")
+    named = {"figures/sigma_r.svg": "", "../outside.csv": "", str(tmp_path / "outside.csv"): ""}
+    (folder / "run.json").write_text(json.dumps({"outputs": named}))
+    written = output.write(experiment, results, folder, RUN, draw=False)
     assert set(written.files) == TABLES | {"run.json", "report.html"}
-    assert not (tmp_path / "figures/sigma_r.svg").exists()
-    assert (tmp_path / "notes.txt").read_text() == "mine"
-    page = (tmp_path / "report.html").read_text()
+    assert not (folder / "figures/sigma_r.svg").exists()
+    for name in ("track.csv", "figures/mine.svg", "../outside.csv"):
+        assert (folder / name).read_text() == "old"
+    page = (folder / "report.html").read_text()
     Page(page)
     assert "<svg" not in page
+
+
+@pytest.mark.parametrize("damaged", [b"", b"[]", b'{"outputs": [1]}', b"\xff", b'{"outputs": null}'])
+def test_a_damaged_record_is_replaced(damaged, tmp_path):
+    (tmp_path / "run.json").write_bytes(damaged)
+    assert provenance.outputs(tmp_path) == []
+
+
+def test_no_claims_no_file(radar_config, expected_case, tmp_path):
+    experiment = load(radar_config("rls2", radar={"sigma_range_m": 251}))
+    written = output.write(experiment, [expected_case(case) for case in experiment.cases], tmp_path, RUN, draw=False)
+    assert "claims.csv" not in written.files
+    assert "Claims of the paper" not in (tmp_path / "report.html").read_text()
 
 
 def test_page_is_whole_and_leads_nowhere(written):
