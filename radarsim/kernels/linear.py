@@ -191,10 +191,14 @@ def fill_estimates(x, plots, dt, observes, start, weights, gains, estimates):
 
 
 def plain(array, *shape, dtype=np.float64):
-    """The array as the kernels take it: of one type, contiguous, broadcast to a shape. Itself where that is so."""
-    if type(array) is np.ndarray and array.shape == shape and array.dtype == dtype and array.flags.c_contiguous:
+    """The array as the kernels take it: of one type, contiguous, writable, broadcast to a shape; itself where it is so.
+
+    Numba counts a read-only array as another type and would compile everything again.
+    """
+    alike = type(array) is np.ndarray and array.shape == shape and array.dtype == dtype
+    if alike and array.flags.c_contiguous and array.flags.writeable:
         return array
-    return np.ascontiguousarray(np.broadcast_to(np.asarray(array, dtype=dtype), shape))
+    return np.array(np.broadcast_to(np.asarray(array, dtype=dtype), shape), order="C")
 
 
 def schedule(dt, observes, start, weights, gains) -> tuple[np.ndarray, ...]:

@@ -1,0 +1,177 @@
+"""The compiler's settings: cache by the hash of all sources, wide registers, the same numbers in plain Python."""
+
+import os
+import shutil
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+from llvmlite.binding import get_host_cpu_features
+
+from radarsim.kernels import compile as compiling
+
+SOURCES = Path(compiling.__file__).parent
+
+
+def python(code, **environment):
+    """Standard output of a fresh interpreter."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", textwrap.dedent(code)],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"} | environment,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+@pytest.fixture
+def house(tmp_path):
+    """A package with a copy of compile.py, a helper file and a kernel that uses it, and a cache of its own."""
+    kernels = tmp_path / "copied" / "kernels"
+    kernels.mkdir(parents=True)
+    shutil.copy(SOURCES / "compile.py", kernels)
+    (kernels / "helper.py").write_text("from .compile import inline\n@inline\ndef grown(x):\n    return x + 1.0\n")
+    (kernels / "user.py").write_text(
+        "from .compile import kernel\nfrom .helper import grown\n@kernel\ndef use(x):\n    return grown(x)\n"
+    )
+    return tmp_path
+
+
+USE = """
+    from copied.kernels.user import use
+    from copied.kernels.compile import CACHE_DIRECTORY
+    print(use(1.0), sum(use.stats.cache_hits.values()), CACHE_DIRECTORY)
+"""
+
+
+def used(house):
+    """What the kernel returns, whether its machine code came from the cache, and the cache's directory."""
+    out = python(USE, PYTHONPATH=str(house), RADARSIM_CACHE_DIR=str(house / "cache"))
+    value, hits, directory = out.split()
+    return float(value), int(hits), directory
+
+
+def test_an_edited_helper_is_noticed(house):
+    """Numba itself would return 2 again: the file of `use` has not changed."""
+    first = used(house)
+    assert first[:2] == (2.0, 0)
+    assert used(house) == (2.0, 1, first[2])
+    helper = house / "copied" / "kernels" / "helper.py"
+    helper.write_text(helper.read_text().replace("1.0", "5.0"))
+    edited = used(house)
+    assert edited[:2] == (6.0, 0)
+    assert edited[2] != first[2]
+    assert Path(edited[2]).parent == house / "cache"
+
+
+def test_every_source_counts(house):
+    """A new file, a renamed file and a changed one each name another directory; the same sources the same one."""
+
+    def directory():
+        code = "from copied.kernels.compile import CACHE_DIRECTORY; print(CACHE_DIRECTORY)"
+        return python(code, PYTHONPATH=str(house), RADARSIM_CACHE_DIR=str(house / "cache"))
+
+    kernels = house / "copied" / "kernels"
+    seen = [directory()]
+    (kernels / "further.py").write_text("")
+    seen.append(directory())
+    (kernels / "further.py").rename(kernels / "farther.py")
+    seen.append(directory())
+    (kernels / "farther.py").unlink()
+    assert directory() == seen[0]
+    assert len(set(seen)) == 3
+
+
+def test_the_first_writable_place(monkeypatch, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a directory")
+    monkeypatch.setenv("RADARSIM_CACHE_DIR", str(tmp_path / "own"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    assert compiling.cache_root() == tmp_path / "own"
+    monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
+    assert compiling.cache_root() == tmp_path / "home" / "radarsim"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
+    monkeypatch.setattr(compiling.tempfile, "tempdir", str(tmp_path))
+    shared = compiling.cache_root()
+    assert shared.parent == tmp_path
+    assert compiling.cache_root() == shared
+    if hasattr(os, "getuid"):
+        assert shared.stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="no such permissions here")
+def test_a_shared_place_that_others_can_write_is_not_trusted(monkeypatch, tmp_path):
+    """The cache holds machine code: in the common temporary directory it must be ours alone."""
+    blocked = tmp_path / "file"
+    blocked.write_text("not a directory")
+    monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
+    monkeypatch.setattr(compiling.tempfile, "tempdir", str(tmp_path))
+    planted = compiling.cache_root()
+    planted.chmod(0o777)
+    assert compiling.cache_root() != planted
+
+
+def test_other_users_of_numba_keep_their_cache():
+    before = numba.config.CACHE_DIR
+
+    @compiling.kernel
+    def twice(x):
+        return 2 * x
+
+    assert before == numba.config.CACHE_DIR
+    assert twice(4) == 8
+
+
+@pytest.mark.skipif(not get_host_cpu_features().get("avx512f"), reason="no registers of 512 bits")
+def test_loops_use_wide_registers():
+    def scaled(x):
+        for i in range(x.size):
+            x[i] = 1.5 * x[i]
+
+    options = {"fastmath": set(compiling.FLAGS), **compiling.COMMON}
+    function = numba.njit(**options)(scaled)
+    function(np.ones(8))
+    (assembly,) = function.inspect_asm().values()
+    assert "zmm" in assembly
+
+
+NUMBERS = """
+import numpy as np
+from radarsim.kernels import linear, random
+key = random.stream(3, "plain")
+pairs, strips = [np.empty(3) for _ in range(4)], [np.empty(16) for _ in range(4)]
+random.fill_normal_pairs(key, 10, 2, *pairs[:2])
+random.fill_uniform_pairs(key, 10, 2, *pairs[2:])
+random.fill_normal_strip(key, 10, 2, *strips[:2])
+random.fill_uniform_strip(key, 10, 2, *strips[2:])
+rng = np.random.default_rng(1)
+gains, weights = rng.uniform(0, 0.3, (2, 6, 3, 2)), rng.normal(size=(2, 3, 2, 3))
+schedule = np.array([1, 2]), np.array([3, 2]), weights, gains
+error, paired, cross = np.zeros((2, 6, 3, 4)), np.zeros((2, 6, 3)), np.zeros((2, 6, 3))
+linear.simulate_block(key, 7, 6, np.ones((6, 3)), np.array([2.0, 1.0]), 1.0, *schedule, 0, error, paired, cross)
+plots = linear.simulate_plots(key, 7, 6, np.ones((6, 3)), np.array([2.0, 1.0]))
+estimates = np.nan_to_num(linear.estimate(plots, 1.0, *schedule), nan=-1.0)
+numbers = [float(v) for a in (*pairs, *strips, error, paired, cross, plots, estimates) for v in a.ravel()]
+"""
+# Words overflow by design, which NumPy's scalars report; the result does not depend on the chunk.
+PLAIN = f"""
+from radarsim.kernels import linear
+linear.CHUNK = 4
+{NUMBERS}
+print(*map(repr, numbers))
+"""
+
+
+def test_plain_python_gives_the_same_numbers():
+    """Without compiler the kernels are readable Python with the same results, but for fused multiply-adds."""
+    scope = {}
+    exec(NUMBERS, scope)
+    plain = python("import numpy as np\nnp.seterr(over='ignore')\n" + PLAIN, NUMBA_DISABLE_JIT="1")
+    np.testing.assert_allclose(np.array(plain.split(), dtype=float), scope["numbers"], rtol=1e-11, atol=1e-11)
