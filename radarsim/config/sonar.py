@@ -176,7 +176,9 @@ class Filter(Model):
         description="least squares on all plots or on the last few, Kalman, fixed gains, or one that knows of ρ"
     )
     degree: Literal[1, 2] = Field(1, description="degree of the polynomial: 1 a straight line, 2 a parabola")
-    plots: whole(2, 1000) | None = Field(None, description="length of a window, in plots")
+    plots: whole(2, 1000) | None = Field(
+        None, description="length of a window; or of the least-squares start of fixed_gain, by default degree + 1"
+    )
     manoeuvre_variance: NonNegative | None = Field(
         None,
         description="variance of a random acceleration, (m/s²)², of degree 2 of a random jerk, (m/s³)²; "
@@ -188,8 +190,10 @@ class Filter(Model):
 
     @model_validator(mode="after")
     def _fits_kind(self):
-        if (self.plots is None) == (self.kind == "window"):
-            raise at("plots", "is needed by a window, and only there")
+        if self.plots is None and self.kind == "window":
+            raise at("plots", "is needed by a window")
+        if self.plots is not None and self.kind not in ("window", "fixed_gain"):
+            raise at("plots", "belongs to a window, or to the start of fixed_gain")
         if self.plots is not None and self.plots < self.degree + 1:
             raise at("plots", f"must be >= {self.degree + 1} for degree {self.degree}")
         if self.kind == "fixed_gain" and not self.manoeuvre_variance:

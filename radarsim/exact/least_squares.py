@@ -7,6 +7,7 @@ degree 1 or 2.
 import numpy as np
 
 from radarsim.models.motion import transition
+from radarsim.models.sonar import error_covariance
 
 
 def design_matrix(t: np.ndarray, size: int) -> np.ndarray:
@@ -29,6 +30,17 @@ def generalised_least_squares(t: np.ndarray, C: np.ndarray, size: int) -> tuple[
     weights = np.linalg.solve(r, q.T) @ np.linalg.inv(factor)
     root = np.linalg.inv(r)
     return scale[:, None] * weights, np.outer(scale, scale) * (root @ root.T)
+
+
+def optimal_sigma(t: np.ndarray, sigma: np.ndarray, rho: float, period: float, size: int) -> np.ndarray:
+    """Least σ (size,) of the state at the last time, from plots of standard deviations sigma (n,), infinite where
+    missed.
+    """
+    came = np.isfinite(sigma)
+    C = error_covariance(sigma[came], rho, t[came], period)
+    _, P = generalised_least_squares(t[came], C, size)
+    F = transition(t[-1] - t[came][-1], size)
+    return np.sqrt(np.diagonal(F @ P @ F.T))
 
 
 def error_of_weights(weights: np.ndarray, C: np.ndarray) -> np.ndarray:

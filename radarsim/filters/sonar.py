@@ -206,13 +206,16 @@ def steady_gain(period: float, sigma: float, size: int, manoeuvre_variance: floa
     return P[:, 0] / (1 + P[0, 0]) * period ** -np.arange(float(size))
 
 
-def fixed_gain(plots: Plots, size: int, manoeuvre_variance: float) -> Design:
-    """The α-β(-γ) filter: least squares from the first `size` plots, then the settled gains, and none at a missed plot.
+def fixed_gain(plots: Plots, size: int, manoeuvre_variance: float, start: int = 0) -> Design:
+    """The α-β(-γ) filter: least squares from the first plots, then the settled gains, and none at a missed plot.
+
+    start is the number of these plots; the least is `size`. After so few the settled gains, small as they are, need
+    long to mend the first velocity.
 
     What it believes is the covariance of its own recursion under that manoeuvre variance.
     """
     gain, carry, P = _information(plots, size, 0.0)
-    variance, early = plots.scaled(manoeuvre_variance, size), plots.early(size)
+    variance, early = plots.scaled(manoeuvre_variance, size), plots.early(max(size, start))
     settled = steady_gain(plots.period, plots.sigma, size, manoeuvre_variance) * plots.period ** np.arange(float(size))
     state = np.zeros((len(gain), size, size))
     for k in range(len(plots.t)):

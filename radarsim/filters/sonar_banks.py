@@ -21,7 +21,7 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Choice:
-    """A filter as chosen: kind, size of the state, length of a window.
+    """A filter as chosen: kind, size of the state, length of a window or of a start.
 
     By coordinate the manoeuvre variance (C,) and ρ (C,).
     """
@@ -42,7 +42,7 @@ def designed(choice: Choice, c: int, plots: filters.Plots) -> filters.Design:
         case "kalman":
             return filters.kalman(plots, size, choice.variance[c])
         case "fixed_gain":
-            return filters.fixed_gain(plots, size, choice.variance[c])
+            return filters.fixed_gain(plots, size, choice.variance[c], choice.length)
         case "kalman_augmented":
             return filters.augmented(plots, size, choice.rho[c], choice.variance[c])
         case "kalman_differenced":
@@ -83,7 +83,8 @@ def packed_inverse(P: np.ndarray, ready: np.ndarray, size: int) -> np.ndarray:
 def shared(choices: list[Choice], plots: list[filters.Plots]) -> kernels.Shared:
     """Filters whose gains all realisations share; plots of each coordinate, of one pattern."""
     F, K, C = len(choices), len(plots[0].t), len(plots)
-    longest = max(f.length for f in choices)
+    length = np.array([f.length if f.kind == "window" else 0 for f in choices])
+    longest = int(length.max())
     gain, carry = np.zeros((F, K, C, 4)), np.zeros((F, K, C))
     weights, inverse = np.zeros((F, K, C, 3, longest)), np.zeros((F, K, C, 6))
     order = np.stack([np.cumsum(p.weight[0] > 0) - 1 for p in plots], axis=1)
@@ -102,7 +103,7 @@ def shared(choices: list[Choice], plots: list[filters.Plots]) -> kernels.Shared:
         gain=gain,
         carry=carry,
         carries=gain[..., 3].any(axis=(1, 2)),
-        length=np.array([f.length for f in choices]),
+        length=length,
         weights=weights,
         slot=np.where(came, order % max(longest, 1), -1),
         known=np.minimum(times[None], size[:, None, None]),

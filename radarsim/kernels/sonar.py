@@ -58,13 +58,13 @@ class Shared(NamedTuple):
 class Sums(NamedTuple):
     """What is added up, over realisations; see `studies.sonar` for the meaning.
 
-    error (F, K, C, 3, 4), paired (F, K, C, 3), nees (F, K, C, 2), ahead (F, K, C, 4), believed and estimates (F, K,
+    error (F, K, C, 3, 4), paired (F, K, C, 3), joint (F, K, C, 4), ahead (F, K, C, 4), believed and estimates (F, K,
     C, 3).
     """
 
     error: np.ndarray
     paired: np.ndarray
-    nees: np.ndarray
+    joint: np.ndarray
     ahead: np.ndarray
     believed: np.ndarray
     estimates: np.ndarray
@@ -186,13 +186,14 @@ def powers(e):
 def error_sums(x, y, shift, truth, inverse, n):
     """Sums over the first n of the errors of a state x (>= 3, n): of value, rate and acceleration, and all together.
 
-    Seventeen: e, e², e³, e⁴ of each; e² f² of each, f the error of the filter y beside it; q and q², q = eᵀ P⁻¹ e
-    with the inverse (6,) packed by rows. shift (2, n) is the deviation of value and rate from the truth (3,).
+    e, e², e³, e⁴ of each; e² f² of each, f the error of the filter y beside it; q, q², p, p² of q = eᵀ P⁻¹ e, with
+    the inverse (6,) packed by rows, and p the product of the errors in value and rate. shift (2, n) is the deviation of
+    value and rate from the truth (3,).
     """
     t0, t1, t2 = truth[0], truth[1], truth[2]
     y00, y01, y02, y11, y12, y22 = inverse[0], inverse[1], inverse[2], inverse[3], inverse[4], inverse[5]
     a1 = a2 = a3 = a4 = b1 = b2 = b3 = b4 = c1 = c2 = c3 = c4 = 0.0
-    p0 = p1 = p2 = q1 = q2 = 0.0
+    p0 = p1 = p2 = q1 = q2 = r1 = r2 = 0.0
     for i in range(n):
         m0, m1 = t0 + shift[0, i], t1 + shift[1, i]
         e0, e1, e2 = x[0, i] - m0, x[1, i] - m1, x[2, i] - t2
@@ -204,9 +205,10 @@ def error_sums(x, y, shift, truth, inverse, n):
         b1, b2, b3, b4 = b1 + e1, b2 + bb, b3 + bbb, b4 + bbbb
         c1, c2, c3, c4 = c1 + e2, c2 + cc, c3 + ccc, c4 + cccc
         p0, p1, p2 = p0 + aa * (f0 * f0), p1 + bb * (f1 * f1), p2 + cc * (f2 * f2)
-        q = y00 * aa + y11 * bb + y22 * cc + 2.0 * (y01 * e0 * e1 + y02 * e0 * e2 + y12 * e1 * e2)
-        q1, q2 = q1 + q, q2 + q * q
-    return (a1, a2, a3, a4, b1, b2, b3, b4, c1, c2, c3, c4), (p0, p1, p2), (q1, q2)
+        ab = e0 * e1
+        q = y00 * aa + y11 * bb + y22 * cc + 2.0 * (y01 * ab + y02 * e0 * e2 + y12 * e1 * e2)
+        q1, q2, r1, r2 = q1 + q, q2 + q * q, r1 + ab, r2 + ab * ab
+    return (a1, a2, a3, a4, b1, b2, b3, b4, c1, c2, c3, c4), (p0, p1, p2), (q1, q2, r1, r2)
 
 
 @summing
@@ -225,7 +227,7 @@ def add_sums(bank, x, plots, truth, k, n, baseline, sums):
     """Add the errors of scan k: x (F, C, 4, CHUNK), plots (C, 4, CHUNK), truth (C, 3)."""
     for f in range(x.shape[0]):
         for c in range(x.shape[1]):
-            own, both, normal = error_sums(x[f, c], x[baseline, c], plots[c, 2:], truth[c], bank.inverse[f, k, c], n)
+            own, both, joint = error_sums(x[f, c], x[baseline, c], plots[c, 2:], truth[c], bank.inverse[f, k, c], n)
             known = bank.known[f, k, c]
             for j in range(known):
                 for q in range(4):
@@ -233,8 +235,8 @@ def add_sums(bank, x, plots, truth, k, n, baseline, sums):
                 if j < bank.known[baseline, k, c]:
                     sums.paired[f, k, c, j] += both[j]
             if known == bank.size[f]:
-                sums.nees[f, k, c, 0] += normal[0]
-                sums.nees[f, k, c, 1] += normal[1]
+                for q in range(4):
+                    sums.joint[f, k, c, q] += joint[q]
 
 
 @kernel

@@ -39,7 +39,7 @@ class Sight(NamedTuple):
 
 
 class Bank(NamedTuple):
-    """F filters: kind (F,), size (F,) of the state, length (F,) of a window.
+    """F filters: kind (F,), size (F,) of the state, length (F,) of a window or of the start of a fixed filter.
 
     carry (F, K, C) correlation that the filter assumes, manoeuvre (F, C) variance in nominal plots and periods, settled
     (F, C, 3) gains of a fixed filter, likewise.
@@ -67,8 +67,14 @@ def detect(sight, first, k, seen):
 
 
 @kernel
-def weigh(sight, k, plots, seen, z, weight):
-    """Plots z (C, n) and their weights (C, n) from what was measured: plots (C', 4, n), row 0."""
+def weigh(sight, k, plots, seen, place, z, weight):
+    """Plots z (C, n) and their weights (C, n) from what was measured: plots (C', 4, n), rows 0 and 1.
+
+    place (3, n) holds range and bearing of the last plot, and 1 where there is one. The plain conversion has its
+    weights from the plot itself; the unbiased one from the plot before, lest a weight go with the error of its own
+    plot, which would be a bias again (the decorrelation of Bordonaro, Willett and Bar-Shalom 2014, with a place that
+    we have).
+    """
     for c in range(z.shape[0]):
         w = sight.weight[k, c]
         for i in range(seen.size):
@@ -83,13 +89,19 @@ def weigh(sight, k, plots, seen, z, weight):
     for i in range(seen.size):
         r, b = sight.measured[k, 0] + plots[0, 1, i], sight.measured[k, 1] + plots[1, 1, i]
         co, si = np.cos(b), np.sin(b)
+        z[0, i], z[1, i] = root * r * co, root * r * si
         if sight.frame == 1:
             across = r * r * sb
             xx, yy = sr * co * co + across * si * si, sr * si * si + across * co * co
         else:
+            r_now, b_now = r, b
+            if place[2, i] > 0.0:
+                r, b = place[0, i], place[1, i]
+                co, si = np.cos(b), np.sin(b)
+            if seen[i] > 0.0:
+                place[0, i], place[1, i], place[2, i] = r_now, b_now, 1.0
             power, twice = 0.5 * grow * (r * r + sr), shrink * (co * co - si * si)
             xx, yy = power * (1.0 + twice) - r * r * co * co, power * (1.0 - twice) - r * r * si * si
-        z[0, i], z[1, i] = root * r * co, root * r * si
         weight[0, i], weight[1, i] = seen[i] * nominal_x / xx, seen[i] * nominal_y / yy
 
 
@@ -145,11 +157,11 @@ def inform(y, before, weight, tau, carry, size, gain, P):
 
 
 @kernel
-def believe(s, before, weight, tau, carry, size, manoeuvre, settled, gain, P):
-    """Covariance s (10, n) of state and carried error by one scan; replaces gain (4, n) and P (6, n) once started.
+def believe(s, before, weight, tau, carry, size, start, manoeuvre, settled, gain, P):
+    """Covariance s (10, n) of state and carried error by one scan; replaces gain (4, n) and P (6, n) after `start`.
 
-    Rows of s: the six of P, then the three covariances with the error and its variance. settled (3,) are fixed gains,
-    all zero for the Kalman gain; P S is taken off in the form that holds for any gain.
+    start counts plots. Rows of s: the six of P, then the three covariances with the error and its variance. settled
+    (3,) are fixed gains, all zero for the Kalman gain; P S is taken off in the form that holds for any gain.
     """
     half, fixed = 0.5 * tau * tau, settled[0] > 0.0
     m0, m1, m2 = (half, tau, 0.0) if size == 2 else (tau * half / 3.0, half, tau)
@@ -184,7 +196,7 @@ def believe(s, before, weight, tau, carry, size, manoeuvre, settled, gain, P):
         q1 += g1 * (g3 * S - k3) - k1 * g3
         q2 += g2 * (g3 * S - k3) - k2 * g3
         e += g3 * (g3 * S - 2.0 * k3)
-        early = before[i] < size
+        early = before[i] < start
         s[0, i] = P[0, i] if early else p00
         s[1, i] = P[1, i] if early else p01
         s[2, i] = P[2, i] if early else p02
@@ -281,7 +293,7 @@ def believed_sums(x, P, shift, truth, count, size, period, sigma, n):
 
     P in nominal units.
     """
-    s0 = s1 = s2 = q1 = q2 = 0.0
+    s0 = s1 = s2 = q1 = q2 = r1 = r2 = 0.0
     one = 1.0 / sigma
     for i in range(n):
         s0 += P[0, i] if count[i] >= 1.0 else 0.0
@@ -294,8 +306,9 @@ def believed_sums(x, P, shift, truth, count, size, period, sigma, n):
             P[0, i], P[1, i], P[2, i], P[3, i], P[4, i], P[5, i], size if full else 0.0
         )
         q = e0 * (y00 * e0 + 2.0 * (y01 * e1 + y02 * e2)) + e1 * (y11 * e1 + 2.0 * y12 * e2) + y22 * e2 * e2
-        q1, q2 = q1 + q, q2 + q * q
-    return s0, s1, s2, q1, q2
+        ab = (x[0, i] - truth[0] - shift[0, i]) * (x[1, i] - truth[1] - shift[1, i]) if full else 0.0
+        q1, q2, r1, r2 = q1 + q, q2 + q * q, r1 + ab, r2 + ab * ab
+    return (s0, s1, s2), (q1, q2, r1, r2)
 
 
 @kernel
@@ -313,11 +326,11 @@ def add_sums(bank, sight, x, P, shift, truth, count, c, f, k, n, baseline, sums)
         if j < bank.size[baseline]:
             sums.paired[f, k, c, j] += s[5]
     size = float(bank.size[f])
-    s = believed_sums(x[f, c], P, shift, truth, count, size, sight.period, sight.sigma[c], n)
+    claimed, joint = believed_sums(x[f, c], P, shift, truth, count, size, sight.period, sight.sigma[c], n)
     for j in range(bank.size[f]):
-        sums.believed[f, k, c, j] += s[j] * unit / sight.period ** (2 * j)
-    sums.nees[f, k, c, 0] += s[3]
-    sums.nees[f, k, c, 1] += s[4]
+        sums.believed[f, k, c, j] += claimed[j] * unit / sight.period ** (2 * j)
+    for q in range(4):
+        sums.joint[f, k, c, q] += joint[q]
 
 
 @summing
@@ -354,7 +367,19 @@ def filter_scan(bank, sight, f, c, k, dt, x, y, s, memory, z, weight, before, co
         return
     inform(y, before, weight, tau, carry, size, gain, P)
     if bank.kind[f] != INFORMATION:
-        believe(s, before, weight, tau, carry, size, bank.manoeuvre[f, c], bank.settled[f, c], gain, P)
+        believe(
+            s,
+            before,
+            weight,
+            tau,
+            carry,
+            size,
+            max(size, bank.length[f]),
+            bank.manoeuvre[f, c],
+            bank.settled[f, c],
+            gain,
+            P,
+        )
     scan(x, z, dt, carry, sight.period, gain)
 
 
@@ -367,19 +392,19 @@ def simulate_block(world, sight, bank, first, total, baseline, sums):
     filters, scans, coordinates = bank.carry.shape
     x, y = np.empty((filters, coordinates, 4, CHUNK)), np.empty((filters, coordinates, 8, CHUNK))
     s = np.empty((filters, coordinates, 10, CHUNK))
-    memory = np.empty((coordinates, 3, bank.length.max(), CHUNK))
+    memory = np.empty((coordinates, 3, np.where(bank.kind == WINDOW, bank.length, 0).max(), CHUNK))
     plots, shift = np.empty((world.walk.size, 4, CHUNK)), np.zeros((coordinates, 3, CHUNK))
     z, weight, seen = np.empty((coordinates, CHUNK)), np.empty((coordinates, CHUNK)), np.empty(CHUNK)
-    before, count = np.empty((coordinates, CHUNK)), np.empty((coordinates, CHUNK))
+    place, before, count = np.empty((3, CHUNK)), np.empty((coordinates, CHUNK)), np.empty((coordinates, CHUNK))
     gain, P = np.empty((4, CHUNK)), np.empty((filters, 6, CHUNK))
     for done in range(0, total, CHUNK):
-        x[:], y[:], s[:], memory[:], plots[:], count[:] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        x[:], y[:], s[:], memory[:], plots[:], count[:], place[:] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         n = min(CHUNK, total - done)
         for k in range(scans):
             dt, truth = world.dt[k], world.truth[k]
             move_and_measure(world, first + done, k, plots)
             detect(sight, first + done, k, seen)
-            weigh(sight, k, plots, seen, z, weight)
+            weigh(sight, k, plots, seen, place, z, weight)
             shift[:, :2] = plots[:coordinates, 2:]
             if k > 0:
                 add_ahead(bank, x, shift, truth, count, k, dt, n, sums)

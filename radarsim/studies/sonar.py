@@ -2,8 +2,8 @@
 
 Sums of F filters over K scans and components (coordinate by coordinate: value, rate and, where a filter has it,
 acceleration): `error`, `paired`, `estimates` as everywhere; `believed` Σ of the variances that the filter claims; by
-coordinate C: `nees` Σq, Σq² of q = eᵀP⁻¹e, and `ahead` Σe … Σe⁴ of the value extrapolated by one scan, in the row of
-the scan that it was extrapolated from.
+coordinate C: `joint` Σq, Σq², Σp, Σp² of q = eᵀP⁻¹e and p the product of the errors in value and rate, and `ahead` Σe
+… Σe⁴ of the value extrapolated by one scan, in the row of the scan that it was extrapolated from.
 """
 
 from dataclasses import dataclass
@@ -276,7 +276,7 @@ def prepare(case: Case) -> Plan:
     bank = banks.shared(wanted, by_coordinate) if shared else banks.own(wanted, seen.t, seen.period, seen.nominal)
     layout = Layout(
         **dict.fromkeys(("paired", "estimates", "believed"), (F, K, C * size)),
-        **{"error": (F, K, C * size, 4), "nees": (F, K, C, 2), "ahead": (F, K, C, 4)},
+        **{"error": (F, K, C * size, 4), "joint": (F, K, C, 4), "ahead": (F, K, C, 4)},
     )
     return Plan(
         layout=layout,
@@ -351,17 +351,25 @@ def axes(spec, seen: Scene, wanted: list[banks.Choice], size: int) -> Axes:
             "scan_period_s": seen.period,
             "sigma": seen.nominal,
             "rho": seen.rho,
+            "sigma_of_plots": np.where(came.T > 0, seen.sigma, np.inf),
+            "conversion_bias": plain_bias(spec, seen),
             "truth": seen.truth,
             "polar": seen.polar,
         },
     )
 
 
+def plain_bias(spec, seen: Scene) -> float:
+    """Mean error, along the line of sight, of the converted first plot, m; nought for the unbiased conversion."""
+    plain = spec.frame == "cartesian"
+    return float(models.conversion_bias(seen.polar[0, 0, 0], spec.sensor.sigma_bearing_rad)) if plain else 0.0
+
+
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
     F, K = len(plan.axes.filters), len(plan.axes.k)
     C = len(plan.axes.extra["coordinates"])
-    shapes = {"error": (3, 4), "paired": (3,), "nees": (2,), "ahead": (4,), "believed": (3,), "estimates": (3,)}
+    shapes = {"error": (3, 4), "paired": (3,), "joint": (4,), "ahead": (4,), "believed": (3,), "estimates": (3,)}
     sums = kernels.Sums(**{name: np.zeros((F, K, C, *tail)) for name, tail in shapes.items()})
     if plan.sight is None:
         kernels.simulate_block(plan.world, plan.bank, first, count, plan.axes.baseline, sums)
@@ -373,4 +381,4 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
         name: getattr(sums, name)[:, :, :, : plan.size].reshape(plan.layout.shapes[name])
         for name in ("error", "paired", "believed", "estimates")
     }
-    return plan.layout.pack(**picked, nees=sums.nees, ahead=sums.ahead)
+    return plan.layout.pack(**picked, joint=sums.joint, ahead=sums.ahead)

@@ -119,7 +119,7 @@ def test_estimates_are_the_twins(sensor):
                 q = np.array(
                     [v @ np.linalg.solve(p, v) for v, p in zip((x - truth[:, c, :size])[full], P[full], strict=True)]
                 )
-                assert sums["nees"][f, full, c, 0] == pytest.approx(q, rel=1e-5)
+                assert sums["joint"][f, full, c, 0] == pytest.approx(q, rel=1e-5)
 
 
 @pytest.mark.parametrize("frame", ["cartesian", "cartesian_unbiased"])
