@@ -103,7 +103,7 @@ Mark = Line | Reference | Bars | Heat | Note
 class Panel:
     """One pair of axes. keys explain styles (not single lines) in a small legend: (words, style).
 
-    direct: lines are named at their ends where the names fit; else always in the legend.
+    direct: lines are named at their ends where the names fit; else always in the legend, at its place or "none".
     """
 
     x: Axis

@@ -215,7 +215,7 @@ def _name(axes, panel: Panel) -> list:
     direct = panel.direct and short and all(m.style.dash is not None for m in lines) and len(lines) <= _fitting(axes)
     if not direct:
         handles = [(m.label, m.style) for m in lines] + handles
-    if handles:
+    if handles and panel.legend != "none":
         look = [Line2D([], [], **_look(style)) for _, style in handles]
         words = [words for words, _ in handles]
         title = panel.key_title or None

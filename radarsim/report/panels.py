@@ -81,6 +81,11 @@ def families(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
     return found
 
 
+def unswept(results: Sequence[CaseResult]) -> list[CaseResult]:
+    """The cases that nothing is swept in, where there are such; else all."""
+    return [result for result in results if not result.swept] or list(results)
+
+
 def shown(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
     """The results that a figure shows, of the cases named, at most eight; and words on those left out."""
     wanted = [result for result in results if result.name in set(names)]

@@ -1,6 +1,6 @@
 """P1's own tables (steady state, consistency, radar) and the words of its report.
 
-Its figures stand in figures' data.
+Its figures stand in range_doppler_figures.
 """
 
 from collections.abc import Sequence
@@ -10,10 +10,11 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels, statistics
 from radarsim.report import tables as common
-from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
+from radarsim.report.range_doppler_figures import PERIODS, QUANTITIES, figures
+
+__all__ = ["answer", "figures", "question", "tables"]
 
 SETTLED = 0.05  # within this share of the steady value, for good; the paper gives no tolerance
-PERIODS = 10  # the paper: a manoeuvre variance is good when the error settles in under ten scan periods
 TARGET_SPEED = 300.0  # m/s, the paper's example of an ambiguous Doppler frequency
 
 
@@ -163,69 +164,6 @@ def radar(results: Sequence[CaseResult]):
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(RADAR)})
 
 
-QUANTITIES = {
-    "r": panels.Quantity("$r$", "range"),
-    "Vr": panels.Quantity("$V_r$", "radial velocity"),
-    "ar": panels.Quantity("$a_r$", "radial acceleration"),
-}
-
-
-def figures(results: Sequence[CaseResult], made: dict, experiment) -> dict[str, Figure]:
-    """sigma_r … gain_ar (the paper's figures 1a … 3b), and `settling` where the manoeuvre variance is swept."""
-    curves = common.groups(made["curves"], "case", "filter", "component")
-    gains = common.groups(made["gains"], "case", "filter", "component")
-
-    def chosen(name: str) -> list[str]:
-        return [case.name for case in experiment.shown_in(name)]
-
-    drawn = panels.per_component(results, curves, gains, QUANTITIES, chosen)
-    some = [result for result in results if result.name in set(chosen("settling"))]
-    figure = settling_figure(some, made["steady"])
-    return drawn | ({"settling": figure} if figure else {})
-
-
-def settling_figure(results: Sequence[CaseResult], table) -> Figure | None:
-    """Steady σ of the range against its settling time over D_M, with the ten-period line and the best D_M named."""
-    rows = table[(table["component"] == "r") & np.isfinite(table["settling_s"])]
-    drawn = []
-    for members in panels.families(results).values():
-        own = rows[rows["case"].isin([r.name for r in members])].drop_duplicates(["filter", "manoeuvre_variance"])
-        if own["manoeuvre_variance"].nunique() > 1:
-            drawn.append(_settling_panel(members[0], own))
-    if not drawn:
-        return None
-    caption = (
-        "Exact steady σ of the range against the settling time of the measured σ (within 5 % of the steady value, for "
-        "good); grey lines join equal manoeuvre variances, named in m²/s⁶. Dotted: ten scan periods, the paper's "
-        "limit; star: the least steady error under it. What does not settle within the run is left out."
-    )
-    columns = min(3, len(drawn))
-    width = COLUMN_MM if columns == 1 else PAGE_MM
-    return Figure(
-        "settling", "Steady error against settling time", caption, tuple(drawn[: panels.MOST]), columns, width
-    )
-
-
-def _settling_panel(result: CaseResult, rows) -> Panel:
-    """rows: of one radar and the range, one for each filter and manoeuvre variance."""
-    marks: list = [Reference(PERIODS * result.axes.extra["scan_period_s"], "x")]
-    for variance, same in rows.sort_values("steady_sigma").groupby("manoeuvre_variance"):
-        t, sigma = same["settling_s"].to_numpy(), same["steady_sigma"].to_numpy()
-        marks.append(Line(t, sigma, "", Style(7, 2, width_pt=0.6)))
-        marks.append(Note(float(t[-1]), float(sigma[-1]), panels.number(float(variance))))
-    for n, name in enumerate(result.axes.filters):
-        own = rows[rows["filter"] == name].sort_values("manoeuvre_variance")
-        best = own[own["best"]]
-        marks.append(
-            Line(own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy(), panels.literal(name), Style(n, n, n))
-        )
-        star = Style(n, None, 7, size_pt=8)
-        marks.append(Line(best["settling_s"].to_numpy(), best["steady_sigma"].to_numpy(), "", star))
-    x, y = Axis("settling time of $\\sigma$ of $r$, s", limits=(0, None)), Axis("steady $\\sigma$ of $r$, m")
-    keys = ((f"{PERIODS} scan periods", Style(7, 2, width_pt=0.7)),)
-    return Panel(x, y, tuple(marks), panels.device(result), keys, direct=False)
-
-
 def question(experiment) -> str:
     """What the experiment asks, in one sentence."""
     filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
@@ -245,7 +183,7 @@ def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
 
     Of cases that nothing is swept in, where there are such.
     """
-    plain = [result for result in results if not result.swept] or results
+    plain = panels.unswept(results)
     rows = made["gains"][made["gains"]["case"].isin([result.name for result in plain])]
     gains = common.groups(rows, "component")
     told = [_gain_sentence(plain, gains[(c,)], of.name) for c, of in QUANTITIES.items() if (c,) in gains]

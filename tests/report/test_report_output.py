@@ -15,6 +15,7 @@ from radarsim.report import files, output, provenance
 
 TABLES = {"curves.csv", "gains.csv", "steady.csv", "consistency.csv", "radar.csv", "claims.csv"}
 FIGURES = {f"figures/{k}_{c}.{f}" for k in ("sigma", "gain") for c in ("r", "Vr", "ar") for f in ("svg", "png")}
+FIGURES |= {"figures/consistency.svg", "figures/consistency.png"}
 RUN = {"stop": "done", "threads": 2, "seconds": 1.5, "warnings": ["watch out"], "identities": {"rls2": "ab"}}
 
 
@@ -125,7 +126,7 @@ def test_page_is_whole_and_leads_nowhere(written):
     assert "script" not in page.tags
     ids = re.findall(r'\bid="([^"]+)"', text)
     assert len(ids) == len(set(ids))
-    assert page.tags.count("svg") == 6
+    assert page.tags.count("svg") == 7
     assert str(escape(written.answer[0])) in text
     assert "watch out" in text
     assert "P1.18" in text

@@ -97,7 +97,7 @@ def test_bounds_of_the_normalised_error(paper):
 
 
 def test_figures_have_the_contracts_names(paper, swept):
-    names = {f"{kind}_{component}" for kind in ("sigma", "gain") for component in ("r", "Vr", "ar")}
+    names = {f"{kind}_{component}" for kind in ("sigma", "gain") for component in ("r", "Vr", "ar")} | {"consistency"}
     assert set(drawn_of(paper)) == names
     assert set(drawn_of(swept)) == names | {"settling"}
 
@@ -128,6 +128,16 @@ def test_gain_figures_draw_the_table(paper):
     for line, result in zip(lines, paper, strict=True):
         np.testing.assert_array_equal(line.y, rows[result.name, "ar"]["gain_percent"])
         np.testing.assert_array_equal(line.x, rows[result.name, "ar"]["t_s"])
+
+
+def test_consistency_figure_draws_the_table(paper):
+    made = made_of(paper)
+    first, second = drawn_of(paper, made)["consistency"].panels
+    assert (first.title, second.title) == ("r", "r+Vr")
+    rows = tables.groups(made["consistency"], "case", "filter", "component")
+    lines = [mark for mark in second.marks if isinstance(mark, Line)]
+    for line, result in zip(lines, paper, strict=True):
+        np.testing.assert_array_equal(line.y, rows[result.name, "r+Vr", "r"]["nees"])
 
 
 def test_settling_figure_draws_the_table(swept):

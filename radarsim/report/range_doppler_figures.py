@@ -1,0 +1,102 @@
+"""P1's figures: 1a to 3b of the paper, steady error against settling, and what the filters believe of themselves."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import panels
+from radarsim.report import tables as common
+from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
+
+PERIODS = 10  # the paper: a manoeuvre variance is good when the error settles in under ten scan periods
+QUANTITIES = {
+    "r": panels.Quantity("$r$", "range"),
+    "Vr": panels.Quantity("$V_r$", "radial velocity"),
+    "ar": panels.Quantity("$a_r$", "radial acceleration"),
+}
+
+
+def figures(results: Sequence[CaseResult], made: dict, experiment) -> dict[str, Figure]:
+    """sigma_r … gain_ar (the paper's figures 1a … 3b), and `settling` where the manoeuvre variance is swept."""
+    curves = common.groups(made["curves"], "case", "filter", "component")
+    gains = common.groups(made["gains"], "case", "filter", "component")
+
+    def chosen(name: str) -> list[str]:
+        return [case.name for case in experiment.shown_in(name)]
+
+    drawn = panels.per_component(results, curves, gains, QUANTITIES, chosen)
+    some = [result for result in results if result.name in set(chosen("settling"))]
+    figure = settling_figure(some, made["steady"])
+    drawn |= {"settling": figure} if figure else {}
+    some, left_out = panels.shown(panels.unswept(results), chosen("consistency"))
+    return drawn | ({"consistency": consistency_figure(some, made["consistency"], left_out)} if some else {})
+
+
+def consistency_figure(results: Sequence[CaseResult], table, left_out: str) -> Figure:
+    """NEES per component against time: a panel for each filter, a line for each case."""
+    rows = common.groups(table.drop_duplicates(["case", "filter", "k"]), "case", "filter")
+    names = list(dict.fromkeys(name for result in results for name in result.axes.filters))
+    drawn = tuple(_consistency_panel(results, rows, name) for name in names)
+    caption = (
+        "Mean of the normalised squared error eᵀP⁻¹e per estimated component, P the covariance that the filter "
+        "believes; one (dotted) for a filter that is right about itself, less for one that is better than it thinks."
+    )
+    columns = min(2, len(drawn))
+    width = COLUMN_MM if columns == 1 else PAGE_MM
+    return Figure("consistency", "What the filters believe of themselves", caption + left_out, drawn, columns, width)
+
+
+def _consistency_panel(results: Sequence[CaseResult], rows: dict, name: str) -> Panel:
+    marks: list = [Reference(1)]
+    for i, result in enumerate(results):
+        if (result.name, name) in rows:
+            own = rows[result.name, name]
+            style = Style(i, i, i)
+            marks.append(Line(own["t_s"].to_numpy(), own["nees"].to_numpy(), panels.label(result), style))
+    x, y = Axis(panels.TIME, limits=(0, None)), Axis("normalised squared error", limits=(0, None))
+    return Panel(x, y, tuple(marks), panels.literal(name))
+
+
+def settling_figure(results: Sequence[CaseResult], table) -> Figure | None:
+    """Steady σ of the range against its settling time over D_M, with the ten-period line and the best D_M named."""
+    rows = table[(table["component"] == "r") & np.isfinite(table["settling_s"])]
+    drawn = []
+    for members in panels.families(results).values():
+        own = rows[rows["case"].isin([r.name for r in members])].drop_duplicates(["filter", "manoeuvre_variance"])
+        if own["manoeuvre_variance"].nunique() > 1:
+            panel = _settling_panel(members[0], own)
+            drawn.append(replace(panel, legend="none") if drawn else panel)
+    if not drawn:
+        return None
+    caption = (
+        "Exact steady σ of the range against the settling time of the measured σ (within 5 % of the steady value, for "
+        "good); grey lines join equal manoeuvre variances, named in m²/s⁶. Dotted: ten scan periods, the paper's "
+        "limit; star: the least steady error under it. What does not settle within the run is left out."
+    )
+    columns = min(3, len(drawn))
+    width = COLUMN_MM if columns == 1 else PAGE_MM
+    return Figure(
+        "settling", "Steady error against settling time", caption, tuple(drawn[: panels.MOST]), columns, width
+    )
+
+
+def _settling_panel(result: CaseResult, rows) -> Panel:
+    """rows: of one radar and the range, one for each filter and manoeuvre variance."""
+    marks: list = [Reference(PERIODS * result.axes.extra["scan_period_s"], "x")]
+    for variance, same in rows.sort_values("steady_sigma").groupby("manoeuvre_variance"):
+        t, sigma = same["settling_s"].to_numpy(), same["steady_sigma"].to_numpy()
+        marks.append(Line(t, sigma, "", Style(7, 0, width_pt=0.5)))
+        marks.append(Note(float(t[-1]), float(sigma[-1]), panels.number(float(variance))))
+    for n, name in enumerate(result.axes.filters):
+        own = rows[rows["filter"] == name].sort_values("manoeuvre_variance")
+        best = own[own["best"]]
+        marks.append(
+            Line(own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy(), panels.literal(name), Style(n, n, n))
+        )
+        star = Style(n, None, 7, size_pt=8)
+        marks.append(Line(best["settling_s"].to_numpy(), best["steady_sigma"].to_numpy(), "", star))
+    x, y = Axis("settling time of $\\sigma$ of $r$, s", limits=(0, None)), Axis("steady $\\sigma$ of $r$, m")
+    keys = ((f"{PERIODS} scan periods", Style(7, 2, width_pt=0.7)),)
+    return Panel(x, y, tuple(marks), panels.device(result), keys, direct=False)
