@@ -110,6 +110,11 @@ def test_tasks_grow_until_they_are_worth_handing_over():
     assert len(sizes) < 1_000
 
 
+def test_threads_work_at_the_same_time():
+    result = collect(Fake(pause_s=2e-3), 16 * 400, threads=4)
+    assert result.kernel_seconds > 2.5 * result.seconds
+
+
 def test_progress_comes_at_most_ten_times_a_second_and_ends_at_all():
     seen = []
     collect(Fake(pause_s=1e-3), 16 * 800, threads=2, progress=lambda *given: seen.append((time.perf_counter(), *given)))

@@ -13,7 +13,9 @@ import pytest
 
 from radarsim.engine.blocks import Node
 from radarsim.engine.collect import collect, stored
+from radarsim.engine.stopping import Signals
 from radarsim.engine.store import Store
+from radarsim.errors import Interrupted
 from tests.engine.fake import Fake, textbook
 
 ROOT = Path(__file__).parents[2]
@@ -89,6 +91,32 @@ def test_a_second_signal_ends_it_within_half_a_second(tmp_path, options):
         process.send_signal(signal.SIGTERM)
         seconds, status = ended(process)
     assert (seconds < 0.5, status) == (True, 143)
+
+
+def test_other_signals_are_left_alone_and_the_handlers_put_back():
+    before = [signal.getsignal(number) for number in Signals.numbers]
+    other = signal.signal(signal.SIGUSR1, lambda *_: None)
+    try:
+        with Signals() as signals:
+            signal.raise_signal(signal.SIGUSR1)
+            time.sleep(0.1)
+            assert signals() is None
+            signals.raise_if_received()
+    finally:
+        signal.signal(signal.SIGUSR1, other)
+    assert [signal.getsignal(number) for number in Signals.numbers] == before
+    assert signal.set_wakeup_fd(-1) == -1
+
+
+def test_a_signal_is_told_as_a_reason_and_as_an_exception():
+    with Signals() as signals:
+        signal.raise_signal(signal.SIGTERM)
+        while signals() is None:
+            time.sleep(0.01)
+        assert signals() == "signal 15"
+    with pytest.raises(Interrupted) as caught:
+        signals.raise_if_received()
+    assert caught.value.exit_code == 143
 
 
 def killed_until_done(store, realisations, pause, period, draw, kills):

@@ -234,6 +234,9 @@ def test_damage_that_cannot_be_moved_aside_is_not_believed_either(tmp_path, bloc
     with monkeypatch.context() as patch:
         patch.setattr(os, "replace", refuse)
         assert stored(WORK, N, tmp_path) is None
+        reader = Store(tmp_path, WORK)
+        assert len(reader.forest(312).nodes) == 3
+        assert len(reader.warnings) == 1
     result = collect(WORK, N, store=tmp_path)
     assert same(result)
     assert len(result.warnings) == 1
@@ -411,23 +414,28 @@ def test_what_is_new_is_written_about_once_a_period(tmp_path, monkeypatch):
 
 
 class Slow(Store):
-    """A disk that takes its time."""
+    """A disk that takes its time, and one writer at a time."""
+
+    writing = False
 
     def write(self, pieces):
+        assert not self.writing
+        self.writing = True
         time.sleep(0.3)
         super().write(pieces)
+        self.writing = False
 
 
-def test_workers_do_not_wait_for_the_disk(tmp_path, monkeypatch):
-    monkeypatch.setattr(keeper, "PERIOD_S", 0.05)
-    slow = keeper.Keeper(Slow(tmp_path, WORK))
-    time.sleep(0.06)
+def test_workers_do_not_wait_for_the_disk_and_one_thing_is_written_at_a_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(keeper, "PERIOD_S", 0.01)
+    writer = keeper.Keeper(Slow(tmp_path, WORK))
     started = time.perf_counter()
-    slow.offer({Node(0, 0): Sums(16, np.ones(5))})
-    slow.offer({Node(0, 0): Sums(16, np.ones(5))})
-    assert time.perf_counter() - started < 0.1
-    slow.finish({Node(0, 0): Sums(16, np.ones(5)), Total(16): Sums(16, np.ones(5))})
-    assert Store(tmp_path, WORK).pieces() == {Node(0, 0), Total(16)}
+    for index in (0, 2, 4):
+        time.sleep(0.02)
+        writer.offer({Node(0, index): Sums(16, np.ones(5))})
+    assert time.perf_counter() - started < 0.25
+    writer.finish({Node(0, index): Sums(16, np.ones(5)) for index in (0, 2, 4)})
+    assert Store(tmp_path, WORK).pieces() == {Node(0, 0), Node(0, 2), Node(0, 4)}
 
 
 @pytest.mark.parametrize("sizes", [(20_000, 20_000), (20_000, 9_999, 33_333)])
@@ -460,6 +468,13 @@ def test_a_node_merged_away_between_listing_and_reading_is_found_in_its_parent(t
     reader = Store(tmp_path, WORK)
     assert list(reader.forest(32).nodes) == [Node(5, 0)]
     assert reader.warnings == []
+
+
+def test_nodes_that_were_found_apart_are_stored_together_before_they_go(tmp_path, blocks):
+    halves = {Node(0, index): Sums(16, WORK.simulate(16 * index, 16)) for index in (0, 1)}
+    Store(tmp_path, WORK).write(halves)
+    assert collect(WORK, 16 * 3, store=tmp_path).from_store == 32
+    assert names(blocks) == ["L00-2.sums", "L01-0.sums", "T48.sums"]
 
 
 def test_stores_are_united_by_copying(tmp_path):
