@@ -170,6 +170,11 @@ def test_the_papers_radar_under_another_name(expected_radar):
     assert "P1.11" not in set(found["claim"])  # needs radars 2 to 5 as well
 
 
+def test_a_longer_run_is_judged_at_the_papers_length(expected_radar):
+    short, long = (judged([expected_radar("rls1", scans=scans)]) for scans in (15, 40))
+    assert tables.to_csv(long) == tables.to_csv(short)
+
+
 def test_exact_values_never_enter_a_verdict(paper):
     wrong = [replace(r, axes=replace(r.axes, exact_sigma=0 * r.axes.exact_sigma + 7)) for r in paper]
     assert tables.to_csv(judged(wrong)) == tables.to_csv(judged(paper))

@@ -1,7 +1,8 @@
 """P1.1 … P1.25: what Gorshkov & Zavizhenets (2017) say, read from their words alone, before anything was measured.
 
 Places are the sections of the article (Doklady BGUIR 2017, no. 4, pp. 19–26): "figures" is the text around figures
-1 to 3, "conclusion" the last section. "At the end" is the last of the fifteen points, 140 s.
+1 to 3, "conclusion" the last section. "At the end" is the last of the paper's fifteen points, 140 s; only steady errors
+and settling (P1.14, P1.15) look at the whole run.
 """
 
 from radarsim.report.claims import Claim, Part, about, above, at_most, below, between, printed, within
@@ -225,7 +226,9 @@ CLAIMS = (
                 (n,),
                 f"σ of range at the end, least D_M − greatest, {words}",
                 "m",
-                measured.by_variance(n, lambda seen, key, observes=observes: seen.sigma(key, observes, "r").last()),
+                measured.by_variance(
+                    n, lambda seen, key, observes=observes: seen.whole_sigma(key, observes, "r").last()
+                ),
                 below(0),
             )
             for n in RADARS

@@ -25,7 +25,7 @@ class Evidence(claims.Evidence):
         """key: the number of a radar (at D_M = 10⁻³), or (number, D_M)."""
         radar, variance = key if isinstance(key, tuple) else (key, VARIANCE)
         for result in self.results:
-            if self._radar(result) == radar and np.isclose(variance, self._variance(result), rtol=1e-9):
+            if self._radar(result) == radar and np.isclose(variance, self._variance(result), rtol=1e-9, atol=0):
                 return result
         raise claims.Missing(key)
 
@@ -49,9 +49,13 @@ class Evidence(claims.Evidence):
             return float("nan")
         return filters[0].manoeuvre_variance
 
-    def sigma(self, key, observes: tuple[str, ...], component: str) -> Series:
-        """σ(k) of the filter that observes these."""
+    def whole_sigma(self, key, observes: tuple[str, ...], component: str) -> Series:
+        """σ(k) of the filter that observes these, to the end of the run."""
         return self.curve(key, self.filter(key, observes), component)
+
+    def sigma(self, key, observes: tuple[str, ...], component: str) -> Series:
+        """σ(k) of the filter that observes these, over the paper's fifteen points."""
+        return _as_long_as_the_papers(self.whole_sigma(key, observes, component))
 
     def filter(self, key, observes: tuple[str, ...]) -> str:
         """The name of the filter that observes these."""
@@ -62,7 +66,7 @@ class Evidence(claims.Evidence):
 
         At k = 1 both filters give the same measured range, and no gain is spoken of.
         """
-        return self.gain(radar, self.filter(radar, RV), component).since(2)
+        return _as_long_as_the_papers(self.gain(radar, self.filter(radar, RV), component).since(2))
 
     def settling(self, key, observes: tuple[str, ...], component: str = "r") -> Estimate:
         """Scan periods from the first plot to settling (5 % of the steady value, for good)."""
@@ -77,6 +81,10 @@ class Evidence(claims.Evidence):
         if len(found) < 2:
             raise claims.Missing(radar)
         return found
+
+
+def _as_long_as_the_papers(series: Series) -> Series:
+    return series.where(series.t <= DURATION + 1e-6)
 
 
 def gain_part(radar: int, component: str, pick: str, what: str, expected: Range, first: int = 2) -> Part:
