@@ -83,7 +83,7 @@ def _claims(table) -> list[dict]:
     """Claims with their parts, from claims.csv's rows."""
     found: dict[str, dict] = {}
     for row in table.to_dict("records"):
-        same = {key: row[key] for key in ("statement", "paper", "place", "overall")}
+        same = {key: row[key] for key in ("statement", "paper", "place", "reading", "overall")}
         found.setdefault(row["claim"], {"id": row["claim"], **same, "parts": []})["parts"].append(row)
     return list(found.values())
 

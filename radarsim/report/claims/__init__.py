@@ -245,7 +245,7 @@ def overall(verdicts: Sequence[str]) -> str:
 
 CLAIMED = (
     *("claim", "paper", "statement", "case", "measured", "lo", "hi", "expected", "verdict"),
-    *("what", "unit", "place", "overall"),
+    *("what", "unit", "place", "reading", "overall"),
 )
 
 
@@ -270,7 +270,7 @@ def _rows(claim: Claim, evidence: Evidence) -> list[tuple]:
     return [
         (
             *(claim.id, PAPERS[claim.paper], claim.statement, case, float(of.value), float(of.lo), float(of.hi)),
-            *(part.expected.words, said, part.what, part.unit, claim.place, overall(verdicts)),
+            *(part.expected.words, said, part.what, part.unit, claim.place, claim.reading, overall(verdicts)),
         )
         for part, case, of, said in zip(claim.parts, cases, measured, verdicts, strict=True)
     ]
@@ -290,7 +290,8 @@ def listed(stored: Mapping[str, object]) -> list[dict]:
     for claim in all_claims():
         table = stored.get(claim.config)
         own = [] if table is None else table[table["claim"] == claim.id].to_dict("records")
-        blank = dict.fromkeys(CLAIMED, "") | {"claim": claim.id, "paper": PAPERS[claim.paper], "place": claim.place}
+        blank = dict.fromkeys(CLAIMED, "") | {"claim": claim.id, "paper": PAPERS[claim.paper]}
+        blank |= {"place": claim.place, "reading": claim.reading}
         rows += own or [blank | {"statement": claim.statement, "verdict": NOT_RUN, "overall": NOT_RUN}]
         for row in rows[-max(1, len(own)) :]:
             row["config"] = claim.config
