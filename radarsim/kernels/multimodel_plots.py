@@ -10,7 +10,7 @@ import numpy as np
 from radarsim.kernels.blocks import dot
 from radarsim.kernels.compile import inline, kernel
 from radarsim.kernels.hypothesis import PLOT
-from radarsim.kernels.lanes import WIDTH, full, get, put, root, row, where_greater
+from radarsim.kernels.lanes import WIDTH, address, full, get, put, root, row, where_greater
 from radarsim.kernels.random import U, normal_pair, sine_cosine_polynomial, threefry, uniform
 
 STRIP = 16  # scans
@@ -150,3 +150,13 @@ def noise_at_prediction(frame, mean, wait, noise):
     p = covariance(frame, r, sine_e, cosine_e, sine_a, cosine_a, u)
     for i in range(6):
         put(noise, i, p[i])
+
+
+@kernel
+def fill_plots(keys, frame, truth, certain, first, random, plots):
+    """All plots of the realisations first … first + 7 of a track: rows PLOT to a scan; truth (K, 8), see `make_plots`."""
+    scans = truth.shape[0]
+    for k in range(0, scans, STRIP):
+        draw_strip(keys, first, k // STRIP, random)
+        to = row(address(plots), k * PLOT)
+        make_plots(address(random), address(frame), address(truth), k, min(STRIP, scans - k), certain, to)

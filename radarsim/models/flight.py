@@ -72,19 +72,19 @@ def fly(
     bounds = [phase.start_s for phase in phases[1:]] + [float(t[-1])]
     state, begin, parts = np.concatenate([position, velocity, np.zeros(3)]).astype(float), 0.0, []
     for phase, end in zip(phases, bounds, strict=True):
+        last = end >= t[-1]
         end = min(end, float(t[-1]))
-        inside = (t >= begin) & ((t < end) | (end == t[-1]) & (t <= end))
+        inside = (t >= begin) & ((t <= end) if last else (t < end))
         arguments = (phase, coefficient, lag)
-        if end > begin:
-            path = solve_ivp(
-                derivative, (begin, end), state, "DOP853", dense_output=True, args=arguments, rtol=TOLERANCE, atol=1e-6
-            )
-            if not path.success:
-                raise Unflyable(f"the flight cannot be integrated beyond {path.t[-1]:.6g} s")
-            states, state = path.sol(t[inside]).T, path.y[:, -1]
-        else:
-            states = np.tile(state, (int(inside.sum()), 1))
+        path = solve_ivp(
+            derivative, (begin, end), state, "DOP853", dense_output=True, args=arguments, rtol=TOLERANCE, atol=1e-6
+        )
+        if not path.success:
+            raise Unflyable(f"the flight cannot be integrated beyond {path.t[-1]:.6g} s")
+        states, state = path.sol(t[inside]).T, path.y[:, -1]
         parts += [_kinematics(at, s, arguments) for at, s in zip(t[inside], states, strict=True)]
+        if last:
+            break
         begin = end
     track = np.array(parts)
     _check(track, t)

@@ -14,7 +14,8 @@ from radarsim.kernels import multimodel as kernels
 from radarsim.kernels import multimodel_plots as plots
 from radarsim.kernels import multimodel_sums as sums
 from radarsim.kernels import random
-from radarsim.kernels.hypothesis import MOST
+from radarsim.kernels.hypothesis import MOST, PLOT
+from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.models import flight, frames
 from radarsim.studies import noise_key
 
@@ -268,3 +269,15 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     memory = sums.memory(len(plan.banks.numbers), len(plan.world.lengths))
     sums.simulate_block(plan.world, plan.banks, memory, arrays, plan.axes.baseline, first, count)
     return plan.layout.pack(**arrays._asdict())
+
+
+def measured(plan: Plan, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Plots of the realisations first … first + 7: positions (K, 3, 8), covariances (K, 6, 8), detected (K, 8) as 0 or 1.
+
+    The covariances are packed (xx, xy, xz, yy, yz, zz).
+    """
+    world, count = plan.world, len(plan.world.truth)
+    found = rows(count * PLOT)
+    plots.fill_plots(world.keys, world.frame, world.plot_truth, sums.START, first, rows(plots.RANDOM), found)
+    cells = found.reshape(count, PLOT, WIDTH)
+    return cells[:, :3], cells[:, 3:9], cells[:, 9]
