@@ -134,7 +134,7 @@ class Estimator(Model):
     steps: whole(1, 1000) = Field(40, description="scoring steps in a window, at most")
     tolerance: Positive = Field(1e-3, description="ε: step, in standard deviations, that ends a window")
     coherence_step: Flag = Field(
-        False, description="divide the steps by the coherence: they are too short away from it"
+        False, description="let steps heed the coherence: far from the maximum the curvature is less than Fisher's"
     )
     search_points: whole(0, 10) = Field(
         0, description="cure at a hand-over: points on each side along the leading direction of R_Δ; 0: none"

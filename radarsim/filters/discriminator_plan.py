@@ -10,7 +10,7 @@ from radarsim.filters.discriminator import Designer, handover_directions
 from radarsim.kernels.discriminator import OPTIONS, WINDOW
 from radarsim.kernels.discriminator_data import PHYSICS, block_table
 from radarsim.kernels.discriminator_scoring import SIZE
-from radarsim.models.burst import Burst, balanced_inverse, signal, turns_per_parameter
+from radarsim.models.burst import Burst, signal, turns_per_parameter
 
 IMAGE_SHARE = 0.02  # of a window's samples: below it the sum at twice the frequency is left out of the likelihood
 
@@ -89,6 +89,19 @@ def phase_prior(sigma: np.ndarray) -> np.ndarray:
     return precision
 
 
+def step_root(data: np.ndarray, precision: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows v (size, size) with Σ v vᵀ = (Φ + P)⁻¹ and vᵀ Φ v = share (size,): Φ the data's, P the prior's information.
+
+    Then (ρΦ + P)⁻¹ = Σ v vᵀ / (1 − (1 − ρ) share) for any coherence ρ.
+    """
+    information = data + np.diag(precision)
+    scale = 1.0 / np.sqrt(np.diag(information))
+    lower = np.linalg.cholesky(information * np.outer(scale, scale))
+    white = np.linalg.solve(lower, np.linalg.solve(lower, data * np.outer(scale, scale)).T)
+    share, vectors = np.linalg.eigh(0.5 * (white + white.T))
+    return (np.linalg.solve(lower.T, vectors) * scale[:, None]).T, np.clip(share, 0.0, 1.0)
+
+
 def estimators(
     designs: list[Design],
     edges: np.ndarray,
@@ -115,8 +128,8 @@ def estimators(
             turns = whole * window["powers"][:size]
             if design.forecast:
                 window["precision"][:size] = phase_prior(sigma) / turns**2
-            information = fisher(pulses) / np.outer(turns, turns) + np.diag(window["precision"][:size])
-            window["step"][:size, :size] = balanced_inverse(information)
+            root, share = step_root(fisher(pulses) / np.outer(turns, turns), window["precision"][:size])
+            window["root"][:size, :size], window["share"][:size] = root, share
             if directions is not None:
                 window["direction"][:size] = directions[k] * whole
     return windows, options

@@ -29,14 +29,15 @@ from radarsim.kernels.discriminator_scoring import (
 )
 from radarsim.kernels.random import U, normal_pair, threefry
 
-LEAST_COHERENCE = 0.25  # a step is lengthened four times at most
+LEAST_COHERENCE = 0.25  # taken into account; below it the main lobe is lost
 
 WINDOW = np.dtype(
     [
         ("pulses", np.int64),
         ("blocks", np.int64),
         ("powers", np.float64, SIZE),  # r^j
-        ("step", np.float64, (SIZE, SIZE)),  # posterior covariance in turns of the window
+        ("root", np.float64, (SIZE, SIZE)),  # rows v: their outer products sum to the posterior covariance, …
+        ("share", np.float64, SIZE),  # … and along each the data's share of the posterior information
         ("precision", np.float64, SIZE),  # of the prior, in turns of the window
         ("direction", np.float64, SIZE),  # to search along, turns over the burst per radian rms
     ],
@@ -48,7 +49,7 @@ OPTIONS = np.dtype(
         ("phases", np.int64),  # tried in the first window; 0: in closed form
         ("steps", np.int64),  # of scoring in a window, at most
         ("tolerance", np.float64),  # ε
-        ("coherent", np.int64),  # whether steps are divided by the coherence
+        ("coherent", np.int64),  # whether steps heed the coherence
         ("search", np.int64),  # points on each side in the search at a hand-over; 0: none
         ("spacing", np.float64),  # of those points, radians rms
         ("margin", np.float64),  # standard errors of the coherence below one that start the search
@@ -103,18 +104,27 @@ def value(physics, window, state):
 
 
 @inline
-def scoring_step(physics, window, state, length):
-    """One step (6) from the gradient in state.out, `length` times as long. Returns its squared length."""
+def scoring_step(physics, window, state, coherence):
+    """One step (6) from the gradient in state.out; returns its squared length.
+
+    Away from the maximum the data's curvature is the coherence times the Fisher matrix, so the step solves with
+    ρ Φ_θ + R_pr⁻¹. (A whole step divided by ρ diverges along directions that the prior alone determines.)
+    """
     weight = TURN * state.amplitude / physics.sigma**2
     for j in range(SIZE):
         state.b[j] = weight * state.out[2 + j] + window.precision[j] * from_prior(window, state, j)
     squared = 0.0
+    for i in range(SIZE):
+        along = 0.0
+        for j in range(SIZE):
+            along += window.root[i, j] * state.b[j]
+        squared += along * along
+        state.along[i] = along / (1.0 - (1.0 - coherence) * window.share[i])
     for j in range(SIZE):
         move = 0.0
-        for m in range(SIZE):
-            move += window.step[j, m] * state.b[m]
-        squared += move * state.b[j]
-        state.x[j] += length * move / window.powers[j]
+        for i in range(SIZE):
+            move += window.root[i, j] * state.along[i]
+        state.x[j] += move / window.powers[j]
     return squared
 
 
@@ -153,11 +163,10 @@ def scored(physics, samples, sums, window, options, search, state):
         passes += 1
         if step == 0 and search and state.out[1] / level < 1.0 - options.margin * error:
             passes += searched(physics, samples, sums, window, options, state)
-        length = 1.0
+        coherence = 1.0
         if options.coherent:
-            # The curvature away from the maximum is the coherence times the Fisher matrix; the margin is for its noise.
-            length = 1.0 / min(max(state.out[1] / level + 3.0 * error, LEAST_COHERENCE), 1.0)
-        if scoring_step(physics, window, state, length) <= options.tolerance**2:
+            coherence = min(max(state.out[1] / level + 3.0 * error, LEAST_COHERENCE), 1.0)  # with a margin for noise
+        if scoring_step(physics, window, state, coherence) <= options.tolerance**2:
             break
     return passes
 

@@ -19,7 +19,7 @@ import numpy as np
 from radarsim.kernels.compile import inline, summing
 from radarsim.kernels.random import sine_cosine_polynomial
 
-SIZE = 6  # coefficients of the phase; unused ones have a zero row in the step matrix
+SIZE = 6  # coefficients of the phase; unused ones have zero rows in the root of the step matrix
 TURN = 2.0 * math.pi
 ROUND = 6755399441055744.0  # 1.5 · 2**52: adding it rounds to a whole number
 # Rows of the array of block sums: the block's central time in bursts; the slope D in radians a burst that is one radian
@@ -27,7 +27,7 @@ ROUND = 6755399441055744.0  # 1.5 · 2**52: adding it rounds to a whole number
 # real and an imaginary part.
 CENTRE, LIMIT, REF, SLOPE, Z0, Z1, Z2, W0, W1, W2, ROWS = 0, 1, 2, 3, 4, 6, 8, 10, 12, 14, 16
 
-SIZE = 6  # coefficients of the phase; unused ones have a zero row in the step matrix
+SIZE = 6  # coefficients of the phase; unused ones have zero rows in the root of the step matrix
 # What a function is given to work on. A record is passed as one pointer; six arrays, which are some fifty words, made a
 # scoring step twice as slow, and a tuple of arrays, which has its references counted, eight times.
 STATE = np.dtype(
@@ -39,6 +39,7 @@ STATE = np.dtype(
         ("out", np.float64, 8),  # L, the coherent sum and the gradient's six sums
         ("begun", np.float64, SIZE),
         ("kept", np.float64, SIZE),
+        ("along", np.float64, SIZE),
         ("amplitude", np.float64),
     ],
     align=True,

@@ -1,5 +1,6 @@
-"""Textbook twins of the discriminator: the log posterior as written, SciPy's least squares, schedules by the formulas."""
+"""Textbook twins of the discriminator: the log posterior as written, least squares by SciPy, the printed formulas."""
 
+import itertools
 import math
 
 import numpy as np
@@ -64,7 +65,7 @@ def handover_form(before, after, mu_after, factor=3.0):
 def block_sums(u, turns, edges, t):
     """Σ u e^{-jψ} (t − mean t)^i over blocks of pulses, i = 0, 1, 2: (3, blocks)."""
     out = []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in itertools.pairwise(edges):
         e, s = np.exp(-2j * np.pi * turns[:, a:b]), t[:, a:b] - t[:, a:b].mean()
         out.append([np.sum(u[:, a:b] * e * s**i) for i in range(3)])
     return np.array(out).T
