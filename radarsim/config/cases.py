@@ -64,12 +64,10 @@ class Expander:
                 document = document.graft((first, *rest), setting.value, setting.origin)
         common, drafts = self._expand(document, ())
         cases = [case for draft in drafts if (case := self._case(draft))]
-        if not self.faults and not cases:
-            raise AssertionError("a config without faults has cases")
         self._refuse_twins(cases, document)
+        self._refuse_mixture(drafts, common, document)
         self._check_figures(common, cases, document)
-        if self.faults or len({case.study for case in cases}) != 1:
-            self._refuse_mixture(drafts, document)
+        if self.faults:
             return None
         stem = document.file.stem if document.file else "config"
         return Experiment(
@@ -222,11 +220,14 @@ class Expander:
                 self.faults.add(document.origin(key), key, f"makes the case {one_line(case.name)!r} twice")
             seen.add(case.name)
 
-    def _refuse_mixture(self, drafts: list[Draft], document: Document) -> None:
-        studies = sorted({draft.study for draft in drafts})
+    def _refuse_mixture(self, drafts: list[Draft], common: Common, document: Document) -> None:
+        studies = {draft.study for draft in drafts}
         if len(studies) > 1:
-            message = f"one study a run, these are of {', '.join(studies)}"
+            message = f"one study a run, these are of {', '.join(sorted(studies))}"
             self.faults.add(document.origin(("include",)), ("include",), message)
+        elif common.study is not None and studies - {common.study}:
+            message = f"must be that of the included configs, {', '.join(studies)}"
+            self.faults.add(document.origin(("study",)), ("study",), message, common.study)
 
     def _check_figures(self, common: Common, cases: list[Case], document: Document) -> None:
         """Every pattern must mean a case, else a figure would be empty without a word."""

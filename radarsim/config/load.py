@@ -52,7 +52,8 @@ def _from_user(source: str | os.PathLike, faults: Faults) -> Document | None:
     file = config_file(name) if is_stem(name) and not FilePath(name).is_file() else None
     if file is None and is_stem(name) and not FilePath(name).suffix:
         known = stems("configs")
-        faults.add(Origin(name), (), f"no such config{did_you_mean(name, known)}; there are: {', '.join(known)}")
+        near = did_you_mean(name, known) or f"; there are: {', '.join(known)}"
+        faults.add(Origin(name), (), f"no such config{near}")
         return None
     file = file or FilePath(name)
     document = read(file, faults)

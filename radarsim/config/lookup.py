@@ -2,6 +2,7 @@
 
 import difflib
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 SHIPPED = Path(__file__).parent.parent / "shipped"
@@ -15,9 +16,12 @@ def config_file(name: str, beside: Path | None = None) -> Path | None:
 
 
 def scenario_file(name: str, config: Path | None) -> Path | None:
-    """The file of a scenario: beside the config, in scenarios/ next to its folder or here, among the shipped."""
+    """The file of a scenario: beside the config, in scenarios/ next to its folder or here, among the shipped.
+
+    A config of that name beside the config is no scenario.
+    """
     folders = [] if config is None else [config.parent, next_to(config.parent) / "scenarios"]
-    return _first(name, [*folders, Path("scenarios"), SHIPPED / "scenarios"], but=config)
+    return _first(name, [*folders, Path("scenarios"), SHIPPED / "scenarios"], refused=_is_config)
 
 
 def next_to(folder: Path) -> Path:
@@ -25,12 +29,21 @@ def next_to(folder: Path) -> Path:
     return folder.parent if folder.name not in ("", "..") else folder / ".."
 
 
-def _first(name: str, folders: list[Path], but: Path | None = None) -> Path | None:
+def _first(name: str, folders: list[Path], refused: Callable[[Path], bool] = lambda file: False) -> Path | None:
     for folder in folders:
         file = folder / f"{name}.yaml"
-        if file != but and file.is_file():
+        if file.is_file() and not refused(file):
             return file
     return None
+
+
+def _is_config(file: Path) -> bool:
+    """Whether a file has a key that only configs have; what cannot be read is judged by who reads it."""
+    try:
+        with file.open(encoding="utf-8", errors="replace") as text:
+            return any(line.startswith(("study:", "include:")) for line in text)
+    except OSError:
+        return False
 
 
 def stems(kind: str) -> tuple[str, ...]:

@@ -257,6 +257,29 @@ def test_bad_include(folder, said, text, line):
 def test_a_study_may_be_named_beside_include_but_must_agree(folder, said):
     folder("configs/both.yaml", "include: [a, b]\nstudy: range_doppler\n")
     assert said("both") == []
+    line = "configs/both.yaml:2:8: study: must be that of the included configs, range_doppler, got "
+    for other in ("sonar", "nonsense"):
+        folder("configs/both.yaml", f"include: [a, b]\nstudy: {other}\n")
+        assert said("both") == [f"{line}'{other}'"]
+
+
+def test_one_study_a_run(folder, said):
+    folder("configs/both.yaml", "include: [a, sonar_smoothing]\n")
+    assert said("both") == ["configs/both.yaml:1:10: include: one study a run, these are of range_doppler, sonar"]
+
+
+def test_too_many_cases_by_include_alone(folder, said):
+    numbers = list(range(1, 81))
+    sweep = f"include: [a]\nsweep: {{radar.sigma_range_m: {numbers}, manoeuvre_variance: {numbers}}}\n"
+    folder("configs/first.yaml", sweep)
+    folder("configs/second.yaml", sweep.replace("[a]", "[b]"))
+    folder("configs/both.yaml", "include: [first, second]\n")
+    assert said("both") == ["configs/both.yaml:1:18: include: more than 10000 cases"]
+
+
+def test_an_override_below_a_scenario_that_is_not_there_is_not_told_twice(folder, said):
+    lines = said("a", "target=../x", "target.kind=turn")
+    assert lines == ["--set target: must be the stem of a scenario, without folder or suffix, got '../x'"]
 
 
 def test_a_web_of_includes_is_read_once_each(folder, said):
