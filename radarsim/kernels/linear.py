@@ -19,7 +19,7 @@ The work array x (F + 1, 3, n) holds the filters' states and, last, the plots (i
 
 import numpy as np
 
-from radarsim.kernels.compile import aligned_zeros, inline, kernel, summing
+from radarsim.kernels.compile import aligned_zeros, inline, kernel, part, summing
 from radarsim.kernels.random import fill_words, normal_pair
 
 CHUNK = 512  # realisations; a row is 4 KB, so that two filters and the plots just fill a first-level cache
@@ -31,7 +31,7 @@ def extrapolated(r, v, a, dt):
     return r + dt * (v + 0.5 * dt * a), v + dt * a, a
 
 
-@kernel
+@part
 def fill_plots(key, first, scan, mean, sigma, z, w):
     """Plots of one scan: values z (n,) and rates w (n,) of realisations first, first + 1, …
 
@@ -46,7 +46,7 @@ def fill_plots(key, first, scan, mean, sigma, z, w):
         z[i], w[i] = mean_z + sigma_z * a, mean_w + sigma_w * b
 
 
-@kernel
+@part
 def add_weighted(x, z, w, weight):
     """One scan's share of the least-squares start: x (3, n) += weight (3, 2) of the plots z (n,), w (n,)."""
     for j in range(3):
@@ -55,7 +55,7 @@ def add_weighted(x, z, w, weight):
             row[i] += of_value * z[i] + of_rate * w[i]
 
 
-@kernel
+@part
 def scan_value(x, z, dt, gain):
     """One scan, in place, of a filter that observes the value: x (3, n) estimates, z (n,) plots, gain (3, >= 1)."""
     r, v, a = x[0], x[1], x[2]
@@ -66,7 +66,7 @@ def scan_value(x, z, dt, gain):
         r[i], v[i], a[i] = p + g0 * residual, q + g1 * residual, s + g2 * residual
 
 
-@kernel
+@part
 def scan_value_rate(x, z, w, dt, gain):
     """One scan, in place, of a filter that observes value z (n,) and rate w (n,): x (3, n) estimates, gain (3, 2)."""
     r, v, a = x[0], x[1], x[2]
@@ -78,7 +78,7 @@ def scan_value_rate(x, z, w, dt, gain):
         r[i], v[i], a[i] = p + g0 * e + h0 * f, q + g1 * e + h1 * f, s + g2 * e + h2 * f
 
 
-@kernel
+@part
 def advance(x, k, dt, observes, start, weights, gains):
     """Scan k, counted from 0, of all filters, in place: x as above, its plots of scan k; dt is the time since k - 1."""
     plots = x.shape[0] - 1
@@ -132,7 +132,7 @@ def products_of_squares(x, f, g, n, truth):
     return r, v, a
 
 
-@kernel
+@part
 def add_sums(x, n, k, truth, observes, start, baseline, error, paired, cross):
     """Add the sums of scan k over the first n realisations of x; truth (3,), the rest as in `simulate_block`."""
     beside, compared = source(x, baseline, k, observes, start)
