@@ -68,12 +68,6 @@ seed_option = click.option("--seed", type=Count(), metavar="S", help="Seed, over
 figures_option = click.option("--no-figures", is_flag=True, help="Draw no figures; tables and report only.")
 
 
-def merged(overrides, realisations, seed):
-    """--set, -n and --seed as one list of overrides."""
-    given = {"realisations": realisations, "seed": seed}
-    return (*overrides, *(f"{key}={value}" for key, value in given.items() if value is not None))
-
-
 @main.command()
 @configs_argument
 @realisations_option
@@ -98,11 +92,18 @@ def run(configs, realisations, seed, overrides, threads, out, no_figures, quiet)
     from radarsim import console, experiment
     from radarsim.engine.stopping import Signals
 
+    overrides = experiment.merged(overrides, realisations, seed)
     with Signals() as stop:
-        for one in experiment.load_all(configs, merged(overrides, realisations, seed)):
+        for one in experiment.load_all(configs, overrides):
             with console.Progress(one.stem, quiet=quiet) as progress:
                 result = experiment.run(
-                    one, threads=threads, out=out, figures=not no_figures, progress=progress.update, stop=stop
+                    one,
+                    overrides=overrides,
+                    threads=threads,
+                    out=out,
+                    figures=not no_figures,
+                    progress=progress.update,
+                    stop=stop,
                 )
             if not quiet:
                 console.print_result(result)
@@ -120,10 +121,10 @@ def check(configs, realisations, seed, overrides):
     Example
       radarsim check configs/range_doppler.yaml -n 1e7
     """
-    from radarsim import console, experiment
+    from radarsim import console, experiment, overview
 
-    for one in experiment.load_all(configs, merged(overrides, realisations, seed)):
-        console.print_outlook(one, experiment.outlook(one))
+    for one in experiment.load_all(configs, experiment.merged(overrides, realisations, seed)):
+        console.print_outlook(one, overview.outlook(one))
 
 
 @main.command()
@@ -142,8 +143,9 @@ def report(configs, realisations, seed, overrides, out, no_figures):
     """
     from radarsim import console, experiment
 
-    for one in experiment.load_all(configs, merged(overrides, realisations, seed)):
-        console.print_result(experiment.report(one, out=out, figures=not no_figures))
+    overrides = experiment.merged(overrides, realisations, seed)
+    for one in experiment.load_all(configs, overrides):
+        console.print_result(experiment.report(one, out=out, overrides=overrides, figures=not no_figures))
 
 
 @main.command()
@@ -201,9 +203,9 @@ def list_():
     Example
       radarsim list
     """
-    from radarsim import console, experiment
+    from radarsim import console, overview
 
-    console.print_inventory(experiment.inventory())
+    console.print_inventory(overview.inventory())
 
 
 @main.command()

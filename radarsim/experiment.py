@@ -1,14 +1,13 @@
 """One experiment from config to written results: the wiring that the command and Python share."""
 
 import os
+import shlex
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from radarsim import plots, studies
-from radarsim.config import lookup
 from radarsim.config.load import Case, Experiment, load
 from radarsim.engine.collect import Collected, collect, stored
 from radarsim.engine.executors import available_cores
@@ -28,51 +27,6 @@ def load_all(sources: Sequence, overrides: Sequence[str] = ()) -> list[Experimen
     if faults:
         raise ConfigError(*faults)
     return loaded
-
-
-@dataclass(frozen=True)
-class CaseOutlook:
-    """What running a case would take: labels, counts, seconds of one thread's work."""
-
-    name: str
-    filters: str
-    scans: int
-    realisations: int
-    seconds: float
-
-
-@dataclass(frozen=True)
-class Outlook:
-    """What running an experiment would take, on `threads` threads."""
-
-    cases: tuple[CaseOutlook, ...]
-    threads: int
-    seconds: float
-    memory_mb: float
-
-
-def outlook(experiment: Experiment, threads: int | None = None) -> Outlook:
-    """Time one block of every case, compiled beforehand, and say what the whole would take."""
-    threads = threads or available_cores()
-    cases, largest = [], 0
-    for case in experiment.cases:
-        work = studies.CaseWork(case)
-        count = min(work.block, case.realisations)
-        work.simulate(0, count)
-        seconds = min(timed(work, count) for _ in range(3)) / count * case.realisations
-        axes = work.plan.axes
-        cases.append(CaseOutlook(case.name, ", ".join(axes.filters), len(axes.k), case.realisations, seconds))
-        largest = max(largest, work.size)
-    # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter and its libraries.
-    memory = 200 + 8e-6 * largest * (2 * threads + 32)
-    return Outlook(tuple(cases), threads, sum(c.seconds for c in cases) / threads, memory)
-
-
-def timed(work: studies.CaseWork, count: int) -> float:
-    """Seconds that `count` realisations take."""
-    started = time.perf_counter()
-    work.simulate(0, count)
-    return time.perf_counter() - started
 
 
 def simulated(
@@ -153,7 +107,7 @@ class Result:
         from radarsim.report import output
 
         folder = Path(out) / self.experiment.stem
-        self.written = output.write(self.experiment, self.cases, folder, self.facts, draw=figures)
+        self.written = output.write(self.experiment, self.cases, folder, self.facts, draw=figures, made=self.tables)
         return self.written
 
     def verdicts(self) -> dict[str, int]:
@@ -181,29 +135,48 @@ def run(
 ) -> Result:
     """Run an experiment and give its result; nothing is written unless `out` names a directory.
 
-    config is a path, the name of a shipped config, a dict as YAML would give it, or a loaded Experiment. overrides are
-    texts `key=value` with dotted keys. Raises ConfigError for a wrong config, StoreError for a bad disk, NonFiniteError
-    for a filter that diverged, and Interrupted, with all that was done stored, if `stop` saw a signal.
+    config is a path, the name of a shipped config, a dict as YAML would give it, or an Experiment loaded with these
+    overrides. overrides are texts `key=value` with dotted keys. Raises ConfigError for a wrong config, StoreError for a
+    bad disk, NonFiniteError for a filter that diverged, and Interrupted, with all that was done stored, if `stop` saw
+    a signal.
 
     >>> result = run("rls2", realisations=2000)
     >>> len(result.curves) > 50
     True
     """
-    given = {"realisations": realisations, "seed": seed}
-    overrides = (*overrides, *(f"{key}={value!r}" for key, value in given.items() if value is not None))
+    overrides = merged(overrides, realisations, seed)
     experiment = config if isinstance(config, Experiment) else load(config, overrides)
     threads = threads or available_cores()
     started = time.perf_counter()
     collected = simulated(experiment, out=out, threads=threads, progress=progress, stop=stop)
     if stop is not None:
         stop.raise_if_received()
-    result = Result(experiment, finished(collected), facts_of(collected, threads, time.perf_counter() - started))
+    facts = facts_of(collected, threads, time.perf_counter() - started)
+    result = Result(experiment, finished(collected), facts | repeated(experiment, overrides))
     if out is not None:
         result.write(out, figures)
     return result
 
 
-def report(experiment: Experiment, *, out: str | os.PathLike, figures: bool = True) -> Result:
+def merged(overrides: Sequence[str], realisations: float | None, seed: int | None) -> tuple[str, ...]:
+    """Overrides with realisations and seed, where given, as two more."""
+    given = {"realisations": realisations, "seed": seed}
+    return (*overrides, *(f"{key}={value}" for key, value in given.items() if value is not None))
+
+
+def repeated(experiment: Experiment, overrides: Sequence[str]) -> dict[str, str]:
+    """The command that repeats a run, as a fact of run.json; none for an experiment that is no file."""
+    if experiment.path is None:
+        return {"command": "none: the config was given in Python, and stands below"}
+    words = ["radarsim", "run", experiment.path]
+    for override in overrides:
+        words += ["--set", override]
+    return {"command": shlex.join(words)}
+
+
+def report(
+    experiment: Experiment, *, out: str | os.PathLike, overrides: Sequence[str] = (), figures: bool = True
+) -> Result:
     """Tables, figures and report of a config from what is stored; raises ConfigError where something is missing."""
     held, missing = [], []
     for case in experiment.cases:
@@ -216,7 +189,7 @@ def report(experiment: Experiment, *, out: str | os.PathLike, figures: bool = Tr
     if missing:
         again = experiment.path or experiment.stem
         raise ConfigError(*missing, f"`radarsim run {again} --out {out}` computes them")
-    result = Result(experiment, finished(held), facts_of(held, 0, 0.0))
+    result = Result(experiment, finished(held), facts_of(held, 0, 0.0) | repeated(experiment, overrides))
     result.write(out, figures)
     return result
 
@@ -266,32 +239,6 @@ def track(experiment: Experiment, source: str | os.PathLike) -> tuple[Case, Trac
     if not hasattr(study, "track"):
         raise ConfigError(f"{place}: study: {case.study} has no filters for recorded plots")
     return case, study.track(case, plots.read(source, study.PLOT_COLUMNS(case.spec)))
-
-
-def described(file: Path) -> str:
-    """The first words of a YAML file's leading comment, without its own name."""
-    with file.open(encoding="utf-8") as lines:
-        for line in lines:
-            words = line.lstrip("#").strip()
-            if not line.startswith("#"):
-                break
-            if not words.startswith("yaml-language-server"):
-                return words.partition(" — ")[2] or words
-    return ""
-
-
-def inventory() -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
-    """What `radarsim list` shows: title, columns and rows of each kind of thing at hand."""
-    configs = [(stem, described(lookup.config_file(stem))) for stem in lookup.stems("configs")]
-    scenarios = [(stem, described(lookup.scenario_file(stem, None))) for stem in lookup.stems("scenarios")]
-    about = [(name, (studies.study(name).__doc__ or "").split("\n")[0]) for name in studies.STUDIES]
-    filters = [(name, key, words) for name in studies.STUDIES for key, words in studies.study(name).FILTERS.items()]
-    return [
-        ("Configs (radarsim run NAME)", ("name", "what it is"), configs),
-        ("Scenarios (target: NAME)", ("name", "what it is"), scenarios),
-        ("Studies (study: NAME)", ("name", "paper and question"), about),
-        ("Filters", ("study", "keys", "what it is"), filters),
-    ]
 
 
 def claims(configs: Sequence[str], out: str | os.PathLike) -> list[dict]:
