@@ -15,7 +15,7 @@ from radarsim.engine.store import Store
 from radarsim.errors import StoreError
 
 LONGEST_TASK_S = 0.1
-SHARES = 8
+SHARES = 4
 POLL_S = 0.05
 PROGRESS_S = 0.1
 
