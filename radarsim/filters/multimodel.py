@@ -43,24 +43,27 @@ def generator(transition: np.ndarray) -> np.ndarray:
 def transition_powers(transition: np.ndarray, exponents: np.ndarray) -> np.ndarray:
     """P(m Δt) = P(Δt)**m, eq. (8), for exponents m (n,): (n, M, M), column-stochastic.
 
-    m >= 1: the real power; m < 1: expm(m Q) with the generator above, so that no probability is negative.
+    Whole m: the power; the part under one: expm(m Q) with the generator above, so that no probability is negative.
     """
     exponents = np.asarray(exponents, dtype=float)
-    powers = np.empty((len(exponents), *transition.shape))
-    whole = exponents == np.round(exponents)
-    rates = None
-    for i, m in enumerate(exponents):
-        if whole[i]:
-            powers[i] = np.linalg.matrix_power(transition, int(m))
-            continue
-        rates = generator(transition) if rates is None else rates
-        if m > 1:
-            # The whole part exactly, the rest by the generator: continuous in m and never negative.
-            powers[i] = np.linalg.matrix_power(transition, int(m)) @ expm((m - int(m)) * rates)
-        else:
-            powers[i] = expm(m * rates)
+    # The whole part exactly, the rest by the generator: continuous in m and never negative.
+    whole = np.floor(exponents + 1e-9).astype(np.int64)
+    rest = np.maximum(exponents - whole, 0.0)
+    distinct, place = np.unique(whole, return_inverse=True)
+    powers = np.stack([np.linalg.matrix_power(transition, m) for m in distinct])[place]
+    broken = rest > 1e-9
+    if broken.any():
+        powers[broken] = powers[broken] @ exponentials(generator(transition), rest[broken])
     powers = np.maximum(powers, 0.0)
     return powers / powers.sum(axis=1, keepdims=True)
+
+
+def exponentials(Q: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """expm(t Q) for times t (n,): (n, M, M); by eigenvectors where they are well conditioned, all times at once."""
+    values, V = np.linalg.eig(Q)
+    if np.linalg.cond(V) > 1e6:
+        return expm(t[:, None, None] * Q)
+    return np.real(V @ (np.exp(t[:, None] * values)[:, :, None] * np.linalg.inv(V)))
 
 
 def start_weights(t: np.ndarray, acceleration_spread: float) -> np.ndarray:

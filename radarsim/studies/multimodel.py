@@ -1,27 +1,31 @@
 """P2 (Sychev & Osipov 2023): multiple-model filters on an aeroballistic target, families × merging rules."""
 
-import csv
 from dataclasses import dataclass
 
 import numpy as np
 
 from radarsim.config.load import Case
 from radarsim.engine.moments import Layout
-from radarsim.engine.results import Axes
-from radarsim.errors import ConfigError
+from radarsim.engine.results import Axes, Track
 from radarsim.filters import multimodel as filters
 from radarsim.kernels import multimodel as kernels
 from radarsim.kernels import multimodel_plots as plots
 from radarsim.kernels import multimodel_sums as sums
-from radarsim.kernels import random
-from radarsim.kernels.hypothesis import MOST, PLOT
+from radarsim.kernels.hypothesis import MODELS, MOST, OUTPUT, PLOT, VARIANCE, work_arrays
 from radarsim.kernels.lanes import WIDTH, rows
-from radarsim.models import flight, frames
 from radarsim.studies import noise_key
+from radarsim.studies.multimodel_scene import intervals, local_plots, plot_truth, sensor_frame, truth
 
 COMPONENTS = tuple(
     (f"{prefix}{axis}", unit) for axis in "xyz" for prefix, unit in (("", "m"), ("v", "m/s"), ("a", "m/s2"))
 )
+FILTERS = {
+    "family": "kalman, gpb1 (MMA1), imm (MMA2), gpb2 (MMA3) with a bank of one to five motion models",
+    "merge": "rule of the partial merges: moment, best, combined, modified_combined",
+    "output": "rule by which the estimate is made: moment, best",
+    "covariance_at": "the plot's covariance at the plot or at its prediction",
+}
+CHUNK = 4096  # recorded plots filtered at a time
 BLOCK = 64  # eight groups of eight; 0.1 s with six filters and 3725 scans
 FAMILIES = {"kalman": kernels.KALMAN, "gpb1": kernels.GPB1, "imm": kernels.IMM, "gpb2": kernels.GPB2}
 RULES = {
@@ -41,111 +45,6 @@ class Plan:
     world: sums.World
     banks: sums.Banks
     block: int = BLOCK
-
-
-def points(path: str) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) in s and positions (n, 3) in m of a CSV file t_s,x_m,y_m,z_m; raises ConfigError by line and column."""
-    columns = ("t_s", "x_m", "y_m", "z_m")
-    with open(path, newline="", encoding="utf-8") as file:
-        reader = csv.reader(file)
-        header = next(reader, [])
-        if missing := [name for name in columns if name not in header]:
-            raise ConfigError(f"{path}:1: no column {', '.join(missing)}; needed: {', '.join(columns)}")
-        at, rows, faults = [header.index(name) for name in columns], [], []
-        for line in reader:
-            try:
-                row = [float(line[i]) for i in at]
-            except (ValueError, IndexError):
-                faults.append(f"{path}:{reader.line_num}: must be four numbers, got {','.join(line)[:60]!r}")
-                continue
-            if not np.isfinite(row).all():
-                faults.append(f"{path}:{reader.line_num}: must be finite, got {','.join(line)[:60]!r}")
-            elif rows and row[0] <= rows[-1][0]:
-                faults.append(f"{path}:{reader.line_num}: t_s must increase, got {row[0]:g} after {rows[-1][0]:g}")
-            else:
-                rows.append(row)
-    if not faults and len(rows) < 5:
-        faults.append(f"{path}: needs at least 5 points, got {len(rows)}")
-    if faults:
-        raise ConfigError(*faults[:20])
-    table = np.array(rows)
-    return table[:, 0], table[:, 1:]
-
-
-def scan_times(spec, case: Case, duration: float) -> np.ndarray:
-    """Times (K,) of the scans, s from the first plot: regular, or with a jitter drawn once from the seed."""
-    period = spec.sensor.scan_period_s
-    count = int(np.floor(duration / period * (1 + 1e-12))) + 1
-    if spec.scans is not None:
-        count = min(spec.scans, count)
-    t = np.arange(count) * period
-    if spec.sensor.jitter_s > 0:
-        a, b = np.empty(count), np.empty(count)
-        random.fill_uniform_pairs(noise_key(case, "jitter"), 0, 0, a, b)
-        t = np.clip(t + spec.sensor.jitter_s * (2 * a - 1), 0.0, duration)
-        t -= t[0]
-    return t
-
-
-def truth(case: Case) -> tuple[np.ndarray, np.ndarray]:
-    """Times (K,) and true states (K, 9) at the scans; raises ConfigError where the target is no possible one."""
-    spec, target = case.spec, case.spec.target
-    try:
-        if target.kind == "recorded":
-            times, positions = points(target.file)
-            t = scan_times(spec, case, float(times[-1] - times[0]))
-            return t, flight.recorded(times, positions, t)
-        phases = [
-            flight.Phase(p.start_s, p.lateral_mps2, p.normal_mps2, p.axial_mps2, p.period_s or 0.0, p.trimmed)
-            for p in target.phases
-        ]
-        t = scan_times(spec, case, target.duration_s)
-        if len(t) < 4:
-            raise ConfigError(f"{case.name}: target: lasts only {len(t)} scans; at least 4 are needed")
-        coefficient = target.ballistic_coefficient_kgpm2
-        return t, flight.fly(target.position_m, target.velocity_mps, coefficient, target.lag_s, phases, t)
-    except flight.Unflyable as error:
-        raise ConfigError(f"{case.name}: target: {error}") from None
-
-
-def plot_truth(case: Case, t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """What plots are made of (K, 8): range, sine and cosine of elevation and azimuth, x, y, z.
-
-    Raises ConfigError where the target leaves the antenna's sector.
-    """
-    sensor = case.spec.sensor
-    position = x[:, 0::3]
-    if sensor.sigma_range_m is None:
-        return np.concatenate([np.zeros((len(t), 5)), position], axis=1)
-    R = frames.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
-    antenna = frames.to_antenna(position, R, sensor.antenna_height_m)
-    r = np.linalg.norm(antenna, axis=1)
-    outside = antenna[:, 0] <= r * np.sqrt(2 * plots.LEAST)
-    if outside.any():
-        when = t[np.argmax(outside)]
-        raise ConfigError(
-            f"{case.name}: target: leaves the antenna's sector at {when:.6g} s: it must stay in front of it"
-        )
-    s_e, s_a = antenna[:, 1] / r, antenna[:, 2] / r
-    return np.stack([r, s_e, np.sqrt(1 - s_e**2), s_a, np.sqrt(1 - s_a**2), *position.T], axis=1)
-
-
-def sensor_frame(sensor) -> np.ndarray:
-    """The numbers of a sensor as the kernels take them."""
-    R = frames.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
-    form = plots.BICONICAL if sensor.sigma_range_m is not None else plots.CARTESIAN
-    unbiased = sensor.conversion == "unbiased"
-    return plots.frame(R, sensor.antenna_height_m, sensor.sigma, form, unbiased, sensor.detection_probability)
-
-
-def intervals(t: np.ndarray, tolerance: float = 1e-9) -> tuple[np.ndarray, np.ndarray]:
-    """For each scan the number of its interval since the last (K,), and the different intervals (U,), s."""
-    steps = np.diff(t, prepend=t[0] - (t[1] - t[0]))
-    rounded, index = np.unique(np.round(steps / tolerance), return_inverse=True)
-    times = (
-        np.array([steps[index == u].mean() for u in range(len(rounded))]) if len(rounded) < 50 else rounded * tolerance
-    )
-    return index.astype(np.int64), times
 
 
 def banks(spec, times: np.ndarray) -> sums.Banks:
@@ -281,3 +180,88 @@ def measured(plan: Plan, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
     plots.fill_plots(world.keys, world.frame, world.plot_truth, sums.START, first, rows(plots.RANDOM), found)
     cells = found.reshape(count, PLOT, WIDTH)
     return cells[:, :3], cells[:, 3:9], cells[:, 9]
+
+
+def PLOT_COLUMNS(spec) -> tuple[tuple[str, ...], ...]:
+    """The columns that `track` reads of a file of recorded plots."""
+    if spec.sensor.sigma_range_m is None:
+        return (("t_s", "x_m", "y_m", "z_m"),)
+    return (("t_s", "range_m", "elevation_rad", "azimuth_rad"),)
+
+
+def track(case: Case, recorded: dict[str, np.ndarray]) -> Track:
+    """The filters of a case over recorded plots: columns of equal length (n,), not-a-number where a value is missing.
+
+    A plot counts where it is whole and in front of the antenna; the first three that count start the track. At the times
+    of the others the estimate is the extrapolated one.
+    """
+    spec, t = case.spec, recorded["t_s"]
+    z, R, whole = local_plots(spec.sensor, np.stack(list(recorded.values())[1:], axis=1))
+    names, most = tuple(f.name for f in spec.filters), max(len(f.models) for f in spec.filters)
+    shape = (len(names), len(t))
+    estimate, sigma = np.full((2, *shape, 9), np.nan)
+    probability = np.full((*shape, most), np.nan)
+    began = np.flatnonzero(whole)[:3]
+    if len(began) == 3:
+        plot_rows = np.concatenate([z, R, whole[:, None]], axis=1)
+        for f, options in enumerate(spec.filters):
+            out = _tracked(spec, options, t, plot_rows, began)
+            size = len(options.models)
+            estimate[f, began[2] :] = out[:, :9]
+            sigma[f, began[2] :] = np.sqrt(np.maximum(out[:, VARIANCE : VARIANCE + 9], 0.0))
+            probability[f, began[2] :, :size] = out[:, MODELS : MODELS + size]
+    return Track(names, COMPONENTS, t, estimate, sigma, probability if most > 1 else None)
+
+
+def _tracked(spec, options, t: np.ndarray, plot_rows: np.ndarray, began: np.ndarray) -> np.ndarray:
+    """Outputs (n', OUTPUT) of one filter from the third whole plot on; plot_rows (n, PLOT)."""
+    one = spec.model_copy(update={"filters": (options,)})
+    work, numbers = work_arrays()
+    weights = filters.start_weights(t[began], spec.start_acceleration_mps2)
+    kernels.start_strip(work, numbers, _lanes(plot_rows[began]), weights, filters.stationary(transition(options)))
+    frame, third, found = sensor_frame(spec.sensor), began[2], []
+    for first in range(third + 1, len(t), CHUNK):
+        stop = min(first + CHUNK, len(t))
+        index, times = intervals(t[first - 1 : stop])
+        own = banks(one, times)
+        size, numbers[1] = own.numbers[0, 4], -1  # the intervals of this chunk are numbered anew
+        count = stop - first
+        out, everything = rows(count * OUTPUT), np.ones(count, dtype=np.int64)
+        kernels.filter_strip(
+            work,
+            numbers,
+            _lanes(plot_rows[first:stop]),
+            0,
+            count,
+            own.models[0, : 3 * size],
+            own.transitions[0],
+            index[1:].copy(),
+            times,
+            own.numbers[0],
+            frame,
+            everything,
+            out,
+        )
+        found.append(out.reshape(count, OUTPUT, WIDTH)[:, :, 0].copy())
+    start = np.zeros((1, OUTPUT))
+    start[0, :9], start[0, VARIANCE : VARIANCE + 9], chances = _started(plot_rows[began], weights, options)
+    start[0, MODELS : MODELS + len(chances)] = chances
+    return np.concatenate([start, *found])
+
+
+def _started(plot_rows: np.ndarray, weights: np.ndarray, options) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean (9,), variances (9,) and probabilities (M,) of a track at its third plot."""
+    a, b, g = weights.reshape(3, 3)
+    mean, variance = np.zeros(9), np.tile(g**2, 3)
+    mean[0::3], mean[1::3] = a @ plot_rows[:, :3], b @ plot_rows[:, :3]
+    own = plot_rows[:, [3, 6, 8]]  # xx, yy, zz
+    variance[0::3] += a**2 @ own
+    variance[1::3] += b**2 @ own
+    return mean, variance, filters.stationary(transition(options))
+
+
+def _lanes(plot_rows: np.ndarray) -> np.ndarray:
+    """Plots (n, PLOT) as rows of eight equal lanes."""
+    found = rows(plot_rows.size)
+    found.reshape(-1, WIDTH)[:] = plot_rows.reshape(-1, 1)
+    return found
