@@ -82,9 +82,9 @@ class Sensor(Model):
         if self.sigma_depth_m is not None and self.sigma_elevation_rad is not None:
             raise at("sigma_elevation_rad", "give either the depth or the elevation")
         if self.further and self.error_correlation != 0.0:
-            raise at(
-                "error_correlation", "must be 0 where there are further sonars: their errors have nothing in common"
-            )
+            raise at("error_correlation", "must be 0 where there are further sonars: their errors are unconnected")
+        if self.further and self.detection_probability < 1:
+            raise at("detection_probability", "must be 1 where there are further sonars; give missed_scans")
         return self
 
 

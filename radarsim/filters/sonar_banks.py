@@ -7,6 +7,7 @@ import numpy as np
 from radarsim.filters import sonar as filters
 from radarsim.kernels import sonar as kernels
 from radarsim.kernels import sonar_patterns as patterns
+from radarsim.models.motion import transition
 from radarsim.models.sonar import step_correlations
 
 KINDS = {
@@ -50,22 +51,46 @@ def designed(choice: Choice, c: int, plots: filters.Plots) -> filters.Design:
     raise ValueError(f"no recursive filter: {choice.kind}")
 
 
-def believed(choice: Choice, c: int, plots: filters.Plots) -> np.ndarray:
-    """The covariance (M, K, 3, 3) that a filter claims in coordinate c."""
+@dataclass(frozen=True)
+class Made:
+    """A choice designed for one coordinate's plots: believed (M, K, 3, 3), and its recursion or, of a window, its rows.
+
+    rows are (first scan, weights (M, 3, n)) at every scan.
+    """
+
+    choice: Choice
+    plots: filters.Plots
+    believed: np.ndarray
+    design: filters.Design | None = None
+    rows: tuple = ()
+
+    @property
+    def known(self) -> np.ndarray:
+        """How many components (M, K) are estimated: plots of one time, however many, tell a value and no rate."""
+        return (np.diagonal(self.believed, axis1=2, axis2=3) > 0).sum(axis=2)
+
+
+def made(choice: Choice, c: int, plots: filters.Plots) -> Made:
+    """Design a choice in coordinate c."""
     if choice.kind != "window":
-        return designed(choice, c, plots).believed
-    scans = len(plots.t)
-    return np.stack([filters.window_weights(plots, k, choice.length, choice.size)[2] for k in range(scans)], axis=1)
+        design = designed(choice, c, plots)
+        return Made(choice, plots, design.believed, design)
+    found = [filters.window_weights(plots, k, choice.length, choice.size) for k in range(len(plots.t))]
+    return Made(choice, plots, np.stack([P for _, _, P in found], axis=1), rows=tuple(row[:2] for row in found))
 
 
-def all_believed(choices: list[Choice], plots: list[filters.Plots]) -> np.ndarray:
-    """Variances (F, K, C, 3) that the filters claim, one pattern of plots in each coordinate."""
-    return np.stack(
-        [
-            np.stack([np.diagonal(believed(f, c, p)[0], axis1=1, axis2=2) for c, p in enumerate(plots)], axis=1)
-            for f in choices
-        ]
-    )
+def applied(choice: Choice, c: int, plots: filters.Plots, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Estimates (n, 3) and covariances (n, 3, 3) over recorded plots z (n,), any number where the weight is zero."""
+    found, x = made(choice, c, plots), np.zeros((len(plots.t), 3))
+    for k, (first, weights) in enumerate(found.rows):
+        x[k] = weights[0] @ z[first : k + 1]
+    now, e, design = np.zeros(3), 0.0, found.design
+    for k in range(len(plots.t)) if design is not None else ():
+        now, e = transition(plots.t[k] - plots.t[max(k - 1, 0)]) @ now, design.carry[k] * e
+        innovation = z[k] - now[0] - e
+        now, e = now + design.gain[0, k, :3] * innovation, e + design.gain[0, k, 3] * innovation
+        x[k] = now
+    return x, found.believed[0]
 
 
 def packed_inverse(P: np.ndarray, ready: np.ndarray, size: int) -> np.ndarray:
@@ -80,24 +105,24 @@ def packed_inverse(P: np.ndarray, ready: np.ndarray, size: int) -> np.ndarray:
     return out
 
 
-def shared(choices: list[Choice], plots: list[filters.Plots]) -> kernels.Shared:
-    """Filters whose gains all realisations share; plots of each coordinate, of one pattern."""
+def shared(choices: list[Choice], designs: list[list[Made]]) -> kernels.Shared:
+    """Filters whose gains all realisations share: designs of each filter and coordinate, of one pattern of plots."""
+    plots = [one.plots for one in designs[0]]
     F, K, C = len(choices), len(plots[0].t), len(plots)
     length = np.array([f.length if f.kind == "window" else 0 for f in choices])
     longest = int(length.max())
     gain, carry = np.zeros((F, K, C, 4)), np.zeros((F, K, C))
     weights, inverse = np.zeros((F, K, C, 3, longest)), np.zeros((F, K, C, 6))
-    order = np.stack([np.cumsum(p.weight[0] > 0) - 1 for p in plots], axis=1)
     came = np.stack([p.weight[0] > 0 for p in plots], axis=1)
-    times = np.stack([p.moments()[0] for p in plots], axis=1)
+    order = np.cumsum(came, axis=0) - 1
+    known = np.stack([np.stack([one.known[0] for one in row], axis=1) for row in designs])
     for f, choice in enumerate(choices):
-        for c, p in enumerate(plots):
-            if choice.kind == "window":
-                weights[f, :, c] = ring_weights(choice, p, order[:, c], longest)
+        for c, one in enumerate(designs[f]):
+            if one.design is None:
+                weights[f, :, c] = ring_weights(one, order[:, c], longest)
             else:
-                design = designed(choice, c, p)
-                gain[f, :, c], carry[f, :, c] = design.gain[0], design.carry
-            inverse[f, :, c] = packed_inverse(believed(choice, c, p)[0], times[:, c] >= choice.size, choice.size)
+                gain[f, :, c], carry[f, :, c] = one.design.gain[0], one.design.carry
+            inverse[f, :, c] = packed_inverse(one.believed[0], known[f, :, c] == choice.size, choice.size)
     size = np.array([f.size for f in choices])
     return kernels.Shared(
         gain=gain,
@@ -106,17 +131,16 @@ def shared(choices: list[Choice], plots: list[filters.Plots]) -> kernels.Shared:
         length=length,
         weights=weights,
         slot=np.where(came, order % max(longest, 1), -1),
-        known=np.minimum(times[None], size[:, None, None]),
+        known=known,
         size=size,
         inverse=inverse,
     )
 
 
-def ring_weights(choice: Choice, plots: filters.Plots, order: np.ndarray, longest: int) -> np.ndarray:
+def ring_weights(one: Made, order: np.ndarray, longest: int) -> np.ndarray:
     """Weights (K, 3, longest) of a window by the places of its plots in the kernel's ring: number modulo its length."""
-    out = np.zeros((len(plots.t), 3, longest))
-    for k in range(len(plots.t)):
-        first, weights, _ = filters.window_weights(plots, k, choice.length, choice.size)
+    out = np.zeros((len(one.rows), 3, longest))
+    for k, (first, weights) in enumerate(one.rows):
         for j in np.flatnonzero(weights[0].any(axis=0)):
             out[k, :, order[first + j] % longest] = weights[0, :, j]
     return out

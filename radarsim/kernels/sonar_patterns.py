@@ -16,6 +16,7 @@ from radarsim.kernels.random import U, uniforms
 from radarsim.kernels.sonar import CHUNK, move_and_measure, powers
 
 INFORMATION, COVARIANCE, FIXED, WINDOW = range(4)
+PLACED = 8.0  # as models.sonar.PLACED
 
 
 class Sight(NamedTuple):
@@ -70,10 +71,10 @@ def detect(sight, first, k, seen):
 def weigh(sight, k, plots, seen, place, z, weight):
     """Plots z (C, n) and their weights (C, n) from what was measured: plots (C', 4, n), rows 0 and 1.
 
-    place (3, n) holds range and bearing of the last plot, and 1 where there is one. The plain conversion has its
-    weights from the plot itself; the unbiased one from the plot before, lest a weight go with the error of its own
-    plot, which would be a bias again (the decorrelation of Bordonaro, Willett and Bar-Shalom 2014, with a place that
-    we have).
+    place (3, n) holds mean range and bearing of the last plots, and how many they are. The plain conversion has its
+    weights from the plot itself; the unbiased one from the plots before, lest a weight go with the error of its own
+    plot, which would be a bias again (the decorrelation of Bordonaro, Willett and Bar-Shalom 2014, who take the
+    predicted place). See `models.sonar.places`.
     """
     for c in range(z.shape[0]):
         w = sight.weight[k, c]
@@ -99,7 +100,9 @@ def weigh(sight, k, plots, seen, place, z, weight):
                 r, b = place[0, i], place[1, i]
                 co, si = np.cos(b), np.sin(b)
             if seen[i] > 0.0:
-                place[0, i], place[1, i], place[2, i] = r_now, b_now, 1.0
+                place[2, i] = min(place[2, i] + 1.0, PLACED)
+                place[0, i] += (r_now - place[0, i]) / place[2, i]
+                place[1, i] += (b_now - place[1, i]) / place[2, i]
             power, twice = 0.5 * grow * (r * r + sr), shrink * (co * co - si * si)
             xx, yy = power * (1.0 + twice) - r * r * co * co, power * (1.0 - twice) - r * r * si * si
         weight[0, i], weight[1, i] = seen[i] * nominal_x / xx, seen[i] * nominal_y / yy

@@ -11,6 +11,8 @@ import numpy as np
 
 from radarsim.models.targets import polynomial
 
+PLACED = 8  # plots in the mean place at which the unbiased conversion's covariance is reckoned
+
 
 # ---- errors of plots -------------------------------------------------------------------------------------------------
 def correlation(rho: float, lags: np.ndarray) -> np.ndarray:
@@ -123,6 +125,21 @@ def converted_unbiased(r, b, sigma_r, sigma_b):
     c2, s2 = shrink * np.cos(2 * b), shrink * np.sin(2 * b)
     covariance = power * (1 + c2) - (r * c) ** 2, power * s2 - r**2 * c * s, power * (1 - c2) - (r * s) ** 2
     return np.sqrt(grow) * r * c, np.sqrt(grow) * r * s, covariance
+
+
+def places(r: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the covariance of the unbiased conversion is reckoned: means of the plots before; r and b (n,) in order.
+
+    A running mean of up to `PLACED` plots, of the first plot itself. At the plot's own place a weight would go with the
+    error of its plot, and weighted estimates be biased again; so they are at a place of few plots, less the more
+    there are.
+    """
+    out, mean, count = np.empty((2, len(r))), np.array([r[0], b[0]]), 0
+    for k, plot in enumerate(np.stack([r, b], axis=1)):
+        out[:, k] = mean if count else plot
+        count = min(count + 1, PLACED)
+        mean = mean + (plot - mean) / count
+    return out[0], out[1]
 
 
 def conversion_bias(r, sigma_b):

@@ -11,19 +11,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from radarsim.config.load import Case
-from radarsim.config.sonar import correlation_of
 from radarsim.engine.moments import Layout
-from radarsim.engine.results import Axes
-from radarsim.exact import least_squares as exact
+from radarsim.engine.results import Axes, Track
 from radarsim.filters import sonar as filters
 from radarsim.filters import sonar_banks as banks
 from radarsim.kernels import sonar as kernels
 from radarsim.kernels import sonar_patterns as pattern_kernels
 from radarsim.models import sonar as models
 from radarsim.studies import noise_key
+from radarsim.studies.sonar_exact import exact_values
+from radarsim.studies.sonar_scene import Scene, choices, patterns, plots_of, scene, third_of
 
 BLOCK = 4096
-MOST_OPEN = 9  # scans that may be missed up to which all patterns are told off for exact values: 512
 NAMES = {
     "polar": (("r", "m"), ("b", "rad")),
     "cartesian": (("x", "m"), ("y", "m")),
@@ -41,27 +40,6 @@ FILTERS = {
 
 
 @dataclass(frozen=True)
-class Scene:
-    """What is looked at: K times, C coordinates.
-
-    t (K,) s; truth (K, C, 3) in the working frame, polar (K, C, 3) as measured; sigma (K, C) of the plots, infinite
-    where a coordinate is not measured; nominal (C,) plots' σ in the working frame; rho (C,); walk (C,) a random
-    acceleration; certain (K,) 1, 0 or -1 as in kernels.sonar_patterns.Sight.
-    """
-
-    t: np.ndarray
-    truth: np.ndarray
-    polar: np.ndarray
-    sigma: np.ndarray
-    nominal: np.ndarray
-    rho: np.ndarray
-    walk: np.ndarray
-    certain: np.ndarray
-    period: float
-    probability: float
-
-
-@dataclass(frozen=True)
 class Plan:
     """All that a block needs; `sight` is None where all realisations share their gains."""
 
@@ -75,217 +53,31 @@ class Plan:
     block: int = BLOCK
 
 
-# ---- the scene ----------------------------------------------------------------------------------------------------
-def schedule(sensor, scans: int) -> tuple[np.ndarray, np.ndarray]:
-    """Times (K,) of all sonars' plots, in order, and σ (K, 2) of range and bearing, infinite where not measured."""
-    t = [np.arange(scans) * sensor.scan_period_s]
-    sigma = [np.tile([sensor.sigma_range_m, sensor.sigma_bearing_rad], (scans, 1))]
-    for other in sensor.further:
-        times = np.arange(other.first_s, t[0][-1] + 1e-9, other.scan_period_s)
-        t.append(times)
-        spread = [np.inf if s is None else s for s in (other.sigma_range_m, other.sigma_bearing_rad)]
-        sigma.append(np.tile(spread, (len(times), 1)))
-    order = np.argsort(np.concatenate(t), kind="stable")
-    return np.concatenate(t)[order], np.concatenate(sigma)[order]
-
-
-def courses(target, t: np.ndarray, third: str | None) -> tuple[np.ndarray, np.ndarray]:
-    """States (K, C, 3) of a target in polar and in cartesian coordinates; a third coordinate is the same in both."""
-    if target.kind == "turning":
-        turns = [(leg.start_s, leg.end_s, leg.rate_radps) for leg in target.turns]
-        flat = models.turning(target.x_m, target.y_m, target.speed_mps, target.course_rad, turns, t)
-        polar = models.polar_states(*flat)
-    elif target.frame == "polar":
-        polar = models.polynomials([target.range_m, target.bearing_rad], t)
-        flat = models.cartesian_states(*polar)
-    else:
-        flat = models.polynomials([target.x_m, target.y_m], t)
-        polar = models.polar_states(*flat)
-    if third is None:
-        return np.stack(polar, axis=1), np.stack(flat, axis=1)
-    beside = models.polynomials([getattr(target, {"depth": "depth_m", "elevation": "elevation_rad"}[third])], t)
-    return np.stack([*polar, *beside], axis=1), np.stack([*flat, *beside], axis=1)
-
-
-def third_of(sensor) -> tuple[str | None, float]:
-    """Name and σ of the third coordinate, if there is one."""
-    if sensor.sigma_depth_m is not None:
-        return "depth", sensor.sigma_depth_m
-    return ("elevation", sensor.sigma_elevation_rad) if sensor.sigma_elevation_rad is not None else (None, 0.0)
-
-
-def scene(spec) -> Scene:
-    """The scene of a case."""
-    sensor, target = spec.sensor, spec.target
-    third, spread = third_of(sensor)
-    t, sigma = schedule(sensor, spec.scans)
-    polar, flat = courses(target, t, third)
-    if third is not None:
-        own = np.isin(np.arange(len(t)), np.flatnonzero(sigma[:, 0] == sensor.sigma_range_m))
-        sigma = np.column_stack([sigma, np.where(own, spread, np.inf)])
-    nominal = sigma[0].copy()
-    if spec.frame != "polar":
-        xx, _, yy = models.converted(*polar[0, :2, 0], *nominal[:2])[2]
-        nominal[:2] = np.sqrt(xx), np.sqrt(yy)
-    walk = getattr(target, "fluctuation_mps2", 0.0)
-    certain = np.full(len(t), 1 if sensor.detection_probability == 1 else -1)
-    certain[0] = 1
-    certain[[k - 1 for k in sensor.missed_scans if k <= len(t)]] = 0
-    return Scene(
-        t=t,
-        truth=polar if spec.frame == "polar" else flat,
-        polar=polar,
-        sigma=sigma,
-        nominal=nominal,
-        rho=np.array([correlation_of(sensor.error_correlation, c) for c in range(sigma.shape[1])]),
-        walk=walk * angular(spec, 1),
-        certain=certain,
-        period=sensor.scan_period_s,
-        probability=sensor.detection_probability,
-    )
-
-
-def angular(spec, power: int) -> np.ndarray:
-    """What turns a lateral (m/s²)^power into the units of each coordinate (C,): 1, and 1 / range^power for angles."""
-    third, _ = third_of(spec.sensor)
-    angle = spec.target.range_0() ** -float(power)
-    units = [1.0, angle if spec.frame == "polar" else 1.0, {"depth": 1.0, "elevation": angle}.get(third, 0.0)]
-    return np.array(units[: 2 if third is None else 3])
-
-
-# ---- the filters --------------------------------------------------------------------------------------------------
-def choices(spec) -> list[banks.Choice]:
-    """The filters of a case, in the units of each coordinate."""
-    found, coordinates = [], len(angular(spec, 2))
-    for f in spec.filters:
-        rho = spec.sensor.error_correlation if f.error_correlation is None else f.error_correlation
-        known = f.kind in ("kalman_augmented", "kalman_differenced")
-        found.append(
-            banks.Choice(
-                kind=f.kind,
-                size=f.degree + 1,
-                length=f.plots or 0,
-                variance=(f.manoeuvre_variance or 0.0) * angular(spec, 2),
-                rho=np.array([correlation_of(rho, c) if known else 0.0 for c in range(coordinates)]),
-            )
-        )
-    return found
-
-
-def plots_of(seen: Scene, c: int, came: np.ndarray) -> filters.Plots:
-    """Plots of coordinate c under patterns came (M, K)."""
-    weight = came * (seen.nominal[c] / seen.sigma[: came.shape[1], c]) ** 2
-    return filters.Plots(seen.t[: came.shape[1]], weight, seen.period, seen.nominal[c])
-
-
-def patterns(seen: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """All patterns (M, K') of plots that come in the first scans, as far as there are not too many, and their
-    probabilities.
-    """
-    open_scans = np.cumsum(seen.certain < 0)
-    reach = int(np.searchsorted(open_scans, MOST_OPEN, side="right"))
-    free = np.flatnonzero(seen.certain[:reach] < 0)
-    came = np.tile(np.maximum(seen.certain[:reach], 0), (2 ** len(free), 1))
-    came[:, free] = (np.arange(2 ** len(free))[:, None] >> np.arange(len(free))) & 1
-    number = came[:, free].sum(axis=1)
-    return came, seen.probability**number * (1 - seen.probability) ** (len(free) - number)
-
-
-# ---- exact values -------------------------------------------------------------------------------------------------
-def true_errors(seen: Scene, choice: banks.Choice, c: int, came: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Bias (M, K, 3), covariance (M, K, 3, 3) and number of plots (M, K) of one filter in one coordinate."""
-    plots, scans = plots_of(seen, c, came), came.shape[1]
-    t, truth, sigma = (
-        seen.t[:scans],
-        seen.truth[:scans, c],
-        np.where(np.isfinite(seen.sigma[:scans, c]), seen.sigma[:scans, c], 0.0),
-    )
-    if choice.kind != "window":
-        design, steps = banks.designed(choice, c, plots), models.step_correlations(seen.rho[c], t, seen.period)
-        errors = exact.recursive_errors(design.gain, design.carry, t, truth, steps, sigma, seen.walk[c])
-        return *errors, design.plots
-    bias, covariance = np.zeros((len(came), scans, 3)), np.zeros((len(came), scans, 3, 3))
-    for k in range(scans):
-        first, weights, _ = filters.window_weights(plots, k, choice.length, choice.size)
-        C = models.error_covariance(sigma[first : k + 1], seen.rho[c], t[first : k + 1], seen.period)
-        started = plots.moments()[:, k].min() >= choice.size
-        bias[:, k], covariance[:, k] = exact.weighted_errors(
-            weights, first, t, truth, C, seen.walk[c], first if started else 0
-        )
-    return bias, covariance, plots.moments()
-
-
-def exact_values(spec, seen: Scene, wanted: list[banks.Choice], size: int) -> dict[str, np.ndarray]:
-    """Exact σ and bias (F, K, C, size), σ one scan ahead and normalised error (F, K, C); not-a-number where not known.
-
-    With random misses they are means over all patterns, each with its probability, as far as these can be told off.
-    """
-    F, K, C = len(wanted), len(seen.t), seen.truth.shape[1]
-    made = {name: np.full((F, K, C, size), np.nan) for name in ("sigma", "bias")}
-    made |= {name: np.full((F, K, C), np.nan) for name in ("ahead", "nees")}
-    if spec.frame != "polar":
-        return made
-    came, probability = patterns(seen)
-    reach = came.shape[1]
-    for f, choice in enumerate(wanted):
-        for c in range(C):
-            bias, S, plots = true_errors(seen, choice, c, came)
-            for j in range(choice.size):
-                share = probability[:, None] * (plots > j)
-                with np.errstate(invalid="ignore", divide="ignore"):
-                    square = (share * (S[:, :, j, j] + bias[:, :, j] ** 2)).sum(axis=0) / share.sum(axis=0)
-                    made["sigma"][f, :reach, c, j] = np.sqrt(square)
-                    made["bias"][f, :reach, c, j] = (share * bias[:, :, j]).sum(axis=0) / share.sum(axis=0)
-            full = probability[:, None] * (plots >= choice.size)
-            made["ahead"][f, :reach, c] = _ahead(seen, c, bias, S, full)
-            if len(came) == 1:
-                believed = banks.believed(choice, c, plots_of(seen, c, came))[0]
-                n = choice.size
-                ready = np.flatnonzero(plots[0] >= n)
-                unit = np.sqrt(np.diagonal(believed, axis1=1, axis2=2))[ready][:, :n]
-                P = believed[ready][:, :n, :n] / (unit[:, :, None] * unit[:, None, :])
-                scaled = S[0, ready][:, :n, :n] / (unit[:, :, None] * unit[:, None, :])
-                made["nees"][f, ready, c] = exact.consistency(P, bias[0, ready][:, :n] / unit, scaled)
-    return made
-
-
-def _ahead(seen: Scene, c: int, bias: np.ndarray, S: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Exact σ (K',) of the value extrapolated to the next scan; not-a-number for the last."""
-    reach = S.shape[1]
-    out = np.full(reach, np.nan)
-    for k in range(min(reach, len(seen.t) - 1)):
-        dt = seen.t[k + 1] - seen.t[k]
-        row = np.array([1.0, dt, dt**2 / 2])
-        variance = np.einsum("i,mij,j->m", row, S[:, k], row) + (seen.walk[c] * dt**2 / 2) ** 2
-        mean = bias[:, k] @ row + row @ seen.truth[k, c] - seen.truth[k + 1, c, 0]
-        total = share[:, k].sum()
-        if total > 0:
-            out[k] = np.sqrt((share[:, k] * (variance + mean**2)).sum() / total)
-    return out
-
-
-# ---- the study ----------------------------------------------------------------------------------------------------
 def prepare(case: Case) -> Plan:
     """Design the filters of a case and reckon the exact values of its errors."""
     spec, seen, wanted = case.spec, scene(case.spec), choices(case.spec)
     size = max(choice.size for choice in wanted)
     F, K, C = len(wanted), len(seen.t), seen.truth.shape[1]
     shared = spec.frame == "polar" and (seen.certain >= 0).all()
-    came = np.maximum(seen.certain, 0)[None]
-    by_coordinate = [plots_of(seen, c, came) for c in range(C)]
-    bank = banks.shared(wanted, by_coordinate) if shared else banks.own(wanted, seen.t, seen.period, seen.nominal)
+    if shared:
+        came, probability = np.maximum(seen.certain, 0)[None], np.ones(1)
+    else:
+        came, probability = patterns(seen) if spec.frame == "polar" else (np.zeros((0, 0)), np.zeros(0))
+    designs = [[banks.made(f, c, plots_of(seen, c, came)) for c in range(C)] for f in wanted] if len(came) else [[]] * F
+    bank = banks.shared(wanted, designs) if shared else banks.own(wanted, seen.t, seen.period, seen.nominal)
+    claimed = [[np.diagonal(one.believed[0], axis1=1, axis2=2) for one in row] for row in designs] if shared else None
     layout = Layout(
         **dict.fromkeys(("paired", "estimates", "believed"), (F, K, C * size)),
         **{"error": (F, K, C * size, 4), "joint": (F, K, C, 4), "ahead": (F, K, C, 4)},
     )
     return Plan(
         layout=layout,
-        axes=axes(spec, seen, wanted, size),
+        axes=axes(spec, seen, wanted, exact_values(seen, designs, probability, size), bank.known if shared else None),
         world=world(case, seen),
         bank=bank,
         sight=None if shared else sight(case, seen),
         size=size,
-        believed=banks.all_believed(wanted, by_coordinate) if shared else None,
+        believed=np.array(claimed).transpose(0, 2, 1, 3) if shared else None,
     )
 
 
@@ -320,23 +112,20 @@ def sight(case: Case, seen: Scene) -> pattern_kernels.Sight:
     )
 
 
-def axes(spec, seen: Scene, wanted: list[banks.Choice], size: int) -> Axes:
-    """Labels and exact values."""
-    F, K, C = len(wanted), len(seen.t), seen.truth.shape[1]
-    third, _ = third_of(spec.sensor)
-    coordinates = (*NAMES[spec.frame], *([THIRD[third]] if third else []))
-    rates = (("", ""), ("v", "/s"), ("a", "/s2"))
-    labels = tuple((before + name, unit + after) for name, unit in coordinates for before, after in rates[:size])
-    values = exact_values(spec, seen, wanted, size)
-    came = np.maximum(seen.certain, 0)[None] if (seen.certain >= 0).all() else np.ones((1, K))
-    count = np.stack([plots_of(seen, c, came).moments()[0] for c in range(C)], axis=1)
+def axes(spec, seen: Scene, wanted: list[banks.Choice], values: dict, known: np.ndarray | None) -> Axes:
+    """Labels and exact values, as `exact_values` gives them; known (F, K, C) components, or as many as may be."""
+    F, K, C, size = values["sigma"].shape
+    came = (seen.certain != 0).astype(float)[None]  # what may come
     degree = np.array([choice.size for choice in wanted])
-    available = (np.arange(size) < degree[:, None, None, None]) & (count[None, :, :, None] > np.arange(size))
+    if known is None:
+        most = np.stack([plots_of(seen, c, came).moments()[0] for c in range(C)], axis=1)
+        known = np.minimum(most[None], degree[:, None, None])
+    available = known[..., None] > np.arange(size)
     names = tuple(f.name for f in spec.filters)
     flat = (F, K, C * size)
     return Axes(
         filters=names,
-        components=labels,
+        components=labels(spec, size),
         k=np.arange(1, K + 1),
         t_s=seen.t,
         available=available.reshape(flat),
@@ -344,7 +133,7 @@ def axes(spec, seen: Scene, wanted: list[banks.Choice], size: int) -> Axes:
         exact_sigma=np.where(available, values["sigma"], np.nan).reshape(flat),
         exact_bias=np.where(available, values["bias"], np.nan).reshape(flat),
         extra={
-            "coordinates": coordinates,
+            "coordinates": coordinates(spec),
             "sizes": degree,
             "exact_ahead": values["ahead"],
             "exact_nees": values["nees"],
@@ -357,6 +146,18 @@ def axes(spec, seen: Scene, wanted: list[banks.Choice], size: int) -> Axes:
             "polar": seen.polar,
         },
     )
+
+
+def coordinates(spec) -> tuple[tuple[str, str], ...]:
+    """Names and units of the coordinates that the filters work in."""
+    third, _ = third_of(spec.sensor)
+    return (*NAMES[spec.frame], *([THIRD[third]] if third else []))
+
+
+def labels(spec, size: int) -> tuple[tuple[str, str], ...]:
+    """Names and units of all components: each coordinate with its rate and, for size 3, its acceleration."""
+    rates = (("", ""), ("v", "/s"), ("a", "/s2"))[:size]
+    return tuple((before + name, unit + after) for name, unit in coordinates(spec) for before, after in rates)
 
 
 def plain_bias(spec, seen: Scene) -> float:
@@ -382,3 +183,66 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
         for name in ("error", "paired", "believed", "estimates")
     }
     return plan.layout.pack(**picked, joint=sums.joint, ahead=sums.ahead)
+
+
+def PLOT_COLUMNS(spec) -> tuple[tuple[str, ...], ...]:
+    """The columns that `track` reads of a file of recorded plots."""
+    third, _ = third_of(spec.sensor)
+    more = {"depth": ("depth_m",), "elevation": ("elevation_rad",)}.get(third, ())
+    return (("t_s", "range_m", "bearing_rad", *more),)
+
+
+def track(case: Case, recorded: dict[str, np.ndarray]) -> Track:
+    """The filters of a case over recorded plots: columns of equal length (n,), not-a-number where a value is missing.
+
+    Bearings are made continuous from plot to plot, so an estimate may leave -pi … pi. In the cartesian frames a plot
+    needs both range and bearing. Further sonars of the config play no part: all plots are taken as the first one's.
+    """
+    spec, t = case.spec, recorded["t_s"] - recorded["t_s"][0]
+    wanted, columns = choices(spec), list(recorded.values())[1:]
+    z, weight, sigma = measured(spec, columns)
+    size = max(choice.size for choice in wanted)
+    estimate, spread = np.full((2, len(wanted), len(t), len(z), size), np.nan)
+    for f, choice in enumerate(wanted):
+        for c in range(len(z)):
+            plots = filters.Plots(t, weight[c][None], spec.sensor.scan_period_s, sigma[c])
+            x, P = banks.applied(choice, c, plots, z[c])
+            known = np.arange(size) < np.minimum(plots.moments()[0], choice.size)[:, None]
+            estimate[f, :, c] = np.where(known, x[:, :size], np.nan)
+            variance = np.diagonal(P, axis1=1, axis2=2)[:, :size]
+            spread[f, :, c] = np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)
+    flat = (len(wanted), len(t), len(z) * size)
+    names = tuple(f.name for f in spec.filters)
+    return Track(names, labels(spec, size), recorded["t_s"], estimate.reshape(flat), spread.reshape(flat))
+
+
+def measured(spec, columns: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Plots (C, n), their weights (C, n), zero where missing, and nominal σ (C,), in the frame that the filters work
+    in.
+    """
+    sensor = spec.sensor
+    third, other = third_of(sensor)
+    sigma = np.array([sensor.sigma_range_m, sensor.sigma_bearing_rad, *([other] if third else [])])
+    z = np.stack(columns)
+    z[1] = continuous(z[1])
+    weight = np.isfinite(z).astype(float)
+    if spec.frame != "polar":
+        came = np.flatnonzero(weight[:2].all(axis=0))
+        plain = spec.frame == "cartesian" or not len(came)
+        place = z[:2, came] if plain else models.places(*z[:2, came])
+        convert = models.converted if spec.frame == "cartesian" else models.converted_unbiased
+        x, y, _ = convert(*z[:2, came], *sigma[:2])
+        xx, _, yy = convert(*place, *sigma[:2])[2]
+        weight[:2], z[:2] = 0.0, 0.0
+        sigma[:2] = np.sqrt([xx[0], yy[0]]) if len(came) else 1.0
+        z[0, came], z[1, came] = x, y
+        weight[0, came], weight[1, came] = sigma[0] ** 2 / xx, sigma[1] ** 2 / yy
+    return np.where(weight > 0, z, 0.0), weight, sigma
+
+
+def continuous(bearing: np.ndarray) -> np.ndarray:
+    """Bearings (n,) without jumps of a full turn between neighbouring plots; gaps stay."""
+    seen = np.isfinite(bearing)
+    out = bearing.copy()
+    out[seen] = np.unwrap(bearing[seen])
+    return out

@@ -126,6 +126,7 @@ CLAIMS = (
             above(0),
         ),
         reading="on the shipped course, whose velocity changes by 0.25 m/s at random between plots, after 40 plots",
+        config="sonar_fluctuating",
     ),
     _claim(
         11,
