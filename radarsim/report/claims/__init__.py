@@ -28,7 +28,7 @@ PAPERS = {
     "P3": "Butyrskiy",
     "P4": "Uss, Baryshev & Djavad 2010",
 }
-STUDIES = ("range_doppler", "multimodel", "sonar")  # those with claims, in the order of the papers
+STUDIES = ("range_doppler", "multimodel", "sonar", "discriminator")  # those with claims, in the order of the papers
 
 CONFIRMED, REFUTED, UNCLEAR, NOT_RUN = "confirmed", "refuted", "not distinguishable", "not run"
 

@@ -1,0 +1,121 @@
+"""How P4's claims are measured: which case is which reading of the paper, which estimator which discriminator.
+
+The paper's numbers do not belong together: its potential spreads follow from a noise variance of 2.25, a quarter of the
+one it states, and then its threshold c is the 1 of (14); its first window follows from the stated 9, and then c is the
+0.5 of (11). Both readings are judged: "computed" and "printed".
+"""
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import claims
+from radarsim.report.claims import Missing, certain
+from radarsim.report.statistics import Estimate, difference, root_mean_square
+
+COMPUTED, PRINTED = "computed", "printed"
+READINGS = {COMPUTED: (2.25, 1.0), PRINTED: (9.0, 0.5)}  # noise variance, threshold c
+WORDS = {COMPUTED: "σ² = 2.25, c = 1", PRINTED: "σ² = 9, c = 0.5"}
+DOPPLER = (10e3, 180e3, -750e3, 1000e3)
+COMPONENTS = ("phi0", "f0", "f1", "f2", "f3")
+ESTIMATE = 1.17  # the paper's own estimate of the amplitude, which it puts into (17)
+
+
+class Evidence(claims.Evidence):
+    """Finds the paper's experiment in its two readings, its swept variants, and the estimators, by what they are."""
+
+    def case(self, key) -> CaseResult:
+        """key: a reading, or (swept key, value) of the maps."""
+        for result in self.results:
+            if not self._is_papers(result):
+                continue
+            if isinstance(key, tuple):
+                if (
+                    len(result.swept) == 1
+                    and result.swept[0][0] == key[0]
+                    and np.isclose(float(result.swept[0][1]), key[1])
+                ):
+                    return result
+            elif not result.swept and result.spec.burst.noise_variance == READINGS[key][0]:
+                return result
+        raise Missing(key)
+
+    @staticmethod
+    def _is_papers(result: CaseResult) -> bool:
+        burst, truth = result.spec.burst, result.spec.truth
+        shape = (burst.pulses, burst.pulse_period_s, burst.pulse_length_s, burst.sampling_period_s, burst.amplitude)
+        return (
+            np.allclose(shape, (30000, 1e-5, 1e-6, 1e-6, 1.0), rtol=1e-9)
+            and burst.samples == "real"
+            and truth.doppler_derivatives is not None
+            and np.allclose(truth.doppler_derivatives[:4], DOPPLER)
+            and len(truth.doppler_derivatives) == 4
+        )
+
+    def estimator(self, key, kind: str) -> int:
+        """Index of an estimator of a case by its kind: sequence, narrow, wide, cured, truth."""
+        threshold = READINGS.get(key, (0, 1.0))[1] if not isinstance(key, tuple) else 1.0
+        for i, e in enumerate(self.case(key).spec.estimators):
+            if kind_of(e, threshold) == kind:
+                return i
+        raise Missing((key, kind))
+
+    def windows(self, key, kind: str = "sequence") -> np.ndarray:
+        """Window lengths in s of an estimator."""
+        durations = self.case(key).axes.extra["duration_s"][self.estimator(key, kind)]
+        return durations[np.isfinite(durations)]
+
+    def lock(
+        self, key, kind: str, column: str = "lock_rate", ends: tuple[str, str] = ("lock_lo", "lock_hi")
+    ) -> Estimate:
+        """Share of bursts at the last window of an estimator."""
+        result, i = self.case(key), self.estimator(key, kind)
+        row = self.row("locks", case=result.name, filter=result.axes.filters[i], k=len(self.windows(key, kind)))
+        return Estimate(*(float(row[name]) for name in (column, *ends)))
+
+    def always(self, key) -> Estimate:
+        """Share of bursts with every component of the sequence within 3σ at every window, σ with the prior."""
+        ends = ("always_posterior_lo", "always_posterior_hi")
+        return self.lock(key, "sequence", "always_posterior_rate_3sigma", ends)
+
+    def accuracy(self, key, kind: str, component: str) -> Estimate:
+        """σ of the locked bursts over the potential one of the window, at the last window."""
+        result, i = self.case(key), self.estimator(key, kind)
+        k, c = len(self.windows(key, kind)) - 1, COMPONENTS.index(component)
+        moments = result.sums["error"][i, k, c]
+        return root_mean_square(moments[1], moments[3], result.sums["locks"][i, k, 0])
+
+    def over_whole(self, key, kind: str, component: str) -> Estimate:
+        """σ of all bursts at an estimator's last window over the potential one of the whole burst."""
+        result, i = self.case(key), self.estimator(key, kind)
+        k, c = len(self.windows(key, kind)) - 1, COMPONENTS.index(component)
+        moments = result.sums["error_all"][i, k, c]
+        scale = result.axes.exact_sigma[i, k, c] / result.axes.extra["potential_closed_form"][c]
+        return Estimate(*(scale * part for part in root_mean_square(moments[1], moments[3], result.count)))
+
+    def potential(self, key, component: str) -> Estimate:
+        """Potential spread of the whole burst, computed."""
+        return certain(self.case(key).axes.extra["potential_closed_form"][COMPONENTS.index(component)])
+
+    def shortest_window(self, key, amplitude: float) -> Estimate:
+        """T_min (17) in ms at an amplitude."""
+        return certain(1e3 * self.case(key).axes.extra["shortest_window_s"] / amplitude**2)
+
+    def lock_loss(self, key, other, kind: str) -> Estimate:
+        """Lock of one case less that of another."""
+        return difference(self.lock(key, kind), self.lock(other, kind))
+
+
+def kind_of(estimator, threshold: float) -> str:
+    """What an estimator is, at the reading's threshold c; "other" for variants."""
+    e = estimator
+    plain = e.method == "sequence" and e.amplitude == "known" and e.density == 1 and e.tail == "gaussian"
+    if not plain or e.steps < 40 or e.phases:
+        return "other"
+    if e.schedule != "designed":
+        whole = len(e.schedule) == 1 and np.isclose(e.schedule[0], 0.3)
+        return {"truth": "truth", "prior": "narrow"}[e.start] if whole else "other"
+    if e.main_lobe_threshold != threshold or e.lock_probability != 0.99 or e.start != "prior":
+        return "other"
+    if e.first_windows == 1:
+        return "wide"
+    return "other" if e.first_windows else "cured" if e.search_points else "sequence"
