@@ -6,11 +6,13 @@ import sys
 import time
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 from radarsim.engine import keeper
 from radarsim.engine.collect import collect
+from radarsim.engine.moments import Sums
 from radarsim.engine.stopping import Signals
 
 
@@ -56,6 +58,26 @@ def textbook(work: Fake, realisations: int) -> np.ndarray:
     for part in parts[1:]:
         total = total + part
     return total
+
+
+WORK = Fake()
+N = 5_005  # 312 blocks of 16, in nodes of 256, 32, 16 and 8, and 13 realisations
+NAMES = ["L03-38.sums", "L04-18.sums", "L05-8.sums", "L08-0.sums", "P312-13.sums", "T5005.sums"]
+
+
+def names(directory: Path) -> list[str]:
+    """File names, sorted."""
+    return sorted(path.name for path in directory.iterdir())
+
+
+def contents(directory: Path) -> dict[str, bytes]:
+    """What the files hold."""
+    return {path.name: path.read_bytes() for path in directory.iterdir()}
+
+
+def same(result: Sums, realisations: int = N) -> bool:
+    """Whether a result is of so many realisations and has the bytes of the textbook."""
+    return result.count == realisations and result.values.tobytes() == textbook(WORK, realisations).tobytes()
 
 
 def say(*words: object) -> None:

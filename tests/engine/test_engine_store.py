@@ -1,52 +1,23 @@
-"""The store: nothing is computed twice, nothing damaged is believed, a full disk or a second run loses nothing."""
+"""The store: nothing is computed twice, what was reported stays to be read, several runs share it."""
 
-import errno
 import hashlib
 import json
 import os
-import random
-import re
 import shutil
-import stat
-import subprocess
-import sys
 import threading
 import time
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from radarsim.engine import executors, keeper, store
+from radarsim.engine import executors, keeper
 from radarsim.engine.blocks import Node, Partial, Total, decomposition
 from radarsim.engine.collect import collect, stored
 from radarsim.engine.moments import Sums
-from radarsim.engine.store import Store, decoded, encoded, piece_named
-from radarsim.errors import NonFiniteError, StoreError
-from tests.engine.fake import Fake, textbook
-
-WORK = Fake()
-N = 5_005  # 312 blocks of 16, in nodes of 256, 32, 16 and 8, and 13 realisations
-NAMES = ["L03-38.sums", "L04-18.sums", "L05-8.sums", "L08-0.sums", "P312-13.sums", "T5005.sums"]
-
-
-@pytest.fixture
-def blocks(tmp_path):
-    """The directory of the finished blocks of WORK under the results directory tmp_path."""
-    return tmp_path / ".blocks" / WORK.identity
-
-
-def names(directory):
-    return sorted(path.name for path in directory.iterdir())
-
-
-def contents(directory):
-    return {path.name: path.read_bytes() for path in directory.iterdir()}
-
-
-def same(result, realisations=N):
-    return result.count == realisations and result.values.tobytes() == textbook(WORK, realisations).tobytes()
+from radarsim.engine.store import Store, decoded, piece_named
+from radarsim.errors import NonFiniteError
+from tests.engine.fake import NAMES, WORK, Fake, N, contents, names, same
 
 
 def test_what_is_stored_is_not_computed_again(tmp_path, blocks):
@@ -148,195 +119,6 @@ def test_temporary_files_of_a_killed_run_are_removed_once_they_are_old(tmp_path,
     collect(WORK, 64, store=tmp_path)
     assert fresh.exists()
     assert not old.exists()
-
-
-def reforged(path, **changes):
-    """A file with a right checksum and a changed header or sums."""
-    header, values = decoded(path.read_bytes())
-    values = changes.pop("values", values)
-    path.write_bytes(encoded(header | changes, values))
-
-
-DAMAGE = {
-    "empty": lambda path: path.write_bytes(b""),
-    "one byte": lambda path: path.write_bytes(b"r"),
-    "magic only": lambda path: path.write_bytes(store.MAGIC),
-    "text": lambda path: path.write_bytes(b"hello\n" * 100),
-    "half": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
-    "without its last byte": lambda path: path.write_bytes(path.read_bytes()[:-1]),
-    "a byte more": lambda path: path.write_bytes(path.read_bytes() + b"\0"),
-    "zeros": lambda path: path.write_bytes(bytes(path.stat().st_size)),
-    "another identity": lambda path: reforged(path, identity="cd34"),
-    "another piece": lambda path: reforged(path, piece="L00-0"),
-    "another place": lambda path: reforged(path, first=1),
-    "another count": lambda path: reforged(path, count=1),
-    "another block": lambda path: reforged(path, block=32),
-    "another size": lambda path: reforged(path, size=6),
-    "fewer numbers": lambda path: reforged(path, values=np.ones(4)),
-    "not a number": lambda path: reforged(path, values=np.array([1.0, 2.0, np.nan, 4.0, 5.0])),
-    "no JSON": lambda path: path.write_bytes(signed(store.MAGIC + b"{]\n" + bytes(40))),
-    "JSON of another kind": lambda path: path.write_bytes(signed(store.MAGIC + b"[]\n" + bytes(40))),
-    "part of a number": lambda path: path.write_bytes(signed(store.MAGIC + b"{}\n" + bytes(43))),
-}
-
-
-def signed(body):
-    return body + hashlib.sha256(body).digest()
-
-
-@pytest.mark.parametrize("name", ["L08-0.sums", "P312-13.sums", "T5005.sums"])
-@pytest.mark.parametrize("kind", DAMAGE)
-def test_damage_is_found_named_and_computed_again(tmp_path, blocks, kind, name):
-    collect(WORK, N, store=tmp_path)
-    DAMAGE[kind](blocks / name)
-    if not name.startswith("T"):
-        (blocks / "T5005.sums").unlink()
-    result = collect(WORK, N, store=tmp_path)
-    assert same(result)
-    assert [warning.split(":")[0] for warning in result.warnings] == [str(blocks / name)]
-    assert result.computed == {"L08-0.sums": 4096, "P312-13.sums": 13, "T5005.sums": 0}[name]
-    assert names(blocks) == sorted([*NAMES, f"{name}.damaged"])
-    clean = collect(WORK, N, store=tmp_path)
-    assert same(clean)
-    assert (clean.warnings, clean.computed) == ((), 0)
-
-
-def test_a_hundred_of_a_hundred_flipped_bits_are_found(tmp_path, blocks):
-    collect(WORK, N, store=tmp_path)
-    good, draw = contents(blocks), random.Random(7)
-    for _ in range(100):
-        name = draw.choice(NAMES)
-        raw = bytearray(good[name])
-        raw[draw.randrange(len(raw))] ^= 1 << draw.randrange(8)
-        (blocks / name).write_bytes(raw)
-        reader = Store(tmp_path, WORK)
-        assert reader.read(piece_named(name)) is None
-        assert len(reader.warnings) == 1
-        (blocks / name).write_bytes(good[name])
-
-
-def test_every_truncation_is_found(tmp_path, blocks):
-    collect(WORK, 16, store=tmp_path)
-    good = (blocks / "L00-0.sums").read_bytes()
-    for length in range(len(good)):
-        (blocks / "L00-0.sums").write_bytes(good[:length])
-        assert Store(tmp_path, WORK).read(Node(0, 0)) is None
-
-
-def test_damage_that_cannot_be_moved_aside_is_not_believed_either(tmp_path, blocks, monkeypatch):
-    collect(WORK, N, store=tmp_path)
-    (blocks / "T5005.sums").unlink()
-    (blocks / "L08-0.sums").write_bytes(b"bad")
-
-    def refuse(*_):
-        raise OSError(errno.EROFS, "Read-only file system")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "replace", refuse)
-        assert stored(WORK, N, tmp_path) is None
-        reader = Store(tmp_path, WORK)
-        assert len(reader.forest(312).nodes) == 3
-        assert len(reader.warnings) == 1
-    result = collect(WORK, N, store=tmp_path)
-    assert same(result)
-    assert len(result.warnings) == 1
-
-
-def test_a_file_appears_whole_and_safe_before_what_it_replaces_goes(tmp_path, blocks, monkeypatch):
-    collect(WORK, 32, store=tmp_path)
-    events = []
-
-    def recorded(owner, name, describe):
-        original = getattr(owner, name)
-
-        def call(*given):
-            events.append(describe(*given))
-            return original(*given)
-
-        monkeypatch.setattr(owner, name, call)
-
-    def replaced(temporary, path):
-        assert decoded(Path(temporary).read_bytes())
-        assert not path.exists()
-        return f"rename {path.name}"
-
-    recorded(os, "fsync", lambda fd: "sync directory" if stat.S_ISDIR(os.fstat(fd).st_mode) else "sync file")
-    recorded(os, "replace", replaced)
-    recorded(Path, "unlink", lambda path: f"remove {path.name}")
-    writer = keeper.Keeper(Store(tmp_path, WORK))
-    writer.finish({Node(2, 0): Sums(64, np.ones(5))})
-    assert events == ["sync file", "rename L02-0.sums", "sync directory", "remove L01-0.sums"]
-
-
-def full_disk(monkeypatch, calls_that_work):
-    """From some call of fsync on, there is no space left."""
-    left = iter(range(calls_that_work))
-    fsync = os.fsync
-
-    def limited(descriptor):
-        if next(left, None) is None:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        fsync(descriptor)
-
-    monkeypatch.setattr(os, "fsync", limited)
-
-
-@pytest.mark.parametrize("calls_that_work", [0, 1, 2, 5])
-def test_a_full_disk_names_the_file_and_leaves_the_old_ones(tmp_path, blocks, monkeypatch, calls_that_work):
-    collect(WORK, N, store=tmp_path)
-    before = contents(blocks)
-    with monkeypatch.context() as patch:
-        full_disk(patch, calls_that_work)
-        with pytest.raises(StoreError, match=r"\.blocks/ab12/.*: cannot be written: No space left on device") as caught:
-            collect(WORK, 100_000, store=tmp_path)
-    assert caught.value.exit_code == 4
-    after = contents(blocks)
-    assert before.items() <= after.items()
-    assert not [name for name in after if name.endswith(".tmp")]
-    assert len(after) == len(before) + calls_that_work
-    resumed = collect(WORK, 100_000, store=tmp_path)
-    assert same(resumed, 100_000)
-    assert resumed.from_store >= 4_992
-
-
-def test_a_disk_that_fills_up_while_running_ends_the_run_at_once(tmp_path, blocks, monkeypatch):
-    monkeypatch.setattr(keeper, "PERIOD_S", 0.05)
-    full_disk(monkeypatch, 3)
-    started = time.perf_counter()
-    with pytest.raises(StoreError, match="No space left"):
-        collect(Fake(pause_s=1e-3), 16 * 10_000, store=tmp_path, threads=2)
-    assert time.perf_counter() - started < 4
-    assert not [name for name in names(blocks) if name.endswith(".tmp")]
-
-
-LIMITED = """if True:
-    import resource, signal
-    from radarsim.engine.collect import collect
-    from radarsim.errors import StoreError
-    from tests.engine.fake import Fake
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (200, 200))
-    try:
-        collect(Fake(), 1_000, store={store!r})
-    except StoreError as error:
-        raise SystemExit(error.exit_code)
-"""
-
-
-def test_a_file_that_may_not_grow_is_never_seen_cut_off(tmp_path, blocks):
-    """The kernel itself cuts the write short, as a quota does."""
-    program = [sys.executable, "-c", LIMITED.format(store=str(tmp_path))]
-    assert subprocess.run(program, cwd=Path(__file__).parents[2], check=False).returncode == 4
-    assert names(blocks) == []
-
-
-@pytest.mark.parametrize("obstacle", ["", ".blocks", ".blocks/ab12"])
-def test_a_directory_that_cannot_be_made_is_named(tmp_path, obstacle):
-    path = tmp_path / "results" / obstacle
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("a file")
-    with pytest.raises(StoreError, match=re.escape(str(path))):
-        collect(WORK, 100, store=tmp_path / "results")
 
 
 def test_numbers_that_are_not_finite_are_not_stored_and_the_rest_is(tmp_path, blocks):
