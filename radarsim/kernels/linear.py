@@ -198,7 +198,9 @@ def plain(array, *shape, dtype=np.float64):
     alike = type(array) is np.ndarray and array.shape == shape and array.dtype == dtype
     if alike and array.flags.c_contiguous and array.flags.writeable:
         return array
-    return np.array(np.broadcast_to(np.asarray(array, dtype=dtype), shape), order="C")
+    made = np.empty(shape, dtype=dtype)
+    made[...] = array
+    return made
 
 
 def schedule(dt, observes, start, weights, gains) -> tuple[np.ndarray, ...]:
