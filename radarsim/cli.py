@@ -1,11 +1,12 @@
 """The command `radarsim`: parse, call one function, print. Heavy imports wait inside the commands."""
 
+import os
 import sys
 
 import click
 
 import radarsim
-from radarsim.errors import RadarsimError
+from radarsim.errors import Interrupted, RadarsimError
 
 SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 
@@ -20,8 +21,12 @@ class Commands(click.Group):
         try:
             return super().invoke(ctx)
         except RadarsimError as error:
-            for line in error.lines:
+            for line in dict.fromkeys(error.lines):
                 click.echo(line, err=True)
+            if isinstance(error, Interrupted):
+                # The interpreter's orderly end takes most of a second, which whoever sent the signal need not wait for.
+                sys.stdout.flush()
+                os._exit(error.exit_code)
             sys.exit(error.exit_code)
 
 

@@ -1,9 +1,11 @@
 """One experiment from config to written results: the wiring that the command and Python share."""
 
+import json
 import os
 import shlex
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
@@ -177,7 +179,12 @@ def repeated(experiment: Experiment, overrides: Sequence[str]) -> dict[str, str]
 def report(
     experiment: Experiment, *, out: str | os.PathLike, overrides: Sequence[str] = (), figures: bool = True
 ) -> Result:
-    """Tables, figures and report of a config from what is stored; raises ConfigError where something is missing."""
+    """Tables, figures and report of a config from what is stored; raises ConfigError where something is missing.
+
+    Where overrides do not say how many realisations, it is as many as the last run reported, else as the config asks.
+    """
+    if not any(override.split("=")[0].strip() == "realisations" for override in overrides):
+        experiment = as_last_run(experiment, Path(out))
     held, missing = [], []
     for case in experiment.cases:
         work = studies.CaseWork(case)
@@ -192,6 +199,19 @@ def report(
     result = Result(experiment, finished(held), facts_of(held, 0, 0.0) | repeated(experiment, overrides))
     result.write(out, figures)
     return result
+
+
+def as_last_run(experiment: Experiment, out: Path) -> Experiment:
+    """The experiment with each case's realisations as the run.json under `out` reports them, where there is one."""
+    try:
+        done = json.loads((out / experiment.stem / "run.json").read_text())["cases"]
+        numbers = {name: int(case["done"]) for name, case in done.items()}
+    except FileNotFoundError:
+        return experiment
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise StoreError(f"{out / experiment.stem / 'run.json'}: cannot be read: {error}") from error
+    cases = tuple(replace(case, realisations=numbers.get(case.name, case.realisations)) for case in experiment.cases)
+    return replace(experiment, cases=cases, realisations=max(case.realisations for case in cases))
 
 
 Gathered = Sequence[tuple[Case, studies.CaseWork, Collected]]

@@ -111,6 +111,9 @@ def test_report_remakes_the_same_tables_and_computes_nothing(done):
     (folder / "curves.csv").unlink()
     radarsim("report", "rls2", "-n", "1e4", "--no-figures", "--out", done)
     assert csv_bytes(folder) == before
+    (folder / "gains.csv").unlink()
+    radarsim("report", "rls2", "--no-figures", "--out", done)
+    assert csv_bytes(folder) == before
     result = radarsim("report", "rls2", "-n", "1e6", "--out", done, code=2)
     assert "1000000 realisations are not stored" in result.stderr
     assert "radarsim run" in result.stderr

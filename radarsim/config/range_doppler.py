@@ -221,7 +221,7 @@ class RangeDoppler(Study):
     def _in_proportion(self) -> None:
         """Refuse accuracies and variances of which one makes the other meaningless.
 
-        Beyond these limits the steady covariance drowns in rounding (tried: SciPy's solver gives up at 1e15 and 1e-18).
+        Beyond these limits the steady covariance drowns in rounding (SciPy's solver gives up at 1e15).
         """
         radar, dt = self.radar, self.radar.scan_period_s
         if not 1e-12 <= (radar.sigma_range_m / (dt * radar.sigma_velocity_mps)) ** 2 <= 1e12:
@@ -229,9 +229,9 @@ class RangeDoppler(Study):
             raise at("radar.sigma_velocity_mps", f"out of proportion: {ratio} must be from 1e-12 to 1e12")
         for i, one in enumerate(self.filters):
             key = f"filters.{i}.manoeuvre_variance"
-            if not 1e-16 <= one.manoeuvre_variance * dt**6 / radar.sigma_range_m**2 <= 1e12:
+            if not 1e-28 <= one.manoeuvre_variance * dt**6 / radar.sigma_range_m**2 <= 1e12:
                 ratio = "manoeuvre_variance scan_period_s⁶ / sigma_range_m²"
-                raise at(key, f"out of proportion: {ratio} must be from 1e-16 to 1e12")
+                raise at(key, f"out of proportion: {ratio} must be from 1e-28 to 1e12")
             if "velocity" in one.observes and one.manoeuvre_variance * dt**4 / radar.sigma_velocity_mps**2 > 1e12:
                 ratio = "manoeuvre_variance scan_period_s⁴ / sigma_velocity_mps²"
                 raise at(key, f"out of proportion: {ratio} must be <= 1e12")

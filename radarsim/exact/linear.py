@@ -50,14 +50,17 @@ def steady_state(
     """Steady covariances (3, 3): the one the filter believes, and the true one on a truth without manoeuvre.
 
     The believed one solves the discrete algebraic Riccati equation; the true one is the fixed point of the error
-    recursion under the steady gain (a Lyapunov equation). Scaled to unit period and range error for the solvers' sake.
+    recursion under the steady gain (a Lyapunov equation).
     """
     from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 
-    scale = sigma[0] * np.array([1.0, 1.0 / dt, 1.0 / dt**2])
-    F, H = transition(1.0), np.eye(3)[:observes]
-    R = np.diag((sigma * np.array([1.0, dt]) / sigma[0])[:observes] ** 2)
-    Q = manoeuvre_covariance(manoeuvre_variance * dt**6 / sigma[0] ** 2, 1.0)
+    # Time counted in the filter's own memory, (σ_r²/D_M)^(1/6), where longer than a scan: then no state is tiny.
+    unit = max(dt, (sigma[0] ** 2 / manoeuvre_variance) ** (1 / 6))
+    scale = sigma[0] * np.array([1.0, 1.0 / unit, 1.0 / unit**2])
+    step = dt / unit
+    F, H = transition(step), np.eye(3)[:observes]
+    R = np.diag((sigma / scale[:2])[:observes] ** 2)
+    Q = manoeuvre_covariance(manoeuvre_variance * unit**6 / sigma[0] ** 2, step)
     extrapolated = solve_discrete_are(F.T, H.T, Q, R)
     K = np.linalg.solve(H @ extrapolated @ H.T + R, H @ extrapolated).T
     kept = np.eye(3) - K @ H

@@ -247,8 +247,8 @@ def test_all_faults_at_once_each_at_its_place(house, said):
     [
         ("radar.sigma_velocity_mps", 1e9, "radar.sigma_velocity_mps", "_velocity_mps)² must be from 1e-12 to 1e12"),
         ("radar.sigma_velocity_mps", 1e-9, "radar.sigma_velocity_mps", "_velocity_mps)² must be from 1e-12 to 1e12"),
-        ("filters.0.manoeuvre_variance", 1e12, "filters.0.manoeuvre_variance", "range_m² must be from 1e-16 to 1e12"),
-        ("filters.1.manoeuvre_variance", 1e-18, "filters.1.manoeuvre_variance", "range_m² must be from 1e-16 to 1e12"),
+        ("filters.0.manoeuvre_variance", 1e12, "filters.0.manoeuvre_variance", "range_m² must be from 1e-28 to 1e12"),
+        ("radar.scan_period_s", 1e-4, "filters.0.manoeuvre_variance", "range_m² must be from 1e-28 to 1e12"),
         ("radar.sigma_velocity_mps", 5e-5, "filters.1.manoeuvre_variance", "sigma_velocity_mps² must be <= 1e12"),
     ],
 )

@@ -132,3 +132,19 @@ def test_start_weights_return_a_polynomial_exactly(observes, n):
     x = targets.polynomial([3e4, 120.0, -2.0], np.arange(n) * dt)
     np.testing.assert_allclose(np.einsum("ijk,kj->i", weights, x[:, :2]), x[-1], rtol=1e-9, atol=1e-9)
     assert not weights[:, observes:].any()
+
+
+@pytest.mark.parametrize("observes", [1, 2])
+@pytest.mark.parametrize("variance", [1e-2, 1e-9, 1e-16])
+def test_steady_state_of_fast_radars_with_long_memory(observes, variance):
+    """A filter whose memory is hundreds of scans and more: its closed form, in the limit of continuous plots of range.
+
+    third-order Butterworth filter of ω = (D/σ²)^(1/6), its transfer function (2ω s² + 2ω² s + ω³) over their
+    third-order Butterworth filter of ω = (D/σ²)^(1/6), its transfer function (2ω s² + 2ω² s + ω³) over their product,
+    and the variance that it leaves of the plots' noise is 5/3·ω·σ²·dt (Parseval).
+    """
+    dt, sigma = 0.01, np.array([50.0, 1e6])
+    _, true = steady_state(observes, variance, sigma, dt)
+    omega = (variance / sigma[0] ** 2) ** (1 / 6)
+    assert omega * dt < 0.01
+    assert true[0, 0] == pytest.approx(5 / 3 * omega * dt * sigma[0] ** 2, rel=3 * omega * dt + 1e-4)
