@@ -139,7 +139,7 @@ def test_start_weights_return_a_polynomial_exactly(observes, n):
 def test_steady_state_of_fast_radars_with_long_memory(observes, variance):
     """A filter whose memory is hundreds of scans and more: its closed form, in the limit of continuous plots of range.
 
-    A jerk of variance D held for dt has the spectral density D·dt, plots have σ²·dt: the filter's poles are those of the
+    A jerk of variance D held for dt has the spectral density D·dt, plots have σ²·dt: its poles are those of the
     third-order Butterworth filter of ω = (D/σ²)^(1/6), its transfer function (2ω s² + 2ω² s + ω³) over their product,
     and the variance that it leaves of the plots' noise is 5/3·ω·σ²·dt (Parseval).
     """
