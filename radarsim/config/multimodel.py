@@ -1,5 +1,7 @@
-"""Keys of the multimodel study (P2): a radar in biconical coordinates, a flight, filters with banks of motion models."""
+"""Keys of the multimodel study (P2): a radar in biconical coordinates, a flight, filters with banks of motion
+models."""
 
+from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -61,7 +63,7 @@ class Sensor(Model):
     def _one_frame(self):
         biconical = [self.sigma_range_m, self.sigma_elevation_rad, self.sigma_azimuth_rad]
         local = [self.sigma_x_m, self.sigma_y_m, self.sigma_z_m]
-        if biconical.count(None) + local.count(None) != 3 or None in biconical and None in local:
+        if biconical.count(None) + local.count(None) != 3 or (None in biconical and None in local):
             raise at(
                 "sigma_range_m",
                 "give sigma_range_m, sigma_elevation_rad, sigma_azimuth_rad, or else sigma_x_m, sigma_y_m, sigma_z_m",
@@ -91,14 +93,16 @@ Stages = Annotated[tuple[Stage, ...], Field(min_length=1, max_length=12), AfterV
 class Target(Model):
     """What all targets share: the stages by which tables are made."""
 
-    stages: Stages = Field((Stage(name="all"),), description="stages in order, the last without an end")
+    stages: Annotated[Stages, Design()] = Field(
+        (Stage(name="all"),), description="stages in order, the last without an end"
+    )
 
     @model_validator(mode="after")
     def _in_order(self):
         ends = [stage.end_s for stage in self.stages]
         if None in ends[:-1] or ends[-1] is not None:
             raise at("stages", "all but the last need end_s, and only they")
-        if any(b <= a for a, b in zip(ends[:-1], ends[1:-1], strict=False)):
+        if any(b <= a for a, b in pairwise(ends[:-1])):
             raise at("stages", "must follow one another in time")
         return self
 
@@ -130,7 +134,7 @@ class Flight(Target):
         starts = [phase.start_s for phase in self.phases]
         if starts[0] != 0:
             raise at("phases.0.start_s", "must be 0")
-        if any(b <= a for a, b in zip(starts, starts[1:], strict=False)):
+        if any(b <= a for a, b in pairwise(starts)):
             raise at("phases", "must follow one another in time")
         if self.velocity_mps == (0, 0, 0):
             raise at("velocity_mps", "must not be zero")

@@ -1,4 +1,5 @@
-"""Design of multiple-model filters: banks of motion models, transition probabilities over any interval, the track start."""
+"""Design of multiple-model filters: banks of motion models, transition probabilities over any interval, the track
+start."""
 
 from collections.abc import Sequence
 
@@ -14,7 +15,8 @@ PREDICT, UPDATE, LIKELIHOOD, MERGE, MERGE_ONCE = 282, 518, 8, 208, -9
 
 
 def bank(motions: Sequence[str], sigmas: Sequence[float]) -> np.ndarray:
-    """The models (M, 3) as a kernel takes them: moves, accelerates (0 or 1), sigma of the acceleration per step (m/s²)."""
+    """The models (M, 3) as a kernel takes them: moves, accelerates (0 or 1), sigma of the acceleration per step
+    (m/s²)."""
     return np.array([(*MOTIONS[motion], sigma) for motion, sigma in zip(motions, sigmas, strict=True)])
 
 
@@ -67,7 +69,8 @@ def exponentials(Q: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 
 def start_weights(t: np.ndarray, acceleration_spread: float) -> np.ndarray:
-    """Least squares of a straight line through three plots at times t (3,): (9,) numbers, see `kernels.multimodel.start`.
+    """Least squares of a straight line through three plots at times t (3,): (9,) numbers, see
+    `kernels.multimodel_strip.start`.
 
     The estimate at the third plot is x = Σ aₖ zₖ, v = Σ bₖ zₖ, acceleration 0. An acceleration w of the target makes
     errors (Σ aₖ τₖ²/2, Σ bₖ τₖ²/2, -1) w, τₖ = tₖ - t₃; with w of the stated spread they enter the covariance.

@@ -1,10 +1,12 @@
 """Small algebra of a hypothesis: nine states, their covariance as six 3 x 3 blocks, for plain numbers or lanes alike.
 
-An axis is the triple (coordinate, velocity, acceleration). A block on the diagonal, own to one axis, is packed symmetric:
-p = (xx, xv, xa, vv, va, aa); a block between two axes is full, row by row: c = (xx, xv, xa, vx, vv, va, ax, av, aa).
-Packing keeps the covariance symmetric by construction: `P - K S K'` on full storage drifts and diverges silently.
+An axis is the triple (coordinate, velocity, acceleration). A block on the diagonal, own to one axis, is packed
+symmetric: p = (xx, xv, xa, vv, va, aa); a block between two axes is full, row by row: c = (xx, xv, xa, vx, vv, va,
+ax, av, aa). Packing keeps the covariance symmetric by construction: `P - K S K'` on full storage drifts and
+diverges silently.
 
-Differences are written term by term, `p - g0*h0 - g1*h1 - g2*h2`: each is one fused instruction; `p - dot(g, h)` is not.
+Differences are written term by term, `p - g0*h0 - g1*h1 - g2*h2`: each is one fused instruction; `p - dot(g, h)` is
+not.
 """
 
 from radarsim.kernels.compile import inline
@@ -12,7 +14,8 @@ from radarsim.kernels.compile import inline
 
 @inline
 def predicted_axis(x, f):
-    """F x of one axis; f = (f01, f02, f11, f12, f22) are the elements of F = [[1, f01, f02], [0, f11, f12], [0, 0, f22]]."""
+    """F x of one axis; f = (f01, f02, f11, f12, f22) are the elements of F = [[1, f01, f02], [0, f11, f12], [0, 0,
+    f22]]."""
     return x[0] + f[0] * x[1] + f[1] * x[2], f[2] * x[1] + f[3] * x[2], f[4] * x[2]
 
 

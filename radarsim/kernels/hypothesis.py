@@ -1,8 +1,8 @@
 """A hypothesis of nine states for eight realisations: merged of others, and predicted and updated in one go.
 
-A hypothesis (P2 eq. 1) takes HYPOTHESIS rows of the work array: mean, covariance in six blocks (see `blocks`), probability.
-What a step needs is held in lanes too (models over the interval, transition probabilities), because after a missed plot
-each realisation has an interval of its own.
+A hypothesis (P2 eq. 1) takes HYPOTHESIS rows of the work array: mean, covariance in six blocks (see `blocks`),
+probability. What a step needs is held in lanes too (models over the interval, transition probabilities), because
+after a missed plot each realisation has an interval of its own.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from radarsim.kernels.blocks import (
     shrunk_own,
     times_symmetric,
 )
-from radarsim.kernels.compile import inline, kernel
+from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import full, get, put, row, rows, where_greater
 
 MOST = 5  # models in a bank
@@ -44,7 +44,7 @@ OUTPUT = 29
 
 
 def work_arrays() -> tuple[np.ndarray, np.ndarray]:
-    """Memory of one filter for eight realisations: rows, and whole numbers (see `multimodel.filter_strip`)."""
+    """Memory of one filter for eight realisations: rows, and whole numbers (see `multimodel_strip.filter_strip`)."""
     return rows(WORK), np.array([0, -1, 1, 0])
 
 
@@ -77,7 +77,7 @@ def put9(pointer, first, x):
     put3(pointer, first + 6, (x[6], x[7], x[8]))
 
 
-# ---- merging: eq. (4) with the shares of any rule ----------------------------------------------------------------------
+# ---- merging: eq. (4) with the shares of any rule --------
 # Addresses say which axis and block is meant: a number in the call would be compiled anew for each of its values.
 @inline
 def mixed_mean(listed, count, shares, means):
@@ -174,20 +174,22 @@ def written(target, means, own, cross):
     put9(target, CROSS + 18, cross[2])
 
 
-@kernel
+@part
 def merged(work, listed, count, target):
     """Write the merge of the listed hypotheses, by the shares, to the address `target`."""
     means, own, cross = mixed(work, listed, count)
     written(target, means, own, cross)
 
 
-# ---- prediction and update: eqs. (6) and (9) ---------------------------------------------------------------------------
-@kernel
+# ---- prediction and update: eqs. (6) and (9) --------
+@part
 def advanced(work, listed, count, target, model, result, plot, noise):
     """Merge the listed hypotheses, predict with the model in row `model`, update with a plot, write to `target`.
 
-    target, plot, noise: addresses of a hypothesis, of the plot (PLOT rows) and of its covariance (6 rows). Rows result and
-    result + 1 take the normalised innovation squared and the determinant of its covariance (0, 1 where the plot is missed).
+    target, plot, noise: addresses of a hypothesis, of the plot (PLOT rows) and of its covariance (6 rows). Rows
+    result and result + 1 take the normalised innovation squared and the determinant of its covariance (0, 1 where
+    the plot is
+    missed).
     """
     f = get(work, model), get(work, model + 1), get(work, model + 2), get(work, model + 3), get(work, model + 4)
     q = get6(work, model + 5)

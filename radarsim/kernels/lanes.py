@@ -1,8 +1,9 @@
 """A number that is eight: compiled code that reads like the textbook and runs eight realisations with one instruction.
 
-`lanes` is a Numba type that stands for LLVM's <8 x double>. `+ - * /` work on it lane by lane, also with plain floats, so
-the step of one realisation is the step of eight, with no loop over lanes and no dependence on the vectoriser (which
-refuses run-time alias checks in loops of fewer than 16 passes, and so leaves a loop over 8 lanes scalar, four times slower).
+`lanes` is a Numba type that stands for LLVM's <8 x double>. `+ - * /` work on it lane by lane, also with plain
+floats, so the step of one realisation is the step of eight, with no loop over lanes and no dependence on the
+vectoriser (which refuses run-time alias checks in loops of fewer than 16 passes, and so leaves a loop over 8 lanes
+scalar, four times slower).
 
 Small matrices are tuples of lanes, passed through functions that are inlined. What lives between steps lies in a flat
 float64 array: row r holds the eight lanes of one quantity, at r * WIDTH … r * WIDTH + 7; `rows` makes such an array.

@@ -8,7 +8,7 @@ detections, the pair 8 s + j gives the uniform numbers of the scans j and 8 + j 
 import numpy as np
 
 from radarsim.kernels.blocks import dot
-from radarsim.kernels.compile import inline, kernel
+from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.hypothesis import PLOT
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, root, row, where_greater
 from radarsim.kernels.random import U, normal_pair, sine_cosine_polynomial, threefry, uniform
@@ -22,15 +22,16 @@ LEAST = 1e-6  # least squared cosine of the angle from the antenna's normal: nea
 
 
 def frame(rotation, height: float, sigma, form: int, unbiased: bool, detection: float) -> np.ndarray:
-    """The numbers (FRAME,) of a sensor: rotation (3, 3), height of the phase centre, sigma (3,), and how plots are made.
+    """The numbers (FRAME,) of a sensor: rotation (3, 3), height of the phase centre, sigma (3,), and how plots are
+    made.
 
-    sigma is that of range (m), elevation and azimuth (rad), or of x, y, z (m) where form is CARTESIAN; unbiased: with the
-    unbiased conversion; detection: probability of detection.
+    sigma is that of range (m), elevation and azimuth (rad), or of x, y, z (m) where form is CARTESIAN; unbiased:
+    with the unbiased conversion; detection: probability of detection.
     """
     return np.concatenate([np.ravel(rotation), sigma, [height, form, unbiased, detection, 0.0, 0.0]]).astype(float)
 
 
-@kernel
+@part
 def draw_strip(keys, first, strip, random):
     """Random numbers of strip `strip` for the realisations first … first + 7, into `random` (RANDOM rows).
 
@@ -111,8 +112,8 @@ def turned(sine, cosine, delta):
 def make_plots(random, frame, truth, scan, scans, certain, plots):
     """Plots of the scans `scan` … of a strip from their random rows.
 
-    truth: rows of eight plain numbers a scan of the whole track: range, sine and cosine of elevation and azimuth, and x, y, z.
-    The first `certain` plots of a track are always detected.
+    truth: rows of eight plain numbers a scan of the whole track: range, sine and cosine of elevation and azimuth,
+    and x, y, z. The first `certain` plots of a track are always detected.
     """
     one, zero = full(1.0), full(0.0)
     for n in range(scans):
@@ -132,9 +133,10 @@ def make_plots(random, frame, truth, scan, scans, certain, plots):
             biconical_plot(row(plots, n * PLOT), frame, r, sine_e, cosine_e, sine_a, cosine_a, detected)
 
 
-@kernel
+@part
 def noise_at_prediction(frame, mean, wait, noise):
-    """Covariance (6 rows at `noise`) of a plot where the estimate `mean` (9 rows) is extrapolated to over `wait`, eq. (10)."""
+    """Covariance (6 rows at `noise`) of a plot where the estimate `mean` (9 rows) is extrapolated to over `wait`,
+    eq. (10)."""
     half = 0.5 * wait * wait
     a = get(mean, 0) + wait * get(mean, 1) + half * get(mean, 2)
     b = get(mean, 3) + wait * get(mean, 4) + half * get(mean, 5) - frame[12]
@@ -154,7 +156,8 @@ def noise_at_prediction(frame, mean, wait, noise):
 
 @kernel
 def fill_plots(keys, frame, truth, certain, first, random, plots):
-    """All plots of the realisations first … first + 7 of a track: rows PLOT to a scan; truth (K, 8), see `make_plots`."""
+    """All plots of the realisations first … first + 7 of a track: rows PLOT to a scan; truth (K, 8), see
+    `make_plots`."""
     scans = truth.shape[0]
     for k in range(0, scans, STRIP):
         draw_strip(keys, first, k // STRIP, random)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.kernels.blocks import dot, inverse, times_symmetric
-from radarsim.kernels.compile import inline, kernel
+from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.hypothesis import (
     INNOVATION,
     MERGES,
@@ -18,8 +18,8 @@ from radarsim.kernels.hypothesis import (
     WORK,
 )
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, rows, total, where_greater
-from radarsim.kernels.multimodel import run_strip, start
 from radarsim.kernels.multimodel_plots import RANDOM, STRIP, draw_strip, make_plots
+from radarsim.kernels.multimodel_strip import run_strip, start
 
 START = 3  # plots that a track is started from
 STAGE = 14  # rows of a stage: sums of nine squared errors, NEES, NIS, hypotheses merged, merges; number of plots
@@ -41,11 +41,12 @@ def believed_error(out, e):
     return dot(times_symmetric(e, i), e)
 
 
-@kernel
+@part
 def add_scan(out, base, truth, counted, kept, error, paired, probability, believed):
     """Add a reported scan of eight realisations to the sums, all by addresses of that filter and scan.
 
-    out, base: outputs of the filter and of the baseline; truth (9,); counted (lanes): 1 for the realisations that count.
+    out, base: outputs of the filter and of the baseline; truth (9,); counted (lanes): 1 for the realisations that
+    count.
     """
     for c in range(9):
         e, b = counted * (get(out, c) - truth[c]), get(base, c) - truth[c]
@@ -65,7 +66,7 @@ def add_scan(out, base, truth, counted, kept, error, paired, probability, believ
     believed[1] += total(q * q)
 
 
-@kernel
+@part
 def add_to_stage(out, plot, truth, everything, stage):
     """Add a scan to the rows of its stage: squared errors and NIS; NEES where `everything` is known."""
     for c in range(9):
@@ -81,7 +82,7 @@ def add_to_stage(out, plot, truth, everything, stage):
         put(stage, NEES, get(stage, NEES) + believed_error(out, e))
 
 
-@kernel
+@part
 def close_stages(stages, filters, count, lengths, counted, sums, pairs):
     """Add each realisation's means over each stage to the sums, and the products of all pairs of filters.
 
@@ -123,7 +124,7 @@ class World(NamedTuple):
     intervals (K,)         number of each scan's interval since the last one; times (U,): the intervals, s
     everything, place (K,) whether a scan is reported, and its place among those
     stage (K,)             stage of a scan; lengths (S, 2): see `close_stages`
-    weights (9,)           start of the track, see `multimodel.start`
+    weights (9,)           start of the track, see `multimodel_strip.start`
     """
 
     keys: np.ndarray
@@ -143,7 +144,7 @@ class Banks(NamedTuple):
     """The filters, rows padded to eights.
 
     numbers (F, 8)         family, merging rule, output rule, covariance at the prediction, number of models
-    models (F, 16), transitions (F, …), probabilities (F, 8): see `multimodel.run_strip`
+    models (F, 16), transitions (F, …), probabilities (F, 8): see `multimodel_strip.run_strip`
     """
 
     numbers: np.ndarray
@@ -168,9 +169,9 @@ class Memory(NamedTuple):
 class MultimodelSums(NamedTuple):
     """Sums over realisations, K' reported scans, S stages.
 
-    error (F, K', 9, 4): e, e², e³, e⁴; paired (F, K', 9): with the baseline's e²; probability (F, K', MOST, 2); believed
-    (F, K', 2): NEES; stage (F, S, MEANS, 2): means over the stage of nine squared errors, NEES, NIS, hypotheses merged, merges; pairs
-    (F, F, S, 9): of the mean squares of two filters.
+    error (F, K', 9, 4): e, e², e³, e⁴; paired (F, K', 9): with the baseline's e²; probability (F, K', MOST, 2);
+    believed (F, K', 2): NEES; stage (F, S, MEANS, 2): means over the stage of nine squared errors, NEES, NIS,
+    hypotheses merged, merges; pairs (F, F, S, 9): of the mean squares of two filters.
     """
 
     error: np.ndarray

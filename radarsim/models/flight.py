@@ -1,7 +1,8 @@
-"""Flight of a point mass in the local frame (x north, y up, z east): gravity, drag, and accelerations commanded by phase.
+"""Flight of a point mass in the local frame (x north, y up, z east): gravity, drag, and accelerations commanded by
+phase.
 
-The paper's trajectory (P2 figs. 1-4) is lost but for its axes, so trajectories are integrated from a description that is
-physical: exponential atmosphere, ballistic coefficient m/(C_D S), commands that are followed with a lag.
+The paper's trajectory (P2 figs. 1-4) is lost but for its axes, so trajectories are integrated from a description
+that is physical: exponential atmosphere, ballistic coefficient m/(C_D S), commands that are followed with a lag.
 """
 
 import math
@@ -18,7 +19,8 @@ TOLERANCE = 1e-10
 
 @dataclass(frozen=True)
 class Phase:
-    """Commanded accelerations (m/s²) from start_s on: to the right, up (normal to the velocity), and along the velocity.
+    """Commanded accelerations (m/s²) from start_s on: to the right, up (normal to the velocity), and along the
+    velocity.
 
     With period_s > 0 they follow a sine of that period from the phase's start. trimmed: lift and thrust also balance
     gravity and drag, as in an aeroplane's steady flight.
@@ -64,8 +66,8 @@ def fly(
 ) -> np.ndarray:
     """States (K, 9) as (x, vx, ax, y, vy, ay, z, vz, az) at times t (K,) in s, increasing from 0.
 
-    position (m), velocity (m/s) at t = 0; coefficient (kg/m²); lag (s) of the commands. Raises Unflyable where the flight
-    hits the ground or exceeds the speed of an orbit.
+    position (m), velocity (m/s) at t = 0; coefficient (kg/m²); lag (s) of the commands. Raises Unflyable where the
+    flight hits the ground or exceeds the speed of an orbit.
     """
     from scipy.integrate import solve_ivp
 
@@ -108,8 +110,8 @@ def _check(track: np.ndarray, t: np.ndarray) -> None:
 def recorded(times: np.ndarray, positions: np.ndarray, t: np.ndarray) -> np.ndarray:
     """States (K, 9) at times t of a recorded flight: times (n,), at least 5 and increasing, positions (n, 3).
 
-    A cubic smoothing spline for each axis, its strength chosen by generalised cross-validation; its derivatives are taken
-    as the true velocity and acceleration. Raises Unflyable as `fly`.
+    A cubic smoothing spline for each axis, its strength chosen by generalised cross-validation; its derivatives are
+    taken as the true velocity and acceleration. Raises Unflyable as `fly`.
     """
     from scipy.interpolate import make_smoothing_spline
 

@@ -1,8 +1,8 @@
 """Local, antenna and biconical coordinates (P2 part 6), with Jacobians.
 
 Local: x north, y up, z east, origin at the radar's foot. Antenna: x along the normal, y and z in the aperture, z to the
-right. Biconical: range r, elevation e and azimuth a, the complements of the angles to the antenna's y and z axes, so that
-y_A = r sin e, z_A = r sin a. Positions are arrays (…, 3); biconical points (…, 3) hold (r, e, a) in m and rad.
+right. Biconical: range r, elevation e and azimuth a, the complements of the angles to the antenna's y and z axes, so
+that y_A = r sin e, z_A = r sin a. Positions are arrays (…, 3); biconical points (…, 3) hold (r, e, a) in m and rad.
 """
 
 import math
@@ -15,7 +15,8 @@ class OutsideSector(ValueError):
 
 
 def rotation(azimuth: float, elevation: float) -> np.ndarray:
-    """R (3, 3) from antenna to local axes: the normal turned by `azimuth` from north to east, then raised by `elevation`."""
+    """R (3, 3) from antenna to local axes: the normal turned by `azimuth` from north to east, then raised by
+    `elevation`."""
     ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
     return np.array([[ca * ce, -ca * se, -sa], [se, ce, 0.0], [sa * ce, -sa * se, ca]])
 
@@ -31,7 +32,8 @@ def to_local(antenna: np.ndarray, R: np.ndarray, height: float) -> np.ndarray:
 
 
 def normal_cosine(biconical: np.ndarray) -> np.ndarray:
-    """Cosine (…) of the angle from the antenna's normal, sqrt(1 - sin² e - sin² a); raises OutsideSector where it is not > 0."""
+    """Cosine (…) of the angle from the antenna's normal, sqrt(1 - sin² e - sin² a); raises OutsideSector where it is
+    not > 0."""
     square = 1.0 - np.sin(biconical[..., 1]) ** 2 - np.sin(biconical[..., 2]) ** 2
     # |e| + |a| >= 90° is no direction in front of the antenna.
     if not np.all((square > 0) & (np.abs(biconical[..., 1:]).sum(axis=-1) < math.pi / 2)):
@@ -48,7 +50,8 @@ def from_biconical(biconical: np.ndarray) -> np.ndarray:
 
 
 def to_biconical(antenna: np.ndarray) -> np.ndarray:
-    """Biconical points (…, 3) of antenna coordinates; raises OutsideSector behind the antenna, in its plane, and at its centre."""
+    """Biconical points (…, 3) of antenna coordinates; raises OutsideSector behind the antenna, in its plane, and at
+    its centre."""
     if not np.all(antenna[..., 0] > 0):
         raise OutsideSector("the point is not in front of the antenna")
     r = np.linalg.norm(antenna, axis=-1)
@@ -76,7 +79,8 @@ def plot_covariance(biconical: np.ndarray, sigma: np.ndarray, R: np.ndarray) -> 
 
 
 def unbiased_from_biconical(biconical: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """Antenna coordinates whose mean, over errors sigma (3,) of the plot, is the true point to the second order in sigma.
+    """Antenna coordinates whose mean, over errors sigma (3,) of the plot, is the true point to the second order in
+    sigma.
 
     sin of a noisy angle has the mean exp(-sigma²/2) sin; for x_A half the trace of the Hessian times the variances is
     taken off.

@@ -1,6 +1,8 @@
-"""P2's figures: the flight (1-4), σ of height and its rate (5, 6), probabilities (7), families × rules, cost, consistency."""
+"""P2's figures: the flight (1-4), σ of height and its rate (5, 6), probabilities (7), families × rules, cost,
+consistency."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,6 +41,14 @@ def _several(name: str, title: str, caption: str, drawn: Sequence[Panel], height
     return Figure(name, title, caption, tuple(drawn), 1 if len(drawn) == 1 else 2, width, height)
 
 
+def _title(result: CaseResult, results: Sequence[CaseResult]) -> str:
+    """What tells a case from the others shown: the swept values where one config is swept, else its label."""
+    if len(results) == 1:
+        return ""
+    one = len(panels.families(results)) == 1
+    return ", ".join(panels.number(value) for _, value in result.swept) if one else panels.label(result)
+
+
 def trajectory(results: Sequence[CaseResult]) -> Figure | None:
     """Ground track, height, speed and acceleration (the paper's figures 1 to 4), a line for each different flight."""
     flights: dict[bytes, CaseResult] = {}
@@ -47,7 +57,7 @@ def trajectory(results: Sequence[CaseResult]) -> Figure | None:
     lines: list[list[Line]] = [[], [], [], []]
     for n, result in enumerate(flights.values()):
         x, t = result.axes.extra["truth"], np.asarray(result.axes.t_s, dtype=float)
-        words, style = panels.label(result) if len(flights) > 1 else "", Style(n, n)
+        words, style = _title(result, results), Style(n, n)
         speed, acceleration = (np.linalg.norm(x[:, i::3], axis=1) for i in (1, 2))
         lines[0].append(Line(x[:, 6] / 1e3, x[:, 0] / 1e3, words, style))
         for place, values in ((1, x[:, 3] / 1e3), (2, speed), (3, acceleration)):
@@ -86,10 +96,10 @@ def sigma(results: Sequence[CaseResult], curves, component: str) -> Figure | Non
             if own is not None:
                 t, value, lo, hi = (own[key].to_numpy(float) for key in ("t_s", "sigma", "sigma_lo", "sigma_hi"))
                 marks.append(Line(t, value, panels.literal(f), Style(n, n), lo, hi))
-        title = panels.label(result) if len(results) > 1 else ""
-        drawn.append(
-            Panel(TIME, Axis(f"$\\sigma$ of {words}, {unit}", "log"), tuple(marks), title, direct=len(results) == 1)
-        )
+        if drawn:
+            marks = _unnamed(marks)
+        y = Axis(f"$\\sigma$ of {words}, {unit}", "log")
+        drawn.append(Panel(TIME, y, tuple(marks), _title(result, results), direct=len(results) == 1))
     caption = (
         f"Root-mean-square error of {words.split(' $')[0]} about the truth, of {results[0].count if results else 0:,} "
         "realisations; bands: 95 % intervals. Dotted: ends of the stages."
@@ -103,7 +113,7 @@ def probabilities(results: Sequence[CaseResult], table) -> Figure | None:
     rows = common.groups(table, "case", "filter", "model")
     drawn = []
     for result in results:
-        for f, (name, models) in enumerate(zip(result.axes.filters, result.axes.extra["models"], strict=True)):
+        for name, models in zip(result.axes.filters, result.axes.extra["models"], strict=True):
             if len(models) < 2 or len(drawn) >= panels.MOST:
                 continue
             marks: list = list(_stage_lines([result]))
@@ -113,7 +123,7 @@ def probabilities(results: Sequence[CaseResult], table) -> Figure | None:
                     own[key].to_numpy(float) for key in ("t_s", "probability", "probability_lo", "probability_hi")
                 )
                 marks.append(Line(t, value, f"{m + 1} {motion}", Style(m, m), lo, hi))
-            title = panels.literal(name) if len(results) == 1 else f"{panels.label(result)}: {panels.literal(name)}"
+            title = panels.literal(name) if len(results) == 1 else f"{_title(result, results)}: {panels.literal(name)}"
             drawn.append(Panel(TIME, Axis("mean probability", limits=(0, 1)), tuple(marks), title, direct=False))
     caption = (
         "Mean posterior probabilities of the models (figure 7); the numbers behind the motions are the spreads of the "
@@ -144,7 +154,7 @@ def families(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
             grid = np.array([[value.get(name, np.nan) for name in row] for row in names], dtype=float)
             x = Axis("merging rule", ticks=tuple((i, rule.replace("_", "\n")) for i, rule in enumerate(RULES)))
             y = Axis("family", ticks=tuple(enumerate(FAMILIES.values())))
-            title = stage if len(results) == 1 else f"{panels.label(result)}: {stage}"
+            title = stage if len(results) == 1 else f"{_title(result, results)}: {stage}"
             drawn.append(Panel(x, y, (Heat(np.arange(4), np.arange(3), grid, "$\\sigma$ of $y$, m"),), title))
     caption = "σ of the height over each stage, by family and rule of the partial merges; one bank, one set of plots."
     return _several("families", "Families and merging rules", caption, drawn[: panels.MOST], 52)
@@ -174,9 +184,9 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     return _several("cost", "Cost and accuracy", caption, drawn, 62)
 
 
-def _unnamed(lines: Sequence[Line]) -> list[Line]:
-    """The same lines without a legend of their own."""
-    return [Line(line.x, line.y, "", line.style, line.lo, line.hi) for line in lines]
+def _unnamed(lines: Sequence) -> list:
+    """The same marks without a legend of their own."""
+    return [replace(line, label="") if isinstance(line, Line) else line for line in lines]
 
 
 def consistency(results: Sequence[CaseResult], table) -> Figure | None:
@@ -187,7 +197,7 @@ def consistency(results: Sequence[CaseResult], table) -> Figure | None:
     rows = common.groups(table[table["case"] == result.name], "filter")
     drawn = []
     for key, title in (("nees", "NEES of the position"), ("nis", "NIS of the plot")):
-        marks: list = [Reference(1.0, "y", "right about itself")]
+        marks: list = [Reference(1.0)]
         stages: tuple = ()
         for n, f in enumerate(result.axes.filters):
             own = rows[(f,)]
@@ -199,7 +209,7 @@ def consistency(results: Sequence[CaseResult], table) -> Figure | None:
         axis = Axis("stage", ticks=tuple(enumerate(stages)))
         drawn.append(Panel(axis, Axis("mean per degree of freedom", "log"), tuple(marks), title, direct=False))
     caption = (
-        "Normalised errors squared, per degree of freedom, by stage: 1 where the filter's own covariance is right, more "
-        f"where it is too sure of itself. {panels.plain_label(result)}."
+        "Normalised errors squared, per degree of freedom, by stage: 1 where the filter's own covariance is right, "
+        f"more where it is too sure of itself. {panels.plain_label(result)}."
     )
     return _several("consistency", "What the filters believe of themselves", caption, drawn, 66)

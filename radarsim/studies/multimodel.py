@@ -10,6 +10,7 @@ from radarsim.engine.results import Axes, Track
 from radarsim.filters import multimodel as filters
 from radarsim.kernels import multimodel as kernels
 from radarsim.kernels import multimodel_plots as plots
+from radarsim.kernels import multimodel_strip as strips
 from radarsim.kernels import multimodel_sums as sums
 from radarsim.kernels.hypothesis import MODELS, MOST, OUTPUT, PLOT, VARIANCE, work_arrays
 from radarsim.kernels.lanes import WIDTH, rows
@@ -171,7 +172,8 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
 
 
 def measured(plan: Plan, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Plots of the realisations first … first + 7: positions (K, 3, 8), covariances (K, 6, 8), detected (K, 8) as 0 or 1.
+    """Plots of the realisations first … first + 7: positions (K, 3, 8), covariances (K, 6, 8), detected (K, 8) as 0
+    or 1.
 
     The covariances are packed (xx, xy, xz, yy, yz, zz).
     """
@@ -192,8 +194,8 @@ def PLOT_COLUMNS(spec) -> tuple[tuple[str, ...], ...]:
 def track(case: Case, recorded: dict[str, np.ndarray]) -> Track:
     """The filters of a case over recorded plots: columns of equal length (n,), not-a-number where a value is missing.
 
-    A plot counts where it is whole and in front of the antenna; the first three that count start the track. At the times
-    of the others the estimate is the extrapolated one.
+    A plot counts where it is whole and in front of the antenna; the first three that count start the track. At the
+    times of the others the estimate is the extrapolated one.
     """
     spec, t = case.spec, recorded["t_s"]
     z, R, whole = local_plots(spec.sensor, np.stack(list(recorded.values())[1:], axis=1))
@@ -218,7 +220,7 @@ def _tracked(spec, options, t: np.ndarray, plot_rows: np.ndarray, began: np.ndar
     one = spec.model_copy(update={"filters": (options,)})
     work, numbers = work_arrays()
     weights = filters.start_weights(t[began], spec.start_acceleration_mps2)
-    kernels.start_strip(work, numbers, _lanes(plot_rows[began]), weights, filters.stationary(transition(options)))
+    strips.start_strip(work, numbers, _lanes(plot_rows[began]), weights, filters.stationary(transition(options)))
     frame, third, found = sensor_frame(spec.sensor), began[2], []
     for first in range(third + 1, len(t), CHUNK):
         stop = min(first + CHUNK, len(t))
@@ -227,7 +229,7 @@ def _tracked(spec, options, t: np.ndarray, plot_rows: np.ndarray, began: np.ndar
         size, numbers[1] = own.numbers[0, 4], -1  # the intervals of this chunk are numbered anew
         count = stop - first
         out, everything = rows(count * OUTPUT), np.ones(count, dtype=np.int64)
-        kernels.filter_strip(
+        strips.filter_strip(
             work,
             numbers,
             _lanes(plot_rows[first:stop]),

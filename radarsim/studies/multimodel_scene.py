@@ -13,7 +13,8 @@ from radarsim.studies import noise_key
 
 
 def points(path: str) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) in s and positions (n, 3) in m of a CSV file t_s,x_m,y_m,z_m; raises ConfigError by line and column."""
+    """Times (n,) in s and positions (n, 3) in m of a CSV file t_s,x_m,y_m,z_m; raises ConfigError by line and
+    column."""
     columns = ("t_s", "x_m", "y_m", "z_m")
     with open(path, newline="", encoding="utf-8") as file:
         reader = csv.reader(file)

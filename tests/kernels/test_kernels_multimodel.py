@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarsim.kernels import hypothesis, multimodel
+from radarsim.kernels import hypothesis, multimodel, multimodel_strip
 from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.kernels.multimodel_plots import frame
 
@@ -39,7 +39,8 @@ def bank(size, seed):
 
 
 def workload(scans, seed=1, missing=0.0):
-    """Plots (K, 3, WIDTH) of a target that manoeuvres, full covariances (K, 3, 3) that change, start x (9,) and P (9, 9)."""
+    """Plots (K, 3, WIDTH) of a target that manoeuvres, full covariances (K, 3, 3) that change, start x (9,) and P
+    (9, 9)."""
     rng = np.random.default_rng(seed)
     t = np.arange(1, scans + 1) * DT
     acceleration = np.stack([12 * (t % 60 > 40), -20 * (t % 50 > 30), 3 * np.sin(t)], axis=1)
@@ -75,7 +76,7 @@ def run_kernel(family, rule, output, kinds, T, p, plots, covariances, x, P, pred
     rules = np.array([FAMILIES[family], RULES[rule], RULES[output], prediction])
     intervals, times, everything = np.zeros(scans, dtype=np.int64), np.array([DT]), np.ones(scans, dtype=np.int64)
     transitions = np.ascontiguousarray(T).ravel()
-    multimodel.filter_strip(
+    multimodel_strip.filter_strip(
         work, numbers, strip, 0, scans, models, transitions, intervals, times, rules, FRAME, everything, out
     )
     cells = out.reshape(scans, hypothesis.OUTPUT, WIDTH)
@@ -126,3 +127,85 @@ def test_kernel_equals_its_twin_over_3721_steps(family, rule, size):
 @pytest.mark.parametrize("family", ["kalman", "gpb1", "imm", "gpb2"])
 def test_missed_plots_are_one_prediction_over_the_real_interval(family):
     compare(family, "combined", "best", 1 if family == "kalman" else 3, 150, missing=0.3, lanes=range(WIDTH))
+
+
+def hypothesis_of(cells, lane=0):
+    """Mean (9,) and covariance (9, 9) of the hypothesis that begins at a row."""
+    P = np.empty((9, 9))
+    for axis in range(3):
+        block = cells[hypothesis.OWN + 6 * axis :][:6, lane]
+        for value, i, j in zip(block, *UPPER, strict=True):
+            P[3 * axis + i, 3 * axis + j] = P[3 * axis + j, 3 * axis + i] = value
+    for pair, (a, b) in enumerate(((0, 1), (0, 2), (1, 2))):
+        block = cells[hypothesis.CROSS + 9 * pair :][:9, lane].reshape(3, 3)
+        P[3 * a : 3 * a + 3, 3 * b : 3 * b + 3], P[3 * b : 3 * b + 3, 3 * a : 3 * a + 3] = block, block.T
+    return cells[:9, lane], P
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_imm_equals_the_papers_form_of_n_squared_extrapolations(rule):
+    kinds, T, p = bank(3, 11)
+    plots, covariances, x, P = workload(60)
+    own = other = (np.tile(x, (3, 1)), np.tile(P, (3, 1, 1)), p)
+    models = [naive.motion(*kind, DT) for kind in kinds]
+    for z, R in zip(plots[:, :, 0], covariances, strict=True):
+        own = naive.imm(*own, models, T, z, R, rule)
+        other = naive.imm_by_extrapolations(*other, models, T, z, R, rule)
+    for one, two in zip(own, other, strict=True):
+        assert np.allclose(one, two, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("family", ["gpb1", "imm", "gpb2"])
+@pytest.mark.parametrize("size", [1, 4])
+def test_equal_models_are_one_kalman_filter(family, size):
+    plots, covariances, x, P = workload(300)
+    kinds, T, p = [("accelerated", 8.0)] * size, np.full((size, size), 1 / size), np.full(size, 1 / size)
+    got = run_kernel(family, "moment", "moment", kinds, T, p, plots, covariances, x, P)
+    kalman = run_kernel("kalman", "moment", "best", kinds[:1], np.eye(1), np.ones(1), plots, covariances, x, P)
+    for one, two in zip(got[:2], kalman[:2], strict=True):
+        assert np.allclose(one, two, rtol=1e-9, atol=1e-9)
+    assert np.allclose(got[2], 1 / size)
+
+
+@pytest.mark.parametrize(
+    ("family", "rule"), [("kalman", "best"), ("gpb1", "moment"), ("imm", "combined"), ("gpb2", "moment")]
+)
+def test_covariances_stay_positive_over_1e5_steps(family, rule):
+    kinds, T, p = bank(1 if family == "kalman" else 3, 5)
+    kinds = [("accelerated", sigma) for _, sigma in kinds]
+    plots, covariances, x, P = workload(100_000)
+    estimates, _, probabilities, cells = run_kernel(family, rule, "best", kinds, T, p, plots, covariances, x, P)
+    assert np.isfinite(estimates).all()
+    assert np.allclose(probabilities.sum(axis=1), 1)
+    for lane in range(WIDTH):
+        eigenvalues = np.linalg.eigvalsh(hypothesis_of(cells, lane)[1])
+        assert eigenvalues.min() > 1e-9 * eigenvalues.max()
+
+
+def test_rules_break_ties_by_the_lower_number():
+    assert np.argmax(naive.shares([0.4, 0.4, 0.2], 1, "best")) == 0
+    kinds, T, p = [("uniform", 5.0)] * 3, np.eye(3), np.array([0.4, 0.4, 0.2])
+    plots, covariances, x, P = workload(1)
+    for rule in RULES:
+        own = naive.track("imm", rule, "best", kinds, lambda t: T, x, P, p, plots[:, :, 0], covariances, [DT])
+        got = run_kernel("imm", rule, "best", kinds, T, p, plots, covariances, x, P)
+        assert np.allclose(got[0][0, :, 0], own[0][0])
+
+
+def test_a_model_that_cannot_be_reached_does_no_harm():
+    kinds, p = [("uniform", 5.0), ("accelerated", 5.0), ("uniform", 1.0)], np.array([0.5, 0.5, 0.0])
+    T = np.array([[0.9, 0.1, 0], [0.1, 0.9, 0], [0, 0, 1.0]])
+    plots, covariances, x, P = workload(200)
+    for family in ("gpb1", "imm", "gpb2"):
+        got = run_kernel(family, "moment", "moment", kinds, T, p, plots, covariances, x, P)
+        two = run_kernel(family, "moment", "moment", kinds[:2], T[:2, :2], p[:2], plots, covariances, x, P)
+        assert np.allclose(got[0], two[0], rtol=1e-10, atol=1e-10)
+        assert np.all(got[2][:, 2] == 0)
+
+
+def test_lanes_do_not_mix():
+    kinds, T, p = bank(3, 8)
+    plots, covariances, x, P = workload(50)
+    got = run_kernel("imm", "combined", "best", kinds, T, p, plots, covariances, x, P)
+    turned = run_kernel("imm", "combined", "best", kinds, T, p, plots[:, :, ::-1].copy(), covariances, x, P)
+    assert np.allclose(got[0], turned[0][:, :, ::-1], rtol=1e-10)

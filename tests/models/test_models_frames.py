@@ -24,7 +24,9 @@ def test_rotation_is_a_right_hand_turn(azimuth, elevation):
     R = frames.rotation(azimuth, elevation)
     assert np.allclose(R @ R.T, np.eye(3), atol=1e-14)
     assert np.isclose(np.linalg.det(R), 1)
-    assert np.allclose(R[:, 0], [np.cos(azimuth) * np.cos(elevation), np.sin(elevation), np.sin(azimuth) * np.cos(elevation)])
+    assert np.allclose(
+        R[:, 0], [np.cos(azimuth) * np.cos(elevation), np.sin(elevation), np.sin(azimuth) * np.cos(elevation)]
+    )
 
 
 def test_the_normal_turns_from_north_to_east_and_up():

@@ -1,6 +1,7 @@
 """Textbook twin of the multiple-model kernels: full 9 x 9 matrices, one realisation, nothing clever.
 
-State [x, vx, ax, y, vy, ay, z, vz, az]; hypotheses are x (M, 9), P (M, 9, 9), p (M,). Transition matrices are column-stochastic.
+State [x, vx, ax, y, vy, ay, z, vz, az]; hypotheses are x (M, 9), P (M, 9, 9), p (M,). Transition matrices are
+column-stochastic.
 """
 
 import numpy as np
@@ -97,9 +98,11 @@ def gpb1(x, P, p, models, T, z, R):
 
 
 def track(family, rule, output, kinds, transition, x, P, p, plots, covariances, times):
-    """Estimates (K, 9), covariances (K, 9, 9), probabilities (K, M) of one realisation; plots (K, 3), rows of NaN are missed.
+    """Estimates (K, 9), covariances (K, 9, 9), probabilities (K, M) of one realisation; plots (K, 3), rows of NaN
+    are missed.
 
-    transition(t): matrix over t seconds; times (K,): seconds since the scan before. x (9,), P (9, 9), p (M,): before the first.
+    transition(t): matrix over t seconds; times (K,): seconds since the scan before. x (9,), P (9, 9), p (M,): before
+    the first.
     """
     size = len(kinds)
     x, P, wait, found = np.tile(x, (size, 1)), np.tile(P, (size, 1, 1)), 0.0, []

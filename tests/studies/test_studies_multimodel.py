@@ -56,7 +56,9 @@ def full(packed):
 
 def test_plots_have_the_stated_errors_and_covariances():
     plan = work(scans=60).plan
-    z, R, detected = (np.concatenate([multimodel.measured(plan, 8 * g)[i] for g in range(60)], axis=-1) for i in range(3))
+    z, R, detected = (
+        np.concatenate([multimodel.measured(plan, 8 * g)[i] for g in range(60)], axis=-1) for i in range(3)
+    )
     assert detected.all()
     truth = plan.world.truth[:, 0::3]
     error = np.moveaxis(z - truth[:, :, None], 2, 0)
@@ -95,12 +97,13 @@ def test_sums_equal_the_twin_on_the_same_plots(sensor, conversion):
     for f, options in enumerate(case.case.spec.filters):
         T = np.array(options.transition)
         kinds = [(m.motion, m.sigma_acceleration_mps2) for m in options.models]
-        powers = lambda s, T=T: multimodel.filters.transition_powers(T, np.array([s / 0.05]))[0]
+
+        def powers(s, T=T):
+            return multimodel.filters.transition_powers(T, np.array([s / 0.05]))[0]
+
         p = multimodel.filters.stationary(T)
         merge, output = options.merge, options.output
-        found = naive.track(
-            options.family, merge, output, kinds, powers, x, P, p, z[3:], covariance[3:], times[3:]
-        )
+        found = naive.track(options.family, merge, output, kinds, powers, x, P, p, z[3:], covariance[3:], times[3:])
         error = found[0] - plan.world.truth[3:]
         scale = np.abs(error).max(axis=0)
         tolerance = 1e-7 if not sensor else 2e-3  # missed and jittered: P(a) P(b) and P(a + b) differ by the generator
@@ -223,7 +226,8 @@ def test_recorded_flights_are_read_and_their_faults_told(tmp_path):
     config = tmp_path / "own.yaml"
     config.write_text(
         f"study: multimodel\nsensor: {SENSOR}\ntarget: {{kind: recorded, file: own.csv}}\n"
-        "filters: [{name: k, family: kalman, models: [{motion: uniform, sigma_acceleration_mps2: 1}]}]\nrealisations: 8\n"
+        "filters: [{name: k, family: kalman, models: [{motion: uniform, sigma_acceleration_mps2: 1}]}]\n"
+        "realisations: 8\n"
     )
     case = studies.CaseWork(load(str(config)).cases[0])
     assert np.allclose(case.plan.world.truth[:, 7], 300, atol=1)

@@ -1,8 +1,8 @@
 """P2.1 … P2.13: what Sychev & Osipov (2023) say, read from their words alone.
 
-Places are the sections of the article (Trudy MAI, 2023, no. 129). The paper's trajectory is lost: claims on it are judged
-on the shipped `aeroballistic`, which was chosen before any filter ran on it; where a claim speaks of flights in general
-it is judged once more, with the letter t, on the other four. "The same" is read as within 0.5 %.
+Places are the sections of the article (Trudy MAI, 2023, no. 129). The paper's trajectory is lost: claims on it are
+judged on the shipped `aeroballistic`, which was chosen before any filter ran on it; where a claim speaks of flights
+in general it is judged once more, with the letter t, on the other four. "The same" is read as within 0.5 %.
 """
 
 from radarsim.report.claims import Claim, Part, above, at_most, below, certain, within
@@ -124,7 +124,9 @@ CLAIMS = (
         "part 7",
         "At 20 Hz combined and modified combined coincide; at 1 Hz the modified rule gains a little under manoeuvre",
         *(
-            gain_part(FAST, RULES["modified_combined"], RULES["combined"], stage, c, SAME, "modified over combined, 20 Hz")
+            gain_part(
+                FAST, RULES["modified_combined"], RULES["combined"], stage, c, SAME, "modified over combined, 20 Hz"
+            )
             for stage in AEROBALLISTIC
             for c in COMPONENTS
         ),
@@ -211,7 +213,7 @@ CLAIMS = (
             for other, words in ((RARE, "ten times rarer"), (OFTEN, "ten times as frequent"))
             for stage in AEROBALLISTIC[1:]
         ),
-        reading="little: σ of the height changes by under 10 % when changes of model are ten times rarer or more frequent",
+        reading="little: σ of the height changes by under 10 % when models change ten times less or more often",
         config="multimodel_transition",
     ),
     _claim(

@@ -1,4 +1,5 @@
-"""How P2's claims are measured: which case and filter are the paper's, and the numbers taken from the sums of the stages.
+"""How P2's claims are measured: which case and filter are the paper's, and the numbers taken from the sums of the
+stages.
 
 Cases are found by target, scan period and what their filters are, whatever their names; filters by family, merging rule
 and bank.
@@ -17,7 +18,10 @@ MATRIX_122 = ((0.996, 0, 0.002), (0, 0.996, 0.002), (0.004, 0.004, 0.996))
 MATRIX_11 = ((0.995, 0.01), (0.005, 0.99))
 MMA2_122 = ("imm", "combined", BANK_122)
 MMA2_11 = ("imm", "combined", BANK_11)
-RIVALS = (MMA2_11, *(("kalman", "", (model,)) for model in ("uniform 20", "uniform 5", "accelerated 20", "accelerated 1")))
+RIVALS = (
+    MMA2_11,
+    *(("kalman", "", (model,)) for model in ("uniform 20", "uniform 5", "accelerated 20", "accelerated 1")),
+)
 COMPONENTS = {"y": 3, "vy": 4}
 UNITS = {"y": "height", "vy": "rate of climb"}
 AEROBALLISTIC = ("start", "ballistic", "manoeuvre", "after")
@@ -62,7 +66,11 @@ class Evidence(claims.Evidence):
         printed = {BANK_122: MATRIX_122, BANK_11: MATRIX_11}.get(bank)
         extra = result.axes.extra
         for f, of in enumerate(result.spec.filters):
-            same = extra["families"][f] == family and extra["models"][f] == bank and (not rule or extra["rules"][f] == rule)
+            same = (
+                extra["families"][f] == family
+                and extra["models"][f] == bank
+                and (not rule or extra["rules"][f] == rule)
+            )
             expected = matrix[0] if matrix else printed
             T = extra["transitions"][f]
             fits = expected is None or (np.shape(expected) == T.shape and np.allclose(expected, T, atol=1e-9))
@@ -126,7 +134,13 @@ def rival_parts(key: tuple, stages: tuple[str, ...], expected: Range) -> tuple[P
         return least
 
     return tuple(
-        Part((key,), f"gain over the best other one, {UNITS[c]}, stage {stage}", "%", measure(stage, c), expected)
+        Part(
+            (key,),
+            f"gain over the best other one, {UNITS[c]}, {key[0]}, stage {stage}",
+            "%",
+            measure(stage, c),
+            expected,
+        )
         for stage in stages
         for c in COMPONENTS
     )
@@ -140,7 +154,7 @@ def gain_part(key: tuple, wanted: tuple, base: tuple, stage: str, component: str
 
 def probability_part(key: tuple, wanted: tuple, stage: str, model: int, expected: Range) -> Part:
     """Mean probability of a model over a stage."""
-    what = f"mean probability of model {model + 1}, stage {stage}"
+    what = f"mean probability of model {model + 1}, {key[0]}, stage {stage}"
     return Part((key,), what, "", lambda seen: seen.probability(key, wanted, stage, model), expected)
 
 
@@ -153,7 +167,7 @@ def lead_part(key: tuple, wanted: tuple, stage: str, model: int, expected: Range
         top = max(others, key=lambda of: of.value)
         return Estimate(own.value - top.value, own.lo - top.hi, own.hi - top.lo)
 
-    return Part((key,), f"lead of model {model + 1} over the next, stage {stage}", "", measure, expected)
+    return Part((key,), f"lead of model {model + 1} over the next, {key[0]}, stage {stage}", "", measure, expected)
 
 
 def cost_part(key: tuple, wanted: tuple, base: tuple, expected: Range, words: str) -> Part:
