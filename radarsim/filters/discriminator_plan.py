@@ -39,8 +39,9 @@ def block_edges(windows: list[int], per_window: int) -> np.ndarray:
         begin = edges[-1]
         while begin < end:
             longest = max(1, max(begin, windows[0]) // per_window)
-            # Equal parts of what is left, so that no sliver remains before the window's end.
-            begin += math.ceil((end - begin) / math.ceil((end - begin) / longest))
+            # Equal parts of what is left, so that no sliver remains before the window's end; whole registers if long.
+            length = math.ceil((end - begin) / math.ceil((end - begin) / longest))
+            begin += length if length < 16 else length // 8 * 8
             edges.append(begin)
     return np.array(edges)
 

@@ -5,6 +5,7 @@ import numpy as np
 from radarsim.kernels.compile import kernel, summing
 from radarsim.kernels.discriminator_scoring import (
     CENTRE,
+    HALF,
     LIMIT,
     REF,
     ROWS,
@@ -18,6 +19,7 @@ from radarsim.kernels.discriminator_scoring import (
     Z2,
     derivative,
     polynomial,
+    second_derivative,
     sincos_turns,
 )
 from radarsim.kernels.random import U, normal_pair, threefry
@@ -39,23 +41,43 @@ PHYSICS = np.dtype(
 BLOCK_SUMS, SAMPLES, DEMODULATED = 0, 1, 2
 
 
+CHUNK = 2048  # samples made at a time, so that noise is still in the first cache when the signal is added
+
+
+@kernel
+def fill_noise(k0, k1, realisation, first, row):
+    """Unit normals into row (n,): draw first + j makes the noise of element j and of the one half of them later."""
+    half = row.size // 2
+    for j in range(half):
+        x, y = threefry(U(realisation), U(first + j), k0, k1)
+        a, b = normal_pair(x, y)
+        row[j] = a
+        row[j + half] = b
+    if row.size % 2:
+        x, y = threefry(U(realisation), U(first + half), k0, k1)
+        row[row.size - 1] = normal_pair(x, y)[0]
+
+
+@kernel
+def add_signal(sigma, clean, row):
+    """clean (n,) plus sigma times the noise in row (n,), in place. In one loop with `fill_noise` LLVM stays scalar."""
+    for j in range(row.size):
+        row[j] = clean[j] + sigma * row[j]
+
+
 @kernel
 def draw_samples(physics, key, realisation, clean, samples):
-    """Samples (1 or 2, n) of a burst: clean (1 or 2, n) and noise; row 1 is the imaginary part.
+    """Samples (1 or 2, n) of a burst: clean (1 or 2, n) and noise; row 1 is the imaginary part, with later draws.
 
-    The columns are all pulses' first samples, then all second ones, …. Draw j makes the noise of column j and of the
-    one half of them later; those of the imaginary part follow.
+    The columns are all pulses' first samples, then all second ones, …; each chunk of them has draws of its own.
     """
-    k0, k1, n, sigma = key[0], key[1], samples.shape[1], physics.sigma
-    half = (n + 1) // 2
-    for row in range(samples.shape[0]):
-        for j in range(n - half):
-            a, b = threefry(U(realisation), U(row * half + j), k0, k1)
-            a, b = normal_pair(a, b)
-            samples[row, j], samples[row, j + half] = clean[row, j] + sigma * a, clean[row, j + half] + sigma * b
-        if n % 2:
-            a, b = threefry(U(realisation), U(row * half + half - 1), k0, k1)
-            samples[row, half - 1] = clean[row, half - 1] + sigma * normal_pair(a, b)[0]
+    n = samples.shape[1]
+    for r in range(samples.shape[0]):
+        for start in range(0, n, CHUNK):
+            stop = min(start + CHUNK, n)
+            part = samples[r, start:stop]
+            fill_noise(key[0], key[1], realisation, r * (n + 1) + start, part)
+            add_signal(physics.sigma, clean[r, start:stop], part)
 
 
 @kernel
@@ -83,7 +105,8 @@ def demodulate(physics, edges, samples, x, first, last, sums):
         centre = sums[CENTRE, i]
         for row in range(Z0, ROWS):
             sums[row, i] = 0.0
-        sums[REF, i] = polynomial(x[0], x[1], x[2], x[3], x[4], x[5], centre)
+        bend = sums[HALF, i] * second_derivative(x[2], x[3], x[4], x[5], centre)
+        sums[REF, i] = polynomial(x[0], x[1], x[2], x[3], x[4], x[5], centre) + bend
         sums[SLOPE, i] = derivative(x[1], x[2], x[3], x[4], x[5], centre)
         for j in range(physics.samples_per_pulse):
             place, count = j * physics.pulses + edges[i], edges[i + 1] - edges[i]
@@ -190,6 +213,7 @@ def block_table(
         part = slice(edges[i], edges[i + 1])
         mean[CENTRE, i] = t[:, part].mean()
         s, e = (t[:, part] - mean[CENTRE, i]).ravel(), turn[:, part].ravel()
+        mean[HALF, i] = 0.5 * np.mean(s**2)
         mean[LIMIT, i] = 1.0 / max(np.sqrt(np.mean(s**2)), 1e-9)
         received = clean[:, part].ravel() * e
         for n, (z, w) in enumerate(((Z0, W0), (Z1, W1), (Z2, W2))):

@@ -108,7 +108,7 @@ RESIDUALS = ("case", "filter", "component", "unit", "k", "t_s", "n", "q05", "med
 
 
 def _residuals(result: CaseResult) -> dict[str, np.ndarray]:
-    """Median and 5 to 95 % band of |error| over all bursts, locked or not, from the histograms of |error| over bound."""
+    """Median and 5 to 95 % band of |error| over all bursts, locked or not, from the histograms."""
     at = f, k, c = common.shown(result)
     bound = result.axes.extra["posterior_sigma"][at]
     low, middle, high = quantiles(result.sums["residuals"][at], result.axes.extra["bin_edges"], QUANTILES)

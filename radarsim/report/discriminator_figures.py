@@ -1,6 +1,7 @@
 """P4's figures: residuals against the window (figure 2), locks, accuracy, and the maps of where the sequence locks."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,12 +21,13 @@ KEYS = {
     "burst.noise_variance": "noise variance $\\sigma^2$",
     "prior.scale": "prior spread over the paper's",
     "prior.error_scale": "true over believed prior error",
-    "lock_probability": "$P_\\Delta$",
+    "lock_probability": "$1 - P_\\Delta$",
     "density": "density of windows",
     "steps": "scoring steps a window",
 }
 WINDOW = "window length, s"
 MOST_LINES = 9
+SURE = 0.99
 
 
 def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
@@ -94,15 +96,15 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
     for n, name in enumerate(result.axes.filters[:MOST_LINES]):
         own = rows[(result.name, name)]
         t, value, lo, hi = (own[c].to_numpy(float) for c in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
-        marks.append(Line(t, value, name, Style(n, n % 4, n), lo, hi))
+        marks.append(Line(t, value, name, Style(n, (n + n // 8) % 4, n + n // 8), lo, hi))
     caption = (
         "Share of bursts with every component within five potential spreads of the window (without prior; the phase to "
-        f"the nearest turn), of {result.count:,} bursts. Bands: 95 % intervals."
+        f"the nearest turn), of {result.count:,} bursts; right: its upper end. Bands: 95 % intervals."
     )
-    panel = Panel(
-        Axis(WINDOW, "log"), Axis("locked", limits=(0, 1.02)), tuple(marks), direct=False, legend="center left"
-    )
-    return Figure("locks", "Locked bursts against the window", caption, (panel,), width_mm=120.0, panel_height_mm=80.0)
+    x = Axis(WINDOW, "log")
+    whole = Panel(x, Axis("locked", limits=(0, 1.02)), tuple(marks), direct=False, legend="center left")
+    upper = Panel(x, Axis("locked", limits=(0.85, 1.003)), tuple(replace(m, label="") for m in marks), direct=False)
+    return Figure("locks", "Locked bursts against the window", caption, (whole, upper), 2, PAGE_MM, 80.0)
 
 
 def accuracy(result: CaseResult, made: Mapping) -> Figure:
@@ -138,7 +140,9 @@ def final(made: Mapping, result: CaseResult, name: str):
 def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mapping) -> Figure:
     """Lock at the end of the burst against one swept key, a line for each estimator."""
     x = np.array([float(member.swept[0][1]) for member in members])
-    order, marks = np.argsort(x), [Reference(0.99, label="0.99")]
+    if key == "lock_probability":
+        x = 1.0 - x
+    order, marks = np.argsort(x), [Reference(SURE, label="0.99")]
     for n, estimator in enumerate(members[0].axes.filters):
         ends = [final(made, members[i], estimator) for i in order]
         value, lo, hi = (np.array([row[c] for row in ends], float) for c in ("lock_rate", "lock_lo", "lock_hi"))
@@ -165,6 +169,25 @@ def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], ma
             values[row, column] = final(made, member, estimator)["lock_rate"]
         marks = (Heat(x, y, values, "locked at the end"),)
         drawn.append(Panel(Axis(KEYS.get(keys[0], keys[0])), Axis(KEYS.get(keys[1], keys[1])), marks, estimator))
-    caption = f"Share of bursts locked at the end, over {keys[0]} and {keys[1]}, of {members[0].count:,} in each cell."
+    drawn.append(region(keys, members, made, x, y))
+    caption = (
+        f"Share of bursts locked at the end, over {keys[0]} and {keys[1]}, of {members[0].count:,} in each cell. Last: "
+        f"the largest {keys[1]} at which the whole 95 % interval of that share, here and below, lies above {SURE:g}."
+    )
     columns = min(2, len(drawn))
     return Figure(name, "Where the sequence locks", caption, tuple(drawn), columns, PAGE_MM, 70.0)
+
+
+def region(keys: tuple[str, ...], members: Sequence[CaseResult], made: Mapping, x: np.ndarray, y: np.ndarray) -> Panel:
+    """The border of where lock is sure: for each value of the first key the largest of the second."""
+    marks = []
+    for n, estimator in enumerate(members[0].axes.filters):
+        sure = np.zeros((len(y), len(x)), dtype=bool)
+        for member in members:
+            column, row = (np.searchsorted(a, float(member.swept[i][1])) for i, a in ((0, x), (1, y)))
+            sure[row, column] = final(made, member, estimator)["lock_lo"] >= SURE
+        reach = np.minimum.accumulate(sure, axis=0).sum(axis=0)
+        border = np.where(reach > 0, y[np.maximum(reach, 1) - 1], np.nan)
+        marks.append(Line(x, border, estimator, Style(n, n % 4, n)))
+    axes = (Axis(KEYS.get(key, key), "log" if a.min() > 0 else "linear") for key, a in zip(keys, (x, y), strict=True))
+    return Panel(*axes, tuple(marks), f"locked in over {SURE:g}", direct=False)
