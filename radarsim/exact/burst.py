@@ -52,6 +52,21 @@ def fisher_sum(burst: Burst, size: int, pulses: int, theta: np.ndarray | None = 
     return burst.amplitude**2 / burst.noise_variance * (weight * k).T @ k
 
 
+def fisher_sums(burst: Burst, size: int, windows: list[int], theta: np.ndarray | None = None) -> list[np.ndarray]:
+    """`fisher_sum` of many windows at once, from running sums of the powers of time."""
+    t = sample_times(burst, max(windows))
+    x = t / burst.duration_s
+    weight = np.full(t.shape, 1.0 if burst.complex_samples else 0.5)
+    if theta is not None and not burst.complex_samples:
+        turns = phase_turns(theta, t)
+        weight = np.sin(2.0 * math.pi * (turns - np.rint(turns))) ** 2
+    ends = np.array(windows) - 1
+    moments = [np.cumsum((weight * x**p).sum(axis=0))[ends] for p in range(2 * size - 1)]
+    c, order = sensitivities(size, burst.duration_s), np.arange(size)
+    level = burst.amplitude**2 / burst.noise_variance
+    return [level * np.outer(c, c) * np.array(moments)[order[:, None] + order, w] for w in range(len(windows))]
+
+
 def spreads(information: np.ndarray) -> np.ndarray:
     """Potential standard deviations (size,) that an information matrix allows."""
     return np.sqrt(np.diag(balanced_inverse(information)))

@@ -111,7 +111,7 @@ class Designer:
 
         if criterion(self.burst.duration_s) <= 0.0:
             return self.burst.pulses
-        root = brentq(criterion, shortest_s, self.burst.duration_s, xtol=1e-9 * self.burst.duration_s)
+        root = brentq(criterion, shortest_s, self.burst.duration_s, xtol=1e-4 * self.burst.pulse_period_s)
         return self.burst.pulses_in(root)
 
     def windows(self, least_s: float = 0.0) -> list[int]:

@@ -1,7 +1,7 @@
 """Arrays for the discriminator's kernels: the burst cut into blocks, each estimator's windows and step matrices."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,12 +108,12 @@ def estimators(
     edges: np.ndarray,
     burst: Burst,
     sigma: np.ndarray,
-    fisher: Callable[[int], np.ndarray],
+    information: Mapping[int, np.ndarray],
     designer: Designer,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Records of the windows (F, K) and options (F,) of a case's estimators.
 
-    fisher gives Φ_θ of so many pulses in the units of θ, sigma (size,) is the prior. Unused windows stay zero.
+    information is Φ_θ by window in the units of θ, sigma (size,) is the prior. Unused windows stay zero.
     """
     size, whole = len(sigma), turns_per_parameter(len(sigma), burst.duration_s)
     windows = np.zeros((len(designs), max(len(d.windows) for d in designs)), WINDOW)
@@ -129,7 +129,7 @@ def estimators(
             turns = whole * window["powers"][:size]
             if design.forecast:
                 window["precision"][:size] = phase_prior(sigma) / turns**2
-            root, share = step_root(fisher(pulses) / np.outer(turns, turns), window["precision"][:size])
+            root, share = step_root(information[pulses] / np.outer(turns, turns), window["precision"][:size])
             window["root"][:size, :size], window["share"][:size] = root, share
             if directions is not None:
                 window["direction"][:size] = directions[k] * whole

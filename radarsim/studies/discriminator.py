@@ -1,7 +1,7 @@
 """P4 (Uss, Baryshev & Djavad 2010): Doppler frequency and its derivatives from one burst, and how often they lock."""
 
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 
@@ -91,16 +91,25 @@ def forecast(spec, burst: model.Burst) -> np.ndarray:
     return given
 
 
-def windows_of(estimator, designer: schedules.Designer, burst: model.Burst) -> list[int]:
-    """Window lengths of an estimator in pulses."""
-    if estimator.method == "ridge":
-        return [burst.pulses]
-    if estimator.schedule == "designed":
-        least = exact.shortest_window(burst, estimator.minimum_energy_ratio) if estimator.minimum_energy_ratio else 0.0
-        windows = designer.windows(least)
-    else:
-        windows = sorted({burst.pulses_in(duration) for duration in estimator.schedule})
-    return schedules.denser(windows, estimator.density)[: estimator.first_windows]
+def windows_of(spec, burst: model.Burst, designer: schedules.Designer) -> list[list[int]]:
+    """Window lengths of every estimator in pulses; estimators of one condition are designed once."""
+
+    @cache
+    def designed(condition: schedules.Condition, least_s: float) -> list[int]:
+        return replace(designer, condition=condition).windows(least_s)
+
+    found = []
+    for e in spec.estimators:
+        if e.method == "ridge":
+            found.append([burst.pulses])
+            continue
+        least = exact.shortest_window(burst, e.minimum_energy_ratio) if e.minimum_energy_ratio else 0.0
+        if e.schedule == "designed":
+            windows = designed(schedules.Condition(e.lock_probability, e.main_lobe_threshold, e.tail), least)
+        else:
+            windows = sorted({burst.pulses_in(duration) for duration in e.schedule})
+        found.append(schedules.denser(windows, e.density)[: e.first_windows])
+    return found
 
 
 def mode_of(spec) -> int:
@@ -116,23 +125,14 @@ def prepare(case: Case) -> Plan:
     burst, mode = burst_of(spec), mode_of(spec)
     phase, sigma = phase_of(spec, burst), forecast(spec, burst)
     size = len(sigma)
-    designers = [
-        schedules.Designer(
-            burst,
-            sigma,
-            partial(exact.fisher, burst, size),
-            schedules.Condition(e.lock_probability, e.main_lobe_threshold, e.tail),
-        )
-        for e in spec.estimators
-    ]
-    windows = [windows_of(e, d, burst) for e, d in zip(spec.estimators, designers, strict=True)]
+    designer = schedules.Designer(burst, sigma, partial(exact.fisher, burst, size), schedules.Condition())
+    windows = windows_of(spec, burst, designer)
     every = sorted({w for own in windows for w in own})
     edges = plans.block_edges(every, spec.blocks_per_window or BLOCKS_PER_WINDOW[mode])
     world = plans.world(burst, mode, edges, every, phase.turns, phase.reference)
     designs = [design_of(e, w) for e, w in zip(spec.estimators, windows, strict=True)]
-    records, options = plans.estimators(
-        designs, edges, burst, sigma, partial(exact.fisher_sum, burst, size), designers[0]
-    )
+    mean_information = dict(zip(every, exact.fisher_sums(burst, size, every), strict=True))
+    records, options = plans.estimators(designs, edges, burst, sigma, mean_information, designer)
     whole = np.ones(SIZE)
     whole[:size] = model.turns_per_parameter(size, burst.duration_s)
     potential, posterior = bounds(burst, windows, phase.theta, sigma)
@@ -186,13 +186,14 @@ def bounds(burst, windows, theta, sigma) -> tuple[np.ndarray, np.ndarray]:
     size, most = len(sigma), max(map(len, windows))
     shape = (len(windows), most, size)
     potential, posterior = np.ones(shape), np.ones(shape)
-    found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+    every = sorted({w for own in windows for w in own})
+    known = np.diag(plans.phase_prior(sigma))
+    found = {
+        window: (exact.spreads(information), exact.spreads(information + known))
+        for window, information in zip(every, exact.fisher_sums(burst, size, every, theta), strict=True)
+    }
     for f, own in enumerate(windows):
         for k, window in enumerate(own):
-            if window not in found:
-                information = exact.fisher_sum(burst, size, window, theta)
-                known = np.diag(plans.phase_prior(sigma))
-                found[window] = exact.spreads(information), exact.spreads(information + known)
             potential[f, k], posterior[f, k] = found[window]
     return potential, posterior
 

@@ -95,3 +95,12 @@ def test_frequency_is_known_best_in_the_middle():
     start, middle = (exact.derivative_spread(covariance, 0, t) for t in (0.0, 0.15))
     assert start == pytest.approx(0.4502, abs=1e-4)
     assert middle < start / 4
+
+
+@pytest.mark.parametrize("theta", [None, THETA])
+def test_many_windows_at_once_are_as_one_by_one(theta):
+    windows = [100, 199, 5000, 30000]
+    for window, information in zip(windows, exact.fisher_sums(PAPER, 5, windows, theta), strict=True):
+        scale = np.sqrt(np.diag(information))
+        alone = exact.fisher_sum(PAPER, 5, window, theta)
+        assert information / np.outer(scale, scale) == pytest.approx(alone / np.outer(scale, scale), abs=1e-9)
