@@ -132,7 +132,11 @@ def test_converted_plots_and_their_weights(frame):
     for realisation in (0, 77):
         sums = plan.layout.unpack(study.simulate(plan, realisation, 1))
         e, came = plots(plan, realisation, 0.0, 0.8)
-        x, y, (xx, _, yy) = convert(polar[:, 0, 0] + e[:, 0], polar[:, 1, 0] + e[:, 1], *SIGMA)
+        r, b = polar[:, 0, 0] + e[:, 0], polar[:, 1, 0] + e[:, 1]
+        x, y, (xx, _, yy) = convert(r, b, *SIGMA)
+        if frame == "cartesian_unbiased":
+            xx, _, yy = np.full((3, SCANS), np.nan)
+            xx[came], _, yy[came] = convert(*models.places(r[came], b[came]), *SIGMA)[2]
         for c, (z, variance) in enumerate(((x, xx), (y, yy))):
             for k in range(2, SCANS):
                 at = np.flatnonzero(came[: k + 1])
