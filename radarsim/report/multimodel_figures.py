@@ -69,6 +69,7 @@ def trajectory(results: Sequence[CaseResult]) -> Figure | None:
         (TIME, Axis("speed, m/s", limits=(0, None)), "3  speed", ends),
         (TIME, Axis("acceleration, m/s²", limits=(0, None)), "4  acceleration", ends),
     )
+    lines[1:] = [_unnamed(own) for own in lines[1:]]
     drawn = [
         Panel(x, y, (*marks, *own), title, direct=False) for (x, y, title, marks), own in zip(axes, lines, strict=True)
     ]
