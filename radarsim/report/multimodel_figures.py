@@ -57,7 +57,7 @@ def trajectory(results: Sequence[CaseResult]) -> Figure | None:
     lines: list[list[Line]] = [[], [], [], []]
     for n, result in enumerate(flights.values()):
         x, t = result.axes.extra["truth"], np.asarray(result.axes.t_s, dtype=float)
-        words, style = _title(result, results), Style(n, n)
+        words, style = _title(result, results) if len(flights) > 1 else "", Style(n, n)
         speed, acceleration = (np.linalg.norm(x[:, i::3], axis=1) for i in (1, 2))
         lines[0].append(Line(x[:, 6] / 1e3, x[:, 0] / 1e3, words, style))
         for place, values in ((1, x[:, 3] / 1e3), (2, speed), (3, acceleration)):
