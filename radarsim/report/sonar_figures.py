@@ -184,7 +184,7 @@ def believed_figure(results: Sequence[CaseResult], believed, consistency) -> Fig
         (
             Panel(
                 x,
-                Axis("$\\sigma$ / $\\sigma$ of a plot", limits=(0, None)),
+                Axis("$\\sigma$ / $\\sigma$ of a plot", limits=(0, 1.75)),
                 tuple(left),
                 direct=False,
                 legend="upper left",
