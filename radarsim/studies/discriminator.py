@@ -22,7 +22,7 @@ FILTERS = {
     "method: sequence": "discriminators over windows that grow to the whole burst, Fisher scoring in each",
     "method: ridge": "the classical rival: short-time spectrum, robust fit, unwrapping, then scoring; no prior",
 }
-BLOCK = 256  # 20 ms with nine estimators on block sums, some seconds on samples
+BLOCK = 64  # 20 ms with nine estimators on block sums, half a second with two on samples
 MODES = {"block_sums": BLOCK_SUMS, "samples": SAMPLES, "demodulated": DEMODULATED}
 BLOCKS_PER_WINDOW = {BLOCK_SUMS: 16, SAMPLES: 16, DEMODULATED: 32}  # 0.016 and 0.024 potential σ from every sample's
 LOCKS = 6  # see kernels.discriminator.accumulate
