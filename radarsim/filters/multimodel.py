@@ -27,7 +27,10 @@ def stationary(transition: np.ndarray) -> np.ndarray:
     """
     size = len(transition)
     mixing = (transition + np.eye(size)) / 2  # the same stationary ones, without periodic chains
-    p = np.linalg.matrix_power(mixing, 2**40) @ np.full(size, 1.0 / size)
+    for _ in range(40):
+        mixing = mixing @ mixing
+        mixing /= mixing.sum(axis=0)  # rounding would grow with each square
+    p = mixing @ np.full(size, 1.0 / size)
     p = np.maximum(p, 0.0)
     return p / p.sum()
 
