@@ -116,7 +116,6 @@ def _information(plots: Plots, size: int, rho: float) -> tuple[np.ndarray, np.nd
         Y = back.T @ Y @ back
         age, c, seen = age + step, c * carry[k], w > 0
         row = np.array([1.0, 0.0, 0.0]) - c[:, None] * np.stack([np.ones(patterns), -age, age**2 / 2], axis=1)
-        row[:, size:] = 0.0
         new = 1 - c * c  # nothing new comes with a plot at the very time of the last one
         weight = np.where(new > 1e-12, w / np.maximum(new, 1e-12), 0.0)
         Y = Y + weight[:, None, None] * row[:, :, None] * row[:, None, :]
@@ -244,7 +243,6 @@ def window_weights(plots: Plots, k: int, length: int, size: int) -> tuple[int, n
     w = np.where(inside, plots.weight[:, : k + 1], 0.0)[:, first:]
     since = (plots.t[first : k + 1] - plots.t[k]) / plots.period
     A = np.stack([np.ones_like(since), since, since**2 / 2], axis=1)
-    A[:, size:] = 0.0
     times = Plots(plots.t[first : k + 1], w, plots.period, plots.sigma).moments()[:, -1]
     P = leading_inverse(np.einsum("mn,ni,nj->mij", w, A, A), np.minimum(times, size))
     scale = plots.period ** -np.arange(3.0)
