@@ -64,6 +64,11 @@ def clock(seconds: float) -> str:
     return f"{whole // 3600}:{whole // 60 % 60:02}:{whole % 60:02}"
 
 
+def plural(count: int, noun: str) -> str:
+    """1 case, 2 cases."""
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
 def show(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], right: Sequence[str] = ()) -> None:
     """Print one table; the columns named in `right` are aligned right."""
     from rich import box
@@ -101,7 +106,9 @@ def print_result(result) -> None:
     show_last_scan(written.tables["curves"], written.tables["gains"])
     verdicts = result.verdicts()
     if verdicts:
-        say("claims   " + ", ".join(f"{count} {verdict}" for verdict, count in verdicts.items()))
+        for verdict, names in verdicts.items():
+            say(f"claims   {len(names)} {verdict}: {', '.join(names)}")
+        say(f"         `radarsim claims {result.experiment.stem}` says what each of them is")
     drawn = sum(name.endswith(".svg") for name in written.files)
     say(f"tables   {written.folder / 'curves.csv'} and {sum(n.endswith('.csv') for n in written.files) - 1} more there")
     if drawn:
@@ -121,15 +128,15 @@ def show_last_scan(curves, gains) -> None:
     rows = [
         (
             *(row.case, row.filter, row.component, f"{row.t_s:g} s"),
-            f"{row.sigma:.4g} {row.unit}",
-            f"{row.sigma_lo:.4g} … {row.sigma_hi:.4g}",
-            known(row.exact_sigma, "{:.4g}"),
+            f"{row.sigma:#.4g} {row.unit.replace('s2', 's²')}",
+            f"{row.sigma_lo:#.4g} … {row.sigma_hi:#.4g}",
+            known(row.exact_sigma, "{:#.4g}"),
             known(row.gain_percent, "{:.2f} %"),
             known(row.gain_lo, "{:.2f} … ") + known(row.gain_hi, "{:.2f}"),
         )
         for row in last.itertuples()
     ]
-    columns = ("case", "filter", "", "at", "sigma", "95 %", "exact", "gain", "95 % of gain")
+    columns = ("case", "filter", "component", "at", "sigma", "95 %", "exact", "gain", "95 % of gain")
     show("", columns, rows, right=columns[3:])
 
 
@@ -145,10 +152,16 @@ def print_outlook(experiment, outlook) -> None:
         (case.name, case.filters, f"{case.scans}", f"{case.realisations:,}", f"{case.seconds:.3g} s")
         for case in outlook.cases
     ]
-    show("", ("case", "filters", "scans", "realisations", "time"), rows, right=("scans", "realisations", "time"))
+    show(
+        "",
+        ("case", "filters", "scans", "realisations", "one thread"),
+        rows,
+        right=("scans", "realisations", "one thread"),
+    )
     say(
-        f"total    {len(outlook.cases)} cases, {sum(c.realisations for c in outlook.cases):,} realisations, "
-        f"about {outlook.seconds:.2g} s on {outlook.threads} threads, {outlook.memory_mb:.0f} MB"
+        f"total    {plural(len(outlook.cases), 'case')}, {sum(c.realisations for c in outlook.cases):,} realisations, "
+        f"about {clock(outlook.seconds)} on {plural(outlook.threads, 'thread')}, {outlook.memory_mb:.0f} MB; "
+        "figures and tables take some seconds more"
     )
 
 
@@ -162,10 +175,13 @@ def print_claims(rows: Sequence[dict]) -> None:
             if row["overall"] == "not run":
                 say(f"       radarsim run {row['config']}")
         if row["overall"] != "not run":
-            measured = f"{row['measured']:.4g} [{row['lo']:.4g}, {row['hi']:.4g}] {row['unit']}"
+            measured = f"{row['measured']:.4g} [{row['lo']:.4g}, {row['hi']:.4g}] {row['unit']}".rstrip()
             say(f"       {row['verdict']:<20} {row['case']}: {row['what']} {measured}; expected {row['expected']}")
     overall = {row["claim"]: row["overall"] for row in rows}
-    say(", ".join(f"{count} {verdict}" for verdict, count in Counter(overall.values()).items()) or "no claims")
+    say(
+        ", ".join(f"{count} {verdict}" for verdict, count in Counter(overall.values()).items())
+        or "no claims are judged by this"
+    )
 
 
 def print_inventory(inventory) -> None:

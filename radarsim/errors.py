@@ -42,7 +42,8 @@ class Interrupted(RadarsimError):
     """A signal stopped the run; what was done is stored."""
 
     def __init__(self, signal_number: int):
-        super().__init__(f"stopped by signal {signal_number}; run the same command again to continue")
+        name = {2: "Ctrl-C", 15: "SIGTERM"}.get(signal_number, f"signal {signal_number}")
+        super().__init__(f"stopped by {name}; run the same command again to continue")
         self.signal_number = signal_number
         self.exit_code = 128 + signal_number
 

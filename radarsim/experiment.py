@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 
 from radarsim import plots, studies
+from radarsim.config import lookup
 from radarsim.config.load import Case, Experiment, load
 from radarsim.engine.collect import Collected, collect, stored
 from radarsim.engine.executors import available_cores
@@ -62,11 +63,20 @@ def simulated(
     return gathered
 
 
+RESULTS = "results"  # the command's default directory
+SHORT = {"realisations": "-n", "seed": "--seed"}
+
+
 class Result:
     """A finished experiment: its cases, tables (pandas), figures (Matplotlib). Nothing is written unless asked for."""
 
     def __init__(self, experiment: Experiment, cases: Sequence[CaseResult], facts: Mapping):
         self.experiment, self.cases, self.facts = experiment, tuple(cases), dict(facts)
+
+    def __repr__(self):
+        counts = sorted({case.count for case in self.cases})
+        each = f"{counts[0]:,}" if len(counts) == 1 else f"{counts[0]:,} to {counts[-1]:,}"
+        return f"<radarsim result {self.experiment.stem}: {len(self.cases)} cases of {each} realisations>"
 
     @cached_property
     def tables(self) -> dict:
@@ -112,10 +122,10 @@ class Result:
         self.written = output.write(self.experiment, self.cases, folder, self.facts, draw=figures, made=self.tables)
         return self.written
 
-    def verdicts(self) -> dict[str, int]:
-        """How many claims came out how; empty where this experiment judges none."""
-        overall = self.tables["claims"].drop_duplicates("claim")["overall"]
-        return overall.value_counts(sort=False).to_dict()
+    def verdicts(self) -> dict[str, list[str]]:
+        """The claims that came out so, by verdict; empty where this experiment judges none."""
+        judged = self.tables["claims"].drop_duplicates("claim")
+        return {verdict: list(group["claim"]) for verdict, group in judged.groupby("overall", sort=False)}
 
     @property
     def warnings(self) -> list[str]:
@@ -170,10 +180,17 @@ def repeated(experiment: Experiment, overrides: Sequence[str]) -> dict[str, str]
     """The command that repeats a run, as a fact of run.json; none for an experiment that is no file."""
     if experiment.path is None:
         return {"command": "none: the config was given in Python, and stands below"}
-    words = ["radarsim", "run", experiment.path]
+    return {"command": command(experiment, overrides, RESULTS)}
+
+
+def command(experiment: Experiment, overrides: Sequence[str], out: str | os.PathLike) -> str:
+    """The command that runs an experiment; a shipped config by its stem."""
+    shipped = experiment.path and Path(experiment.path).resolve().is_relative_to(lookup.SHIPPED.resolve())
+    words = ["radarsim", "run", experiment.stem if shipped else str(experiment.path)]
     for override in overrides:
-        words += ["--set", override]
-    return {"command": shlex.join(words)}
+        key, _, value = override.partition("=")
+        words += [SHORT[key], value] if key in SHORT else ["--set", override]
+    return shlex.join(words + (["--out", str(out)] if str(out) != RESULTS else []))
 
 
 def report(
@@ -194,8 +211,7 @@ def report(
         else:
             held.append((case, work, collected))
     if missing:
-        again = experiment.path or experiment.stem
-        raise ConfigError(*missing, f"`radarsim run {again} --out {out}` computes them")
+        raise ConfigError(*missing, f"`{command(experiment, overrides, out)}` computes them")
     result = Result(experiment, finished(held), facts_of(held, 0, 0.0) | repeated(experiment, overrides))
     result.write(out, figures)
     return result
@@ -272,10 +288,12 @@ def claims(configs: Sequence[str], out: str | os.PathLike) -> list[dict]:
     held = {stem: table for stem in stems if (table := _stored_claims(Path(out) / stem / "claims.csv")) is not None}
     if not configs:
         return papers.listed(held)
-    rows = [row for row in papers.listed(held) if row["config"] in stems]
-    judged = {row["claim"] for row in rows}
-    for stem, table in held.items():
-        rows += [row | {"config": stem} for row in table.to_dict("records") if row["claim"] not in judged]
+    rows = []
+    for stem in stems:
+        if stem in held:
+            rows += [row | {"config": stem} for row in held[stem].to_dict("records")]
+        else:
+            rows += [row for row in papers.listed({}) if row["config"] == stem]
     return rows
 
 

@@ -224,3 +224,16 @@ def test_config_outside_a_checkout_runs_by_path(tmp_path):
     (tmp_path / "own.yaml").write_text(text)
     radarsim("run", tmp_path / "own.yaml", "-n", 100, "--no-figures", "--out", tmp_path / "r")
     assert (tmp_path / "r" / "own" / "curves.csv").exists()
+
+
+def test_claims_of_a_config_not_yet_run_are_listed_as_such(tmp_path):
+    result = radarsim("claims", "range_doppler", "--out", tmp_path)
+    assert "25 not run" in result.stdout
+    radarsim("run", "rls2", "-n", 3000, "--no-figures", "--out", tmp_path)
+    assert "P1.18" in radarsim("claims", "rls2", "--out", tmp_path).stdout
+
+
+def test_the_command_that_computes_what_is_missing_is_whole(tmp_path):
+    arguments = ("rls3", "-n", 500, "--seed", 4, "--set", "radar.sigma_range_m=300", "--out", tmp_path)
+    result = radarsim("report", *arguments, code=2)
+    assert f"radarsim run rls3 --set radar.sigma_range_m=300 -n 500 --seed 4 --out {tmp_path}" in result.stderr

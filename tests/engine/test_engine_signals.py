@@ -80,7 +80,7 @@ def test_a_main_thread_that_never_asks_is_ended_within_two_seconds(tmp_path):
     with started(tmp_path, 1, "--linger") as process:
         process.send_signal(signal.SIGTERM)
         seconds, status = ended(process)
-        assert "stopped by signal 15" in process.stderr.read()
+        assert "stopped by SIGTERM" in process.stderr.read()
     assert (1 < seconds < 2, status) == (True, 143)
 
 
