@@ -147,7 +147,7 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
         ends = [final(made, members[i], estimator) for i in order]
         value, lo, hi = (np.array([row[c] for row in ends], float) for c in ("lock_rate", "lock_lo", "lock_hi"))
         marks.append(Line(x[order], value, estimator, Style(n, n % 4, n), lo, hi))
-    scale = "log" if x.min() > 0 and x.max() / x.min() > 8 else "linear"
+    scale = "log" if x.min() > 0 and x.max() / x.min() > 20 else "linear"
     caption = (
         f"Share of bursts locked at the end of the burst against {key}, of {members[0].count:,} each. "
         "Bands: 95 % intervals."

@@ -12,6 +12,7 @@ from radarsim.exact import burst as exact
 from radarsim.filters import discriminator as schedules
 from radarsim.filters import discriminator_plan as plans
 from radarsim.kernels import discriminator as kernels
+from radarsim.kernels import discriminator_sums as sums_of
 from radarsim.kernels.discriminator_data import BLOCK_SUMS, DEMODULATED, SAMPLES
 from radarsim.kernels.discriminator_scoring import SIZE
 from radarsim.models import burst as model
@@ -25,7 +26,7 @@ FILTERS = {
 BLOCK = 64  # 20 ms with nine estimators on block sums, half a second with two on samples
 MODES = {"block_sums": BLOCK_SUMS, "samples": SAMPLES, "demodulated": DEMODULATED}
 BLOCKS_PER_WINDOW = {BLOCK_SUMS: 16, SAMPLES: 16, DEMODULATED: 32}  # 0.016 and 0.024 potential σ from every sample's
-LOCKS = 6  # see kernels.discriminator.accumulate
+LOCKS = 6  # see kernels.discriminator_sums.accumulate
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,7 @@ def prepare(case: Case) -> Plan:
             error=(count, most, size, 4),
             error_all=(count, most, size, 4),
             locks=(count, most, LOCKS),
-            residuals=(count, most, size, kernels.BINS),
+            residuals=(count, most, size, sums_of.BINS),
             passes=(count, 2),
         ),
         axes=axes(spec, burst, windows, phase, sigma, potential, posterior),
@@ -224,7 +225,7 @@ def axes(spec, burst, windows, phase: Phase, sigma, potential, posterior) -> Axe
             "potential_closed_form": exact.spreads(whole),
             "potential_covariance": model.balanced_inverse(whole),
             "energy_ratio": exact.energy_ratio(burst, 1.0) * durations,
-            "bin_edges": kernels.bin_edges(),
+            "bin_edges": sums_of.bin_edges(),
             "burst_s": burst.duration_s,
             "shortest_window_s": exact.shortest_window(burst),
             "model_error_turns": float(np.sqrt(np.mean((phase.turns - phase.reference) ** 2))),
@@ -243,7 +244,7 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
     errors, passes = estimate(plan, first, count)
     sums = {name: np.zeros(shape) for name, shape in plan.layout.shapes.items()}
-    kernels.accumulate(
+    sums_of.accumulate(
         errors,
         plan.layout.shapes["error"][2],
         plan.options,

@@ -79,20 +79,14 @@ def test_each_designed_window_is_the_longest_safe_one():
 def test_hand_overs_of_the_paper_are_less_safe_than_designed():
     """The factor 3 gives 0.978 a hand-over, not 0.99: the form is one chi-square, not a Gaussian."""
     d, windows = designer(), designer().windows()
-    lost = [
-        filters.tail_probability(d.handover(a * 1e-5, b * 1e-5)[0], 1.0)
-        for a, b in itertools.pairwise(windows)
-    ]
+    lost = [filters.tail_probability(d.handover(a * 1e-5, b * 1e-5)[0], 1.0) for a, b in itertools.pairwise(windows)]
     assert np.median(lost) == pytest.approx(0.022, abs=0.001)
 
 
 def test_exact_tail_keeps_its_probability():
     d = designer(tail="exact", probability=0.999)
     windows = d.windows()
-    lost = [
-        filters.tail_probability(d.handover(a * 1e-5, b * 1e-5)[0], 1.0)
-        for a, b in itertools.pairwise(windows)
-    ]
+    lost = [filters.tail_probability(d.handover(a * 1e-5, b * 1e-5)[0], 1.0) for a, b in itertools.pairwise(windows)]
     assert max(lost[:-1]) == pytest.approx(1e-3, rel=0.05)
     assert len(windows) == 16
 

@@ -6,6 +6,7 @@ import pytest
 from radarsim.kernels import discriminator as kernels
 from radarsim.kernels import discriminator_data as data
 from radarsim.kernels import discriminator_scoring as scoring
+from radarsim.kernels import discriminator_sums as added
 from radarsim.kernels.compile import kernel
 from radarsim.kernels.random import stream
 from radarsim.models import burst as model
@@ -201,12 +202,12 @@ def test_noise_of_samples_is_white():
 
 
 def test_bins_are_quarter_octaves():
-    edges = kernels.bin_edges()
-    assert len(edges) == kernels.BINS + 1
+    edges = added.bin_edges()
+    assert len(edges) == added.BINS + 1
     ratios = np.exp(np.random.default_rng(4).uniform(np.log(edges[0]), np.log(edges[-1]), 1000))
-    assert np.array_equal([kernels.bin_of(r) for r in ratios], np.searchsorted(edges, ratios, side="right") - 1)
-    assert kernels.bin_of(0.0) == 0
-    assert kernels.bin_of(1e300) == kernels.BINS - 1
+    assert np.array_equal([added.bin_of(r) for r in ratios], np.searchsorted(edges, ratios, side="right") - 1)
+    assert added.bin_of(0.0) == 0
+    assert added.bin_of(1e300) == added.BINS - 1
 
 
 def test_sums_of_errors_against_numpy():
@@ -217,8 +218,8 @@ def test_sums_of_errors_against_numpy():
     errors = rng.normal(0, 2.5, (n, 2, 4, 6))
     potential, posterior = rng.uniform(0.5, 2, (2, 2, 4, 6))
     error, every = np.zeros((2, 2, 4, size, 4))
-    locks, residuals = np.zeros((2, 4, 6)), np.zeros((2, 4, size, kernels.BINS))
-    kernels.accumulate(errors, size, options, potential, posterior, error, every, locks, residuals)
+    locks, residuals = np.zeros((2, 4, 6)), np.zeros((2, 4, size, added.BINS))
+    added.accumulate(errors, size, options, potential, posterior, error, every, locks, residuals)
     for f, windows in enumerate((4, 2)):
         ratio, narrow = errors[:, f, :windows, :size] / potential[f, :windows, :size], None
         narrow = np.abs(errors[:, f, :windows, :size] / posterior[f, :windows, :size]).max(axis=2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radarsim import experiment
-from radarsim.kernels.discriminator import bin_edges, bin_of
+from radarsim.kernels.discriminator_sums import bin_edges, bin_of
 from radarsim.report import discriminator as report
 from radarsim.report.claims import discriminator as claims
 from radarsim.report.claims import discriminator_measures as measures
