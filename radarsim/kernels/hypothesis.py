@@ -9,13 +9,14 @@ import numpy as np
 
 from radarsim.kernels.blocks import (
     dot,
-    inverse,
+    factored,
     predicted_axis,
     predicted_cross,
     predicted_own,
+    scaled,
     shrunk_cross,
     shrunk_own,
-    times_symmetric,
+    whitened,
 )
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import full, get, put, row, rows, where_greater
@@ -199,27 +200,26 @@ def advanced(work, listed, count, target, model, result, plot, noise):
     x, y, z = predicted_axis(means[0], f), predicted_axis(means[1], f), predicted_axis(means[2], f)
 
     r = get6(noise, 0)
-    i, determinant = inverse((a[0] + r[0], d[0] + r[1], e[0] + r[2], b[0] + r[3], g[0] + r[4], c[0] + r[5]))
+    lower, i, determinant = factored((a[0] + r[0], d[0] + r[1], e[0] + r[2], b[0] + r[3], g[0] + r[4], c[0] + r[5]))
     detected = get(plot, 9)
-    i = i[0] * detected, i[1] * detected, i[2] * detected, i[3] * detected, i[4] * detected, i[5] * detected
-    innovation = get(plot, 0) - x[0], get(plot, 1) - y[0], get(plot, 2) - z[0]
-    v = times_symmetric(innovation, i)
-    put(work, result, dot(innovation, v))
+    i = i[0] * detected, i[1] * detected, i[2] * detected
+    v = whitened((get(plot, 0) - x[0], get(plot, 1) - y[0], get(plot, 2) - z[0]), lower)
+    put(work, result, dot(scaled(v, i), v))
     put(work, result + 1, where_greater(detected, full(0.5), determinant, full(1.0)))
 
-    # Rows of P H': the columns of P that belong to the three coordinates.
-    hx = (a[0], d[0], e[0]), (a[1], d[3], e[3]), (a[2], d[6], e[6])
-    hy = (d[0], b[0], g[0]), (d[1], b[1], g[3]), (d[2], b[2], g[6])
-    hz = (e[0], g[0], c[0]), (e[1], g[1], c[1]), (e[2], g[2], c[2])
-    gx = times_symmetric(hx[0], i), times_symmetric(hx[1], i), times_symmetric(hx[2], i)
-    gy = times_symmetric(hy[0], i), times_symmetric(hy[1], i), times_symmetric(hy[2], i)
-    gz = times_symmetric(hz[0], i), times_symmetric(hz[1], i), times_symmetric(hz[2], i)
+    # Rows of P H', the columns of P that belong to the three coordinates, whitened: P H' S⁻¹ H P is their product.
+    hx = whitened((a[0], d[0], e[0]), lower), whitened((a[1], d[3], e[3]), lower), whitened((a[2], d[6], e[6]), lower)
+    hy = whitened((d[0], b[0], g[0]), lower), whitened((d[1], b[1], g[3]), lower), whitened((d[2], b[2], g[6]), lower)
+    hz = whitened((e[0], g[0], c[0]), lower), whitened((e[1], g[1], c[1]), lower), whitened((e[2], g[2], c[2]), lower)
+    gx = scaled(hx[0], i), scaled(hx[1], i), scaled(hx[2], i)
+    gy = scaled(hy[0], i), scaled(hy[1], i), scaled(hy[2], i)
+    gz = scaled(hz[0], i), scaled(hz[1], i), scaled(hz[2], i)
     written(
         target,
         (
-            (x[0] + dot(hx[0], v), x[1] + dot(hx[1], v), x[2] + dot(hx[2], v)),
-            (y[0] + dot(hy[0], v), y[1] + dot(hy[1], v), y[2] + dot(hy[2], v)),
-            (z[0] + dot(hz[0], v), z[1] + dot(hz[1], v), z[2] + dot(hz[2], v)),
+            (x[0] + dot(gx[0], v), x[1] + dot(gx[1], v), x[2] + dot(gx[2], v)),
+            (y[0] + dot(gy[0], v), y[1] + dot(gy[1], v), y[2] + dot(gy[2], v)),
+            (z[0] + dot(gz[0], v), z[1] + dot(gz[1], v), z[2] + dot(gz[2], v)),
         ),
         (shrunk_own(a, gx, hx), shrunk_own(b, gy, hy), shrunk_own(c, gz, hz)),
         (shrunk_cross(d, gx, hy), shrunk_cross(e, gx, hz), shrunk_cross(g, gy, hz)),

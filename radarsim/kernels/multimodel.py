@@ -26,6 +26,7 @@ from radarsim.kernels.lanes import any_greater, exponential, full, get, put, roo
 
 KALMAN, GPB1, IMM, GPB2 = range(4)
 MOMENT, BEST, COMBINED, MODIFIED = range(4)
+CREDIBLE = 1e-100
 
 
 # ---- merging rules: maps of weights --------
@@ -112,8 +113,13 @@ def smaller(x, y):
 
 @inline
 def likelihood(work, least, result):
-    """Density of the innovation in rows result, result + 1, relative to exp(-least / 2) (eq. 9)."""
-    return exponential(0.5 * (least - get(work, result))) / root(get(work, result + 1))
+    """Density of the innovation in rows result, result + 1, relative to exp(-least / 2) (eq. 9).
+
+    `least` is of what had more than a probability of CREDIBLE; what had less may be relatively likelier, up to exp 200.
+    So the sum of all weights can neither vanish nor overflow, however far a plot lies from every hypothesis.
+    """
+    x, most = 0.5 * (least - get(work, result)), full(200.0)
+    return exponential(smaller(x, most)) / root(get(work, result + 1))
 
 
 @part
@@ -143,7 +149,7 @@ def step(work, listed, old, new, size, family, rule, plot, noise):
             advanced(work, listed, count, row(work, to), model, result, plot, noise)
             q = get(work, result)
             surprise, top = where_greater(w, top, q, surprise), where_greater(w, top, w, top)
-            least = where_greater(w, nothing, smaller(least, q), least)
+            least = where_greater(w, full(CREDIBLE), smaller(least, q), least)
         if family == GPB2:
             c = group_likelihood(work, size, least)
             put(work, RESULT_GROUP + 2 * i, least)

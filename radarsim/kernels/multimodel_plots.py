@@ -18,6 +18,7 @@ NORMALS, UNIFORMS = 3 * STRIP, STRIP
 RANDOM = NORMALS + UNIFORMS  # rows of random numbers of a strip
 BICONICAL, CARTESIAN = 0, 1
 FRAME = 18  # numbers of an antenna, see `frame`
+NEARLY_OUTSIDE = 0.1  # cosine of the angle from the normal under which no prediction's covariance is used
 LEAST = 1e-6  # least squared cosine of the angle from the antenna's normal: nearer to its plane a plot is missed
 
 
@@ -134,9 +135,11 @@ def make_plots(random, frame, truth, scan, scans, certain, plots):
 
 
 @part
-def noise_at_prediction(frame, mean, wait, noise):
-    """Covariance (6 rows at `noise`) of a plot where the estimate `mean` (9 rows) is extrapolated to over `wait`,
-    eq. (10)."""
+def noise_at_prediction(frame, mean, wait, at_plot, noise):
+    """Covariance (6 rows at `noise`) of a plot where the estimate `mean` (9 rows) is extrapolated to over `wait`.
+
+    Where that lies outside the sector, or nearly so, the covariance at the plot (6 rows at `at_plot`) stands. Eq. (10).
+    """
     half = 0.5 * wait * wait
     a = get(mean, 0) + wait * get(mean, 1) + half * get(mean, 2)
     b = get(mean, 3) + wait * get(mean, 4) + half * get(mean, 5) - frame[12]
@@ -145,13 +148,14 @@ def noise_at_prediction(frame, mean, wait, noise):
     y = frame[1] * a + frame[4] * b + frame[7] * c
     z = frame[2] * a + frame[5] * b + frame[8] * c
     r = root(x * x + y * y + z * z)
-    scale, least, one = 1.0 / r, full(LEAST), full(1.0)
-    sine_e, sine_a, u = y * scale, z * scale, x * scale
-    u = where_greater(u, least, u, least)
-    cosine_e, cosine_a = root(one - sine_e * sine_e), root(one - sine_a * sine_a)
-    p = covariance(frame, r, sine_e, cosine_e, sine_a, cosine_a, u)
+    scale, least, one = 1.0 / r, full(NEARLY_OUTSIDE), full(1.0)
+    sine_e, sine_a, seen = y * scale, z * scale, x * scale
+    inside = where_greater(seen, least, one, full(0.0))
+    sine_e, sine_a = sine_e * inside, sine_a * inside
+    u = where_greater(seen, least, seen, one)
+    p = covariance(frame, r, sine_e, root(one - sine_e * sine_e), sine_a, root(one - sine_a * sine_a), u)
     for i in range(6):
-        put(noise, i, p[i])
+        put(noise, i, where_greater(inside, full(0.5), p[i], get(at_plot, i)))
 
 
 @kernel

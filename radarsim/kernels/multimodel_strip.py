@@ -196,7 +196,7 @@ def run_strip(
             numbers[1] = interval
         if rules[3] == 1:
             noise = row(work, NOISE)
-            noise_at_prediction(frame, row(work, ESTIMATE), get(work, WAIT), noise)
+            noise_at_prediction(frame, row(work, ESTIMATE), get(work, WAIT), row(plot, 3), noise)
         put(work, MERGED, full(0.0))
         put(work, MERGED + 1, full(0.0))
         old, new = numbers[0] * BANK, (1 - numbers[0]) * BANK

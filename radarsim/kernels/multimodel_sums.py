@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.blocks import dot, inverse, times_symmetric
+from radarsim.kernels.blocks import dot, factored, scaled, whitened
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.hypothesis import (
     INNOVATION,
@@ -37,8 +37,9 @@ def believed_error(out, e):
         get(out, POSITION + 2),
         get(out, VARIANCE + 6),
     )
-    i, _ = inverse(p)
-    return dot(times_symmetric(e, i), e)
+    lower, i, _ = factored(p)
+    e = whitened(e, lower)
+    return dot(scaled(e, i), e)
 
 
 @part

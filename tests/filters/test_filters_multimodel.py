@@ -85,12 +85,12 @@ def test_operations_are_those_of_the_formulas():
         of["predicted_cross"]((x,) * 9, (x,) * 5)
     assert Counted.count == filters.PREDICT
     Counted.count = 6 + 3  # S = H P H' + R; the innovation
-    of["inverse"]((x,) * 6)
-    v = of["times_symmetric"]((x,) * 3, (x,) * 6)
-    of["dot"]((x,) * 3, v)
+    of["factored"]((x,) * 6)
+    v = of["whitened"]((x,) * 3, (x,) * 3)
+    of["dot"](of["scaled"](v, (x,) * 3), v)
     for _ in range(9):
-        of["times_symmetric"]((x,) * 3, (x,) * 6)
-        _ = x + of["dot"]((x,) * 3, v)
+        y = of["whitened"]((x,) * 3, (x,) * 3)
+        _ = x + of["dot"](of["scaled"](y, (x,) * 3), v)
     for _ in range(45):
         of["shrunk"](x, (x,) * 3, (x,) * 3)
     assert Counted.count == filters.UPDATE

@@ -282,3 +282,10 @@ def test_a_track_of_two_plots_has_no_estimate():
     columns = multimodel.PLOT_COLUMNS(case.case.spec)[0]
     track = multimodel.track(case.case, dict(zip(columns, [np.arange(2.0), *np.full((3, 2), 0.1)], strict=True)))
     assert np.isnan(track.estimate).all()
+
+
+def test_coarse_angles_err_but_stay_finite():
+    sensor = {**SENSOR, "scan_period_s": 0.05, "sigma_elevation_deg": 3, "sigma_azimuth_deg": 3, "antenna_height_m": 0}
+    filters = [FILTERS[0], FILTERS[1], {**FILTERS[0], "name": "there", "covariance_at": "prediction"}]
+    case = work(sensor=sensor, filters=filters, target="ballistic", scans=1500)
+    assert np.isfinite(case.simulate(0, 16)).all()
