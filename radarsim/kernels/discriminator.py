@@ -55,6 +55,7 @@ OPTIONS = np.dtype(
         ("margin", np.float64),  # standard errors of the coherence below one that start the search
         ("from_truth", np.int64),
         ("amplitude", np.int64),  # 0: known, 1: estimated by (7), 2: as (7) is printed
+        ("forecast", np.int64),  # 0: an estimator that uses none, and is started elsewhere; see `polish`
     ],
     align=True,
 )
@@ -269,6 +270,8 @@ def estimate_block(
         else:
             draw_sums(keys[0], first + i, mean, factor, sums)
         for e in range(options.size):
+            if not options[e].forecast:
+                continue
             state.amplitude = physics.amplitude
             if options[e].amplitude > 0:
                 state.amplitude = estimated_amplitude(physics, samples, options[e].amplitude)

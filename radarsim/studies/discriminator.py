@@ -288,7 +288,8 @@ def _follow_ridges(plan: Plan, f: int, first: int, errors: np.ndarray, passes: n
     """The classical rival's errors and passes: its start is found outside the kernels, burst by burst."""
     from radarsim.filters.ridge import Ridge
 
-    physics, clean = plan.world.physics, plan.world.clean
+    physics, clean = plan.world.physics.copy(), plan.world.clean
+    physics["mode"] = SAMPLES
     follow = Ridge(int(physics["pulses"]), plan.layout.shapes["error"][2])
     samples = np.empty(clean.shape)
     for i in range(len(errors)):

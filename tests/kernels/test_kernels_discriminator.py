@@ -148,6 +148,20 @@ def test_score_of_blocks_is_nearly_that_of_samples(theta, complex_samples):
     assert np.abs(found[2] - found[0]).max() > 20
 
 
+def test_blocks_keep_the_information_of_the_bend_within_them():
+    """Without noise, sixteen blocks: the gradient away from the reference is that of the samples to a few in 10⁴."""
+    burst = model.Burst(10e9, 1e-5, 1e-6, 1e-6, 3200, 1.0, 1e-12, True)
+    _, u, _, physics, sums = demodulated(burst, THETA, THETA, per_block=200)
+    window, state = window_of(burst, 3200, 16), np.zeros(1, scoring.STATE)[0]
+    state["amplitude"], found = 1.0, []
+    for mode in (kernels.SAMPLES, kernels.BLOCK_SUMS):
+        physics["mode"] = mode
+        state["x"] = turns(THETA, burst) + np.array([0, 0, 0, 0, 0.01, 0])
+        kernels.evaluate(physics, rows(u), sums, window, state)
+        found.append(np.array(state["out"][2:7]))
+    assert found[1] == pytest.approx(found[0], rel=6e-4)
+
+
 @pytest.mark.parametrize("theta", [THETA, SLOW])
 @pytest.mark.parametrize("complex_samples", [False, True])
 def test_drawn_sums_have_the_law_of_demodulated_samples(theta, complex_samples):

@@ -240,8 +240,9 @@ def test_several_samples_a_pulse():
 
 
 @pytest.mark.parametrize("samples", ["real", "complex"])
-def test_the_rival_locks_without_a_prior(samples):
-    plan = plan_of({"name": "ridge", "method": "ridge"}, engine="samples", burst={"samples": samples})
+@pytest.mark.parametrize("engine", ["samples", "demodulated"])
+def test_the_rival_locks_without_a_prior(samples, engine):
+    plan = plan_of({"name": "ridge", "method": "ridge"}, engine=engine, burst={"samples": samples})
     ratio, lock = final(plan, 0, 12)
     assert lock.all()
     assert np.sqrt(np.mean(ratio**2)) < 1.6
