@@ -1,5 +1,5 @@
 """`python -m radarsim` is the command `radarsim`."""
 
-from radarsim.cli import main
+from radarsim.cli import entry
 
-main()
+entry()

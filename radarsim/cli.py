@@ -1,33 +1,49 @@
 """The command `radarsim`: parse, call one function, print. Heavy imports wait inside the commands."""
 
 import os
+import signal
 import sys
 
 import click
 
 import radarsim
-from radarsim.errors import Interrupted, RadarsimError
+from radarsim.errors import Interrupted, RadarsimError, StoreError
 
 SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 
 
 class Commands(click.Group):
-    """Commands in the order of their definition; our own errors become lines on stderr and an exit code."""
+    """Commands in the order of their definition; faults become lines on stderr and an exit code, never a traceback."""
 
     def list_commands(self, ctx):
         return list(self.commands)
 
     def invoke(self, ctx):
         try:
-            return super().invoke(ctx)
+            result = super().invoke(ctx)
+            sys.stdout.flush()
+            return result
         except RadarsimError as error:
-            for line in dict.fromkeys(error.lines):
-                click.echo(line, err=True)
-            if isinstance(error, Interrupted):
-                # The interpreter's orderly end takes most of a second, which whoever sent the signal need not wait for.
-                sys.stdout.flush()
-                os._exit(error.exit_code)
-            sys.exit(error.exit_code)
+            fail(error)
+        except KeyboardInterrupt:
+            fail(Interrupted(signal.SIGINT))
+        except BrokenPipeError:
+            # The reader of our output has seen enough (`| head`): no fault of anybody's.
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+            sys.exit(0)
+        except OSError as error:
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+            fail(StoreError(f"{error.filename or 'output'}: cannot be written: {error.strerror or error}"))
+
+
+def fail(error: RadarsimError) -> None:
+    """Tell a fault, a line each, and leave with its exit code."""
+    for line in dict.fromkeys(error.lines):
+        click.echo(line, err=True)
+    if isinstance(error, Interrupted):
+        # The interpreter's orderly end takes most of a second, which whoever sent the signal need not wait for.
+        os._exit(error.exit_code)
+    sys.exit(error.exit_code)
 
 
 class Count(click.ParamType):
@@ -36,13 +52,25 @@ class Count(click.ParamType):
     name = "N"
 
     def convert(self, value, param, ctx):
+        text = str(value)
         try:
-            number = float(value)
+            number = float(text) if text.isascii() and "_" not in text else float("nan")
         except ValueError:
             number = float("nan")
         if not number.is_integer() or number < 0:
             self.fail(f"must be a whole number such as 1000 or 1e5, got {value!r}", param, ctx)
-        return int(value) if str(value).isdigit() else int(number)
+        return int(text) if text.isdigit() else int(number)
+
+
+def entry():
+    """The console script: `main` with streams that are there and can hold every character."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+    main()
 
 
 @click.group(cls=Commands, context_settings=SETTINGS)
@@ -94,11 +122,12 @@ def run(configs, realisations, seed, overrides, threads, out, no_figures, quiet)
       radarsim run range_doppler -n 1e6 --threads 2
       radarsim run rls2 --set radar.sigma_range_m=300 --set filters.0.manoeuvre_variance=1e-4
     """
-    from radarsim import console, experiment
     from radarsim.engine.stopping import Signals
 
-    overrides = experiment.merged(overrides, realisations, seed)
     with Signals() as stop:
+        from radarsim import console, experiment
+
+        overrides = experiment.merged(overrides, realisations, seed)
         for one in experiment.load_all(configs, overrides):
             with console.Progress(one.stem, quiet=quiet) as progress:
                 result = experiment.run(
@@ -227,4 +256,4 @@ def schema():
 
 
 if __name__ == "__main__":
-    main()
+    entry()

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 SILENT_S = 2.0  # a run shorter than this shows no progress
-PIPED_WIDTH = 160
+PIPED_WIDTH = 10_000  # whatever reads it wraps it, or not
 MOST_ROWS = 36  # of the last scan's table; a larger experiment speaks by its answer and files
 
 
@@ -69,23 +69,39 @@ def plural(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
-def show(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], right: Sequence[str] = ()) -> None:
-    """Print one table; the columns named in `right` are aligned right."""
+def show(
+    title: str,
+    columns: Sequence[str],
+    rows: Sequence[Sequence[object]],
+    right: Sequence[str] = (),
+    spare: Sequence[str] = (),
+) -> None:
+    """Print one table; columns in `right` are aligned right, those in `spare` left out on a narrow terminal."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
 
+    screen, cells = console(), [[printable(str(cell)) for cell in row] for row in rows]
+    shown = fitting(columns, cells, spare, screen.width)
     terminal = sys.stdout.isatty()
     table = Table(title=title or None, title_justify="left", box=box.SIMPLE_HEAD if terminal else None, pad_edge=False)
-    for column in columns:
-        table.add_column(column, justify="right" if column in right else "left", no_wrap=not terminal)
-    for row in rows:
-        table.add_row(*(Text(printable(str(cell))) for cell in row))
-    screen = console()
+    for i in shown:
+        table.add_column(columns[i], justify="right" if columns[i] in right else "left", no_wrap=not terminal)
+    for row in cells:
+        table.add_row(*(Text(row[i]) for i in shown))
     with screen.capture() as captured:
         screen.print(table)
     for line in captured.get().rstrip("\n").split("\n"):
         sys.stdout.write(line.rstrip() + "\n")
+
+
+def fitting(columns: Sequence[str], cells: Sequence[Sequence[str]], spare: Sequence[str], width: int) -> list[int]:
+    """The places of the columns that fit into a width, the spare ones left out one by one."""
+    wide = [max(len(text) for text in (name, *(row[i] for row in cells))) for i, name in enumerate(columns)]
+    places, leave = list(range(len(columns))), list(spare)
+    while leave and sum(wide[i] + 2 for i in places) > width:
+        places.remove(list(columns).index(leave.pop(0)))
+    return places
 
 
 def printable(text: str) -> str:
@@ -137,7 +153,7 @@ def show_last_scan(curves, gains) -> None:
         for row in last.itertuples()
     ]
     columns = ("case", "filter", "component", "at", "sigma", "95 %", "exact", "gain", "95 % of gain")
-    show("", columns, rows, right=columns[3:])
+    show("", columns, rows, right=columns[3:], spare=("95 % of gain", "exact", "95 %", "gain"))
 
 
 def known(value: float, form: str) -> str:

@@ -129,8 +129,10 @@ class Result:
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader of the numbers must know: damaged or mixed blocks."""
-        return self.facts["warnings"]
+        """What a reader of the numbers must know: damaged or mixed blocks, too few realisations."""
+        from radarsim.report import provenance
+
+        return [*self.facts["warnings"], *provenance.few(self.cases)]
 
 
 def run(
@@ -186,7 +188,8 @@ def repeated(experiment: Experiment, overrides: Sequence[str]) -> dict[str, str]
 def command(experiment: Experiment, overrides: Sequence[str], out: str | os.PathLike) -> str:
     """The command that runs an experiment; a shipped config by its stem."""
     shipped = experiment.path and Path(experiment.path).resolve().is_relative_to(lookup.SHIPPED.resolve())
-    words = ["radarsim", "run", experiment.stem if shipped else str(experiment.path)]
+    path = os.fsencode(experiment.path or "").decode("utf-8", "backslashreplace")
+    words = ["radarsim", "run", experiment.stem if shipped else path]
     for override in overrides:
         key, _, value = override.partition("=")
         words += [SHORT[key], value] if key in SHORT else ["--set", override]
@@ -302,8 +305,11 @@ def _stored_claims(path: Path):
     import pandas as pd
 
     try:
-        return pd.read_csv(path, keep_default_na=False)
+        table = pd.read_csv(path, keep_default_na=False)
     except FileNotFoundError:
         return None
     except (OSError, ValueError) as error:
         raise StoreError(f"{path}: cannot be read: {error}") from error
+    if not {"claim", "verdict", "measured", "overall"} <= set(table.columns):
+        raise StoreError(f"{path}: is no table of claims; `radarsim report` makes it anew")
+    return table

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import re
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from radarsim.cli import main
+from radarsim.console import fitting
 
 CURVES = "case,filter,component,unit,k,t_s,n,sigma,sigma_lo,sigma_hi,bias,bias_se,spread,exact_sigma"
 GAINS = "case,filter,baseline,component,k,t_s,gain_percent,gain_lo,gain_hi,exact_percent"
@@ -236,4 +238,52 @@ def test_claims_of_a_config_not_yet_run_are_listed_as_such(tmp_path):
 def test_the_command_that_computes_what_is_missing_is_whole(tmp_path):
     arguments = ("rls3", "-n", 500, "--seed", 4, "--set", "radar.sigma_range_m=300", "--out", tmp_path)
     result = radarsim("report", *arguments, code=2)
-    assert f"radarsim run rls3 --set radar.sigma_range_m=300 -n 500 --seed 4 --out {tmp_path}" in result.stderr
+    assert f"rls3.yaml --set radar.sigma_range_m=300 -n 500 --seed 4 --out {tmp_path}`" in result.stderr
+
+
+def test_a_spoiled_table_of_claims_is_told(tmp_path):
+    (tmp_path / "rls2").mkdir()
+    (tmp_path / "rls2" / "claims.csv").write_text("garbage\n")
+    assert "is no table of claims" in radarsim("claims", "rls2", "--out", tmp_path, code=4).stderr
+
+
+def command(*arguments, **options):
+    """The console script in a process of its own."""
+    return subprocess.run([sys.executable, "-m", "radarsim", *arguments], capture_output=True, check=False, **options)
+
+
+def test_output_that_cannot_be_written_and_output_that_nobody_reads():
+    shell = f"{sys.executable} -m radarsim list"
+    full = subprocess.run(f"{shell} > /dev/full", shell=True, capture_output=True, check=False)
+    assert full.returncode == 4
+    assert b"No space left" in full.stderr
+    closed = subprocess.run(f"{shell} >&-", shell=True, capture_output=True, check=False)
+    assert (closed.returncode, closed.stderr) == (0, b"")
+    piped = subprocess.run(
+        ["bash", "-c", f"{shell} | head -1; exit ${{PIPESTATUS[0]}}"], capture_output=True, check=False
+    )
+    assert (piped.returncode, piped.stderr) == (0, b"")
+
+
+def test_streams_that_know_no_greek(tmp_path):
+    environment = {**os.environ, "PYTHONIOENCODING": "latin-1"}
+    arguments = ("run", "rls2", "-n", "200", "--no-figures", "--out", str(tmp_path))
+    finished = command(*arguments, env=environment)
+    assert (finished.returncode, finished.stderr) == (0, b"")
+
+
+def test_a_path_that_is_no_text(tmp_path):
+    folder = os.fsencode(tmp_path) + b"/d\xe9"
+    os.mkdir(folder)
+    with open(folder + b"/rls2.yaml", "wb") as file:
+        file.write(Path("configs/rls2.yaml").read_bytes())
+    finished = command("run", folder + b"/rls2.yaml", "-n", "100", "--no-figures", "--quiet", "--out", str(tmp_path))
+    assert (finished.returncode, finished.stderr) == (0, b"")
+
+
+def test_narrow_terminals_lose_columns_not_digits():
+    cells = [["rls2", "189.12 m", "188.1 … 190.2"]]
+    columns = ("case", "sigma", "95 %")
+    assert fitting(columns, cells, ("95 %",), 80) == [0, 1, 2]
+    assert fitting(columns, cells, ("95 %",), 20) == [0, 1]
+    assert fitting(columns, cells, (), 5) == [0, 1, 2]

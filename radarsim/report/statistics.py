@@ -115,7 +115,9 @@ def gain_unpaired(square, fourth, n, base_square, base_fourth, base_n) -> Estima
 
 def _gain(mean_square, base, log_variance, freedom) -> Estimate:
     ratio = np.sqrt(mean_square / base)
-    factor = np.exp(0.5 * student(freedom) * np.sqrt(log_variance))
+    # One realisation tells nothing of its spread: the interval is all there can be.
+    step = np.where(np.asarray(freedom) > 0, 0.5 * student(freedom) * np.sqrt(log_variance), np.inf)
+    factor = np.exp(step)
     return Estimate(100 * (1 - ratio), 100 * (1 - ratio * factor), 100 * (1 - ratio / factor))
 
 
