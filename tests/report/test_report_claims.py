@@ -31,6 +31,12 @@ def test_ranges_from_words():
     assert claims.within(3, 4)[:2] == (3, 4)
 
 
+def test_words_tell_the_range_tested():
+    assert claims.between("10", "50").words == "10 to 50 (9.5 … 50.5)"
+    assert claims.printed("18").words == "18 (17.5 … 18.5)"
+    assert claims.about("10").words == "about 10 (9 … 11)"
+
+
 @pytest.mark.parametrize(
     ("lo", "hi", "said"),
     [
@@ -83,6 +89,10 @@ def test_twenty_five_claims_all_judged(table):
     assert list(dict.fromkeys(table["claim"])) == [f"P1.{n}" for n in range(1, 26)]
     assert ",".join(table.columns[:9]) == "claim,paper,statement,case,measured,lo,hi,expected,verdict"
     assert not table[["statement", "what", "place", "expected"]].eq("").any(axis=None)
+    assert tuple(table.columns[9:11]) == ("expected_lo", "expected_hi")
+    above = table[table["expected"] == "> 50"].iloc[0]
+    assert above["expected_lo"] == 50
+    assert np.isnan(above["expected_hi"])
 
 
 # Claim, case, pattern of what is measured, and the exact value found by another calculation.

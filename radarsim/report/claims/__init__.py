@@ -38,27 +38,32 @@ class Missing(KeyError):
 
 
 class Range(NamedTuple):
-    """The values that the paper's words leave, ends included, and the words."""
+    """The values that the paper's words leave, ends included, and the words with these ends where they widen them."""
 
     lo: float
     hi: float
     words: str
 
 
+def _widened(lo: float, hi: float, words: str) -> Range:
+    """A range whose ends the words alone do not tell: both stand in them."""
+    return Range(lo, hi, f"{words} ({lo:.6g} … {hi:.6g})")
+
+
 def printed(text: str) -> Range:
     """A printed number: values that round to its last digit."""
     half = 0.5 * 10.0 ** -(len(text.partition(".")[2]))
-    return Range(float(text) - half, float(text) + half, text)
+    return _widened(float(text) - half, float(text) + half, text)
 
 
 def between(low: str, high: str) -> Range:
     """A printed range, each end with its rounding."""
-    return Range(printed(low).lo, printed(high).hi, f"{low} to {high}")
+    return _widened(printed(low).lo, printed(high).hi, f"{low} to {high}")
 
 
 def about(low: str, high: str | None = None) -> Range:
     """A positive number or range with "about": 10 % beyond it."""
-    return Range(0.9 * float(low), 1.1 * float(high or low), f"about {low}" + (f" to {high}" if high else ""))
+    return _widened(0.9 * float(low), 1.1 * float(high or low), f"about {low}" + (f" to {high}" if high else ""))
 
 
 def above(value: float) -> Range:
@@ -245,7 +250,7 @@ def overall(verdicts: Sequence[str]) -> str:
 
 CLAIMED = (
     *("claim", "paper", "statement", "case", "measured", "lo", "hi", "expected", "verdict"),
-    *("what", "unit", "place", "reading", "overall"),
+    *("expected_lo", "expected_hi", "what", "unit", "place", "reading", "overall"),
 )
 
 
@@ -270,10 +275,16 @@ def _rows(claim: Claim, evidence: Evidence) -> list[tuple]:
     return [
         (
             *(claim.id, PAPERS[claim.paper], claim.statement, case, float(of.value), float(of.lo), float(of.hi)),
-            *(part.expected.words, said, part.what, part.unit, claim.place, claim.reading, overall(verdicts)),
+            *(part.expected.words, said, _end(part.expected.lo), _end(part.expected.hi)),
+            *(part.what, part.unit, claim.place, claim.reading, overall(verdicts)),
         )
         for part, case, of, said in zip(claim.parts, cases, measured, verdicts, strict=True)
     ]
+
+
+def _end(value: float) -> float:
+    """An end of a range as a table holds it: at twelve digits, not-a-number where there is none."""
+    return float(f"{value:.12g}") if math.isfinite(value) else math.nan
 
 
 def all_claims() -> list[Claim]:
