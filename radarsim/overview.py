@@ -10,6 +10,9 @@ from radarsim.config.load import Experiment
 from radarsim.engine.executors import available_cores
 
 
+PILOT_S = 0.3
+
+
 @dataclass(frozen=True)
 class CaseOutlook:
     """What running a case would take: labels, counts, seconds of one thread's work."""
@@ -32,20 +35,30 @@ class Outlook:
 
 
 def outlook(experiment: Experiment, threads: int | None = None) -> Outlook:
-    """Time one block of every case, compiled beforehand, and say what the whole would take."""
+    """Prepare every case and time a few realisations of it, compiled beforehand, and say what the whole would take."""
     threads = threads or available_cores()
-    cases, largest = [], 0
+    cases, largest, preparing = [], 0, 0.0
     for case in experiment.cases:
         work = studies.CaseWork(case)
-        count = min(work.block, case.realisations)
-        work.simulate(0, count)
-        seconds = min(timed(work, count) for _ in range(3)) / count * case.realisations
+        work.simulate(0, 1)
+        started = time.perf_counter()
+        studies.study(case.study).prepare(case)
+        preparing += time.perf_counter() - started
+        seconds = seconds_each(work, case.realisations) * case.realisations
         axes = work.plan.axes
         cases.append(CaseOutlook(case.name, ", ".join(axes.filters), len(axes.k), case.realisations, seconds))
         largest = max(largest, work.size)
     # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter and its libraries.
     memory = 200 + 8e-6 * largest * (2 * threads + 32)
-    return Outlook(tuple(cases), threads, sum(c.seconds for c in cases) / threads, memory)
+    return Outlook(tuple(cases), threads, preparing + sum(c.seconds for c in cases) / threads, memory)
+
+
+def seconds_each(work: studies.CaseWork, realisations: int) -> float:
+    """Seconds of one thread for one realisation: of a block, or of as many as a third of a second allows."""
+    alone = timed(work, 1)
+    count = work.block if alone * work.block < PILOT_S else max(1, int(PILOT_S / alone))
+    count = min(count, work.block, realisations)
+    return min(timed(work, count) for _ in range(2)) / count
 
 
 def timed(work: studies.CaseWork, count: int) -> float:

@@ -34,13 +34,19 @@ def error_recursion(
     bias, covariance = np.zeros((scans, 3)), np.zeros((scans, 3, 3))
     covariance[: start - 1, :observes, :observes] = R
     bias[start - 1], covariance[start - 1] = start_errors(weights, truth, sigma)
+    defect = truth[:-1] @ F.T - truth[1:]
+    settled = False
     for k in range(start, scans):
-        K = gains[k, :, :observes]
-        kept = np.eye(3) - K @ H
-        bias[k] = kept @ (F @ (bias[k - 1] + truth[k - 1]) - truth[k])
-        A = kept @ F
-        S = A @ covariance[k - 1] @ A.T + K @ R @ K.T
-        covariance[k] = (S + S.T) / 2
+        if not (settled and np.array_equal(gains[k], gains[k - 1])):
+            K = gains[k, :, :observes]
+            kept = np.eye(3) - K @ H
+            A = kept @ F
+            S = A @ covariance[k - 1] @ A.T + K @ R @ K.T
+            covariance[k] = (S + S.T) / 2
+            settled = np.array_equal(covariance[k], covariance[k - 1])
+        else:  # the covariance is stationary to the last bit while the gain does not change
+            covariance[k] = covariance[k - 1]
+        bias[k] = A @ bias[k - 1] + kept @ defect[k - 1]
     return bias, covariance
 
 

@@ -72,4 +72,7 @@ def design(
         P = joseph @ P @ joseph.T + K @ R @ K.T
         P = (P + P.T) / 2
         gains[k, :, :observes], believed[k] = K, P
+        if np.array_equal(P, believed[k - 1]):  # stationary to the last bit, and so it stays
+            gains[k:], believed[k:] = gains[k], P
+            break
     return LinearFilter(observes, start, weights, gains, believed, available)
