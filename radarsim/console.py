@@ -176,7 +176,7 @@ def print_outlook(experiment, outlook) -> None:
     )
     say(
         f"total    {plural(len(outlook.cases), 'case')}, {sum(c.realisations for c in outlook.cases):,} realisations, "
-        f"about {clock(outlook.seconds)} on {plural(outlook.threads, 'thread')}, {outlook.memory_mb:.0f} MB; "
+        f"{'under a second' if outlook.seconds < 1 else 'about ' + clock(outlook.seconds)} on {plural(outlook.threads, 'thread')}, {outlook.memory_mb:.0f} MB; "
         "figures and tables take some seconds more"
     )
 

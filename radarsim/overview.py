@@ -9,7 +9,6 @@ from radarsim.config import lookup
 from radarsim.config.load import Experiment
 from radarsim.engine.executors import available_cores
 
-
 PILOT_S = 0.3
 
 
