@@ -36,6 +36,7 @@ def page(
         question=question,
         answer=answer,
         record=record,
+        extent=provenance.extent(record),
         claims=claims,
         verdicts=list(counts.items()),
         figures=[_figure(figure, svg) for figure, svg in drawn.values()],
@@ -50,8 +51,11 @@ def command(experiment, record: Mapping) -> str:
     """The command that repeats the run: as the run's facts give it, else by the config."""
     if "command" in record:
         return str(record["command"])
-    asked = f"-n {record['realisations_asked']} --seed {record['seed']}"
-    return f"radarsim run {shlex.quote(str(experiment.path or experiment.stem))} {asked}"
+    words = ["radarsim", "run", shlex.quote(str(experiment.path or experiment.stem))]
+    for flag, key in (("-n", "asked"), ("--seed", "seed")):
+        asked = {case[key] for case in record["cases"].values()}
+        words += [flag, str(*asked)] if len(asked) == 1 else []  # cases that differ have it from the config
+    return " ".join(words)
 
 
 def number(value: object) -> str:

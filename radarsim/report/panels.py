@@ -8,6 +8,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.report.provenance import span
 from radarsim.report.statistics import Z95
 
 WIDE_MM = 120.0  # one panel of many lines
@@ -81,6 +82,11 @@ def families(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
     return found
 
 
+def realisations(results: Sequence[CaseResult]) -> str:
+    """How many realisations stand behind a figure: "100,000 to 200,000 realisations" where its cases differ."""
+    return f"{span([result.count for result in results])} realisations"
+
+
 def unswept(results: Sequence[CaseResult]) -> list[CaseResult]:
     """The cases that nothing is swept in, where there are such; else all."""
     return [result for result in results if not result.swept] or list(results)
@@ -101,9 +107,8 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
     panels = [_sigma_panel(members, curves, component, of) for members in families(results).values()]
     panels = [panel for panel in panels if panel.marks]
     single = len(panels) == 1
-    count = results[0].count if results else 0
     caption = (
-        f"Root-mean-square error of the {of.name} about the truth against time, of {count:,} realisations. "
+        f"Root-mean-square error of the {of.name} about the truth against time, of {realisations(results)}. "
         "Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact values."
     )
     title = f"σ of the {of.name}"
@@ -173,7 +178,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
     base = results[0].axes.filters[results[0].axes.baseline]
     caption = (
         f"Relative gain in σ of the {of.name} against filter {base}, paired on common noise, of "
-        f"{results[0].count:,} realisations. Bands: 95 % intervals. Crosses: exact values. Below zero: a loss."
+        f"{realisations(results)}. Bands: 95 % intervals. Crosses: exact values. Below zero: a loss."
     )
     panel = Panel(Axis(TIME, limits=(0, None)), Axis(f"gain in $\\sigma$ of {of.symbol}, %"), tuple(marks))
     return Figure(
@@ -224,7 +229,7 @@ def dynamic_figure(
         return None
     caption = (
         f"Errors of the {of.name} where the target leaves the filters' model: mean error (dynamic, bias) and standard "
-        f"deviation (fluctuation, spread) of {results[0].count:,} realisations; σ² is the sum of their squares."
+        f"deviation (fluctuation, spread) of {realisations(results)}; σ² is the sum of their squares."
     )
     columns = min(3, len(drawn))
     width = COLUMN_MM if columns == 1 else PAGE_MM

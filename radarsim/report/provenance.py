@@ -13,6 +13,7 @@ from pathlib import Path
 from radarsim.engine.results import CaseResult
 from radarsim.report.statistics import FEW
 
+MOST_SEEDS = 5  # named in a line
 PACKAGES = ("radarsim", "numpy", "numba", "llvmlite", "scipy", "pandas", "matplotlib", "pydantic", "pyyaml")
 
 
@@ -22,7 +23,7 @@ def record(
     """All of run.json but the report's own hash.
 
     run gives the facts of the run (stop reason, threads, times, warnings, identities …), kept as they are; contents
-    are the outputs, by path.
+    are the outputs, by path. Realisations asked and done are sums over the cases, which may differ in both.
     """
     facts = dict(run)
     stop = facts.pop("stop", "done")
@@ -32,8 +33,8 @@ def record(
         "config": experiment.stem,
         "study": experiment.study,
         "answer": list(answer),
-        "realisations_asked": experiment.realisations,
-        "realisations_done": min(done.values(), default=0),
+        "realisations_asked": sum(case.realisations for case in experiment.cases),
+        "realisations_done": sum(done.get(case.name, 0) for case in experiment.cases),
         "cases": {
             case.name: {"asked": case.realisations, "done": done.get(case.name, 0), "seed": case.seed}
             for case in experiment.cases
@@ -71,6 +72,23 @@ def few(results: Sequence[CaseResult]) -> list[str]:
         for result in results
         if result.count < FEW
     ]
+
+
+def extent(record: Mapping) -> str:
+    """Realisations of a case and the seeds in words; how many were asked for only where a case is short of them."""
+    cases = record["cases"].values()
+    done, asked, seeds = (sorted({case[key] for case in cases}) for key in ("done", "asked", "seed"))
+    words = f"{span(done)} realisations{' a case' if len(cases) > 1 else ''}"
+    if any(case["done"] < case["asked"] for case in cases):
+        words += f" of {span(asked)} asked"
+    named = ", ".join(map(str, seeds[:MOST_SEEDS])) + (", …" if len(seeds) > MOST_SEEDS else "")
+    return f"{words}, {'seeds' if len(seeds) > 1 else 'seed'} {named}"
+
+
+def span(counts: Sequence[int]) -> str:
+    """Counts in words: the one there is, or the least to the largest."""
+    low, high = min(counts, default=0), max(counts, default=0)
+    return f"{low:,}" if low == high else f"{low:,} to {high:,}"
 
 
 def to_json(value: object) -> bytes:

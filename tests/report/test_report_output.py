@@ -146,6 +146,18 @@ def test_few_realisations_are_warned_of(experiment, expected_case, tmp_path):
     assert record["realisations_done"] == 10
 
 
+def of_cases(*cases):
+    return {"cases": {str(i): dict(zip(("asked", "done", "seed"), case, strict=True)) for i, case in enumerate(cases)}}
+
+
+def test_extent_in_words():
+    assert provenance.extent(of_cases((10_000, 10_000, 7))) == "10,000 realisations, seed 7"
+    differing = of_cases((100_000, 100_000, 2017), (200_000, 200_000, 1))
+    assert provenance.extent(differing) == "100,000 to 200,000 realisations a case, seeds 1, 2017"
+    short = of_cases((200_000, 100_000, 1), (200_000, 200_000, 1))
+    assert provenance.extent(short) == "100,000 to 200,000 realisations a case of 200,000 asked, seed 1"
+
+
 def test_a_file_is_replaced_whole(tmp_path):
     files.replace_all(tmp_path, {"a/b.txt": b"one"})
     files.replace_all(tmp_path, {"a/b.txt": b"two"})

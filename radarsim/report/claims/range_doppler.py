@@ -147,7 +147,7 @@ CLAIMS = (
             faster_part(
                 *pair,
                 "least difference of range gain, fast − slow, at common times",
-                "%",
+                "points",
                 measured.gain_raised,
                 above(0),
             )
@@ -285,7 +285,7 @@ CLAIMS = (
             Part(
                 (4, 5, 1, 2),
                 f"final {words} gain: least of RLS 4, 5 − largest of RLS 1, 2",
-                "%",
+                "points",
                 measured.least_minus_largest(c, (4, 5), (1, 2), "last", strict=True),
                 above(0),
             )
@@ -295,7 +295,7 @@ CLAIMS = (
             Part(
                 (4, 5, 1, 2, 3),
                 f"largest {words} gain: best of RLS 4, 5 − best of RLS 1, 2, 3",
-                "%",
+                "points",
                 measured.least_minus_largest(c, (4, 5), (1, 2, 3), "largest", strict=False),
                 above(0),
             )
@@ -363,8 +363,8 @@ CLAIMS = (
         24,
         "figures, after figure 2",
         "The velocity gain falls, with transients in RLS 1",
-        *(Part((n,), "velocity gain, end − first", "%", measured.fall(n), below(0)) for n in RADARS),
-        Part((1,), "largest rise of the velocity gain over an earlier scan", "%", measured.rise(1), above(0)),
+        *(Part((n,), "velocity gain, end − first", "points", measured.fall(n), below(0)) for n in RADARS),
+        Part((1,), "largest rise of the velocity gain over an earlier scan", "points", measured.rise(1), above(0)),
         reading="each of the five ends below its first value; RLS 1 rises in between",
     ),
     _claim(
