@@ -32,16 +32,19 @@ class Design:
     forecast: bool = True  # whether the prior is used
 
 
-def block_edges(windows: list[int], per_window: int) -> np.ndarray:
-    """Pulses where blocks begin and end: every window ends one, and none is longer than its time over per_window."""
+def block_edges(windows: list[int], per_window: int, whole: int = 1) -> np.ndarray:
+    """Pulses where blocks begin and end: every window ends one, and none is longer than its time over per_window.
+
+    Long ones are multiples of `whole`: with 8, demodulation fills its registers, at the price of a third more blocks.
+    """
     edges = [0]
     for end in sorted(set(windows)):
         begin = edges[-1]
         while begin < end:
             longest = max(1, max(begin, windows[0]) // per_window)
-            # Equal parts of what is left, so that no sliver remains before the window's end; whole registers if long.
+            # Equal parts of what is left, so that no sliver remains before the window's end.
             length = math.ceil((end - begin) / math.ceil((end - begin) / longest))
-            begin += length if length < 16 else length // 8 * 8
+            begin += length if length < 2 * whole else length // whole * whole
             edges.append(begin)
     return np.array(edges)
 

@@ -129,7 +129,8 @@ def prepare(case: Case) -> Plan:
     designer = schedules.Designer(burst, sigma, partial(exact.fisher, burst, size), schedules.Condition())
     windows = windows_of(spec, burst, designer)
     every = sorted({w for own in windows for w in own})
-    edges = plans.block_edges(every, spec.blocks_per_window or BLOCKS_PER_WINDOW[mode])
+    per_window = spec.blocks_per_window or BLOCKS_PER_WINDOW[mode]
+    edges = plans.block_edges(every, per_window, 8 if mode == DEMODULATED else 1)
     world = plans.world(burst, mode, edges, every, phase.turns, phase.reference)
     designs = [design_of(e, w) for e, w in zip(spec.estimators, windows, strict=True)]
     mean_information = dict(zip(every, exact.fisher_sums(burst, size, every), strict=True))
