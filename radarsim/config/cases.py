@@ -66,6 +66,7 @@ class Expander:
         cases = [case for draft in drafts if (case := self._case(draft))]
         self._refuse_twins(cases, document)
         self._refuse_mixture(drafts, common, document)
+        self._check_figure_names(common, drafts, document)
         self._check_figures(common, cases, document)
         if self.faults:
             return None
@@ -159,14 +160,14 @@ class Expander:
             return []
         axes = []
         for key in common.sweep:
-            if not self._may_be_swept(document, key, drafts):
+            if not self._may_be_swept(document, common, key, drafts):
                 continue
             values = document.data["sweep"][key]
             axes.append([Setting(key, v, document.origin(("sweep", key, i))) for i, v in enumerate(values)])
         return [self._with(draft, settings) for draft in drafts for settings in itertools.product(*axes)]
 
-    def _may_be_swept(self, document: Document, key: str, drafts: list[Draft]) -> bool:
-        """Whether a swept key is one that a sweep, and no override, decides."""
+    def _may_be_swept(self, document: Document, common: Common, key: str, drafts: list[Draft]) -> bool:
+        """Whether a swept key is one that this sweep, and no other and no override, decides."""
         origin = document.key_origin(("sweep", key))
         if key.split(".")[0] in COMMON_KEYS:
             self.faults.add(origin, ("sweep", key), "cannot be swept")
@@ -176,6 +177,13 @@ class Expander:
         except NoSuchKey as error:
             self.faults.add(origin, ("sweep", key), str(error))
             return False
+        before = list(itertools.takewhile(lambda other: other != key, common.sweep))
+        for draft in drafts:
+            for other in (*(swept_key for swept_key, _ in draft.swept), *before):
+                taken = key_paths(draft.document, study_model(draft.study), other, missing_ok=True)
+                if any(overlap(path, one) for path in taken for one in swept):
+                    self.faults.add(origin, ("sweep", key), f"sweeps what {other} sweeps as well")
+                    return False
         for setting in self.settings:
             for draft in drafts:
                 set_here = key_paths(draft.document, study_model(draft.study), setting.key, missing_ok=True)
@@ -229,6 +237,17 @@ class Expander:
             message = f"must be that of the included configs, {', '.join(studies)}"
             self.faults.add(document.origin(("study",)), ("study",), message, common.study)
 
+    def _check_figure_names(self, common: Common, drafts: list[Draft], document: Document) -> None:
+        """A figure must be one that the study may draw, where its schema says which these are."""
+        known = [study_model(study).figure_names for study in {draft.study for draft in drafts}]
+        if len(known) != 1 or known[0] is None:
+            return
+        for figure in common.figures:
+            if figure not in known[0]:
+                path = ("figures", figure)
+                near = did_you_mean(figure, known[0]) or f"; there are: {', '.join(known[0])}"
+                self.faults.add(document.key_origin(path), path, f"no such figure{near}")
+
     def _check_figures(self, common: Common, cases: list[Case], document: Document) -> None:
         """Every pattern must mean a case, else a figure would be empty without a word."""
         if self.faults:
@@ -239,3 +258,9 @@ class Expander:
                     path = ("figures", figure, i)
                     near = did_you_mean(pattern, [case.name for case in cases])
                     self.faults.add(document.origin(path), path, f"no case has this name{near}", pattern)
+
+
+def overlap(one: tuple, other: tuple) -> bool:
+    """Whether two paths lead to the same value, or one to a part of the other's."""
+    shared = min(len(one), len(other))
+    return one[:shared] == other[:shared]

@@ -1,15 +1,19 @@
 """A document against a schema: what pydantic finds, told in the user's words at the place where the value stands."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Literal, get_args, get_origin
+from functools import cache
+from typing import Annotated, Any, Literal, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
+from pydantic import AfterValidator, BaseModel, TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError
 
 from radarsim.config.document import Document, child
 from radarsim.config.faults import ABSENT, Faults, Path, short
-from radarsim.config.fields import in_degrees, in_radians
+from radarsim.config.fields import At, NotRead, in_degrees, in_radians, radians
 from radarsim.config.lookup import did_you_mean
 
 WORDS = {
@@ -51,10 +55,13 @@ def check(model: type[BaseModel], document: Document, faults: Faults, also: Iter
     try:
         return model.model_validate(document.data)
     except ValidationError as error:
-        found = [_Found.of(each, document) for each in error.errors(include_url=False, include_input=False)]
+        errors = error.errors(include_url=False, include_input=False)
+        found = [one for each in errors for one in _Found.of(each, document)]
         for each in found:
             if not _beside_the_point(each, found, document):
                 _tell(model, document, each, faults, also)
+        for each in _Partial(model, document, found, faults).misfits():
+            _tell(model, document, each, faults, also)
         return None
 
 
@@ -68,16 +75,96 @@ class _Found:
     text: str
 
     @classmethod
-    def of(cls, error: dict, document: Document) -> "_Found":
+    def of(cls, error: dict, document: Document) -> "list[_Found]":
+        """One, or one for each fault that the cross-checks of a mapping found."""
         kind, context = error["type"], dict(error.get("ctx", {}))
         path = path_in(document.data, error["loc"], keep_last=kind in ("missing", "extra_forbidden"))
         if kind in ("union_tag_invalid", "union_tag_not_found"):
             path = (*path, context["discriminator"].strip("'"))
             kind = kind if document.get(path) is not ABSENT else "missing"
         if kind == "at":
-            *outer, key = context["key"].split(".")
-            path = twin(document.data, (*path, *outer), key)
-        return cls(kind, path, context, error["msg"])
+            return [cls.misfit(each, path, document) for each in context["faults"]]
+        return [cls(kind, path, context, error["msg"])]
+
+    @classmethod
+    def misfit(cls, fault: At, path: Path, document: Document) -> "_Found":
+        """A fault that a cross-check of the mapping at a path found."""
+        *outer, key = fault.key.split(".")
+        outer = [int(step) if step.isdecimal() else step for step in outer]
+        return cls("at", twin(document.data, (*path, *outer), key), {"message": fault.message}, fault.message)
+
+
+class _Partial:
+    """A document with faults, read as far as it has none, for the cross-checks that what was read is enough for.
+
+    Where a mapping has an unknown key, its optional keys that are not given count as unread: one may be misspelt.
+    """
+
+    def __init__(self, model: type[BaseModel], document: Document, found: list[_Found], faults: Faults):
+        self.model, self.document, self.faults = model, document, faults
+        self.whole = {one.path for one in found if one.kind not in ("unique", "extra_forbidden")}
+        self.inside = {one.path[:n] for one in found for n in range(len(one.path) + 1)}
+        self.unknown = {one.path[:-1] for one in found if one.kind == "extra_forbidden"}
+        self.more: list[_Found] = []
+
+    def misfits(self) -> list[_Found]:
+        """The faults that are found beside the document's own."""
+        with suppress(NotRead):
+            self._read(())
+        return self.more
+
+    def _read(self, path: Path) -> Any:
+        """The mapping at a path, without the fields that have faults; raises NotRead if it is none."""
+        model, data = model_at(self.model, self.document.data, path), self.document.get(path)
+        if path in self.whole or model is None or not isinstance(data, dict):
+            raise NotRead
+        if path not in self.inside:
+            return model.model_validate(data)
+        read, unread = {}, []
+        for name, info in model.model_fields.items():
+            key = twin(data, (), name)[0]
+            try:
+                if key in data:
+                    read[name] = self._field((*path, key), name, info, model)
+                elif info.is_required() or path in self.unknown or (*path, key) in self.whole:
+                    unread.append(name)
+            except (NotRead, ValidationError):
+                unread.append(name)
+        part = model.model_construct(**read)
+        for name in unread:
+            part.__dict__.pop(name, None)
+        self.more += [_Found.misfit(each, path, self.document) for each in part.misfits()]
+        return part
+
+    def _field(self, path: Path, name: str, info: FieldInfo, model: type[BaseModel]) -> Any:
+        data = self.document.get(path)
+        if path in self.whole or self.faults.spoiled(self.document.origin(path), path):
+            raise NotRead
+        if path not in self.inside:
+            return _reader(model, name).validate_python(radians(data) if path[-1] != name else data)
+        if not models_in(info.annotation) or not isinstance(data, list):
+            return self._read(path)
+        members = tuple([self._read((*path, i)) for i in range(len(data))])
+        for mark in info.metadata:
+            if isinstance(mark, AfterValidator):
+                self._validate(mark.func, members, path)
+        return members
+
+    def _validate(self, check: Callable, members: tuple, path: Path) -> None:
+        """Let a check of the whole list see what was read of its members."""
+        try:
+            check(members)
+        except NotRead:
+            return
+        except PydanticCustomError as error:
+            self.more.append(_Found(error.type, path, dict(error.context or {}), error.message()))
+
+
+@cache
+def _reader(model: type[BaseModel], name: str) -> TypeAdapter:
+    """The check of one field by itself."""
+    info = model.model_fields[name]
+    return TypeAdapter(Annotated[info.annotation, info])
 
 
 def _beside_the_point(one: _Found, found: list[_Found], document: Document) -> bool:

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from radarsim.config.fields import (
     Design,
@@ -16,6 +16,8 @@ from radarsim.config.fields import (
     Scenario,
     Study,
     at,
+    cross_check,
+    of_each,
     unique_names,
     whole,
 )
@@ -39,13 +41,20 @@ class Burst(Model):
     noise_variance: Positive = Field(description="variance of the white noise in each real number sampled")
     samples: Literal["real", "complex"] = Field("real", description="what the receiver gives")
 
-    @model_validator(mode="after")
+    @cross_check
     def _pulses_fit(self):
         if self.pulse_length_s > self.pulse_period_s:
-            raise at("pulse_length_s", "must be at most the pulse period")
+            yield at("pulse_length_s", "must be at most the pulse period")
+
+    @cross_check
+    def _few_samples(self):
         if self.pulses * self.pulse_length_s / self.sampling_period_s > MOST_SAMPLES:
-            raise at("sampling_period_s", f"the burst has over {MOST_SAMPLES} samples")
-        return self
+            yield at("sampling_period_s", f"the burst has over {MOST_SAMPLES} samples")
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the burst: a period for every pulse, s."""
+        return self.pulses * self.pulse_period_s
 
 
 class Truth(Model):
@@ -65,18 +74,20 @@ class Truth(Model):
         3, description="with a velocity profile: derivatives of the Doppler frequency that are estimated"
     )
 
-    @model_validator(mode="after")
+    @cross_check
     def _one_kind(self):
         profile = self.times_s is not None and self.velocities_mps is not None
         if profile == (self.doppler_derivatives is not None):
-            raise at("doppler_derivatives", "give either doppler_derivatives or times_s and velocities_mps")
-        if profile and len(self.times_s) != len(self.velocities_mps):
-            raise at("velocities_mps", "must have as many values as times_s")
-        if profile and (
+            yield at("doppler_derivatives", "give either doppler_derivatives or times_s and velocities_mps")
+        elif profile and len(self.times_s) != len(self.velocities_mps):
+            yield at("velocities_mps", "must have as many values as times_s")
+
+    @cross_check
+    def _times_rise(self):
+        if self.times_s is not None and (
             self.times_s[0] != 0 or any(b <= a for a, b in zip(self.times_s, self.times_s[1:], strict=False))
         ):
-            raise at("times_s", "must begin with 0 and rise")
-        return self
+            yield at("times_s", "must begin with 0 and rise")
 
     @property
     def parameters(self) -> int:
@@ -99,11 +110,10 @@ class Prior(Model):
         1.0, description="factor between the forecast's true errors and those that the estimators believe in"
     )
 
-    @model_validator(mode="after")
+    @cross_check
     def _one_kind(self):
         if (self.spread_over_potential is None) == (self.sigma is None):
-            raise at("spread_over_potential", "give either spread_over_potential or sigma")
-        return self
+            yield at("spread_over_potential", "give either spread_over_potential or sigma")
 
     @property
     def given(self) -> tuple[float, ...]:
@@ -147,11 +157,10 @@ class Estimator(Model):
         "known", description="given, or estimated from the energy by (7) corrected, or as printed (its square)"
     )
 
-    @model_validator(mode="after")
+    @cross_check
     def _rises(self):
         if self.schedule != "designed" and any(b <= a for a, b in zip(self.schedule, self.schedule[1:], strict=False)):
-            raise at("schedule", "window lengths must rise")
-        return self
+            yield at("schedule", "window lengths must rise")
 
 
 class Discriminator(Study):
@@ -174,28 +183,36 @@ class Discriminator(Study):
         None, description="a block is a window over this; default 16, and 32 for demodulated"
     )
 
-    @model_validator(mode="after")
-    def _fits_together(self):
+    @cross_check
+    def _prior_fits(self):
         size = self.truth.parameters
         if len(self.prior.given) != size:
             key = "spread_over_potential" if self.prior.sigma is None else "sigma"
-            raise at(f"prior.{key}", f"must have {size} values: phase, Doppler frequency and {size - 2} derivatives")
-        duration = self.burst.pulses * self.burst.pulse_period_s
-        if self.truth.times_s is not None and self.truth.times_s[-1] < duration * (1 - 1e-9):
-            raise at("truth.times_s", "must reach the end of the burst")
-        for i, estimator in enumerate(self.estimators):
-            self._check(i, estimator, duration)
-        return self
+            yield at(f"prior.{key}", f"must have {size} values: phase, Doppler frequency and {size - 2} derivatives")
 
-    def _check(self, i: int, estimator: Estimator, duration: float) -> None:
-        if estimator.schedule != "designed" and estimator.schedule[-1] > duration * (1 + 1e-9):
-            raise at(f"estimators.{i}.schedule", "must not reach beyond the burst")
+    @cross_check
+    def _profile_fits(self):
+        if self.truth.times_s is not None and self.truth.times_s[-1] < self.burst.duration_s * (1 - 1e-9):
+            yield at("truth.times_s", "must reach the end of the burst")
+
+    @cross_check
+    def _estimators_fit(self):
+        for check in (self._schedule_fits, self._ridge_fits, self._engine_fits):
+            yield from of_each(self.estimators, check)
+
+    def _schedule_fits(self, i: int, estimator: Estimator):
+        if estimator.schedule != "designed" and estimator.schedule[-1] > self.burst.duration_s * (1 + 1e-9):
+            yield at(f"estimators.{i}.schedule", "must not reach beyond the burst")
+
+    def _ridge_fits(self, i: int, estimator: Estimator):
         if estimator.method == "ridge" and self.burst.pulse_length_s > 1.5 * self.burst.sampling_period_s:
-            raise at(f"estimators.{i}.method", "ridge needs one sample a pulse")
-        if estimator.method == "ridge" and self.burst.pulses < 1024:
-            raise at(f"estimators.{i}.method", "ridge needs at least 1024 pulses")
+            yield at(f"estimators.{i}.method", "ridge needs one sample a pulse")
+        elif estimator.method == "ridge" and self.burst.pulses < 1024:
+            yield at(f"estimators.{i}.method", "ridge needs at least 1024 pulses")
+
+    def _engine_fits(self, i: int, estimator: Estimator):
         if self.engine == "block_sums" and self.needs_samples(estimator):
-            raise at("engine", f"block_sums cannot serve estimator {estimator.name}: it needs the samples")
+            yield at("engine", f"block_sums cannot serve estimator {estimator.name}: it needs the samples")
 
     def needs_samples(self, estimator: Estimator) -> bool:
         """Whether an estimator looks at more than the block sums tell."""

@@ -12,7 +12,7 @@ LONGEST_SOURCE = 500  # characters of the place
 
 
 class Origin(NamedTuple):
-    """Where a value was written: a file with line and column from 1, `--set KEY`, or `config` for a dictionary.
+    """Where a value was written: a file with line and column from 1, `--set KEY`, `--seed`, or `config`: a dictionary.
 
     prefix counts the leading keys of a path that do not stand in that file: a scenario's own keys begin below `target`.
     """
@@ -65,9 +65,9 @@ class Faults:
 
 
 def _names(origin: Origin, key: str) -> bool:
-    """Whether the origin, `--set KEY`, says the key already; a bare filter key is the end of the full one."""
+    """Whether the origin, `--set KEY` or `--KEY`, says the key already; a bare filter key is the end of the full."""
     option, _, given = origin.source.partition(" ")
-    return option == "--set" and (key == given or key.endswith(f".{given}"))
+    return origin.source == f"--{key}" or (option == "--set" and (key == given or key.endswith(f".{given}")))
 
 
 def dotted(path: Path) -> str:

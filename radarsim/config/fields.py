@@ -6,8 +6,10 @@ is understood as well (and `_degps` for `_radps`); the checked object holds radi
 
 import math
 import re
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import (
     AfterValidator,
@@ -57,9 +59,46 @@ class Scenario:
         return {"anyOf": [{"type": "string", "description": "stem of a file in scenarios/"}, inline]}
 
 
-def at(key: str, message: str) -> PydanticCustomError:
-    """A fault to raise in a model's validator about a key, dotted if deeper: `raise at("scans", "must be >= 3")`."""
-    return PydanticCustomError("at", "{message}", {"key": key, "message": message})
+class NotRead(Exception):
+    """What a cross-check asks for has a fault of its own; so nothing can be said."""
+
+
+class At(NamedTuple):
+    """A fault that a cross-check finds: at which key, dotted if deeper, and what must be."""
+
+    key: str
+    message: str
+
+
+def at(key: str, message: str) -> At:
+    """A fault for a cross-check to yield: `yield at("scans", "must be >= 3")`."""
+    return At(key, message)
+
+
+def cross_check(method: Callable[[Any], Iterator[At]]) -> Callable[[Any], Iterator[At]]:
+    """Mark of a model's method that yields faults of fields that do not go together.
+
+    All cross-checks of a model are run, in order. Where some fields have faults of their own they are run as well, on
+    what could be read: there one that touches an unread field ends at once, so what is independent stands apart.
+    """
+    method.is_cross_check = True
+    return method
+
+
+def of_each(members: Iterable, check: Callable[[int, Any], Iterator[At]]) -> Iterator[At]:
+    """The faults of every member of a list, `check(i, member)`; what is unread in one does not silence the others."""
+    for i, member in enumerate(members):
+        with suppress(NotRead):
+            yield from check(i, member)
+
+
+def readable(members: Iterable, value: Callable[[Any], Any]) -> list:
+    """The value of every member of which it could be read."""
+    values = []
+    for member in members:
+        with suppress(NotRead):
+            values.append(value(member))
+    return values
 
 
 class Model(BaseModel):
@@ -76,6 +115,27 @@ class Model(BaseModel):
         if not any(key in twins for key in data):
             return data
         return {twins.get(key, key): radians(value) if key in twins else value for key, value in data.items()}
+
+    @model_validator(mode="after")
+    def _fits_together(self):
+        found = list(self.misfits())
+        if found:
+            raise PydanticCustomError("at", "fields that do not go together", {"faults": found})
+        return self
+
+    def misfits(self) -> Iterator[At]:
+        """What all cross-checks find; those that need an unread field end there."""
+        seen: dict[str, Any] = {}
+        for klass in reversed(type(self).__mro__):
+            seen |= {name: one for name, one in vars(klass).items() if getattr(one, "is_cross_check", False)}
+        for check in seen.values():
+            with suppress(NotRead):
+                yield from check(self)
+
+    def __getattr__(self, name: str) -> Any:
+        if name in type(self).model_fields:  # only of a model read in part
+            raise NotRead(name)
+        return super().__getattr__(name)
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> dict:
@@ -152,10 +212,22 @@ def whole(least: int, most: int) -> Any:
 class Study(Model):
     """A study's own top-level keys, beside the common ones.
 
-    bare_keys names the list whose members a bare key of `sweep` and `--set` speaks to.
+    bare_keys names the list whose members a bare key of `sweep` and `--set` speaks to. figure_names are all figures
+    that the study's report may draw; None: not known here, and names under `figures` go unchecked.
     """
 
     bare_keys: ClassVar[str] = "filters"
+    figure_names: ClassVar[tuple[str, ...] | None] = None
+
+    @cross_check
+    def _names_exist(self):
+        for field, info in type(self).model_fields.items():
+            for mark in info.metadata:
+                if isinstance(mark, NameIn) and getattr(self, field) is not None:
+                    names = [member.name for member in getattr(self, mark.field)]
+                    if getattr(self, field) not in names:
+                        one = mark.field.removesuffix("s")
+                        yield at(field, f"must be the name of a {one}: {', '.join(names)}")
 
 
 def unique_names(members: tuple[Any, ...]) -> tuple[Any, ...]:

@@ -17,6 +17,7 @@ from radarsim.config.values import DEEPEST, NotFinite, from_python, from_text
 __all__ = ["Case", "Experiment", "canonical", "load", "schema_json", "world"]
 
 LARGEST_FILE = 256_000  # bytes
+OPTIONS = ("realisations", "seed")  # overrides that are options of their own on the command line
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same events and marks, ten times faster
 
 
@@ -69,7 +70,7 @@ def _setting(text: str, faults: Faults) -> Setting | None:
     """An override `key=value`, its value read as YAML."""
     key, equals, value = text.partition("=")
     key = key.strip()
-    origin = Origin(f"--set {key}")
+    origin = Origin(f"--{key}" if key in OPTIONS else f"--set {key}")
     if not equals or not key or not all(key.split(".")):
         faults.add(Origin(f"--set {text}"), (), "must be KEY=VALUE, with a dotted KEY")
         return None
@@ -126,6 +127,8 @@ def parse(text: str, source: str, faults: Faults, plain_origin: Origin | None = 
         line = text.count("\n", 0, position)
         column = position - (text.rfind("\n", 0, position) + 1)
         faults.add(plain_origin or Origin(source, line + 1, column + 1), (), f"not valid YAML: {error.reason}")
+    except UnicodeEncodeError:
+        faults.add(plain_origin or Origin(source), (), "is not UTF-8 text")
     except _Refused:
         pass  # what was refused is noted; nothing after it can be understood
     else:

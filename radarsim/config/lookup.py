@@ -59,6 +59,6 @@ def is_stem(name: str) -> bool:
 def did_you_mean(name: str, known) -> str:
     """`; did you mean X?` for the known name nearest to a mistaken one, or nothing."""
     name, known = str(name)[:100], list(known)
-    begun = [full for full in known if len(name) > 2 and full.startswith(name)]
+    begun = [full for full in known if len(name) > 2 and full.lower().startswith(name.lower())]
     near = begun or difflib.get_close_matches(name, known, n=1, cutoff=0.6)
     return f"; did you mean {near[0]}?" if near else ""

@@ -4,7 +4,7 @@ models."""
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from radarsim.config.fields import (
     DataFile,
@@ -21,6 +21,7 @@ from radarsim.config.fields import (
     Scenario,
     Study,
     at,
+    cross_check,
     unique_names,
     whole,
 )
@@ -59,18 +60,20 @@ class Sensor(Model):
         "plain", description="of plots to the local frame: as in the paper, or with its mean error taken off"
     )
 
-    @model_validator(mode="after")
+    @cross_check
     def _one_frame(self):
         biconical = [self.sigma_range_m, self.sigma_elevation_rad, self.sigma_azimuth_rad]
         local = [self.sigma_x_m, self.sigma_y_m, self.sigma_z_m]
         if biconical.count(None) + local.count(None) != 3 or (None in biconical and None in local):
-            raise at(
+            yield at(
                 "sigma_range_m",
                 "give sigma_range_m, sigma_elevation_rad, sigma_azimuth_rad, or else sigma_x_m, sigma_y_m, sigma_z_m",
             )
+
+    @cross_check
+    def _scans_in_order(self):
         if 2 * self.jitter_s >= self.scan_period_s:
-            raise at("jitter_s", "must be under half the scan period")
-        return self
+            yield at("jitter_s", "must be under half the scan period")
 
     @property
     def sigma(self) -> tuple[float, float, float]:
@@ -97,14 +100,13 @@ class Target(Model):
         (Stage(name="all"),), description="stages in order, the last without an end"
     )
 
-    @model_validator(mode="after")
+    @cross_check
     def _in_order(self):
         ends = [stage.end_s for stage in self.stages]
         if None in ends[:-1] or ends[-1] is not None:
-            raise at("stages", "all but the last need end_s, and only they")
-        if any(b <= a for a, b in pairwise(ends[:-1])):
-            raise at("stages", "must follow one another in time")
-        return self
+            yield at("stages", "all but the last need end_s, and only they")
+        elif any(b <= a for a, b in pairwise(ends[:-1])):
+            yield at("stages", "must follow one another in time")
 
 
 class Phase(Model):
@@ -129,16 +131,18 @@ class Flight(Target):
     lag_s: Positive = Field(1.0, description="time constant with which commands are followed, s")
     phases: Annotated[tuple[Phase, ...], Field(min_length=1, max_length=64)] = Field(description="phases, in order")
 
-    @model_validator(mode="after")
+    @cross_check
     def _phases_in_order(self):
         starts = [phase.start_s for phase in self.phases]
         if starts[0] != 0:
-            raise at("phases.0.start_s", "must be 0")
+            yield at("phases.0.start_s", "must be 0")
         if any(b <= a for a, b in pairwise(starts)):
-            raise at("phases", "must follow one another in time")
+            yield at("phases", "must follow one another in time")
+
+    @cross_check
+    def _moves(self):
         if self.velocity_mps == (0, 0, 0):
-            raise at("velocity_mps", "must not be zero")
-        return self
+            yield at("velocity_mps", "must not be zero")
 
 
 class Recorded(Target):
@@ -188,19 +192,23 @@ class Filter(Model):
         description="where the plot's covariance is reckoned: at the plot, as in the paper, or at its prediction",
     )
 
-    @model_validator(mode="after")
-    def _fits_together(self):
+    @cross_check
+    def _family_fits(self):
         size = len(self.models)
         if self.family == "kalman" and size != 1:
-            raise at("models", f"kalman has one model, got {size}; take imm, gpb1 or gpb2")
+            yield at("models", f"kalman has one model, got {size}; take imm, gpb1 or gpb2")
+
+    @cross_check
+    def _transition_fits(self):
+        size = len(self.models)
         if len(self.transition) != size or any(len(row) != size for row in self.transition):
-            raise at("transition", f"must be {size} rows of {size} probabilities, one for each model")
+            yield at("transition", f"must be {size} rows of {size} probabilities, one for each model")
+            return
         columns = [sum(row[j] for row in self.transition) for j in range(size)]
         if any(abs(total - 1) > COLUMN_TOLERANCE for total in columns):
             by_rows = all(abs(sum(row) - 1) <= COLUMN_TOLERANCE for row in self.transition)
             hint = "; its rows do: transpose it" if by_rows else ""
-            raise at("transition", f"its columns must sum to one (column j: from model j){hint}")
-        return self
+            yield at("transition", f"its columns must sum to one (column j: from model j){hint}")
 
 
 class Multimodel(Study):
@@ -223,10 +231,3 @@ class Multimodel(Study):
     report_every: Annotated[whole(1, MOST_SCANS), Design()] = Field(
         1, description="tables and figures keep every such scan and the last; stages are made of all"
     )
-
-    @model_validator(mode="after")
-    def _baseline_exists(self):
-        names = [f.name for f in self.filters]
-        if self.baseline is not None and self.baseline not in names:
-            raise at("baseline", f"must be the name of a filter: {', '.join(names)}")
-        return self

@@ -18,6 +18,9 @@ from radarsim.config.fields import (
     Scenario,
     Study,
     at,
+    cross_check,
+    of_each,
+    readable,
     unique_names,
     whole,
 )
@@ -75,11 +78,10 @@ class Starting(Model):
         None, description="scan, counted from 1, at which it begins; in place of start_s"
     )
 
-    @model_validator(mode="after")
+    @cross_check
     def _one_start(self):
         if (self.start_s is None) == (self.start_scan is None):
-            raise at("start_s", "give either start_s or start_scan")
-        return self
+            yield at("start_s", "give either start_s or start_scan")
 
     def timed(self, period: float):
         """The same target with its start in seconds."""
@@ -174,20 +176,32 @@ class Filter(Model):
         None, description="scans in its least-squares start; default and least: 3 for range, 2 with velocity"
     )
 
-    @model_validator(mode="after")
-    def _start(self):
+    @cross_check
+    def _can_start(self):
         if self.observes not in (("range",), ("range", "velocity")):
-            raise at("observes", "must be [range] or [range, velocity]")
-        least = PLOTS_NEEDED[len(self.observes)]
-        if self.initial_scans is None:
-            return self.model_copy(update={"initial_scans": least})
-        if self.initial_scans < least:
-            raise at("initial_scans", f"must be >= {least} for a filter that observes {' and '.join(self.observes)}")
-        return self
+            yield at("observes", "must be [range] or [range, velocity]")
+        elif self.plots_to_start < PLOTS_NEEDED[len(self.observes)]:
+            least = PLOTS_NEEDED[len(self.observes)]
+            yield at("initial_scans", f"must be >= {least} for a filter that observes {' and '.join(self.observes)}")
+
+    @model_validator(mode="after")
+    def _completed(self):
+        return self.model_copy(update={"initial_scans": self.plots_to_start})
+
+    @property
+    def plots_to_start(self) -> int:
+        """Scans in the least-squares start, given or by default."""
+        return self.initial_scans or PLOTS_NEEDED[len(self.observes)]
 
 
 class RangeDoppler(Study):
     """Range alone against range and radial velocity."""
+
+    figure_names = (
+        *(f"{kind}_{component}" for component in ("r", "Vr", "ar") for kind in ("sigma", "gain", "dynamic")),
+        "settling",
+        "consistency",
+    )
 
     radar: Radar = Field(description="the radar")
     target: Annotated[Target, Scenario()] = Field(description="the target: a scenario's stem, or inline")
@@ -200,38 +214,50 @@ class RangeDoppler(Study):
     scans: Annotated[whole(2, MOST_SCANS), Design()] = Field(description="number of plots")
 
     @model_validator(mode="after")
-    def _fits_together(self):
-        names = [f.name for f in self.filters]
-        if self.baseline is not None and self.baseline not in names:
-            raise at("baseline", f"must be the name of a filter: {', '.join(names)}")
-        slowest = max(self.filters, key=lambda f: f.initial_scans)
-        if self.scans < slowest.initial_scans:
-            raise at("scans", f"must be >= {slowest.initial_scans} for the initialisation of filter {slowest.name}")
-        self._in_proportion()
+    def _completed(self):
+        return self.model_copy(update={"target": self._flown()}) if isinstance(self.target, Starting) else self
+
+    def _flown(self) -> Starting:
+        return self.target.timed(self.radar.scan_period_s)
+
+    @cross_check
+    def _long_enough(self):
+        starts = readable(self.filters, lambda one: (one.plots_to_start, one.name))
+        plots, slowest = max(starts, key=lambda start: start[0], default=(0, ""))
+        if self.scans < plots:
+            yield at("scans", f"must be >= {plots} for the initialisation of filter {slowest}")
+
+    @cross_check
+    def _within_reach(self):
         last = (self.scans - 1) * self.radar.scan_period_s
         if self.target.reach_m(last) > FARTHEST_M:
-            raise at("target", f"must stay within 1e15 m of the radar up to the last plot, at {short(last)} s")
-        if not isinstance(self.target, Starting):
-            return self
-        target = self.target.timed(self.radar.scan_period_s)
-        if isinstance(target, Turn) and target.closest_m(last) < NEAREST_M:
-            raise at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")
-        return self.model_copy(update={"target": target})
+            yield at("target", f"must stay within 1e15 m of the radar up to the last plot, at {short(last)} s")
+        elif isinstance(self.target, Turn) and self._flown().closest_m(last) < NEAREST_M:
+            yield at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")
 
-    def _in_proportion(self) -> None:
-        """Refuse accuracies and variances of which one makes the other meaningless.
+    @cross_check
+    def _accuracies_in_proportion(self):
+        """Refuse accuracies of which one makes the other meaningless.
 
         Beyond these limits the steady covariance drowns in rounding (SciPy's solver gives up at 1e15).
         """
-        radar, dt = self.radar, self.radar.scan_period_s
-        if not 1e-12 <= (radar.sigma_range_m / (dt * radar.sigma_velocity_mps)) ** 2 <= 1e12:
+        radar = self.radar
+        if not 1e-12 <= (radar.sigma_range_m / (radar.scan_period_s * radar.sigma_velocity_mps)) ** 2 <= 1e12:
             ratio = "(sigma_range_m / scan_period_s / sigma_velocity_mps)²"
-            raise at("radar.sigma_velocity_mps", f"out of proportion: {ratio} must be from 1e-12 to 1e12")
-        for i, one in enumerate(self.filters):
-            key = f"filters.{i}.manoeuvre_variance"
-            if not 1e-28 <= one.manoeuvre_variance * dt**6 / radar.sigma_range_m**2 <= 1e12:
-                ratio = "manoeuvre_variance scan_period_s⁶ / sigma_range_m²"
-                raise at(key, f"out of proportion: {ratio} must be from 1e-28 to 1e12")
-            if "velocity" in one.observes and one.manoeuvre_variance * dt**4 / radar.sigma_velocity_mps**2 > 1e12:
-                ratio = "manoeuvre_variance scan_period_s⁴ / sigma_velocity_mps²"
-                raise at(key, f"out of proportion: {ratio} must be <= 1e12")
+            yield at("radar.sigma_velocity_mps", f"out of proportion: {ratio} must be from 1e-12 to 1e12")
+
+    @cross_check
+    def _variances_in_proportion(self):
+        """The same of manoeuvre variances."""
+        if not any(True for _ in self._accuracies_in_proportion()):  # else that is the fault
+            yield from of_each(self.filters, self._in_proportion)
+
+    def _in_proportion(self, i: int, one: Filter):
+        radar, dt = self.radar, self.radar.scan_period_s
+        key = f"filters.{i}.manoeuvre_variance"
+        if not 1e-28 <= one.manoeuvre_variance * dt**6 / radar.sigma_range_m**2 <= 1e12:
+            ratio = "manoeuvre_variance scan_period_s⁶ / sigma_range_m²"
+            yield at(key, f"out of proportion: {ratio} must be from 1e-28 to 1e12")
+        elif "velocity" in one.observes and one.manoeuvre_variance * dt**4 / radar.sigma_velocity_mps**2 > 1e12:
+            ratio = "manoeuvre_variance scan_period_s⁴ / sigma_velocity_mps²"
+            yield at(key, f"out of proportion: {ratio} must be <= 1e12")

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from radarsim.config.fields import (
     Correlation,
@@ -18,6 +18,9 @@ from radarsim.config.fields import (
     Scenario,
     Study,
     at,
+    cross_check,
+    of_each,
+    readable,
     unique_names,
     whole,
 )
@@ -77,15 +80,20 @@ class Sensor(Model):
     )
     further: tuple[FurtherSensor, ...] = Field((), max_length=4, description="further sonars on the same target")
 
-    @model_validator(mode="after")
+    @cross_check
     def _consistent(self):
         if self.sigma_depth_m is not None and self.sigma_elevation_rad is not None:
-            raise at("sigma_elevation_rad", "give either the depth or the elevation")
+            yield at("sigma_elevation_rad", "give either the depth or the elevation")
+
+    @cross_check
+    def _further_fit(self):
         if self.further and self.error_correlation != 0.0:
-            raise at("error_correlation", "must be 0 where there are further sonars: their errors are unconnected")
+            yield at("error_correlation", "must be 0 where there are further sonars: their errors are unconnected")
+
+    @cross_check
+    def _further_see(self):
         if self.further and self.detection_probability < 1:
-            raise at("detection_probability", "must be 1 where there are further sonars; give missed_scans")
-        return self
+            yield at("detection_probability", "must be 1 where there are further sonars; give missed_scans")
 
 
 class Polynomial(Model):
@@ -106,21 +114,26 @@ class Polynomial(Model):
         description="standard deviation of a random acceleration, new at every scan: velocity walks at random, m/s²",
     )
 
-    @model_validator(mode="after")
+    @cross_check
     def _coordinates(self):
         wanted = ("range_m", "bearing_rad") if self.frame == "polar" else ("x_m", "y_m")
         other = ("x_m", "y_m") if self.frame == "polar" else ("range_m", "bearing_rad")
         for key in wanted:
             if getattr(self, key) is None:
-                raise at(key, f"is needed in the {self.frame} frame")
+                yield at(key, f"is needed in the {self.frame} frame")
         for key in other:
             if getattr(self, key) is not None:
-                raise at(key, f"does not belong to the {self.frame} frame")
-        if self.frame == "polar" and self.range_m[0] <= 0:
-            raise at("range_m", "must begin with a positive range")
+                yield at(key, f"does not belong to the {self.frame} frame")
+
+    @cross_check
+    def _ahead(self):
+        if self.frame == "polar" and self.range_m is not None and self.range_m[0] <= 0:
+            yield at("range_m", "must begin with a positive range")
+
+    @cross_check
+    def _fluctuates(self):
         if self.frame == "cartesian" and self.fluctuation_mps2:
-            raise at("fluctuation_mps2", "needs the polar frame")
-        return self
+            yield at("fluctuation_mps2", "needs the polar frame")
 
     def range_0(self) -> float:
         """Range at the first plot, m: scales what is lateral to an angle."""
@@ -136,11 +149,10 @@ class Leg(Model):
     end_s: Positive = Field(description="when it ends, s")
     rate_radps: Number = Field(description="turn rate, rad/s, positive to starboard")
 
-    @model_validator(mode="after")
+    @cross_check
     def _order(self):
         if self.end_s <= self.start_s:
-            raise at("end_s", "must come after start_s")
-        return self
+            yield at("end_s", "must come after start_s")
 
 
 class Turning(Model):
@@ -153,11 +165,10 @@ class Turning(Model):
     course_rad: Number = Field(description="course at first, from north to east, rad")
     turns: Annotated[tuple[Leg, ...], Field(min_length=1, max_length=16)] = Field(description="the turns, in order")
 
-    @model_validator(mode="after")
+    @cross_check
     def _in_order(self):
         if any(later.start_s < earlier.end_s for earlier, later in zip(self.turns, self.turns[1:], strict=False)):
-            raise at("turns", "must follow one another without overlap")
-        return self
+            yield at("turns", "must follow one another without overlap")
 
     def range_0(self) -> float:
         """Range at the first plot, m."""
@@ -188,21 +199,26 @@ class Filter(Model):
         None, description="correlation that the filter assumes; default: the sonar's own"
     )
 
-    @model_validator(mode="after")
+    @cross_check
     def _fits_kind(self):
         if self.plots is None and self.kind == "window":
-            raise at("plots", "is needed by a window")
+            yield at("plots", "is needed by a window")
         if self.plots is not None and self.kind not in ("window", "fixed_gain"):
-            raise at("plots", "belongs to a window, or to the start of fixed_gain")
-        if self.plots is not None and self.plots < self.degree + 1:
-            raise at("plots", f"must be >= {self.degree + 1} for degree {self.degree}")
+            yield at("plots", "belongs to a window, or to the start of fixed_gain")
+        elif self.plots is not None and self.plots < self.degree + 1:
+            yield at("plots", f"must be >= {self.degree + 1} for degree {self.degree}")
+
+    @cross_check
+    def _variance_fits_kind(self):
         if self.kind == "fixed_gain" and not self.manoeuvre_variance:
-            raise at("manoeuvre_variance", "must be > 0 for fixed_gain: it decides the steady gains")
+            yield at("manoeuvre_variance", "must be > 0 for fixed_gain: it decides the steady gains")
         if self.manoeuvre_variance and self.kind not in ("fixed_gain", "kalman", "kalman_augmented"):
-            raise at("manoeuvre_variance", f"{self.kind} allows for no manoeuvre; take kalman or kalman_augmented")
+            yield at("manoeuvre_variance", f"{self.kind} allows for no manoeuvre; take kalman or kalman_augmented")
+
+    @cross_check
+    def _correlation_fits_kind(self):
         if self.error_correlation is not None and self.kind not in CORRELATED:
-            raise at("error_correlation", f"only {' and '.join(CORRELATED)} know of it")
-        return self
+            yield at("error_correlation", f"only {' and '.join(CORRELATED)} know of it")
 
 
 class Sonar(Study):
@@ -221,29 +237,39 @@ class Sonar(Study):
     )
     scans: Annotated[whole(2, MOST_SCANS), Design()] = Field(description="number of scans of the first sonar")
 
-    @model_validator(mode="after")
-    def _fits_together(self):
-        names = [f.name for f in self.filters]
-        if self.baseline is not None and self.baseline not in names:
-            raise at("baseline", f"must be the name of a filter: {', '.join(names)}")
-        most = max(f.degree for f in self.filters) + 1
+    @cross_check
+    def _long_enough(self):
+        most = max(readable(self.filters, lambda one: one.degree), default=0) + 1
         if self.scans < most:
-            raise at("scans", f"must be >= {most} for a filter of degree {most - 1}")
+            yield at("scans", f"must be >= {most} for a filter of degree {most - 1}")
+
+    @cross_check
+    def _target_measured(self):
         for key, unit in (("depth", "m"), ("elevation", "rad")):
             measured = getattr(self.sensor, f"sigma_{key}_{unit}") is not None
             if measured and getattr(self.target, f"{key}_{unit}", None) is None:
-                raise at("target", f"needs {key}_{unit}, which the sonar measures")
-        if self.frame != "polar":
-            self._check_cartesian()
-        return self
+                yield at("target", f"needs {key}_{unit}, which the sonar measures")
 
-    def _check_cartesian(self):
-        if self.sensor.sigma_elevation_rad is not None:
-            raise at("frame", "must be polar where the elevation is measured")
-        if self.sensor.further:
-            raise at("frame", "must be polar where there are further sonars")
-        if getattr(self.target, "fluctuation_mps2", 0.0):
-            raise at("frame", "must be polar for a fluctuating target")
-        for i, f in enumerate(self.filters):
-            if f.kind in CORRELATED:
-                raise at(f"filters.{i}.kind", f"{f.kind} works in the polar frame alone")
+    @cross_check
+    def _elevation_in_polar(self):
+        if self.frame != "polar" and self.sensor.sigma_elevation_rad is not None:
+            yield at("frame", "must be polar where the elevation is measured")
+
+    @cross_check
+    def _further_in_polar(self):
+        if self.frame != "polar" and self.sensor.further:
+            yield at("frame", "must be polar where there are further sonars")
+
+    @cross_check
+    def _fluctuating_in_polar(self):
+        if self.frame != "polar" and getattr(self.target, "fluctuation_mps2", 0.0):
+            yield at("frame", "must be polar for a fluctuating target")
+
+    @cross_check
+    def _correlated_in_polar(self):
+        def check(i: int, one: Filter):
+            if one.kind in CORRELATED:
+                yield at(f"filters.{i}.kind", f"{one.kind} works in the polar frame alone")
+
+        if self.frame != "polar":
+            yield from of_each(self.filters, check)
