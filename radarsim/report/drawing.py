@@ -103,7 +103,8 @@ Mark = Line | Reference | Bars | Heat | Note
 class Panel:
     """One pair of axes. keys explain styles (not single lines) in a small legend: (words, style).
 
-    direct: lines are named at their ends where the names fit; else always in the legend, at its place or "none".
+    direct: lines are named at their ends where the names fit; else always in the legend, at its place, "none", or
+    "right", beside the panel. A remark stands in the upper right corner. Without marks a panel is its legend alone.
     """
 
     x: Axis
@@ -114,6 +115,7 @@ class Panel:
     key_title: str = ""
     direct: bool = True
     legend: str = "best"
+    remark: str = ""
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ POINTS = 2000  # of a line; longer ones are drawn at every n-th scan
 LONGEST_AT_END = 28  # letters of a name that may stand at a line's end
 MOST_IN_COLUMN = 10  # names in one column of a legend
 MARKED = 16  # at most about so many markers or crosses a line
+EXACT = {"linestyle": "none", "marker": "+", "color": "black", "markersize": 4.2, "markeredgewidth": 0.6}
 STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 7.5,
@@ -75,9 +76,11 @@ def _laid_out(figure: Figure) -> Canvas:
     FigureCanvasAgg(canvas)
     canvas.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.05)
     grid = canvas.subplots(rows, figure.columns, squeeze=False, sharey=figure.share_y)
-    ended = []
+    ended, told = [], False  # crosses are told once a figure
     for axes, panel in zip(grid.flat, figure.panels, strict=False):
-        ended.append(_draw(axes, panel))
+        crosses = not told and any(isinstance(m, Line) and m.exact is not None for m in panel.marks)
+        told |= crosses
+        ended.append(_draw(axes, panel, crosses) if panel.marks else _legend(axes, panel, list(panel.keys), False))
     for axes in grid.flat[len(figure.panels) :]:
         axes.set_visible(False)
     canvas.draw_without_rendering()
@@ -101,8 +104,11 @@ def _bytes(canvas: Canvas, kind: str, name: str) -> bytes:
     return out.getvalue()
 
 
-def _draw(axes, panel: Panel) -> list:
-    """Draw a panel; the texts written at line ends come back, to be moved apart once the layout stands."""
+def _draw(axes, panel: Panel, crosses: bool) -> list:
+    """Draw a panel, with a key to exact crosses or not.
+
+    The texts written at line ends come back, to be moved apart once the layout stands.
+    """
     axes.set_xscale(panel.x.scale)
     axes.set_yscale(panel.y.scale)
     axes.margins(x=0.02)
@@ -117,7 +123,9 @@ def _draw(axes, panel: Panel) -> list:
         if axis.ticks:
             where, words = zip(*axis.ticks, strict=True)
             (axes.set_xticks if axis is panel.x else axes.set_yticks)(where, words)
-    return _name(axes, panel)
+    if panel.remark:
+        axes.text(0.98, 0.98, panel.remark, transform=axes.transAxes, ha="right", va="top", fontsize=7, zorder=5)
+    return _name(axes, panel, crosses)
 
 
 def _colour(style: Style):
@@ -148,8 +156,7 @@ def _line(axes, line: Line) -> None:
         else:
             axes.fill_between(line.x, line.lo, line.hi, color=_colour(line.style), alpha=0.25, linewidth=0, zorder=2)
     if line.exact is not None:
-        look = {"linestyle": "none", "marker": "+", "color": "black", "markersize": 4.2, "markeredgewidth": 0.6}
-        axes.plot(line.x[step::every], line.exact[step::every], zorder=4, **look)
+        axes.plot(line.x[step::every], line.exact[step::every], zorder=4, **EXACT)
 
 
 def _thinned(line: Line) -> Line:
@@ -204,7 +211,7 @@ def _note(axes, note: Note) -> None:
 DRAWN = {Line: _line, Reference: _reference, Bars: _bars, Heat: _heat, Note: _note}
 
 
-def _name(axes, panel: Panel) -> list:
+def _name(axes, panel: Panel, crosses: bool) -> list:
     """Name the lines: at their ends where there are few enough, else in a legend.
 
     And the keys of styles in a legend.
@@ -215,13 +222,7 @@ def _name(axes, panel: Panel) -> list:
     direct = panel.direct and short and all(m.style.dash is not None for m in lines) and len(lines) <= _fitting(axes)
     if not direct:
         handles = [(m.label, m.style) for m in lines] + handles
-    if handles and panel.legend != "none":
-        look = [Line2D([], [], **_look(style)) for _, style in handles]
-        words = [words for words, _ in handles]
-        title = panel.key_title or None
-        room = {"ncols": -(-len(words) // MOST_IN_COLUMN), "borderaxespad": 0.3, "labelspacing": 0.3}
-        legend = axes.legend(look, words, loc=panel.legend, title=title, alignment="left", **room)
-        legend.set_in_layout(False)  # it lies inside the panel, and may not push it to nothing
+    _legend(axes, panel, handles if panel.legend != "none" else [], crosses)
     if not direct:
         return []
     texts = []
@@ -239,6 +240,25 @@ def _name(axes, panel: Panel) -> list:
             )
         )
     return texts
+
+
+def _legend(axes, panel: Panel, handles: list, crosses: bool) -> list:
+    """A legend of words and styles, with the exact crosses where asked; of a panel without marks in its middle."""
+    look = [Line2D([], [], **_look(style)) for _, style in handles] + [Line2D([], [], **EXACT)] * crosses
+    words = [words for words, _ in handles] + ["exact"] * crosses
+    if not words:
+        return []
+    place = {"loc": "best" if panel.legend == "none" else panel.legend}
+    if not panel.marks:
+        axes.set_axis_off()
+        place = {"loc": "center"}
+    elif panel.legend == "right":
+        place = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
+    room = {"ncols": -(-len(words) // MOST_IN_COLUMN), "borderaxespad": 0.3, "labelspacing": 0.3}
+    legend = axes.legend(look, words, title=panel.key_title or None, alignment="left", **place, **room)
+    # Inside the panel it may not push it to nothing; beside it, it takes its room.
+    legend.set_in_layout(panel.legend == "right")
+    return []
 
 
 def _fitting(axes) -> int:

@@ -12,9 +12,12 @@ from radarsim.report.provenance import span
 from radarsim.report.statistics import Z95
 
 WIDE_MM = 120.0  # one panel of many lines
+MOST_AT_ENDS = 6  # lines of one panel named at their ends; more by colour and dash
 MOST = 8  # cases a figure shows; more are told in its caption
 TIME = "time from the first plot, s"
 SYMBOLS = {"manoeuvre_variance": "$D_M$"}
+POWERS = ("manoeuvre_variance",)  # swept keys that are read as powers of ten
+KEY_UNITS = {"manoeuvre_variance": "(m/s³)²"}
 UNITS = {"m/s2": "m/s²", "m/s3": "m/s³", "hz": "Hz"}
 
 
@@ -25,12 +28,12 @@ class Quantity(NamedTuple):
     name: str
 
 
-def number(value) -> str:
-    """A number for people: 0.001 as 10⁻³, others at four digits; text as it is."""
+def number(value, powers: bool = False) -> str:
+    """A number for people: 0.001 as 10⁻³ (with powers, 0.1 as 10⁻¹), others at four digits; text as it is."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         return literal(str(value))
     power = f"{value:.0e}".partition("e")[2]
-    if value != 0 and float(f"1e{power}") == value and abs(int(power)) > 1:
+    if value != 0 and float(f"1e{power}") == value and (abs(int(power)) > 1 or (powers and int(power) < 0)):
         return "10" + str(int(power)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"{value:.4g}"
 
@@ -56,7 +59,12 @@ def device(result: CaseResult) -> str:
 
 def swept(result: CaseResult) -> str:
     """The swept keys of a case in short: "D_M = 10⁻³"."""
-    return ", ".join(f"{symbol_of(key)} = {number(value)}" for key, value in result.swept)
+    return ", ".join(f"{symbol_of(key)} = {number(value, key in POWERS)}" for key, value in result.swept)
+
+
+def with_unit(words: str, unit: str) -> str:
+    """An axis' words with their unit, where there is one."""
+    return ", ".join(filter(None, (words, UNITS.get(unit, unit))))
 
 
 def symbol_of(key: str) -> str:
@@ -107,12 +115,21 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
     panels = [_sigma_panel(members, curves, component, of) for members in families(results).values()]
     panels = [panel for panel in panels if panel.marks]
     single = len(panels) == 1
+    if not single and all(panel.keys == panels[0].keys for panel in panels):
+        panels[1:] = [replace(panel, keys=()) for panel in panels[1:]]
     caption = (
         f"Root-mean-square error of the {of.name} about the truth against time, of {realisations(results)}. "
         "Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact values."
     )
     title = f"σ of the {of.name}"
-    shape = {"width_mm": COLUMN_MM} if single else {"columns": min(3, len(panels)), "width_mm": PAGE_MM}
+    beside = single and panels[0].legend == "right"
+    if not single:
+        panels = [replace(panel, legend="best") for panel in panels]
+    shape = (
+        {"width_mm": WIDE_MM if beside else COLUMN_MM}
+        if single
+        else {"columns": min(3, len(panels)), "width_mm": PAGE_MM}
+    )
     return Figure(name, title, caption, tuple(panels), **shape, panel_height_mm=64 if single else 56)
 
 
@@ -128,14 +145,25 @@ def _sigma_panel(members: Sequence[CaseResult], curves: Mapping, component: str,
                 continue
             unit = rows["unit"].iloc[0]
             style = look(filters.index(f), i, len(members))
-            words = number(result.swept[0][1]) if one_key else swept(result)
+            words = number(result.swept[0][1], result.swept[0][0] in POWERS) if one_key else swept(result)
             marks.append(_sigma_line(rows, literal(f) if len(members) == 1 else words, style))
-    y = Axis(f"$\\sigma$ of {of.symbol}, {UNITS.get(unit, unit)}", limits=(0, None))
+    y = Axis(with_unit(f"$\\sigma$ of {of.symbol}", unit), limits=(0, None))
     panel = Panel(Axis(TIME, limits=(0, None)), y, tuple(marks), device(members[0]))
     if len(members) == 1:
         return panel
+    dashes = tuple((literal(f), Style(0, n, n)) for n, f in enumerate(filters))
+    if len(marks) > MOST_AT_ENDS and len(filters) > 1:
+        return _by_colour(panel, dashes, members[0].swept[0][0] if one_key else "")
     title = f"at the lines: {symbol_of(members[0].swept[0][0])}" if one_key else ""
-    return replace(panel, keys=tuple((literal(f), Style(0, n, n)) for n, f in enumerate(filters)), key_title=title)
+    return replace(panel, keys=dashes, key_title=title)
+
+
+def _by_colour(panel: Panel, dashes: tuple, key: str) -> Panel:
+    """A panel of many lines: names not at the lines but in a legend beside it, one of each colour and each dash."""
+    shades = {mark.label: Style(mark.style.colour, 0) for mark in panel.marks}
+    marks = tuple(replace(mark, label="") for mark in panel.marks)
+    title = ", ".join(filter(None, (symbol_of(key), KEY_UNITS.get(key, "")))) if key else ""
+    return replace(panel, marks=marks, keys=(*shades.items(), *dashes), key_title=title, legend="right")
 
 
 def _sigma_line(rows, words: str, style: Style) -> Line:
@@ -245,6 +273,6 @@ def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Quantity) -> 
         marks.append(Line(t, rows["spread"].to_numpy(), "", Style(n, 1, n)))
     keys = [(literal(f), Style(n, None, n)) for n, (f, _) in enumerate(found)]
     keys += [("bias", Style(0, 0)), ("spread", Style(0, 1))]
-    title = ", ".join(number(value) for _, value in result.swept) or device(result)
-    y = Axis(f"error of {of.symbol}, {UNITS.get(unit, unit)}")
+    title = ", ".join(number(value, key in POWERS) for key, value in result.swept) or device(result)
+    y = Axis(with_unit(f"error of {of.symbol}", unit))
     return Panel(Axis(TIME, limits=(0, None)), y, tuple(marks), title, tuple(keys))

@@ -4,6 +4,7 @@ Its figures stand in range_doppler_figures.
 """
 
 from collections.abc import Sequence
+from statistics import NormalDist
 
 import numpy as np
 
@@ -29,15 +30,24 @@ STEADY = (
 )
 
 
+def follows_the_model(result: CaseResult) -> bool:
+    """Whether the target moves as the filters take it to, by no more than a square of the time."""
+    target = result.spec.target
+    return target.kind == "polynomial" and not any(target.coefficients[3:])
+
+
 def steady(results: Sequence[CaseResult]):
     """Steady σ (exact) against settling, of every case, filter and component.
 
     Settled is the first scan from which σ(k) stays within 5 % of the exact steady value to the end of the run; the
-    interval takes σ at the kind and at the unkind end of its own. Empty where it does not settle within the run.
+    interval takes σ at the kind and at the unkind end of its own; infinite where it does not settle within the run.
+    Cases whose target breaks the filters' model have no steady error and no rows.
     `best` marks, among the cases of one config that differ in D_M, the least steady σ of those that settle in under
     ten periods.
     """
-    rows = [row for result in results for row in _steady(result)]
+    rows = [row for result in results if follows_the_model(result) for row in _steady(result)]
+    if not rows:
+        return common.frame({name: [] for name in STEADY})
     table = common.frame({name: [row[i] for row in rows] for i, name in enumerate(STEADY[:-1])})
     stem = table["case"].str.split(" ").str[0]
     family = table.groupby([stem, table["filter"], table["component"]], sort=False)
@@ -87,15 +97,15 @@ def _for_good(settled: np.ndarray, t: np.ndarray) -> float:
 
 CONSISTENCY = (
     *("case", "filter", "component", "unit", "k", "t_s", "sigma", "believed_sigma", "ratio", "ratio_lo", "ratio_hi"),
-    *("nees", "nees_bound_lo", "nees_bound_hi", "verdict"),
+    *("nees", "nees_bound_lo", "nees_bound_hi", "nees_verdict"),
 )
 
 
 def consistency(results: Sequence[CaseResult]):
     """What a filter believes of its σ against what it is (ratio over 1: pessimistic), and its normalised error squared.
 
-    `nees` is the mean of eᵀP⁻¹e per estimated component, 1 for a filter that is right about itself; the bounds hold
-    95 % of such filters' means over as many realisations.
+    `nees` is the mean of eᵀP⁻¹e per estimated component, 1 for a filter that is right about itself. In
+    95 % of runs of such a filter over as many realisations the means of all its scans lie within the bounds.
     """
     return common.joined([_consistency(result) for result in results], CONSISTENCY)
 
@@ -121,14 +131,15 @@ def _consistency(result: CaseResult) -> dict[str, np.ndarray]:
         "nees": nees,
         "nees_bound_lo": lo,
         "nees_bound_hi": hi,
-        "verdict": np.select([nees < lo, nees > hi], ["pessimistic", "optimistic"], "consistent").astype(object),
+        "nees_verdict": np.select([nees < lo, nees > hi], ["pessimistic", "optimistic"], "consistent").astype(object),
     }
 
 
 def normalised_error(result: CaseResult) -> statistics.Estimate:
-    """Mean of eᵀP⁻¹e per estimated component (F, K), P the believed covariance, and the 95 % bounds of a right filter.
+    """Mean of eᵀP⁻¹e per estimated component (F, K), P the believed covariance, and the bounds of a right filter.
 
     From Σe² and Σ of the products of two components; N·d times the mean is then chi-square of N·d degrees of freedom.
+    The bounds hold 95 % over all scans of a filter together (Bonferroni: 5 % shared among them).
     """
     axes, P = result.axes, result.axes.extra["believed"]
     second = np.zeros(P.shape)
@@ -146,7 +157,9 @@ def normalised_error(result: CaseResult) -> statistics.Estimate:
             one, other = ((part * unit)[where][:, known][:, :, known] for part in (P, second))
             mean[where] = np.trace(np.linalg.solve(one, other), axis1=1, axis2=2) / known.size
             ninth[where] = 2 / (9 * known.size * result.count)
-    step = statistics.Z95 * np.sqrt(ninth)
+    looks = np.maximum(np.sum(np.isfinite(mean), axis=1, keepdims=True), 1)
+    z = np.vectorize(lambda n: NormalDist().inv_cdf(1 - 0.025 / n), otypes=[float])(looks)
+    step = z * np.sqrt(ninth)
     return statistics.Estimate(mean, (1 - ninth - step) ** 3, (1 - ninth + step) ** 3)
 
 
@@ -179,10 +192,15 @@ def listed(names: Sequence[str]) -> str:
 
 
 def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
-    """Sentences with numbers and 95 % intervals: the gains at the end of the run, component by component.
+    """Sentences with numbers and 95 % intervals: the gains at the last scan, component by component.
 
-    Of cases that nothing is swept in, where there are such.
+    Of cases that nothing is swept in, where there are such. Further: the best D_M where several are tried, and the
+    worst error where a target breaks the model.
     """
+    return [*_gain_sentences(results, made), *_best_sentences(results, made), *_broken_sentences(results, made)]
+
+
+def _gain_sentences(results: Sequence[CaseResult], made: dict) -> list[str]:
     plain = panels.unswept(results)
     rows = made["gains"][made["gains"]["case"].isin([result.name for result in plain])]
     gains = common.groups(rows, "component")
@@ -194,15 +212,73 @@ def _gain_sentence(results: Sequence[CaseResult], rows, quantity: str) -> str:
     labels = {result.name: panels.plain_label(result) for result in results}
     last = rows.loc[rows.groupby(["case", "filter"], sort=False)["k"].idxmax()]
     several = rows["filter"].nunique() > 1
-    base = f"than with {rows['baseline'].iloc[0]} alone" if rows["baseline"].nunique() == 1 else "than the baseline's"
+    base = _baseline(results)
     if len(last) > 1:
+        early, late = last["t_s"].min(), last["t_s"].max()
+        when = f"at {late:g} s" if early == late else f"at the last scan (after {early:g} to {late:g} s)"
         low, high = (last.loc[last["gain_percent"].agg(pick)] for pick in ("idxmin", "idxmax"))
         ends = " to ".join(f"{_gain(row)} ({_who(row, labels, several)})" for row in (low, high))
-        return f"{quantity.capitalize()}: at the end of the run σ is {ends} {base}."
+        return f"{quantity.capitalize()}: {when} σ is {ends} {base}."
     row = last.iloc[0]
     best = rows.loc[rows["gain_percent"].idxmax()]
     peak = "" if best["k"] == row["k"] else f"; at best {_gain(best)}, at {best['t_s']:g} s"
-    return f"{quantity.capitalize()}: at the end of the run ({row['t_s']:g} s) σ is {_gain(row)} {base}{peak}."
+    return f"{quantity.capitalize()}: at {row['t_s']:g} s, the last scan, σ is {_gain(row)} {base}{peak}."
+
+
+def _baseline(results: Sequence[CaseResult]) -> str:
+    """Than what a gain is: range alone only where the baseline filter observes no more."""
+    bases = [result.spec.filters[result.axes.baseline] for result in results]
+    if all(base.observes == ("range",) for base in bases):
+        return "than with range alone"
+    names = {base.name for base in bases}
+    return f"than with filter '{bases[0].name}'" if len(names) == 1 else "than with the baseline filter"
+
+
+def _best_sentences(results: Sequence[CaseResult], made: dict) -> list[str]:
+    """The best manoeuvre variance of each radar and filter, in words, where several were tried."""
+    table, told = made["steady"], []
+    for members in panels.families(results).values():
+        rows = table[table["case"].isin([r.name for r in members]) & (table["component"] == "r")]
+        if rows.groupby("filter")["manoeuvre_variance"].nunique().max() > 1:
+            chosen = [_best(rows[rows["filter"] == name], name) for name in members[0].axes.filters]
+            told.append(f"{panels.device(members[0])}: {'; '.join(chosen)}")
+    if not told:
+        return []
+    rule = f"least steady σ of the range among those that settle in under {PERIODS} scan periods"
+    return [f"Best manoeuvre variance D_M, (m/s³)² ({rule}). {'. '.join(told)}."]
+
+
+def _best(rows, name: str) -> str:
+    best = rows[rows["best"]]
+    if not len(best):
+        return f"{name} none of those tried"
+    row = best.iloc[0]
+    variance = panels.number(float(row["manoeuvre_variance"]), powers=True)
+    return f"{name} {variance} (σ {row['steady_sigma']:.4g} m, settled after {row['settling_s']:g} s)"
+
+
+MOST_TOLD = 4  # cases with a broken model told in the answer
+
+
+def _broken_sentences(results: Sequence[CaseResult], made: dict) -> list[str]:
+    """Where a target breaks the model: the worst σ of the range over the run, and the largest bias, of each filter."""
+    broken = [result for result in results if not follows_the_model(result)]
+    rows = common.groups(made["curves"][made["curves"]["component"] == "r"], "case", "filter")
+    told = []
+    for result in broken[:MOST_TOLD]:
+        words = [f"{name} {_worst(rows[result.name, name])}" for name in result.axes.filters]
+        told.append(f"{panels.plain_label(result)}, a target that breaks the filters' model: {'; '.join(words)}.")
+    left = len(broken) - len(told)
+    return told + ([f"{left} further cases break the model: see curves.csv."] if left else [])
+
+
+def _worst(rows) -> str:
+    worst, bias = rows.loc[rows["sigma"].idxmax()], rows.loc[rows["bias"].abs().idxmax()]
+    text = (
+        f"worst σ of the range {worst['sigma']:.4g} m [{worst['sigma_lo']:.4g}, {worst['sigma_hi']:.4g}] "
+        f"at {worst['t_s']:g} s, largest bias {bias['bias']:.4g} m at {bias['t_s']:g} s"
+    )
+    return text.replace("-", "−")
 
 
 def _gain(row) -> str:

@@ -48,6 +48,9 @@ def consistency_figure(results: Sequence[CaseResult], table, left_out: str) -> F
     return Figure("consistency", "What the filters believe of themselves", caption + left_out, drawn, columns, width)
 
 
+WIDE = 100  # largest over least NEES from which its axis is logarithmic
+
+
 def _consistency_panel(results: Sequence[CaseResult], rows: dict, name: str) -> Panel:
     marks: list = [Reference(1)]
     for i, result in enumerate(results):
@@ -55,48 +58,66 @@ def _consistency_panel(results: Sequence[CaseResult], rows: dict, name: str) -> 
             own = rows[result.name, name]
             style = Style(i, i, i)
             marks.append(Line(own["t_s"].to_numpy(), own["nees"].to_numpy(), panels.label(result), style))
-    x, y = Axis(panels.TIME, limits=(0, None)), Axis("normalised squared error", limits=(0, None))
-    return Panel(x, y, tuple(marks), panels.literal(name))
+    values = np.concatenate([mark.y for mark in marks[1:]] or [np.ones(1)])
+    wide = values.min() > 0 and values.max() > WIDE * values.min()
+    words = "NEES per component\n(1 = consistent, below = pessimistic)"
+    y = Axis(words, "log") if wide else Axis(words, limits=(0, None))
+    return Panel(Axis(panels.TIME, limits=(0, None)), y, tuple(marks), panels.literal(name))
 
 
 def settling_figure(results: Sequence[CaseResult], table) -> Figure | None:
     """Steady σ of the range against its settling time over D_M, with the ten-period line and the best D_M named."""
-    rows = table[(table["component"] == "r") & np.isfinite(table["settling_s"])]
-    drawn = []
+    rows = table[table["component"] == "r"]
+    drawn: list[Panel] = []
     for members in panels.families(results).values():
         own = rows[rows["case"].isin([r.name for r in members])].drop_duplicates(["filter", "manoeuvre_variance"])
         if own["manoeuvre_variance"].nunique() > 1:
-            panel = _settling_panel(members[0], own)
-            drawn.append(replace(panel, legend="none") if drawn else panel)
+            drawn.append(_settling_panel(members[0], own))
+    drawn = drawn[: panels.MOST]
     if not drawn:
         return None
     caption = (
         "Exact steady σ of the range against the settling time of the measured σ (within 5 % of the steady value, for "
-        "good); grey lines join equal manoeuvre variances, named in m²/s⁶. Dotted: ten scan periods, the paper's "
-        "limit; star: the least steady error under it. What does not settle within the run is left out."
+        "good); grey lines join equal manoeuvre variances D_M, named in (m/s³)². Dotted: ten scan periods, the paper's "
+        "limit; star: the least steady error under it. What does not settle within the run is named and left out."
     )
     columns = min(3, len(drawn))
     width = COLUMN_MM if columns == 1 else PAGE_MM
-    return Figure(
-        "settling", "Steady error against settling time", caption, tuple(drawn[: panels.MOST]), columns, width
-    )
+    if len(drawn) % columns:  # a cell is free: the legend has it
+        drawn = [replace(panel, legend="none") for panel in drawn] + [replace(drawn[0], marks=(), title="")]
+    else:
+        drawn[1:] = [replace(panel, legend="none") for panel in drawn[1:]]
+    return Figure("settling", "Steady error against settling time", caption, tuple(drawn), columns, width)
 
 
 def _settling_panel(result: CaseResult, rows) -> Panel:
     """rows: of one radar and the range, one for each filter and manoeuvre variance."""
-    marks: list = [Reference(PERIODS * result.axes.extra["scan_period_s"], "x")]
-    for variance, same in rows.sort_values("steady_sigma").groupby("manoeuvre_variance"):
+    settled = rows[np.isfinite(rows["settling_s"])]
+    limit = PERIODS * result.axes.extra["scan_period_s"]
+    marks: list = [Reference(limit, "x")]
+    for variance, same in settled.sort_values("steady_sigma").groupby("manoeuvre_variance"):
         t, sigma = same["settling_s"].to_numpy(), same["steady_sigma"].to_numpy()
         marks.append(Line(t, sigma, "", Style(7, 0, width_pt=0.5)))
-        marks.append(Note(float(t[-1]), float(sigma[-1]), panels.number(float(variance))))
+        marks.append(Note(float(t[-1]), float(sigma[-1]), panels.number(float(variance), powers=True)))
+    keys = []
     for n, name in enumerate(result.axes.filters):
-        own = rows[rows["filter"] == name].sort_values("manoeuvre_variance")
-        best = own[own["best"]]
-        marks.append(
-            Line(own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy(), panels.literal(name), Style(n, n, n))
-        )
+        own = settled[settled["filter"] == name].sort_values("manoeuvre_variance")
+        best, style = own[own["best"]], Style(n, n, n)
+        marks.append(Line(own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy(), "", style))
         star = Style(n, None, 7, size_pt=8)
         marks.append(Line(best["settling_s"].to_numpy(), best["steady_sigma"].to_numpy(), "", star))
-    x, y = Axis("settling time of $\\sigma$ of $r$, s", limits=(0, None)), Axis("steady $\\sigma$ of $r$, m")
-    keys = ((f"{PERIODS} scan periods", Style(7, 2, width_pt=0.7)),)
-    return Panel(x, y, tuple(marks), panels.device(result), keys, direct=False)
+        keys.append((panels.literal(name), style))
+    longest = max([limit, *settled["settling_s"]])
+    x = Axis("settling time of $\\sigma$ of $r$, s", limits=(-0.04 * longest, 1.15 * longest))
+    keys += [("best $D_M$", Style(0, None, 7, size_pt=8)), (f"{PERIODS} scan periods", Style(7, 2, width_pt=0.7))]
+    y, title = Axis("steady $\\sigma$ of $r$, m"), "at the points: $D_M$, (m/s³)²"
+    remark = _not_settled(rows[~np.isfinite(rows["settling_s"])])
+    return Panel(x, y, tuple(marks), panels.device(result), tuple(keys), title, direct=False, remark=remark)
+
+
+def _not_settled(rows) -> str:
+    """Words on the manoeuvre variances that do not settle within the run: a line for each."""
+    return "\n".join(
+        f"{panels.number(float(variance), powers=True)} ({panels.literal(', '.join(same['filter']))}): not settled"
+        for variance, same in rows.groupby("manoeuvre_variance")
+    )

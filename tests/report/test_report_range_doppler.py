@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radarsim.report import range_doppler, statistics, tables
-from radarsim.report.drawing import Line
+from radarsim.report.drawing import Line, Style
 
 
 def made_of(results):
@@ -81,9 +81,9 @@ def test_consistency_before_the_filter_adds_manoeuvre(paper):
     start = table[(table["filter"] == "r") & (table["k"] <= 3)]
     np.testing.assert_allclose(start["nees"], 1, rtol=1e-9)
     np.testing.assert_allclose(start["ratio"], 1, rtol=1e-9)
-    assert set(start["verdict"]) == {"consistent"}
+    assert set(start["nees_verdict"]) == {"consistent"}
     late = table[table["k"] >= 6]
-    assert set(late["verdict"]) == {"pessimistic"}
+    assert set(late["nees_verdict"]) == {"pessimistic"}
     assert (late["ratio"] >= 1 - 1e-9).all()
 
 
@@ -92,8 +92,9 @@ def test_bounds_of_the_normalised_error(paper):
 
     of = range_doppler.normalised_error(paper[0])
     freedom = 3 * paper[0].count
-    assert of.lo[0, 5] == pytest.approx(chdtri(freedom, 0.975) / freedom, rel=1e-7)
-    assert of.hi[0, 5] == pytest.approx(chdtri(freedom, 0.025) / freedom, rel=1e-7)
+    share = 0.025 / 15  # of fifteen scans
+    assert of.lo[0, 5] == pytest.approx(chdtri(freedom, 1 - share) / freedom, rel=1e-7)
+    assert of.hi[0, 5] == pytest.approx(chdtri(freedom, share) / freedom, rel=1e-7)
 
 
 def test_figures_have_the_contracts_names(paper, swept):
@@ -143,7 +144,7 @@ def test_consistency_figure_draws_the_table(paper):
 def test_settling_figure_draws_the_table(swept):
     made = made_of(swept)
     (panel,) = drawn_of(swept, made)["settling"].panels
-    (line,) = [mark for mark in panel.marks if isinstance(mark, Line) and mark.label == "r+Vr"]
+    (line,) = [mark for mark in panel.marks if isinstance(mark, Line) and mark.style == Style(1, 1, 1)]
     rows = made["steady"][(made["steady"]["filter"] == "r+Vr") & (made["steady"]["component"] == "r")]
     np.testing.assert_array_equal(line.y, rows["steady_sigma"])
     np.testing.assert_array_equal(line.x, rows["settling_s"])
@@ -165,10 +166,38 @@ def test_answer_tells_the_last_gain_of_each_component(paper):
     made = made_of(paper[1:2])
     told = range_doppler.answer(paper[1:2], made)
     assert len(told) == 3
-    assert "(140 s) σ is 18.3 % [" in told[0]
+    assert "at 140 s, the last scan, σ is 18.3 % [" in told[0]
+    assert "than with range alone" in told[0]
     assert "at best 34.6 % [" in told[0]
     assert "RLS 1" in range_doppler.answer(paper, made_of(paper))[2]
     assert "higher (RLS 1)" in range_doppler.answer(paper, made_of(paper))[2]
+
+
+def test_answer_names_a_baseline_that_observes_more(expected_radar):
+    velocity = [
+        {"name": f"D {v}", "observes": ["range", "velocity"], "manoeuvre_variance": v, "initial_scans": 3}
+        for v in (1e-3, 1e-2)
+    ]
+    results = [expected_radar("rls2", filters=velocity)]
+    assert "than with filter 'D 0.001'" in range_doppler.answer(results, made_of(results))[0]
+
+
+def test_answer_tells_the_best_variance(swept):
+    told = range_doppler.answer(swept, made_of(swept))[-1]
+    assert told.startswith("Best manoeuvre variance D_M")
+    assert "RLS 2: r 10⁻³ (σ 189.1 m, settled after 90 s); r+Vr 10⁻³ (σ 154." in told
+
+
+def test_a_target_that_breaks_the_model(expected_radar):
+    target = {"kind": "jerk_pulse", "coefficients": [1e5, -250], "start_s": 50, "jerk_mps3": 1, "duration_s": 20}
+    results = [expected_radar("rls2", target=target)]
+    made = made_of(results)
+    assert made["steady"].empty
+    rows = made["curves"][(made["curves"]["component"] == "r") & (made["curves"]["filter"] == "r")]
+    worst = rows.loc[rows["sigma"].idxmax()]
+    told = range_doppler.answer(results, made)[-1]
+    assert f"r worst σ of the range {worst['sigma']:.4g} m [" in told
+    assert f"at {worst['t_s']:g} s, largest bias " in told
 
 
 def test_answer_of_a_single_filter(expected_radar):
