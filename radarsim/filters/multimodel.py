@@ -11,7 +11,7 @@ COLUMN_TOLERANCE = 1e-9  # of a column's sum from one
 
 # Additions, subtractions, multiplications, divisions, roots and exponentials of one step, all three axes, counted on
 # the formulas of `kernels.blocks` and `kernels.hypothesis` (a test counts them again).
-PREDICT, UPDATE, LIKELIHOOD, MERGE, MERGE_ONCE = 282, 444, 8, 208, -9
+PREDICT, UPDATE, LIKELIHOOD, MERGE, MERGE_ONCE = 282, 456, 8, 208, -9
 
 
 def bank(motions: Sequence[str], sigmas: Sequence[float]) -> np.ndarray:
