@@ -133,7 +133,10 @@ class _Partial:
         part = model.model_construct(**read)
         for name in unread:
             part.__dict__.pop(name, None)
-        self.more += [_Found.misfit(each, path, self.document) for each in part.misfits()]
+        misfits = list(part.misfits())
+        self.more += [_Found.misfit(each, path, self.document) for each in misfits]
+        for each in misfits:
+            part.__dict__.pop(each.key, None)  # what is around it must not lean on it
         return part
 
     def _field(self, path: Path, name: str, info: FieldInfo, model: type[BaseModel]) -> Any:
