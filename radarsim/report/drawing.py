@@ -104,7 +104,7 @@ class Panel:
     """One pair of axes. keys explain styles (not single lines) in a small legend: (words, style).
 
     direct: lines are named at their ends where the names fit; else always in the legend, at its place, "none", or
-    "right", beside the panel. A remark stands in the upper right corner. Without marks a panel is its legend alone.
+    "right", beside the panel. A remark stands above the panel, at its right. Without marks a panel is its legend alone.
     """
 
     x: Axis

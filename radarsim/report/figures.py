@@ -124,7 +124,7 @@ def _draw(axes, panel: Panel, crosses: bool) -> list:
             where, words = zip(*axis.ticks, strict=True)
             (axes.set_xticks if axis is panel.x else axes.set_yticks)(where, words)
     if panel.remark:
-        axes.text(0.98, 0.98, panel.remark, transform=axes.transAxes, ha="right", va="top", fontsize=7, zorder=5)
+        axes.set_title(panel.remark, loc="right", fontsize=7)
     return _name(axes, panel, crosses)
 
 

@@ -10,6 +10,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import provenance
 from radarsim.report.drawing import Figure
 
+NOT_SETTLED = "not settled in the run"
 ROWS = 300  # of a table shown in the page
 SHOWN_FACTS = ("threads", "seconds", "kernel_seconds", "realisations_computed", "realisations_from_store")
 
@@ -22,8 +23,9 @@ def page(
     record: Mapping,
     answer: Sequence[str],
     question: str,
+    inputs=None,
 ) -> str:
-    """The page of an experiment: question, answer, claims, figures, tables, provenance.
+    """The page of an experiment: question, answer, inputs (a table, or None), figures, tables, claims, provenance.
 
     drawn gives the figures and their SVG by name (none with --no-figures); record is run.json's.
     """
@@ -35,6 +37,7 @@ def page(
         experiment=experiment,
         question=question,
         answer=answer,
+        inputs=None if inputs is None else _table("inputs", inputs),
         record=record,
         extent=provenance.extent(record),
         claims=claims,
@@ -75,8 +78,21 @@ def _template():
 
     loader = PackageLoader("radarsim.report")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    environment.filters |= {"number": number, "thousands": lambda n: f"{n:,}", "css": _css}
+    own = {"number": number, "thousands": lambda n: f"{n:,}", "css": _css, "kept": kept, "measured": _measured}
+    environment.filters |= own
     return environment.get_template("report.html.j2")
+
+
+def kept(text: object) -> str:
+    """Text in which a per cent sign stays with its number."""
+    return str(text).replace(" %", "\u00a0%")
+
+
+def _measured(part: Mapping) -> str:
+    """What a part of a claim measured; a settling time without end in words."""
+    if math.isinf(part["measured"]) and "settling" in part["what"]:
+        return NOT_SETTLED
+    return number(part["measured"])
 
 
 def _css(verdict: str) -> str:
@@ -92,10 +108,19 @@ def _claims(table) -> list[dict]:
     return list(found.values())
 
 
+def _cell(column: str, value: object) -> str:
+    endless = column.startswith("settling") and isinstance(value, float) and math.isinf(value)
+    return NOT_SETTLED if endless else number(value)
+
+
 def _table(name: str, table) -> dict:
-    rows = table.head(ROWS)
-    columns = [{"name": column, "numeric": table[column].dtype.kind in "iuf"} for column in table.columns]
-    cells = [[number(value) for value in row] for row in rows.astype(object).itertuples(index=False, name=None)]
+    order = list(table.columns)
+    if {"sigma", "exact_sigma"} <= set(order):  # side by side, to be compared
+        order.remove("exact_sigma")
+        order.insert(order.index("sigma") + 1, "exact_sigma")
+    rows = table[order].head(ROWS)
+    columns = [{"name": column, "numeric": table[column].dtype.kind in "iuf"} for column in order]
+    cells = [list(map(_cell, order, row)) for row in rows.astype(object).itertuples(index=False, name=None)]
     return {"name": name, "columns": columns, "rows": cells, "count": len(table), "cut": len(table) > ROWS}
 
 

@@ -1,7 +1,7 @@
 """From finished cases to files: tables, figures, claims, run.json and report.html of one experiment.
 
-A study adds to this by report/<study>.py (`tables`, `figures`, `question`, `answer`) and report/claims/<study>.py, both
-found by the study's name.
+A study adds to this by report/<study>.py (`tables`, `figures`, `question`, `answer`, and `inputs` where it has a table
+of them) and report/claims/<study>.py, both found by the study's name.
 """
 
 from collections.abc import Mapping, Sequence
@@ -80,7 +80,8 @@ def write(
     answer = tuple(study(experiment.study).answer(results, made))
     record = provenance.record(experiment, results, run, contents, answer)
     question = study(experiment.study).question(experiment)
-    contents["report.html"] = html.page(experiment, results, made, drawn, record, answer, question).encode()
+    inputs = getattr(study(experiment.study), "inputs", lambda results: None)(results)
+    contents["report.html"] = html.page(experiment, results, made, drawn, record, answer, question, inputs).encode()
     contents["run.json"] = provenance.to_json(provenance.with_output(record, "report.html", contents["report.html"]))
     files.replace_all(folder, contents, stale=provenance.outputs(folder))
     return Written(folder, tuple(sorted(contents)), made, answer)

@@ -79,7 +79,12 @@ def label(result: CaseResult) -> str:
 
 def plain_label(result: CaseResult) -> str:
     """`label` for text: letters plain."""
-    return label(result).replace(r"\$", "\0").replace("$", "").replace("\0", "$")
+    return plain(label(result))
+
+
+def plain(text: str) -> str:
+    """A figure's words without the marks of mathematical text."""
+    return text.replace(r"\$", "\0").replace("$", "").replace("\0", "$")
 
 
 def families(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:

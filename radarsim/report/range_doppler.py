@@ -177,6 +177,26 @@ def radar(results: Sequence[CaseResult]):
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(RADAR)})
 
 
+def inputs(results: Sequence[CaseResult]):
+    """What was put in, for the page: a row for each radar, with its C_θ and the manoeuvre variances D_M tried."""
+    rows = []
+    for members in panels.families(results).values():
+        radar, extra = members[0].spec.radar, members[0].axes.extra
+        tried = sorted({f.manoeuvre_variance for result in members for f in result.spec.filters})
+        scans = sorted({result.spec.scans for result in members})
+        rows.append(
+            (
+                *(panels.plain(panels.device(members[0])), radar.sigma_range_m, radar.sigma_velocity_mps),
+                *(radar.scan_period_s, radar.wavelength_m, float(extra["C_theta"])),
+                *(", ".join(panels.number(v, powers=True) for v in tried), ", ".join(map(str, scans))),
+            )
+        )
+    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(INPUTS)})
+
+
+INPUTS = ("radar", "σ_r, m", "σ_V, m/s", "Δt, s", "λ, m", "C_θ", "D_M, (m/s³)²", "scans")
+
+
 def question(experiment) -> str:
     """What the experiment asks, in one sentence."""
     filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
@@ -241,7 +261,7 @@ def _best_sentences(results: Sequence[CaseResult], made: dict) -> list[str]:
         rows = table[table["case"].isin([r.name for r in members]) & (table["component"] == "r")]
         if rows.groupby("filter")["manoeuvre_variance"].nunique().max() > 1:
             chosen = [_best(rows[rows["filter"] == name], name) for name in members[0].axes.filters]
-            told.append(f"{panels.device(members[0])}: {'; '.join(chosen)}")
+            told.append(f"{panels.plain(panels.device(members[0]))}: {'; '.join(chosen)}")
     if not told:
         return []
     rule = f"least steady σ of the range among those that settle in under {PERIODS} scan periods"

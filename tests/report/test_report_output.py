@@ -127,7 +127,10 @@ def test_page_is_whole_and_leads_nowhere(written):
     ids = re.findall(r'\bid="([^"]+)"', text)
     assert len(ids) == len(set(ids))
     assert page.tags.count("svg") == 7
-    assert str(escape(written.answer[0])) in text
+    assert str(escape(written.answer[0])).replace(" %", "\u00a0%") in text
+    assert "C_θ" in text[text.index('id="inputs"') : text.index('id="figures"')]
+    assert "(1 rows)" not in text
+    assert re.search(r">sigma</th><th[^>]*>exact_sigma<", text)
     assert "watch out" in text
     assert "P1.18" in text
 
