@@ -27,6 +27,7 @@ from radarsim.config.fields import (
 
 MOST_SCANS = 100_000
 FARTHEST_M = 1e15  # a range that still resolves a metre in double precision
+RESOLVED = 1e-4 * 2.0**52  # range over accuracy at which rounding reaches a ten-thousandth of the accuracy
 NEAREST_M = 100.0  # a target that flies over the radar has no radial motion that a filter could follow
 FASTEST_MPS = 12_000.0  # escape from the Earth
 HARDEST_MPS2 = 1000.0  # about 100 g, more than any missile's
@@ -228,14 +229,6 @@ class RangeDoppler(Study):
             yield at("scans", f"must be >= {plots} for the initialisation of filter {slowest}")
 
     @cross_check
-    def _within_reach(self):
-        last = (self.scans - 1) * self.radar.scan_period_s
-        if self.target.reach_m(last) > FARTHEST_M:
-            yield at("target", f"must stay within 1e15 m of the radar up to the last plot, at {short(last)} s")
-        elif isinstance(self.target, Turn) and self._flown().closest_m(last) < NEAREST_M:
-            yield at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")
-
-    @cross_check
     def _accuracies_in_proportion(self):
         """Refuse accuracies of which one makes the other meaningless.
 
@@ -261,3 +254,17 @@ class RangeDoppler(Study):
         elif "velocity" in one.observes and one.manoeuvre_variance * dt**4 / radar.sigma_velocity_mps**2 > 1e12:
             ratio = "manoeuvre_variance scan_period_s⁴ / sigma_velocity_mps²"
             yield at(key, f"out of proportion: {ratio} must be <= 1e12")
+
+    @cross_check
+    def _within_reach(self):
+        last = (self.scans - 1) * self.radar.scan_period_s
+        radar = self.radar
+        finest = min(radar.sigma_range_m, radar.sigma_velocity_mps * radar.scan_period_s)
+        farthest = min(FARTHEST_M, finest * RESOLVED)
+        if self.target.reach_m(last) > farthest:
+            so_far = f"must stay within {short(float(f'{farthest:.2g}'))} m of the radar up to the last plot"
+            yield at(
+                "target", f"{so_far}, at {short(last)} s: beyond, double precision does not resolve its accuracies"
+            )
+        elif isinstance(self.target, Turn) and self._flown().closest_m(last) < NEAREST_M:
+            yield at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")
