@@ -54,7 +54,8 @@ STEP = {"kind": "acceleration_start", "coefficients": [1e5], "start_scan": 6, "a
         (
             STEP,
             {"coefficients": [0, 1e14]},
-            "target: must stay within 1e15 m of the radar up to the last plot, at 140 s, got "
+            "target: must stay within 68e12 m of the radar up to the last plot, at 140 s: beyond, double precision "
+            "does not resolve its accuracies, got "
             "{kind: 'acceleration_start', coefficients: [0, 1e14], start…",
         ),
     ],
