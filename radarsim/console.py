@@ -174,10 +174,11 @@ def print_outlook(experiment, outlook) -> None:
         rows,
         right=("scans", "realisations", "one thread"),
     )
+    seconds = "under a second" if outlook.seconds < 1 else "about " + clock(outlook.seconds)
+    realisations = sum(case.realisations for case in outlook.cases)
     say(
-        f"total    {plural(len(outlook.cases), 'case')}, {sum(c.realisations for c in outlook.cases):,} realisations, "
-        f"{'under a second' if outlook.seconds < 1 else 'about ' + clock(outlook.seconds)} on {plural(outlook.threads, 'thread')}, {outlook.memory_mb:.0f} MB; "
-        "figures and tables take some seconds more"
+        f"total    {plural(len(outlook.cases), 'case')}, {realisations:,} realisations, {seconds} on "
+        f"{plural(outlook.threads, 'thread')}, {outlook.memory_mb:.0f} MB; figures and tables take some seconds more"
     )
 
 
