@@ -208,8 +208,8 @@ def claims(configs, out):
 def track(config, plots, output, overrides):
     """The config's filters over recorded measurements.
 
-    PLOTS.csv has a header and one row a plot, at any spacing in time; an empty cell is a missing value. Its columns
-    are t_s and what the study's sensor measures: `range_m, bearing_rad` (sonar), `range_m, elevation_rad,
+    PLOTS.csv has a header and one row a plot, its times rising at any spacing; an empty cell is a missing value. Its
+    columns are t_s and what the study's sensor measures: `range_m, bearing_rad` (sonar), `range_m, elevation_rad,
     azimuth_rad` or `x_m, y_m, z_m` (multimodel).
 
     \b

@@ -158,7 +158,7 @@ def show_last_scan(curves, gains) -> None:
 
 def known(value: float, form: str) -> str:
     """A number in a form, or nothing for not-a-number."""
-    return form.format(value) if value == value else ""
+    return form.format(round(value, 12) + 0.0) if value == value else ""
 
 
 def print_outlook(experiment, outlook) -> None:

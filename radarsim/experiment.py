@@ -9,6 +9,8 @@ from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
+from numpy.linalg import LinAlgError
+
 from radarsim import plots, studies
 from radarsim.config import lookup
 from radarsim.config.load import Case, Experiment, load
@@ -272,12 +274,19 @@ def track(experiment: Experiment, source: str | os.PathLike) -> tuple[Case, Trac
     """
     place = experiment.path or experiment.stem
     if len(experiment.cases) > 1:
-        raise ConfigError(f"{place}: must be one case to track with, got {len(experiment.cases)}")
+        count = len(experiment.cases)
+        raise ConfigError(f"{place}: must be one case to track with, got {count}; choose: --set sweep.KEY=[VALUE]")
     (case,) = experiment.cases
     study = studies.study(case.study)
     if not hasattr(study, "track"):
         raise ConfigError(f"{place}: study: {case.study} has no filters for recorded plots")
-    return case, study.track(case, plots.read(source, study.PLOT_COLUMNS(case.spec)))
+    recorded = plots.read(source, study.PLOT_COLUMNS(case.spec))
+    try:
+        return case, study.track(case, recorded)
+    except LinAlgError as error:
+        raise ConfigError(
+            f"{source}: t_s: intervals so different leave a filter's equations without solution"
+        ) from error
 
 
 def claims(configs: Sequence[str], out: str | os.PathLike) -> list[dict]:

@@ -53,6 +53,11 @@ def _columns(path: str, rows, choices: Sequence[Sequence[str]]) -> dict[str, np.
     if not values and not faults:
         faults.append(f"{path}: has no rows")
     array = np.array(values, dtype=float).reshape(-1, len(wanted))
+    if values and not faults and np.isnan(array[:, 1:]).all():
+        faults.append(f"{path}: has no measured value in {', '.join(wanted[1:])}")
+    for i, j in np.argwhere(impossible(array, wanted))[:MOST_FAULTS]:
+        allowed = "must be > 0" if wanted[j] == "range_m" else "must be in radians, from -2 pi to 2 pi"
+        faults.append(f"{path}:{lines[i]}:{places[j] + 1}: {wanted[j]}: {allowed}, got {array[i, j]:g}")
     for i in np.flatnonzero(~(np.diff(array[:, 0]) > 0))[:MOST_FAULTS]:
         if np.isfinite(array[i : i + 2, 0]).all():
             place = f"{path}:{lines[i + 1]}:{places[0] + 1}: t_s"
@@ -60,6 +65,17 @@ def _columns(path: str, rows, choices: Sequence[Sequence[str]]) -> dict[str, np.
     if faults:
         raise ConfigError(*faults)
     return dict(zip(wanted, array.T.copy(), strict=True))
+
+
+def impossible(array: np.ndarray, names: list[str]) -> np.ndarray:
+    """Which values (n, columns) no sensor can have given: ranges not positive, angles beyond a turn (degrees?)."""
+    wrong = np.zeros(array.shape, dtype=bool)
+    for j, name in enumerate(names):
+        if name == "range_m":
+            wrong[:, j] = array[:, j] <= 0
+        elif name.endswith("_rad"):
+            wrong[:, j] = np.abs(array[:, j]) > 2 * np.pi
+    return wrong
 
 
 def _chosen(path: str, header: list[str], choices: Sequence[Sequence[str]]) -> list[str]:

@@ -50,6 +50,12 @@ def test_the_second_choice_of_columns(tmp_path):
         ("t_s,x_m,y_m\n0,1,1\n2,1,1\n1,1,1\n", "plots.csv:4:1: t_s: must be later than the row before, got 1 after 2"),
         ("t_s,x_m,y_m\n5,1,1\n5,1,1\n", "plots.csv:3:1: t_s: must be later than the row before, got 5 after 5"),
         ('t_s,x_m,y_m\n0,"1,1\n', "plots.csv:2: not a CSV row: unexpected end of data"),
+        ("t_s,x_m,y_m\n0,,\n1,,\n", "plots.csv: has no measured value in x_m, y_m"),
+        (
+            "t_s,range_m,bearing_rad\n0,100,45\n",
+            "plots.csv:2:3: bearing_rad: must be in radians, from -2 pi to 2 pi, got 45",
+        ),
+        ("t_s,range_m,bearing_rad\n0,-100,1\n", "plots.csv:2:2: range_m: must be > 0, got -100"),
         (b"t_s,x_m,y_m\n0,\xff,1\n", "plots.csv: is not UTF-8 text"),
     ],
 )
@@ -96,3 +102,13 @@ def test_an_unwritable_place(tmp_path):
     track = Track(("one",), (("r", "m"),), np.zeros(1), np.zeros((1, 1, 1)), np.ones((1, 1, 1)))
     with pytest.raises(StoreError, match="cannot be written"):
         plots.write(track, tmp_path / "no folder" / "track.csv")
+
+
+def test_intervals_that_no_filter_can_take_are_a_fault_of_the_file(tmp_path):
+    from radarsim import experiment
+
+    path = tmp_path / "plots.csv"
+    path.write_text("t_s,range_m,bearing_rad\n0,9000,1\n1e-6,9000,1\n1e7,9000,1\n")
+    (config,) = experiment.load_all(["sonar_smoothing"])
+    with pytest.raises(ConfigError, match="t_s: intervals so different"):
+        experiment.track(config, path)

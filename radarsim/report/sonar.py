@@ -323,7 +323,10 @@ def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
 def _best(result: CaseResult, curves) -> str:
     first = result.axes.components[0][0]
     rows = curves[(curves["case"] == result.name) & (curves["component"] == first)]
-    last = rows[rows["k"] == rows["k"].max()].sort_values("sigma", kind="stable")
+    last = rows[rows["k"] == rows["k"].max()]
+    # By the exact values where all are known: filters of one accuracy are not to be told apart by their noise.
+    order = last["exact_sigma"].round(9) if last["exact_sigma"].notna().all() else last["sigma"]
+    last = last.loc[order.sort_values(kind="stable").index]
     low, high = last.iloc[0], last.iloc[-1]
     where = panels.swept(result)
     said = f"{low['filter']} {low['sigma']:.4g} {low['unit']} [{low['sigma_lo']:.4g}, {low['sigma_hi']:.4g}]"
