@@ -244,15 +244,9 @@ class Sonar(Study):
             yield at("scans", f"must be >= {most} for a filter of degree {most - 1}")
 
     @cross_check
-    def _plots_within_scans(self):
+    def _misses_within_scans(self):
         if any(scan > self.scans for scan in self.sensor.missed_scans):
             yield at("sensor.missed_scans", f"must be <= {self.scans}, the last scan")
-        if not self.sensor.further:  # else there are more plots than scans
-            yield from of_each(self.filters, self._reachable)
-
-    def _reachable(self, i: int, one: Filter):
-        if one.plots is not None and one.plots > self.scans:
-            yield at(f"filters.{i}.plots", f"must be <= {self.scans}, the number of scans")
 
     @cross_check
     def _target_measured(self):
