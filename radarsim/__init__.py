@@ -11,7 +11,7 @@ from importlib import import_module
 __version__ = "0.1.0"
 __all__ = ["ConfigError", "RadarsimError", "Result", "__version__", "run"]
 
-_HOMES = {"run": "experiment", "Result": "experiment", "ConfigError": "errors", "RadarsimError": "errors"}
+_HOMES = {"run": "experiment", "Result": "result", "ConfigError": "errors", "RadarsimError": "errors"}
 
 
 def __getattr__(name: str):

@@ -4,21 +4,19 @@ import json
 import os
 import shlex
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cached_property
 from pathlib import Path
 
-from numpy.linalg import LinAlgError
-
-from radarsim import plots, studies
+from radarsim import studies
 from radarsim.config import lookup
 from radarsim.config.load import Case, Experiment, load
 from radarsim.engine.collect import Collected, collect, stored
 from radarsim.engine.executors import available_cores
-from radarsim.engine.results import CaseResult, Track
+from radarsim.engine.results import CaseResult
 from radarsim.engine.stopping import Signals
 from radarsim.errors import ConfigError, StoreError
+from radarsim.result import Result
 
 
 def load_all(sources: Sequence, overrides: Sequence[str] = ()) -> list[Experiment]:
@@ -67,74 +65,6 @@ def simulated(
 
 RESULTS = "results"  # the command's default directory
 SHORT = {"realisations": "-n", "seed": "--seed"}
-
-
-class Result:
-    """A finished experiment: its cases, tables (pandas), figures (Matplotlib). Nothing is written unless asked for."""
-
-    def __init__(self, experiment: Experiment, cases: Sequence[CaseResult], facts: Mapping):
-        self.experiment, self.cases, self.facts = experiment, tuple(cases), dict(facts)
-
-    def __repr__(self):
-        counts = sorted({case.count for case in self.cases})
-        each = f"{counts[0]:,}" if len(counts) == 1 else f"{counts[0]:,} to {counts[-1]:,}"
-        return f"<radarsim result {self.experiment.stem}: {len(self.cases)} cases of {each} realisations>"
-
-    @cached_property
-    def tables(self) -> dict:
-        """Every table by the stem of its file: `curves`, `gains`, `claims`, and the study's own."""
-        from radarsim.report import output
-
-        return output.tables(self.cases)
-
-    @property
-    def curves(self):
-        """sigma(k), bias and spread of every case, filter and component: a DataFrame with the columns of curves.csv."""
-        return self.tables["curves"]
-
-    @property
-    def gains(self):
-        """Gains against the baseline filter: a DataFrame with the columns of gains.csv."""
-        return self.tables["gains"]
-
-    @cached_property
-    def _described(self) -> dict:
-        from radarsim.report import output
-
-        return output.figures(self.cases, self.tables, self.experiment)
-
-    @property
-    def figures(self) -> tuple[str, ...]:
-        """The names that `figure` takes."""
-        return tuple(self._described)
-
-    def figure(self, name: str):
-        """A Matplotlib figure by its name; KeyError names those there are."""
-        from radarsim.report import figures
-
-        if name not in self._described:
-            raise KeyError(f"no figure {name!r}; there are: {', '.join(self._described)}")
-        return figures.render(self._described[name])
-
-    def write(self, out: str | os.PathLike, figures: bool = True):
-        """Write tables, figures, claims, run.json and report.html into out/<stem>/; what was written."""
-        from radarsim.report import output
-
-        folder = Path(out) / self.experiment.stem
-        self.written = output.write(self.experiment, self.cases, folder, self.facts, draw=figures, made=self.tables)
-        return self.written
-
-    def verdicts(self) -> dict[str, list[str]]:
-        """The claims that came out so, by verdict; empty where this experiment judges none."""
-        judged = self.tables["claims"].drop_duplicates("claim")
-        return {verdict: list(group["claim"]) for verdict, group in judged.groupby("overall", sort=False)}
-
-    @property
-    def warnings(self) -> list[str]:
-        """What a reader of the numbers must know: damaged or mixed blocks, too few realisations."""
-        from radarsim.report import provenance
-
-        return [*self.facts["warnings"], *provenance.few(self.cases)]
 
 
 def run(
@@ -265,28 +195,6 @@ def facts_of(gathered: Gathered, threads: int, seconds: float) -> dict:
         "warnings": list(dict.fromkeys(warning for c in collected for warning in c.warnings)),
         "identities": {case.name: work.identity for case, work, _ in gathered},
     }
-
-
-def track(experiment: Experiment, source: str | os.PathLike) -> tuple[Case, Track]:
-    """The filters of an experiment's one case over the recorded plots in a CSV file.
-
-    Raises ConfigError for an experiment of several cases, a study without recorded plots, and faults in the file.
-    """
-    place = experiment.path or experiment.stem
-    if len(experiment.cases) > 1:
-        count = len(experiment.cases)
-        raise ConfigError(f"{place}: must be one case to track with, got {count}; choose: --set sweep.KEY=[VALUE]")
-    (case,) = experiment.cases
-    study = studies.study(case.study)
-    if not hasattr(study, "track"):
-        raise ConfigError(f"{place}: study: {case.study} has no filters for recorded plots")
-    recorded = plots.read(source, study.PLOT_COLUMNS(case.spec))
-    try:
-        return case, study.track(case, recorded)
-    except LinAlgError as error:
-        raise ConfigError(
-            f"{source}: t_s: intervals so different leave a filter's equations without solution"
-        ) from error
 
 
 def claims(configs: Sequence[str], out: str | os.PathLike) -> list[dict]:

@@ -105,10 +105,10 @@ def test_an_unwritable_place(tmp_path):
 
 
 def test_intervals_that_no_filter_can_take_are_a_fault_of_the_file(tmp_path):
-    from radarsim import experiment
+    from radarsim import experiment, recorded
 
     path = tmp_path / "plots.csv"
     path.write_text("t_s,range_m,bearing_rad\n0,9000,1\n1e-6,9000,1\n1e7,9000,1\n")
     (config,) = experiment.load_all(["sonar_smoothing"])
     with pytest.raises(ConfigError, match="t_s: intervals so different"):
-        experiment.track(config, path)
+        recorded.track(config, path)

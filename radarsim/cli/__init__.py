@@ -1,0 +1,20 @@
+"""The command `radarsim`: parse, call one function, print; a file for each part of `radarsim --help`."""
+
+import os
+import sys
+
+from radarsim.cli import experiments, house, own_data
+from radarsim.cli.group import main
+
+__all__ = ["entry", "experiments", "house", "main", "own_data"]
+
+
+def entry():
+    """The console script: `main` with streams that are there and can hold every character."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+    main()
