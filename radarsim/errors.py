@@ -26,6 +26,10 @@ class TargetUnmet(RadarsimError):
     exit_code = 3
 
 
+class ClusterError(TargetUnmet):
+    """The cluster was lost on the way: what was done is stored, the rest is not done."""
+
+
 class StoreError(RadarsimError):
     """The disk, or results on it, are damaged or cannot be written."""
 

@@ -25,7 +25,8 @@ class Outcome:
 
 
 class Executor(Protocol):
-    """`workers` tasks run at once, `depth` are worth handing over in advance, and one should last `shortest_s` or more.
+    """`workers` tasks run at once, `depth` are worth handing over in advance, and one should last from `shortest_s` to
+    `longest_s`.
 
     Tasks must be started in the order of submit, so that what is done when a run is stopped is all from the left.
     """
@@ -33,6 +34,7 @@ class Executor(Protocol):
     workers: int
     depth: int
     shortest_s: float
+    longest_s: float
 
     def submit(self, work: Work, piece: Node | Partial) -> None:
         """Hand over a task; returns at once."""
@@ -70,6 +72,7 @@ class Threads:
     """
 
     shortest_s = 3e-3
+    longest_s = 0.1
 
     def __init__(self, workers: int | None = None):
         self.workers = workers or available_cores()
@@ -116,7 +119,7 @@ class Threads:
 class Serial:
     """Everything in the calling thread, a task at a time: for debuggers and profilers."""
 
-    workers, depth, shortest_s = 1, 1, Threads.shortest_s
+    workers, depth, shortest_s, longest_s = 1, 1, Threads.shortest_s, Threads.longest_s
 
     def __init__(self) -> None:
         self._tasks: deque = deque()

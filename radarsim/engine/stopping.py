@@ -1,5 +1,6 @@
 """Reasons to stop a run: a stop condition is called between tasks and gives None or the reason in words."""
 
+import math
 import os
 import select
 import signal
@@ -16,6 +17,21 @@ def time_limit(seconds: float) -> Stop:
     """Stop when that many seconds have passed from now."""
     end = time.monotonic() + seconds
     return lambda: f"time limit of {seconds:g} s" if time.monotonic() >= end else None
+
+
+class Either:
+    """Whichever of several conditions gives a reason first; `grace_s` is then that one's."""
+
+    def __init__(self, *conditions: Stop | None) -> None:
+        self._conditions = [condition for condition in conditions if condition is not None]
+        self.grace_s = math.inf
+
+    def __call__(self) -> str | None:
+        for condition in self._conditions:
+            if (reason := condition()) is not None:
+                self.grace_s = getattr(condition, "grace_s", math.inf)
+                return reason
+        return None
 
 
 class Signals:

@@ -42,7 +42,7 @@ class Shuffled(Serial):
 class Processes:
     """Worker processes, behind the interface that further executors will have."""
 
-    workers, depth, shortest_s = 2, 4, 1e-3
+    workers, depth, shortest_s, longest_s = 2, 4, 1e-3, 0.1
 
     def __init__(self, pool):
         self._pool, self._done = pool, SimpleQueue()

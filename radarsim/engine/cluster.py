@@ -1,0 +1,227 @@
+"""Tasks on a Dask cluster: processes of this machine, or the workers of a scheduler. The only file that knows Dask.
+
+A task travels as the pickled work (a case: a few kilobytes) and the piece; the worker prepares a work once and keeps
+it. Workers may come and go: Dask hands the tasks of a dead one to another. They must have the same sources, which the
+identity of the work tells.
+"""
+
+import contextlib
+import logging
+import pickle
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from functools import lru_cache
+from itertools import count
+from queue import Empty, SimpleQueue
+
+from radarsim.engine.blocks import Node, Partial, Work
+from radarsim.engine.executors import Outcome, attempted
+from radarsim.errors import ClusterError, ConfigError, Interrupted
+
+CONNECT_S = 10
+WORKERS_S = 30  # how long a scheduler may be without a worker
+DEATHS = 20  # of workers under one task, after which it is taken for their cause
+LOOK_S = 1.0
+HINT = "--workers and --scheduler need Dask: pip install 'radarsim[cluster]'"
+QUIET = ("distributed", "distributed.nanny", "distributed.worker", "distributed.scheduler", "distributed.comm")
+# Spawned, since a fork of a process with live threads may hang; no dashboard, no limit of memory to kill a worker at.
+SETTINGS = {
+    "distributed.worker.multiprocessing-method": "spawn",
+    "distributed.scheduler.allowed-failures": DEATHS,
+    "distributed.comm.timeouts.connect": f"{CONNECT_S}s",
+    "logging": dict.fromkeys(QUIET, "critical"),
+}
+
+
+def _dask():
+    try:
+        import distributed
+    except ImportError as error:
+        raise ConfigError(f"{HINT} ({error})") from error
+    return distributed
+
+
+class Cluster:
+    """The workers of a Dask scheduler, as an executor; to be entered, and left when all runs are done."""
+
+    shortest_s = 0.05
+    longest_s = 0.5
+
+    def __init__(self, workers: int | None = None, scheduler: str | None = None):
+        """So many worker processes on this machine, or the workers of the scheduler at an address.
+
+        Raises ConfigError where Dask is missing, the address is wrong, or no worker is there within half a minute.
+        """
+        distributed = _dask()
+        import dask
+
+        for name in QUIET:
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        self._dead = distributed.scheduler.KilledWorker
+        self._done: SimpleQueue = SimpleQueue()
+        self._tasks: dict[str, tuple] = {}  # by key: the future, the work, the piece
+        self._running: set[str] = set()  # after a cancel: those let finish
+        self._numbers = count()
+        self._looked = self._seen = time.monotonic()
+        self._local = None
+        self._place = scheduler or "this machine"
+        with dask.config.set(SETTINGS):
+            if scheduler is None:
+                options = {"threads_per_worker": 1, "dashboard_address": None, "memory_limit": 0, "host": "127.0.0.1"}
+                self._local = distributed.LocalCluster(n_workers=workers, silence_logs=logging.CRITICAL, **options)
+            try:
+                self._client = distributed.Client(self._local or scheduler, timeout=CONNECT_S, set_as_default=False)
+            except (OSError, ValueError, TypeError) as error:
+                raise ConfigError(f"--scheduler: no Dask scheduler answers at {scheduler!r}: {error}") from error
+        self._client.register_plugin(_plugin(distributed))
+        self._wait_for_workers()
+
+    def _wait_for_workers(self) -> None:
+        end = time.monotonic() + WORKERS_S
+        while not self._count():
+            if time.monotonic() > end:
+                self.close()
+                raise ConfigError(f"--scheduler: no worker is connected to {self._place}; `dask worker` starts one")
+            time.sleep(0.1)
+
+    def _count(self) -> int:
+        self.workers = sum(self._client.nthreads().values())
+        self.depth = 2 * self.workers + 2
+        return self.workers
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, *_):
+        # After a signal the process ends at once, and its workers with it; an orderly end would take two seconds.
+        if kind is not Interrupted:
+            self.close()
+
+    def submit(self, work: Work, piece: Node | Partial) -> None:
+        """Hand over a task; returns at once."""
+        number = next(self._numbers)
+        key = f"radarsim-{work.identity[:16]}-{piece.name}-{number}"
+        given = (pickle.dumps(work), work.identity, piece)
+        future = self._client.submit(_attempted, *given, key=key, pure=False, priority=-number)
+        self._tasks[key] = future, work, piece
+        future.add_done_callback(self._done.put)
+
+    def finished(self, timeout_s: float) -> list[Outcome]:
+        """What has finished since the last call, waiting at most timeout_s for the first.
+
+        Raises ClusterError when the scheduler or all workers are gone, or a task cannot run there at all.
+        """
+        outcomes: list[Outcome] = []
+        with contextlib.suppress(Empty):
+            outcomes += self._taken(self._done.get(timeout=timeout_s))
+            while True:
+                outcomes += self._taken(self._done.get_nowait())
+        self._look()
+        return outcomes
+
+    def _taken(self, future) -> list[Outcome]:
+        task = self._tasks.pop(future.key, None)
+        if task is None:  # cancelled before
+            return []
+        self._running.discard(future.key)
+        if future.status == "finished":
+            with contextlib.suppress(Exception):  # the worker died before it was asked: once more
+                return [future.result()]
+            self.submit(*task[1:])
+            return []
+        if future.status == "cancelled":
+            raise self._lost()
+        error = future.exception()
+        if isinstance(error, self._dead):
+            raise ClusterError(f"{self._place}: {DEATHS} workers died under the same blocks; what was done is stored")
+        if isinstance(error, ConfigError):
+            raise error
+        raise ClusterError(f"{self._place}: a worker cannot run the blocks: {type(error).__name__}: {error}")
+
+    def _look(self) -> None:
+        """About once a second: is the scheduler there, and who works for it?"""
+        now = time.monotonic()
+        if now < self._looked + LOOK_S:
+            return
+        self._looked = now
+        if self._client.status != "running":
+            raise self._lost()
+        try:
+            working = self._count()
+        except Exception as error:
+            raise self._lost() from error
+        if working:
+            self._seen = now
+        elif now > self._seen + WORKERS_S:
+            raise ClusterError(f"{self._place}: no worker for {WORKERS_S} s; what was done is stored")
+
+    def _lost(self) -> ClusterError:
+        return ClusterError(f"{self._place}: the scheduler went away; what was done is stored, run again to continue")
+
+    def cancel(self) -> int:
+        """Drop the tasks that are not yet started; how many those were."""
+        waiting = self._tasks.keys() - self._running
+        if not waiting:
+            return 0
+        try:
+            stacks = self._client.call_stack(keys=list(waiting)) if self._client.status == "running" else {}
+            started = {str(key) for tasks in stacks.values() for key in tasks}
+        except Exception:  # whatever Dask has against it, nothing is then known to run
+            started = set()
+        self._running |= waiting & started
+        dropped = [self._tasks.pop(key)[0] for key in waiting - started]
+        with contextlib.suppress(Exception):
+            self._client.cancel(dropped, force=True)
+        return len(dropped)
+
+    def close(self) -> None:
+        """Let the workers go, without waiting for tasks that still run; those of this machine end."""
+        with _muted():
+            self._client.close(timeout=1)
+            if self._local is not None:
+                self._local.close(timeout=2)
+
+
+@contextlib.contextmanager
+def _muted() -> Iterator[None]:
+    """Without the complaints of a cluster that is torn down under its tasks."""
+    logging.disable(logging.CRITICAL)
+    try:
+        with contextlib.suppress(Exception):
+            yield
+    finally:
+        logging.disable(logging.NOTSET)
+
+
+def _plugin(distributed):
+    class Deaf(distributed.WorkerPlugin):
+        """Ctrl-C in a terminal reaches every process of it; the run decides when its workers end."""
+
+        name = "radarsim signals"
+
+        def setup(self, worker) -> None:
+            with contextlib.suppress(ValueError):  # not in the main thread: a worker inside somebody's process
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    return Deaf()
+
+
+_preparing = threading.Lock()
+
+
+@lru_cache(maxsize=4)
+def _prepared(pickled: bytes) -> Work:
+    work = pickle.loads(pickled)
+    work.block  # noqa: B018  (prepares it)
+    return work
+
+
+def _attempted(pickled: bytes, identity: str, piece: Node | Partial) -> Outcome:
+    """Run one task on a worker. ConfigError if the worker would compute other numbers than the run asks for."""
+    with _preparing:
+        work = _prepared(pickled)
+    if work.identity != identity:
+        raise ConfigError("--scheduler: a worker has other sources than this machine; install the same radarsim there")
+    return attempted(work, piece)

@@ -1,0 +1,265 @@
+"""One run: what is stored, what is missing, tasks handed out and taken in, and the sums that come of it."""
+
+import math
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, Work, added, widest
+from radarsim.engine.executors import Executor, Outcome
+from radarsim.engine.keeper import Keeper
+from radarsim.engine.moments import Sums
+from radarsim.engine.stopping import Stop
+from radarsim.engine.store import Store
+
+SHARES = 4
+POLL_S = 0.05
+PROGRESS_S = 0.1
+
+
+@dataclass(frozen=True)
+class Collected(Sums):
+    """The sums of realisations 0 … count-1, and how they were come by.
+
+    count is what was asked for unless `stopped` says why it is less. from_store and computed are realisations: those
+    read, and those simulated in this call. kernel_seconds is the time inside tasks, summed over the workers.
+    """
+
+    asked: int
+    from_store: int
+    computed: int
+    seconds: float
+    kernel_seconds: float
+    stopped: str | None
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Shared:
+    """What computing a share came to, in realisations; `stopped` says why `done` is less than `asked`."""
+
+    asked: int
+    done: int
+    from_store: int
+    computed: int
+    seconds: float
+    kernel_seconds: float
+    stopped: str | None
+    warnings: tuple[str, ...]
+
+
+class Pace:
+    """How many blocks make a task, from how long one takes. It never changes a number: sums merge in the same tree."""
+
+    def __init__(self, executor: Executor):
+        self._executor = executor
+        self._block_s = math.inf
+
+    def note(self, blocks: int, seconds: float) -> None:
+        """The least time counts: the first tasks may contain a compilation."""
+        self._block_s = min(self._block_s, max(seconds, 1e-7) / blocks)
+
+    def level(self, blocks_left: int) -> int:
+        """log2 of the blocks of the next task: long enough to be worth handing over, short enough to end together."""
+        if math.isinf(self._block_s):
+            return 0
+        share = self._block_s * blocks_left / (self._executor.workers * SHARES)
+        fair = math.floor(math.log2(min(share, self._executor.longest_s) / self._block_s))
+        worthwhile = math.ceil(math.log2(self._executor.shortest_s / self._block_s))
+        return max(0, fair, worthwhile)
+
+
+class Run:
+    """One call of collect: realisations 0 … N-1, of which blocks first … stop-1 and the cut one are its own to do."""
+
+    def __init__(
+        self,
+        work: Work,
+        realisations: int,
+        store: str | os.PathLike | None,
+        progress: Callable[[int, int, int], None] | None,
+    ):
+        self.work, self.asked = work, realisations
+        self.full, self.rest = divmod(realisations, work.block)
+        self.first, self.stop = 0, self.full
+        self.forest = Forest(work.block, work.size)
+        self.partial: Sums | None = None
+        self.total: Sums | None = None
+        self.from_store = self.computed = 0
+        self.kernel_seconds = 0.0
+        self.started = time.perf_counter()
+        self._keeper = None if store is None else Keeper(Store(store, work))
+        self._progress, self._progress_due = progress, 0.0
+        self._fault: Outcome | None = None
+
+    def restored(self) -> bool:
+        """Read what is stored; whether that is all."""
+        if self._keeper is None:
+            return False
+        self.total = self._keeper.store.read(Total(self.asked))
+        if self.total is None:
+            self._read_pieces()
+        held = [self.total] if self.total is not None else self.pieces().values()
+        self.from_store = sum(sums.count for sums in held)
+        return self.from_store == self.asked
+
+    def _read_pieces(self) -> None:
+        self.forest = self._keeper.store.forest(self.full)
+        self._keeper.found(self.forest.nodes)
+        if self.rest:
+            self.partial = self._keeper.store.read(Partial(self.full, self.rest))
+
+    def compute(self, executor: Executor, stop: Stop | None) -> str | None:
+        """Hand out what is missing and take it in; the reason, if stop gave one."""
+        pace = Pace(executor)
+        tasks = self._tasks(pace)
+        waiting, stopped, give_up = 0, None, math.inf
+        while True:
+            if stopped is None and stop is not None and (stopped := stop()) is not None:
+                give_up = time.perf_counter() + getattr(stop, "grace_s", math.inf)
+            if stopped is not None or self._fault is not None:
+                waiting -= executor.cancel()
+            else:
+                while waiting < executor.depth and (piece := next(tasks, None)) is not None:
+                    executor.submit(self.work, piece)
+                    waiting += 1
+            if waiting == 0 or time.perf_counter() > give_up:
+                break
+            for outcome in executor.finished(POLL_S):
+                waiting -= 1
+                self._take(outcome, pace)
+            self._report()
+            if self._keeper is not None:
+                self._keeper.offer(self.forest.nodes)
+        if self._fault is not None:
+            raise self._fault.error
+        return stopped
+
+    def missing(self) -> list[tuple[int, int]]:
+        """Runs (first, stop) of its blocks that are not done."""
+        cut = ((max(first, self.first), min(stop, self.stop)) for first, stop in self.forest.gaps(self.stop))
+        return [(first, stop) for first, stop in cut if first < stop]
+
+    def _tasks(self, pace: Pace) -> Iterator[Node | Partial]:
+        gaps = self.missing()
+        left = sum(stop - first for first, stop in gaps)
+        for first, stop in gaps:
+            while first < stop:
+                node = widest(first, stop, pace.level(left))
+                yield node
+                first = node.stop
+                left -= 1 << node.level
+        if self.rest and self.partial is None:
+            yield Partial(self.full, self.rest)
+
+    def _take(self, outcome: Outcome, pace: Pace) -> None:
+        self.kernel_seconds += outcome.seconds
+        if outcome.error is not None:
+            if self._fault is None or outcome.piece.first < self._fault.piece.first:
+                self._fault = outcome
+            return
+        self.computed += outcome.sums.count
+        if self._keeper is not None:
+            self._keeper.store.platforms.add(outcome.instruction_set)
+        if isinstance(outcome.piece, Partial):
+            self.partial = outcome.sums
+        else:
+            pace.note(1 << outcome.piece.level, outcome.seconds)
+            self.forest.add(outcome.piece, outcome.sums)
+
+    def _report(self, *, last: bool = False) -> None:
+        now = time.perf_counter()
+        if self._progress is not None and (last or now >= self._progress_due):
+            self._progress(self.from_store + self.computed, self.asked, self.from_store)
+            self._progress_due = now + PROGRESS_S
+
+    def pieces(self) -> dict[Piece, Sums]:
+        """What is done, as it is stored."""
+        cut = {} if self.partial is None else {Partial(self.full, self.rest): self.partial}
+        return self.forest.nodes | cut
+
+    def keep(self, pieces: dict[Piece, Sums]) -> None:
+        """Put these into the store, if there is one."""
+        if self._keeper is not None:
+            self._keeper.finish(pieces)
+
+    def finished(self, stopped: str | None) -> Collected:
+        """The result, once all that it rests on is stored, and itself as a total."""
+        result = self.result(stopped)
+        if self.total is None:
+            reported = {Total(result.count): Sums(result.count, result.values)} if result.count else {}
+            self.keep(self.pieces() | reported)
+        self._report(last=True)
+        return result
+
+    def result(self, stopped: str | None) -> Collected:
+        """The sums of what is done from realisation 0 on without a gap."""
+        sums = self.total or self.forest.total()
+        if self.total is None and self.partial is not None and sums.count == self.full * self.work.block:
+            sums = added(sums, self.partial, 0) if self.full else self.partial
+        return Collected(
+            count=sums.count,
+            values=sums.values,
+            asked=self.asked,
+            from_store=self.from_store,
+            computed=self.computed,
+            seconds=time.perf_counter() - self.started,
+            kernel_seconds=self.kernel_seconds,
+            stopped=stopped if sums.count < self.asked else None,
+            warnings=self._warnings(),
+        )
+
+    def _warnings(self) -> tuple[str, ...]:
+        if self._keeper is None:
+            return ()
+        store = self._keeper.store
+        if len(store.platforms) < 2:
+            return tuple(store.warnings)
+        mixed = "; ".join(sorted(store.platforms))
+        return (*store.warnings, f"{store.path}: sums from several instruction sets, equal to 1e-12 only: {mixed}")
+
+
+class Share(Run):
+    """One call of share. Its sums go into the store as nodes; a total there is none."""
+
+    def __init__(
+        self,
+        work: Work,
+        realisations: int,
+        number: int,
+        of: int,
+        store: str | os.PathLike,
+        progress: Callable[[int, int, int], None] | None,
+    ):
+        super().__init__(work, realisations, store, progress)
+        self.first, self.stop = (self.full * bound // of for bound in (number - 1, number))
+        self.rest = self.rest if number == of else 0
+        self.asked = (self.stop - self.first) * work.block + self.rest
+
+    def restored(self) -> bool:
+        """Read what is stored; whether that is all of the share."""
+        self._read_pieces()
+        self.from_store = self.done()
+        return self.from_store == self.asked
+
+    def done(self) -> int:
+        """Realisations of the share that are done."""
+        missing = sum(stop - first for first, stop in self.missing()) * self.work.block
+        return self.asked - missing - (self.rest if self.partial is None else 0)
+
+    def finished(self, stopped: str | None) -> Shared:
+        """What came of it, once it is stored."""
+        self.keep(self.pieces())
+        self._report(last=True)
+        done = self.done()
+        return Shared(
+            asked=self.asked,
+            done=done,
+            from_store=self.from_store,
+            computed=self.computed,
+            seconds=time.perf_counter() - self.started,
+            kernel_seconds=self.kernel_seconds,
+            stopped=stopped if done < self.asked else None,
+            warnings=self._warnings(),
+        )
