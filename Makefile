@@ -6,7 +6,7 @@ RADARSIM := $(BIN)/radarsim
 # Smoke runs keep out of results/, which holds what was made at full size.
 SMOKE := $(VENV)/smoke
 
-.PHONY: run test slow lint smoke reproduce-figures bench schema clean
+.PHONY: run test slow lint smoke reproduce-figures bench schema docs clean
 
 run: $(VENV)/installed
 	$(RADARSIM) run configs/rls2.yaml
@@ -35,8 +35,13 @@ bench: $(VENV)/installed
 schema: $(VENV)/installed
 	$(RADARSIM) schema > docs/schema.json
 
+# Every warning is an error: a link that leads nowhere, a page in no contents, a docstring that does not read.
+docs: $(VENV)/documented
+	$(BIN)/sphinx-build -q -n -W --keep-going -c docs -d docs/_build/doctrees . docs/_build/html
+	@echo "documentation: docs/_build/html/index.html"
+
 clean:
-	rm -rf $(VENV) build *.egg-info .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) docs/_build build *.egg-info .pytest_cache .ruff_cache .hypothesis
 
 $(VENV)/installed: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -45,4 +50,8 @@ $(VENV)/installed: pyproject.toml constraints.txt
 
 $(VENV)/tested: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	touch $@
+
+$(VENV)/documented: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
 	touch $@

@@ -1,0 +1,51 @@
+"""Sphinx over the whole repository, so that links between pages are ordinary relative ones, here as on a file view.
+
+`make docs` builds into docs/_build/html. What can be read off the program (commands, YAML keys, Python) is generated
+while building: see making/.
+"""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from making import contents, generated, modules
+
+import radarsim
+
+project = "radarsim"
+author = "radarsim"
+version = release = radarsim.__version__
+language = "en"
+
+extensions = ["myst_parser", "sphinx.ext.autodoc"]
+root_doc = "docs/README"
+include_patterns = ["README.md", "CHANGELOG.md", "docs/**.md", "benchmarks/README.md", "results/README.md"]
+exclude_patterns = ["docs/_build", ".venv", ".git", "results/.blocks", "radarsim", "tests"]
+myst_heading_anchors = 4
+
+default_role = "code"  # of single backticks in docstrings
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+# Types of other libraries: their documentation is elsewhere, and the build looks nothing up outside.
+nitpick_ignore_regex = [
+    ("py:.*", r"(np|numpy|pd|pandas|matplotlib|collections|os|pathlib|types|numba|click|pydantic|markupsafe)\..*"),
+    ("py:class", r"radarsim\.config\.fields\..*"),  # their keys have a page of their own
+]
+
+html_theme = "furo"
+html_title = f"radarsim {version}"
+html_copy_source = False
+html_show_sourcelink = False
+pygments_style = "friendly"
+pygments_dark_style = "monokai"
+
+
+def setup(app):
+    """What is made while building: the contents from the index, pages from the program, a front page."""
+    app.connect("source-read", contents.add)
+    app.connect("source-read", generated.fill)
+    app.connect("autodoc-process-docstring", modules.plain)
+    app.connect("build-finished", contents.front_page)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,17 @@
+"""Parts of pages that are read off the program while building: `<!-- generated: NAME -->` on a line of its own."""
+
+import re
+
+from making import commands, keys, modules
+
+MARK = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
+PARTS = {
+    "commands": commands.markdown,
+    "keys": keys.markdown,
+    "modules": modules.markdown,
+}
+
+
+def fill(app, name: str, source: list[str]) -> None:
+    """Put each part in the place of its mark; KeyError for a mark that nothing makes."""
+    source[0] = MARK.sub(lambda found: PARTS[found[1]](), source[0])

@@ -1,0 +1,69 @@
+"""The package's modules as Markdown: what each is, and its public names for autodoc to describe."""
+
+import inspect
+import pkgutil
+import re
+import textwrap
+from importlib import import_module
+from types import ModuleType
+
+from pydantic import BaseModel
+
+import radarsim
+
+FLOORS = ("models", "exact", "filters", "kernels", "studies", "engine", "report", "config")
+
+
+def markdown() -> str:
+    """A heading for each floor of the house, a heading for each module on it."""
+    parts = []
+    for floor in FLOORS:
+        package = import_module(f"radarsim.{floor}")
+        parts += [f"## {floor}", inspect.getdoc(package) or ""]
+        for info in pkgutil.walk_packages(package.__path__, f"radarsim.{floor}."):
+            module = import_module(info.name)
+            if not holds_keys(module):
+                parts += [f"### {info.name}", described(module)]
+    return "\n\n".join(parts)
+
+
+def holds_keys(module: ModuleType) -> bool:
+    """Whether a module is a part of the schema, which has a page of its own."""
+    return any(inspect.isclass(value) and issubclass(value, BaseModel) for _, value in public(module))
+
+
+def plain(app, what: str, name: str, thing: object, options: dict, lines: list[str]) -> None:
+    """Docstrings are prose: columns stay columns, bars and stars are magnitudes and products, no markup."""
+    paragraphs = "\n".join(lines).strip("\n").split("\n\n")
+    lines[:] = [*"\n\n".join(map(paragraph, paragraphs)).split("\n"), ""]
+
+
+def paragraph(text: str) -> str:
+    """One paragraph for Sphinx: examples as they are, what stands in columns as it stands, prose without markup."""
+    if text.lstrip().startswith((">>>", "* ", "- ")):
+        return text
+    if re.search(r"\S   ?\S|\n +\S", text):
+        return "::\n\n" + textwrap.indent(text, "    ")
+    return re.sub(r"([|*\\])", r"\\\1", text)
+
+
+def described(module: ModuleType) -> str:
+    """Autodoc's directives for a module and its public names, in the order of the file."""
+    return f"```{{eval-rst}}\n.. automodule:: {module.__name__}\n   :members:\n   :undoc-members:\n```"
+
+
+def public(module: ModuleType) -> list[tuple[str, object]]:
+    """Functions, kernels and classes that a module defines, without those that begin with an underscore."""
+    found = []
+    for name, value in vars(module).items():
+        inner = getattr(value, "py_func", value)
+        is_ours = getattr(inner, "__module__", None) == module.__name__
+        if not name.startswith("_") and is_ours and (inspect.isfunction(inner) or inspect.isclass(inner)):
+            found.append((name, inner))
+    return found
+
+
+def every_module() -> list[ModuleType]:
+    """All modules of the package but its `python -m` entry."""
+    names = [info.name for info in pkgutil.walk_packages(radarsim.__path__, "radarsim.")]
+    return [radarsim, *(import_module(name) for name in names if name != "radarsim.__main__")]
