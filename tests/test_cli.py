@@ -267,7 +267,7 @@ def test_output_that_cannot_be_written_and_output_that_nobody_reads():
 
 def test_streams_that_know_no_greek(tmp_path):
     environment = {**os.environ, "PYTHONIOENCODING": "latin-1"}
-    arguments = ("run", "rls2", "-n", "200", "--no-figures", "--out", str(tmp_path))
+    arguments = ("run", "rls2", "-n", "1000", "--no-figures", "--out", str(tmp_path))
     finished = command(*arguments, env=environment)
     assert (finished.returncode, finished.stderr) == (0, b"")
 

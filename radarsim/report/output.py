@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import claims, files, provenance
+from radarsim.report import claims, files, notes, provenance
 from radarsim.report import tables as common
 from radarsim.report.drawing import Figure
 
@@ -29,7 +29,7 @@ def tables(results: Sequence[CaseResult]) -> dict:
     shared = {"curves": common.curves, "gains": common.gains}
     made = {name: own[name] if name in own else table(results) for name, table in shared.items()} | own
     made["claims"] = claims.judged(results[0].study, results, made)
-    return made
+    return notes.noted(made, results)
 
 
 def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:

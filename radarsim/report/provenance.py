@@ -11,9 +11,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from radarsim.engine.results import CaseResult
-from radarsim.report.statistics import FEW
+from radarsim.report.statistics import FEW, FEW_HEAVY
 
-MOST_SEEDS = 5  # named in a line
+MOST_SEEDS, MOST_NAMES = 5, 3  # named in a line
 PACKAGES = ("radarsim", "numpy", "numba", "llvmlite", "scipy", "pandas", "matplotlib", "pydantic", "pyyaml")
 
 
@@ -66,12 +66,25 @@ def outputs(folder: Path) -> list[str]:
 
 
 def few(results: Sequence[CaseResult]) -> list[str]:
-    """Warnings on cases whose intervals rest on too few realisations."""
+    """Warnings on cases whose intervals rest on too few realisations, a line for each degree of it."""
+    counts = {result.name: result.count for result in results}
+    rough = [name for name, count in counts.items() if count < FEW]
+    heavy = [name for name, count in counts.items() if FEW <= count < FEW_HEAVY]
+    degrees = (
+        (rough, f"are rough, use at least {FEW}"),
+        (heavy, f"are too narrow where errors have heavy tails, use at least {FEW_HEAVY} there"),
+    )
     return [
-        f"{result.name}: intervals of {result.count} realisations are rough, use at least {FEW}"
-        for result in results
-        if result.count < FEW
+        f"{_named(names)}: intervals of {span([counts[name] for name in names])} realisations {words}"
+        for names, words in degrees
+        if names
     ]
+
+
+def _named(names: Sequence[str]) -> str:
+    """A few names, and how many more."""
+    more = len(names) - MOST_NAMES
+    return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
 def extent(record: Mapping) -> str:
