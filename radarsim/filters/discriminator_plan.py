@@ -1,7 +1,7 @@
 """Arrays for the discriminator's kernels: the burst cut into blocks, each estimator's windows and step matrices."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,9 +9,10 @@ import numpy as np
 from radarsim.filters.discriminator import Designer, handover_directions
 from radarsim.kernels.discriminator import OPTIONS, WINDOW
 from radarsim.kernels.discriminator_data import PHYSICS, block_table
-from radarsim.kernels.discriminator_scoring import SIZE
+from radarsim.kernels.discriminator_scoring import SIZE, Z0
 from radarsim.models.burst import Burst, signal, turns_per_parameter
 
+Blocks = Callable[[int], tuple[int, int, int]]
 IMAGE_SHARE = 0.02  # of a window's samples: below it the sum at twice the frequency is left out of the likelihood
 
 
@@ -32,23 +33,6 @@ class Design:
     forecast: bool = True  # whether the prior is used
 
 
-def block_edges(windows: list[int], per_window: int, whole: int = 1) -> np.ndarray:
-    """Pulses where blocks begin and end: every window ends one, and none is longer than its time over per_window.
-
-    Long ones are multiples of `whole`: with 8, demodulation fills its registers, at the price of a third more blocks.
-    """
-    edges = [0]
-    for end in sorted(set(windows)):
-        begin = edges[-1]
-        while begin < end:
-            longest = max(1, max(begin, windows[0]) // per_window)
-            # Equal parts of what is left, so that no sliver remains before the window's end.
-            length = math.ceil((end - begin) / math.ceil((end - begin) / longest))
-            begin += length if length < 2 * whole else length // whole * whole
-            edges.append(begin)
-    return np.array(edges)
-
-
 @dataclass(frozen=True)
 class World:
     """The burst for the kernels, see `kernels.discriminator.estimate_block`."""
@@ -59,14 +43,23 @@ class World:
     mean: np.ndarray
     factor: np.ndarray
 
+    @property
+    def sums(self) -> np.ndarray:
+        """Means (blocks, 4) of Z₀ and Z₁, of which factor (blocks, 10) is the covariance root."""
+        return np.ascontiguousarray(self.mean[Z0 : Z0 + 4, : len(self.factor)].T)
 
-def world(
-    burst: Burst, mode: int, edges: np.ndarray, windows: list[int], truth_turns: np.ndarray, reference_turns: np.ndarray
-) -> World:
-    """Arrays of a burst; phases (samples per pulse, pulses) in turns, the same unless the truth is no polynomial."""
+
+def has_image(burst: Burst, windows: list[int], truth_turns: np.ndarray) -> bool:
+    """Whether the sum at twice the frequency counts in any window; phases (samples per pulse, pulses) in turns."""
     ends = np.array(windows)
     doubled = np.cumsum(np.exp(-4j * math.pi * (truth_turns - np.rint(truth_turns))).sum(axis=0))[ends - 1]
-    image = not burst.complex_samples and np.any(np.abs(doubled) > IMAGE_SHARE * burst.samples_per_pulse * ends)
+    return not burst.complex_samples and bool(np.any(np.abs(doubled) > IMAGE_SHARE * burst.samples_per_pulse * ends))
+
+
+def world(
+    burst: Burst, mode: int, edges: np.ndarray, image: bool, truth_turns: np.ndarray, reference_turns: np.ndarray
+) -> World:
+    """Arrays of a burst; phases (samples per pulse, pulses) in turns, the same unless the truth is no polynomial."""
     physics = np.zeros(1, PHYSICS)
     physics[0] = (
         mode,
@@ -108,7 +101,7 @@ def step_root(data: np.ndarray, precision: np.ndarray) -> tuple[np.ndarray, np.n
 
 def estimators(
     designs: list[Design],
-    edges: np.ndarray,
+    blocks: Blocks,
     burst: Burst,
     sigma: np.ndarray,
     information: Mapping[int, np.ndarray],
@@ -116,6 +109,7 @@ def estimators(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Records of the windows (F, K) and options (F,) of a case's estimators.
 
+    blocks gives a window's place in the table of blocks, in that of weights, and its number of blocks, see `Tables`;
     information is Φ_θ by window in the units of θ, sigma (size,) is the prior. Unused windows stay zero.
     """
     size, whole = len(sigma), turns_per_parameter(len(sigma), burst.duration_s)
@@ -127,7 +121,8 @@ def estimators(
         directions = handover_directions(designer, list(design.windows)) if design.search else None
         for k, pulses in enumerate(design.windows):
             window = windows[e, k]
-            window["pulses"], window["blocks"] = pulses, np.searchsorted(edges, pulses)
+            window["pulses"] = pulses
+            window["table"], window["weights"], window["blocks"] = blocks(pulses)
             window["powers"] = (pulses / burst.pulses) ** np.arange(SIZE)
             turns = whole * window["powers"][:size]
             if design.forecast:

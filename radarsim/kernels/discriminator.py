@@ -2,7 +2,7 @@
 
 An estimate x (6,) is the phase's coefficients in turns over the whole burst; a window that is the share r of it sees
 b_j = x_j r^j. The step of (6) is (Φ_θ + R_pr⁻¹)⁻¹ ∂P/∂θ; it ends a window when it is shorter than ε, measured in that
-matrix. With block sums the true phase is the reference, so x and the prior are deviations from the truth.
+matrix. Block sums drawn by their own law have kernels of their own, `discriminator_strip`.
 """
 
 import math
@@ -11,12 +11,10 @@ import numpy as np
 
 from radarsim.kernels.compile import inline, kernel
 from radarsim.kernels.discriminator_data import (
-    BLOCK_SUMS,
     DEMODULATED,
     SAMPLES,
     demodulate,
     draw_samples,
-    draw_sums,
 )
 from radarsim.kernels.discriminator_scoring import (
     SIZE,
@@ -35,6 +33,8 @@ WINDOW = np.dtype(
     [
         ("pulses", np.int64),
         ("blocks", np.int64),
+        ("table", np.int64),  # where they begin in the tables of `discriminator_lanes`, …
+        ("weights", np.int64),  # … and their weights
         ("powers", np.float64, SIZE),  # r^j
         ("root", np.float64, (SIZE, SIZE)),  # rows v: their outer products sum to the posterior covariance, …
         ("share", np.float64, SIZE),  # … and along each the data's share of the posterior information
@@ -249,26 +249,19 @@ def estimated_amplitude(physics, samples, kind):
 
 
 @kernel
-def estimate_block(
-    physics, edges, clean, mean, factor, windows, options, keys, first, truth, prior_sigma, errors, passes
-):
+def estimate_block(physics, edges, clean, blank, windows, options, keys, first, truth, prior_sigma, errors, passes):
     """Bursts first, first + 1, …: errors (n, F, K, 6) in turns over the burst and passes (n, F) are written.
 
-    windows (F, K) and options (F,) are the estimators; mean and factor the law of the block sums, see `block_table`;
-    keys (2, 2) those of noise and prior; truth and prior_sigma (6,) in turns over the burst. With block sums all is
-    relative to the truth.
+    windows (F, K) and options (F,) are the estimators; blank (ROWS, blocks padded) has the times of the blocks, see
+    `block_table`; keys (2, 2) those of noise and prior; truth and prior_sigma (6,) in turns over the burst.
     """
-    sampled = physics.mode != BLOCK_SUMS
-    samples, sums = np.empty((clean.shape[0], clean.shape[1] if sampled else 1)), mean.copy()
+    samples, sums = np.empty(clean.shape), blank.copy()
     state = np.zeros(1, STATE)[0]
     for j in range(SIZE):
-        state.truth[j] = truth[j] if sampled else 0.0
+        state.truth[j] = truth[j]
     for i in range(errors.shape[0]):
         draw_prior(keys[1], first + i, prior_sigma, state)
-        if sampled:
-            draw_samples(physics, keys[0], first + i, clean, samples)
-        else:
-            draw_sums(keys[0], first + i, mean, factor, sums)
+        draw_samples(physics, keys[0], first + i, clean, samples)
         for e in range(options.size):
             if not options[e].forecast:
                 continue

@@ -81,21 +81,6 @@ def draw_samples(physics, key, realisation, clean, samples):
 
 
 @kernel
-def draw_sums(key, realisation, mean, factor, sums):
-    """Block sums (ROWS, blocks padded) of a burst about the true phase: draws 2i and 2i + 1 make block i."""
-    k0, k1, f = key[0], key[1], factor
-    for i in range(sums.shape[1]):
-        x, y = threefry(U(realisation), U(2 * i), k0, k1)
-        n0, n1 = normal_pair(x, y)
-        x, y = threefry(U(realisation), U(2 * i + 1), k0, k1)
-        n2, n3 = normal_pair(x, y)
-        sums[Z0, i] = mean[Z0, i] + f[0, i] * n0
-        sums[Z0 + 1, i] = mean[Z0 + 1, i] + f[1, i] * n0 + f[2, i] * n1
-        sums[Z1, i] = mean[Z1, i] + f[3, i] * n0 + f[4, i] * n1 + f[5, i] * n2
-        sums[Z1 + 1, i] = mean[Z1 + 1, i] + f[6, i] * n0 + f[7, i] * n1 + f[8, i] * n2 + f[9, i] * n3
-
-
-@kernel
 def demodulate(physics, edges, samples, x, first, last, sums):
     """Block sums of blocks first … last − 1 from the samples, about the phase of x (6,), turns over the burst.
 
@@ -196,7 +181,7 @@ def reference_image(count, time, step, centre, x, sums, i):
 def block_table(
     physics: np.void, edges: np.ndarray, reference: np.ndarray, clean: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Exact mean (ROWS, blocks padded to eights) and covariance root (10, …) of block sums about a reference phase.
+    """Exact mean (ROWS, blocks padded to eights) and covariance root (blocks, 10) of sums about a reference phase.
 
     reference (samples per pulse, pulses) in turns; clean alike, the noise-free samples. Z₂ is put at its mean: its
     noise meets only the square of a small slope. The root holds the lower triangle by rows for Re and Im of Z₀ and Z₁;
@@ -205,7 +190,7 @@ def block_table(
     """
     blocks = len(edges) - 1
     padded = -(-blocks // 8) * 8  # so that loops over blocks have no remainder
-    mean, factor = np.zeros((ROWS, padded)), np.zeros((10, padded))
+    mean, factor = np.zeros((ROWS, padded)), np.zeros((blocks, 10))
     t = np.arange(physics["pulses"]) * physics["step"]
     t = t + np.arange(physics["samples_per_pulse"])[:, None] * physics["offset"]
     turn = np.exp(-1j * TURN * (reference - np.rint(reference)))
@@ -227,5 +212,5 @@ def block_table(
             covariance = covariance + rows @ rows.T
         values, vectors = np.linalg.eigh(covariance)
         root = np.linalg.qr((vectors * np.sqrt(np.maximum(values, 0.0))).T)[1].T
-        factor[:, i] = physics["sigma"] * root[np.tril_indices(4)]
+        factor[i] = physics["sigma"] * root[np.tril_indices(4)]
     return mean, factor

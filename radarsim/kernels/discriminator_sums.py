@@ -22,42 +22,49 @@ def bin_edges() -> np.ndarray:
 
 
 @kernel
+def add_component(e, within, potential, posterior, error, error_all, residuals):
+    """Adds one component's errors e (n,) of a window, see `accumulate`; within (n,) is 1 where the burst is locked."""
+    a1 = a2 = a3 = a4 = l1 = l2 = l3 = l4 = 0.0
+    for i in range(e.size):
+        x = e[i] * potential
+        xx, locked = x * x, within[i]
+        a1, a2, a3, a4 = a1 + x, a2 + xx, a3 + xx * x, a4 + xx * xx
+        l1, l2, l3, l4 = l1 + locked * x, l2 + locked * xx, l3 + locked * (xx * x), l4 + locked * (xx * xx)
+        residuals[bin_of(abs(e[i]) * posterior)] += 1.0
+    error_all[0], error_all[1], error_all[2], error_all[3] = a1, a2, a3, a4
+    error[0], error[1], error[2], error[3] = l1, l2, l3, l4
+
+
+@kernel
 def accumulate(errors, size, options, potential, posterior, error, error_all, locks, residuals):
-    """Adds errors (n, F, K, 6), in turns over the burst, to the sums of locked and of all realisations.
+    """Sums over errors (n, F, K, 6), in turns over the burst, of locked and of all realisations.
 
     potential and posterior (F, K, 6) are the bounds without and with the prior, in the same unit. error and error_all
-    (F, K, size, 4) take Σe … Σe⁴, in units of the potential bound; residuals (F, K, size, BINS) the histogram of
-    |e| over the posterior bound. locks (F, K, 6) counts bursts within 5 and 3 potential bounds, within 5 and 3
-    posterior ones, and within 3 potential, 3 posterior ones at this and all earlier windows.
+    (F, K, size, 4) become Σe … Σe⁴, in units of the potential bound; to residuals (F, K, size, BINS) the histogram of
+    |e| over the posterior bound is added. locks (F, K, 6) counts bursts within 5 and 3 potential bounds, within 5 and
+    3 posterior ones, and within 3 potential, 3 posterior ones at this and all earlier windows.
     """
-    for i in range(errors.shape[0]):
-        for f in range(options.size):
-            always = always_posterior = True
-            for k in range(options[f].windows):
+    n = errors.shape[0]
+    e, within = np.empty((size, n)), np.empty(n)
+    always, always_posterior = np.empty(n), np.empty(n)
+    for f in range(options.size):
+        always[:], always_posterior[:] = 1.0, 1.0
+        for k in range(options[f].windows):
+            a, b, own = 1.0 / potential[f, k], 1.0 / posterior[f, k], locks[f, k]
+            for i in range(n):
                 worst = worst_posterior = 0.0
                 for j in range(size):
-                    e = abs(errors[i, f, k, j])
-                    worst = max(worst, e / potential[f, k, j])
-                    ratio = e / posterior[f, k, j]
-                    worst_posterior = max(worst_posterior, ratio)
-                    residuals[f, k, j, bin_of(ratio)] += 1.0
-                always &= worst < 3.0
-                always_posterior &= worst_posterior < 3.0
-                locks[f, k, 0] += 1.0 if worst < 5.0 else 0.0
-                locks[f, k, 1] += 1.0 if worst < 3.0 else 0.0
-                locks[f, k, 2] += 1.0 if worst_posterior < 5.0 else 0.0
-                locks[f, k, 3] += 1.0 if worst_posterior < 3.0 else 0.0
-                locks[f, k, 4] += 1.0 if always else 0.0
-                locks[f, k, 5] += 1.0 if always_posterior else 0.0
-                for j in range(size):
-                    e = errors[i, f, k, j] / potential[f, k, j]
-                    ee = e * e
-                    if worst < 5.0:
-                        error[f, k, j, 0] += e
-                        error[f, k, j, 1] += ee
-                        error[f, k, j, 2] += ee * e
-                        error[f, k, j, 3] += ee * ee
-                    error_all[f, k, j, 0] += e
-                    error_all[f, k, j, 1] += ee
-                    error_all[f, k, j, 2] += ee * e
-                    error_all[f, k, j, 3] += ee * ee
+                    x = errors[i, f, k, j]
+                    e[j, i] = x
+                    worst, worst_posterior = max(worst, abs(x) * a[j]), max(worst_posterior, abs(x) * b[j])
+                within[i] = 1.0 if worst < 5.0 else 0.0
+                always[i] *= 1.0 if worst < 3.0 else 0.0
+                always_posterior[i] *= 1.0 if worst_posterior < 3.0 else 0.0
+                own[0] += within[i]
+                own[1] += 1.0 if worst < 3.0 else 0.0
+                own[2] += 1.0 if worst_posterior < 5.0 else 0.0
+                own[3] += 1.0 if worst_posterior < 3.0 else 0.0
+                own[4] += always[i]
+                own[5] += always_posterior[i]
+            for j in range(size):
+                add_component(e[j], within, a[j], b[j], error[f, k, j], error_all[f, k, j], residuals[f, k, j])

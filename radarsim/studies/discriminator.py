@@ -10,8 +10,10 @@ from radarsim.engine.moments import Layout
 from radarsim.engine.results import Axes
 from radarsim.exact import burst as exact
 from radarsim.filters import discriminator as schedules
+from radarsim.filters import discriminator_blocks as cuts
 from radarsim.filters import discriminator_plan as plans
 from radarsim.kernels import discriminator as kernels
+from radarsim.kernels import discriminator_strip as strips
 from radarsim.kernels import discriminator_sums as sums_of
 from radarsim.kernels.discriminator_data import BLOCK_SUMS, DEMODULATED, SAMPLES
 from radarsim.kernels.discriminator_scoring import SIZE
@@ -26,6 +28,7 @@ FILTERS = {
 BLOCK = 64  # 20 ms with nine estimators on block sums, half a second with two on samples
 MODES = {"block_sums": BLOCK_SUMS, "samples": SAMPLES, "demodulated": DEMODULATED}
 BLOCKS_PER_WINDOW = {BLOCK_SUMS: 16, SAMPLES: 16, DEMODULATED: 32}  # 0.016 and 0.024 potential σ from every sample's
+IMAGE_BLOCKS_PER_WINDOW = 24
 LOCKS = 6  # see kernels.discriminator_sums.accumulate
 
 
@@ -36,6 +39,7 @@ class Plan:
     layout: Layout
     axes: Axes
     world: plans.World
+    tables: tuple[np.ndarray, np.ndarray]
     windows: np.ndarray
     options: np.ndarray
     keys: np.ndarray
@@ -129,12 +133,15 @@ def prepare(case: Case) -> Plan:
     designer = schedules.Designer(burst, sigma, partial(exact.fisher, burst, size), schedules.Condition())
     windows = windows_of(spec, burst, designer)
     every = sorted({w for own in windows for w in own})
+    image = plans.has_image(burst, every, phase.turns)
     per_window = spec.blocks_per_window or BLOCKS_PER_WINDOW[mode]
-    edges = plans.block_edges(every, per_window, 8 if mode == DEMODULATED else 1)
-    world = plans.world(burst, mode, edges, every, phase.turns, phase.reference)
+    edges = cuts.block_edges(every, per_window, 8 if mode == DEMODULATED else 1)
+    world = plans.world(burst, mode, edges, image, phase.turns, phase.reference)
+    tables = cuts.Tables(edges, world.mean, per_window)
+    blocks = tables.window if mode == BLOCK_SUMS else tables.drawn
     designs = [design_of(e, w) for e, w in zip(spec.estimators, windows, strict=True)]
     mean_information = dict(zip(every, exact.fisher_sums(burst, size, every), strict=True))
-    records, options = plans.estimators(designs, edges, burst, sigma, mean_information, designer)
+    records, options = plans.estimators(designs, blocks, burst, sigma, mean_information, designer)
     whole = np.ones(SIZE)
     whole[:size] = model.turns_per_parameter(size, burst.duration_s)
     potential, posterior = bounds(burst, windows, phase.theta, sigma)
@@ -149,6 +156,7 @@ def prepare(case: Case) -> Plan:
         ),
         axes=axes(spec, burst, windows, phase, sigma, potential, posterior),
         world=world,
+        tables=tables.arrays(),
         windows=records,
         options=options,
         keys=np.stack([noise_key(case, "noise"), noise_key(case, "prior")]),
@@ -264,21 +272,16 @@ def estimate(plan: Plan, first: int, count: int) -> tuple[np.ndarray, np.ndarray
     """Errors (count, F, K, 6) in turns over the burst and passes (count, F) of bursts first, first + 1, …."""
     shape = plan.windows.shape
     errors, passes = np.zeros((count, *shape, SIZE)), np.zeros((count, shape[0]), np.int64)
-    world = plan.world
+    physics, law, bursts = plan.world.physics, plan.world, (plan.keys, first)
+    if physics["mode"] == BLOCK_SUMS:
+        strips.estimate_strips(
+            *(physics, law.sums, law.factor, plan.tables, plan.windows, plan.options),
+            *(*bursts, plan.prior_sigma, errors, passes),
+        )
+        return errors, passes
     kernels.estimate_block(
-        world.physics,
-        world.edges,
-        world.clean,
-        world.mean,
-        world.factor,
-        plan.windows,
-        plan.options,
-        plan.keys,
-        first,
-        plan.truth,
-        plan.prior_sigma,
-        errors,
-        passes,
+        *(physics, law.edges, law.clean, law.mean, plan.windows, plan.options),
+        *(*bursts, plan.truth, plan.prior_sigma, errors, passes),
     )
     for f in plan.ridges:
         _follow_ridges(plan, f, first, errors, passes)

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from radarsim.exact import burst as exact
 from radarsim.filters import discriminator as filters
+from radarsim.filters import discriminator_blocks as cuts
 from radarsim.filters import discriminator_plan as plans
 from radarsim.models.burst import Burst
 from tests.naive import discriminator as naive
@@ -129,7 +130,7 @@ def test_direction_is_the_leading_error_of_a_handover():
 @pytest.mark.parametrize("per_window", [4, 16, 64])
 def test_blocks_end_with_windows_and_grow_with_time(per_window):
     windows = designer().windows()
-    edges = plans.block_edges(windows, per_window)
+    edges = cuts.block_edges(windows, per_window)
     assert set(windows) <= set(edges)
     assert edges[0] == 0
     lengths = np.diff(edges)
@@ -151,3 +152,15 @@ def test_step_root_solves_for_any_coherence():
 def test_a_wide_phase_prior_says_nothing():
     assert plans.phase_prior(np.array([6.1, 2.0]))[0] == 0.0
     assert plans.phase_prior(np.array([0.5, 2.0])) == pytest.approx([4.0, 0.25])
+
+
+@pytest.mark.parametrize("per_window", [4, 16, 24])
+def test_merged_blocks_are_few_and_short(per_window):
+    windows = designer().windows()
+    edges = cuts.block_edges(windows, per_window)
+    for pulses in windows:
+        ends = cuts.merged(edges, pulses, per_window)
+        merged = edges[[0, *ends]]
+        assert merged[-1] == pulses
+        assert np.diff(merged).max() <= max(1, pulses / per_window)
+        assert len(ends) < 1.6 * per_window + 2

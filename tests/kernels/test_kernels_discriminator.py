@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 
+from radarsim.filters import discriminator_blocks as cuts
 from radarsim.kernels import discriminator as kernels
 from radarsim.kernels import discriminator_data as data
+from radarsim.kernels import discriminator_lanes as laned
 from radarsim.kernels import discriminator_scoring as scoring
+from radarsim.kernels import discriminator_strip as strips
 from radarsim.kernels import discriminator_sums as added
+from radarsim.kernels import lanes
 from radarsim.kernels.compile import kernel
 from radarsim.kernels.random import stream
 from radarsim.models import burst as model
@@ -139,7 +143,7 @@ def test_score_of_blocks_is_nearly_that_of_samples(theta, complex_samples):
     found = []
     for shift in (0.0, 0.15):
         state["x"] = turns(theta, burst) + shift * np.array([0.3, 1, 1, 0, 0, 0])
-        for mode in (kernels.SAMPLES, kernels.BLOCK_SUMS):
+        for mode in (kernels.SAMPLES, kernels.DEMODULATED):
             physics["mode"] = mode
             kernels.evaluate(physics, rows(u), sums, window, state)
             found.append(np.array(state["out"]))
@@ -154,7 +158,7 @@ def test_blocks_keep_the_information_of_the_bend_within_them():
     _, u, _, physics, sums = demodulated(burst, THETA, THETA, per_block=200)
     window, state = window_of(burst, 3200, 16), np.zeros(1, scoring.STATE)[0]
     state["amplitude"], found = 1.0, []
-    for mode in (kernels.SAMPLES, kernels.BLOCK_SUMS):
+    for mode in (kernels.SAMPLES, kernels.DEMODULATED):
         physics["mode"] = mode
         state["x"] = turns(THETA, burst) + np.array([0, 0, 0, 0, 0.01, 0])
         kernels.evaluate(physics, rows(u), sums, window, state)
@@ -174,10 +178,13 @@ def test_drawn_sums_have_the_law_of_demodulated_samples(theta, complex_samples):
     mean, factor = data.block_table(physics, edges, phase, clean)
     n = 40_000
     drawn, made = np.empty((2, n, 4, 4))
-    sums, samples, other = mean.copy(), np.empty((1 + complex_samples, 60)), mean.copy()
+    samples, other = np.empty((1 + complex_samples, 60)), mean.copy()
+    _, _, sums, a, b = strips.room_for(4)
+    law = np.ascontiguousarray(mean[scoring.Z0 : scoring.Z0 + 4, :4].T)
     for i in range(n):
-        data.draw_sums(KEY, i, mean, factor, sums)
-        drawn[i] = sums[scoring.Z0 : scoring.Z0 + 4, :4].T
+        if i % 8 == 0:
+            strips.draw_strip(KEY, i, law, factor, a, b, sums)
+            drawn[i : i + 8] = sums.reshape(4, 4, 8).transpose(2, 0, 1)
         data.draw_samples(physics, KEY, i, rows(clean), samples)
         data.demodulate(physics, edges, samples, turns(theta, burst), 0, 4, other)
         made[i] = other[scoring.Z0 : scoring.Z0 + 4, :4].T
@@ -190,6 +197,64 @@ def test_drawn_sums_have_the_law_of_demodulated_samples(theta, complex_samples):
         assert np.cov(both[0].T) == pytest.approx(np.cov(both[1].T), abs=8 / np.sqrt(n))
     between = np.corrcoef(drawn[:, 2, 0], drawn[:, 3, 0])[0, 1]
     assert abs(between) < 5 / np.sqrt(n)
+
+
+@kernel
+def many_lanes(u, s, c):
+    u, s, c = lanes.address(u), lanes.address(s), lanes.address(c)
+    for i in range(2000):
+        y, x = laned.sine_cosine(lanes.get(u, i))
+        lanes.put(s, i, y)
+        lanes.put(c, i, x)
+
+
+def test_sine_and_cosine_of_lanes():
+    u = np.concatenate([np.random.default_rng(2).uniform(-50, 50, 16_000 - 33), np.arange(-16, 17) / 8])
+    s, c = np.empty_like(u), np.empty_like(u)
+    many_lanes(u, s, c)
+    exact = u - np.rint(u)
+    assert np.abs(s - np.sin(2 * np.pi * exact)).max() < 3e-16 * 4
+    assert np.abs(c - np.cos(2 * np.pi * exact)).max() < 3e-16 * 4
+
+
+@pytest.mark.parametrize("theta", [THETA, SLOW])
+@pytest.mark.parametrize("complex_samples", [False, True])
+@pytest.mark.parametrize("per_pulse", [1, 2])
+def test_merged_blocks_hold_the_same_likelihood(theta, complex_samples, per_pulse):
+    """Sums about the truth made from samples, merged to a window's blocks: the score of samples, eight at once."""
+    burst = burst_of(complex_samples=complex_samples, per_pulse=per_pulse)
+    t = model.sample_times(burst, burst.pulses)
+    phase, physics, image = model.phase_turns(theta, t), physics_of(burst), not complex_samples
+    edges = cuts.block_edges([100, 400, 600], 30)
+    mean, factor = data.block_table(physics, edges, phase, model.signal(burst, phase))
+    tables = cuts.Tables(edges, mean, 30)
+    first, weights, count = tables.window(400)
+    assert count < np.searchsorted(edges, 400)  # some are merged indeed
+    work, sums, drawn, *_ = strips.room_for(len(factor))
+    state, window = np.zeros(1, scoring.STATE)[0], window_of(burst, 400)
+    state["amplitude"], expected = burst.amplitude, []
+    shifts = np.outer(np.linspace(0, 0.2, 8), [0.3, 1, 1, -0.5, 0.5, 0])
+    for lane in range(8):
+        _, u = noisy(burst, theta, lane)
+        data.demodulate(physics, edges, rows(u), turns(theta, burst), 0, len(factor), mean)
+        drawn.reshape(-1, 4, 8)[:, :, lane] = mean[scoring.Z0 : scoring.Z0 + 4, : len(factor)].T
+        state["x"] = turns(theta, burst) + shifts[lane]
+        kernels.evaluate(physics, rows(u), np.zeros((1, 1)), window, state)
+        expected.append(np.array(state["out"]))
+    work.reshape(-1, 8)[laned.B : laned.B + 6] = (shifts * window["powers"]).T
+    evaluate_merged(*tables.arrays(), first, weights, count, image, burst.amplitude, work, sums, drawn)
+    found = work.reshape(-1, 8)[laned.VALUE : laned.VALUE + 8].T
+    noise = np.sqrt(burst.noise_variance * 400 * per_pulse)
+    assert found == pytest.approx(np.array(expected), abs=0.02 * noise)
+    assert np.abs(np.diff(expected, axis=0)).max() > noise
+
+
+@kernel
+def evaluate_merged(table, weights, first, begin, blocks, image, amplitude, work, sums, drawn):
+    table, weights = lanes.address(table), lanes.address(weights)
+    work, sums, drawn = lanes.address(work), lanes.address(sums), lanes.address(drawn)
+    laned.merge(drawn, table, weights, first, begin, blocks, sums)
+    laned.score(work, sums, table, first, blocks, image, amplitude)
 
 
 def test_a_realisation_is_itself_in_any_block():

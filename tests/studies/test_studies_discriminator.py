@@ -12,6 +12,7 @@ from radarsim.errors import ConfigError
 from radarsim.kernels import discriminator as kernels
 from radarsim.kernels import discriminator_data as data
 from radarsim.kernels import discriminator_scoring as scoring
+from radarsim.kernels import discriminator_strip as strips
 from radarsim.models import burst as model
 from radarsim.studies import discriminator as study
 from tests.naive import discriminator as naive
@@ -105,20 +106,20 @@ def test_phase_is_judged_to_the_nearest_turn():
 def paired_errors(plan, first, count):
     """As `final`, with block sums about the true phase made from the very samples that the samples engine draws."""
     world, last = plan.world, int(plan.options["windows"][0]) - 1
-    samples, sums, state = np.empty(world.clean.shape), world.mean.copy(), np.zeros(1, scoring.STATE)[0]
-    physics, found = world.physics.copy(), np.empty((count, len(plan.options), 6))
-    errors = np.zeros((plan.windows.shape[1], 6))
-    for i in range(count):
-        physics["mode"] = kernels.BLOCK_SUMS
-        state["truth"], state["amplitude"] = 0.0, physics["amplitude"]
-        kernels.draw_prior(plan.keys[1], first + i, plan.prior_sigma, state)
-        data.draw_samples(physics, plan.keys[0], first + i, world.clean, samples)
-        data.demodulate(physics, world.edges, samples, plan.truth, 0, len(world.edges) - 1, sums)
-        sums[scoring.REF] = sums[scoring.SLOPE] = 0.0
-        sums[scoring.Z2 :] = world.mean[scoring.Z2 :]  # as drawn block sums have it: without noise
+    blocks, physics = len(world.factor), world.physics.copy()
+    samples, made = np.empty(world.clean.shape), world.mean.copy()
+    room, errors = strips.room_for(blocks), np.zeros((8, plan.windows.shape[1], 6))
+    found = np.empty((count, len(plan.options), 6))
+    work, sums, drawn = room[:3]
+    for start in range(0, count, 8):
+        for lane in range(8):
+            data.draw_samples(physics, plan.keys[0], first + start + lane, world.clean, samples)
+            data.demodulate(physics, world.edges, samples, plan.truth, 0, blocks, made)
+            drawn.reshape(-1, 4, 8)[:, :, lane] = made[scoring.Z0 : scoring.Z0 + 4, :blocks].T
+        strips.draw_forecasts(plan.keys[1], first + start, plan.prior_sigma, work)
         for f, options in enumerate(plan.options):
-            kernels.run_sequence(physics, world.edges, samples, sums, plan.windows[f], options, state, errors)
-            found[i, f] = errors[last]
+            strips.run_strip(physics, drawn, plan.tables, plan.windows[f], options, work, sums, errors)
+            found[start : start + 8, f] = errors[: count - start, last]
     size = plan.layout.shapes["error"][2]
     ratio = (found / plan.potential[:, last])[..., :size]
     return ratio, np.abs(ratio).max(axis=2) < 5
@@ -129,7 +130,7 @@ def compare(n, truth, first=0):
     tight = {**CURED, "tolerance": 1e-3}
     plan = plan_of(SEQUENCE, tight, engine="samples", truth=truth)
     direct, lock = final(plan, first, n)
-    blocks, block_lock = paired_errors(plan, first, n)
+    blocks, block_lock = paired_errors(plan_of(SEQUENCE, tight, truth=truth), first, n)
     both = lock & block_lock
     for f in range(2):
         one, other = direct[both[:, f], f], blocks[both[:, f], f]
@@ -257,9 +258,9 @@ def test_amplitude_is_estimated_or_misprinted():
 
 
 def test_auto_takes_samples_where_block_sums_cannot_serve():
-    assert plan_of(SEQUENCE, engine="auto").world.physics["mode"] == kernels.BLOCK_SUMS
+    assert plan_of(SEQUENCE, engine="auto").world.physics["mode"] == data.BLOCK_SUMS
     estimated = {**SEQUENCE, "amplitude": "estimated"}
-    assert plan_of(estimated, engine="auto").world.physics["mode"] == kernels.SAMPLES
+    assert plan_of(estimated, engine="auto").world.physics["mode"] == data.SAMPLES
     with pytest.raises(ConfigError, match="block_sums cannot serve"):
         plan_of(estimated, engine="block_sums")
 
