@@ -1,9 +1,11 @@
 """What the terminal shows: progress with rate and time left, tables of the answer, where things were written."""
 
+import math
 import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 
 SILENT_S = 2.0  # a run shorter than this shows no progress
 PIPED_WIDTH = 10_000  # whatever reads it wraps it, or not
@@ -119,7 +121,7 @@ def print_result(result) -> None:
     written = result.written
     for line in written.answer:
         say(line)
-    show_last_scan(written.tables["curves"], written.tables["gains"])
+    show_last_scan(result.last_scan)
     verdicts = result.verdicts()
     if verdicts:
         for verdict, names in verdicts.items():
@@ -134,13 +136,10 @@ def print_result(result) -> None:
         sys.stderr.write(f"warning: {printable(warning)}\n")
 
 
-def show_last_scan(curves, gains) -> None:
+def show_last_scan(last) -> None:
     """σ with interval, exact σ and gain of each case, filter and component at the last scan, unless too many."""
-    keys = ["case", "filter", "component"]
-    last = curves.groupby(keys, sort=False).tail(1)
     if not 0 < len(last) <= MOST_ROWS:
         return
-    last = last.merge(gains.groupby(keys, sort=False).tail(1), on=[*keys, "k", "t_s"], how="left")
     rows = [
         (
             *(row.case, row.filter, row.component, f"{row.t_s:g} s"),
@@ -168,18 +167,43 @@ def print_outlook(experiment, outlook) -> None:
         (case.name, case.filters, f"{case.scans}", f"{case.realisations:,}", f"{case.seconds:.3g} s")
         for case in outlook.cases
     ]
-    show(
-        "",
-        ("case", "filters", "scans", "realisations", "one thread"),
-        rows,
-        right=("scans", "realisations", "one thread"),
-    )
+    columns = ("case", "filters", "scans", "realisations", "one thread")
+    show("", columns, rows, right=columns[2:])
+    if outlook.precision is not None:
+        print_needs(experiment, outlook)
     seconds = "under a second" if outlook.seconds < 1 else "about " + clock(outlook.seconds)
     realisations = sum(case.realisations for case in outlook.cases)
     say(
         f"total    {plural(len(outlook.cases), 'case')}, {realisations:,} realisations, {seconds} on "
         f"{plural(outlook.threads, 'thread')}, {outlook.memory_mb:.0f} MB; figures and tables take some seconds more"
     )
+
+
+def print_needs(experiment, outlook) -> None:
+    """How many realisations a precision takes, and whether the run may do so many."""
+    asked = {case.name: case.realisations for case in experiment.cases}
+    needs = {case.name: case.need for case in outlook.cases}
+    rows = [
+        (name, "out of reach" if need.realisations is None else f"{need.realisations:,}", need.known_by, need.last)
+        for name, need in needs.items()
+    ]
+    columns = ("case", f"for ± {outlook.precision:g} %", "known from", "last to get there")
+    show("", columns, rows, right=columns[1:2], spare=columns[3:])
+    short = [name for name, need in needs.items() if need.realisations is None or need.realisations > asked[name]]
+    if short:
+        most = max((need.realisations or math.inf) for need in needs.values())
+        cure = f"; -n {most} would do" if math.isfinite(most) else ""
+        say(f"precision not within reach of {plural(len(short), 'case')}: {', '.join(short[:3])}{cure}")
+
+
+def print_share(share, out) -> None:
+    """What a share of an experiment came to, and what to do with it."""
+    done = sum(one.done for one in share.cases.values())
+    held = sum(one.from_store for one in share.cases.values())
+    say(f"share    {share.number} of {share.of} of {share.config}: {done:,} realisations, {held:,} were stored before")
+    say(f"blocks   {Path(out) / '.blocks'}; copy all shares into one, and `radarsim run` finds them")
+    for warning in share.warnings:
+        sys.stderr.write(f"warning: {printable(warning)}\n")
 
 
 def print_claims(rows: Sequence[dict]) -> None:

@@ -1,22 +1,26 @@
 """One experiment from config to written results: the wiring that the command and Python share."""
 
 import json
+import math
 import os
 import shlex
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict, replace
 from pathlib import Path
 
-from radarsim import studies
+from radarsim import simulation, studies
 from radarsim.config import lookup
-from radarsim.config.load import Case, Experiment, load
-from radarsim.engine.collect import Collected, collect, stored
-from radarsim.engine.executors import available_cores
+from radarsim.config.load import Experiment, load
+from radarsim.engine import stopping
+from radarsim.engine.collect import stored
+from radarsim.engine.executors import Executor, available_cores
 from radarsim.engine.results import CaseResult
-from radarsim.engine.stopping import Signals
-from radarsim.errors import ConfigError, StoreError
+from radarsim.engine.stopping import Signals, Stop
+from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.result import Result
+from radarsim.simulation import Gathered, Means, Progress
 
 
 def load_all(sources: Sequence, overrides: Sequence[str] = ()) -> list[Experiment]:
@@ -32,37 +36,6 @@ def load_all(sources: Sequence, overrides: Sequence[str] = ()) -> list[Experimen
     return loaded
 
 
-def simulated(
-    experiment: Experiment,
-    *,
-    out: str | os.PathLike | None = None,
-    threads: int | None = None,
-    progress: Callable[[int, int, int], None] | None = None,
-    stop: Signals | None = None,
-) -> list[tuple[Case, studies.CaseWork, Collected]]:
-    """Collect every case in turn, cases of one identity once; progress(done, total, from_store) is over all of them."""
-    total = sum(case.realisations for case in experiment.cases)
-    made: dict[tuple[str, int], tuple[studies.CaseWork, Collected]] = {}
-    gathered, done, held = [], 0, 0
-
-    def over_all(case_done: int, _: int, case_held: int) -> None:
-        if progress is not None:
-            progress(done + case_done, total, held + case_held)
-
-    for case in experiment.cases:
-        work = studies.CaseWork(case)
-        key = (work.identity, case.realisations)
-        if key not in made:
-            made[key] = work, collect(work, case.realisations, store=out, threads=threads, progress=over_all, stop=stop)
-        work, collected = made[key]
-        gathered.append((case, work, collected))
-        done += collected.count
-        held += collected.from_store
-        if collected.stopped:
-            break
-    return gathered
-
-
 RESULTS = "results"  # the command's default directory
 SHORT = {"realisations": "-n", "seed": "--seed"}
 
@@ -73,18 +46,28 @@ def run(
     realisations: float | None = None,
     seed: int | None = None,
     overrides: Sequence[str] = (),
+    precision: float | None = None,
+    time_limit: float | Stop | None = None,
     threads: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    executor: Executor | None = None,
     out: str | os.PathLike | None = None,
     figures: bool = True,
-    progress: Callable[[int, int, int], None] | None = None,
+    progress: Progress | None = None,
     stop: Signals | None = None,
 ) -> Result:
     """Run an experiment and give its result; nothing is written unless `out` names a directory.
 
     config is a path, the name of a shipped config, a dict as YAML would give it, or an Experiment loaded with these
-    overrides. overrides are texts `key=value` with dotted keys. Raises ConfigError for a wrong config, StoreError for a
-    bad disk, NonFiniteError for a filter that diverged, and Interrupted, with all that was done stored, if `stop` saw
-    a signal.
+    overrides. overrides are texts `key=value` with dotted keys. With a precision, in per cent, a case ends at the first
+    of 2000, 4000, 8000 … realisations at which the 95 % half-width of every σ is under it. time_limit is in seconds, or
+    a condition that runs already. `result.unmet` says what of the two was not reached. workers are processes of this
+    machine, scheduler the address of a Dask scheduler, executor one that is open already.
+
+    Raises ConfigError for a wrong config, StoreError for a bad disk, NonFiniteError for a filter that diverged,
+    TargetUnmet where the time did not suffice for a single block, and Interrupted, with all that was done stored, if
+    `stop` saw a signal.
 
     >>> result = run("rls2", realisations=2000)
     >>> len(result.curves) > 50
@@ -92,16 +75,52 @@ def run(
     """
     overrides = merged(overrides, realisations, seed)
     experiment = config if isinstance(config, Experiment) else load(config, overrides)
-    threads = threads or available_cores()
+    if precision is not None:
+        simulation.check_precision([experiment], precision)
+    limit = time_limit if time_limit is None or callable(time_limit) else stopping.time_limit(time_limit)
     started = time.perf_counter()
-    collected = simulated(experiment, out=out, threads=threads, progress=progress, stop=stop)
-    if stop is not None:
-        stop.raise_if_received()
-    facts = facts_of(collected, threads, time.perf_counter() - started)
-    result = Result(experiment, finished(collected), facts | repeated(experiment, overrides))
+    with cluster(workers, scheduler) if executor is None else nullcontext(executor) as pool:
+        threads = pool.workers if pool else threads or available_cores()
+        means = Means(out, threads, stopping.Either(stop, limit), pool)
+        gathered = simulation.simulated(experiment, means, progress=progress, precision=precision)
+        if stop is not None:
+            stop.raise_if_received()
+    if not gathered.cases:
+        raise TargetUnmet(f"{experiment.stem}: {gathered.stopped}: nothing was done by then")
+    facts = facts_of(gathered, threads, time.perf_counter() - started)
+    result = Result(experiment, finished(gathered), facts | repeated(experiment, overrides))
     if out is not None:
         result.write(out, figures)
     return result
+
+
+def share(
+    experiment: Experiment,
+    number: int,
+    of: int,
+    *,
+    out: str | os.PathLike,
+    threads: int | None = None,
+    executor: Executor | None = None,
+    time_limit: Stop | None = None,
+    progress: Progress | None = None,
+    stop: Signals | None = None,
+) -> simulation.Shares:
+    """Compute share `number` of `of` of every case into the store under out; no tables. Arguments as those of `run`."""
+    means = Means(out, threads, stopping.Either(stop, time_limit), executor)
+    done = simulation.shared(experiment, number, of, means, progress=progress)
+    if stop is not None:
+        stop.raise_if_received()
+    return done
+
+
+def cluster(workers: int | None, scheduler: str | None) -> AbstractContextManager[Executor | None]:
+    """The executor of these workers or of this scheduler, to be entered; None where neither is given."""
+    if workers is None and scheduler is None:
+        return nullcontext()
+    from radarsim.engine.cluster import Cluster
+
+    return Cluster(workers, scheduler)
 
 
 def merged(overrides: Sequence[str], realisations: float | None, seed: int | None) -> tuple[str, ...]:
@@ -137,14 +156,16 @@ def report(
     """
     if not any(override.split("=")[0].strip() == "realisations" for override in overrides):
         experiment = as_last_run(experiment, Path(out))
-    held, missing = [], []
+    held, missing = Gathered(), []
     for case in experiment.cases:
         work = studies.CaseWork(case)
+        if not case.realisations:  # the last run was stopped before it came to this case
+            continue
         collected = stored(work, case.realisations, out)
         if collected is None:
             missing.append(f"{case.name}: {case.realisations} realisations are not stored in {out}")
         else:
-            held.append((case, work, collected))
+            held.cases.append((case, work, collected))
     if missing:
         raise ConfigError(*missing, f"`{command(experiment, overrides, out)}` computes them")
     result = Result(experiment, finished(held), facts_of(held, 0, 0.0) | repeated(experiment, overrides))
@@ -165,36 +186,34 @@ def as_last_run(experiment: Experiment, out: Path) -> Experiment:
     return replace(experiment, cases=cases, realisations=max(case.realisations for case in cases))
 
 
-Gathered = Sequence[tuple[Case, studies.CaseWork, Collected]]
-
-
 def finished(gathered: Gathered) -> list[CaseResult]:
-    """Cases with their sums and the labels that say what these are; display names are each case's own."""
-    results = []
-    for case, work, collected in gathered:
-        plan = work.plan if work.case == case else studies.study(case.study).prepare(case)
-        sums = plan.layout.unpack(collected.values)
-        results.append(
-            CaseResult(
-                case.name, case.study, case.spec, case.swept, collected.count, sums, plan.axes, collected.kernel_seconds
-            )
-        )
-    return results
+    """Cases with their sums and the labels that say what these are."""
+    return [simulation.result_of(*one) for one in gathered.cases]
 
 
 def facts_of(gathered: Gathered, threads: int, seconds: float) -> dict:
-    """The facts of a run for run.json: stop reason, threads, times, warnings, identities."""
-    collected = [c for _, _, c in gathered]
-    return {
-        "stop": next((c.stopped for c in collected if c.stopped), "done"),
+    """The facts of a run for run.json: stop reason, threads, times, warnings, identities, the precision reached."""
+    collected = [c for _, _, c in gathered.cases]
+    facts = {
+        "stop": "; ".join(gathered.unmet) or "done",
+        "unmet": gathered.unmet,
         "threads": threads,
         "seconds": seconds,
         "kernel_seconds": sum(c.kernel_seconds for c in collected),
         "realisations_computed": sum(c.computed for c in collected),
         "realisations_from_store": sum(c.from_store for c in collected),
         "warnings": list(dict.fromkeys(warning for c in collected for warning in c.warnings)),
-        "identities": {case.name: work.identity for case, work, _ in gathered},
+        "identities": {case.name: work.identity for case, work, _ in gathered.cases},
     }
+    if gathered.precision is None:
+        return facts
+    widest = {name: asdict(cell) | {"percent": finite(cell.percent)} for name, cell in gathered.cells.items()}
+    return facts | {"precision": {"asked_percent": gathered.precision, "widest": widest}}
+
+
+def finite(value: float) -> float | None:
+    """The number, or None where it is none that JSON knows."""
+    return value if math.isfinite(value) else None
 
 
 def claims(configs: Sequence[str], out: str | os.PathLike) -> list[dict]:

@@ -4,12 +4,27 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from radarsim import studies
 from radarsim.config import lookup
 from radarsim.config.load import Experiment
+from radarsim.engine.collect import collect
 from radarsim.engine.executors import available_cores
+from radarsim.simulation import check_precision, result_of
 
 PILOT_S = 0.3
+PILOT_OF_PRECISION_S, LEAST, MOST = 1.0, 256, 16_384  # realisations that a precision is judged from
+
+
+@dataclass(frozen=True)
+class Need:
+    """What a precision takes: realisations (None beyond all bounds), from `exact` values or a `pilot` of how many, and
+    the σ that is last to get there, in words."""
+
+    realisations: int | None
+    known_by: str
+    last: str
 
 
 @dataclass(frozen=True)
@@ -21,6 +36,7 @@ class CaseOutlook:
     scans: int
     realisations: int
     seconds: float
+    need: Need | None = None
 
 
 @dataclass(frozen=True)
@@ -31,11 +47,17 @@ class Outlook:
     threads: int
     seconds: float
     memory_mb: float
+    precision: float | None = None
 
 
-def outlook(experiment: Experiment, threads: int | None = None) -> Outlook:
-    """Prepare every case and time a few realisations of it, compiled beforehand, and say what the whole would take."""
+def outlook(experiment: Experiment, threads: int | None = None, precision: float | None = None) -> Outlook:
+    """Prepare every case and time a few realisations of it, compiled beforehand, and say what the whole would take.
+
+    With a precision, in per cent: a case ends when that is reached, or at the last look before its N.
+    """
     threads = threads or available_cores()
+    if precision is not None:
+        check_precision([experiment], precision)
     cases, largest, preparing = [], 0, 0.0
     for case in experiment.cases:
         work = studies.CaseWork(case)
@@ -43,13 +65,39 @@ def outlook(experiment: Experiment, threads: int | None = None) -> Outlook:
         started = time.perf_counter()
         studies.study(case.study).prepare(case)
         preparing += time.perf_counter() - started
-        seconds = seconds_each(work, case.realisations) * case.realisations
+        each = seconds_each(work, case.realisations)
+        need = None if precision is None else needed(work, precision, each)
+        count = case.realisations if need is None else ending(need, case.realisations)
         axes = work.plan.axes
-        cases.append(CaseOutlook(case.name, ", ".join(axes.filters), len(axes.k), case.realisations, seconds))
+        cases.append(CaseOutlook(case.name, ", ".join(axes.filters), len(axes.k), count, each * count, need))
         largest = max(largest, work.size)
     # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter and its libraries.
     memory = 200 + 8e-6 * largest * (2 * threads + 32)
-    return Outlook(tuple(cases), threads, preparing + sum(c.seconds for c in cases) / threads, memory)
+    return Outlook(tuple(cases), threads, preparing + sum(c.seconds for c in cases) / threads, memory, precision)
+
+
+def needed(work: studies.CaseWork, percent: float, seconds_each: float) -> Need:
+    """How many realisations a precision takes: from exact values, where errors are Gaussian with these, else from a
+    pilot."""
+    from radarsim.report import precision
+
+    exact = getattr(work.plan, "gaussian", False)
+    count = LEAST if exact else min(max(LEAST, int(PILOT_OF_PRECISION_S / seconds_each)), MOST)
+    result = result_of(work.case, work, collect(work, count))
+    if exact:
+        result = precision.gaussian(result)
+        axes = result.axes
+        exact = bool(np.isfinite(axes.exact_sigma[axes.available]).all())
+    n, cell = precision.needed(result, percent), precision.worst(result)
+    last = "no sigma in this case" if cell is None else f"{cell.filter}, {cell.component}, k = {cell.k}"
+    return Need(n, "exact" if exact else f"pilot of {count:,}", last)
+
+
+def ending(need: Need, most: int) -> int:
+    """Realisations at which a run to a precision would end: where it is reached, or at the last look before N."""
+    from radarsim.report import precision
+
+    return max(n for n in precision.looks(most) if need.realisations is None or n <= need.realisations)
 
 
 def seconds_each(work: studies.CaseWork, realisations: int) -> float:

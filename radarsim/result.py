@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 
@@ -37,6 +38,13 @@ class Result:
         """Gains against the baseline filter: a DataFrame with the columns of gains.csv."""
         return self.tables["gains"]
 
+    @property
+    def last_scan(self):
+        """The rows of curves at the last scan of each case, filter and component, with those of gains beside them."""
+        keys = ["case", "filter", "component"]
+        last = self.curves.groupby(keys, sort=False).tail(1)
+        return last.merge(self.gains.groupby(keys, sort=False).tail(1), on=[*keys, "k", "t_s"], how="left")
+
     @cached_property
     def _described(self) -> dict:
         from radarsim.report import output
@@ -56,18 +64,30 @@ class Result:
             raise KeyError(f"no figure {name!r}; there are: {', '.join(self._described)}")
         return figures.render(self._described[name])
 
-    def write(self, out: str | os.PathLike, figures: bool = True):
-        """Write tables, figures, claims, run.json and report.html into out/<stem>/; what was written."""
-        from radarsim.report import output
+    def write(self, out: str | os.PathLike, figures: bool = True, formats: Sequence[str] = ("svg", "png")):
+        """Write tables, figures, claims, run.json and report.html into out/<stem>/, and out/index.html anew.
+
+        formats are those of the figures' files: svg, png, pdf. What was written comes back.
+        """
+        from radarsim.report import index, output
 
         folder = Path(out) / self.experiment.stem
-        self.written = output.write(self.experiment, self.cases, folder, self.facts, draw=figures, made=self.tables)
+        facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
+        self.written = output.write(
+            self.experiment, self.cases, folder, facts, draw=figures, made=self.tables, formats=formats
+        )
+        index.write(Path(out))
         return self.written
 
     def verdicts(self) -> dict[str, list[str]]:
         """The claims that came out so, by verdict; empty where this experiment judges none."""
         judged = self.tables["claims"].drop_duplicates("claim")
         return {verdict: list(group["claim"]) for verdict, group in judged.groupby("overall", sort=False)}
+
+    @property
+    def unmet(self) -> list[str]:
+        """The targets of precision or time that the run did not reach, in words; empty if it is all that was asked."""
+        return list(self.facts.get("unmet", ()))
 
     @property
     def warnings(self) -> list[str]:

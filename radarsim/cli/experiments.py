@@ -3,14 +3,19 @@
 import click
 
 from radarsim.cli.group import (
+    Positive,
+    Share,
     configs_argument,
     figures_option,
+    json_option,
     main,
     out_option,
+    precision_option,
     realisations_option,
     seed_option,
     set_option,
 )
+from radarsim.errors import TargetUnmet
 
 
 @main.command()
@@ -18,41 +23,89 @@ from radarsim.cli.group import (
 @realisations_option
 @seed_option
 @set_option
+@precision_option
+@click.option("--time-limit", type=Positive("SECONDS"), metavar="SECONDS", help="Stop cleanly then, keep what is done.")
+@click.option("--shard", type=Share(), metavar="i/n", help="Compute this share of the blocks only; no tables.")
 @click.option("--threads", type=click.IntRange(1, 1024), metavar="T", help="Threads; default: all cores.")
+@click.option("--workers", type=click.IntRange(1, 1024), metavar="N", help="Worker processes on this machine (Dask).")
+@click.option("--scheduler", metavar="ADDR", help="Address of a Dask scheduler whose workers compute: tcp://host:8786.")
 @out_option
 @figures_option
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
-def run(configs, realisations, seed, overrides, threads, out, no_figures, quiet):
+@json_option
+def run(
+    configs,
+    realisations,
+    seed,
+    overrides,
+    precision,
+    time_limit,
+    shard,
+    threads,
+    workers,
+    scheduler,
+    out,
+    no_figures,
+    quiet,
+    as_json,
+):
     """Run experiments; resumes by itself.
 
     CONFIG is a YAML file, or the name of a shipped experiment (`radarsim list`). Finished blocks are kept under
-    DIR/.blocks: a run that was stopped continues, a larger N continues, an edited config starts anew.
+    DIR/.blocks: a run that was stopped continues, a larger N continues, an edited config starts anew. A precision or
+    time limit that left something undone ends in exit code 3, with tables of what is done.
 
     \b
     Examples
       radarsim run configs/rls2.yaml
       radarsim run range_doppler -n 1e6 --threads 2
       radarsim run rls2 --set radar.sigma_range_m=300 --set filters.0.manoeuvre_variance=1e-4
+      radarsim run rls2 -n 1e7 --precision 0.5          until every σ is known to ± 0.5 %
+      radarsim run multimodel -n 1e5 --time-limit 600   for ten minutes; the same again continues
+      radarsim run rls2 -n 1e8 --shard 2/3              on the second of three machines
+      radarsim run rls2 -n 1e8 --workers 8              or --scheduler tcp://host:8786
+      radarsim run rls2 --json | jq '.[0].last_scan[0].sigma'
     """
-    from radarsim.engine.stopping import Signals
+    if shard and precision:
+        raise click.UsageError("--shard and --precision do not go together: a precision is judged on all blocks")
+    if workers and scheduler:
+        raise click.UsageError("--workers and --scheduler do not go together: give one of them")
+    if threads and (workers or scheduler):
+        raise click.UsageError("--threads and a cluster do not go together: its workers compute, not this process")
+    from radarsim.engine import stopping
 
-    with Signals() as stop:
-        from radarsim import console, experiment
+    limit = stopping.time_limit(time_limit) if time_limit else None
+    with stopping.Signals() as stop:
+        from radarsim import console, documents, experiment, simulation
 
         overrides = experiment.merged(overrides, realisations, seed)
-        for one in experiment.load_all(configs, overrides):
-            with console.Progress(one.stem, quiet=quiet) as progress:
-                result = experiment.run(
-                    one,
-                    overrides=overrides,
-                    threads=threads,
-                    out=out,
-                    figures=not no_figures,
-                    progress=progress.update,
-                    stop=stop,
-                )
-            if not quiet:
-                console.print_result(result)
+        loaded = experiment.load_all(configs, overrides)
+        if precision is not None:
+            simulation.check_precision(loaded, precision)
+        told, unmet = [], []
+        with experiment.cluster(workers, scheduler) as pool:
+            for one in loaded:
+                means = {"out": out, "threads": threads, "executor": pool, "time_limit": limit, "stop": stop}
+                with console.Progress(one.stem, quiet=quiet) as progress:
+                    means["progress"] = progress.update
+                    try:
+                        if shard:
+                            done = experiment.share(one, *shard, **means)
+                        else:
+                            done = experiment.run(
+                                one, overrides=overrides, precision=precision, figures=not no_figures, **means
+                            )
+                    except TargetUnmet as error:
+                        unmet += error.lines
+                        continue
+                unmet += [f"{one.stem}: {reason}" for reason in done.unmet]
+                told.append(documents.share(done) if shard else documents.result(done))
+                if not (quiet or as_json):
+                    console.print_share(done, out) if shard else console.print_result(done)
+        if as_json:
+            click.echo(documents.text(told))
+        if unmet:
+            raise TargetUnmet(*unmet)
 
 
 @main.command()
@@ -60,17 +113,29 @@ def run(configs, realisations, seed, overrides, threads, out, no_figures, quiet)
 @realisations_option
 @seed_option
 @set_option
-def check(configs, realisations, seed, overrides):
+@precision_option
+@json_option
+def check(configs, realisations, seed, overrides, precision, as_json):
     """Validate configs; say what would run: cases, filters, realisations, time, memory.
 
-    \b
-    Example
-      radarsim check configs/range_doppler.yaml -n 1e7
-    """
-    from radarsim import console, experiment, overview
+    With a precision, also how many realisations it takes: from exact values where the filters are linear, else from a
+    pilot of a second or two.
 
+    \b
+    Examples
+      radarsim check configs/range_doppler.yaml -n 1e7
+      radarsim check multimodel --precision 1
+    """
+    from radarsim import console, documents, experiment, overview
+
+    told = []
     for one in experiment.load_all(configs, experiment.merged(overrides, realisations, seed)):
-        console.print_outlook(one, overview.outlook(one))
+        outlook = overview.outlook(one, precision=precision)
+        told.append(documents.outlook(one, outlook))
+        if not as_json:
+            console.print_outlook(one, outlook)
+    if as_json:
+        click.echo(documents.text(told))
 
 
 @main.command()
@@ -80,33 +145,47 @@ def check(configs, realisations, seed, overrides):
 @set_option
 @out_option
 @figures_option
-def report(configs, realisations, seed, overrides, out, no_figures):
+@json_option
+def report(configs, realisations, seed, overrides, out, no_figures, as_json):
     """Tables, figures and report from what is stored; computes nothing.
 
     \b
-    Example
+    Examples
       radarsim report rls2
+      radarsim report rls2 --json --no-figures
     """
-    from radarsim import console, experiment
+    from radarsim import console, documents, experiment
 
     overrides = experiment.merged(overrides, realisations, seed)
+    told = []
     for one in experiment.load_all(configs, overrides):
-        console.print_result(experiment.report(one, out=out, overrides=overrides, figures=not no_figures))
+        result = experiment.report(one, out=out, overrides=overrides, figures=not no_figures)
+        told.append(documents.result(result))
+        if not as_json:
+            console.print_result(result)
+    if as_json:
+        click.echo(documents.text(told))
 
 
 @main.command()
 @click.argument("configs", nargs=-1, metavar="[CONFIG…]")
 @out_option
-def claims(configs, out):
+@json_option
+def claims(configs, out, as_json):
     """The papers' claims: stated, measured with interval, verdict; computes nothing.
 
     Without CONFIG all claims of all papers; those without stored results are listed as not run, with the command that
     would judge them.
 
     \b
-    Example
+    Examples
       radarsim claims range_doppler
+      radarsim claims --json
     """
-    from radarsim import console, experiment
+    from radarsim import console, documents, experiment
 
-    console.print_claims(experiment.claims(configs, out))
+    rows = experiment.claims(configs, out)
+    if as_json:
+        click.echo(documents.text(rows))
+    else:
+        console.print_claims(rows)

@@ -1,6 +1,8 @@
 """The group of commands: what all share of options, faults and exit codes."""
 
+import math
 import os
+import re
 import signal
 import sys
 
@@ -9,7 +11,7 @@ import click
 import radarsim
 from radarsim.errors import Interrupted, RadarsimError, StoreError
 
-ORDER = ("run", "check", "report", "claims", "track", "list", "schema")
+ORDER = ("run", "check", "report", "claims", "track", "list", "schema", "doctor", "clean")
 SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 
 
@@ -63,6 +65,35 @@ class Count(click.ParamType):
         return int(text) if text.isdigit() else int(number)
 
 
+class Positive(click.ParamType):
+    """A finite number above zero, and up to `most`."""
+
+    def __init__(self, name: str, most: float = math.inf):
+        self.name, self.most = name, most
+
+    def convert(self, value, param, ctx):
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not (0 < number <= self.most and math.isfinite(number)):
+            bound = f" and ≤ {self.most:g}" if math.isfinite(self.most) else ""
+            self.fail(f"must be a number > 0{bound}, got {value!r}", param, ctx)
+        return number
+
+
+class Share(click.ParamType):
+    """Which share of how many: 2/3."""
+
+    name = "i/n"
+
+    def convert(self, value, param, ctx):
+        match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", value, re.ASCII)
+        if not match or not 1 <= int(match[1]) <= int(match[2]):
+            self.fail(f"must be i/n with i from 1 to n, such as 2/3, got {value!r}", param, ctx)
+        return int(match[1]), int(match[2])
+
+
 @click.group(cls=Commands, context_settings=SETTINGS)
 @click.version_option(radarsim.__version__, prog_name="radarsim")
 def main():
@@ -88,4 +119,11 @@ realisations_option = click.option(
     "-n", "--realisations", type=Count(), metavar="N", help="Realisations, overrides the config; 1e5 is a number."
 )
 seed_option = click.option("--seed", type=Count(), metavar="S", help="Seed, overrides the config.")
+precision_option = click.option(
+    "--precision",
+    type=Positive("PCT", most=100),
+    metavar="PCT",
+    help="Run until the 95 % half-width of every σ is under PCT %, at most N; looks at 2000, 4000, 8000, …",
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout in place of words.")
 figures_option = click.option("--no-figures", is_flag=True, help="Draw no figures; tables and report only.")

@@ -2,20 +2,25 @@
 
 import click
 
-from radarsim.cli.group import main
+from radarsim.cli.group import json_option, main
 
 
 @main.command(name="list")
-def list_():
+@json_option
+def list_(as_json):
     """Configs, scenarios, studies and filters at hand.
 
     \b
-    Example
+    Examples
       radarsim list
+      radarsim list --json | jq -r '.configs[].name'
     """
-    from radarsim import console, overview
+    from radarsim import console, documents, overview
 
-    console.print_inventory(overview.inventory())
+    if as_json:
+        click.echo(documents.text(documents.inventory(overview.inventory())))
+    else:
+        console.print_inventory(overview.inventory())
 
 
 @main.command()

@@ -20,7 +20,7 @@ QUANTILES = (0.05, 0.5, 0.95)
 def tables(results: Sequence[CaseResult]) -> dict:
     """curves and gains in place of the common ones, and locks, windows, residuals, bounds, motion, passes."""
     return {
-        "curves": common.joined([_curves(result) for result in results], CURVES),
+        "curves": curves(results),
         "gains": common.frame({name: [] for name in common.GAINS}),
         "locks": common.joined([_locks(result) for result in results], LOCKS),
         "residuals": common.joined([_residuals(result) for result in results], RESIDUALS),
@@ -32,6 +32,11 @@ def tables(results: Sequence[CaseResult]) -> dict:
 
 
 CURVES = (*common.CURVES, "sigma_all", "posterior_sigma")
+
+
+def curves(results: Sequence[CaseResult]):
+    """σ of the locked bursts in place of the common table."""
+    return common.joined([_curves(result) for result in results], CURVES)
 
 
 def _curves(result: CaseResult) -> dict[str, np.ndarray]:

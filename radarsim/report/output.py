@@ -32,6 +32,11 @@ def tables(results: Sequence[CaseResult]) -> dict:
     return notes.noted(made, results)
 
 
+def curves(results: Sequence[CaseResult]):
+    """The table curves alone, without the work of the others."""
+    return getattr(study(results[0].study), "curves", common.curves)(results)
+
+
 def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
     """The figures of an experiment, described, by the stem of their file."""
     return study(results[0].study).figures(results, made, experiment)

@@ -36,6 +36,7 @@ class Plan:
     weights: np.ndarray
     gains: np.ndarray
     block: int = BLOCK
+    gaussian = True  # the errors are, with the exact bias and σ of the axes
 
 
 def truth(target, t: np.ndarray) -> np.ndarray:

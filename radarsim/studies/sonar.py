@@ -52,6 +52,11 @@ class Plan:
     believed: np.ndarray | None
     block: int = BLOCK
 
+    @property
+    def gaussian(self) -> bool:
+        """Whether errors are Gaussian with the exact bias and σ of the axes, where these are known."""
+        return self.sight is None
+
 
 def prepare(case: Case) -> Plan:
     """Design the filters of a case and reckon the exact values of its errors."""

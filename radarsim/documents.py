@@ -1,0 +1,60 @@
+"""What the commands give with --json: plain data, one document a command, of the same content as their words."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+
+
+def text(document: object) -> str:
+    """A document as JSON; what is not a number, or not finite, is null."""
+    return json.dumps(_plain(document), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "item"):  # NumPy's numbers
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def result(one) -> dict:
+    """A finished run or report: what was asked and done, the answer, σ at the last scan, verdicts, files."""
+    names = {case.name: case.count for case in one.cases}
+    return {
+        "config": one.experiment.stem,
+        "stop": one.facts["stop"],
+        "unmet": one.unmet,
+        "cases": {
+            case.name: {"asked": case.realisations, "done": names.get(case.name, 0), "seed": case.seed}
+            for case in one.experiment.cases
+        },
+        "precision": one.facts.get("precision"),
+        "answer": list(one.written.answer),
+        "last_scan": one.last_scan.to_dict("records"),
+        "claims": one.verdicts(),
+        "folder": str(one.written.folder),
+        "files": list(one.written.files),
+        "warnings": one.warnings,
+    }
+
+
+def share(done) -> dict:
+    """What a share came to, in realisations, by case."""
+    return {**asdict(done), "unmet": done.unmet, "warnings": done.warnings}
+
+
+def outlook(experiment, one) -> dict:
+    """What a run would take."""
+    return {"config": experiment.stem, "path": experiment.path, **asdict(one)}
+
+
+def inventory(tables: Sequence) -> dict:
+    """Configs, scenarios, studies and filters: lists of rows by the first word of their title."""
+    return {
+        title.split()[0].lower(): [dict(zip(columns, row, strict=True)) for row in rows]
+        for title, columns, rows in tables
+    }
