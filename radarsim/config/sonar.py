@@ -24,6 +24,16 @@ from radarsim.config.fields import (
     unique_names,
     whole,
 )
+from radarsim.config.sonar_manoeuvre import (
+    Accelerating,
+    Adapting,
+    Detectors,
+    Uses,
+    answer_misfits,
+    detector_misfits,
+    uses_misfits,
+)
+from radarsim.config.sonar_tracker import Sector, Tracking, tracker_misfits
 
 MOST_SCANS = 100_000
 Wide = Annotated[Positive, Field(le=0.5)]  # rad: beyond some 30 degrees an angle's error is no longer Gaussian
@@ -73,12 +83,20 @@ class Sensor(Model):
         0.0, description="correlation ρ of the errors of neighbouring plots, eq. (15); one number, or by coordinate"
     )
     detection_probability: Annotated[Probability, Field(gt=0)] = Field(
-        1.0, description="probability that the plot of a scan comes; that of the first scan always does"
+        1.0,
+        description="probability that the plot of a scan comes; that of the first scan always does, save for filters "
+        "with an association",
     )
     missed_scans: tuple[whole(2, MOST_SCANS), ...] = Field(
         (), description="scans, counted from 1, whose plots never come"
     )
     further: tuple[FurtherSensor, ...] = Field((), max_length=4, description="further sonars on the same target")
+    false_plots_per_km2: Annotated[NonNegative, Field(le=1e4), Design()] = Field(
+        0.0, description="mean number of false plots a scan in a square kilometre of the surveyed sector"
+    )
+    sector: Annotated[Sector | None, Design()] = Field(
+        None, description="the surveyed sector, of filters with an association; outside it there are no plots"
+    )
 
     @cross_check
     def _consistent(self):
@@ -175,16 +193,20 @@ class Turning(Model):
         return max((self.x_m**2 + self.y_m**2) ** 0.5, 1.0)
 
 
-Target = Annotated[Polynomial | Turning, Field(discriminator="kind")]
+Target = Annotated[Polynomial | Turning | Accelerating, Field(discriminator="kind")]
 CORRELATED = ("kalman_augmented", "kalman_differenced")
 
 
-class Filter(Model):
+class Filter(Adapting, Tracking):
     """A filter of each coordinate by itself."""
 
     name: Annotated[Name, Display()] = Field(description="label, unlike that of any other filter")
-    kind: Literal["growing_memory", "window", "kalman", "fixed_gain", "kalman_augmented", "kalman_differenced"] = Field(
-        description="least squares on all plots or on the last few, Kalman, fixed gains, or one that knows of ρ"
+    kind: Literal[
+        *("growing_memory", "window", "kalman", "fixed_gain", "kalman_augmented", "kalman_differenced"),
+        *("adaptive", "imm"),
+    ] = Field(
+        description="least squares on all plots or on the last few, Kalman, fixed gains, one that knows of ρ, one that "
+        "answers to a detector of manoeuvres, or two Kalman filters that interact"
     )
     degree: Literal[1, 2] = Field(1, description="degree of the polynomial: 1 a straight line, 2 a parabola")
     plots: whole(2, 1000) | None = Field(
@@ -236,12 +258,37 @@ class Sonar(Study):
         None, description="name of the filter that gains are against; default: the first"
     )
     scans: Annotated[whole(2, MOST_SCANS), Design()] = Field(description="number of scans of the first sonar")
+    detectors: Annotated[Detectors, Design()] = Field((), description="detectors of manoeuvres, measured on the plots")
+    uses: Annotated[Uses | None, Design()] = Field(
+        None, description="course, speed, predicted position and closest approach, with their σ; none: left out"
+    )
 
     @cross_check
     def _long_enough(self):
         most = max(readable(self.filters, lambda one: one.degree), default=0) + 1
         if self.scans < most:
             yield at("scans", f"must be >= {most} for a filter of degree {most - 1}")
+
+    @property
+    def tracking(self) -> bool:
+        """Whether its filters have to find their plots among false ones."""
+        return any(f.association is not None for f in self.filters)
+
+    @cross_check
+    def _trackers_fit(self):
+        yield from tracker_misfits(self)
+
+    @cross_check
+    def _detectors_fit(self):
+        yield from detector_misfits(self)
+
+    @cross_check
+    def _uses_fit(self):
+        yield from uses_misfits(self)
+
+    @cross_check
+    def _answers_fit(self):
+        yield from answer_misfits(self)
 
     @cross_check
     def _misses_within_scans(self):

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from radarsim.filters import sonar as filters
+from radarsim.filters.sonar_manoeuvre import Models, Rule, Trials, interacting, switching
 from radarsim.kernels import sonar as kernels
 from radarsim.kernels import sonar_patterns as patterns
 from radarsim.models.motion import transition
@@ -17,14 +18,17 @@ KINDS = {
     "kalman_augmented": patterns.COVARIANCE,
     "fixed_gain": patterns.FIXED,
     "window": patterns.WINDOW,
+    "adaptive": patterns.ADAPTIVE,
+    "imm": patterns.IMM,
 }
+ANSWERING = ("adaptive", "imm")  # to the data: their gains are each realisation's own
 
 
 @dataclass(frozen=True)
 class Choice:
     """A filter as chosen: kind, size of the state, length of a window or of a start.
 
-    By coordinate the manoeuvre variance (C,) and ρ (C,).
+    By coordinate the manoeuvre variance (C,) and ρ (C,). A filter that answers to manoeuvres has its rule or models.
     """
 
     kind: str
@@ -32,6 +36,7 @@ class Choice:
     length: int
     variance: np.ndarray
     rho: np.ndarray
+    answer: Rule | Models | None = None
 
 
 def designed(choice: Choice, c: int, plots: filters.Plots) -> filters.Design:
@@ -146,8 +151,8 @@ def ring_weights(one: Made, order: np.ndarray, longest: int) -> np.ndarray:
     return out
 
 
-def own(choices: list[Choice], t: np.ndarray, period: float, nominal: np.ndarray) -> patterns.Bank:
-    """Filters that go along with each realisation's plots; nominal (C,) σ of a plot."""
+def own(choices: list[Choice], t: np.ndarray, period: float, nominal: np.ndarray, trials: Trials) -> patterns.Bank:
+    """Filters that go along with each realisation's plots; nominal (C,) σ of a plot, trials all tests there are."""
     F, C = len(choices), len(nominal)
     manoeuvre, settled = np.zeros((F, C)), np.zeros((F, C, 3))
     carry = np.zeros((F, len(t), C))
@@ -165,4 +170,7 @@ def own(choices: list[Choice], t: np.ndarray, period: float, nominal: np.ndarray
         carry=carry,
         manoeuvre=manoeuvre,
         settled=settled,
+        memory=max([trials.longest, *(f.length for f in choices if f.kind == "window")]),
+        switching=switching([f.answer for f in choices], [f.length for f in choices], trials, C),
+        interacting=interacting([f.answer for f in choices], [f.size for f in choices], period, nominal),
     )

@@ -10,13 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.compile import kernel
+from radarsim.kernels.compile import kernel, part
 from radarsim.kernels.random import U, uniforms
 from radarsim.kernels.sonar import CHUNK, move_and_measure
+from radarsim.kernels.sonar_detector import MODE, PLOTS, Switching, adapt, add_alarms, examine
+from radarsim.kernels.sonar_imm import PROBABILITY, ROWS, Interacting, interact, mode_sums
 from radarsim.kernels.sonar_steps import fit, recur, remember
 from radarsim.kernels.sonar_sums import add_ahead, add_sums
 
-INFORMATION, COVARIANCE, FIXED, WINDOW = range(4)
+INFORMATION, COVARIANCE, FIXED, WINDOW, ADAPTIVE, IMM = range(6)
 PLACED = 8.0  # as models.sonar.PLACED
 
 
@@ -44,7 +46,7 @@ class Bank(NamedTuple):
     """F filters: kind (F,), size (F,) of the state, length (F,) of a window or of the start of a fixed filter.
 
     carry (F, K, C) correlation that the filter assumes, manoeuvre (F, C) variance in nominal plots and periods, settled
-    (F, C, 3) gains of a fixed filter, likewise.
+    (F, C, 3) gains of a fixed filter, likewise. memory is how many plots are kept for windows and detectors.
     """
 
     kind: np.ndarray
@@ -53,6 +55,22 @@ class Bank(NamedTuple):
     carry: np.ndarray
     manoeuvre: np.ndarray
     settled: np.ndarray
+    memory: int
+    switching: Switching
+    interacting: Interacting
+
+
+class Further(NamedTuple):
+    """What is added up of filters that answer to manoeuvres, and what is kept of estimates.
+
+    modes (F, K, C, 3): Σp, Σp² of the probability of a manoeuvre, and Σ of the plots in memory. at (A,) are scans, and
+    kept (A, F, 2, 6, count) of the first two coordinates there: value, rate, variance of the value, covariance,
+    variance of the rate, all as believed, and 1 where the state is complete.
+    """
+
+    modes: np.ndarray
+    at: np.ndarray
+    kept: np.ndarray
 
 
 # ---- plots --------------------------------------------------------------------------------------------------------
@@ -110,12 +128,27 @@ def weigh(sight, k, plots, seen, place, z, weight):
 
 
 @kernel
-def filter_scan(bank, sight, f, c, k, dt, x, y, s, memory, z, weight, before, count, P):
-    """Scan k of filter f in coordinate c, in place: x (4, n), y (8, n), s (10, n), memory (3, L, n).
+def filter_scan(bank, sight, f, c, k, dt, x, y, s, memory, z, weight, before, count, q, P):
+    """Scan k of filter f in coordinate c, in place: x (4, n), y (8, n), s (>= 10, n), memory (3, L, n).
 
-    Leaves P (6, n).
+    q (D, G, n) statistics of the detectors. Leaves P (6, n).
     """
     size, carry = bank.size[f], bank.carry[f, k, c]
+    if bank.kind[f] == ADAPTIVE:
+        rule = bank.switching
+        d, length = rule.detector[f], bank.length[f]
+        adapt(
+            *(size, rule.raises[f], length, rule.quiet[f], rule.threshold[f, c], q[d, rule.group[f, c]]),
+            *(dt, sight.period, x, y, s, memory, z, weight, before, P),
+        )
+        return
+    if bank.kind[f] == IMM:
+        models = bank.interacting
+        interact(
+            *(size, models.stay[f], models.manoeuvre[f, c], dt, sight.period, sight.sigma[c]),
+            *(x, y, s, z, weight, before, P),
+        )
+        return
     if bank.kind[f] == WINDOW:
         fit(x, memory, bank.length[f], size, sight.period, count, P)
         return
@@ -124,14 +157,39 @@ def filter_scan(bank, sight, f, c, k, dt, x, y, s, memory, z, weight, before, co
     recur(by_covariance, size, start, dt, sight.period, carry, manoeuvre, settled, x, y, s, z, weight, before, P)
 
 
+@part
+def add_modes(bank, s, f, c, k, used, out, modes):
+    """Add the modes of filter f in coordinate c at scan k; s its memory."""
+    if bank.kind[f] == ADAPTIVE:
+        mode_sums(s, MODE, PLOTS, used, out)
+    elif bank.kind[f] == IMM:
+        mode_sums(s, PROBABILITY + 1, -1, used, out)
+    else:
+        return
+    for j in range(3):
+        modes[f, k, c, j] += out[j]
+
+
+@part
+def keep(x, P, count, size, unit, period, first, n, kept):
+    """A coordinate's estimate and what is believed of it, of n realisations, into kept (6, total) from `first` on."""
+    for i in range(n):
+        kept[0, first + i], kept[1, first + i] = x[0, i], x[1, i]
+        kept[5, first + i] = 1.0 if count[i] >= size else 0.0
+        kept[2, first + i] = P[0, i] * unit * unit
+        kept[3, first + i] = P[1, i] * unit * unit / period
+        kept[4, first + i] = P[3, i] * unit * unit / (period * period)
+
+
 @kernel
-def simulate_block(world, sight, bank, first, total, baseline, sums):
+def simulate_block(world, sight, bank, watch, first, total, baseline, sums, alarms, further):
     """Add the sums of realisations first … first + total - 1; a partial chunk is computed in full and summed in
     part."""
     filters, scans, coordinates = bank.carry.shape
     x, y = np.empty((filters, coordinates, 4, CHUNK)), np.empty((filters, coordinates, 8, CHUNK))
-    s, P = np.empty((filters, coordinates, 10, CHUNK)), np.empty((6, CHUNK))
-    memory = np.empty((coordinates, 3, np.where(bank.kind == WINDOW, bank.length, 0).max(), CHUNK))
+    s, P = np.empty((filters, coordinates, ROWS if (bank.kind == IMM).any() else 10, CHUNK)), np.empty((6, CHUNK))
+    memory = np.empty((coordinates, 3, bank.memory, CHUNK))
+    q, passed = np.empty((watch.plots.size, coordinates + 1, CHUNK)), np.empty((*watch.threshold.shape, CHUNK))
     plots, shift = np.empty((world.walk.size, 4, CHUNK)), np.zeros((coordinates, 3, CHUNK))
     z, weight, seen = np.empty((coordinates, CHUNK)), np.empty((coordinates, CHUNK)), np.empty(CHUNK)
     place, before, count = np.empty((3, CHUNK)), np.empty((coordinates, CHUNK)), np.empty((coordinates, CHUNK))
@@ -139,7 +197,7 @@ def simulate_block(world, sight, bank, first, total, baseline, sums):
     order = np.append(np.array([baseline]), np.delete(np.arange(filters), baseline))  # the others are set against it
     for done in range(0, total, CHUNK):
         x[:], y[:], s[:], memory[:], plots[:], count[:], place[:] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        used[total - done :] = 0.0
+        used[total - done :], passed[:] = 0.0, 0.0
         for k in range(scans):
             dt, truth = world.dt[k], world.truth[k]
             move_and_measure(world, first + done, k, plots)
@@ -153,11 +211,20 @@ def simulate_block(world, sight, bank, first, total, baseline, sums):
             for c in range(coordinates):
                 if memory.shape[2] > 0:
                     remember(memory[c], z[c], weight[c], dt / sight.period)
+            examine(watch, k, memory, sight.sigma, count, weight, q)
+            add_alarms(watch, k, q, used, passed, alarms)
+            for c in range(coordinates):
                 for f in order:
                     filter_scan(
                         *(bank, sight, f, c, k, dt, x[f, c], y[f, c], s[f, c], memory[c], z[c], weight[c]),
-                        *(before[c], count[c], P),
+                        *(before[c], count[c], q, P),
                     )
+                    add_modes(bank, s[f, c], f, c, k, used, out, further.modes)
+                    for a in range(further.at.size if c < 2 else 0):
+                        if further.at[a] == k:
+                            shown = min(CHUNK, total - done)
+                            unit, into = sight.sigma[c], further.kept[a, f, c]
+                            keep(x[f, c], P, count[c], bank.size[f], unit, sight.period, done, shown, into)
                     add_sums(
                         *(bank.size[f], sight.sigma[c], sight.period, x[f, c], x[baseline, c], bank.size[baseline], P),
                         *(shift[c], truth[c], count[c], used, f, k, c, out, sums),

@@ -75,6 +75,22 @@ def _arc(position: np.ndarray, speed: float, course: float, rate: float, elapsed
     return np.stack([np.stack(x, axis=1), np.stack(y, axis=1)])
 
 
+def accelerating(
+    x: float, y: float, speed: float, course: float, acceleration: float, start: float, end: float, t: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """States (K, 3) in x and y of a target on a straight course, accelerated along it from start to end (s, m/s²).
+
+    Right at the start the acceleration is there already, at the end no more.
+    """
+    on, off = np.maximum(t - start, 0.0), np.maximum(t - end, 0.0)
+    way = speed * t + acceleration * (on**2 - off**2) / 2
+    pace = speed + acceleration * (on - off)
+    along = np.stack([way, pace, np.where((t >= start) & (t < end), acceleration, 0.0)], axis=1)
+    origin = np.array([[x], [y]]) * np.array([1.0, 0.0, 0.0])
+    states = origin[:, None, :] + np.array([math.cos(course), math.sin(course)])[:, None, None] * along
+    return states[0], states[1]
+
+
 def polar_states(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """States (K, 3) of range and (unwrapped) bearing from those of x and y."""
     r = np.hypot(x[:, 0], y[:, 0])

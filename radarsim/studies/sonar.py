@@ -3,7 +3,8 @@
 Sums of F filters over K scans and components (coordinate by coordinate: value, rate and, where a filter has it,
 acceleration): `error`, `paired`, `estimates` as everywhere; `believed` Σ of the variances that the filter claims; by
 coordinate C: `joint` Σq, Σq², Σp, Σp² of q = eᵀP⁻¹e and p the product of the errors in value and rate, and `ahead` Σe
-… Σe⁴ of the value extrapolated by one scan, in the row of the scan that it was extrapolated from.
+… Σe⁴ of the value extrapolated by one scan, in the row of the scan that it was extrapolated from. Cases with detectors,
+filters that answer to manoeuvres or uses have the sums of `sonar_manoeuvre` beside.
 """
 
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from radarsim.kernels import sonar as kernels
 from radarsim.kernels import sonar_patterns as pattern_kernels
 from radarsim.models import sonar as models
 from radarsim.studies import noise_key
+from radarsim.studies import sonar_manoeuvre as manoeuvres
 from radarsim.studies.sonar_exact import exact_values
 from radarsim.studies.sonar_scene import Scene, choices, patterns, plots_of, scene, third_of
 
@@ -36,12 +38,14 @@ FILTERS = {
     "kind: fixed_gain": "α-β (degree 1) or α-β-γ (degree 2) at the steady gains",
     "kind: kalman_augmented": "plots' errors estimated beside the state, for correlated errors",
     "kind: kalman_differenced": "differences of neighbouring plots, for correlated errors",
+    "kind: adaptive": "growing memory that a detector of manoeuvres (3) begins anew, at a higher degree or held short",
+    "kind: imm": "two Kalman filters that interact, steady and manoeuvring",
 }
 
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a block needs; `sight` is None where all realisations share their gains."""
+    """All that a block needs; `sight` and `watched` are None where all realisations share their gains."""
 
     layout: Layout
     axes: Axes
@@ -50,40 +54,52 @@ class Plan:
     sight: tuple | None
     size: int
     believed: np.ndarray | None
+    watched: manoeuvres.Watched | None = None
     block: int = BLOCK
-
-    @property
-    def gaussian(self) -> bool:
-        """Whether errors are Gaussian with the exact bias and σ of the axes, where these are known."""
-        return self.sight is None
 
 
 def prepare(case: Case) -> Plan:
     """Design the filters of a case and reckon the exact values of its errors."""
-    spec, seen, wanted = case.spec, scene(case.spec), choices(case.spec)
+    spec, seen = case.spec, scene(case.spec)
+    wanted = manoeuvres.answered(spec, choices(spec))
     size = max(choice.size for choice in wanted)
     F, K, C = len(wanted), len(seen.t), seen.truth.shape[1]
-    shared = spec.frame == "polar" and (seen.certain >= 0).all()
+    shared = spec.frame == "polar" and (seen.certain >= 0).all() and not manoeuvres.manoeuvring(spec)
     if shared:
         came, probability = np.maximum(seen.certain, 0)[None], np.ones(1)
     else:
         came, probability = patterns(seen) if spec.frame == "polar" else (np.zeros((0, 0)), np.zeros(0))
-    designs = [[banks.made(f, c, plots_of(seen, c, came)) for c in range(C)] for f in wanted] if len(came) else [[]] * F
-    bank = banks.shared(wanted, designs) if shared else banks.own(wanted, seen.t, seen.period, seen.nominal)
-    claimed = [[np.diagonal(one.believed[0], axis1=1, axis2=2) for one in row] for row in designs] if shared else None
+    designs = [_designs(choice, seen, came) for choice in wanted]
+    watched = None if shared else manoeuvres.watched(spec, seen, wanted)
+    if shared:
+        bank, claimed = banks.shared(wanted, designs), [[one.believed[0] for one in row] for row in designs]
+    else:
+        bank, claimed = banks.own(wanted, seen.t, seen.period, seen.nominal, watched.trials), None
     layout = Layout(
         **dict.fromkeys(("paired", "estimates", "believed"), (F, K, C * size)),
         **{"error": (F, K, C * size, 4), "joint": (F, K, C, 4), "ahead": (F, K, C, 4)},
+        **(manoeuvres.shapes(watched, F) if watched else {}),
     )
+    made = axes(spec, seen, wanted, exact_values(seen, designs, probability, size), bank.known if shared else None)
+    if manoeuvres.manoeuvring(spec):
+        made.extra.update(manoeuvres.told(watched, came, probability))
     return Plan(
         layout=layout,
-        axes=axes(spec, seen, wanted, exact_values(seen, designs, probability, size), bank.known if shared else None),
+        axes=made,
         world=world(case, seen),
         bank=bank,
         sight=None if shared else sight(case, seen),
         size=size,
-        believed=np.array(claimed).transpose(0, 2, 1, 3) if shared else None,
+        believed=np.diagonal(claimed, axis1=3, axis2=4).transpose(0, 2, 1, 3) if shared else None,
+        watched=watched,
     )
+
+
+def _designs(choice: banks.Choice, seen: Scene, came: np.ndarray) -> list[banks.Made]:
+    """The designs of a filter by coordinate for all patterns of plots; none where gains depend on the plots' values."""
+    if not len(came) or choice.kind in banks.ANSWERING:
+        return []
+    return [banks.made(choice, c, plots_of(seen, c, came)) for c in range(len(seen.nominal))]
 
 
 def world(case: Case, seen: Scene) -> kernels.World:
@@ -177,17 +193,21 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     C = len(plan.axes.extra["coordinates"])
     shapes = {"error": (3, 4), "paired": (3,), "joint": (4,), "ahead": (4,), "believed": (3,), "estimates": (3,)}
     sums = kernels.Sums(**{name: np.zeros((F, K, C, *tail)) for name, tail in shapes.items()})
+    added = {}
     if plan.sight is None:
         kernels.simulate_block(plan.world, plan.bank, first, count, plan.axes.baseline, sums)
         sums.believed[:] = count * plan.believed
         sums.estimates[:] = count * (plan.bank.known[..., None] > np.arange(3))
     else:
-        pattern_kernels.simulate_block(plan.world, plan.sight, plan.bank, first, count, plan.axes.baseline, sums)
+        world, watched = (plan.world, plan.sight, plan.bank, plan.watched.watch), plan.watched
+        alarms, further = manoeuvres.empty_sums(watched, F, count)
+        pattern_kernels.simulate_block(*world, first, count, plan.axes.baseline, sums, alarms, further)
+        added = manoeuvres.added_up(watched, alarms, further)
     picked = {
         name: getattr(sums, name)[:, :, :, : plan.size].reshape(plan.layout.shapes[name])
         for name in ("error", "paired", "believed", "estimates")
     }
-    return plan.layout.pack(**picked, joint=sums.joint, ahead=sums.ahead)
+    return plan.layout.pack(**picked, joint=sums.joint, ahead=sums.ahead, **added)
 
 
 def PLOT_COLUMNS(spec) -> tuple[tuple[str, ...], ...]:

@@ -34,12 +34,14 @@ def exact_values(
     """Exact σ and bias (F, K, C, size), σ one scan ahead and normalised error (F, K, C); not-a-number where not known.
 
     designs are of each filter in each coordinate, for M patterns of plots in the first scans, with their probability
-    (M,): the values are means over these. Without designs nothing is known.
+    (M,): the values are means over these. Of a filter without designs nothing is known.
     """
     F, K, C = len(designs), len(seen.t), seen.truth.shape[1]
     found = {name: np.full((F, K, C, size), np.nan) for name in ("sigma", "bias")}
     found |= {name: np.full((F, K, C), np.nan) for name in ("ahead", "nees")}
-    for f, c in np.ndindex(F, C) if probability.size else ():
+    for f, c in np.ndindex(F, C):
+        if not designs[f]:
+            continue
         one = designs[f][c]
         bias, S, plots = true_errors(seen, one, c)
         reach = plots.shape[1]

@@ -1,5 +1,6 @@
 """P3's scene: what a configured sonar observes, which plots come, and the filters in the units of each coordinate."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,6 +52,11 @@ def courses(target, t: np.ndarray, third: str | None) -> tuple[np.ndarray, np.nd
     if target.kind == "turning":
         turns = [(leg.start_s, leg.end_s, leg.rate_radps) for leg in target.turns]
         flat = models.turning(target.x_m, target.y_m, target.speed_mps, target.course_rad, turns, t)
+        polar = models.polar_states(*flat)
+    elif target.kind == "accelerating":
+        end = math.inf if target.end_s is None else target.end_s
+        vessel = (target.x_m, target.y_m, target.speed_mps, target.course_rad, target.acceleration_mps2)
+        flat = models.accelerating(*vessel, target.start_s, end, t)
         polar = models.polar_states(*flat)
     elif target.frame == "polar":
         polar = models.polynomials([target.range_m, target.bearing_rad], t)

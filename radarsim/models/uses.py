@@ -1,0 +1,87 @@
+"""What a track is used for: course, speed, predicted position, closest point of approach; to first order their spread.
+
+A track gives value and rate of two coordinates, range and bearing or x (north) and y (east): state (…, 2, 2), and of
+each the variance of the value, the covariance, the variance of the rate: (…, 2, 3). The coordinates are filtered apart,
+so nothing connects them. Course and speed are taken to last.
+"""
+
+import numpy as np
+
+QUANTITIES = (("course", "rad"), ("speed", "m/s"), ("x_ahead", "m"), ("y_ahead", "m"), ("cpa", "m"), ("t_cpa", "s"))
+
+
+def flat(state: np.ndarray, polar: bool) -> np.ndarray:
+    """x, y and their rates (…, 4) of a state."""
+    if not polar:
+        return np.stack([state[..., 0, 0], state[..., 1, 0], state[..., 0, 1], state[..., 1, 1]], axis=-1)
+    (r, vr), (b, vb) = np.moveaxis(state, (-2, -1), (0, 1))
+    c, s = np.cos(b), np.sin(b)
+    return np.stack([r * c, r * s, vr * c - r * vb * s, vr * s + r * vb * c], axis=-1)
+
+
+def uses(track: np.ndarray, own: np.ndarray, horizon: float) -> np.ndarray:
+    """The QUANTITIES (…, 6) of x, y and their rates (…, 4).
+
+    own (…, 4) are those of the vessel that the closest approach is to; horizon in s. t_cpa is counted from now, and
+    negative where the closest approach has passed.
+    """
+    x, y, vx, vy = np.moveaxis(track, -1, 0)
+    px, py, wx, wy = np.moveaxis(track - own, -1, 0)
+    square = wx**2 + wy**2
+    with np.errstate(divide="ignore", invalid="ignore"):  # a target that keeps its place has no closest approach
+        cpa, when = np.abs(px * wy - py * wx) / np.sqrt(square), -(px * wx + py * wy) / square
+    ahead = x + horizon * vx, y + horizon * vy
+    return np.stack([np.arctan2(vy, vx), np.hypot(vx, vy), *ahead, cpa, when], axis=-1)
+
+
+def gradients(track: np.ndarray, own: np.ndarray, horizon: float) -> np.ndarray:
+    """Derivatives (…, 6, 4) of the QUANTITIES with respect to x, y and their rates.
+
+    With u the unit vector from the own ship to the target at the closest approach, which is normal to the relative
+    velocity, d cpa = u · (dp + t_cpa dv). At a distance of zero u is one of the two normals, and the first order fails:
+    a distance cannot be negative.
+    """
+    vx, vy = track[..., 2], track[..., 3]
+    px, py, wx, wy = np.moveaxis(track - own, -1, 0)
+    zero, one, ahead = np.zeros_like(vx), np.ones_like(vx), np.full_like(vx, horizon)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        power, speed, fast = vx**2 + vy**2, np.hypot(vx, vy), wx**2 + wy**2
+        when = -(px * wx + py * wy) / fast
+        side = np.where(px * wy - py * wx < 0, -1.0, 1.0) / np.sqrt(fast)
+        ux, uy = side * wy, -side * wx
+        rows = [
+            [zero, zero, -vy / power, vx / power],
+            [zero, zero, vx / speed, vy / speed],
+            [one, zero, ahead, zero],
+            [zero, one, zero, ahead],
+            [ux, uy, ux * when, uy * when],
+            [-wx / fast, -wy / fast, -(px + 2 * when * wx) / fast, -(py + 2 * when * wy) / fast],
+        ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def variances(state: np.ndarray, P: np.ndarray, polar: bool, own: np.ndarray, horizon: float) -> np.ndarray:
+    """First-order variances (…, 6) of the QUANTITIES from the covariances (…, 2, 3) of the two coordinates."""
+    track = flat(state, polar)
+    x, y, vx, vy = (track[..., None, i] for i in range(4))
+    g = np.moveaxis(gradients(track, own, horizon), -1, 0)
+    if polar:
+        b, vb = state[..., None, 1, 0], state[..., None, 1, 1]
+        c, s = np.cos(b), np.sin(b)
+        value = g[0] * c + g[1] * s + vb * (g[3] * c - g[2] * s), g[1] * x - g[0] * y + g[3] * vx - g[2] * vy
+        rate = g[2] * c + g[3] * s, g[3] * x - g[2] * y
+    else:
+        value, rate = (g[0], g[1]), (g[2], g[3])
+    found = 0.0
+    for coordinate in range(2):
+        a, d = value[coordinate], rate[coordinate]
+        xx, xv, vv = (P[..., coordinate, i, None] for i in range(3))
+        found = found + a * a * xx + 2 * a * d * xv + d * d * vv
+    return found
+
+
+def errors(found: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Estimated less true QUANTITIES (…, 6), the course within half a turn."""
+    off = found - true
+    off[..., 0] = np.remainder(off[..., 0] + np.pi, 2 * np.pi) - np.pi
+    return off
