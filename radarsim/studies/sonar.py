@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from radarsim.config.load import Case
+from radarsim.config.sonar_manoeuvre import ANSWERING
 from radarsim.engine.moments import Layout
 from radarsim.engine.results import Axes, Track
 from radarsim.filters import sonar as filters
@@ -57,6 +58,11 @@ class Plan:
     watched: manoeuvres.Watched | None = None
     block: int = BLOCK
 
+    @property
+    def gaussian(self) -> bool:
+        """Whether errors are Gaussian with the exact bias and σ of the axes, where these are known."""
+        return self.sight is None and self.watched is None
+
 
 def prepare(case: Case) -> Plan:
     """Design the filters of a case and reckon the exact values of its errors."""
@@ -64,7 +70,7 @@ def prepare(case: Case) -> Plan:
     wanted = manoeuvres.answered(spec, choices(spec))
     size = max(choice.size for choice in wanted)
     F, K, C = len(wanted), len(seen.t), seen.truth.shape[1]
-    shared = spec.frame == "polar" and (seen.certain >= 0).all() and not manoeuvres.manoeuvring(spec)
+    shared = spec.frame == "polar" and (seen.certain >= 0).all() and not spec.manoeuvring
     if shared:
         came, probability = np.maximum(seen.certain, 0)[None], np.ones(1)
     else:
@@ -81,7 +87,7 @@ def prepare(case: Case) -> Plan:
         **(manoeuvres.shapes(watched, F) if watched else {}),
     )
     made = axes(spec, seen, wanted, exact_values(seen, designs, probability, size), bank.known if shared else None)
-    if manoeuvres.manoeuvring(spec):
+    if spec.manoeuvring:
         made.extra.update(manoeuvres.told(watched, came, probability))
     return Plan(
         layout=layout,
@@ -97,7 +103,7 @@ def prepare(case: Case) -> Plan:
 
 def _designs(choice: banks.Choice, seen: Scene, came: np.ndarray) -> list[banks.Made]:
     """The designs of a filter by coordinate for all patterns of plots; none where gains depend on the plots' values."""
-    if not len(came) or choice.kind in banks.ANSWERING:
+    if not len(came) or choice.kind in ANSWERING:
         return []
     return [banks.made(choice, c, plots_of(seen, c, came)) for c in range(len(seen.nominal))]
 
