@@ -47,7 +47,7 @@ def test_run_writes_what_the_contract_lists(done):
     assert {"run.json", "curves.csv", "gains.csv", "report.html"} | {f"figures/{name}" for name in drawn} <= names
     assert (folder / "curves.csv").read_text().split("\n", 1)[0] == CURVES
     assert (folder / "gains.csv").read_text().split("\n", 1)[0] == GAINS
-    assert {path.name for path in done.iterdir()} == {"rls2", ".blocks"}
+    assert {path.name for path in done.iterdir()} == {"rls2", ".blocks", "index.html"}
 
 
 def test_run_json_tells_where_the_numbers_come_from(done):

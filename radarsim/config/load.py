@@ -35,6 +35,18 @@ def load(source: str | os.PathLike | Mapping, overrides: Iterable[str] = ()) -> 
     return experiment
 
 
+def as_yaml(value: Mapping) -> str:
+    """Plain data as YAML text, keys in their order, short lists in one line."""
+    return yaml.dump(value, Dumper=_Plain, sort_keys=False, allow_unicode=True, width=110, default_flow_style=None)
+
+
+class _Plain(yaml.SafeDumper):
+    """Writes what is equal twice over, never as an alias, which this reader would refuse."""
+
+    def ignore_aliases(self, data):
+        return True
+
+
 def schema_json() -> str:
     """JSON Schema of the YAML, as text."""
     from radarsim.config import json_schema  # here, because a run has no use for it

@@ -103,7 +103,9 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
     )
     x = Axis(WINDOW, "log")
     whole = Panel(x, Axis("locked", limits=(0, 1.02)), tuple(marks), direct=False, legend="center left")
-    upper = Panel(x, Axis("locked", limits=(0.85, 1.003)), tuple(replace(m, label="") for m in marks), direct=False)
+    upper = Panel(
+        x, Axis("locked", limits=(0.85, 1.003)), tuple(replace(m, label="", name=m.label) for m in marks), direct=False
+    )
     return Figure("locks", "Locked bursts against the window", caption, (whole, upper), 2, PAGE_MM, 80.0)
 
 

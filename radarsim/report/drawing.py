@@ -41,7 +41,8 @@ class Line:
     """A series y (n,) over x (n,), with its 95 % band lo … hi and its exact values (small crosses) where known.
 
     The label is written at the line's end where labels fit, else into a legend. dash None leaves markers alone
-    (scatter), with whiskers for lo … hi.
+    (scatter), with whiskers for lo … hi. name says which line it is where the label leaves that to keys or to another
+    panel.
     """
 
     x: np.ndarray
@@ -51,6 +52,7 @@ class Line:
     lo: np.ndarray | None = None
     hi: np.ndarray | None = None
     exact: np.ndarray | None = None
+    name: str = ""
 
 
 @dataclass(frozen=True)

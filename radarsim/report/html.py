@@ -1,53 +1,72 @@
 """report.html: one self-contained page of an experiment; the template escapes all text from configs and tables."""
 
+import base64
+import hashlib
+import json
 import math
-import re
 import shlex
 from collections.abc import Mapping, Sequence
 from functools import cache
+from importlib import resources
 
-from radarsim.engine.results import CaseResult
-from radarsim.report import provenance
-from radarsim.report.drawing import Figure
+from radarsim.config.load import as_yaml
+from radarsim.report import asked, chart, provenance
+from radarsim.report.chart_text import spoken
+from radarsim.report.drawing import Figure, Line
 
 NOT_SETTLED = "not settled in the run"
-ROWS = 300  # of a table shown in the page
+ROWS = 200  # of a table shown in the page
+MOST_POINTS = 16_000  # of all curves of a page together, which keeps it small
+LEAST_POINTS = 60  # of one curve, however many there are
+MOST_CASES = 12  # written out as YAML
 SHOWN_FACTS = ("threads", "seconds", "kernel_seconds", "realisations_computed", "realisations_from_store")
 
 
 def page(
     experiment,
-    results: Sequence[CaseResult],
     made: Mapping,
-    drawn: Mapping[str, tuple[Figure, str]],
+    figures: Sequence[Figure],
     record: Mapping,
     answer: Sequence[str],
     question: str,
+    *,
     inputs=None,
+    agreement=None,
 ) -> str:
-    """The page of an experiment: question, answer, inputs (a table, or None), figures, tables, claims, provenance.
+    """The page of an experiment: question, answer, what was asked, figures, claims, exact values, tables, provenance.
 
-    drawn gives the figures and their SVG by name (none with --no-figures); record is run.json's.
+    figures are described ones (none with --no-figures); record is run.json's; inputs and agreement tables, or None.
     """
     claims = _claims(made["claims"])
     counts: dict[str, int] = {}
     for claim in claims:
         counts[claim["overall"]] = counts.get(claim["overall"], 0) + 1
-    return _template().render(
+    return whole(
+        "report.html.j2",
         experiment=experiment,
         question=question,
         answer=answer,
         inputs=None if inputs is None else _table("inputs", inputs),
+        asked=[_table(title, table) for title, table in asked.asked(experiment.cases).items()],
+        agreement=None if agreement is None else _table("exact against Monte-Carlo", agreement),
+        yaml=yaml_of(record["resolved"]),
         record=record,
         extent=provenance.extent(record),
         claims=claims,
         verdicts=list(counts.items()),
-        figures=[_figure(figure, svg) for figure, svg in drawn.values()],
+        figures=_figures(figures),
         tables=[_table(name, table) for name, table in made.items() if name != "claims" and len(table)],
         facts=[(name.replace("_", " "), number(record[name])) for name in SHOWN_FACTS if name in record],
         command=command(experiment, record),
-        resolved=provenance.to_json(record["resolved"]).decode(),
     )
+
+
+def yaml_of(resolved: Mapping) -> str:
+    """The resolved experiment as YAML; of very many cases the first."""
+    cases = resolved["cases"]
+    text = as_yaml({**resolved, "cases": cases[:MOST_CASES]})
+    left = len(cases) - MOST_CASES
+    return text + (f"# {left} further cases stand in run.json\n" if left > 0 else "")
 
 
 def command(experiment, record: Mapping) -> str:
@@ -73,14 +92,14 @@ def number(value: object) -> str:
 
 
 @cache
-def _template():
+def _template(name: str):
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     loader = PackageLoader("radarsim.report")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     own = {"number": number, "thousands": lambda n: f"{n:,}", "css": _css, "kept": kept, "measured": _measured}
     environment.filters |= own
-    return environment.get_template("report.html.j2")
+    return environment.get_template(name)
 
 
 def kept(text: object) -> str:
@@ -124,23 +143,39 @@ def _table(name: str, table) -> dict:
     return {"name": name, "columns": columns, "rows": cells, "count": len(table), "cut": len(table) > ROWS}
 
 
-def _figure(figure: Figure, svg: str) -> dict:
-    return {"name": figure.name, "title": figure.title, "caption": figure.caption, "svg": inline(svg, figure)}
-
-
-def inline(svg: str, figure: Figure):
-    """An SVG for the page: without prologue, its ids apart from other figures', named for those who cannot see it.
-
-    Marked safe: it is Matplotlib's own output, which escapes all text; title and caption are escaped here.
-    """
+def _figures(figures: Sequence[Figure]) -> list[dict]:
+    """The figures as charts; where there are many curves, each is drawn of fewer points."""
     from markupsafe import Markup
 
-    body = svg[svg.index("<svg") :]
-    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
-    body = re.sub(r'\bid="', f'id="{figure.name}-', body)
-    body = re.sub(r'(href="#|url\(#)', rf"\1{figure.name}-", body)
-    body = re.sub(r'\bd="[^"]*"', lambda path: re.sub(r"(\d\.\d\d)\d+", r"\1", path[0]), body)  # hundredths of a point
-    width = 0.36 * figure.width_mm
-    look = f"max-width: {width:.0f}rem; min-width: {min(width, 18) if width < 50 else 36:.0f}rem"
-    named = Markup('<svg role="img" aria-label="{}" style="{}" ').format(f"{figure.title}. {figure.caption}", look)
-    return named + Markup(body[len("<svg ") :])
+    lines = sum(isinstance(mark, Line) for figure in figures for panel in figure.panels for mark in panel.marks)
+    points = max(LEAST_POINTS, min(chart.POINTS, MOST_POINTS // max(1, lines)))
+    made = []
+    for figure in figures:
+        drawn = chart.chart(figure, points)
+        data = json.dumps([panel.data for panel in drawn.panels], ensure_ascii=False, separators=(",", ":"))
+        safe = Markup(data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+        named = {"name": figure.name, "title": spoken(figure.title), "caption": spoken(figure.caption)}
+        made.append({**named, "chart": drawn, "data": safe})
+    return made
+
+
+@cache
+def script() -> tuple[str, str]:
+    """The page's script, and its hash as the page's policy names it: no other script runs."""
+    text = _file("script.js")
+    return text, "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+
+@cache
+def _file(name: str) -> str:
+    return resources.files("radarsim.report").joinpath("templates", name).read_text(encoding="utf-8")
+
+
+def whole(template: str, **words) -> str:
+    """A page from a template, with the style and the script that all pages share."""
+    from markupsafe import Markup
+
+    text, digest = script()
+    return _template(template).render(
+        style=Markup(_file("style.css")), script=Markup(text), script_hash=digest, **words
+    )

@@ -187,7 +187,7 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
 
 def _unnamed(lines: Sequence) -> list:
     """The same marks without a legend of their own."""
-    return [replace(line, label="") if isinstance(line, Line) else line for line in lines]
+    return [replace(line, label="", name=line.name or line.label) if isinstance(line, Line) else line for line in lines]
 
 
 def consistency(results: Sequence[CaseResult], table) -> Figure | None:

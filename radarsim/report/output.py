@@ -1,7 +1,8 @@
 """From finished cases to files: tables, figures, claims, run.json and report.html of one experiment.
 
-A study adds to this by report/<study>.py (`tables`, `figures`, `question`, `answer`, and `inputs` where it has a table
-of them) and report/claims/<study>.py, both found by the study's name.
+A study adds to this by report/<study>.py (`tables`, `figures`, `question`, `answer`, `inputs` where it has a table of
+them, and EXACT = False where its exact_sigma is a bound and not the error of its filters) and report/claims/<study>.py,
+both found by the study's name.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import claims, files, notes, provenance
+from radarsim.report import agreement, claims, files, notes, provenance
 from radarsim.report import tables as common
 from radarsim.report.drawing import Figure
 
@@ -63,30 +64,38 @@ def write(
     *,
     draw: bool = True,
     made: Mapping | None = None,
+    formats: Sequence[str] = ("svg", "png"),
 ) -> Written:
     """Write all of an experiment's outputs into folder; every file at once, none half.
 
-    run holds the facts of the run for run.json: see provenance.record; made the tables, where they are at hand. Outputs
-    of an earlier run that this one does not write (figures without `draw`) are removed, so that nothing stale stands
-    beside new numbers; nothing else is.
+    run holds the facts of the run for run.json: see provenance.record; made the tables, where they are at hand; formats
+    those of the figures' files. Outputs of an earlier run that this one does not write (figures without `draw`) are
+    removed, so that nothing stale stands beside new numbers; nothing else is.
     """
     from radarsim.report import html
 
     made = tables(results) if made is None else made
     contents = {f"{name}.csv": common.to_csv(table) for name, table in made.items() if len(table) or name in ALWAYS}
-    drawn = {}
+    described = figures(results, made, experiment) if draw else {}
     if draw:
         from radarsim.report import figures as drawing  # Matplotlib
 
-        for name, figure in figures(results, made, experiment).items():
-            saved = drawing.save(figure)
-            drawn[name] = (figure, saved["svg"].decode())
-            contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
-    answer = tuple(study(experiment.study).answer(results, made))
+        for name, figure in described.items():
+            contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.save(figure, formats).items()}
+    own = study(experiment.study)
+    answer = tuple(own.answer(results, made))
     record = provenance.record(experiment, results, run, contents, answer)
-    question = study(experiment.study).question(experiment)
-    inputs = getattr(study(experiment.study), "inputs", lambda results: None)(results)
-    contents["report.html"] = html.page(experiment, results, made, drawn, record, answer, question, inputs).encode()
+    page = html.page(
+        experiment,
+        made,
+        list(described.values()),
+        record,
+        answer,
+        own.question(experiment),
+        inputs=getattr(own, "inputs", lambda results: None)(results),
+        agreement=agreement.agreement(made["curves"]) if getattr(own, "EXACT", True) else None,
+    )
+    contents["report.html"] = page.encode()
     contents["run.json"] = provenance.to_json(provenance.with_output(record, "report.html", contents["report.html"]))
     files.replace_all(folder, contents, stale=provenance.outputs(folder))
     return Written(folder, tuple(sorted(contents)), made, answer)

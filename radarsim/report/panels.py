@@ -151,7 +151,8 @@ def _sigma_panel(members: Sequence[CaseResult], curves: Mapping, component: str,
             unit = rows["unit"].iloc[0]
             style = look(filters.index(f), i, len(members))
             words = number(result.swept[0][1], result.swept[0][0] in POWERS) if one_key else swept(result)
-            marks.append(_sigma_line(rows, literal(f) if len(members) == 1 else words, style))
+            name = literal(f) if len(members) == 1 else f"{literal(f)}, {swept(result)}"
+            marks.append(_sigma_line(rows, literal(f) if len(members) == 1 else words, style, name))
     y = Axis(with_unit(f"$\\sigma$ of {of.symbol}", unit), limits=(0, None))
     panel = Panel(Axis(TIME, limits=(0, None)), y, tuple(marks), device(members[0]))
     if len(members) == 1:
@@ -171,12 +172,12 @@ def _by_colour(panel: Panel, dashes: tuple, key: str) -> Panel:
     return replace(panel, marks=marks, keys=(*shades.items(), *dashes), key_title=title, legend="right")
 
 
-def _sigma_line(rows, words: str, style: Style) -> Line:
+def _sigma_line(rows, words: str, style: Style, name: str) -> Line:
     values = {
         name: rows[name].to_numpy(dtype=float) for name in ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")
     }
     exact = values["exact_sigma"] if np.isfinite(values["exact_sigma"]).any() else None
-    return Line(values["t_s"], values["sigma"], words, style, values["sigma_lo"], values["sigma_hi"], exact)
+    return Line(values["t_s"], values["sigma"], words, style, values["sigma_lo"], values["sigma_hi"], exact, name)
 
 
 def look(nth_filter: int, nth_case: int, cases: int) -> Style:
@@ -271,11 +272,12 @@ def dynamic_figure(
 
 def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Quantity) -> Panel:
     marks: list[Mark] = [Reference(0)]
-    for n, (_, rows) in enumerate(found):
+    for n, (f, rows) in enumerate(found):
         t, unit = rows["t_s"].to_numpy(), rows["unit"].iloc[0]
         bias, half = rows["bias"].to_numpy(), Z95 * rows["bias_se"].to_numpy()
-        marks.append(Line(t, bias, "", Style(n, 0, n), bias - half, bias + half))
-        marks.append(Line(t, rows["spread"].to_numpy(), "", Style(n, 1, n)))
+        name = literal(f)
+        marks.append(Line(t, bias, "", Style(n, 0, n), bias - half, bias + half, name=f"{name}: bias"))
+        marks.append(Line(t, rows["spread"].to_numpy(), "", Style(n, 1, n), name=f"{name}: spread"))
     keys = [(literal(f), Style(n, None, n)) for n, (f, _) in enumerate(found)]
     keys += [("bias", Style(0, 0)), ("spread", Style(0, 1))]
     title = ", ".join(number(value, key in POWERS) for key, value in result.swept) or device(result)

@@ -103,9 +103,10 @@ def _settling_panel(result: CaseResult, rows) -> Panel:
     for n, name in enumerate(result.axes.filters):
         own = settled[settled["filter"] == name].sort_values("manoeuvre_variance")
         best, style = own[own["best"]], Style(n, n, n)
-        marks.append(Line(own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy(), "", style))
-        star = Style(n, None, 7, size_pt=8)
-        marks.append(Line(best["settling_s"].to_numpy(), best["steady_sigma"].to_numpy(), "", star))
+        words, star = panels.literal(name), Style(n, None, 7, size_pt=8)
+        marks.append(Line(own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy(), "", style, name=words))
+        x, y = (best[key].to_numpy() for key in ("settling_s", "steady_sigma"))
+        marks.append(Line(x, y, "", star, name=f"{words}: best $D_M$"))
         keys.append((panels.literal(name), style))
     longest = max([limit, *settled["settling_s"]])
     x = Axis("settling time of $\\sigma$ of $r$, s", limits=(-0.04 * longest, 1.15 * longest))

@@ -1,0 +1,90 @@
+"""What was asked, in words: every key of the cases with its value and what the schema says of it."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from radarsim.config.fields import Model
+from radarsim.report import tables as common
+
+COLUMNS = ("key", "value", "meaning")
+MOST_ENTRIES = 12  # of a list told one by one
+MOST_CASES = 40  # told row by row
+
+
+def asked(cases: Sequence) -> dict:
+    """Tables of words by their title: what all cases share, and where there are several, in what they differ."""
+    told = {case.name: {key: (value, about) for key, value, about in described(case.spec)} for case in cases}
+    first = told[cases[0].name]
+    shared = [
+        (key, value, about)
+        for key, (value, about) in first.items()
+        if all(key in other and other[key][0] == value for other in told.values())
+    ]
+    counted = [("realisations", f"{n:,}", "independent runs") for n in sorted({case.realisations for case in cases})]
+    counted += [("seed", str(s), "of the noise") for s in sorted({case.seed for case in cases})]
+    title = "Every key with its value and meaning" if len(cases) == 1 else f"What all {len(cases)} cases share"
+    made = {title: _frame(COLUMNS, [*shared, *(counted if len(counted) == 2 else [])])}
+    if len(cases) > 1:
+        same = {key for key, _, _ in shared}
+        keys = list(dict.fromkeys(key for of in told.values() for key in of if key not in same))
+        rows = [
+            (case.name, *(told[case.name].get(key, ("–", ""))[0] for key in keys), f"{case.realisations:,}", case.seed)
+            for case in cases[:MOST_CASES]
+        ]
+        left = len(cases) - len(rows)
+        title = "In what the cases differ" + (f" (first {MOST_CASES}; {left} more in run.json)" if left else "")
+        made[title] = _frame(("case", *keys, "realisations", "seed"), rows)
+    return made
+
+
+def _frame(columns: Sequence[str], rows: Sequence[tuple]):
+    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(columns)})
+
+
+def described(model: Model, before: str = "") -> Iterator[tuple[str, str, str]]:
+    """Key, value and meaning of every field that a checked model holds, in the order of its schema."""
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        about = " ".join((field.description or "").split())
+        if isinstance(value, Model):
+            yield from described(value, f"{before}{name}.")
+        elif _models(value):
+            for i, one in enumerate(value[:MOST_ENTRIES]):
+                yield f"{before}{name}.{i}", "; ".join(_pairs(one)), about if i == 0 else ""
+            if len(value) > MOST_ENTRIES:
+                yield f"{before}{name}", f"{len(value) - MOST_ENTRIES} more", ""
+        elif value is not None and value != ():
+            yield f"{before}{name}", said(name, value), about
+
+
+def _models(value) -> bool:
+    return isinstance(value, tuple | list) and bool(value) and all(isinstance(one, Model) for one in value)
+
+
+def _pairs(model: Model) -> Iterator[str]:
+    """A short "key value" for each field that is set."""
+    for name in type(model).model_fields:
+        value = getattr(model, name)
+        if isinstance(value, Model):
+            yield f"{name}: {', '.join(_pairs(value))}"
+        elif _models(value):
+            yield f"{name}: {' | '.join(', '.join(_pairs(one)) for one in value)}"
+        elif value is not None and value != ():
+            yield f"{name} {said(name, value)}"
+
+
+def said(name: str, value) -> str:
+    """A value in words: angles in degrees too, lists with commas."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        text = f"{value:.6g}".replace("-", "−")
+        degrees = {"_rad": "°", "_radps": "°/s"}.get(name[name.rfind("_") :]) if "_" in name else None
+        return f"{text} ({math.degrees(value):.6g}{degrees})".replace("-", "−") if degrees and value else text
+    if isinstance(value, tuple | list):
+        return ", ".join(
+            said(name, one) if not isinstance(one, tuple | list) else f"[{said(name, one)}]" for one in value
+        )
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key}: {said(str(key), one)}" for key, one in value.items())
+    return str(value)

@@ -1,0 +1,98 @@
+"""Axes of a page's charts: from values to places, limits and ticks."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from radarsim.report.drawing import Axis
+
+MARGIN = {"x": 0.02, "y": 0.06}  # of the span of the data, on either side
+STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+MOST_DECADES = 7  # labelled on a logarithmic axis
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A linear or logarithmic axis from `low` to `high` over the places `start` to `end`."""
+
+    log: bool
+    low: float
+    high: float
+    start: float
+    end: float
+
+    def place(self, values) -> np.ndarray:
+        """Places of values; not-a-number where a value has none."""
+        v = np.asarray(values, dtype=float)
+        low, high = self.low, self.high
+        if self.log:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                v = np.log10(np.where(v > 0, v, np.nan))
+            low, high = math.log10(low), math.log10(high)
+        return self.start + (self.end - self.start) * (v - low) / (high - low)
+
+    def ticks(self, wanted: int) -> list[tuple[float, str]]:
+        """About `wanted` round values inside the axis, with their words."""
+        if self.log and self.high / self.low >= 10:
+            return decades(self.low, self.high)
+        return [(v, words(v)) for v in steps(self.low, self.high, wanted)]
+
+
+def scale(axis: Axis, values: Sequence[np.ndarray], which: str, start: float, end: float) -> Scale:
+    """The scale of an axis for the data of its panel: limits where given, else the data with a margin."""
+    log = axis.scale == "log"
+    parts = [np.ravel(np.asarray(v, dtype=float)) for v in values]
+    v = np.concatenate(parts) if parts else np.zeros(0)
+    v = v[np.isfinite(v) & ((v > 0) | (not log))]
+    low, high = (float(v.min()), float(v.max())) if v.size else ((1.0, 10.0) if log else (0.0, 1.0))
+    a, b = (math.log10(low), math.log10(high)) if log else (low, high)
+    pad = MARGIN[which] * (b - a)
+    if pad == 0:
+        pad = 0.5 if log else 0.5 * abs(a) or 0.5
+    a, b = a - pad, b + pad
+    low, high = (10.0**a, 10.0**b) if log else (a, b)
+    given = axis.limits
+    low, high = low if given[0] is None else given[0], high if given[1] is None else given[1]
+    if not low < high:
+        high = low + 1.0 if not log else 10.0 * low
+    return Scale(log, low, high, start, end)
+
+
+def steps(low: float, high: float, wanted: int) -> list[float]:
+    """Multiples of a round step between low and high."""
+    rough = (high - low) / max(wanted, 1)
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(s for s in STEPS if s * power >= rough * (1 - 1e-9)) * power
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [n * step for n in range(first, last + 1)]
+
+
+def decades(low: float, high: float) -> list[tuple[float, str]]:
+    """Powers of ten, and of few of them 2 and 5 times as well."""
+    first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
+    stride = max(1, -(-(last - first + 1) // MOST_DECADES))
+    ticks = [(10.0**n, power(n)) for n in range(first, last + 1, stride)]
+    if len(ticks) > 3:
+        return ticks
+    fine = [m * 10.0**n for n in range(first - 1, last + 1) for m in (2, 5) if low <= m * 10.0**n <= high]
+    return sorted([*ticks, *((v, words(v)) for v in fine)])
+
+
+def power(n: int) -> str:
+    """10ⁿ in figures where short."""
+    if -3 <= n <= 4:
+        return words(10.0**n)
+    return "10" + str(n).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def words(value: float) -> str:
+    """A tick's number: at most six digits, a true minus, powers of ten raised."""
+    text = f"{value:.6g}"
+    text = "0" if float(text) == 0 else text
+    mantissa, e, exponent = text.partition("e")
+    if e:
+        raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        text = f"{mantissa}·10{raised}" if mantissa not in ("1", "-1") else mantissa.replace("1", "10") + raised
+    return text.replace("-", "−")

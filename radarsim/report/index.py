@@ -1,0 +1,55 @@
+"""results/index.html: all runs of a folder, newest first, each with its answer in one line."""
+
+import csv
+import json
+from collections import Counter
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from urllib.parse import quote
+
+from radarsim.report import files, html, provenance
+
+NAME = "index.html"
+
+
+def write(out: Path) -> None:
+    """Write the index of the runs under out; raises StoreError. Runs whose run.json cannot be read are left out."""
+    runs = sorted(filter(None, map(_run, Path(out).glob("*/run.json"))), key=lambda run: run["finished"], reverse=True)
+    page = html.whole("index.html.j2", runs=runs, version=provenance.versions()["radarsim"])
+    files.replace_all(Path(out), {NAME: page.encode()})
+
+
+def _run(path: Path) -> dict | None:
+    """A row of the index, from a run.json and the claims.csv beside it."""
+    try:
+        record = json.loads(path.read_bytes())
+        answer = [str(line) for line in record["answer"]]
+        made = {
+            "name": path.parent.name,
+            "address": f"{quote(path.parent.name)}/report.html",
+            "answer": answer[0] if answer else "",
+            "study": str(record["study"]),
+            "realisations": provenance.span(sorted({int(case["done"]) for case in record["cases"].values()})),
+            "finished": _finished(record, path),
+        }
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        return None
+    return made | {"claims": _claims(path.parent / "claims.csv")}
+
+
+def _finished(record: Mapping, path: Path) -> str:
+    """When the run ended, UTC, to the second: as run.json says, else when that was written."""
+    told = record.get("finished")
+    when = datetime.fromisoformat(told) if told else datetime.fromtimestamp(path.stat().st_mtime, UTC)
+    return when.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+
+
+def _claims(path: Path) -> str:
+    """How many claims of a table came out how; nothing where there is none."""
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            overall = {row["claim"]: row["overall"] for row in csv.DictReader(file)}
+    except (OSError, ValueError, LookupError, csv.Error):
+        return ""
+    return ", ".join(f"{count} {verdict}" for verdict, count in Counter(overall.values()).items())

@@ -1,0 +1,210 @@
+"""report.html in Chromium: it loads offline without a word in the console; sorting, hovering, switching work."""
+
+import re
+
+import pytest
+
+pytestmark = pytest.mark.slow
+LARGEST = 1_500_000  # bytes
+SOONEST_S = 1.0
+THEMES = [False, True]
+
+# Text against what lies under it, by WCAG 2.2: whatever is below 4.5 : 1, or 3 : 1 where large.
+CONTRAST = """
+(() => {
+  const parse = (c) => (c.match(/[\\d.]+/g) || []).map(Number);
+  const light = ([r, g, b]) => [r, g, b].map((v) => v / 255)
+    .map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4))
+    .reduce((s, v, i) => s + v * [0.2126, 0.7152, 0.0722][i], 0);
+  const under = (e) => {
+    for (let n = e; n; n = n.parentElement) {
+      const c = parse(getComputedStyle(n).backgroundColor);
+      if (c.length === 3 || c[3] > 0) return c;
+    }
+    return parse(getComputedStyle(document.body).backgroundColor);
+  };
+  const bad = [];
+  for (const e of document.querySelectorAll("body *")) {
+    const own = [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim());
+    if (!own || !e.checkVisibility() || ["SCRIPT", "STYLE"].includes(e.tagName)) continue;
+    const style = getComputedStyle(e);
+    const ink = parse(e.closest("svg") ? style.fill : style.color);
+    const [a, b] = [light(ink), light(under(e))].sort((x, y) => y - x);
+    const ratio = (a + 0.05) / (b + 0.05);
+    const large = parseFloat(style.fontSize) >= 24;
+    if (ratio < (large ? 3 : 4.5)) bad.push([e.tagName, e.textContent.slice(0, 30), ratio]);
+  }
+  return bad;
+})()
+"""
+
+# Everything that can be used has a name; every picture has words; names are not used twice; headings do not skip.
+NAMES = """
+(() => {
+  const bad = [];
+  const name = (e) => (e.getAttribute("aria-label") || e.textContent || "").trim();
+  for (const e of document.querySelectorAll("button, a, [tabindex], [role=img], summary")) {
+    if (!name(e)) bad.push(e.outerHTML.slice(0, 80));
+  }
+  for (const e of document.querySelectorAll("svg")) {
+    if (e.closest("svg.chart")) continue;
+    if (!e.hasAttribute("aria-hidden") && !e.getAttribute("aria-label")) bad.push(e.outerHTML.slice(0, 80));
+  }
+  const ids = [...document.querySelectorAll("[id]")].map((e) => e.id);
+  if (new Set(ids).size !== ids.length) bad.push("ids used twice");
+  for (const a of document.querySelectorAll("a[href^='#']")) {
+    if (!document.getElementById(a.hash.slice(1))) bad.push(a.hash);
+  }
+  let last = 1;
+  for (const h of document.querySelectorAll("h1, h2, h3, h4")) {
+    const level = Number(h.tagName[1]);
+    if (level > last + 1) bad.push(`heading ${h.textContent} skips a level`);
+    last = level;
+  }
+  for (const t of document.querySelectorAll("th")) if (!t.scope) bad.push(`th without scope: ${t.textContent}`);
+  if (!document.documentElement.lang || !document.title) bad.push("no language or title");
+  return bad;
+})()
+"""
+
+
+@pytest.mark.parametrize("name", ["rls2", "range_doppler"])
+def test_loads_offline_in_under_a_second_without_a_complaint(page, results, name):
+    report = results / name / "report.html"
+    assert report.stat().st_size < LARGEST
+    times = []
+    for _ in range(5):
+        page.open(report)
+        assert page.complaints() == []
+        assert page.requested() == [report.resolve().as_uri()]
+        times.append(page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd") / 1000)
+    assert min(times) < SOONEST_S, times
+
+
+def first_panel(page):
+    """Middle of the plot of the first panel, and its width, in the window."""
+    x, y = page.place("svg.chart")
+    width = page.evaluate("document.querySelector('svg.chart').getBoundingClientRect().width")
+    return x, y, width
+
+
+def test_hovering_shows_the_value_and_its_interval(page, results):
+    page.open(results / "rls2" / "report.html")
+    x, y, width = first_panel(page)
+    page.move(x + 0.05 * width, y)
+    tip = page.evaluate("document.querySelector('figure .tip').innerText")
+    assert page.evaluate("!document.querySelector('figure .tip').hidden")
+    assert "time from the first plot, s: " in tip
+    at = float(re.search(r"s: ([\d.]+)", tip)[1])
+    rows = [row.split(",") for row in (results / "rls2" / "curves.csv").read_text().splitlines()[1:]]
+    for row in rows:
+        if row[2] == "r" and float(row[5]) == at:
+            told = re.search(
+                rf"^{re.escape(row[1])}: ([\d.]+) \[([\d.]+), ([\d.]+)\], exact ([\d.]+)$", tip, re.MULTILINE
+            )
+            assert [float(v) for v in told.groups()] == pytest.approx([float(row[i]) for i in (7, 8, 9, 13)], rel=1e-4)
+    page.move(5, 5)
+    assert page.evaluate("document.querySelector('figure .tip').hidden")
+
+
+def test_the_keyboard_reads_values_too(page, results):
+    page.open(results / "rls2" / "report.html")
+    page.evaluate("document.querySelector('svg.chart').focus()")
+    told = []
+    for _ in range(3):
+        page.key("ArrowRight")
+        told.append(page.evaluate("document.querySelector('figure .tip div').innerText"))
+    assert [text.split(": ")[1] for text in told] == ["0", "10", "20"]
+    page.key("Escape")
+    assert page.evaluate("document.querySelector('figure .tip').hidden")
+
+
+def test_curves_are_switched_off_and_on(page, results):
+    page.open(results / "rls2" / "report.html")
+    seen = "[...document.querySelectorAll('figure')[0].querySelectorAll('[data-g=\"0\"]')].map((e) => e.style.display)"
+    page.click(".switches button")
+    assert page.evaluate(f"[{seen}].flat().filter((d) => d === 'none').length") == 1
+    assert page.evaluate("document.querySelector('.switches button').getAttribute('aria-pressed')") == "false"
+    x, y, width = first_panel(page)
+    page.move(x + 0.05 * width, y)
+    tip = page.evaluate("document.querySelector('figure .tip').innerText")
+    assert "r+Vr: " in tip
+    assert not re.search(r"^r: ", tip, re.MULTILINE)
+    page.click(".switches button")
+    assert page.evaluate(f"{seen}.every((d) => d === '')")
+
+
+def test_tables_are_sorted_by_number_and_by_word_and_copied(page, results):
+    page.open(results / "rls2" / "report.html")
+
+    def column(n):
+        cells = f"[...document.querySelectorAll('#table-curves tbody tr')].map((r) => r.cells[{n}].textContent)"
+        return page.evaluate(cells)
+
+    names = page.evaluate("[...document.querySelectorAll('#table-curves th')].map((h) => h.textContent.trim())")
+    sigma = names.index("sigma")
+    before = column(sigma)
+    page.click(f"#table-curves th:nth-child({sigma + 1}) button")
+    rising = [float(text) for text in column(sigma)]
+    assert rising == sorted(rising)
+    assert sorted(before) == sorted(column(sigma))
+    page.click(f"#table-curves th:nth-child({sigma + 1}) button")
+    assert [float(text) for text in column(sigma)] == rising[::-1]
+    assert page.evaluate(f"document.querySelectorAll('#table-curves th')[{sigma}].ariaSort") == "descending"
+    page.click(f"#table-curves th:nth-child({names.index('component') + 1}) button")
+    words = column(names.index("component"))
+    assert words == sorted(words, key=str.lower)
+    page.call("Browser.grantPermissions", permissions=["clipboardReadWrite", "clipboardSanitizedWrite"])
+    page.click("button[data-of=table-curves]")
+    copied = page.evaluate("navigator.clipboard.readText()")
+    lines = copied.split("\n")
+    assert len(lines) == len(words) + 1
+    assert [cell.rstrip(" ↕↑↓") for cell in lines[0].split("\t")] == names
+
+
+@pytest.mark.parametrize("dark", THEMES)
+def test_the_theme_follows_the_system_until_switched(page, results, dark):
+    page.open(results / "rls2" / "report.html", dark=dark)
+    shade = "getComputedStyle(document.body).backgroundColor"
+    colours = ["rgb(255, 255, 255)", "rgb(15, 20, 25)"]
+    assert page.evaluate(shade) == colours[dark]
+    curve = "getComputedStyle(document.querySelector('svg.chart [data-g]')).color"
+    first = page.evaluate(curve)
+    page.click("#theme")
+    assert page.evaluate(shade) == colours[not dark]
+    assert page.evaluate(curve) != first
+
+
+@pytest.mark.parametrize("dark", THEMES)
+@pytest.mark.parametrize("name", ["rls2/report.html", "range_doppler/report.html", "index.html"])
+def test_names_and_contrast(page, results, name, dark):
+    page.open(results / name, dark=dark)
+    page.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true; })")
+    assert page.evaluate(NAMES) == []
+    assert page.evaluate(CONTRAST) == []
+
+
+@pytest.mark.parametrize("name", ["rls2/report.html", "range_doppler/report.html", "index.html"])
+def test_a_phone_reads_it_without_scrolling_sideways(page, results, name):
+    page.open(results / name, width=390, height=800)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    widths = page.evaluate("[...document.querySelectorAll('svg.chart')].map((s) => s.getBoundingClientRect().width)")
+    assert all(width / 440 * 13.5 >= 10 for width in widths)  # pixels of a chart's letters
+
+
+def test_it_prints_whole(page, results):
+    page.open(results / "rls2" / "report.html", media="print")
+    assert page.evaluate("getComputedStyle(document.querySelector('button.copy')).display") == "none"
+    assert page.evaluate("getComputedStyle(document.querySelector('.scroll')).maxHeight") == "none"
+    printed = page.call("Page.printToPDF")["data"]
+    assert len(printed) > 50_000
+
+
+def test_the_index_leads_to_every_run(page, results):
+    page.open(results / "index.html")
+    assert page.complaints() == []
+    names = page.evaluate("[...document.querySelectorAll('#runs td a')].map((a) => a.getAttribute('href'))")
+    assert names == ["range_doppler/report.html", "rls2/report.html"]  # newest first
+    page.click("#runs td a")
+    page.wait("Page.loadEventFired")
+    assert page.evaluate("document.title") == "range_doppler – radarsim"
