@@ -129,7 +129,7 @@ def test_page_is_whole_and_leads_nowhere(written):
     assert len(ids) == len(set(ids))
     assert text.count('class="chart"') == 8  # two panels in the last
     assert str(escape(written.answer[0])).replace(" %", "\u00a0%") in text
-    assert "C_θ" in text[text.index('id="inputs"') : text.index('id="figures"')]
+    assert "C_θ" in text[text.index('id="asked"') : text.index('id="figures"')]
     assert "(1 rows)" not in text
     assert re.search(r">sigma</th><th[^>]*>exact_sigma<", text)
     assert "watch out" in text
