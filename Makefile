@@ -6,7 +6,7 @@ RADARSIM := $(BIN)/radarsim
 # Smoke runs keep out of results/, which holds what was made at full size.
 SMOKE := $(VENV)/smoke
 
-.PHONY: run test slow lint smoke reproduce-figures bench schema known docs clean
+.PHONY: run test slow lint smoke reproduce-figures bench schema known docs docs-numbers docs-examples clean
 
 run: $(VENV)/installed
 	$(RADARSIM) run configs/rls2.yaml
@@ -43,6 +43,14 @@ known: $(VENV)/installed
 docs: $(VENV)/documented
 	$(BIN)/sphinx-build -q -n -W --keep-going -c docs -d docs/_build/doctrees . docs/_build/html
 	@echo "documentation: docs/_build/html/index.html"
+
+# The numbers between marks in the pages, from what reproduce-figures left.
+docs-numbers: $(VENV)/installed
+	PYTHONPATH=docs $(BIN)/python -m making.numbers results
+
+# What the commands in the pages' examples print.
+docs-examples: $(VENV)/installed
+	PYTHONPATH=docs $(BIN)/python -m making.examples README.md docs/*.md docs/howto/*.md
 
 clean:
 	rm -rf $(VENV) docs/_build build *.egg-info .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,166 @@
+"""Examples of a Markdown page, run in their order in one folder as a reader would.
+
+    ```yaml      beginning `# NAME.yaml`: that file; beginning `# in NAME.yaml`: the same keys of that file changed
+    ```console   lines `$ command`, each with what it prints; nothing below it: only that it ends well
+    ```python    run, with names kept to the end of the page
+    ```pycon     the same with `>>>` and what it gives
+
+A line of output that is `…` alone stands for any lines. `<!-- slow -->` on the line before a block leaves it to the
+slow tests. Other blocks (`text`, `sh`) are not run. `make docs-examples` writes what the commands print now into the
+pages.
+"""
+
+import doctest
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import chdir
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+BLOCK = re.compile(r"^(<!-- slow -->\n)?```(yaml|console|python|pycon)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+ANYTHING = "…"
+
+
+@dataclass(frozen=True)
+class Block:
+    """One example: its language, its text, the line of the page it begins on, and whether it takes long."""
+
+    language: str
+    text: str
+    line: int
+    slow: bool
+
+
+class Failed(Exception):
+    """An example that does not do what the page says."""
+
+
+def blocks(page: str) -> list[Block]:
+    """The examples of a page, in order."""
+    found = BLOCK.finditer(page)
+    return [Block(one[2], one[3], page[: one.start(3)].count("\n") + 1, bool(one[1])) for one in found]
+
+
+def run(page: str, folder: Path, slow: bool) -> Iterator[tuple[Block, str]]:
+    """Run a page's examples in a folder; each with its text as it would stand if written now."""
+    names: dict = {}
+    with chdir(folder):
+        for block in blocks(page):
+            if slow or not block.slow:
+                try:
+                    yield block, RUN[block.language](block.text, names)
+                except Failed as failure:
+                    raise Failed(f"line {block.line}: {failure}") from None
+
+
+def yaml(text: str, names: dict) -> str:
+    """Write the file that the first line names, or change the same keys in it."""
+    first, _, rest = text.partition("\n")
+    match re.fullmatch(r"# (in )?(\S+\.yaml)", first):
+        case None:
+            raise Failed(f"a yaml example begins `# NAME.yaml` or `# in NAME.yaml`, got {first!r}")
+        case found if found[1]:
+            file = Path(found[2])
+            file.write_text(changed(file.read_text(encoding="utf-8"), rest), encoding="utf-8")
+        case found:
+            Path(found[2]).write_text(text, encoding="utf-8")
+    return text
+
+
+def changed(config: str, lines: str) -> str:
+    """A config with the values of some lines `key: value`; lines without a value only say where these stand."""
+    for key, value in re.findall(r"^ *(\w+): *([^\s#].*?)(?: +#.*)?$", lines, re.MULTILINE):
+        config, count = re.subn(rf"(?m)^( *{key}: *)([^\s#]\S*)", lambda old, new=value: old[1] + new, config)
+        if count != 1:
+            raise Failed(f"{key} stands {count} times in the file")
+    return config
+
+
+def console(text: str, names: dict) -> str:
+    """Run the commands; the block with their present output. Failed where that is not what stands there."""
+    made = []
+    for entry in re.split(r"^(?=\$ )", text, flags=re.MULTILINE)[1:]:
+        command, said = re.fullmatch(r"\$ ((?:[^\n]*\\\n)*[^\n]*)\n?(.*)", entry, re.DOTALL).groups()
+        printed = output(command.replace("\\\n", ""))
+        made.append(entry if not said or agrees(said, printed) else f"$ {command}\n{shortened(printed, said)}")
+    return "".join(made)
+
+
+def output(command: str) -> str:
+    """What a command prints; radarsim's own in this process, which saves its start."""
+    if command.startswith("radarsim "):
+        import shlex
+
+        from click.testing import CliRunner
+
+        from radarsim.cli import main
+
+        result = CliRunner().invoke(main, shlex.split(command)[1:])
+        code, out, err = result.exit_code, result.stdout, result.stderr + (repr(result.exception) or "")
+    else:
+        done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+        code, out, err = done.returncode, done.stdout, done.stderr
+    if code:
+        raise Failed(f"`{command}` ends with {code}: {err}")
+    return "\n".join(line.rstrip() for line in out.rstrip("\n").split("\n")) + "\n"
+
+
+def agrees(said: str, printed: str) -> bool:
+    """Whether what was printed is what the page says, a line `…` standing for any lines."""
+    parts = [re.escape(part) for part in re.split(rf"^{ANYTHING}\n", said, flags=re.MULTILINE)]
+    return re.fullmatch(r"(?:.*\n)*?".join(parts), printed) is not None
+
+
+def shortened(printed: str, said: str) -> str:
+    """What was printed, cut where the page cuts it off after so many lines."""
+    lines = said.splitlines()
+    if lines[-1] != ANYTHING:
+        return printed
+    return "\n".join([*printed.splitlines()[: len(lines) - 1], ANYTHING]) + "\n"
+
+
+def python(text: str, names: dict) -> str:
+    """Run a piece of Python."""
+    exec(compile(text, "example", "exec"), names)
+    return text
+
+
+def pycon(text: str, names: dict) -> str:
+    """Run a session; Failed where something else comes out."""
+    test = doctest.DocTestParser().get_doctest(text, names, "example", None, 0)
+    said: list[str] = []
+    if (
+        doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
+        .run(test, out=said.append, clear_globs=False)
+        .failed
+    ):
+        raise Failed("".join(said))
+    names.update(test.globs)
+    return text
+
+
+RUN = {"yaml": yaml, "console": console, "python": python, "pycon": pycon}
+
+
+def rewritten(path: Path, folder: Path) -> bool:
+    """Write what the commands of a page print now into it; whether that changed anything."""
+    page = path.read_text(encoding="utf-8")
+    new = page
+    for block, text in run(page, folder, slow=True):
+        new = new.replace(block.text, text, 1)
+    path.write_text(new, encoding="utf-8")
+    return new != page
+
+
+if __name__ == "__main__":
+    import tempfile
+
+    os.environ.setdefault("COLUMNS", "110")
+    for name in sys.argv[1:]:
+        page = Path(name).resolve()
+        with tempfile.TemporaryDirectory() as scratch:
+            sys.stdout.write(f"{name}: {'changed' if rewritten(page, Path(scratch)) else 'as it was'}\n")

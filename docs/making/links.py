@@ -1,0 +1,40 @@
+"""Links between the repository's Markdown pages: files that must be there, headings that must stand in them."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+LINK = re.compile(r"(?<!!)\[(?:[^\[\]]|\[[^\]]*\])*\]\(([^)\s]+)\)|!\[[^\]]*\]\(([^)\s]+)\)")
+OUTSIDE = re.compile(r"[a-z]+:")
+
+
+def prose(page: str) -> str:
+    """A page without its code, where brackets mean nothing."""
+    return re.sub(r"`[^`\n]*`", "", re.sub(r"^```.*?^```$", "", page, flags=re.MULTILINE | re.DOTALL))
+
+
+def anchors(page: str) -> set[str]:
+    """What `#…` may name in a page, made of its headings as GitHub does."""
+    seen: Counter = Counter()
+    found = set()
+    for heading in re.findall(r"^#{1,6} +(.+?) *$", re.sub(r"^```.*?^```$", "", page, flags=re.M | re.S), re.MULTILINE):
+        words = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower()
+        slug = re.sub(r"[^\w\- ]", "", words).replace(" ", "-")
+        found.add(f"{slug}-{seen[slug]}" if seen[slug] else slug)
+        seen[slug] += 1
+    return found
+
+
+def broken(path: Path) -> Iterator[str]:
+    """Links of a page that lead nowhere, each with the reason."""
+    for found in LINK.finditer(prose(path.read_text(encoding="utf-8"))):
+        link = found[1] or found[2]
+        if OUTSIDE.match(link):
+            continue
+        file, _, anchor = link.partition("#")
+        target = (path.parent / file).resolve() if file else path
+        if not target.exists():
+            yield f"{link}: no such file"
+        elif anchor and anchor not in anchors(target.read_text(encoding="utf-8")):
+            yield f"{link}: no such heading"

@@ -1,0 +1,105 @@
+"""Numbers of docs/range_doppler.md."""
+
+import math
+
+from making.numbers import Results, with_bounds
+
+RADARS = ("rls1", "rls2", "rls3", "rls4", "rls5")
+COMPONENTS = {"r": "range", "Vr": "velocity", "ar": "acceleration"}
+
+
+def title(case: str) -> str:
+    """RLS 2 of the case rls2."""
+    return case.replace("rls", "RLS ")
+
+
+def gains(results: Results) -> list[tuple]:
+    """The largest and the last gain of each radar and component, with its interval."""
+    table = results.table("range_doppler", "gains")
+    ratio = results.table("range_doppler", "radar").set_index("case")["C_theta"]
+    heads = [head for name in COMPONENTS.values() for head in (f"{name}: best, %", "at 140 s, %")]
+    rows: list[tuple] = [("radar", "C_θ", *heads)]
+    for radar in RADARS:
+        cells = [title(radar), f"{ratio[radar]:.3g}"]
+        for component in COMPONENTS:
+            own = table[(table["case"] == radar) & (table["component"] == component)]
+            highest = own.loc[own["gain_percent"].idxmax()]
+            cells += [f"{bounded(highest)}, at {highest['t_s']:g} s", bounded(own.iloc[-1])]
+        rows.append(tuple(cells))
+    return rows
+
+
+def bounded(row) -> str:
+    """A gain with its interval."""
+    return with_bounds(row["gain_percent"], row["gain_lo"], row["gain_hi"])
+
+
+def best(results: Results) -> list[tuple]:
+    """The best manoeuvre variance of each radar and filter by the paper's rule, with steady σ and settling time."""
+    steady = results.table("manoeuvre_variance", "steady")
+    ranges = steady[steady["component"] == "r"]
+    rows = [("radar", "filter", "best D_M, (m/s³)²", "steady σ_r, m", "settled after, s")]
+    for radar in RADARS:
+        own = ranges[ranges["case"].str.startswith(f"{radar} ")]
+        for name in dict.fromkeys(own["filter"]):
+            for one in own[(own["filter"] == name) & own["best"]].itertuples():
+                settled = f"{one.settling_s:g}"
+                rows.append((title(radar), name, power(one.manoeuvre_variance), f"{one.steady_sigma:.1f}", settled))
+            if not own.loc[own["filter"] == name, "best"].any():
+                rows.append((title(radar), name, "none of those tried", "–", "–"))
+    return rows
+
+
+def power(value: float) -> str:
+    """A power of ten as print writes it."""
+    exponent = round(math.log10(value))
+    return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def exact_gain(radar: str, component: str, k: int):
+    """The exact gain of a radar at scan k, %."""
+
+    def made(results: Results) -> str:
+        table = results.table("range_doppler", "gains")
+        (row,) = table[(table["case"] == radar) & (table["component"] == component) & (table["k"] == k)].itertuples()
+        return f"{row.exact_percent:.1f} %"
+
+    return made
+
+
+def difference(which: str):
+    """The exact difference of σ_r between the filters of RLS 2: its `peak` with the time, or its `last` value."""
+
+    def made(results: Results) -> str:
+        table = results.table("range_doppler", "curves")
+        own = table[(table["case"] == "rls2") & (table["component"] == "r")]
+        sigma = own.pivot(index="t_s", columns="filter", values="exact_sigma")
+        apart = sigma["r"] - sigma["r+Vr"]
+        return f"{apart.max():.0f} m at {apart.idxmax():g} s" if which == "peak" else f"{apart.iloc[-1]:.0f} m"
+
+    return made
+
+
+def settling(radar: str):
+    """Scan periods in which the range of a radar settles with range alone at D_M = 10⁻³."""
+
+    def made(results: Results) -> str:
+        steady = results.table("range_doppler", "steady")
+        (row,) = steady[
+            (steady["case"] == radar) & (steady["filter"] == "r") & (steady["component"] == "r")
+        ].itertuples()
+        return f"{row.settling_periods:g}"
+
+    return made
+
+
+MEASURED = {
+    "range_doppler_gains": gains,
+    "range_doppler_best": best,
+    "rls2_first_velocity_gain": exact_gain("rls2", "Vr", 3),
+    "rls3_first_velocity_gain": exact_gain("rls3", "Vr", 3),
+    "rls2_difference_peak": difference("peak"),
+    "rls2_difference_last": difference("last"),
+    "rls3_settling": settling("rls3"),
+    "rls5_settling": settling("rls5"),
+}

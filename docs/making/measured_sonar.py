@@ -1,0 +1,124 @@
+"""Numbers of docs/sonar.md."""
+
+from collections.abc import Callable
+
+from making.numbers import Results, signed, with_bounds
+
+COURSES = {"straight": "steady", "fluctuating": "fluctuating, 0.05 m/s²", "turning": "75 s into a turn of 1°/s"}
+DETECTION = (1, 0.9, 0.7, 0.5)
+CORRELATIONS = (-0.5, 0, 0.3, 0.6, 0.9, 0.99)
+BEARINGS_DEG = (0.5, 1, 2, 4, 8)
+
+
+def rows(results: Results, stem: str, name: str, **wanted):
+    """The rows of a table with these values; `case` by its end."""
+    table = results.table(stem, name)
+    for column, value in wanted.items():
+        held = table[column]
+        table = table[held.str.endswith(value) if column == "case" else held == value]
+    return table
+
+
+def last(results: Results, stem: str, **wanted):
+    """The last scan of one filter's σ of the range."""
+    return rows(results, stem, "curves", component="r", **wanted).iloc[-1]
+
+
+def sigma(row) -> str:
+    """σ with its interval."""
+    return with_bounds(row["sigma"], row["sigma_lo"], row["sigma_hi"])
+
+
+def plots(results: Results) -> list[tuple]:
+    """What each further plot of a straight course buys, smoothed and a scan ahead, σ of a plot being 1."""
+    heads = ("plots", "smoothed", "formula", "bought, %", "one scan ahead", "formula", "bought, %")
+    made: list[tuple] = [heads]
+    for count in range(2, 9):
+        cells: list[str] = [str(count)]
+        for what in ("smoothed", "extrapolated"):
+            wanted = {"filter": "growing", "component": "r", "what": what, "plots": count}
+            row = rows(results, "sonar_smoothing", "plots", **wanted).iloc[0]
+            value = with_bounds(row["ratio"], row["ratio_lo"], row["ratio_hi"])
+            cells += [value, f"{row['formula']:.4f}", f"{row['bought_percent']:.1f}" if count > 2 else ""]
+        made.append(tuple(cells))
+    return made
+
+
+def courses(results: Results) -> list[tuple]:
+    """σ_r at the last of 40 scans of each filter on each course."""
+    shown = ("growing", "kalman q", "alpha-beta", "window 10", "window 5")
+    made: list[tuple] = [("course", *shown)]
+    for target, words in COURSES.items():
+        case = {"case": f"target=sonar_{target}"}
+        made.append((words, *(sigma(last(results, "sonar_fluctuating", filter=name, **case)) for name in shown)))
+    return made
+
+
+def missed(results: Results) -> list[tuple]:
+    """σ_r after 20 scans of which three gave no plot, by the probability that each of the others did."""
+    shown = ("growing", "kalman", "window 5", "growing 2")
+    made: list[tuple] = [("P_D", *shown)]
+    for probability in DETECTION:
+        case = {"case": f"probability={probability:g}"}
+        made.append(
+            (f"{probability:g}", *(sigma(last(results, "sonar_missed", filter=name, **case)) for name in shown))
+        )
+    return made
+
+
+def gap(name: str) -> Callable[[Results], str]:
+    """σ_r of a filter before and at the end of three scans missed in a row."""
+
+    def made(results: Results) -> str:
+        own = rows(results, "sonar_missed", "curves", case="probability=1", filter=name, component="r").set_index("k")
+        return f"{own.loc[7, 'sigma']:.1f} → {own.loc[10, 'sigma']:.1f} m"
+
+    return made
+
+
+def correlated(results: Results) -> list[tuple]:
+    """What ignoring the correlation of the errors costs after 20 plots, and what the filter then believes."""
+    heads = (
+        "ρ",
+        "σ_r of those that know, m",
+        "of those that do not, m",
+        "they believe, m",
+        "normalised error",
+        "calculated",
+    )
+    made: list[tuple] = [heads]
+    for rho in CORRELATIONS:
+        case = {"case": f"correlation={rho:g}"}
+        knows, ignores = (last(results, "sonar_correlated", filter=name, **case) for name in ("augmented", "naive"))
+        naive = {"filter": "naive", "component": "r", **case}
+        believed = rows(results, "sonar_correlated", "believed", **naive).iloc[-1]
+        error = rows(results, "sonar_correlated", "consistency", **naive).iloc[-1]
+        normalised = (with_bounds(error["nees"], error["nees_lo"], error["nees_hi"]), f"{error['exact_nees']:.2f}")
+        made.append(
+            (signed(f"{rho:g}"), sigma(knows), sigma(ignores), f"{believed['believed_sigma']:.2f}", *normalised)
+        )
+    return made
+
+
+def conversion(results: Results) -> list[tuple]:
+    """The bias of converted plots at 15 km, plain and unbiased."""
+    made: list[tuple] = [("σ_β", "plain, m", "by the formula, m", "unbiased, m")]
+    for degrees in BEARINGS_DEG:
+        plain, unbiased = (
+            rows(results, "sonar_conversion", "conversion", case=f"deg={degrees:g} frame={frame}").iloc[0]
+            for frame in ("cartesian", "cartesian_unbiased")
+        )
+        first, second = (with_bounds(row["bias_m"], row["bias_lo"], row["bias_hi"]) for row in (plain, unbiased))
+        made.append((f"{degrees:g}°", first, signed(f"{plain['formula_m']:.1f}"), second))
+    return made
+
+
+MEASURED = {
+    "sonar_plots": plots,
+    "sonar_courses": courses,
+    "sonar_missed": missed,
+    "sonar_gap_growing": gap("growing"),
+    "sonar_gap_window": gap("window 5"),
+    "sonar_correlated": correlated,
+    "sonar_conversion": conversion,
+}

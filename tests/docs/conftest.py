@@ -1,0 +1,17 @@
+"""The documentation's own tools, which live beside it."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "docs"))
+
+
+@pytest.fixture
+def without_drawing(monkeypatch):
+    """Runs that draw no figure but write its files: drawing is most of an example's time, and tested elsewhere."""
+    from radarsim.report import figures
+
+    monkeypatch.setattr(figures, "save", lambda figure, formats=("svg", "png"): dict.fromkeys(formats, b"<svg></svg>"))

@@ -1,0 +1,43 @@
+"""Every link in the repository's pages leads somewhere, and every page of docs/ is in the index."""
+
+import re
+from pathlib import Path
+
+import pytest
+from making import contents, links
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "benchmarks/README.md", ROOT / "results/README.md"]
+PAGES += [page for page in sorted((ROOT / "docs").rglob("*.md")) if "_build" not in page.parts]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page):
+    assert not list(links.broken(page))
+
+
+def test_wrong_links_are_seen(tmp_path):
+    (tmp_path / "a.md").write_text("# One\n\n## Two words, `code`\n\n## One\n")
+    page = tmp_path / "b.md"
+    page.write_text("[x](a.md#two-words-code) [x](a.md#one-1) [x](https://a.b) `[x](y)` [x](c.md) [`x`](a.md#three)\n")
+    assert list(links.broken(page)) == ["c.md: no such file", "a.md#three: no such heading"]
+
+
+def test_every_page_is_in_the_index():
+    index = (ROOT / "docs/README.md").read_text(encoding="utf-8")
+    listed = [page for _, pages in contents.sections(index) for page in pages]
+    there = {page.relative_to(ROOT).with_suffix("").as_posix() for page in PAGES} - {contents.INDEX}
+    assert sorted(listed) == sorted(there)
+
+
+def test_pages_that_are_named_without_a_link_exist():
+    """`docs/results.md` and the like in code font, in pages and docstrings."""
+    named = re.compile(r"\b(?:docs|configs|scenarios|benchmarks)/[\w/]+\.(?:md|json|yaml|py)\b")
+    files = PAGES
+    missing = {
+        (str(file.relative_to(ROOT)), name)
+        for file in files
+        for name in named.findall(file.read_text(encoding="utf-8"))
+        if not (ROOT / name).exists() and "NAME" not in name
+    }
+    assert not missing
