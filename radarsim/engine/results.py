@@ -51,6 +51,10 @@ class Track:
 
     t_s (n,); estimate and sigma (F, n, C), not-a-number where a filter has none, in the components' units; probability
     (F, n, M) of a filter's models, not-a-number beyond its own, or None where the study has no models.
+
+    What tells whether the stated accuracies fit, where a study gives it: residual (F, n, D), the plot less the
+    estimate, of the measured (name, unit); nis (F, n, Q), the squared innovation over its believed variance, of the
+    tested (name, degrees of freedom); not-a-number where there is no plot or no freedom.
     """
 
     filters: tuple[str, ...]
@@ -59,3 +63,7 @@ class Track:
     estimate: np.ndarray
     sigma: np.ndarray
     probability: np.ndarray | None = None
+    measured: tuple[tuple[str, str], ...] = ()
+    residual: np.ndarray | None = None
+    tested: tuple[tuple[str, int], ...] = ()
+    nis: np.ndarray | None = None
