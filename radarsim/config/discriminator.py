@@ -180,7 +180,9 @@ class Discriminator(Study):
         "demodulated: samples drawn and demodulated once; auto: block_sums where it is valid, else samples",
     )
     blocks_per_window: Annotated[whole(4, 1000) | None, Design()] = Field(
-        None, description="a block is a window over this; default 16, and 32 for demodulated"
+        None,
+        description="a block is a window over this; default: 20, or 24 where the Doppler frequency is near zero; "
+        "32 for demodulated",
     )
 
     @cross_check

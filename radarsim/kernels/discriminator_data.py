@@ -18,6 +18,7 @@ from radarsim.kernels.discriminator_scoring import (
     Z1,
     Z2,
     derivative,
+    number,
     polynomial,
     second_derivative,
     sincos_turns,
@@ -108,11 +109,12 @@ def demodulate(physics, edges, samples, x, first, last, sums):
 def demodulate_real(samples, place, count, time, step, centre, x, sums, i):
     """Adds the samples from column `place`, the first at `time`, to Z₀, Z₁, Z₂ of block i."""
     x0, x1, x2, x3, x4, x5 = x[0], x[1], x[2], x[3], x[4], x[5]
+    row = samples[0, place : place + count]  # an index that may be negative is not vectorised
     a = b = p = q = v = w = 0.0
     for m in range(count):
-        t = time + m * step
+        t = time + number(m) * step
         s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))
-        u, t = samples[0, place + m], t - centre
+        u, t = row[m], t - centre
         c, s = u * c, u * s
         a += c
         b += s
@@ -133,11 +135,12 @@ def demodulate_real(samples, place, count, time, step, centre, x, sums, i):
 def demodulate_complex(samples, place, count, time, step, centre, x, sums, i):
     """As `demodulate_real` for complex samples."""
     x0, x1, x2, x3, x4, x5 = x[0], x[1], x[2], x[3], x[4], x[5]
+    real, imaginary = samples[0, place : place + count], samples[1, place : place + count]
     a = b = p = q = v = w = 0.0
     for m in range(count):
-        t = time + m * step
+        t = time + number(m) * step
         s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))
-        re, im, t = samples[0, place + m], samples[1, place + m], t - centre
+        re, im, t = real[m], imaginary[m], t - centre
         c, s = re * c + im * s, im * c - re * s
         a += c
         b += s
@@ -160,7 +163,7 @@ def reference_image(count, time, step, centre, x, sums, i):
     x0, x1, x2, x3, x4, x5 = 2.0 * x[0], 2.0 * x[1], 2.0 * x[2], 2.0 * x[3], 2.0 * x[4], 2.0 * x[5]
     a = b = p = q = v = w = 0.0
     for m in range(count):
-        t = time + m * step
+        t = time + number(m) * step
         s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))
         a += c
         b += s

@@ -65,6 +65,12 @@ def sincos_turns(u):
 
 
 @inline
+def number(m):
+    """A whole number from 0 to 2**52 as float64: AVX2 has no such conversion, and a loop with one is half scalar."""
+    return np.int64(m + np.int64(0x4330000000000000)).view(np.float64) - 4503599627370496.0
+
+
+@inline
 def polynomial(b0, b1, b2, b3, b4, b5, t):
     return ((((b5 * t + b4) * t + b3) * t + b2) * t + b1) * t + b0
 
@@ -86,11 +92,12 @@ def score_samples(samples, first, pulses, step, offset, amplitude, state):
     Adds to state.out (8,): L, the coherent sum that is A/2 a sample at the truth, and the sums of ∂L/∂ψ τ^j, j = 0 … 5.
     """
     b0, b1, b2, b3, b4, b5 = state.b[0], state.b[1], state.b[2], state.b[3], state.b[4], state.b[5]
+    u = samples[0, first : first + pulses]  # an index that may be negative is not vectorised
     uc = cc = g0 = g1 = g2 = g3 = g4 = g5 = 0.0
     for m in range(pulses):
-        t = m * step + offset
+        t = number(m) * step + offset
         s, c = sincos_turns(polynomial(b0, b1, b2, b3, b4, b5, t))
-        y = samples[0, first + m]
+        y = u[m]
         uc += y * c
         cc += c * c
         e = s * (amplitude * c - y)
@@ -120,11 +127,12 @@ def score_samples(samples, first, pulses, step, offset, amplitude, state):
 def score_complex_samples(samples, first, pulses, step, offset, state):
     """As `score_samples` for complex samples, the imaginary parts in row 1."""
     b0, b1, b2, b3, b4, b5 = state.b[0], state.b[1], state.b[2], state.b[3], state.b[4], state.b[5]
+    u, v = samples[0, first : first + pulses], samples[1, first : first + pulses]
     uc = g0 = g1 = g2 = g3 = g4 = g5 = 0.0
     for m in range(pulses):
-        t = m * step + offset
+        t = number(m) * step + offset
         s, c = sincos_turns(polynomial(b0, b1, b2, b3, b4, b5, t))
-        x, y = samples[0, first + m], samples[1, first + m]
+        x, y = u[m], v[m]
         uc += x * c + y * s
         e = y * c - x * s
         g0 += e

@@ -155,9 +155,8 @@ def test_block_sums_and_samples_over_many_bursts(truth):
     for f, (difference, ratio, lock, block_lock) in enumerate(compare(n, truth)):
         assert difference.max() < 0.03
         assert ratio == pytest.approx(1, abs=0.003)
-        # Without the cure a lost hand-over may end in either side lobe: shares agree, a few bursts change places.
-        assert abs(lock.mean() - block_lock.mean()) <= (0.01 if f == 0 else 0)
-        assert np.sum(lock != block_lock) <= (0.02 * n if f == 0 else 0)
+        # Without the cure a start between two lobes may end in either.
+        assert np.sum(lock != block_lock) <= (0.01 * n if f == 0 else 0)
 
 
 def test_without_the_image_the_crossing_is_estimated_worse():
