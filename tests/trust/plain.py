@@ -1,0 +1,230 @@
+"""Sums of tiny runs of every kernel, as arrays in a file: `python -m tests.trust.plain OUT.npz`.
+
+With NUMBA_DISABLE_JIT=1 the kernels are plain Python; those on lanes then get NumPy floats, eight in an array, in place
+of the registers, and calculate by the same algebra. The names of the kernels that ran are kept beside the sums.
+"""
+
+import functools
+import importlib
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from radarsim.kernels import compile as compiling
+
+PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"
+WIDTH = 8
+SIZES = {"CHUNK": WIDTH, "GROUPS": 1}  # short chunks: a partial one is calculated whole, which takes its time here
+ran: set[str] = set()
+there: set[str] = set()
+
+
+class Pointer:
+    """A place in a flat array, as the kernels index it."""
+
+    def __init__(self, array, start=0):
+        self.array, self.start = array, start
+
+    def __getitem__(self, i):
+        return self.array[self.start + i]
+
+    def __setitem__(self, i, value):
+        self.array[self.start + i] = value
+
+    def row(self, r):
+        return slice(self.start + WIDTH * r, self.start + WIDTH * (r + 1))
+
+
+def put(pointer, row, value):
+    pointer.array[pointer.row(row)] = value
+
+
+def total(x):
+    while len(x) > 1:
+        x = x[: len(x) // 2] + x[len(x) // 2 :]
+    return x[0]
+
+
+LANES = {
+    "where_greater": lambda x, y, yes, no: np.where(x > y, yes, no),
+    "any_greater": lambda x, y: bool(np.any(x > y)),
+    "full": lambda number: np.full(WIDTH, float(number)),
+    "root": np.sqrt,
+    "nearest": np.rint,
+    "power_of_two": lambda x: np.ldexp(1.0, x.astype(int)),
+    "total": total,
+    "address": lambda array: Pointer(array.reshape(-1)),
+    "row": lambda pointer, number: Pointer(pointer.array, pointer.start + WIDTH * number),
+    "get": lambda pointer, row: pointer.array[pointer.row(row)].copy(),
+    "put": put,
+}
+
+
+def record(argument):
+    """A structured array or element of one with its fields as attributes, as compiled code has them."""
+    if isinstance(argument, np.void) and not isinstance(argument, np.record):
+        return np.array(argument).reshape(1).view(np.recarray)[0]
+    if isinstance(argument, np.ndarray) and argument.dtype.names and not isinstance(argument, np.recarray):
+        return argument.view(np.recarray)
+    return argument
+
+
+class Records:
+    """NumPy whose structured zeros are records."""
+
+    def __getattr__(self, name):
+        return getattr(np, name)
+
+    def zeros(self, shape, dtype=float):
+        return record(np.zeros(shape, dtype))
+
+
+def recorded(decorate):
+    """The decorator, of functions that note that they ran."""
+
+    def noted(function):
+        name, made = f"{function.__module__.rpartition('.')[2]}.{function.__name__}", decorate(function)
+        there.add(name)
+
+        @functools.wraps(function)
+        def noting(*arguments):
+            ran.add(name)
+            return made(*map(record, arguments))
+
+        return noting
+
+    return noted
+
+
+def uncompiled():
+    """Put the plain floats in place of the registers, before any kernel is imported."""
+    np.seterr(over="ignore")  # words of random numbers overflow by design
+    for name in ("kernel", "part", "summing"):
+        setattr(compiling, name, recorded(getattr(compiling, name)))
+    from radarsim.kernels import lanes
+
+    for name, plain in LANES.items():
+        setattr(lanes, name, plain)
+    for file in sorted(Path(compiling.__file__).parent.glob("[a-z]*.py")):
+        module = importlib.import_module(f"radarsim.kernels.{file.stem}")
+        if hasattr(module, "np"):
+            module.np = Records()
+        if "discriminator" not in file.stem:
+            for name, size in SIZES.items():
+                if hasattr(module, name):
+                    setattr(module, name, size)
+
+
+BURST = {"carrier_hz": 10e9, "pulse_period_s": 1e-5, "pulse_length_s": 2e-6, "sampling_period_s": 1e-6, "pulses": 64}
+DISCRIMINATOR = {
+    "study": "discriminator",
+    "burst": BURST | {"amplitude": 1.0, "noise_variance": 0.2},
+    "truth": {"phase_rad": 0.7, "doppler_derivatives": [300.0, -2000.0, 0.0, 0.0]},
+    "prior": {"spread_over_potential": [3.0, 3.0, 3.0, 3.0, 3.0]},
+    "estimators": [
+        {"name": "sequence", "schedule": [2e-4, 6.4e-4]},
+        {"name": "steps", "schedule": [6.4e-4], "phases": 4, "steps": 3},
+        {"name": "cured", "schedule": [2e-4, 6.4e-4], "coherence_step": True, "search_points": 2, "search_margin": 0},
+    ],
+    "realisations": 10,
+}
+COMPLEX = {"burst": DISCRIMINATOR["burst"] | {"samples": "complex"}}
+ESTIMATED = {"estimators": [{"name": "estimated", "schedule": [6.4e-4], "amplitude": "estimated"}]}
+RIVAL = {"estimators": [{"name": "ridge", "method": "ridge"}]}
+RIVAL["burst"] = COMPLEX["burst"] | {"pulse_length_s": 1e-6, "pulses": 1024}
+
+# Angles as rough as ranges: the plots' covariance is of a condition near 50 and not 3·10⁶, which multiplies rounding.
+EVEN = ["sensor.sigma_range_m=2500", "sensor.sigma_elevation_deg=2", "sensor.sigma_azimuth_deg=2"]
+SHORT = ["scans=9", "report_every=3", *EVEN]
+SWEPT = [word if "elevation" not in word else "sweep.sensor.sigma_elevation_deg=[2]" for word in SHORT]
+NEAR = "target={kind: polynomial, frame: polar, range_m: [900, -4], bearing_deg: [2, 0.01]}"
+# What is run: name → config, overrides, realisations; of several cases the last.
+RUNS = {
+    "linear": ("rls2", ["scans=9"], 11),
+    "sonar alike": ("sonar_smoothing", ["scans=9"], 9),
+    "sonar correlated": ("sonar_correlated", ["scans=9"], 9),
+    "sonar missed": ("sonar_missed", ["scans=12", "sweep.sensor.detection_probability=[0.7]", NEAR], 9),
+    "sonar converted": ("sonar_conversion", ["scans=6"], 9),
+    "sonar fluctuating": ("sonar_fluctuating", ["scans=7", "sweep.target=[sonar_fluctuating]"], 9),
+    "multimodel families": ("multimodel_families", SHORT, 8),
+    "multimodel irregular": ("multimodel_irregular", SHORT, 8),
+    "multimodel at prediction": ("multimodel_covariance", SWEPT, 8),
+    "discriminator on block sums": (DISCRIMINATOR | {"engine": "block_sums", "blocks_per_window": 8}, [], 8),
+    "discriminator demodulated": (DISCRIMINATOR | {"engine": "demodulated", "blocks_per_window": 8}, [], 2),
+    "discriminator on samples": (DISCRIMINATOR | {"engine": "samples"}, [], 2),
+    "discriminator complex": (DISCRIMINATOR | COMPLEX | ESTIMATED | {"engine": "samples"}, [], 2),
+    "discriminator ridge": (DISCRIMINATOR | RIVAL | {"engine": "samples"}, [], 2),
+    "discriminator complex demodulated": (DISCRIMINATOR | COMPLEX | {"engine": "demodulated"}, [], 2),
+}
+
+
+def words():
+    """Random numbers of every kind."""
+    from radarsim.kernels import random
+
+    key, made = random.stream(3, "plain"), {}
+    for fill, size in (
+        (random.fill_normal_pairs, 5),
+        (random.fill_uniform_pairs, 5),
+        (random.fill_normal_strip, 16),
+        (random.fill_uniform_strip, 16),
+    ):
+        a, b = np.empty(size), np.empty(size)
+        fill(key, 10, 2, a, b)
+        made[fill.__name__] = np.stack([a, b])
+    return made
+
+
+def work(config, overrides):
+    """The last case of a config, as it is run."""
+    from radarsim import studies
+    from radarsim.config.load import load
+
+    return studies.CaseWork(load(config, overrides).cases[-1])
+
+
+def sums(config, overrides, count):
+    """Sums by name, from realisation 8 on."""
+    one = work(config, overrides)
+    return one.plan.layout.unpack(one.simulate(8, count))
+
+
+def tracks():
+    """Plots that are drawn by themselves, and estimates over recorded ones."""
+    from radarsim.kernels import linear
+    from radarsim.studies import multimodel
+
+    made = {}
+    plan = work(*RUNS["linear"][:2]).plan
+    plots = linear.simulate_plots(plan.key, 7, 3, plan.truth, plan.sigma)
+    made["linear plots"] = plots
+    schedule = plan.observes, plan.start, plan.weights, plan.gains
+    made["linear estimates"] = np.nan_to_num(linear.estimate(plots, plan.dt, *schedule))
+    one = work(*RUNS["multimodel families"][:2])
+    z, R, _ = multimodel.measured(one.plan, 0)
+    made["multimodel plots"], made["multimodel covariances"] = z, R
+    r = np.linalg.norm(z[:, :, 0], axis=1)
+    angles = np.arcsin(z[:, 1, 0] / r), np.arcsin(z[:, 2, 0] / r)
+    columns = (0.5 * np.arange(len(r)), r, *angles)
+    recorded = dict(zip(("t_s", "range_m", "elevation_rad", "azimuth_rad"), columns, strict=True))
+    track = multimodel.track(one.case, recorded)
+    made["multimodel track"] = np.nan_to_num(track.estimate)
+    return made
+
+
+def numbers():
+    """All arrays: {run/name: array}."""
+    made = {f"random/{name}": array for name, array in words().items()}
+    made |= {f"tracks/{name}": array for name, array in tracks().items()}
+    for run, arguments in RUNS.items():
+        made |= {f"{run}/{name}": array for name, array in sums(*arguments).items()}
+    return made
+
+
+if __name__ == "__main__":
+    if PLAIN:
+        uncompiled()
+    made = numbers()
+    np.savez(sys.argv[1], **made, ran=np.array(sorted(ran)), there=np.array(sorted(there)))

@@ -1,0 +1,64 @@
+"""Compiled kernels against plain Python, kernel by kernel; this processor's machine code against the common one."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.trust import plain
+
+AGREED = 1e-12
+ROOT = Path(__file__).parents[2]
+MOMENTS = ("error", "error_all", "ahead")  # Σe, Σe², Σe³, Σe⁴ in the last axis
+
+
+def elsewhere(path, **environment):
+    """The arrays of `tests.trust.plain` from an interpreter of its own."""
+    paths = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
+    subprocess.run(
+        [sys.executable, "-W", "ignore", "-m", "tests.trust.plain", str(path)],
+        env=os.environ | {"PYTHONPATH": paths} | environment,
+        cwd=ROOT,
+        check=True,
+    )
+    with np.load(path) as arrays:
+        return dict(arrays)
+
+
+def apart(name, one, other):
+    """Largest difference of two arrays, in sizes of what is summed: a power's relative error is the error's, times it.
+
+    Sums over realisations of (F, K, …): the size is the largest over filters and scans, by component.
+    """
+    if name.endswith(MOMENTS):
+        power = np.arange(1, 5)
+        size = power * np.abs(other[..., 3:]).max(axis=(0, 1), keepdims=True) ** (power / 4)
+        size = np.maximum(size, 1.0) if name.startswith("discriminator") else size  # errors over potential σ
+    else:
+        size = np.abs(other).max(axis=(0, 1) if other.ndim > 2 else None, keepdims=True)
+    return float((np.abs(one - other) / np.where(size > 0, size, 1)).max())
+
+
+def assert_agree(one, other):
+    wide = {name: apart(name, one[name], array) for name, array in other.items()}
+    assert {name: size for name, size in wide.items() if not size <= AGREED} == {}
+
+
+def test_every_kernel_in_plain_python(tmp_path):
+    """Without compiler, registers replaced by plain floats: the same numbers but for fused multiply-adds."""
+    found = elsewhere(tmp_path / "plain.npz", NUMBA_DISABLE_JIT="1")
+    never = set(found.pop("there")) - set(found.pop("ran"))
+    assert never == set()
+    assert_agree(found, plain.numbers())
+
+
+@pytest.mark.slow
+def test_every_kernel_for_the_common_processor(tmp_path):
+    """Compiled without this processor's wide registers and fused multiply-adds, in a cache of its own."""
+    generic = {"NUMBA_CPU_NAME": "generic", "RADARSIM_CACHE_DIR": str(tmp_path / "cache")}
+    found = elsewhere(tmp_path / "generic.npz", **generic)
+    assert_agree({name: array for name, array in found.items() if name not in ("ran", "there")}, plain.numbers())
+    assert any((tmp_path / "cache").rglob("*.nbi"))
