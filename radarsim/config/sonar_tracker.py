@@ -103,6 +103,9 @@ def tracker_misfits(spec):
         yield at("frame", "must be polar for filters with an association")
     if sensor.error_correlation != 0.0:
         yield at("sensor.error_correlation", "must be 0 for filters with an association")
+    for key, given in (("detectors", spec.detectors), ("uses", spec.uses)):
+        if given:
+            yield at(key, "must not be given beside filters with an association")
     if sensor.further:
         yield at("sensor.further", "must be empty for filters with an association")
     for key in ("sigma_depth_m", "sigma_elevation_rad"):

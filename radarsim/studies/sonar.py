@@ -4,7 +4,8 @@ Sums of F filters over K scans and components (coordinate by coordinate: value, 
 acceleration): `error`, `paired`, `estimates` as everywhere; `believed` Σ of the variances that the filter claims; by
 coordinate C: `joint` Σq, Σq², Σp, Σp² of q = eᵀP⁻¹e and p the product of the errors in value and rate, and `ahead` Σe
 … Σe⁴ of the value extrapolated by one scan, in the row of the scan that it was extrapolated from. Cases with detectors,
-filters that answer to manoeuvres or uses have the sums of `sonar_manoeuvre` beside.
+filters that answer to manoeuvres or uses have the sums of `sonar_manoeuvre` beside; those whose filters have to find
+their plots among false ones are of `sonar_clutter`.
 """
 
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from radarsim.kernels import sonar as kernels
 from radarsim.kernels import sonar_patterns as pattern_kernels
 from radarsim.models import sonar as models
 from radarsim.studies import noise_key
+from radarsim.studies import sonar_clutter as clutter
 from radarsim.studies import sonar_manoeuvre as manoeuvres
 from radarsim.studies.sonar_exact import exact_values
 from radarsim.studies.sonar_scene import Scene, choices, patterns, plots_of, scene, third_of
@@ -40,6 +42,9 @@ FILTERS = {
     "kind: kalman_augmented": "plots' errors estimated beside the state, for correlated errors",
     "kind: kalman_differenced": "differences of neighbouring plots, for correlated errors",
     "kind: adaptive": "growing memory that a detector of manoeuvres (3) begins anew, at a higher degree or held short",
+    "association: nearest": "a tracker among false plots: the nearest plot in the gate; of kind kalman, degree 1",
+    "association: pda": "a tracker with probabilistic data association",
+    "association: known": "a filter told which plots are the target's, beside the trackers",
     "kind: imm": "two Kalman filters that interact, steady and manoeuvring",
 }
 
@@ -64,9 +69,11 @@ class Plan:
         return self.sight is None and self.watched is None
 
 
-def prepare(case: Case) -> Plan:
+def prepare(case: Case) -> Plan | clutter.Plan:
     """Design the filters of a case and reckon the exact values of its errors."""
     spec, seen = case.spec, scene(case.spec)
+    if spec.tracking:
+        return clutter.prepare(case, seen, world(case, seen))
     wanted = manoeuvres.answered(spec, choices(spec))
     size = max(choice.size for choice in wanted)
     F, K, C = len(wanted), len(seen.t), seen.truth.shape[1]
@@ -193,8 +200,10 @@ def plain_bias(spec, seen: Scene) -> float:
     return float(models.conversion_bias(seen.polar[0, 0, 0], spec.sensor.sigma_bearing_rad)) if plain else 0.0
 
 
-def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
+def simulate(plan: Plan | clutter.Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
+    if isinstance(plan, clutter.Plan):
+        return clutter.simulate(plan, first, count)
     F, K = len(plan.axes.filters), len(plan.axes.k)
     C = len(plan.axes.extra["coordinates"])
     shapes = {"error": (3, 4), "paired": (3,), "joint": (4,), "ahead": (4,), "believed": (3,), "estimates": (3,)}
