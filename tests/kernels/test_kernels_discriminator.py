@@ -233,7 +233,7 @@ def test_merged_blocks_hold_the_same_likelihood(theta, complex_samples, per_puls
     work, sums, drawn, *_ = strips.room_for(len(factor))
     state, window = np.zeros(1, scoring.STATE)[0], window_of(burst, 400)
     state["amplitude"], expected = burst.amplitude, []
-    shifts = np.outer(np.linspace(0, 0.2, 8), [0.3, 1, 1, -0.5, 0.5, 0])
+    shifts = np.outer(np.linspace(0, 2, 8), [0.3, 1, 1, -0.5, 0.5, 0])
     for lane in range(8):
         _, u = noisy(burst, theta, lane)
         data.demodulate(physics, edges, rows(u), turns(theta, burst), 0, len(factor), mean)
@@ -245,7 +245,7 @@ def test_merged_blocks_hold_the_same_likelihood(theta, complex_samples, per_puls
     evaluate_merged(*tables.arrays(), first, weights, count, image, burst.amplitude, work, sums, drawn)
     found = work.reshape(-1, 8)[laned.VALUE : laned.VALUE + 8].T
     noise = np.sqrt(burst.noise_variance * 400 * per_pulse)
-    assert found == pytest.approx(np.array(expected), abs=0.02 * noise)
+    assert found == pytest.approx(np.array(expected), abs=0.006 * noise)
     assert np.abs(np.diff(expected, axis=0)).max() > noise
 
 

@@ -105,7 +105,7 @@ def test_phase_is_judged_to_the_nearest_turn():
 
 def paired_errors(plan, first, count):
     """As `final`, with block sums about the true phase made from the very samples that the samples engine draws."""
-    world, last = plan.world, int(plan.options["windows"][0]) - 1
+    world, last = plan.world, plan.options["windows"] - 1
     blocks, physics = len(world.factor), world.physics.copy()
     samples, made = np.empty(world.clean.shape), world.mean.copy()
     room, errors = strips.room_for(blocks), np.zeros((8, plan.windows.shape[1], 6))
@@ -119,9 +119,9 @@ def paired_errors(plan, first, count):
         strips.draw_forecasts(plan.keys[1], first + start, plan.prior_sigma, work)
         for f, options in enumerate(plan.options):
             strips.run_strip(physics, drawn, plan.tables, plan.windows[f], options, work, sums, errors)
-            found[start : start + 8, f] = errors[: count - start, last]
+            found[start : start + 8, f] = errors[: count - start, last[f]]
     size = plan.layout.shapes["error"][2]
-    ratio = (found / plan.potential[:, last])[..., :size]
+    ratio = (found / plan.potential[np.arange(len(last)), last])[..., :size]
     return ratio, np.abs(ratio).max(axis=2) < 5
 
 
