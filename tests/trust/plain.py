@@ -194,7 +194,7 @@ def sums(config, overrides, count):
 def tracks():
     """Plots that are drawn by themselves, and estimates over recorded ones."""
     from radarsim.kernels import linear
-    from radarsim.studies import multimodel
+    from radarsim.studies import multimodel, multimodel_plots
 
     made = {}
     plan = work(*RUNS["linear"][:2]).plan
@@ -209,7 +209,7 @@ def tracks():
     angles = np.arcsin(z[:, 1, 0] / r), np.arcsin(z[:, 2, 0] / r)
     columns = (0.5 * np.arange(len(r)), r, *angles)
     recorded = dict(zip(("t_s", "range_m", "elevation_rad", "azimuth_rad"), columns, strict=True))
-    track = multimodel.track(one.case, recorded)
+    track = multimodel_plots.track(one.case, recorded)
     made["multimodel track"] = np.nan_to_num(track.estimate)
     return made
 

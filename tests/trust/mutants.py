@@ -1,0 +1,342 @@
+"""Planted faults: one small wrong change each, and the tests that must notice it. `make mutants` runs them all.
+
+Each is a place of the program where a slip would give plausible, wrong numbers: a sign, a transposed index, a lost
+term, a bound one off. A test of the ordinary suite keeps the list in step with the sources.
+"""
+
+from typing import NamedTuple
+
+
+class Mutant(NamedTuple):
+    """In the file `path`, the text `original`, there once, becomes `mutated`; one of `tests` must then fail."""
+
+    path: str
+    original: str
+    mutated: str
+    tests: tuple[str, ...]
+
+
+def mutants(path: str, *faults: tuple[str, str, str]) -> list[Mutant]:
+    """Faults (original, mutated, tests after tests/, separated by blanks) of one file."""
+    return [Mutant(path, a, b, tuple(f"tests/{test}" for test in tests.split())) for a, b, tests in faults]
+
+
+LINEAR, RANDOM = "kernels/test_kernels_linear.py", "kernels/test_kernels_random.py"
+TEXTBOOK = f"{LINEAR}::test_estimates_are_the_textbook_filter"
+TWIN = "kernels/test_kernels_multimodel.py::test_kernel_equals_its_twin"
+SONAR = "kernels/test_kernels_sonar.py::test_estimates_are_the_twins"
+BURST = "kernels/test_kernels_discriminator.py"
+EXACT, SQUARES = "exact/test_exact_linear.py", "exact/test_exact_least_squares.py"
+FRAMES, PLACES = "models/test_models_frames.py", "models/test_models_sonar.py"
+STATISTICS, COVERAGE = "report/test_report_statistics.py", "trust/test_trust_statistics.py"
+BLOCKS, STORE = "engine/test_engine_blocks.py", "engine/test_engine_store.py"
+
+KERNELS = (
+    *mutants(
+        "radarsim/kernels/random.py",
+        ("U(0x1BD11BDAA9FC1A22)", "U(0x1BD11BDAA9FC1A23)", f"{RANDOM}::test_published_vectors"),
+        ("U(12)) * 2.0**-52 + 2.0**-53", "U(12)) * 2.0**-52 + 2.0**-3", f"{RANDOM}::test_uniforms"),
+        ("q + 0.2222219857317996", "q + 0.2222229857317996", f"{RANDOM}::test_polynomials_against_the_library"),
+        (
+            "radius * (c if turned else s)",
+            "radius * (s if turned else c)",
+            f"{RANDOM}::test_independence_within_a_pair",
+        ),
+    ),
+    *mutants(
+        "radarsim/kernels/linear.py",
+        ("r + dt * (v + 0.5 * dt * a), v + dt * a, a", "r + dt * (v + dt * a), v + dt * a, a", TEXTBOOK),
+        ("q + g1 * e + h1 * f", "q + g1 * e + h0 * f", TEXTBOOK),
+        ("if k < start[f]:", "if k <= start[f]:", TEXTBOOK),
+        ("r4 + rr * rr, v4 + vv * vv", "r4 + rr * vv, v4 + vv * vv", f"{LINEAR}::test_sums_are_those_of_the_estimates"),
+        ("if row != beside:", "if row == beside:", f"{LINEAR}::test_sums_are_those_of_the_estimates"),
+    ),
+    *mutants(
+        "radarsim/kernels/blocks.py",
+        ("f[4] * (f[4] * p[5]) + q[5]", "f[4] * (f[4] * p[5])", TWIN),
+        ("m = s[0] * s[4] - s[1] * s[2]", "m = s[0] * s[4] - s[1] * s[1]", TWIN),
+    ),
+    *mutants(
+        "radarsim/kernels/hypothesis.py",
+        ("p[0] + w * (q[0] + d[0] * d[0])", "p[0] + w * q[0]", TWIN),
+        ("(a[1], d[3], e[3]), lower)", "(a[1], d[1], e[3]), lower)", TWIN),
+    ),
+    *mutants(
+        "radarsim/kernels/multimodel.py",
+        ("TRANSITION + i * MOST + j) * get", "TRANSITION + j * MOST + i) * get", TWIN),
+        (
+            "where_greater(of_main, others, is_main, full(1.0))",
+            "where_greater(others, of_main, is_main, full(1.0))",
+            TWIN,
+        ),
+    ),
+    *mutants(
+        "radarsim/kernels/sonar.py",
+        ("step_one * one[1, i] + fresh_one * a", "step_one * one[1, i] - fresh_one * a", SONAR),
+    ),
+    *mutants(
+        "radarsim/kernels/sonar_steps.py",
+        (
+            "where_greater(w, zero, zero, get(a, ages + i) + tau)",
+            "where_greater(w, zero, zero, get(a, ages + i))",
+            SONAR,
+        ),
+    ),
+    *mutants(
+        "radarsim/kernels/discriminator_lanes.py",
+        (
+            "g0 + e, g1 + m1 * e + s1 * h",
+            "g0 + e, g1 + m1 * e - s1 * h",
+            f"{BURST}::test_merged_blocks_hold_the_same_likelihood",
+        ),
+        ("1.0 - 0.5 * square, square - 1.0", "1.0 - square, square - 1.0", f"{BURST}::test_sine_and_cosine_of_lanes"),
+    ),
+    *mutants(
+        "radarsim/kernels/discriminator_sums.py",
+        (
+            "within[i] = 1.0 if worst < 5.0",
+            "within[i] = 1.0 if worst < 4.0",
+            f"{BURST}::test_sums_of_errors_against_numpy",
+        ),
+        ("1.0 if worst_posterior < 5.0", "1.0 if worst < 5.0", f"{BURST}::test_sums_of_errors_against_numpy"),
+    ),
+)
+
+FILTERS = (
+    *mutants(
+        "radarsim/filters/linear.py",
+        ("P = F @ P @ F.T + Q", "P = F @ P @ F.T", f"{LINEAR}::test_gains_are_the_papers_closed_forms"),
+        (
+            "joseph @ P @ joseph.T + K @ R @ K.T",
+            "joseph @ P @ joseph.T",
+            f"{LINEAR}::test_gains_are_the_papers_closed_forms",
+        ),
+        ("transition((k - start + 1) * dt)", "transition((k - start) * dt)", TEXTBOOK),
+    ),
+    *mutants(
+        "radarsim/filters/multimodel.py",
+        (
+            "rest = np.maximum(exponents - whole, 0.0)",
+            "rest = np.maximum(exponents - whole, 1.0)",
+            "filters/test_filters_multimodel.py",
+        ),
+        (
+            "np.where(np.eye(len(Q), dtype=bool), 0.0, np.maximum(Q, 0.0))",
+            "np.where(np.eye(len(Q), dtype=bool), 0.0, Q)",
+            "filters/test_filters_multimodel.py",
+        ),
+        (
+            "bent = tau**2 / 2",
+            "bent = tau**2",
+            "filters/test_filters_multimodel.py::test_start_is_least_squares_with_its_covariance",
+        ),
+    ),
+    *mutants(
+        "radarsim/filters/sonar.py",
+        (
+            "h + 2 * g * step + f * step**2",
+            "h + g * step + f * step**2",
+            "filters/test_filters_sonar.py::test_line_recursion_is_least_squares",
+        ),
+        (
+            "np.stack([np.ones(patterns), -age, age**2 / 2]",
+            "np.stack([np.ones(patterns), -age, age**2]",
+            "filters/test_filters_sonar.py::test_differenced_is_generalised_least_squares",
+        ),
+    ),
+    *mutants(
+        "radarsim/filters/discriminator.py",
+        (
+            "-0.5 * np.log(1.0 - 2.0 * weights",
+            "-np.log(1.0 - 2.0 * weights",
+            "filters/test_filters_discriminator.py::test_tail_of_equal_weights_is_chi_square",
+        ),
+        (
+            "math.sqrt(2.0 * float(np.sum(weights**2)))",
+            "math.sqrt(float(np.sum(weights**2)))",
+            "filters/test_filters_discriminator.py::test_gaussian_condition_is_equation_14",
+        ),
+    ),
+)
+
+FRAMES_AND_MODELS = (
+    *mutants(
+        "radarsim/models/frames.py",
+        ("[sa * ce, -sa * se, ca]", "[sa * ce, sa * se, ca]", f"{FRAMES}::test_rotation_is_a_right_hand_turn"),
+        (
+            "np.stack([u, -r * np.sin(e) * np.cos(e) / u",
+            "np.stack([u, -r * np.sin(e) / u",
+            f"{FRAMES}::test_jacobian_equals_central_differences",
+        ),
+        (
+            "np.array([1.0, 1 + ve / 2, 1 + va / 2])",
+            "np.array([1.0, 1 - ve / 2, 1 + va / 2])",
+            f"{FRAMES}::test_unbiased_conversion_takes_the_mean_error_off",
+        ),
+    ),
+    *mutants(
+        "radarsim/models/sonar.py",
+        (
+            "y[:, 2] * sb + r * vb**2",
+            "y[:, 2] * sb - r * vb**2",
+            f"{PLACES}::test_frames_are_inverse_and_their_rates_are_derivatives",
+        ),
+        (
+            "np.exp(sigma_b**2), np.exp(-2 * sigma_b**2)",
+            "np.exp(sigma_b**2), np.exp(-(sigma_b**2))",
+            f"{PLACES}::test_conversions_against_quadrature",
+        ),
+        (
+            "np.where(lags % 2 == 1, -1.0, 1.0)",
+            "np.where(lags % 2 == 0, -1.0, 1.0)",
+            f"{PLACES}::test_correlation_over_lags_and_gaps",
+        ),
+    ),
+    *mutants(
+        "radarsim/models/targets.py",
+        (
+            "(speed**2 - radial_velocity**2 + np",
+            "(speed**2 + np",
+            "models/test_models_targets.py::test_velocity_and_acceleration_are_the_derivatives",
+        ),
+    ),
+    *mutants(
+        "radarsim/models/motion.py",
+        (
+            "float(np.prod(range(1, lag + 1)))",
+            "float(lag)",
+            "models/test_models_targets.py::test_manoeuvre_covariance_is_the_papers_matrix",
+        ),
+    ),
+    *mutants(
+        "radarsim/models/burst.py",
+        (
+            "path[i] + s * (v[i] + 0.5 * s *",
+            "path[i] + s * (v[i] + s *",
+            "models/test_models_burst.py::test_profile_phase_is_the_integral_of_its_doppler",
+        ),
+    ),
+)
+
+EXACT_VALUES = (
+    *mutants(
+        "radarsim/exact/linear.py",
+        (
+            "A @ bias[k - 1] + kept @ defect[k - 1]",
+            "A @ bias[k - 1] - kept @ defect[k - 1]",
+            "studies/test_studies_range_doppler.py::test_bias_of_a_turning_target_is_the_exact_one",
+        ),
+        (
+            "solve_discrete_lyapunov(kept @ F,",
+            "solve_discrete_lyapunov(F @ kept,",
+            f"{EXACT}::test_settles_to_the_steady_state",
+        ),
+    ),
+    *mutants(
+        "radarsim/exact/least_squares.py",
+        (
+            "Q[4, 4] = sigma[k] ** 2 * (1 - a * a)",
+            "Q[4, 4] = sigma[k] ** 2 * (1 - a)",
+            f"{SQUARES}::test_recursion_of_true_errors_is_that_of_the_weights",
+        ),
+        (
+            "np.sqrt(720 / (n * (n**2 - 1)",
+            "np.sqrt(720 / (n * (n**2 + 1)",
+            f"{SQUARES}::test_720_formula_is_least_squares",
+        ),
+    ),
+    *mutants(
+        "radarsim/exact/burst.py",
+        (
+            "(order[:, None] + order + 1.0)",
+            "(order[:, None] + order + 2.0)",
+            "exact/test_exact_burst.py::test_closed_form_is_the_printed_matrix",
+        ),
+    ),
+)
+
+NUMBERS = (
+    *mutants(
+        "radarsim/report/statistics.py",
+        (
+            "np.maximum(excess, 0) / (9 * n)",
+            "np.maximum(excess, 0) / (18 * n)",
+            f"{COVERAGE}::test_coverage_at_the_least_sizes_without_a_note",
+        ),
+        (
+            "- 2 * _per_one(cross, n) / (a * b)",
+            "- _per_one(cross, n) / (a * b)",
+            f"{COVERAGE}::test_pairing_narrows_a_gain",
+        ),
+        ("middle, half = (p + zz / 2)", "middle, half = (p + zz)", f"{STATISTICS}::test_rate_is_wilsons"),
+        (
+            "np.hypot(np.subtract(a.value, a.lo), np",
+            "np.maximum(np.subtract(a.value, a.lo), np",
+            f"{STATISTICS}::test_difference_adds_in_squares",
+        ),
+        ("inv_cdf(1 - 0.025 / n)", "inv_cdf(1 - 0.025)", f"{COVERAGE}::test_bounds_for_many_looks"),
+        ("np.sqrt(variance / np.abs(n - 1)), np.nan)", "np.sqrt(variance / n), np.nan)", f"{STATISTICS}::test_by_hand"),
+    ),
+    *mutants(
+        "radarsim/report/tables.py",
+        ("both[b] = False", "both[b] = True", "report/test_report_tables.py::test_gains_are_against_the_baseline"),
+        (
+            'result.sums.get("estimates")',
+            'result.sums.get("estimated")',
+            "report/test_report_tables.py::test_fewer_estimates_than_realisations",
+        ),
+    ),
+)
+
+ENGINE = (
+    *mutants(
+        "radarsim/engine/moments.py",
+        (
+            "self.count + other.count",
+            "self.count",
+            f"{BLOCKS}::test_sums_are_a_commutative_monoid_where_addition_is_exact",
+        ),
+    ),
+    *mutants(
+        "radarsim/engine/blocks.py",
+        (
+            "        while number & 1:",
+            "        if number & 1:",
+            f"{BLOCKS}::test_any_cut_in_any_order_gives_the_bytes_of_the_textbook",
+        ),
+        (
+            "(first & -first).bit_length() - 1)",
+            "(first & -first).bit_length())",
+            f"{BLOCKS}::test_the_widest_node_is_aligned_and_cannot_grow",
+        ),
+        (
+            "if not np.isfinite(both.values).all():",
+            "if np.isnan(both.values).all():",
+            f"{BLOCKS}::test_an_overflow_between_blocks_is_no_result",
+        ),
+    ),
+    *mutants(
+        "radarsim/engine/store.py",
+        (
+            "if hashlib.sha256(body).digest() != digest:",
+            "if len(digest) != DIGEST:",
+            "engine/test_engine_damage.py::test_a_hundred_of_a_hundred_flipped_bits_are_found",
+        ),
+        ('"identity": work.identity,', '"identity": "",', STORE),
+    ),
+    *mutants(
+        "radarsim/studies/__init__.py",
+        (
+            '"seed": case.seed,',
+            '"seed": 1,',
+            "studies/test_studies_range_doppler.py::test_identity_ignores_names_and_realisations",
+        ),
+        (
+            "digest(world(case.spec))",
+            "digest(canonical(case.spec))",
+            "studies/test_studies_range_doppler.py::test_cases_that_differ_only_in_filters_share_their_noise",
+        ),
+    ),
+)
+
+ALL = (*KERNELS, *FILTERS, *FRAMES_AND_MODELS, *EXACT_VALUES, *NUMBERS, *ENGINE)
