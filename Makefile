@@ -17,6 +17,9 @@ test: $(VENV)/tested
 slow: $(VENV)/tested
 	$(BIN)/python -m pytest -m slow
 
+mutants: $(VENV)/tested
+	nice $(BIN)/python -m tests.trust.mutate
+
 lint: $(VENV)/tested
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
