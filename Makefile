@@ -6,7 +6,7 @@ RADARSIM := $(BIN)/radarsim
 # Smoke runs keep out of results/, which holds what was made at full size.
 SMOKE := $(VENV)/smoke
 
-.PHONY: run test slow lint smoke reproduce-figures bench schema known docs docs-numbers docs-examples clean
+.PHONY: run test slow mutants lint smoke reproduce-figures bench schema known docs docs-numbers docs-examples clean
 
 run: $(VENV)/installed
 	$(RADARSIM) run configs/rls2.yaml
