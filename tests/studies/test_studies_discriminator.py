@@ -81,6 +81,44 @@ def test_locks_of_the_papers_experiment():
     assert narrow < 0.01
 
 
+def whole_run(plan, n, batch=2500):
+    """Shares locked (F,), rms errors of the locked over the bound (F, size) and mean passes (F,) of n bursts."""
+    locked, squares, passes = 0.0, 0.0, 0.0
+    for first in range(0, n, batch):
+        ratio, lock = final(plan, first, batch)
+        locked = locked + lock.sum(axis=0)
+        squares = squares + (ratio**2 * lock[..., None]).sum(axis=0)
+        passes = passes + study.estimate(plan, first, 100)[1].mean(axis=0) * batch
+    return locked / n, np.sqrt(squares / np.maximum(locked, 1)[:, None]), passes / n
+
+
+@pytest.mark.slow
+def test_locks_and_accuracy_of_the_papers_experiment_over_many_bursts():
+    ten = {**SEQUENCE, "name": "ten", "steps": 10, "phases": 16}
+    five, dense = {**ten, "name": "five", "steps": 5}, {**SEQUENCE, "name": "dense", "density": 2}
+    plan = plan_of(SEQUENCE, five, ten, dense, {"name": "narrow", "schedule": [0.3]}, CURED, FROM_TRUTH)
+    n = 50_000
+    locks, accuracy, passes = whole_run(plan, n)
+    assert locks[:3] == pytest.approx([0.955, 0.879, 0.940], abs=0.005)
+    assert locks[3] >= 0.995
+    assert locks[4] < 0.01
+    assert locks[5] >= 0.9995
+    assert accuracy[5] == pytest.approx(1, abs=0.01)
+    assert passes[5] <= 60
+    assert locks[6] == 1
+    assert accuracy[6] == pytest.approx(1, abs=5.85 / np.sqrt(2 * n))
+
+
+@pytest.mark.slow
+def test_lock_of_the_cure_at_the_printed_noise():
+    prior = {"sigma": [6.1, 67.5, 6.1e3, 183.38e3, 2.426e6]}
+    plan = plan_of({**CURED, "main_lobe_threshold": 0.5}, burst={"noise_variance": 9.0}, prior=prior)
+    assert list(plan.windows["pulses"][0, :1]) == [179]
+    assert plan.options["windows"][0] == 22
+    locks, _, _ = whole_run(plan, 20_000)
+    assert locks[0] >= 0.99
+
+
 def test_the_cure_is_cheap():
     _, passes = study.estimate(paper(), 0, 1000)
     assert passes[:, 5].mean() <= 60
