@@ -3,11 +3,12 @@
 A plots file has a header; `t_s` must rise from row to row, an empty cell means missing, other columns are ignored.
 """
 
+import contextlib
 import csv
 import math
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from radarsim.errors import ConfigError, StoreError
 
 MOST_FAULTS = 20  # told at once; a file of the wrong kind would have one in each row
 LARGEST = 1e18  # of any number, as in configs
+CHUNK = 20_000  # rows read, filtered and written at a time
 
 
 def read(path: str | os.PathLike, choices: Sequence[Sequence[str]]) -> dict[str, np.ndarray]:
@@ -24,47 +26,109 @@ def read(path: str | os.PathLike, choices: Sequence[Sequence[str]]) -> dict[str,
 
     Raises ConfigError with all faults, each `file:row's line:column: name: what is wrong`.
     """
+    parts = list(chunks(path, choices))
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def chunks(
+    path: str | os.PathLike, choices: Sequence[Sequence[str]], size: int = CHUNK
+) -> Iterator[dict[str, np.ndarray]]:
+    """The columns of a file as `read` gives them, some rows at a time, so that memory does not grow with the file.
+
+    After the first fault no more rows come: the rest is read for its faults, and ConfigError raised at the end.
+    """
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
-            return _columns(str(path), csv.reader(file, strict=True), choices)
+            yield from _Reader(str(path), csv.reader(file, strict=True), choices).chunks(size)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is not UTF-8 text") from error
 
 
-def _columns(path: str, rows, choices: Sequence[Sequence[str]]) -> dict[str, np.ndarray]:
-    """Header, then numbers, then the order of the times."""
-    faults: list[str] = []
-    values: list[list[float]] = []
-    lines: list[int] = []
-    try:
-        header = [name.strip() for name in next(rows, [])]
-        wanted = _chosen(path, header, choices)
-        places = [header.index(name) for name in wanted]
-        for row in rows:
-            if row:
-                lines.append(rows.line_num)
-                values.append(_numbers(f"{path}:{rows.line_num}", row, len(header), wanted, places, faults))
-            if len(faults) >= MOST_FAULTS:
-                raise ConfigError(*faults, f"{path}: more faults may follow")
-    except csv.Error as error:
-        raise ConfigError(*faults, f"{path}:{rows.line_num}: not a CSV row: {error}") from error
-    if not values and not faults:
-        faults.append(f"{path}: has no rows")
-    array = np.array(values, dtype=float).reshape(-1, len(wanted))
-    if values and not faults and np.isnan(array[:, 1:]).all():
-        faults.append(f"{path}: has no measured value in {', '.join(wanted[1:])}")
-    for i, j in np.argwhere(impossible(array, wanted))[:MOST_FAULTS]:
-        allowed = "must be > 0" if wanted[j] == "range_m" else "must be in radians, from -2 pi to 2 pi"
-        faults.append(f"{path}:{lines[i]}:{places[j] + 1}: {wanted[j]}: {allowed}, got {array[i, j]:g}")
-    for i in np.flatnonzero(~(np.diff(array[:, 0]) > 0))[:MOST_FAULTS]:
-        if np.isfinite(array[i : i + 2, 0]).all():
-            place = f"{path}:{lines[i + 1]}:{places[0] + 1}: t_s"
-            faults.append(f"{place}: must be later than the row before, got {array[i + 1, 0]:g} after {array[i, 0]:g}")
-    if faults:
-        raise ConfigError(*faults)
-    return dict(zip(wanted, array.T.copy(), strict=True))
+class _Reader:
+    """Header, then numbers, then the order of the times; faults are gathered."""
+
+    def __init__(self, path: str, rows, choices: Sequence[Sequence[str]]):
+        self.path, self.rows, self.faults, self.measured = path, rows, [], False
+        try:
+            header = [name.strip() for name in next(rows, [])]
+        except csv.Error as error:
+            raise ConfigError(f"{path}:{rows.line_num}: not a CSV row: {error}") from error
+        self.wanted = _chosen(path, header, choices)
+        self.width, self.places = len(header), [header.index(name) for name in self.wanted]
+        self.last = math.nan
+
+    def chunks(self, size: int) -> Iterator[dict[str, np.ndarray]]:
+        """The wanted columns, `size` rows at a time."""
+        any_row = False
+        while True:
+            lines, values = self._some(size)
+            if not lines:
+                break
+            any_row = True
+            array = np.array(values, dtype=float).reshape(-1, len(self.wanted))
+            self._judge(array, lines)
+            self.last = array[-1, 0]
+            if not self.faults:
+                yield dict(zip(self.wanted, array.T.copy(), strict=True))
+        if not any_row and not self.faults:
+            self.faults.append(f"{self.path}: has no rows")
+        if not self.faults and not self.measured:
+            self.faults.append(f"{self.path}: has no measured value in {', '.join(self.wanted[1:])}")
+        if self.faults:
+            raise ConfigError(*self.faults)
+
+    def _some(self, size: int) -> tuple[list[int], list[list[float]]]:
+        """Line numbers and numbers of the next rows."""
+        lines: list[int] = []
+        values: list[list[float]] = []
+        try:
+            for row in self.rows:
+                if row:
+                    line = self.rows.line_num
+                    lines.append(line)
+                    values.append(self._numbers(row, line))
+                if len(self.faults) >= MOST_FAULTS:
+                    raise ConfigError(*self.faults, f"{self.path}: more faults may follow")
+                if len(lines) == size:
+                    break
+        except csv.Error as error:
+            raise ConfigError(*self.faults, f"{self.path}:{self.rows.line_num}: not a CSV row: {error}") from error
+        return lines, values
+
+    def _judge(self, array: np.ndarray, lines: list[int]) -> None:
+        """Note values that no sensor can have given, and times that do not rise."""
+        path, wanted, places = self.path, self.wanted, self.places
+        self.measured |= bool(np.isfinite(array[:, 1:]).any())
+        for i, j in np.argwhere(impossible(array, wanted))[:MOST_FAULTS]:
+            allowed = "must be > 0" if wanted[j] == "range_m" else "must be in radians, from -2 pi to 2 pi"
+            self.faults.append(f"{path}:{lines[i]}:{places[j] + 1}: {wanted[j]}: {allowed}, got {array[i, j]:g}")
+        t = np.append(self.last, array[:, 0])
+        for i in np.flatnonzero(~(np.diff(t) > 0))[:MOST_FAULTS]:
+            if np.isfinite(t[i : i + 2]).all():
+                place = f"{path}:{lines[i]}:{places[0] + 1}: t_s"
+                self.faults.append(f"{place}: must be later than the row before, got {t[i + 1]:g} after {t[i]:g}")
+
+    def _numbers(self, row: list[str], line: int) -> list[float]:
+        """The wanted numbers of a row; faults are noted and stand as not-a-number."""
+        if len(row) != self.width:
+            self.faults.append(f"{self.path}:{line}: must have {self.width} cells as the header, got {len(row)}")
+            return [math.nan] * len(self.wanted)
+        return [self._number(row[p].strip(), line, p, name) for name, p in zip(self.wanted, self.places, strict=True)]
+
+    def _number(self, text: str, line: int, place: int, name: str) -> float:
+        if not text and name != "t_s":
+            return math.nan
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not abs(value) <= LARGEST or "_" in text:
+            where = f"{self.path}:{line}:{place + 1}: {name}"
+            self.faults.append(f"{where}: must be a finite number, got {text[:60]!r}")
+            return math.nan
+        return value
 
 
 def impossible(array: np.ndarray, names: list[str]) -> np.ndarray:
@@ -90,67 +154,78 @@ def _chosen(path: str, header: list[str], choices: Sequence[Sequence[str]]) -> l
     raise ConfigError(f"{path}:1: must have the columns {allowed}; got {', '.join(header)[:200] or 'nothing'}")
 
 
-def _numbers(
-    place: str, row: list[str], width: int, names: list[str], places: list[int], faults: list[str]
-) -> list[float]:
-    """The wanted numbers of a row; faults are noted and stand as not-a-number."""
-    if len(row) != width:
-        faults.append(f"{place}: must have {width} cells as the header, got {len(row)}")
-        return [math.nan] * len(names)
-    return [_number(f"{place}:{p + 1}: {name}", row[p].strip(), faults) for name, p in zip(names, places, strict=True)]
-
-
-def _number(place: str, text: str, faults: list[str]) -> float:
-    if not text and not place.endswith(" t_s"):
-        return math.nan
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not abs(value) <= LARGEST or "_" in text:
-        faults.append(f"{place}: must be a finite number, got {text[:60]!r}")
-        return math.nan
-    return value
-
-
-def rows_of(track: Track) -> list[tuple]:
-    """Header and rows of a track: t_s, filter, component, unit, estimate, sigma, and the models' probabilities."""
+def header_of(track: Track) -> tuple[str, ...]:
+    """The columns of a track."""
     models = 0 if track.probability is None else track.probability.shape[2]
-    header = (
-        "t_s",
-        "filter",
-        "component",
-        "unit",
-        "estimate",
-        "sigma",
-        *(f"probability_{m + 1}" for m in range(models)),
-    )
-    rows = [header]
-    for i, t in enumerate(track.t_s):
+    names = ("t_s", "filter", "component", "unit", "estimate", "sigma")
+    return (*names, *(f"probability_{m + 1}" for m in range(models)))
+
+
+def rows_of(track: Track) -> Iterator[tuple]:
+    """Rows of a track: t_s, filter, component, unit, estimate, sigma, and the models' probabilities."""
+    for i, t in enumerate(track.t_s.tolist()):
         for f, name in enumerate(track.filters):
-            shares = () if track.probability is None else tuple(_cell(p) for p in track.probability[f, i])
-            for c, (component, unit) in enumerate(track.components):
-                if not math.isnan(track.estimate[f, i, c]):
-                    numbers = (_cell(track.estimate[f, i, c]), _cell(track.sigma[f, i, c]))
-                    rows.append((_cell(t), name, component, unit, *numbers, *shares))
-    return rows
+            shares = () if track.probability is None else tuple(map(_cell, track.probability[f, i].tolist()))
+            numbers = zip(track.estimate[f, i].tolist(), track.sigma[f, i].tolist(), track.components, strict=True)
+            for estimate, sigma, (component, unit) in numbers:
+                if not math.isnan(estimate):
+                    yield (repr(t), name, component, unit, repr(estimate), _cell(sigma), *shares)
 
 
 def _cell(value: float) -> str:
-    return "" if math.isnan(value) else repr(float(value))
+    return "" if math.isnan(value) else repr(value)
+
+
+class Writer:
+    """A CSV file that is there whole or not at all: rows go to a temporary file beside it, renamed at a good end.
+
+    Faults of the disk become StoreError.
+    """
+
+    def __init__(self, path: str | os.PathLike):
+        self.path = Path(path)
+
+    def __enter__(self):
+        try:
+            number, self.temporary = tempfile.mkstemp(prefix=f".{self.path.name}.", dir=self.path.parent)
+        except OSError as error:
+            raise self._told(error) from error
+        os.chmod(self.temporary, 0o644)
+        self.file = os.fdopen(number, "w", encoding="utf-8", newline="")
+        self.rows = csv.writer(self.file, lineterminator="\n")
+        return self
+
+    def write(self, rows: Iterable[Sequence]) -> None:
+        """Write rows of text."""
+        try:
+            self.rows.writerows(rows)
+        except OSError as error:
+            raise self._told(error) from error
+
+    def __exit__(self, kind, *_):
+        try:
+            self.file.close()
+            if kind is None:
+                os.replace(self.temporary, self.path)
+        except OSError as error:
+            raise self._told(error) from error
+        finally:
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(self.temporary)
+
+    def _told(self, error: OSError) -> StoreError:
+        return StoreError(f"{self.path}: cannot be written: {error.strerror}")
 
 
 def write(track: Track, path: str | os.PathLike) -> None:
     """Write a track as CSV, whole or not at all; raises StoreError."""
-    path = Path(path)
-    try:
-        number, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        try:
-            with os.fdopen(number, "w", encoding="utf-8", newline="") as file:
-                csv.writer(file, lineterminator="\n").writerows(rows_of(track))
-            os.replace(temporary, path)
-        except BaseException:
-            os.unlink(temporary)
-            raise
-    except OSError as error:
-        raise StoreError(f"{path}: cannot be written: {error.strerror}") from error
+    with Writer(path) as file:
+        file.write([header_of(track)])
+        file.write(rows_of(track))
+
+
+def write_columns(columns: Mapping[str, np.ndarray], path: str | os.PathLike) -> None:
+    """Write columns (n,) of numbers as CSV, an empty cell for not-a-number, whole or not at all; raises StoreError."""
+    with Writer(path) as file:
+        file.write([tuple(columns)])
+        file.write(zip(*([_cell(v) for v in column.tolist()] for column in columns.values()), strict=True))

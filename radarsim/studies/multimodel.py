@@ -6,16 +6,15 @@ import numpy as np
 
 from radarsim.config.load import Case
 from radarsim.engine.moments import Layout
-from radarsim.engine.results import Axes, Track
+from radarsim.engine.results import Axes
 from radarsim.filters import multimodel as filters
 from radarsim.kernels import multimodel as kernels
 from radarsim.kernels import multimodel_plots as plots
-from radarsim.kernels import multimodel_strip as strips
 from radarsim.kernels import multimodel_sums as sums
-from radarsim.kernels.hypothesis import MODELS, MOST, OUTPUT, PLOT, VARIANCE, work_arrays
+from radarsim.kernels.hypothesis import MOST, PLOT
 from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.studies import noise_key
-from radarsim.studies.multimodel_scene import intervals, local_plots, plot_truth, sensor_frame, truth
+from radarsim.studies.multimodel_scene import intervals, plot_truth, sensor_frame, truth
 
 COMPONENTS = tuple(
     (f"{prefix}{axis}", unit) for axis in "xyz" for prefix, unit in (("", "m"), ("v", "m/s"), ("a", "m/s2"))
@@ -26,7 +25,6 @@ FILTERS = {
     "output": "rule by which the estimate is made: moment, best",
     "covariance_at": "the plot's covariance at the plot or at its prediction",
 }
-CHUNK = 4096  # recorded plots filtered at a time
 BLOCK = 64  # eight groups of eight; 0.1 s with six filters and 3725 scans
 FAMILIES = {"kalman": kernels.KALMAN, "gpb1": kernels.GPB1, "imm": kernels.IMM, "gpb2": kernels.GPB2}
 RULES = {
@@ -182,88 +180,3 @@ def measured(plan: Plan, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
     plots.fill_plots(world.keys, world.frame, world.plot_truth, sums.START, first, rows(plots.RANDOM), found)
     cells = found.reshape(count, PLOT, WIDTH)
     return cells[:, :3], cells[:, 3:9], cells[:, 9]
-
-
-def PLOT_COLUMNS(spec) -> tuple[tuple[str, ...], ...]:
-    """The columns that `track` reads of a file of recorded plots."""
-    if spec.sensor.sigma_range_m is None:
-        return (("t_s", "x_m", "y_m", "z_m"),)
-    return (("t_s", "range_m", "elevation_rad", "azimuth_rad"),)
-
-
-def track(case: Case, recorded: dict[str, np.ndarray]) -> Track:
-    """The filters of a case over recorded plots: columns of equal length (n,), not-a-number where a value is missing.
-
-    A plot counts where it is whole and in front of the antenna; the first three that count start the track. At the
-    times of the others the estimate is the extrapolated one.
-    """
-    spec, t = case.spec, recorded["t_s"]
-    z, R, whole = local_plots(spec.sensor, np.stack(list(recorded.values())[1:], axis=1))
-    names, most = tuple(f.name for f in spec.filters), max(len(f.models) for f in spec.filters)
-    shape = (len(names), len(t))
-    estimate, sigma = np.full((2, *shape, 9), np.nan)
-    probability = np.full((*shape, most), np.nan)
-    began = np.flatnonzero(whole)[:3]
-    if len(began) == 3:
-        plot_rows = np.concatenate([z, R, whole[:, None]], axis=1)
-        for f, options in enumerate(spec.filters):
-            out = _tracked(spec, options, t, plot_rows, began)
-            size = len(options.models)
-            estimate[f, began[2] :] = out[:, :9]
-            sigma[f, began[2] :] = np.sqrt(np.maximum(out[:, VARIANCE : VARIANCE + 9], 0.0))
-            probability[f, began[2] :, :size] = out[:, MODELS : MODELS + size]
-    return Track(names, COMPONENTS, t, estimate, sigma, probability if most > 1 else None)
-
-
-def _tracked(spec, options, t: np.ndarray, plot_rows: np.ndarray, began: np.ndarray) -> np.ndarray:
-    """Outputs (n', OUTPUT) of one filter from the third whole plot on; plot_rows (n, PLOT)."""
-    one = spec.model_copy(update={"filters": (options,)})
-    work, numbers = work_arrays()
-    weights = filters.start_weights(t[began], spec.start_acceleration_mps2)
-    strips.start_strip(work, numbers, _lanes(plot_rows[began]), weights, filters.stationary(transition(options)))
-    frame, third, found = sensor_frame(spec.sensor), began[2], []
-    for first in range(third + 1, len(t), CHUNK):
-        stop = min(first + CHUNK, len(t))
-        index, times = intervals(t[first - 1 : stop])
-        own = banks(one, times)
-        size, numbers[1] = own.numbers[0, 4], -1  # the intervals of this chunk are numbered anew
-        count = stop - first
-        out, everything = rows(count * OUTPUT), np.ones(count, dtype=np.int64)
-        strips.filter_strip(
-            work,
-            numbers,
-            _lanes(plot_rows[first:stop]),
-            0,
-            count,
-            own.models[0, : 3 * size],
-            own.transitions[0],
-            index[1:].copy(),
-            times,
-            own.numbers[0],
-            frame,
-            everything,
-            out,
-        )
-        found.append(out.reshape(count, OUTPUT, WIDTH)[:, :, 0].copy())
-    start = np.zeros((1, OUTPUT))
-    start[0, :9], start[0, VARIANCE : VARIANCE + 9], chances = _started(plot_rows[began], weights, options)
-    start[0, MODELS : MODELS + len(chances)] = chances
-    return np.concatenate([start, *found])
-
-
-def _started(plot_rows: np.ndarray, weights: np.ndarray, options) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mean (9,), variances (9,) and probabilities (M,) of a track at its third plot."""
-    a, b, g = weights.reshape(3, 3)
-    mean, variance = np.zeros(9), np.tile(g**2, 3)
-    mean[0::3], mean[1::3] = a @ plot_rows[:, :3], b @ plot_rows[:, :3]
-    own = plot_rows[:, [3, 6, 8]]  # xx, yy, zz
-    variance[0::3] += a**2 @ own
-    variance[1::3] += b**2 @ own
-    return mean, variance, filters.stationary(transition(options))
-
-
-def _lanes(plot_rows: np.ndarray) -> np.ndarray:
-    """Plots (n, PLOT) as rows of eight equal lanes."""
-    found = rows(plot_rows.size)
-    found.reshape(-1, WIDTH)[:] = plot_rows.reshape(-1, 1)
-    return found

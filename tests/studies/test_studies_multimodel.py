@@ -11,7 +11,7 @@ from radarsim import studies
 from radarsim.config.load import load
 from radarsim.errors import ConfigError
 from radarsim.models import frames
-from radarsim.studies import multimodel
+from radarsim.studies import multimodel, multimodel_plots
 
 spec = importlib.util.spec_from_file_location("naive_multimodel", Path(__file__).parents[1] / "naive" / "multimodel.py")
 naive = importlib.util.module_from_spec(spec)
@@ -254,8 +254,8 @@ def test_track_over_recorded_plots_equals_the_experiment():
     R = frames.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
     biconical = frames.to_biconical(frames.to_antenna(z[:, :, 0], R, sensor.antenna_height_m))
     t = np.concatenate([plan.axes.t_s[:1] - 1.5, plan.axes.t_s[:1] - 1.0, plan.axes.t_s[:1] - 0.5, plan.axes.t_s])
-    columns = multimodel.PLOT_COLUMNS(case.case.spec)[0]
-    track = multimodel.track(case.case, dict(zip(columns, [t + 100, *biconical.T], strict=True)))
+    columns = multimodel_plots.PLOT_COLUMNS(case.case.spec)[0]
+    track = multimodel_plots.track(case.case, dict(zip(columns, [t + 100, *biconical.T], strict=True)))
     sums = plan.layout.unpack(case.simulate(0, 1))
     assert np.isnan(track.estimate[:, :2]).all()
     assert np.allclose(track.estimate[:, 3:], sums["error"][..., 0] + plan.world.truth[3:], rtol=1e-7, atol=1e-3)
@@ -265,12 +265,12 @@ def test_track_over_recorded_plots_equals_the_experiment():
 
 def test_track_waits_over_gaps_and_plots_beyond_the_edge():
     case = work()
-    columns = multimodel.PLOT_COLUMNS(case.case.spec)[0]
+    columns = multimodel_plots.PLOT_COLUMNS(case.case.spec)[0]
     t = np.cumsum(np.random.default_rng(3).uniform(0.02, 3, 9000))
     plots = np.stack([np.full(9000, 5e4), np.full(9000, 0.1), np.full(9000, -0.1)])
     plots[0, 40:60] = np.nan
     plots[1, 70] = 1.5
-    track = multimodel.track(case.case, dict(zip(columns, [t, *plots], strict=True)))
+    track = multimodel_plots.track(case.case, dict(zip(columns, [t, *plots], strict=True)))
     assert np.isfinite(track.estimate[:, 2:]).all()
     assert np.isfinite(track.sigma[:, 2:]).all()
     assert (track.sigma[0, 59, ::3] > track.sigma[0, 39, ::3]).all()
@@ -279,8 +279,8 @@ def test_track_waits_over_gaps_and_plots_beyond_the_edge():
 
 def test_a_track_of_two_plots_has_no_estimate():
     case = work()
-    columns = multimodel.PLOT_COLUMNS(case.case.spec)[0]
-    track = multimodel.track(case.case, dict(zip(columns, [np.arange(2.0), *np.full((3, 2), 0.1)], strict=True)))
+    columns = multimodel_plots.PLOT_COLUMNS(case.case.spec)[0]
+    track = multimodel_plots.track(case.case, dict(zip(columns, [np.arange(2.0), *np.full((3, 2), 0.1)], strict=True)))
     assert np.isnan(track.estimate).all()
 
 
