@@ -25,6 +25,7 @@ from radarsim.config.fields import (
     whole,
 )
 from radarsim.config.sonar_manoeuvre import (
+    ANSWERING,
     Accelerating,
     Adapting,
     Detectors,
@@ -273,6 +274,11 @@ class Sonar(Study):
     def tracking(self) -> bool:
         """Whether its filters have to find their plots among false ones."""
         return any(f.association is not None for f in self.filters)
+
+    @property
+    def manoeuvring(self) -> bool:
+        """Whether it measures detectors or uses of a track, or has filters that answer to manoeuvres."""
+        return bool(self.detectors or self.uses or any(f.kind in ANSWERING for f in self.filters))
 
     @cross_check
     def _trackers_fit(self):

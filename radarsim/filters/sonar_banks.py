@@ -21,7 +21,6 @@ KINDS = {
     "adaptive": patterns.ADAPTIVE,
     "imm": patterns.IMM,
 }
-ANSWERING = ("adaptive", "imm")  # to the data: their gains are each realisation's own
 
 
 @dataclass(frozen=True)

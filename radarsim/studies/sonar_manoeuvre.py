@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from radarsim.config.sonar_manoeuvre import ANSWERING
 from radarsim.exact import detector as exact
 from radarsim.filters import sonar as filters
-from radarsim.filters.sonar_banks import ANSWERING, Choice
+from radarsim.filters.sonar_banks import Choice
 from radarsim.filters.sonar_manoeuvre import Models, Rule, Trials, trials_of, watch
 from radarsim.kernels import sonar_detector as kernels
 from radarsim.kernels import sonar_patterns as patterns
@@ -32,11 +33,6 @@ class Watched:
     watch: kernels.Watch
     measured: int
     at: np.ndarray
-
-
-def manoeuvring(spec) -> bool:
-    """Whether a case has anything of this file in it."""
-    return bool(spec.detectors or spec.uses or any(one.kind in ANSWERING for one in spec.filters))
 
 
 def times_of(target) -> tuple[float, float] | None:
@@ -172,8 +168,13 @@ def told(watched: Watched, came: np.ndarray, probability: np.ndarray) -> dict:
         "phase": watched.watch.phase,
         "manoeuvre_s": times_of(spec.target),
     }
-    uses = {"uses_at": watched.at, "uses_true": true_uses(spec, seen, watched.at)} if spec.uses else {}
-    return found | uses
+    return found | (_uses_told(spec, seen, watched.at) if spec.uses else {})
+
+
+def _uses_told(spec, seen: Scene, at: np.ndarray) -> dict:
+    """Scans, true values and speed relative to the own ship (A,) of the uses."""
+    apart = tracks.flat(seen.truth[at, :2, :2], spec.frame == "polar") - own_ship(spec, seen.t[at])
+    return {"uses_at": at, "uses_true": true_uses(spec, seen, at), "uses_closing": np.hypot(apart[:, 2], apart[:, 3])}
 
 
 # ---- uses ---------------------------------------------------------------------------------------------------------

@@ -126,7 +126,7 @@ def test_alarms_and_first_events_are_the_twins(probability):
             q = statistics(z, spec["plots"], spec.get("test_every", 1)).T
             assert (sums["tested"][d] == ~np.isnan(q)).all()
             limits = [spec["threshold_k"]] * 3 if "threshold_k" in spec else exact.threshold(0.1, [[1], [1], [2]])
-            for g, i in ((g, i) for g in range(3) for i in range(len(limits[g]))):
+            for g, i in np.ndindex(3, len(limits[0])):
                 alarm = q[g] > limits[g][i]
                 assert (sums["alarms"][d, g, i] == alarm).all()
                 event = np.where(phase == 2, ~alarm & ~np.isnan(q[g]), alarm)

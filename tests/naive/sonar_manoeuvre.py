@@ -1,4 +1,4 @@
-"""Textbook twins of the detector, the adaptive filter and the IMM: one realisation, plain NumPy, nothing of the package.
+"""Textbook twins of the detector, the adaptive filter and the IMM: one realisation, plain NumPy.
 
 Plots z (K,) of one coordinate with not-a-number where missed, at times t (K,); everything in physical units.
 """

@@ -6,6 +6,7 @@ paper's sections.
 """
 
 from radarsim.report.claims import Claim, Part, Range, above, at_most, below, within
+from radarsim.report.claims import sonar_manoeuvre as manoeuvres
 from radarsim.report.claims import sonar_measures as measured
 from radarsim.report.claims.sonar_measures import Evidence
 
@@ -128,6 +129,7 @@ CLAIMS = (
         reading="on the shipped course, whose velocity changes by 0.25 m/s at random between plots, after 40 plots",
         config="sonar_fluctuating",
     ),
+    *manoeuvres.CLAIMS,
     _claim(
         11,
         "principle of optimal construction, sequential smoothing",

@@ -8,6 +8,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.exact import least_squares as exact
 from radarsim.report import claims, statistics
 from radarsim.report.claims import Missing, certain, ratio
+from radarsim.report.claims import sonar_manoeuvre_measures as manoeuvres
 from radarsim.report.sonar import textbook
 from radarsim.report.statistics import Estimate
 
@@ -17,10 +18,12 @@ class Evidence(claims.Evidence):
 
     Keys: "textbook" (equal intervals and weights, white errors, no miss, growing memory of degree 1 and 2),
     "fluctuating", "gap" (scans that never give a plot, the others always), "asynchronous" (several sonars), ("rho",
-    ρ).
+    ρ), and those of `sonar_manoeuvre_measures`.
     """
 
     def case(self, key) -> CaseResult:
+        if key in (manoeuvres.WEAK, manoeuvres.STRONG, manoeuvres.EQUAL):
+            return manoeuvres.case(self.results, key)
         for result in self.results:
             if result.spec.frame == "polar" and self._is(result, key):
                 return result

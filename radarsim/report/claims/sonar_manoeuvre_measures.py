@@ -1,0 +1,137 @@
+"""How P3's claims on manoeuvres are measured: the cases they mean, and the numbers taken from tables."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import claims
+from radarsim.report.claims import Missing, certain, ratio
+from radarsim.report.statistics import Z95, Estimate
+
+WEAK, STRONG, EQUAL = "weakest manoeuvre", "strongest manoeuvre", "manoeuvre of one σ_a"
+USUAL = 0.01  # false alarms a test
+Measure = Callable[[claims.Evidence], Estimate]
+
+
+def case(results: Sequence[CaseResult], key: str) -> CaseResult:
+    """The case of an accelerating target that a key means; raises Missing."""
+    found = [
+        r for r in results if r.spec.frame == "polar" and r.spec.detectors and r.spec.target.kind == "accelerating"
+    ]
+    found = [r for r in found if r.axes.extra["manoeuvre_s"]]
+    found.sort(key=lambda r: abs(r.spec.target.acceleration_mps2))
+    if key == EQUAL:
+        found = [r for r in found if abs(_shift_of_five(r) - 1) < 0.01]
+    if not found or (key != EQUAL and len(found) < 2):
+        raise Missing(key)
+    return found[-1] if key == STRONG else found[0]
+
+
+def _detector(result: CaseResult, plots: int, what: str, value: float) -> tuple[int, int]:
+    """Number of the detector of so many plots that tests at every scan, and of its threshold; raises Missing."""
+    for d, one in enumerate(result.spec.detectors):
+        given = getattr(one, what) or ()
+        if one.plots == plots and one.test_every == 1 and value in given:
+            return d, given.index(value)
+    raise Missing((plots, value))
+
+
+def _shift_of_five(result: CaseResult) -> float:
+    """Mean acceleration of five plots in σ_a at the last scan of the manoeuvre, in the range; nought without them."""
+    try:
+        d, _ = _detector(result, 5, "threshold_k", 1.0)
+    except Missing:
+        return 0.0
+    return float(result.axes.extra["shifts"][d, 0, _last(result)])
+
+
+def _last(result: CaseResult) -> int:
+    """The last scan of the manoeuvre."""
+    return int(np.flatnonzero(result.axes.extra["phase"] == 1)[-1])
+
+
+def thresholds_ratio(more: int, few: int) -> Measure:
+    """Accelerations at the thresholds of two detectors of the same false alarms: algebra."""
+
+    def measure(seen: claims.Evidence) -> Estimate:
+        result, found = seen.case(STRONG), []
+        for plots in (more, few):
+            d, _ = _detector(result, plots, "false_alarm_probability", USUAL)
+            name = result.spec.detectors[d].name
+            rows = seen.tables["thresholds"]
+            rows = rows[(rows["case"] == result.name) & (rows["filter"] == name) & (rows["component"] == "r")]
+            near = (rows["false_alarm_probability"] - USUAL).abs().idxmin()
+            found.append(rows.loc[near, "threshold_acceleration"])
+        return certain(found[0] / found[1])
+
+    return measure
+
+
+def mean_delay(result: CaseResult, plots: int) -> Estimate:
+    """Mean time from the beginning to the first alarm in the range, s; where there is none, to the manoeuvre's end."""
+    d, t = _detector(result, plots, "false_alarm_probability", USUAL)
+    scans = np.flatnonzero(result.axes.extra["phase"] == 1)
+    share = np.asarray(result.sums["first"])[d, 0, t, scans] / result.count
+    share[-1] += 1 - share.sum()
+    delay = result.axes.t_s[scans] - result.axes.extra["manoeuvre_s"][0]
+    mean = share @ delay
+    half = Z95 * np.sqrt((share @ delay**2 - mean**2) / result.count)
+    return Estimate(float(mean), float(mean - half), float(mean + half))
+
+
+def delays_ratio(key: str, more: int, few: int) -> Measure:
+    """Mean delays of two detectors, taken as independent."""
+    return lambda seen: ratio(mean_delay(seen.case(key), more), mean_delay(seen.case(key), few))
+
+
+def fastest(key: str) -> Measure:
+    """Plots of the detector with the least mean delay; the interval spans all that cannot be told from it."""
+
+    def measure(seen: claims.Evidence) -> Estimate:
+        result = seen.case(key)
+        every = [
+            one.plots
+            for one in result.spec.detectors
+            if USUAL in (one.false_alarm_probability or ()) and one.test_every == 1
+        ]
+        of = {plots: mean_delay(result, plots) for plots in every}
+        best = min(of, key=lambda plots: of[plots].value)
+        near = [plots for plots in every if of[plots].lo <= of[best].hi]
+        return Estimate(float(best), float(min(near)), float(max(near)))
+
+    return measure
+
+
+def detected_at_one(seen: claims.Evidence) -> Estimate:
+    """Share of alarms of five plots at k = 1 at the last scan of the manoeuvre of one σ_a."""
+    result = seen.case(EQUAL)
+    d, _ = _detector(result, 5, "threshold_k", 1.0)
+    name, k = result.spec.detectors[d].name, int(result.axes.k[_last(result)])
+    row = seen.row("detections", case=result.name, filter=name, component="r", threshold_k=1.0, k=k)
+    return Estimate(*(float(row[part]) for part in ("probability", "lo", "hi")))
+
+
+def degrees_ratio(key: str, degree: int) -> Measure:
+    """σ over the run of growing memory of a held degree, over that of the degree switched by five plots."""
+
+    def measure(seen: claims.Evidence) -> Estimate:
+        result = seen.case(key)
+        held = next((f.name for f in result.spec.filters if (f.kind, f.degree) == ("growing_memory", degree)), None)
+        switched = next((f.name for f in result.spec.filters if _by_five(f)), None)
+        if held is None or switched is None:
+            raise Missing(key)
+        return ratio(*(_over_run(seen.curve(key, name, "r").since(5)) for name in (held, switched)))
+
+    return measure
+
+
+def _by_five(one) -> bool:
+    own = one.detector
+    simple = one.kind == "adaptive" and one.response != "shorten_memory" and (one.end_after or 1) == 1
+    return bool(simple and own.plots == 5 and own.false_alarm_probability == USUAL and own.coordinates == "each")
+
+
+def _over_run(curve: claims.Series) -> Estimate:
+    """Root of the mean square of a curve; scans of one realisation go together, so ends are taken all at once."""
+    return Estimate(*(float(np.sqrt(np.mean(np.square(part)))) for part in (curve.value, curve.lo, curve.hi)))
