@@ -4,7 +4,7 @@ import math
 import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 SILENT_S = 2.0  # a run shorter than this shows no progress
@@ -204,6 +204,30 @@ def print_share(share, out) -> None:
     say(f"blocks   {Path(out) / '.blocks'}; copy all shares into one, and `radarsim run` finds them")
     for warning in share.warnings:
         sys.stderr.write(f"warning: {printable(warning)}\n")
+
+
+def print_facts(facts: Mapping[str, str]) -> None:
+    """Labels and what there is to say of them, a line each."""
+    width = max(map(len, facts))
+    for label, words in facts.items():
+        say(f"{label:<{width}}  {words}")
+
+
+def print_inspection(found) -> None:
+    """What a look over a result found; its faults are told as errors."""
+    say(f"{found.folder}: {plural(found.outputs, 'output')} and {plural(found.pieces, 'stored piece')} checked")
+    if found.recomputed:
+        pieces = plural(len(found.recomputed), "piece")
+        say(f"computed again: {pieces}, {found.realisations:,} realisations")
+    for note in found.notes:
+        say(f"note: {note}")
+    say("all whole" if not found.faults else f"{plural(len(found.faults), 'fault')} found")
+
+
+def print_cleaned(cleaned, dry_run: bool) -> None:
+    """How much was dropped, or would be."""
+    what = f"{plural(cleaned.files, 'file')} of {plural(cleaned.identities, 'case')}, {cleaned.size / 1e6:.1f} MB"
+    say(f"{'would drop' if dry_run else 'dropped'} {what} in {cleaned.path}")
 
 
 def print_claims(rows: Sequence[dict]) -> None:

@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 
 
 def text(document: object) -> str:
@@ -19,6 +20,11 @@ def _plain(value: object) -> object:
     if hasattr(value, "item"):  # NumPy's numbers
         value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def fields(one) -> dict:
+    """A dataclass as it is, paths as text."""
+    return {key: str(value) if isinstance(value, Path) else value for key, value in asdict(one).items()}
 
 
 def result(one) -> dict:

@@ -77,13 +77,14 @@ def distance(table: str, one: bytes, other: bytes) -> float:
         numbers = columns[columns.index(FIRST_NUMBER[table]) :]
         if any(a.get(name) != b[name] for name in columns if name not in numbers):
             return float("inf")
-        scale = float(b["sigma"] or 1) if table == "curves" else 100.0
+        scale = float(b["sigma"] or 1) if table == "curves" else 100.0  # ends of intervals may lie far above σ
         for name in numbers:
             if (a.get(name) or "") == b[name]:
                 continue
             if not (a.get(name) and b[name]):
                 return float("inf")
-            farthest = max(farthest, abs(float(a[name]) - float(b[name])) / scale)
+            difference = abs(float(a[name]) - float(b[name]))
+            farthest = max(farthest, difference / max(scale, abs(float(b[name]))))
     return farthest
 
 

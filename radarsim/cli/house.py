@@ -2,7 +2,8 @@
 
 import click
 
-from radarsim.cli.group import json_option, main
+from radarsim.cli.group import Count, json_option, main, out_option, seed_option, set_option
+from radarsim.errors import StoreError
 
 
 @main.command(name="list")
@@ -34,3 +35,76 @@ def schema():
     from radarsim.config.json_schema import schema_json
 
     click.echo(schema_json(), nl=False)
+
+
+@main.command()
+@click.argument("result", required=False, metavar="[RESULT]")
+@click.option("--recompute", type=Count(), default=0, metavar="N", help="Compute N stored pieces of each case again.")
+@json_option
+def doctor(result, recompute, as_json):
+    """The machine, and a self-test with known answers; of RESULT: is all that is stored of it whole?
+
+    RESULT is a folder such as results/rls2. Every output is checked against run.json, every stored block of its cases
+    against its checksum, every total against its blocks; --recompute computes the N smallest pieces of each case again.
+    Damage ends in exit code 4 and names each file: `radarsim run` computes what is missing, `radarsim report` makes
+    tables anew.
+
+    \b
+    Examples
+      radarsim doctor
+      radarsim doctor results/rls2 --recompute 3
+    """
+    if recompute and result is None:
+        raise click.UsageError("--recompute needs a RESULT: a folder such as results/rls2")
+    from radarsim import console, doctor, documents
+
+    if result is None:
+        from radarsim import selftest
+
+        facts = doctor.machine()
+        if not as_json:
+            console.print_facts(facts)
+        verdicts = selftest.verdicts()
+        if as_json:
+            click.echo(documents.text({**facts, "self-test": [documents.fields(verdict) for verdict in verdicts]}))
+        else:
+            console.print_facts({f"self-test {verdict.study}": verdict.words for verdict in verdicts})
+        bad = [f"self-test: {verdict.study}: {verdict.words}" for verdict in verdicts if not verdict.good]
+    else:
+        found = doctor.inspected(result, recompute)
+        if as_json:
+            click.echo(documents.text(documents.fields(found)))
+        else:
+            console.print_inspection(found)
+        bad = found.faults
+    if bad:
+        raise StoreError(*bad)
+
+
+@main.command()
+@click.argument("configs", nargs=-1, metavar="[CONFIG…]")
+@seed_option
+@set_option
+@out_option
+@click.option("--dry-run", is_flag=True, help="Remove nothing; say how much it would be.")
+@json_option
+def clean(configs, seed, overrides, out, dry_run, as_json):
+    """Drop stored blocks, all or of some configs; tables, figures and reports stay.
+
+    Without CONFIG all blocks below DIR/.blocks, those of older configs and older versions too. Nothing else is touched.
+
+    \b
+    Examples
+      radarsim clean --dry-run
+      radarsim clean rls2 --out results
+    """
+    from radarsim import cleaning, console, documents, experiment
+
+    if not configs and (overrides or seed is not None):
+        raise click.UsageError("--set and --seed need a CONFIG whose blocks they mean")
+    chosen = experiment.load_all(configs, experiment.merged(overrides, None, seed)) if configs else None
+    cleaned = cleaning.clean(out, chosen, dry_run)
+    if as_json:
+        click.echo(documents.text(documents.fields(cleaned) | {"dry_run": dry_run}))
+    else:
+        console.print_cleaned(cleaned, dry_run)
