@@ -36,7 +36,7 @@ def detection(k, shift, coordinates: int = 1):
 def shift_for(probability: float, k: float) -> float:
     """Acceleration in units of σ_a that one coordinate's test at threshold k detects with that probability.
 
-    Zero where false alarms alone reach it. At k = 1 and 0.68 it is 1.456.
+    Zero where false alarms alone reach it. At k = 1 and 0.683 it is 1.456.
     """
     from scipy.optimize import brentq
 
@@ -58,9 +58,9 @@ def acceleration_law(
 
 
 def by_then(p: np.ndarray) -> np.ndarray:
-    """Probability (n,) of a first event up to each of n independent tests of probabilities p (n,).
+    """Probability (…, n) of a first event up to each of n independent tests of probabilities p (…, n).
 
     Overlapping windows are not independent, and their law is a multivariate normal one without a closed form. Where no
     target manoeuvres and errors are white it is an upper bound there (Šidák 1967): alarms come in runs.
     """
-    return 1 - np.cumprod(1 - p)
+    return 1 - np.cumprod(1 - p, axis=-1)

@@ -18,6 +18,7 @@ from radarsim.engine.moments import Layout
 from radarsim.engine.results import Axes, Track
 from radarsim.filters import sonar as filters
 from radarsim.filters import sonar_banks as banks
+from radarsim.filters.sonar_recorded import followed
 from radarsim.kernels import sonar as kernels
 from radarsim.kernels import sonar_patterns as pattern_kernels
 from radarsim.models import sonar as models
@@ -239,21 +240,29 @@ def track(case: Case, recorded: dict[str, np.ndarray]) -> Track:
     needs both range and bearing. Further sonars of the config play no part: all plots are taken as the first one's.
     """
     spec, t = case.spec, recorded["t_s"] - recorded["t_s"][0]
-    wanted, columns = choices(spec), list(recorded.values())[1:]
+    wanted, columns = manoeuvres.answered(spec, choices(spec)), list(recorded.values())[1:]
     z, weight, sigma = measured(spec, columns)
-    size = max(choice.size for choice in wanted)
-    estimate, spread = np.full((2, len(wanted), len(t), len(z), size), np.nan)
+    plots = [filters.Plots(t, w[None], spec.sensor.scan_period_s, unit) for w, unit in zip(weight, sigma, strict=True)]
+    size, period = max(choice.size for choice in wanted), spec.sensor.scan_period_s
+    x, P = np.zeros((len(wanted), len(t), len(z), 3)), np.zeros((len(wanted), len(t), len(z), 3, 3))
+    known = np.zeros(x.shape, dtype=bool)
+    answering = [f for f, choice in enumerate(wanted) if choice.answer]
+    if answering:
+        x[answering], P[answering] = followed([wanted[f] for f in answering], t, period, sigma, z, weight)
     for f, choice in enumerate(wanted):
         for c in range(len(z)):
-            plots = filters.Plots(t, weight[c][None], spec.sensor.scan_period_s, sigma[c])
-            x, P = banks.applied(choice, c, plots, z[c])
-            known = np.arange(size) < np.minimum(plots.moments()[0], choice.size)[:, None]
-            estimate[f, :, c] = np.where(known, x[:, :size], np.nan)
-            variance = np.diagonal(P, axis1=1, axis2=2)[:, :size]
-            spread[f, :, c] = np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)
-    flat = (len(wanted), len(t), len(z) * size)
-    names = tuple(f.name for f in spec.filters)
-    return Track(names, labels(spec, size), recorded["t_s"], estimate.reshape(flat), spread.reshape(flat))
+            if not choice.answer:
+                x[f, :, c], P[f, :, c] = banks.applied(choice, c, plots[c], z[c])
+            known[f, :, c] = np.arange(3) < np.minimum(plots[c].moments()[0], choice.size)[:, None]
+    variance = np.diagonal(P, axis1=3, axis2=4)
+    estimate, spread = np.where(known, x, np.nan), np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)
+    flat, components = (len(wanted), len(t), len(z) * size), labels(spec, size)
+    estimate, spread = estimate[..., :size].reshape(flat), spread[..., :size].reshape(flat)
+    if spec.uses is not None:
+        found = manoeuvres.uses_of(spec, t, x, P, known)
+        components += manoeuvres.QUANTITIES
+        estimate, spread = (np.concatenate(pair, axis=2) for pair in zip((estimate, spread), found, strict=True))
+    return Track(tuple(f.name for f in spec.filters), components, recorded["t_s"], estimate, spread)
 
 
 def measured(spec, columns: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

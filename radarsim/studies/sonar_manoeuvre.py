@@ -22,6 +22,8 @@ from radarsim.models import sonar as models
 from radarsim.models import uses as tracks
 from radarsim.studies.sonar_scene import Scene, angular, courses, plots_of
 
+QUANTITIES = tracks.QUANTITIES
+
 
 @dataclass(frozen=True)
 class Watched:
@@ -193,6 +195,20 @@ def true_uses(spec, seen: Scene, at: np.ndarray) -> np.ndarray:
     _, later = courses(spec.target, t + horizon, None)
     found[:, 2:4] = later[:, :2, 0]
     return found
+
+
+def uses_of(spec, t: np.ndarray, x: np.ndarray, P: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Uses of tracks and their first-order σ (F, n, 6), not-a-number where a state is not complete.
+
+    t (n,) from the first plot; x (F, n, C, 3), P (F, n, C, 3, 3) and known (F, n, C, 3), of which the first two
+    coordinates count.
+    """
+    state, polar, own = x[:, :, :2, :2], spec.frame == "polar", own_ship(spec, t)
+    spread = np.stack([P[:, :, :2, 0, 0], P[:, :, :2, 0, 1], P[:, :, :2, 1, 1]], axis=-1)
+    ready = known[:, :, :2, :2].all(axis=(2, 3))[..., None]
+    found = tracks.uses(tracks.flat(state, polar), own, spec.uses.horizon_s)
+    variance = tracks.variances(state, spread, polar, own, spec.uses.horizon_s)
+    return np.where(ready, found, np.nan), np.where(ready, np.sqrt(variance), np.nan)
 
 
 def use_sums(spec, seen: Scene, at: np.ndarray, kept: np.ndarray) -> np.ndarray:

@@ -66,7 +66,7 @@ CLAIMS = (
             ),
         ),
         "the paper names no manoeuvre; taken: k = 1 and an acceleration of one σ_a, which is where its threshold then "
-        "lies. 0.683 is the probability of no alarm without a manoeuvre; 0.68 is detected of 1.456 σ_a",
+        "lies. 0.683 is the probability of no alarm without a manoeuvre; as often are 1.456 σ_a detected",
         CONFIG,
     ),
     Claim(
