@@ -89,11 +89,11 @@ class Tracker:
         spec = self.case.spec
         made = sonar.track(self.case, recorded)
         z, weight, sigma = sonar.measured(spec, list(recorded.values())[1:])
-        size = made.estimate.shape[2] // len(z)
-        residual = np.where(weight > 0, z, np.nan).T[None] - made.estimate[..., ::size]
+        at = [made.components.index(coordinate) for coordinate in sonar.coordinates(spec)]
+        residual = np.where(weight > 0, z, np.nan).T[None] - made.estimate[..., at]
         with np.errstate(divide="ignore", invalid="ignore"):
             variance = np.where(weight > 0, sigma[:, None] ** 2 / weight, np.nan).T[None]
-            freedom = variance - made.sigma[..., ::size] ** 2
+            freedom = variance - made.sigma[..., at] ** 2
             # For least squares and Kalman filters the residual left after the update has variance R - P, and its square
             # over that is the squared innovation over its own.
             nis = np.where(freedom > LEAST_FREEDOM * variance, residual**2 / freedom, np.nan)
