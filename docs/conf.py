@@ -32,14 +32,15 @@ autodoc_typehints_format = "short"
 nitpick_ignore_regex = [
     ("py:.*", r"(np|numpy|pd|pandas|matplotlib|collections|os|pathlib|types|numba|click|pydantic|markupsafe)\..*"),
     ("py:class", r"radarsim\.config\.fields\..*"),  # their keys have a page of their own
+    ("py:class", r"dict\[.*"),  # a subscript that autodoc takes for a name
 ]
 
 html_theme = "furo"
 html_title = f"radarsim {version}"
 html_copy_source = False
 html_show_sourcelink = False
-pygments_style = "friendly"
-pygments_dark_style = "monokai"
+html_static_path = ["style"]
+html_css_files = ["page.css"]
 
 
 def setup(app):

@@ -80,7 +80,8 @@ def words(name: str) -> str:
 def taken(part: dict, definitions: dict) -> str:
     """What a key takes, in words: type, choices, bounds."""
     if "$ref" in part:
-        return title(references(part)[0], definitions)
+        name = title(references(part)[0], definitions)
+        return f"`{name}`" if name.startswith("kind") else name
     choices = [*part.get("anyOf", ()), *part.get("oneOf", ())]
     if choices:
         return ", or ".join(dict.fromkeys(taken(choice, definitions) for choice in choices))
@@ -111,4 +112,6 @@ def written(value: object) -> str:
             return f"{value:g}"
         case int() if value >= 10**9 and str(value).rstrip("0") == "1":
             return f"1e{len(str(value)) - 1}"
+        case int() if value >= 2**32 and value & (value + 1) == 0:
+            return f"2^{value.bit_length()} − 1"
     return str(value)

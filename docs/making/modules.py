@@ -57,7 +57,7 @@ def public(module: ModuleType) -> list[tuple[str, object]]:
     found = []
     for name, value in vars(module).items():
         inner = getattr(value, "py_func", value)
-        is_ours = getattr(inner, "__module__", None) == module.__name__
+        is_ours = (getattr(inner, "__module__", None), getattr(inner, "__name__", None)) == (module.__name__, name)
         if not name.startswith("_") and is_ours and (inspect.isfunction(inner) or inspect.isclass(inner)):
             found.append((name, inner))
     return found

@@ -37,8 +37,10 @@ class Burst(Model):
     pulse_length_s: Positive = Field(description="length of a pulse, s")
     sampling_period_s: Positive = Field(description="time from sample to sample inside a pulse, s")
     pulses: whole(FEWEST_PULSES, MOST_SAMPLES) = Field(description="number of pulses")
-    amplitude: Positive = Field(description="amplitude of the echo")
-    noise_variance: Positive = Field(description="variance of the white noise in each real number sampled")
+    amplitude: Positive = Field(description="amplitude of the echo, in the samples' unit")
+    noise_variance: Positive = Field(
+        description="variance of the white noise in each real number sampled, in the samples' unit squared"
+    )
     samples: Literal["real", "complex"] = Field("real", description="what the receiver gives")
 
     @cross_check
@@ -131,12 +133,14 @@ class Estimator(Model):
     schedule: Literal["designed"] | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_WINDOWS)] = (
         Field("designed", description="designed by (14)–(16), or a list of rising window lengths, s")
     )
-    lock_probability: Share = Field(0.99, description="P_Δ of a hand-over")
-    main_lobe_threshold: Positive = Field(1.0, description="c: 1 as in (10) and (14), 0.5 as in (11)")
+    lock_probability: Share = Field(0.99, description="probability P_Δ of a hand-over")
+    main_lobe_threshold: Positive = Field(1.0, description="c, no unit: 1 as in (10) and (14), 0.5 as in (11)")
     tail: Literal["gaussian", "exact"] = Field(
         "gaussian", description="law of the quadratic form: the paper's Gaussian, or the weighted sum of χ² itself"
     )
-    minimum_energy_ratio: NonNegative = Field(0.0, description="μ_min of (17), below which no window begins; 0: none")
+    minimum_energy_ratio: NonNegative = Field(
+        0.0, description="energy ratio μ_min of (17), below which no window begins; 0: none"
+    )
     density: whole(1, 10) = Field(1, description="windows for each designed one; 2: one at each geometric mean between")
     first_windows: whole(1, MOST_WINDOWS) | None = Field(None, description="stop after so many windows; default: all")
     start: Literal["prior", "truth"] = Field("prior", description="where the first window starts")

@@ -44,9 +44,9 @@ Derivatives = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
 class Correlations(Model):
     """A correlation for each coordinate; one that is not named has none."""
 
-    range: Correlation = Field(0.0, description="of the range")
-    bearing: Correlation = Field(0.0, description="of the bearing")
-    third: Correlation = Field(0.0, description="of depth or elevation")
+    range: Correlation = Field(0.0, description="correlation of the range's errors")
+    bearing: Correlation = Field(0.0, description="correlation of the bearing's errors")
+    third: Correlation = Field(0.0, description="correlation of the errors of depth or elevation")
 
     def of(self, index: int) -> float:
         """Of the coordinate of that number."""
@@ -93,7 +93,7 @@ class Sensor(Model):
     )
     further: tuple[FurtherSensor, ...] = Field((), max_length=4, description="further sonars on the same target")
     false_plots_per_km2: Annotated[NonNegative, Field(le=1e4), Design()] = Field(
-        0.0, description="mean number of false plots a scan in a square kilometre of the surveyed sector"
+        0.0, description="mean number of false plots a scan, per km² of the surveyed sector"
     )
     sector: Annotated[Sector | None, Design()] = Field(
         None, description="the surveyed sector, of filters with an association; outside it there are no plots"

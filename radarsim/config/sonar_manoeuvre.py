@@ -133,10 +133,10 @@ class Adapting(Model):
         None, description="tests without an alarm, in a row, that end a manoeuvre; default 1"
     )
     manoeuvre_variances: Annotated[tuple[NonNegative, NonNegative], Field()] | None = Field(
-        None, description="of the two models of an imm, steady and manoeuvring, as manoeuvre_variance"
+        None, description="of the two models of an imm, steady and manoeuvring, (m/s²)², as manoeuvre_variance"
     )
     stay_probabilities: Annotated[tuple[Rate, Rate], Field()] | None = Field(
-        None, description="of an imm: that the steady and the manoeuvring model last from scan to scan"
+        None, description="of an imm: probabilities that the steady and the manoeuvring model last from scan to scan"
     )
 
     @cross_check

@@ -61,10 +61,12 @@ class Tracking(Model):
         None, description="scans in a row without a plot after which a confirmed track is dropped; default 3"
     )
     speed_mps: Positive | None = Field(
-        None, description="standard deviation of a target's speed in each direction, for the second gate; default 10"
+        None,
+        description="standard deviation of a target's speed in each direction, m/s, for the second gate; default 10",
     )
     lost_beyond_sigmas: Positive | None = Field(
-        None, description="error, in σ of a plot, beyond which a track has lost its target; default 10"
+        None,
+        description="error, in standard deviations of a plot, beyond which a track has lost its target; default 10",
     )
 
     def tracker(self, key: str) -> float:

@@ -1,0 +1,1 @@
+"""Monte Carlo without a word of radar: blocks of realisations, sums that add, threads, a store, stopping."""

@@ -36,7 +36,7 @@ def fisher(burst: Burst, size: int, duration_s: float) -> np.ndarray:
 
 
 def fisher_sum(burst: Burst, size: int, pulses: int, theta: np.ndarray | None = None) -> np.ndarray:
-    """Fisher matrix of the samples of the first `pulses` pulses as a sum.
+    """Fisher matrix (size, size) of the samples of the first `pulses` pulses as a sum; theta (size,).
 
     With the true θ the sum is exact; without, sin² of the phase is replaced by its mean ½, as in the closed form.
     """
@@ -78,12 +78,12 @@ def prior_information(sigma: np.ndarray) -> np.ndarray:
 
 
 def radial_motion(sigma: np.ndarray, wavelength_m: float) -> np.ndarray:
-    """Spreads of radial velocity (m/s), acceleration (m/s²), … from those of f₀, f₁, … : v = λ f / 2."""
+    """Spreads (n - 1,) of radial velocity (m/s), acceleration (m/s²), … from those of θ, (n,): v = λ f / 2."""
     return 0.5 * wavelength_m * np.asarray(sigma)[1:]
 
 
 def derivative_spread(covariance: np.ndarray, order: int, t_s: float) -> float:
-    """Spread of the frequency's derivative of this order at time t within the burst, from the covariance of θ.
+    """Spread of the frequency's derivative of this order at time t within the burst, from the covariance (n, n) of θ.
 
     The beginning of the burst, where θ is defined, is the worst place: in the middle it is known many times better.
     """

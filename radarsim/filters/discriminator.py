@@ -40,7 +40,7 @@ def spread_factor(probability: float) -> float:
 
 
 def tail_probability(weights: np.ndarray, threshold: float) -> float:
-    """P(Σ wᵢ χ²₁ > c) for weights ≥ 0, to about 10⁻¹².
+    """P(Σ wᵢ χ²₁ > c) for weights (n,) ≥ 0, to about 10⁻¹².
 
     Laplace inversion of the moment generating function Π(1 − 2wᵢs)^(−½) along a parabola that starts between the pole
     at 0 and the first branch point and bends around the cut, where exp(−sc) makes the integrand vanish like a Gaussian.
@@ -60,7 +60,7 @@ def tail_probability(weights: np.ndarray, threshold: float) -> float:
 
 
 def excess(weights: np.ndarray, condition: Condition) -> float:
-    """Negative where the hand-over is safe, growing with the errors: the left side of (14) less c, or the tail."""
+    """Negative where a hand-over with weights (n,) is safe: the left side of (14) less c, or the tail's excess."""
     if condition.tail == "exact":
         return tail_probability(weights, condition.threshold) - (1.0 - condition.probability)
     spread = math.sqrt(2.0 * float(np.sum(weights**2)))

@@ -12,7 +12,7 @@ from radarsim.kernels.discriminator_scoring import Z0 as SUM_Z
 
 
 def block_edges(windows: list[int], per_window: int, whole: int = 1) -> np.ndarray:
-    """Pulses where blocks begin and end: every window ends one, and none is longer than its time over per_window.
+    """Pulses (B + 1,) where B blocks begin and end: every window ends one, none longer than its time over per_window.
 
     Long ones are multiples of `whole`: with 8, demodulation fills its registers, at the price of a third more blocks.
     """
@@ -29,7 +29,7 @@ def block_edges(windows: list[int], per_window: int, whole: int = 1) -> np.ndarr
 
 
 def merged(edges: np.ndarray, pulses: int, per_window: int) -> list[int]:
-    """Indices in edges where a window's blocks end: as few as may be, none longer than the window over per_window.
+    """Indices in edges (B + 1,) where a window's blocks end: as few as may be, none longer than it over per_window.
 
     A block that was drawn longer stays alone.
     """

@@ -52,7 +52,7 @@ def least_squares_start(observes: int, start: int, sigma: np.ndarray, dt: float)
 def design(
     observes: int, start: int, manoeuvre_variance: float, sigma: np.ndarray, dt: float, scans: int
 ) -> LinearFilter:
-    """The paper's filter: least squares on `start` scans, then eqs. (5), (9), (13) with M of eq. (6).
+    """The paper's filter: least squares on `start` scans, then eqs. (5), (9), (13) with M of eq. (6); sigma (2,).
 
     Before the start the estimates are the plots themselves: the range, and the velocity where it is observed.
     """

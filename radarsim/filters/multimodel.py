@@ -88,7 +88,7 @@ def start_weights(t: np.ndarray, acceleration_spread: float) -> np.ndarray:
 def operations(family: str, transition: np.ndarray) -> tuple[float, float, float]:
     """Arithmetic operations of one scan: fixed ones, and those of each merged hypothesis and of each merge.
 
-    Merges of a single hypothesis are copies and cost nothing.
+    transition (N, N) is that of N models. Merges of a single hypothesis are copies and cost nothing.
     """
     size = len(transition)
     advanced = np.count_nonzero(transition) if family == "gpb2" else size

@@ -84,7 +84,7 @@ def switching(answers: Sequence, plots: Sequence[int], trials: Trials, coordinat
 
 
 def interacting(answers: Sequence, sizes: Sequence[int], period: float, nominal: np.ndarray) -> Interacting:
-    """Models of F filters in nominal plots and periods; those of filters without any are not read."""
+    """Models of F filters in nominal plots (C,) and periods; those of filters without any are not read."""
     manoeuvre, stay = np.zeros((len(answers), len(nominal), 2)), np.full((len(answers), 2), 0.5)
     for f, models in enumerate(answers):
         if isinstance(models, Models):

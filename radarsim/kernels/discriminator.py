@@ -63,6 +63,7 @@ OPTIONS = np.dtype(
 
 @inline
 def from_nearest_turn(turns):
+    """Turns, less the nearest whole number of them."""
     return turns - np.rint(turns)
 
 
@@ -131,6 +132,7 @@ def scoring_step(physics, window, state, coherence):
 
 @inline
 def move_along(window, state, radians):
+    """Move state.x along the direction of a window by so many radians rms."""
     for j in range(SIZE):
         state.x[j] += radians * window.direction[j]
 

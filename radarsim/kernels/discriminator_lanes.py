@@ -25,6 +25,7 @@ BEST, CHOSEN, BEGUN, KEPT, ALONG, ROWS = 29, 30, 31, 37, 43, 49
 
 @inline
 def fraction(turns):
+    """Turns, less the nearest whole number of them."""
     return turns - nearest(turns)
 
 

@@ -72,16 +72,19 @@ def number(m):
 
 @inline
 def polynomial(b0, b1, b2, b3, b4, b5, t):
+    """Σ bⱼ tʲ by Horner's scheme, j = 0 … 5."""
     return ((((b5 * t + b4) * t + b3) * t + b2) * t + b1) * t + b0
 
 
 @inline
 def derivative(b1, b2, b3, b4, b5, t):
+    """d/dt of `polynomial`."""
     return (((5.0 * b5 * t + 4.0 * b4) * t + 3.0 * b3) * t + 2.0 * b2) * t + b1
 
 
 @inline
 def second_derivative(b2, b3, b4, b5, t):
+    """d²/dt² of `polynomial`."""
     return ((20.0 * b5 * t + 12.0 * b4) * t + 6.0 * b3) * t + 2.0 * b2
 
 

@@ -51,16 +51,19 @@ def work_arrays() -> tuple[np.ndarray, np.ndarray]:
 
 @inline
 def get3(pointer, first):
+    """Three neighbours in memory, from number `first` on."""
     return get(pointer, first), get(pointer, first + 1), get(pointer, first + 2)
 
 
 @inline
 def get6(pointer, first):
+    """Six neighbours in memory, from number `first` on."""
     return get3(pointer, first) + get3(pointer, first + 3)
 
 
 @inline
 def put3(pointer, first, x):
+    """Write three neighbours, from number `first` on."""
     put(pointer, first, x[0])
     put(pointer, first + 1, x[1])
     put(pointer, first + 2, x[2])
@@ -68,12 +71,14 @@ def put3(pointer, first, x):
 
 @inline
 def put6(pointer, first, x):
+    """Write six neighbours, from number `first` on."""
     put3(pointer, first, (x[0], x[1], x[2]))
     put3(pointer, first + 3, (x[3], x[4], x[5]))
 
 
 @inline
 def put9(pointer, first, x):
+    """Write nine neighbours, from number `first` on."""
     put6(pointer, first, (x[0], x[1], x[2], x[3], x[4], x[5]))
     put3(pointer, first + 6, (x[6], x[7], x[8]))
 
@@ -94,6 +99,7 @@ def mixed_mean(listed, count, shares, means):
 
 @inline
 def offset(means, hypothesis, mean):
+    """Three numbers of a hypothesis' mean less those of `mean`."""
     x = get3(means, hypothesis)
     return x[0] - mean[0], x[1] - mean[1], x[2] - mean[2]
 
@@ -166,6 +172,7 @@ def mixed(work, listed, count):
 
 @inline
 def written(target, means, own, cross):
+    """Write means and packed covariances of the three axes into a hypothesis."""
     put9(target, MEAN, means[0] + means[1] + means[2])
     put6(target, OWN, own[0])
     put6(target, OWN + 6, own[1])

@@ -108,6 +108,7 @@ def foretold(work, bank, size, i):
 
 @inline
 def smaller(x, y):
+    """The smaller of two, lane by lane."""
     return where_greater(x, y, y, x)
 
 

@@ -112,6 +112,7 @@ def close_stages(stages, filters, count, lengths, counted, sums, pairs):
 
 @inline
 def clear(rows, count):
+    """Set `count` rows to zero."""
     for n in range(count):
         put(rows, n, full(0.0))
 

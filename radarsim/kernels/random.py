@@ -26,11 +26,13 @@ def stream(seed: int, name: str) -> np.ndarray:
 
 @inline
 def rotated(x, n):
+    """A 64-bit word rotated to the left by n bits."""
     return (x << n) | (x >> (U(64) - n))
 
 
 @inline
 def four_rounds(x0, x1, a, b, c, d):
+    """Four rounds of Threefry2x64 with these rotations (Salmon et al. 2011)."""
     x0 += x1
     x1 = rotated(x1, a) ^ x0
     x0 += x1

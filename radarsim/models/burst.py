@@ -66,7 +66,7 @@ def phase_turns(theta: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 
 def signal(burst: Burst, turns: np.ndarray) -> np.ndarray:
-    """Noise-free samples at phases in turns: A cos (4), or A exp j where the receiver gives complex numbers."""
+    """Noise-free samples at phases in turns, any shape: A cos (4), or A exp j where the receiver gives complex ones."""
     angle = 2.0 * math.pi * (turns - np.rint(turns))
     return burst.amplitude * (np.exp(1j * angle) if burst.complex_samples else np.cos(angle))
 
@@ -112,6 +112,6 @@ def fitted_parameters(turns: np.ndarray, t: np.ndarray, size: int) -> np.ndarray
 
 
 def balanced_inverse(information: np.ndarray) -> np.ndarray:
-    """Inverse of a positive definite matrix whose rows differ by many orders of magnitude, as those of θ's units do."""
+    """Inverse (n, n) of a positive definite matrix whose rows differ by many orders of magnitude, as θ's units do."""
     scale = 1.0 / np.sqrt(np.diag(information))
     return np.linalg.inv(information * np.outer(scale, scale)) * np.outer(scale, scale)

@@ -32,8 +32,10 @@ def to_local(antenna: np.ndarray, R: np.ndarray, height: float) -> np.ndarray:
 
 
 def normal_cosine(biconical: np.ndarray) -> np.ndarray:
-    """Cosine (…) of the angle from the antenna's normal, sqrt(1 - sin² e - sin² a); raises OutsideSector where it is
-    not > 0."""
+    """Cosine (…) of the angle from the antenna's normal of biconical (…, 3), sqrt(1 - sin² e - sin² a).
+
+    Raises OutsideSector where it is not > 0.
+    """
     square = 1.0 - np.sin(biconical[..., 1]) ** 2 - np.sin(biconical[..., 2]) ** 2
     # |e| + |a| >= 90° is no direction in front of the antenna.
     if not np.all((square > 0) & (np.abs(biconical[..., 1:]).sum(axis=-1) < math.pi / 2)):

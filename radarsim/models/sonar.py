@@ -16,7 +16,7 @@ PLACED = 8  # plots in the mean place at which the unbiased conversion's covaria
 
 # ---- errors of plots -------------------------------------------------------------------------------------------------
 def correlation(rho: float, lags: np.ndarray) -> np.ndarray:
-    """ρ to the power of the lags, in periods (P3 eq. 15).
+    """ρ to the power of the lags in periods, of any shape (P3 eq. 15).
 
     A negative ρ means something at whole periods only: lags are rounded.
     """

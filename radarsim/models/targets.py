@@ -13,20 +13,20 @@ STANDARD_GRAVITY_MPS2 = 9.80665  # ISO 80000-3
 
 
 def polynomial(coefficients: Sequence[float], t: np.ndarray) -> np.ndarray:
-    """Σ cᵢ tⁱ / i! with its first two derivatives; the coefficients are the derivatives at t = 0 (m, m/s, m/s², …)."""
+    """Σ cᵢ tⁱ / i! and two derivatives, (K, 3) at times t (K,); the cᵢ are derivatives at t = 0 (m, m/s, m/s², …)."""
     series = np.polynomial.Polynomial([c / math.factorial(i) for i, c in enumerate(coefficients)])
     return np.stack([series(t), series.deriv(1)(t), series.deriv(2)(t)], axis=1)
 
 
 def acceleration_start(coefficients: Sequence[float], acceleration: float, start: float, t: np.ndarray) -> np.ndarray:
-    """A polynomial whose acceleration grows by `acceleration` (m/s²) from `start` (s) on."""
+    """A polynomial whose acceleration grows by `acceleration` (m/s²) from `start` (s) on: (K, 3) at times t (K,)."""
     since = np.maximum(t - start, 0.0)
     step = np.stack([since**2 / 2, since, np.where(t >= start, 1.0, 0.0)], axis=1)
     return polynomial(coefficients, t) + acceleration * step
 
 
 def jerk_pulse(coefficients: Sequence[float], jerk: float, start: float, duration: float, t: np.ndarray) -> np.ndarray:
-    """A polynomial with a constant jerk (m/s³) from `start` for `duration` (s); the acceleration built up stays."""
+    """A polynomial with a constant jerk (m/s³) from `start` for `duration` (s), then acceleration: (K, 3) at t (K,)."""
 
     def ramp(onset):
         since = np.maximum(t - onset, 0.0)
@@ -42,6 +42,7 @@ def turn(
 
     range_0 (m) at t = 0; speed (m/s); aspect (rad) of the velocity from the direction away from the radar (pi: straight
     in); acceleration_g the lateral acceleration in standard gravities, positive to the left; start and duration in s.
+    Gives range, radial velocity and acceleration (K, 3) at times t (K,).
     """
     rate = acceleration_g * STANDARD_GRAVITY_MPS2 / speed
     turned = rate * np.clip(t - start, 0.0, duration)

@@ -1,0 +1,1 @@
+"""From sums to tables, figures, verdicts and the page of a run."""
