@@ -55,6 +55,9 @@ class Track:
     What tells whether the stated accuracies fit, where a study gives it: residual (F, n, D), the plot less the
     estimate, of the measured (name, unit); nis (F, n, Q), the squared innovation over its believed variance, of the
     tested (name, degrees of freedom); not-a-number where there is no plot or no freedom.
+
+    Where filters find several tracks, a filter stands once for each: numbers (F,) tell them apart, score (F, n) is the
+    logarithm of the likelihood ratio that the track is a target's.
     """
 
     filters: tuple[str, ...]
@@ -67,3 +70,5 @@ class Track:
     residual: np.ndarray | None = None
     tested: tuple[tuple[str, int], ...] = ()
     nis: np.ndarray | None = None
+    numbers: np.ndarray | None = None
+    score: np.ndarray | None = None

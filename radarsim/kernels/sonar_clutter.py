@@ -141,7 +141,7 @@ def associate(field, rule, first, scan, n, dt, tracks, life, came, z, again, for
             life[MISSES, i] += 1.0
 
 
-@part
+@kernel
 def followed(state, hits, misses, age, m, n, most):
     """State of a track after a scan, by the rules m of n and of misses."""
     if state == TENTATIVE:
@@ -234,7 +234,7 @@ def add_ratio(a, b, n, ratio):
     """Σa, Σa², Σb, Σb², Σab over n realisations."""
     for i in range(n):
         one, other = a[i], b[i]
-        ratio[0] += 1.0
+        ratio[0] += one
         ratio[1] += one * one
         ratio[2] += other
         ratio[3] += other * other

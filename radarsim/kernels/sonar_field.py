@@ -143,8 +143,8 @@ def false_plots(k0, k1, share, grid, realisation, scan, gate, place, S, so_far):
     i_first, i_last = cells(least, most, q0, dq, nq)
     if ring:
         high = min(high, 0.5 * nb * db)
-        j_first = int(math.floor((b - high - b0) / db))
-        j_last = min(int(math.floor((b + high - b0) / db)), j_first + nb - 1)
+        j_first = math.floor((b - high - b0) / db)
+        j_last = min(math.floor((b + high - b0) / db), j_first + nb - 1)
     else:
         j_first, j_last = cells(b - high, b + high, b0, db, nb)
     for i in range(i_first, i_last + 1):
@@ -198,6 +198,16 @@ def decided(so_far, rule, r, S, settled):
         astray * per,
         score,
     )
+
+
+@kernel
+def weighed(rule, settled, r, rr, rb, bb, innovations_r, innovations_b):
+    """`decided` of given innovations (n,) of one track at range r, with innovation covariance (rr, rb, bb)."""
+    irr, irb, ibb, _ = inverse_two(rr, rb, bb)
+    so_far = nothing_seen()
+    for i in range(innovations_r.size):
+        so_far = seen(so_far, innovations_r[i], innovations_b[i], 0.0, irr, irb, ibb, rule.gate)
+    return decided(so_far, rule, r, (rr, rb, bb), settled)
 
 
 @kernel

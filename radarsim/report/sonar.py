@@ -8,6 +8,9 @@ from radarsim.engine.results import CaseResult
 from radarsim.exact import least_squares as exact
 from radarsim.exact import operations as counted
 from radarsim.report import panels, sonar_figures, statistics
+from radarsim.report import sonar_clutter as clutter
+from radarsim.report import sonar_manoeuvre as manoeuvres
+from radarsim.report import sonar_manoeuvre_words as words
 from radarsim.report import tables as common
 
 figures = sonar_figures.figures
@@ -25,6 +28,8 @@ def tables(results: Sequence[CaseResult]) -> dict:
         "conversion": common.joined([_conversion(r) for r in results if r.spec.frame != "polar"], CONVERSION),
         "operations": operations(),
     }
+    made |= clutter.tables([result for result in results if result.spec.tracking])
+    made |= manoeuvres.tables([result for result in results if result.spec.manoeuvring])
     return {name: table for name, table in made.items() if len(table)}
 
 
@@ -36,7 +41,7 @@ def textbook(result: CaseResult) -> bool:
         target.kind == "polynomial" and not target.fluctuation_mps2 and result.spec.frame == target.frame == "polar"
     )
     straight = steady and all(len(c) <= 2 or not any(c[2:]) for c in (target.range_m, target.bearing_rad))
-    return whole and straight and not result.axes.extra["rho"].any()
+    return whole and straight and not result.spec.tracking and not result.axes.extra["rho"].any()
 
 
 def coordinate_rows(result: CaseResult, mask: np.ndarray):
@@ -295,6 +300,10 @@ def operations():
 def question(experiment) -> str:
     """What the experiment asks, in one sentence."""
     specs = [case.spec for case in experiment.cases]
+    if any(spec.tracking for spec in specs):
+        return clutter.QUESTION
+    if any(spec.manoeuvring for spec in specs):
+        return words.question(specs)
     if any(spec.frame != "polar" for spec in specs):
         return "What does it cost to convert range and bearing to x and y, and when does the conversion's bias matter?"
     if any(np.any(np.array(_rho(spec)) != 0) for spec in specs):
@@ -315,9 +324,13 @@ def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
 
     Who is honest.
     """
+    tracked = [result for result in results if result.spec.tracking]
+    if tracked:
+        return clutter.answer(tracked, made)
     told = [_best(result, made["curves"]) for result in results[: panels.MOST]]
     wrong = _overconfident(results, made)
-    return [*told, *([wrong] if wrong else [])]
+    seen = words.answer([result for result in results if result.spec.manoeuvring], made)
+    return [*seen, *told, *([wrong] if wrong else [])]
 
 
 def _best(result: CaseResult, curves) -> str:

@@ -8,6 +8,8 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels
+from radarsim.report import sonar_clutter_figures as clutter
+from radarsim.report import sonar_manoeuvre_figures as manoeuvres
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
 
@@ -44,7 +46,11 @@ def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[st
         chosen, left_out = panels.shown(results, [case.name for case in experiment.shown_in(name)])
         if any(component in dict(result.axes.components) for result in chosen):
             drawn[name] = sigma_figure(name, chosen, curves, component, of, left_out)
-    return {name: figure for name, figure in (drawn | own(results, made)).items() if figure}
+    plain = [result for result in results if not result.spec.tracking]
+    drawn |= own(plain, made) if plain else {}
+    drawn |= clutter.figures([result for result in results if result.spec.tracking], made)
+    drawn |= manoeuvres.figures([result for result in results if result.spec.manoeuvring], made, QUANTITIES)
+    return {name: figure for name, figure in drawn.items() if figure}
 
 
 def own(results: Sequence[CaseResult], made: Mapping) -> dict[str, Figure | None]:

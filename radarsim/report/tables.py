@@ -93,6 +93,7 @@ def _gains(result: CaseResult) -> dict[str, np.ndarray]:
     axes, b = result.axes, result.axes.baseline
     both = np.array(axes.available[b : b + 1] & axes.available)
     both[b] = False
+    both &= "paired" in result.sums  # trackers keep tracks in realisations of their own
     at = f, k, c = shown(result, both)
     error, exact = np.asarray(result.sums["error"]), np.asarray(axes.exact_sigma, dtype=float)
     own, base = error[at], error[b, k, c]

@@ -19,11 +19,11 @@ from radarsim.kernels import sonar_clutter as kernels
 from radarsim.kernels import sonar_patterns as pattern_kernels
 from radarsim.kernels.sonar_field import Field
 from radarsim.studies import noise_key
+from radarsim.studies.sonar_clutter_plots import COMPONENTS, chosen, realised
 from radarsim.studies.sonar_exact import exact_values
-from radarsim.studies.sonar_scene import Scene, angular, choices, plots_of
+from radarsim.studies.sonar_scene import Scene, choices, plots_of
 
 BLOCK = 4096
-COMPONENTS = (("r", "m"), ("vr", "m/s"), ("b", "rad"), ("vb", "rad/s"))
 COORDINATES = (("r", "m"), ("b", "rad"))
 
 
@@ -40,22 +40,6 @@ class Plan:
     seeds: np.ndarray
     trackers: kernels.Trackers
     block: int = BLOCK
-
-
-def chosen(spec) -> list[design.Choice]:
-    """The trackers of a case."""
-    return [
-        design.Choice(
-            f.association,
-            f.tracker("gate_probability"),
-            *f.m_of_n(),
-            int(f.tracker("drop_after_misses")),
-            f.tracker("speed_mps"),
-            f.tracker("lost_beyond_sigmas"),
-            (f.manoeuvre_variance or 0.0) * angular(spec, 2),
-        )
-        for f in spec.filters
-    ]
 
 
 def detected(spec, seen: Scene) -> np.ndarray:
@@ -97,7 +81,7 @@ def prepare(case: Case, seen: Scene, world: sonar_kernels.World) -> Plan:
     )
     return Plan(
         layout=layout,
-        axes=axes(spec, seen, certain, wanted),
+        axes=axes(spec, seen, certain, wanted, lambda: realised(spec, world, sight, fields[0], wanted)),
         world=world,
         sight=sight,
         field=fields[0],
@@ -107,7 +91,7 @@ def prepare(case: Case, seen: Scene, world: sonar_kernels.World) -> Plan:
     )
 
 
-def axes(spec, seen: Scene, certain: np.ndarray, wanted: list[design.Choice]) -> Axes:
+def axes(spec, seen: Scene, certain: np.ndarray, wanted: list[design.Choice], realisation) -> Axes:
     """Labels, exact σ of an oracle's filters where every plot's coming is certain, exact laws of initiation."""
     F, K = len(wanted), len(seen.t)
     values = oracle_values(spec, seen, certain)
@@ -151,6 +135,7 @@ def axes(spec, seen: Scene, certain: np.ndarray, wanted: list[design.Choice]) ->
             "exact_confirmed": confirmed,
             "exact_begun": begun,
             "area_m2": sector.area_m2(),
+            "realisation": realisation,
         },
     )
 

@@ -1,0 +1,205 @@
+"""P3's figures of tracks among false plots, described: confirmation, life, accuracy, false tracks, classes, a map."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import panels
+from radarsim.report import tables as common
+from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Style
+
+KEYS = {
+    "false_plots_per_km2": ("sensor.false_plots_per_km2", "false plots per km² and scan"),
+    "detection_probability": ("sensor.detection_probability", "detection probability"),
+    "gate_probability": ("gate_probability", "gate probability"),
+}
+WIDE = 150.0
+
+
+def figures(results: Sequence[CaseResult], made: Mapping) -> dict[str, Figure | None]:
+    """The figures of these cases, all of trackers."""
+    if not results:
+        return {}
+    return {
+        "track_map": map_figure(results[0]),
+        "confirmation": confirmation_figure(results, made["tracks"]),
+        "track_life": life_figure(results, made),
+        "false_tracks": false_figure(results, made["tracking"]),
+        "track_classes": classes_figure(results, made["track_classes"]),
+    }
+
+
+def swept_over(tracking) -> tuple[str, str] | None:
+    """The column that cases differ in, and its words: density, detection probability or gate; None for one case."""
+    for column, (_, words) in KEYS.items():
+        if tracking[column].nunique() > 1 and tracking.groupby(["filter", column]).size().max() == 1:
+            return column, words
+    return None
+
+
+def confirmation_figure(results: Sequence[CaseResult], tracks) -> Figure | None:
+    """Probability of a confirmed track by time: a panel for each case, a line for each tracker."""
+    groups, drawn = common.groups(tracks, "case", "filter"), []
+    for result in results[: panels.MOST]:
+        marks = []
+        for n, f in enumerate(result.axes.filters):
+            rows = groups.get((result.name, f))
+            if rows is None:
+                continue
+            v = [rows[key].to_numpy(dtype=float) for key in ("t_s", "confirmed", "confirmed_lo", "confirmed_hi")]
+            known = rows["exact_confirmed"].to_numpy(dtype=float)
+            exact = known if np.isfinite(known).any() else None
+            marks.append(Line(v[0], v[1], panels.literal(f), Style(n, n, n), v[2], v[3], exact))
+            kept = [rows[key].to_numpy(dtype=float) for key in ("kept", "kept_lo", "kept_hi")]
+            marks.append(Line(v[0], kept[0], "", Style(n, n, None, 0.7), kept[1], kept[2]))
+        if marks:
+            keys = (("thin: kept at that time", Style(0, 0, None, 0.7)),) if not drawn else ()
+            y = Axis("probability", limits=(0, 1.02))
+            panel = Panel(Axis(panels.TIME, limits=(0, None)), y, tuple(marks), _words(result), keys, direct=False)
+            drawn.append(panel)
+    if not drawn:
+        return None
+    left = len(results) - panels.MOST
+    caption = (
+        f"Probability that a track of the target was confirmed by that time, of {panels.realisations(results)}; thin "
+        "lines: that a confirmed track is there and on the target. Bands: 95 % intervals. Crosses: exact."
+    ) + (f" {left} further cases are in the tables alone." if left > 0 else "")
+    return Figure(
+        "confirmation", "Probability of a confirmed track", caption, tuple(drawn), min(2, len(drawn)), PAGE_MM
+    )
+
+
+def _words(result: CaseResult) -> str:
+    """A case's swept keys as words."""
+    names = dict(KEYS.values())
+    parts = [f"{names.get(key, panels.symbol_of(key))}: {panels.number(value)}" for key, value in result.swept]
+    return ", ".join(parts)
+
+
+def life_figure(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
+    """Track life, time to confirmation, wrong plots and accuracy of the kept tracks over what is swept."""
+    tracking = made["tracking"]
+    over = swept_over(tracking)
+    if over is None:
+        return None
+    column, words = over
+    axis = Axis(words)
+    shown = {
+        "life": ("life_s", Axis("track life, s", "log")),
+        "time": ("time_to_confirm_s", Axis("time to confirmation, s", limits=(0, None))),
+        "wrong": ("wrong_share", Axis("share of wrong plots", limits=(0, None))),
+    }
+    found = tuple(
+        Panel(axis, y, tuple(_lines(tracking, column, value, ends)), direct=False) for ends, (value, y) in shown.items()
+    )
+    values = [(result.name, row) for result in results for row in [_place(tracking, result.name, column)]]
+    accuracy = _lines(_at_end(results, made["curves"], dict(values), column), column, "sigma", "sigma")
+    y = Axis("$\\sigma$ of $r$ of kept tracks, m", limits=(0, None))
+    found += (Panel(axis, y, tuple(accuracy), direct=False),)
+    caption = (
+        "Mean time between ends of a confirmed track (no point: no end was seen), mean time to its confirmation, "
+        "weight of false plots among those taken, and root-mean-square error of the range of the tracks kept at the "
+        f"end, of {panels.realisations(results)}. Bands: 95 % intervals."
+    )
+    return Figure("track_life", "Track life and accuracy", caption, found, 2, PAGE_MM, 58)
+
+
+def _place(tracking, case: str, column: str) -> float:
+    """The swept value of a case."""
+    rows = tracking[tracking["case"] == case]
+    return float(rows[column].iloc[0])
+
+
+def _at_end(results: Sequence[CaseResult], curves, values: Mapping, column: str):
+    """Rows of the range's σ at the last scan, with the swept value of their case."""
+    rows = curves[(curves["component"] == "r") & (curves["k"] == results[0].axes.k[-1])]
+    return rows.assign(**{column: rows["case"].map(values)})
+
+
+def _lines(table, x: str, value: str, ends: str) -> list[Line]:
+    """A line for each filter of a table's value over x, where it is finite, an infinite end of an interval left out."""
+    lines = []
+    for n, (name, rows) in enumerate(table.groupby("filter", sort=False)):
+        rows = rows[np.isfinite(rows[value])].sort_values(x)
+        y, lo, hi = (rows[key].to_numpy(dtype=float) for key in (value, f"{ends}_lo", f"{ends}_hi"))
+        lo, hi = np.where(np.isfinite(lo), lo, y), np.where(np.isfinite(hi), hi, y)
+        lines.append(Line(rows[x].to_numpy(dtype=float), y, panels.literal(name), Style(n, n, n), lo, hi))
+    return lines
+
+
+def false_figure(results: Sequence[CaseResult], tracking) -> Figure | None:
+    """False tracks an hour over what is swept, on a logarithmic axis."""
+    over = swept_over(tracking)
+    rows = tracking[tracking["false_tracks_per_hour"] > 0]
+    if over is None or rows.empty:
+        return None
+    column, words = over
+    lines = [Line(m.x, m.y, m.label, m.style, np.maximum(m.lo, m.y / 10), m.hi) for m in _lines(rows, column, *FALSE)]
+    rules = {row["filter"]: f"{row['m']:.0f} of {row['of']:.0f}" for _, row in rows.iterrows()}
+    lines = [Line(m.x, m.y, f"{m.label} ({rules[m.label]})", m.style, m.lo, m.hi) for m in lines]
+    caption = (
+        "False tracks confirmed in an hour in the whole sector, every false plot beginning a tentative track, of "
+        f"{panels.realisations(results)} such plots a case. Bands: 95 % intervals."
+    )
+    panel = Panel(Axis(words), Axis("false tracks per hour", "log"), tuple(lines), direct=False)
+    return Figure("false_tracks", "False tracks", caption, (panel,), width_mm=WIDE)
+
+
+FALSE = ("false_tracks_per_hour", "false")
+
+
+def classes_figure(results: Sequence[CaseResult], classes) -> Figure | None:
+    """Error rates of the class by score, over its threshold: the case of most false plots."""
+    case = max(results, key=lambda result: result.spec.sensor.false_plots_per_km2)
+    table = classes[(classes["case"] == case.name) & (classes["n_false"] > 0)]
+    if table.empty:
+        return None
+    drawn = []
+    for value, ends, words in (
+        ("false_called_true", "false", "false tracks called true"),
+        ("true_called_false", "true", "target's tracks called false"),
+    ):
+        rows = table[table[value] > 0]
+        marks = [Line(m.x, m.y, m.label, m.style, m.lo, m.hi) for m in _lines(rows, "threshold", value, ends)]
+        if value == "false_called_true" and marks:
+            longest = max(marks, key=lambda m: len(m.x))
+            marks.append(Line(longest.x, np.exp(-longest.x), "bound", Style(7, 1, None)))
+        if marks:
+            x = Axis("threshold of the score")
+            drawn.append(Panel(x, Axis(f"share of {words}", "log"), tuple(marks), direct=False))
+    caption = (
+        "Error rates of calling a track true once its score (logarithm of the likelihood ratio) reaches a threshold, "
+        f"of {panels.realisations(results)} tracks each. Left: of tracks that false plots began; no more than "
+        "exp(−threshold) of them can (bound). Right: of the target's first tracks. Bands: 95 % intervals."
+        + (f" Case: {_words(case)}." if case.swept else "")
+    )
+    return Figure("track_classes", "True or false by the score", caption, tuple(drawn), 2, PAGE_MM) if drawn else None
+
+
+def map_figure(result: CaseResult) -> Figure | None:
+    """Plots, gates and tracks of realisation 0 of a case, on the map."""
+    seen = result.axes.extra["realisation"]()
+    km = 1e-3
+    marks = [
+        Line(seen["false"][1] * km, seen["false"][0] * km, "false plots", Style(7, None, 0, 1.1, 1.0)),
+        Line(seen["truth"][1] * km, seen["truth"][0] * km, "target", Style(1, 1, None)),
+        Line(seen["plots"][1] * km, seen["plots"][0] * km, "its plots", Style(1, None, 1, 1.1, 2.0)),
+    ]
+    for n, (x, y) in enumerate(seen["tracks"]):
+        marks.append(Line(y * km, x * km, "tracks" if n == 0 else "", Style(2, 0, None, 1.3)))
+    for n, (x, y) in enumerate(seen["gates"]):
+        marks.append(Line(y * km, x * km, "gates" if n == 0 else "", Style(3, 0, None, 0.6)))
+    (south, north), (west, east) = seen["window"]
+    caption = (
+        f"Realisation 0 of {result.name}, tracker {seen['tracker']}: the target's course and plots, the false plots of "
+        f"all {len(result.axes.k)} scans, the confirmed tracks and their gates at every fourth scan, near the target."
+    )
+    panel = Panel(
+        Axis("way east, km", limits=(west * km, east * km)),
+        Axis("way north, km", limits=(south * km, north * km)),
+        tuple(marks),
+        direct=False,
+        legend="right",
+    )
+    return Figure("track_map", "Plots, gates and tracks", caption, (panel,), width_mm=WIDE, panel_height_mm=100)
