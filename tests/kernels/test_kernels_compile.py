@@ -175,3 +175,20 @@ def test_plain_python_gives_the_same_numbers():
     exec(NUMBERS, scope)
     plain = python("import numpy as np\nnp.seterr(over='ignore')\n" + PLAIN, NUMBA_DISABLE_JIT="1")
     np.testing.assert_allclose(np.array(plain.split(), dtype=float), scope["numbers"], rtol=1e-11, atol=1e-11)
+
+
+def test_functions_without_an_entry_refuse_python():
+    """They stay untranslated until a kernel needs them; Python gets an error, no crash."""
+
+    @compiling.part
+    def halved(x):
+        return x / 2
+
+    @compiling.inline
+    def grown(x):
+        return halved(x) + 1
+
+    for function in (halved, grown):
+        with pytest.raises(TypeError, match="not callable"):
+            function(4.0)
+    assert compiling.kernel(lambda x: grown(x))(4.0) == 3.0
