@@ -1,6 +1,7 @@
 """Recorded plots: one track from a CSV file, and the estimates over it back to one.
 
-A plots file has a header; `t_s` must rise from row to row, an empty cell means missing, other columns are ignored.
+A plots file has a header; `t_s` must rise from row to row (or, for studies that take several plots at a time, not
+fall), an empty cell means missing, other columns are ignored.
 """
 
 import contextlib
@@ -31,15 +32,17 @@ def read(path: str | os.PathLike, choices: Sequence[Sequence[str]]) -> dict[str,
 
 
 def chunks(
-    path: str | os.PathLike, choices: Sequence[Sequence[str]], size: int = CHUNK
+    path: str | os.PathLike, choices: Sequence[Sequence[str]], size: int = CHUNK, several: bool = False
 ) -> Iterator[dict[str, np.ndarray]]:
     """The columns of a file as `read` gives them, some rows at a time, so that memory does not grow with the file.
+
+    several: rows may have the time of the row before.
 
     After the first fault no more rows come: the rest is read for its faults, and ConfigError raised at the end.
     """
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
-            yield from _Reader(str(path), csv.reader(file, strict=True), choices).chunks(size)
+            yield from _Reader(str(path), csv.reader(file, strict=True), choices, several).chunks(size)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
@@ -49,7 +52,8 @@ def chunks(
 class _Reader:
     """Header, then numbers, then the order of the times; faults are gathered."""
 
-    def __init__(self, path: str, rows, choices: Sequence[Sequence[str]]):
+    def __init__(self, path: str, rows, choices: Sequence[Sequence[str]], several: bool):
+        self.several = several
         self.path, self.rows, self.faults, self.measured = path, rows, [], False
         try:
             header = [name.strip() for name in next(rows, [])]
@@ -105,10 +109,12 @@ class _Reader:
             allowed = "must be > 0" if wanted[j] == "range_m" else "must be in radians, from -2 pi to 2 pi"
             self.faults.append(f"{path}:{lines[i]}:{places[j] + 1}: {wanted[j]}: {allowed}, got {array[i, j]:g}")
         t = np.append(self.last, array[:, 0])
-        for i in np.flatnonzero(~(np.diff(t) > 0))[:MOST_FAULTS]:
+        rises = np.diff(t) >= 0 if self.several else np.diff(t) > 0
+        for i in np.flatnonzero(~rises)[:MOST_FAULTS]:
             if np.isfinite(t[i : i + 2]).all():
                 place = f"{path}:{lines[i]}:{places[0] + 1}: t_s"
-                self.faults.append(f"{place}: must be later than the row before, got {t[i + 1]:g} after {t[i]:g}")
+                must = "not be earlier" if self.several else "be later"
+                self.faults.append(f"{place}: must {must} than the row before, got {t[i + 1]:g} after {t[i]:g}")
 
     def _numbers(self, row: list[str], line: int) -> list[float]:
         """The wanted numbers of a row; faults are noted and stand as not-a-number."""
@@ -151,21 +157,25 @@ def _chosen(path: str, header: list[str], choices: Sequence[Sequence[str]]) -> l
                 raise ConfigError(*(f"{path}:1: the column {name} is there twice" for name in twice))
             return list(choice)
     allowed = " or ".join(", ".join(choice) for choice in choices)
-    raise ConfigError(f"{path}:1: must have the columns {allowed}; got {', '.join(header)[:200] or 'nothing'}")
+    given = "".join(c if c.isprintable() else "�" for c in ", ".join(header)[:200])
+    raise ConfigError(f"{path}:1: must have the columns {allowed}; got {given or 'nothing'}")
 
 
 def header_of(track: Track) -> tuple[str, ...]:
     """The columns of a track."""
     models = 0 if track.probability is None else track.probability.shape[2]
     names = ("t_s", "filter", "component", "unit", "estimate", "sigma")
-    return (*names, *(f"probability_{m + 1}" for m in range(models)))
+    more = () if track.numbers is None else ("track", "score")
+    return (*names, *(f"probability_{m + 1}" for m in range(models)), *more)
 
 
 def rows_of(track: Track) -> Iterator[tuple]:
-    """Rows of a track: t_s, filter, component, unit, estimate, sigma, and the models' probabilities."""
+    """Rows of a track: t_s, filter, component, unit, estimate, sigma, the models' probabilities, number and score."""
     for i, t in enumerate(track.t_s.tolist()):
         for f, name in enumerate(track.filters):
             shares = () if track.probability is None else tuple(map(_cell, track.probability[f, i].tolist()))
+            if track.numbers is not None:
+                shares = (*shares, str(track.numbers[f]), _cell(float(track.score[f, i])))
             numbers = zip(track.estimate[f, i].tolist(), track.sigma[f, i].tolist(), track.components, strict=True)
             for estimate, sigma, (component, unit) in numbers:
                 if not math.isnan(estimate):

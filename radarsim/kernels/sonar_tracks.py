@@ -72,7 +72,7 @@ def across_foretold(c, tau):
 @inline
 def line_taken(P, y, before, w):
     """Gain (2) and covariance (6) of a line with a plot taken where w is 1; y (8) the information with it."""
-    zero, rank = full(0.0), before + w
+    zero = full(0.0)
     _, g, p = y
     s = (P[0], P[1], P[2], P[3], P[4], P[5], zero, zero, zero, zero)
     _, gain, taken = believed(s, g, p, before, w, 0.0, 0.0, 2, 2, 0.0, NOWHERE)

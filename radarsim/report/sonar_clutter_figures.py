@@ -22,12 +22,23 @@ def figures(results: Sequence[CaseResult], made: Mapping) -> dict[str, Figure | 
     if not results:
         return {}
     return {
-        "track_map": map_figure(results[0]),
+        "track_map": map_figure(middle(results)),
         "confirmation": confirmation_figure(results, made["tracks"]),
         "track_life": life_figure(results, made),
         "false_tracks": false_figure(results, made["tracking"]),
         "track_classes": classes_figure(results, made["track_classes"]),
     }
+
+
+def middle(results: Sequence[CaseResult]) -> CaseResult:
+    """The case in the middle, for figures of one."""
+    return results[(len(results) - 1) // 2]
+
+
+def axis_over(words: str, values) -> Axis:
+    """An axis of swept values: logarithmic where they span more than a factor of twenty."""
+    least, most = float(np.min(values)), float(np.max(values))
+    return Axis(words, "log" if least > 0 and most / least > 20 else "linear")
 
 
 def swept_over(tracking) -> tuple[str, str] | None:
@@ -84,7 +95,7 @@ def life_figure(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     if over is None:
         return None
     column, words = over
-    axis = Axis(words)
+    axis = axis_over(words, tracking[column])
     shown = {
         "life": ("life_s", Axis("track life, s", "log")),
         "time": ("time_to_confirm_s", Axis("time to confirmation, s", limits=(0, None))),
@@ -142,7 +153,7 @@ def false_figure(results: Sequence[CaseResult], tracking) -> Figure | None:
         "False tracks confirmed in an hour in the whole sector, every false plot beginning a tentative track, of "
         f"{panels.realisations(results)} such plots a case. Bands: 95 % intervals."
     )
-    panel = Panel(Axis(words), Axis("false tracks per hour", "log"), tuple(lines), direct=False)
+    panel = Panel(axis_over(words, rows[column]), Axis("false tracks per hour", "log"), tuple(lines), direct=False)
     return Figure("false_tracks", "False tracks", caption, (panel,), width_mm=WIDE)
 
 
@@ -150,24 +161,25 @@ FALSE = ("false_tracks_per_hour", "false")
 
 
 def classes_figure(results: Sequence[CaseResult], classes) -> Figure | None:
-    """Error rates of the class by score, over its threshold: the case of most false plots."""
-    case = max(results, key=lambda result: result.spec.sensor.false_plots_per_km2)
+    """Error rates of the class by score, over its threshold, of one case."""
+    case = middle(results)
     table = classes[(classes["case"] == case.name) & (classes["n_false"] > 0)]
     if table.empty:
         return None
     drawn = []
-    for value, ends, words in (
-        ("false_called_true", "false", "false tracks called true"),
-        ("true_called_false", "true", "target's tracks called false"),
+    for value, ends, words, scale in (
+        ("false_called_true", "false", "false tracks called true", "log"),
+        ("true_called_false", "true", "target's tracks called false", "linear"),
     ):
-        rows = table[table[value] > 0]
+        rows = table[table[value] > 0] if scale == "log" else table
         marks = [Line(m.x, m.y, m.label, m.style, m.lo, m.hi) for m in _lines(rows, "threshold", value, ends)]
         if value == "false_called_true" and marks:
             longest = max(marks, key=lambda m: len(m.x))
             marks.append(Line(longest.x, np.exp(-longest.x), "bound", Style(7, 1, None)))
         if marks:
             x = Axis("threshold of the score")
-            drawn.append(Panel(x, Axis(f"share of {words}", "log"), tuple(marks), direct=False))
+            y = Axis(f"share of {words}", scale, (None, None) if scale == "log" else (0, None))
+            drawn.append(Panel(x, y, tuple(marks), direct=False))
     caption = (
         "Error rates of calling a track true once its score (logarithm of the likelihood ratio) reaches a threshold, "
         f"of {panels.realisations(results)} tracks each. Left: of tracks that false plots began; no more than "

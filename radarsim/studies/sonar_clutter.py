@@ -19,7 +19,7 @@ from radarsim.kernels import sonar_clutter as kernels
 from radarsim.kernels import sonar_patterns as pattern_kernels
 from radarsim.kernels.sonar_field import Field
 from radarsim.studies import noise_key
-from radarsim.studies.sonar_clutter_plots import COMPONENTS, chosen, realised
+from radarsim.studies.sonar_clutter_plots import COMPONENTS, chosen, realised, sight_of
 from radarsim.studies.sonar_exact import exact_values
 from radarsim.studies.sonar_scene import Scene, choices, plots_of
 
@@ -42,34 +42,13 @@ class Plan:
     block: int = BLOCK
 
 
-def detected(spec, seen: Scene) -> np.ndarray:
-    """Which scans give a plot of the target (K,): 0 never (missed, or outside the sector), 1 always, else -1."""
-    sensor = spec.sensor
-    certain = np.where(seen.certain == 0, 0, 1 if sensor.detection_probability == 1 else -1)
-    (near, far), (first, last) = sensor.sector.range_m, sensor.sector.bearing_rad
-    r, b = seen.polar[:, 0, 0], seen.polar[:, 1, 0]
-    turned = first + np.mod(b - first, 2 * np.pi)
-    return np.where((near <= r) & (r <= far) & (turned <= last), certain, 0)
-
-
 def prepare(case: Case, seen: Scene, world: sonar_kernels.World) -> Plan:
     """Design the trackers of a case, given its scene and the world of its target's plots."""
     spec = case.spec
     sensor, wanted = spec.sensor, chosen(spec)
     F, K, T = len(wanted), len(seen.t), len(design.THRESHOLDS)
     density = sensor.false_plots_per_km2 / 1e6
-    certain = detected(spec, seen)
-    sight = pattern_kernels.Sight(
-        misses=noise_key(case, "misses"),
-        certain=certain,
-        probability=seen.probability,
-        weight=np.ones((K, 2)),
-        period=seen.period,
-        sigma=seen.nominal,
-        frame=0,
-        measured=np.ascontiguousarray(seen.polar[:, :2, 0]),
-        spread=seen.sigma[0, :2].copy(),
-    )
+    sight = sight_of(case, seen)
     fields = [design.field(noise_key(case, name), sensor.sector, density, seen.nominal) for name in ("false", "seeds")]
     layout = Layout(
         **{"error": (F, K, 4, 4), "estimates": (F, K, 4), "believed": (F, K, 4)},
@@ -81,7 +60,7 @@ def prepare(case: Case, seen: Scene, world: sonar_kernels.World) -> Plan:
     )
     return Plan(
         layout=layout,
-        axes=axes(spec, seen, certain, wanted, lambda: realised(spec, world, sight, fields[0], wanted)),
+        axes=axes(spec, seen, sight.certain, wanted, lambda: realised(spec, world, sight, fields[0], wanted)),
         world=world,
         sight=sight,
         field=fields[0],

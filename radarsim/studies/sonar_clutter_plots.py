@@ -10,7 +10,8 @@ from radarsim.filters.sonar_multitrack import charted
 from radarsim.kernels import sonar as sonar_kernels
 from radarsim.kernels import sonar_patterns as pattern_kernels
 from radarsim.kernels.sonar_field import Field, whole_field
-from radarsim.studies.sonar_scene import angular
+from radarsim.studies import noise_key
+from radarsim.studies.sonar_scene import Scene, angular
 
 COMPONENTS = (("r", "m"), ("vr", "m/s"), ("b", "rad"), ("vb", "rad/s"))
 NEAR_M = 2500.0  # of the target's course: what the map shows
@@ -137,3 +138,47 @@ def track(case: Case, recorded: dict[str, np.ndarray]) -> Track:
         score[i, life.scans] = life.scores
     names = tuple(spec.filters[f].name for f, _, _ in lives)
     return Track(names, COMPONENTS, t, estimate, sigma, numbers=np.array([n for _, n, _ in lives]), score=score)
+
+
+def simulated(case: Case, seen: Scene, world, realisation: int) -> dict[str, np.ndarray]:
+    """All plots of one realisation in the sector, in order of time and bearing, as the columns of a file of plots.
+
+    true_target is 1 for the target's plots, 0 for false ones; true_range_m and true_bearing_rad are the target's. A
+    scan without a plot has one row without values.
+    """
+    spec = case.spec
+    sight = sight_of(case, seen)
+    field = design.field(noise_key(case, "false"), spec.sensor.sector, _conditions(spec)[3], seen.nominal)
+    z, true = target_plots(world, sight, realisation)
+    rows = []
+    for k, t in enumerate(seen.t):
+        own = [(z[k, 0], z[k, 1], 1.0)] if np.isfinite(z[k, 0]) else []
+        scan = [*own, *((r, b, 0.0) for r, b in false_plots(field, realisation, k).T)] or [(np.nan, np.nan, np.nan)]
+        rows += [(t, r, b, whose, *true[k]) for r, b, whose in sorted(scan, key=lambda row: row[1])]
+    names = ("t_s", "range_m", "bearing_rad", "true_target", "true_range_m", "true_bearing_rad")
+    return dict(zip(names, np.array(rows).T, strict=True))
+
+
+def detected(spec, seen: Scene) -> np.ndarray:
+    """Which scans give a plot of the target (K,): 0 never (missed, or outside the sector), 1 always, else -1."""
+    sensor = spec.sensor
+    certain = np.where(seen.certain == 0, 0, 1 if sensor.detection_probability == 1 else -1)
+    (near, far), (first, last) = sensor.sector.range_m, sensor.sector.bearing_rad
+    r, b = seen.polar[:, 0, 0], seen.polar[:, 1, 0]
+    turned = first + np.mod(b - first, 2 * np.pi)
+    return np.where((near <= r) & (r <= far) & (turned <= last), certain, 0)
+
+
+def sight_of(case: Case, seen: Scene) -> pattern_kernels.Sight:
+    """When the target's plots come."""
+    return pattern_kernels.Sight(
+        misses=noise_key(case, "misses"),
+        certain=detected(case.spec, seen),
+        probability=seen.probability,
+        weight=np.ones((len(seen.t), 2)),
+        period=seen.period,
+        sigma=seen.nominal,
+        frame=0,
+        measured=np.ascontiguousarray(seen.polar[:, :2, 0]),
+        spread=seen.sigma[0, :2].copy(),
+    )

@@ -7,6 +7,7 @@ from radarsim.engine.results import Track
 from radarsim.kernels import random
 from radarsim.kernels import sonar as kernels
 from radarsim.studies import noise_key, sonar
+from radarsim.studies import sonar_clutter_plots as clutter
 from radarsim.studies.sonar import PLOT_COLUMNS, labels
 from radarsim.studies.sonar_scene import Scene, scene, third_of
 
@@ -32,9 +33,12 @@ def sigmas(spec) -> dict[str, tuple[str, ...]]:
 def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     """The plots of one realisation of the study and the truth, columns (K,).
 
-    Not-a-number where a plot is missed, or where a further sonar does not measure that coordinate.
+    Not-a-number where a plot is missed, or where a further sonar does not measure that coordinate. Among false plots
+    the rows of a scan are all that it gave.
     """
     spec, seen = case.spec, scene(case.spec)
+    if spec.tracking:
+        return clutter.simulated(case, seen, sonar.world(case, seen), realisation)
     drawn = _drawn(case, seen, realisation)
     C = seen.truth.shape[1]
     deviation, error = drawn[:, :C, 2:], drawn[:, :C, 1]
@@ -77,16 +81,19 @@ class Tracker:
     """The filters of a case over recorded plots.
 
     Windows and bulk designs reach back over many rows, so all are taken in one piece: `whole` tells the reader to.
+    several: there may be plots of the same time, which trackers among false plots choose from.
     """
 
     whole = MOST_ROWS
 
     def __init__(self, case: Case):
-        self.case = case
+        self.case, self.several = case, case.spec.tracking
 
     def feed(self, recorded: dict[str, np.ndarray]) -> Track:
         """The estimates over all rows: columns (n,), not-a-number where a value is missing."""
         spec = self.case.spec
+        if spec.tracking:
+            return clutter.track(self.case, recorded)
         made = sonar.track(self.case, recorded)
         z, weight, sigma = sonar.measured(spec, list(recorded.values())[1:])
         at = [made.components.index(coordinate) for coordinate in sonar.coordinates(spec)]
