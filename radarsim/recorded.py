@@ -1,32 +1,194 @@
-"""The filters of an experiment over recorded plots."""
+"""The filters of an experiment over recorded plots, and a realisation's plots to try them on."""
 
 import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from pathlib import Path
 
+import numpy as np
 from numpy.linalg import LinAlgError
 
-from radarsim import plots, studies
+from radarsim import plots
 from radarsim.config.load import Case, Experiment
 from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
 
+MOST_DRAWN = 2000  # rows kept for figures; of more, every second is dropped again and again
+GAP = 3.0  # intervals' median lengths that make a gap
+HEAD = 5000  # rows that a better σ is looked for on
 
-def track(experiment: Experiment, source: str | os.PathLike) -> tuple[Case, Track]:
-    """The filters of an experiment's one case over the recorded plots in a CSV file.
 
-    Raises ConfigError for an experiment of several cases, a study without recorded plots, and faults in the file.
-    """
+def module_of(study: str):
+    """The study's module of plots; None where it records none."""
+    name = f"radarsim.studies.{study}_plots"
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name != name:
+            raise
+        return None
+
+
+def one_case(experiment: Experiment, what: str) -> Case:
+    """The one case of an experiment, of a study with plots; raises ConfigError."""
     place = experiment.path or experiment.stem
     if len(experiment.cases) > 1:
         count = len(experiment.cases)
-        raise ConfigError(f"{place}: must be one case to track with, got {count}; choose: --set sweep.KEY=[VALUE]")
+        raise ConfigError(f"{place}: must be one case to {what}, got {count}; choose: --set sweep.KEY=[VALUE]")
     (case,) = experiment.cases
-    study = studies.study(case.study)
-    if not hasattr(study, "track"):
+    if module_of(case.study) is None:
         raise ConfigError(f"{place}: study: {case.study} has no filters for recorded plots")
-    recorded = plots.read(source, study.PLOT_COLUMNS(case.spec))
+    return case
+
+
+def simulated(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndarray]:
+    """The plots of one realisation of an experiment's one case, the very numbers of a run, and the truth as true_….
+
+    Columns of equal length, not-a-number where a plot is missed.
+    """
+    case = one_case(experiment, "simulate")
+    return module_of(case.study).simulated(case, realisation)
+
+
+@dataclass
+class Tally:
+    """How many tests of a filter's innovations there were, and the sum of their squares over their variances."""
+
+    filter: str
+    name: str
+    freedom: int
+    count: int = 0
+    total: float = 0.0
+
+    @property
+    def mean(self) -> float:
+        """Per degree of freedom: 1 for a filter that is right about its errors."""
+        return self.total / (self.count * self.freedom) if self.count else np.nan
+
+
+@dataclass
+class Followed:
+    """What came of a file of plots: rows, time, gaps, missing values, tests; and what figures and checks need of it."""
+
+    case: Case
+    rows: int = 0
+    first_s: float = np.nan
+    last_s: float = np.nan
+    missing: dict[str, int] = field(default_factory=dict)
+    gaps: int = 0
+    longest_gap_s: float = 0.0
+    longest_gap_at_s: float = np.nan
+    tallies: dict[tuple[str, str], Tally] = field(default_factory=dict)
+    drawn: list[Track] = field(default_factory=list)
+    stride: int = 1
+    head: dict[str, np.ndarray] = field(default_factory=dict)
+    median_s: float = np.nan
+
+    def take(self, columns: Mapping[str, np.ndarray], track: Track) -> None:
+        """Count one more piece of the file."""
+        t = columns["t_s"]
+        self._gaps(np.unique(t))
+        for name, column in list(columns.items())[1:]:
+            self.missing[name] = self.missing.get(name, 0) + int(np.isnan(column).sum())
+        for q, (name, freedom) in enumerate(track.tested):
+            for f, filter_name in enumerate(track.filters):
+                known = track.nis[f, :, q]
+                known = known[np.isfinite(known)]
+                tally = self.tallies.setdefault((filter_name, name), Tally(filter_name, name, freedom))
+                tally.count, tally.total = tally.count + known.size, tally.total + float(known.sum())
+        if not self.head:
+            self.head = {name: column[:HEAD] for name, column in columns.items()}
+        self._draw(track)
+        self.rows += len(t)
+
+    def _gaps(self, t: np.ndarray) -> None:
+        if self.rows == 0:
+            self.first_s = self.last_s = float(t[0])
+            self.median_s = float(np.median(np.diff(t))) if len(t) > 1 else np.nan
+        steps = np.diff(t, prepend=self.last_s)
+        wide = steps > GAP * self.median_s
+        self.gaps += int(wide.sum())
+        if wide.any() and steps.max() > self.longest_gap_s:
+            self.longest_gap_s, at = float(steps.max()), int(steps.argmax())
+            self.longest_gap_at_s = float(t[at] - steps[at])
+        self.last_s = float(t[-1])
+
+    def _draw(self, track: Track) -> None:
+        kept = np.flatnonzero((self.rows + np.arange(len(track.t_s))) % self.stride == 0)
+        self.drawn.append(rows_of(track, kept))
+        while sum(len(part.t_s) for part in self.drawn) > MOST_DRAWN:
+            self.stride *= 2
+            whole = self.track()
+            self.drawn = [rows_of(whole, np.arange(0, len(whole.t_s), 2))]
+
+    def track(self) -> Track:
+        """The track, thinned for figures."""
+        return joined(self.drawn)
+
+
+def rows_of(track: Track, kept: np.ndarray) -> Track:
+    """Some rows of a track, copied."""
+    arrays = ("estimate", "sigma", "probability", "residual", "nis", "score")
+    some = {name: getattr(track, name)[:, kept] for name in arrays if getattr(track, name) is not None}
+    return replace(track, t_s=track.t_s[kept], **some)
+
+
+def joined(parts: list[Track]) -> Track:
+    """Tracks one after the other."""
+    arrays = ("estimate", "sigma", "probability", "residual", "nis", "score")
+    first = parts[0]
+    whole = {
+        name: np.concatenate([getattr(part, name) for part in parts], axis=1)
+        for name in arrays
+        if getattr(first, name) is not None
+    }
+    return replace(first, t_s=np.concatenate([part.t_s for part in parts]), **whole)
+
+
+def follow(
+    experiment: Experiment, source: str | os.PathLike, sink: Callable[[Track], None] = lambda track: None
+) -> Followed:
+    """The filters of an experiment's one case over the recorded plots in a CSV file, piece by piece to `sink`.
+
+    Memory does not grow with the file where the study's filters go from row to row; others take so many rows at most.
+    Raises ConfigError for an experiment of several cases, a study without recorded plots, and faults in the file.
+    """
+    case = one_case(experiment, "track with")
+    study = module_of(case.study)
+    tracker, followed = study.Tracker(case), Followed(case)
+    size = getattr(tracker, "whole", plots.CHUNK)
     try:
-        return case, study.track(case, recorded)
+        several = getattr(tracker, "several", False)
+        for columns in plots.chunks(source, study.PLOT_COLUMNS(case.spec), size, several):
+            if followed.rows and hasattr(tracker, "whole"):
+                raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
+            track = tracker.feed(columns)
+            sink(track)
+            followed.take(columns, track)
     except LinAlgError as error:
         raise ConfigError(
             f"{source}: t_s: intervals so different leave a filter's equations without solution"
         ) from error
+    return followed
+
+
+def track(experiment: Experiment, source: str | os.PathLike) -> tuple[Case, Track]:
+    """The filters of an experiment's one case over the recorded plots in a CSV file, all of it at once.
+
+    Raises ConfigError as `follow`.
+    """
+    parts: list[Track] = []
+    followed = follow(experiment, source, parts.append)
+    return followed.case, joined(parts)
+
+
+def draw(followed: Followed, folder: str | os.PathLike) -> list[str]:
+    """Figures of a track as SVG and PNG into a folder; their names. Raises StoreError."""
+    from radarsim.report import figures, files
+    from radarsim.report import recorded as described
+
+    made = described.figures(followed.track())
+    contents = {f"{name}.{kind}": data for name, one in made.items() for kind, data in figures.save(one).items()}
+    files.replace_all(Path(folder), contents)
+    return list(made)

@@ -11,7 +11,7 @@ import click
 import radarsim
 from radarsim.errors import Interrupted, RadarsimError, StoreError
 
-ORDER = ("run", "check", "report", "claims", "track", "list", "schema", "doctor", "clean")
+ORDER = ("run", "check", "report", "claims", "new", "simulate", "track", "list", "schema", "doctor", "clean")
 SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 
 

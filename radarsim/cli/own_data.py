@@ -2,33 +2,98 @@
 
 import click
 
-from radarsim.cli.group import main, set_option
+from radarsim.cli.group import Count, main, set_option
+
+
+@main.command()
+@click.argument("name", metavar="NAME")
+@click.option("--like", required=True, metavar="CONFIG", help="The config to begin from: `radarsim list` names them.")
+def new(name, like):
+    """A commented config of one's own: ./NAME.yaml.
+
+    It is CONFIG written anew, with the unit and the meaning of every key beside it, and the keys that might be there
+    too. A file of that name is never overwritten.
+
+    \b
+    Example
+      radarsim new mine --like rls2
+    """
+    from radarsim.config import own
+
+    path = own.new(name, like)
+    click.echo(f"config   {path}")
+    click.echo(f"         change its numbers, then `radarsim check {path}` and `radarsim run {path}`")
+
+
+@main.command()
+@click.argument("config", metavar="CONFIG")
+@click.option("-o", "--output", required=True, metavar="PLOTS.csv", help="Where the plots are written.")
+@click.option("-i", "--realisation", type=Count(), default=0, show_default=True, help="Which realisation, from 0.")
+@set_option
+def simulate(config, output, realisation, overrides):
+    """One realisation's measurements, with the truth in columns true_….
+
+    The plots are those that a run of CONFIG draws in this realisation, number for number: `radarsim track` over them
+    makes the errors that the run adds up. A missed plot is an empty cell.
+
+    \b
+    Example
+      radarsim simulate rls2 -o plots.csv
+      radarsim track rls2 plots.csv -o track.csv
+    """
+    from radarsim import experiment, plots, recorded
+
+    (loaded,) = experiment.load_all([config], overrides)
+    columns = recorded.simulated(loaded, realisation)
+    plots.write_columns(columns, output)
+    count = len(next(iter(columns.values())))
+    click.echo(f"plots    {output} ({count} rows: {', '.join(columns)})")
 
 
 @main.command()
 @click.argument("config", metavar="CONFIG")
 @click.argument("plots", metavar="PLOTS.csv")
 @click.option("-o", "--output", metavar="TRACK.csv", help="Where the track is written; default: to the terminal.")
+@click.option("--figures", metavar="DIR", help="Draw track, residuals and probabilities of the models into DIR.")
+@click.option("-q", "--quiet", is_flag=True, help="Say nothing of gaps and of how well the accuracies fit.")
 @set_option
-def track(config, plots, output, overrides):
+def track(config, plots, output, figures, quiet, overrides):
     """The config's filters over recorded measurements.
 
-    PLOTS.csv has a header and one row a plot, its times rising at any spacing; an empty cell is a missing value. Its
-    columns are t_s and what the study's sensor measures: `range_m, bearing_rad` (sonar), `range_m, elevation_rad,
-    azimuth_rad` or `x_m, y_m, z_m` (multimodel).
+    PLOTS.csv has a header and one row a plot, its times rising at any spacing; an empty cell is a missing value, other
+    columns are ignored. Its columns are t_s and what the study's sensor measures: `range_m, velocity_mps`
+    (range_doppler), `range_m, bearing_rad` (sonar), `range_m, elevation_rad, azimuth_rad` or `x_m, y_m, z_m`
+    (multimodel).
+
+    Told beside: gaps and missing values, and whether the accuracies that the config states fit the plots: the filters'
+    own innovations are tested (NIS, 1 for a filter that is right about its errors).
 
     \b
     Example
-      radarsim track sonar_smoothing plots.csv -o track.csv
+      radarsim track sonar_smoothing plots.csv -o track.csv --figures figures
     """
-    from radarsim import experiment, recorded
+    import contextlib
+
+    from radarsim import accuracy, experiment, findings, recorded
     from radarsim import plots as files
 
     (loaded,) = experiment.load_all([config], overrides)
-    _, estimates = recorded.track(loaded, plots)
-    if output is None:
-        for row in files.rows_of(estimates):
-            click.echo(",".join(row))
-    else:
-        files.write(estimates, output)
+    started = False
+
+    def sink(piece):
+        nonlocal started
+        if not started:
+            write([files.header_of(piece)])
+            started = True
+        write(files.rows_of(piece))
+
+    with contextlib.ExitStack() as stack:
+        write = stack.enter_context(files.Writer(output)).write if output else findings.echo
+        followed = recorded.follow(loaded, plots, sink)
+    drawn = recorded.draw(followed, figures) if figures else []
+    if not quiet:
+        findings.tell(followed, accuracy.judged(followed), stderr=output is None)
+    if output:
         click.echo(f"track    {output}")
+    if drawn:
+        click.echo(f"figures  {figures} ({', '.join(drawn)})")

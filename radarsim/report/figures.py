@@ -147,7 +147,7 @@ def _look(style: Style) -> dict:
 
 def _line(axes, line: Line) -> None:
     line = _thinned(line)
-    step = max(1, -(-len(line.x) // MARKED))
+    step = 1 if line.style.dash is None else max(1, -(-len(line.x) // MARKED))
     every = step if line.exact is None else 2 * step  # markers and crosses by turns
     axes.plot(line.x, line.y, markevery=every, zorder=3, **_look(line.style))
     if line.lo is not None and line.hi is not None:

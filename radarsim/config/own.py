@@ -1,0 +1,30 @@
+"""`radarsim new`: a config of one's own, written once and never over another."""
+
+import os
+from pathlib import Path
+
+from radarsim.config import load
+from radarsim.config.faults import Faults
+from radarsim.config.lookup import is_stem
+from radarsim.config.starter import starter
+from radarsim.errors import ConfigError, StoreError
+
+
+def new(name: str, like: str | os.PathLike, folder: str | os.PathLike = ".") -> Path:
+    """Write folder/NAME.yaml after a known config; its path. Raises ConfigError where it is there already."""
+    if not is_stem(name):
+        raise ConfigError(f"{name}: must be a plain name of letters, digits and _ + = - . without folder or suffix")
+    path = Path(folder) / f"{name}.yaml"
+    experiment = load.load(like)
+    faults = Faults()
+    document = load.read(Path(experiment.path), faults)
+    faults.raise_if_any()
+    text = starter(document.data, experiment.study, name, experiment.stem)
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise ConfigError(f"{path}: is there already and is never overwritten; choose another name") from None
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be written: {error.strerror}") from error
+    return path

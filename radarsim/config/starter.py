@@ -1,0 +1,145 @@
+"""A config of one's own to begin with: a known one written anew, each key with its meaning beside it."""
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from types import UnionType
+from typing import Annotated, Union, get_args, get_origin
+
+from pydantic_core import PydanticUndefined
+
+from radarsim.config.faults import short
+from radarsim.config.fields import Model, in_radians
+from radarsim.config.schema import COMMON_KEYS, Common, study_model
+
+PLAIN = re.compile(r"[A-Za-z_][\w+ .*-]*")  # text that YAML reads as text without quotes
+WORDS = {"true", "false", "null", "yes", "no", "on", "off", "none"}
+COLUMN = 44  # at which comments begin
+WIDTH = 110
+DEVICES = ("radar", "sensor")  # whose display name is the config's
+DEGREES = {"rad": "degrees", "rad/s": "degrees per second"}
+
+
+def starter(data: Mapping, study: str, name: str, like: str) -> str:
+    """YAML of a config's data (as read, keys as written) under a new name, with the schema's words on every key.
+
+    Keys that are not given but might be stand below, commented out, with their defaults.
+    """
+    study_keys = study_model(study)
+    lines = [
+        f"# {name}.yaml — like {like}: change the numbers, then `radarsim run {name}.yaml`",
+        "# Units stand in the keys: _m, _s, _mps (m/s), _mps2 (m/s²), _hz, _rad; _deg is taken wherever _rad is.",
+    ]
+    common = {key: value for key, value in data.items() if key in COMMON_KEYS}
+    own = {key: value for key, value in data.items() if key not in COMMON_KEYS}
+    own = {key: {**value, "name": name} if key in DEVICES and "name" in value else value for key, value in own.items()}
+    for key in ("study", "include"):
+        if key in common:
+            lines += _entry(key, common.pop(key), Common, "")
+    if own:
+        lines += _mapping(own, study_keys, "", optional=True)
+    lines += [line for key, value in common.items() for line in _entry(key, value, Common, "")]
+    missing = [key for key in ("sweep", "realisations", "seed") if key not in data]
+    samples = {"sweep": "{some_key: [1, 2, 3]}", "realisations": "1e5", "seed": "1"}
+    lines += [_line(f"# {key}: {samples[key]}", _about(Common, key)) for key in missing]
+    return "\n".join(lines) + "\n"
+
+
+def _mapping(data: Mapping, model, indent: str, optional: bool) -> list[str]:
+    """The lines of a mapping, and of the keys it might have too."""
+    lines = [line for key, value in data.items() for line in _entry(key, value, model, indent)]
+    if optional and model is not None:
+        given = {in_radians(key) or key for key in data} | set(data)
+        for key, field in model.model_fields.items():
+            default = field.default
+            if key not in given and default is not PydanticUndefined:
+                value = "…" if default is None or isinstance(default, Model) or default in ((), {}) else flow(default)
+                lines.append(_line(f"{indent}# {key}: {value}", _about(model, key)))
+    return lines
+
+
+def _entry(key: str, value, model, indent: str) -> list[str]:
+    """The lines of one key: short values beside it, mappings and lists of mappings below."""
+    about, inner = _about(model, key), _inner(model, key, value)
+    if isinstance(value, Mapping) and inner is not None and key != "sweep":
+        return [_line(f"{indent}{key}:", about), *_mapping(value, inner, indent + "  ", optional=True)]
+    if isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
+        lines = [_line(f"{indent}{key}:", about)]
+        if inner is not None:
+            used = list(dict.fromkeys(name for one in value for name in one))
+            lines += [f"{indent}  # {name}: {_about(inner, name)}" for name in used if _about(inner, name)]
+        return [*lines, *(line for one in value for line in _item(one, indent))]
+    return [_line(f"{indent}{key}: {flow(value)}", about)]
+
+
+def _item(one: Mapping, indent: str) -> Iterator[str]:
+    """A mapping of a list: in one line where it fits, else a key a line."""
+    whole = f"{indent}  - {flow(one)}"
+    if len(whole) <= WIDTH:
+        yield whole
+        return
+    for n, (key, value) in enumerate(one.items()):
+        yield f"{indent}  {'-' if n == 0 else ' '} {key}: {flow(value)}"
+
+
+def _line(text: str, about: str) -> str:
+    return f"{text:<{COLUMN}}  # {about}" if about else text
+
+
+def _about(model, key: str) -> str:
+    """What the schema says of a key; of one in degrees with that unit."""
+    if model is None:
+        return ""
+    name = key if key in model.model_fields else in_radians(key)
+    if name not in model.model_fields:
+        return ""
+    words = " ".join((model.model_fields[name].description or "").split())
+    if name != key:
+        for unit, degrees in sorted(DEGREES.items(), reverse=True):
+            words = re.sub(rf"(?<=, ){re.escape(unit)}(?![\w/])", degrees, words)
+    return words
+
+
+def _inner(model, key: str, value):
+    """The model of a key's mapping, or of the members of its list: of several the one whose keys and kind fit."""
+    name = key if model is not None and key in model.model_fields else None
+    if name is None:
+        return None
+    members = value if isinstance(value, list) else [value]
+    found = [
+        one
+        for one in _models(model.model_fields[name].annotation)
+        if all(isinstance(member, Mapping) and _fits(one, member) for member in members)
+    ]
+    return found[0] if found else None
+
+
+def _fits(model: type[Model], data: Mapping) -> bool:
+    kind = model.model_fields.get("kind")
+    if kind is not None and "kind" in data and data["kind"] not in get_args(kind.annotation):
+        return False
+    return all((in_radians(key) or key) in model.model_fields or key in model.model_fields for key in data)
+
+
+def _models(annotation) -> Iterator[type[Model]]:
+    """Every model that a type may be, or hold in a list."""
+    if isinstance(annotation, type) and issubclass(annotation, Model):
+        yield annotation
+    elif get_origin(annotation) in (Annotated, Union, UnionType, tuple, list):
+        for part in get_args(annotation):
+            yield from _models(part)
+
+
+def flow(value) -> str:
+    """A value as YAML in one line; numbers at their shortest."""
+    match value:
+        case bool():
+            return str(value).lower()
+        case int() | float():
+            return short(value)
+        case list() | tuple():
+            return "[" + ", ".join(map(flow, value)) + "]"
+        case Mapping():
+            return "{" + ", ".join(f"{key}: {flow(one)}" for key, one in value.items()) + "}"
+    text = str(value)
+    return text if PLAIN.fullmatch(text) and text == text.strip() and text.lower() not in WORDS else json.dumps(text)
