@@ -8,6 +8,7 @@ from scipy.linalg import expm, logm
 
 MOTIONS = {"still": (0.0, 0.0), "uniform": (1.0, 0.0), "accelerated": (1.0, 1.0)}  # with velocity, with acceleration
 COLUMN_TOLERANCE = 1e-9  # of a column's sum from one
+MOST_STEPS = 2.0**52  # of a power: whatever is not forgotten by then never is, and more would not fit a whole number
 
 # Additions, subtractions, multiplications, divisions, roots and exponentials of one step, all three axes, counted on
 # the formulas of `kernels.blocks` and `kernels.hypothesis` (a test counts them again).
@@ -50,7 +51,7 @@ def transition_powers(transition: np.ndarray, exponents: np.ndarray) -> np.ndarr
 
     Whole m: the power; the part under one: expm(m Q) with the generator above, so that no probability is negative.
     """
-    exponents = np.asarray(exponents, dtype=float)
+    exponents = np.minimum(np.asarray(exponents, dtype=float), MOST_STEPS)
     # The whole part exactly, the rest by the generator: continuous in m and never negative.
     whole = np.floor(exponents + 1e-9).astype(np.int64)
     rest = np.maximum(exponents - whole, 0.0)
