@@ -232,17 +232,23 @@ def question(experiment) -> str:
 
 
 def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
-    """Sentences with numbers: lock at the last window of each estimator of the first case, and accuracy."""
-    result, told = results[0], []
-    locks = common.groups(made["locks"], "case", "filter")
+    """Sentences with numbers of the cases without a sweep, of the first where all are swept: `told`."""
+    plain = [result for result in results if not result.swept] or [results[0]]
+    return [words for result in plain for words in told(result, made, f"{result.name}, " if len(plain) > 1 else "")]
+
+
+def told(result: CaseResult, made: Mapping, before: str) -> list[str]:
+    """Lock and accuracy at the last window of each estimator."""
+    locks, words = common.groups(made["locks"], "case", "filter"), []
     for f, name in enumerate(result.axes.filters):
         row = locks[(result.name, name)].iloc[-1]
-        ratio = np.sqrt(result.sums["error"][f, int(row["k"]) - 1, :, 1] / max(row["lock_rate"] * row["n"], 1))
-        accuracy = (
-            f"; σ of the locked over the bound {ratio.min():.3f} to {ratio.max():.3f}" if row["lock_rate"] else ""
-        )
-        told.append(
-            f"{name}: {int(row['k'])} windows, locked in {100 * row['lock_rate']:.2f} % "
+        k, n, accuracy = int(row["k"]), max(row["lock_rate"] * row["n"], 1), ""
+        if row["lock_rate"]:
+            bound = result.axes.extra["posterior_sigma"][f, k - 1] / result.axes.exact_sigma[f, k - 1]
+            ratio = np.sqrt(result.sums["error"][f, k - 1, :, 1] / n) / bound
+            accuracy = f"; σ of the locked over the bound (forecast included) {ratio.min():.3f} to {ratio.max():.3f}"
+        words.append(
+            f"{before}{name}: {k} window{'s' if k > 1 else ''}, locked in {100 * row['lock_rate']:.2f} % "
             f"[{100 * row['lock_lo']:.2f}, {100 * row['lock_hi']:.2f}] of {result.count:,} bursts{accuracy}."
         )
-    return told
+    return words

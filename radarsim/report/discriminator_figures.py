@@ -17,6 +17,7 @@ SYMBOLS = {
     "f3": ("$|\\Delta f_3|$, Hz/s³", "third derivative"),
     "f4": ("$|\\Delta f_4|$, Hz/s⁴", "fourth derivative"),
 }
+NAMES = {"phi0": "$\\varphi_0$"} | {f"f{n}": f"$f_{n}$" for n in range(5)}
 KEYS = {
     "burst.noise_variance": "noise variance $\\sigma^2$",
     "prior.scale": "prior spread over the paper's",
@@ -25,18 +26,20 @@ KEYS = {
     "density": "density of windows",
     "steps": "scoring steps a window",
 }
+WHOLE = ("density", "steps")  # keys that take whole numbers
 WINDOW = "window length, s"
 MOST_LINES = 9
+MOST_TICKS = 8
 SURE = 0.99
 
 
 def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
-    """residuals, locks and accuracy of the first case without a sweep; a figure for each family of swept cases."""
+    """residuals, locks and accuracy of each case without a sweep; a figure for each family of swept cases."""
     drawn: dict[str, Figure] = {}
-    plain = [result for result in results if not result.swept]
-    if plain:
-        drawn |= {"residuals": residuals(plain[0], made), "locks": locks(plain[0], made)}
-        drawn["accuracy"] = accuracy(plain[0], made)
+    for n, result in enumerate(result for result in results if not result.swept):
+        for figure in (residuals(result, made), locks(result, made), accuracy(result, made)):
+            named = figure if n == 0 else of_case(figure, result.name)
+            drawn[named.name] = named
     for keys, members in swept_families(results).items():
         name = "_".join(["lock", *(key.split(".")[-1] for key in keys)])
         if len(keys) == 1:
@@ -44,6 +47,16 @@ def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[st
         elif len(keys) == 2:
             drawn[name] = lock_map(name, keys, members, made)
     return drawn
+
+
+def of_case(figure: Figure, case: str) -> Figure:
+    """A figure told apart from its like of another case."""
+    return replace(figure, name=f"{figure.name}_{case}", title=f"{figure.title}, {case}")
+
+
+def numbers(values: Sequence[float]) -> tuple[tuple[float, str], ...]:
+    """Ticks at whole numbers, every one or every few."""
+    return tuple((v, f"{v:g}") for v in values[:: -(-len(values) // MOST_TICKS)])
 
 
 def swept_families(results: Sequence[CaseResult]) -> dict[tuple[str, ...], list[CaseResult]]:
@@ -61,7 +74,15 @@ def residuals(result: CaseResult, made: Mapping) -> Figure:
     rows = common.groups(made["residuals"], "case", "filter", "component")
     windows = common.groups(made["windows"], "case", "filter")[(result.name, name)]
     k, t = windows["k"].to_numpy(float), windows["t_s"].to_numpy(float)
-    drawn = [Panel(Axis("window $k$"), Axis("$T_k$, s", "log"), (Line(k, t, "", Style(0, 0, 0)),), "a", direct=False)]
+    drawn = [
+        Panel(
+            Axis("window $k$", ticks=numbers(k)),
+            Axis("$T_k$, s", "log"),
+            (Line(k, t, "", Style(0, 0, 0)),),
+            "a",
+            direct=False,
+        )
+    ]
     for letter, (component, _) in zip("bcdefg", result.axes.components, strict=False):
         own = rows[(result.name, name, component)]
         t, middle, low, high, bound = (
@@ -78,7 +99,7 @@ def residuals(result: CaseResult, made: Mapping) -> Figure:
                 marks,
                 letter,
                 direct=False,
-                legend="lower left",
+                legend="lower left" if letter == "b" else "none",
             )
         )
     caption = (
@@ -102,9 +123,12 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
         f"the nearest turn), of {result.count:,} bursts; right: its upper end. Bands: 95 % intervals."
     )
     x = Axis(WINDOW, "log")
-    whole = Panel(x, Axis("locked", limits=(0, 1.02)), tuple(marks), direct=False, legend="center left")
+    whole = Panel(x, Axis("share locked", limits=(0, 1.02)), tuple(marks), direct=False, legend="center left")
     upper = Panel(
-        x, Axis("locked", limits=(0.85, 1.003)), tuple(replace(m, label="", name=m.label) for m in marks), direct=False
+        x,
+        Axis("share locked", limits=(0.85, 1.003)),
+        tuple(replace(m, label="", name=m.label) for m in marks),
+        direct=False,
     )
     return Figure("locks", "Locked bursts against the window", caption, (whole, upper), 2, PAGE_MM, 80.0)
 
@@ -121,10 +145,11 @@ def accuracy(result: CaseResult, made: Mapping) -> Figure:
                 continue
             t, bound = own["t_s"].to_numpy(float), own["posterior_sigma"].to_numpy(float)
             value, lo, hi = (own[c].to_numpy(float) / bound for c in ("sigma", "sigma_lo", "sigma_hi"))
-            marks.append(Line(t, value, component, Style(n, n % 4, n), lo, hi))
+            marks.append(Line(t, value, NAMES[component], Style(n, n % 4, n), lo, hi))
         if len(marks) > 1:
             axis = Axis("$\\sigma$ / bound", limits=(0.9, 1.3))
-            drawn.append(Panel(Axis(WINDOW, "log"), axis, tuple(marks), name, direct=False, legend="upper right"))
+            legend = "none" if drawn else "upper right"
+            drawn.append(Panel(Axis(WINDOW, "log"), axis, tuple(marks), name, direct=False, legend=legend))
     caption = (
         "Root-mean-square error of the locked bursts over the potential spread of the window, prior included. "
         f"Bands: 95 % intervals. {result.count:,} bursts; lock is judged at five spreads without prior."
@@ -144,7 +169,7 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
     x = np.array([float(member.swept[0][1]) for member in members])
     if key == "lock_probability":
         x = 1.0 - x
-    order, marks = np.argsort(x), [Reference(SURE, label="0.99")]
+    order, marks = np.argsort(x), [Reference(SURE)]
     for n, estimator in enumerate(members[0].axes.filters):
         ends = [final(made, members[i], estimator) for i in order]
         value, lo, hi = (np.array([row[c] for row in ends], float) for c in ("lock_rate", "lock_lo", "lock_hi"))
@@ -152,10 +177,14 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
     scale = "log" if x.min() > 0 and x.max() / x.min() > 20 else "linear"
     caption = (
         f"Share of bursts locked at the end of the burst against {key}, of {members[0].count:,} each. "
-        "Bands: 95 % intervals."
+        f"Bands: 95 % intervals; dotted: {SURE:g}."
     )
+    ticks = numbers(x[order]) if key in WHOLE else ()
     panel = Panel(
-        Axis(KEYS.get(key, key), scale), Axis("locked at the end", limits=(None, 1.02)), tuple(marks), direct=False
+        Axis(KEYS.get(key, key), scale, ticks=ticks),
+        Axis("share locked", limits=(None, 1.02)),
+        tuple(marks),
+        direct=False,
     )
     return Figure(name, f"Lock against {key}", caption, (panel,), width_mm=110.0, panel_height_mm=70.0)
 
@@ -169,12 +198,13 @@ def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], ma
         for member in members:
             column, row = (np.searchsorted(a, float(member.swept[i][1])) for i, a in ((0, x), (1, y)))
             values[row, column] = final(made, member, estimator)["lock_rate"]
-        marks = (Heat(x, y, values, "locked at the end"),)
+        marks = (Heat(x, y, values, "share locked"),)
         drawn.append(Panel(Axis(KEYS.get(keys[0], keys[0])), Axis(KEYS.get(keys[1], keys[1])), marks, estimator))
     drawn.append(region(keys, members, made, x, y))
     caption = (
         f"Share of bursts locked at the end, over {keys[0]} and {keys[1]}, of {members[0].count:,} in each cell. Last: "
-        f"the largest {keys[1]} at which the whole 95 % interval of that share, here and below, lies above {SURE:g}."
+        f"the largest {keys[1]} at which the whole 95 % interval of that share, here and below, lies above {SURE:g}; "
+        "an estimator without a line is nowhere so sure."
     )
     columns = min(2, len(drawn))
     return Figure(name, "Where the sequence locks", caption, tuple(drawn), columns, PAGE_MM, 70.0)
