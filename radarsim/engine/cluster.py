@@ -7,11 +7,12 @@ identity of the work tells.
 
 import contextlib
 import logging
+import os
 import pickle
-import signal
+import subprocess
+import sys
 import threading
 import time
-from collections.abc import Iterator
 from functools import lru_cache
 from itertools import count
 from queue import Empty, SimpleQueue
@@ -26,9 +27,7 @@ DEATHS = 20  # of workers under one task, after which it is taken for their caus
 LOOK_S = 1.0
 HINT = "--workers and --scheduler need Dask: pip install 'radarsim[cluster]'"
 QUIET = ("distributed", "distributed.nanny", "distributed.worker", "distributed.scheduler", "distributed.comm")
-# Spawned, since a fork of a process with live threads may hang; no dashboard, no limit of memory to kill a worker at.
 SETTINGS = {
-    "distributed.worker.multiprocessing-method": "spawn",
     "distributed.scheduler.allowed-failures": DEATHS,
     "distributed.comm.timeouts.connect": f"{CONNECT_S}s",
     "logging": dict.fromkeys(QUIET, "critical"),
@@ -41,6 +40,16 @@ def _dask():
     except ImportError as error:
         raise ConfigError(f"{HINT} ({error})") from error
     return distributed
+
+
+def _check(distributed, address: str) -> None:
+    """ConfigError for an address that is none: a Client that cannot read it takes half a minute to say so."""
+    try:
+        distributed.comm.resolve_address(address)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ConfigError(
+            f"--scheduler: must be an address such as tcp://host:8786, got {address!r}: {error}"
+        ) from error
 
 
 class Cluster:
@@ -65,17 +74,21 @@ class Cluster:
         self._running: set[str] = set()  # after a cancel: those let finish
         self._numbers = count()
         self._looked = self._seen = time.monotonic()
-        self._local = None
+        self._scheduler, self._own = None, None
         self._place = scheduler or "this machine"
         with dask.config.set(SETTINGS):
-            if scheduler is None:
-                options = {"threads_per_worker": 1, "dashboard_address": None, "memory_limit": 0, "host": "127.0.0.1"}
-                self._local = distributed.LocalCluster(n_workers=workers, silence_logs=logging.CRITICAL, **options)
+            if scheduler is not None:
+                _check(distributed, scheduler)
+            else:
+                options = {"dashboard_address": None, "host": "127.0.0.1", "protocol": "tcp", "processes": False}
+                self._scheduler = distributed.LocalCluster(n_workers=0, silence_logs=logging.CRITICAL, **options)
             try:
-                self._client = distributed.Client(self._local or scheduler, timeout=CONNECT_S, set_as_default=False)
-            except (OSError, ValueError, TypeError) as error:
-                raise ConfigError(f"--scheduler: no Dask scheduler answers at {scheduler!r}: {error}") from error
-        self._client.register_plugin(_plugin(distributed))
+                where = scheduler or self._scheduler.scheduler_address
+                self._client = distributed.Client(where, timeout=CONNECT_S, set_as_default=False)
+            except OSError as error:
+                raise ConfigError(f"--scheduler: no Dask scheduler answers at {scheduler}: {error}") from error
+        if workers is not None:
+            self._own = _Processes(workers, self._scheduler.scheduler_address)
         self._wait_for_workers()
 
     def _wait_for_workers(self) -> None:
@@ -95,8 +108,9 @@ class Cluster:
         return self
 
     def __exit__(self, kind, *_):
-        # After a signal the process ends at once, and its workers with it; an orderly end would take two seconds.
-        if kind is not Interrupted:
+        if self._own is not None:
+            self._own.kill()
+        if kind is not Interrupted:  # whose process ends at once; an orderly end would take two seconds
             self.close()
 
     def submit(self, work: Work, piece: Node | Partial) -> None:
@@ -146,6 +160,8 @@ class Cluster:
         if now < self._looked + LOOK_S:
             return
         self._looked = now
+        if self._own is not None:
+            self._own.replace()
         if self._client.status != "running":
             raise self._lost()
         try:
@@ -178,34 +194,47 @@ class Cluster:
 
     def close(self) -> None:
         """Let the workers go, without waiting for tasks that still run; those of this machine end."""
-        with _muted():
-            self._client.close(timeout=1)
-            if self._local is not None:
-                self._local.close(timeout=2)
+        if self._own is not None:
+            self._own.kill()
+        logging.disable(logging.CRITICAL)  # complaints of a cluster that is torn down under its tasks
+        try:
+            with contextlib.suppress(Exception):
+                self._client.close(timeout=1)
+            with contextlib.suppress(Exception):
+                if self._scheduler is not None:
+                    self._scheduler.close(timeout=1)
+        finally:
+            logging.disable(logging.NOTSET)
 
 
-@contextlib.contextmanager
-def _muted() -> Iterator[None]:
-    """Without the complaints of a cluster that is torn down under its tasks."""
-    logging.disable(logging.CRITICAL)
-    try:
-        with contextlib.suppress(Exception):
-            yield
-    finally:
-        logging.disable(logging.NOTSET)
+class _Processes:
+    """Worker processes on this machine, in sessions of their own: Ctrl-C in a terminal is for the run alone.
 
+    They are programs started anew, no forks of a process with live threads. One that dies is replaced; all end by
+    themselves when the scheduler, and so this process, is gone.
+    """
 
-def _plugin(distributed):
-    class Deaf(distributed.WorkerPlugin):
-        """Ctrl-C in a terminal reaches every process of it; the run decides when its workers end."""
+    def __init__(self, workers: int, address: str):
+        options = ["--no-nanny", "--no-dashboard", "--nthreads", "1", "--memory-limit", "0", "--death-timeout", "10"]
+        self._command = [sys.executable, "-m", "distributed.cli.dask_worker", address, *options]
+        self._environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        self._running = [self._started() for _ in range(workers)]
 
-        name = "radarsim signals"
+    def _started(self) -> subprocess.Popen:
+        silent = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+        return subprocess.Popen(self._command, env=self._environment, start_new_session=True, **silent)
 
-        def setup(self, worker) -> None:
-            with contextlib.suppress(ValueError):  # not in the main thread: a worker inside somebody's process
-                signal.signal(signal.SIGINT, signal.SIG_IGN)
+    def replace(self) -> None:
+        """Start a new one for each that has died."""
+        self._running = [process if process.poll() is None else self._started() for process in self._running]
 
-    return Deaf()
+    def kill(self) -> None:
+        """End them all at once."""
+        for process in self._running:
+            process.kill()
+        for process in self._running:
+            process.wait()
+        self._running = []
 
 
 _preparing = threading.Lock()

@@ -233,7 +233,8 @@ class Share(Run):
         progress: Callable[[int, int, int], None] | None,
     ):
         super().__init__(work, realisations, store, progress)
-        self.first, self.stop = (self.full * bound // of for bound in (number - 1, number))
+        blocks = self.full + (self.rest > 0)
+        self.first, self.stop = (min(blocks * bound // of, self.full) for bound in (number - 1, number))
         self.rest = self.rest if number == of else 0
         self.asked = (self.stop - self.first) * work.block + self.rest
 
