@@ -147,7 +147,7 @@ def followed(tmp_path, config, overrides, stated=()):
     [
         ("rls2", ("scans=2000", "manoeuvre_variance=1e-7"), "radar.sigma_range_m", 250),
         ("rls2", ("scans=2000", "manoeuvre_variance=1e-7"), "radar.sigma_velocity_mps", 15),
-        ("sonar_smoothing", ("scans=600",), "sensor.sigma_bearing_rad", math.radians(1)),
+        ("sonar_smoothing", ("scans=300",), "sensor.sigma_bearing_rad", math.radians(1)),
     ],
 )
 @pytest.mark.parametrize("factor", [0.5, 2])
