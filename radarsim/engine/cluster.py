@@ -89,11 +89,11 @@ class Cluster:
                 raise ConfigError(f"--scheduler: no Dask scheduler answers at {scheduler}: {error}") from error
         if workers is not None:
             self._own = _Processes(workers, self._scheduler.scheduler_address)
-        self._wait_for_workers()
+        self._wait_for_workers(workers or 1)
 
-    def _wait_for_workers(self) -> None:
+    def _wait_for_workers(self, wanted: int) -> None:
         end = time.monotonic() + WORKERS_S
-        while not self._count():
+        while self._count() < wanted:
             if time.monotonic() > end:
                 self.close()
                 raise ConfigError(f"--scheduler: no worker is connected to {self._place}; `dask worker` starts one")
@@ -191,6 +191,16 @@ class Cluster:
         with contextlib.suppress(Exception):
             self._client.cancel(dropped, force=True)
         return len(dropped)
+
+    def forget(self) -> None:
+        """Drop all tasks, those that run too."""
+        futures = [future for future, _, _ in self._tasks.values()]
+        self._tasks.clear()
+        self._running.clear()
+        self._done = SimpleQueue()
+        if futures:
+            with contextlib.suppress(Exception):
+                self._client.cancel(futures, force=True)
 
     def close(self) -> None:
         """Let the workers go, without waiting for tasks that still run; those of this machine end."""

@@ -66,7 +66,7 @@ def _computed(run: Run, threads: int | None, stop: Stop | None, executor: Execut
         run.keep(run.pieces())
         raise
     finally:
-        pool.cancel()
+        pool.forget()
         if executor is None:
             pool.close()
 

@@ -45,6 +45,9 @@ class Executor(Protocol):
     def cancel(self) -> int:
         """Drop the tasks that are not yet started; how many those were."""
 
+    def forget(self) -> None:
+        """The run is over, in whatever way: drop all tasks, and never give back the outcome of one that still runs."""
+
     def close(self) -> None:
         """Let the workers go, without waiting for tasks that still run."""
 
@@ -84,11 +87,12 @@ class Threads:
 
     def _serve(self) -> None:
         while (task := self._tasks.get()) is not None:
-            self._outcomes.put(attempted(*task))
+            outcomes, work, piece = task
+            outcomes.put(attempted(work, piece))
 
     def submit(self, work: Work, piece: Node | Partial) -> None:
         """Hand over a task; returns at once."""
-        self._tasks.put((work, piece))
+        self._tasks.put((self._outcomes, work, piece))
 
     def finished(self, timeout_s: float) -> list[Outcome]:
         """What has finished since the last call, waiting at most timeout_s for the first."""
@@ -109,6 +113,11 @@ class Threads:
                 dropped += 1
         except Empty:
             return dropped
+
+    def forget(self) -> None:
+        """Drop all tasks; what still runs ends unheard."""
+        self.cancel()
+        self._outcomes = SimpleQueue()
 
     def close(self) -> None:
         """Let the threads end after their present task, without waiting for them."""
@@ -137,6 +146,10 @@ class Serial:
         dropped = len(self._tasks)
         self._tasks.clear()
         return dropped
+
+    def forget(self) -> None:
+        """Drop all tasks."""
+        self.cancel()
 
     def close(self) -> None:
         """Nothing is held."""

@@ -59,6 +59,9 @@ class Processes:
     def cancel(self):
         return 0
 
+    def forget(self):
+        pass
+
     def close(self):
         raise AssertionError("whoever hands an executor in closes it")
 
@@ -203,6 +206,21 @@ def test_ctrl_c_in_somebodys_own_program_comes_through():
 
     with pytest.raises(KeyboardInterrupt):
         collect(WORK, 10**6, stop=stop)
+
+
+def test_what_a_failed_run_left_running_is_no_part_of_the_next():
+    class Late(Fake):
+        def simulate(self, first, count):
+            if first == 0:
+                raise KeyError("at once")
+            time.sleep(0.3)
+            return np.full(self.size, -1.0)
+
+    pool = Threads(2)
+    with pytest.raises(KeyError):
+        collect(Late(), 16 * 2, executor=pool)
+    assert collect(Fake(pause_s=5e-3), 16 * 100, executor=pool).values.tobytes() == textbook(WORK, 1_600).tobytes()
+    pool.close()
 
 
 def test_the_default_is_all_cores():

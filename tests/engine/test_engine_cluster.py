@@ -1,0 +1,155 @@
+"""Dask workers: the same bytes, also when workers die; what goes wrong is told in words."""
+
+import os
+import pickle
+import random
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from radarsim.engine import cluster
+from radarsim.engine.blocks import Node
+from radarsim.engine.cluster import Cluster
+from radarsim.engine.collect import collect
+from radarsim.errors import ClusterError, ConfigError, NonFiniteError
+from tests.engine.fake import WORK, Fake, N, same, textbook
+
+ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.filterwarnings("ignore")  # Dask's own
+
+
+@pytest.fixture(scope="module")
+def two():
+    """Two worker processes, for all tests of this file."""
+    with Cluster(2) as workers:
+        yield workers
+
+
+def alive(workers):
+    """The processes of a cluster."""
+    return [process.pid for process in workers._own._running]
+
+
+def test_workers_give_the_bytes_of_the_textbook(two, tmp_path):
+    assert two.workers == 2
+    for realisations in (1, 16, N):
+        assert same(collect(WORK, realisations, executor=two), realisations)
+    assert same(collect(WORK, N, executor=two, store=tmp_path))
+    assert collect(WORK, N, executor=two, store=tmp_path).computed == 0
+
+
+def test_a_stop_leaves_the_workers_fit_for_the_next_run(two, tmp_path):
+    asked = iter([None] * 20)
+    slow = Fake(pause_s=1e-2)
+    cut = collect(slow, 16 * 10_000, executor=two, store=tmp_path, stop=lambda: next(asked, "enough"))
+    assert cut.stopped == "enough"
+    assert 0 < cut.count < 16 * 10_000
+    assert cut.values.tobytes() == textbook(WORK, cut.count).tobytes()
+    assert same(collect(WORK, N, executor=two))
+
+
+def test_dead_workers_are_replaced_and_no_byte_is_lost(two):
+    killed = []
+
+    def kill():
+        draw = random.Random(5)
+        for _ in range(2):
+            time.sleep(0.7)
+            killed.append(draw.choice(alive(two)))
+            os.kill(killed[-1], signal.SIGKILL)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    result = collect(Fake(pause_s=2e-2), N, executor=two)
+    killer.join()
+    assert same(result)
+    assert len(killed) == 2
+    assert set(killed).isdisjoint(alive(two))
+
+
+def test_numbers_that_are_not_finite_are_named_from_afar(two):
+    with pytest.raises(NonFiniteError, match="realisations 992 to 1007"):
+        collect(Fake(bad=1_000), N, executor=two)
+    assert same(collect(WORK, N, executor=two))
+
+
+@dataclass(frozen=True)
+class Elsewhere(Fake):
+    """A work that has another identity where it arrives: the sources there are others."""
+
+    def __reduce__(self):
+        return Fake, ("cd34",)
+
+
+def test_workers_with_other_sources_are_refused(two):
+    with pytest.raises(ConfigError, match="a worker has other sources than this machine"):
+        collect(Elsewhere(), N, executor=two)
+    assert same(collect(WORK, N, executor=two))
+
+
+def test_a_worker_prepares_a_work_once(monkeypatch):
+    made = []
+
+    class Counted(Fake):
+        def __reduce__(self):
+            return counted, ()
+
+    def counted():
+        made.append(1)
+        return WORK
+
+    monkeypatch.setattr(sys.modules[__name__], "counted", counted, raising=False)
+    counted.__module__, counted.__qualname__ = __name__, "counted"
+    pickled = pickle.dumps(Counted())
+    for index in range(3):
+        cluster._attempted(pickled, WORK.identity, Node(0, index))
+    assert made == [1]
+
+
+@pytest.mark.parametrize("address", ["foo bar", "", "xyz://a:1", "tcp://no-such-host.invalid:8786"])
+def test_an_address_that_is_none_is_told(address):
+    with pytest.raises(ConfigError, match=r"--scheduler: must be an address such as tcp://host:8786, got"):
+        Cluster(scheduler=address)
+
+
+def test_nobody_at_the_address(monkeypatch):
+    monkeypatch.setattr(cluster, "CONNECT_S", 1)
+    with pytest.raises(ConfigError, match="no Dask scheduler answers at"):
+        Cluster(scheduler="tcp://127.0.0.1:9")
+
+
+def test_without_dask_the_hint_names_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ConfigError, match=r"need Dask: pip install 'radarsim\[cluster\]'"):
+        Cluster(2)
+
+
+LOST = """
+    import sys
+    from distributed import LocalCluster
+    if __name__ == "__main__":
+        options = {"dashboard_address": None, "host": "127.0.0.1", "processes": False, "protocol": "tcp"}
+        there = LocalCluster(n_workers=1, threads_per_worker=1, **options)
+        print(there.scheduler_address, flush=True)
+        sys.stdin.readline()
+"""
+
+
+def test_a_scheduler_that_goes_away_is_told_and_what_was_done_is_stored(tmp_path):
+    program = [sys.executable, "-c", textwrap.dedent(LOST)]
+    with subprocess.Popen(program, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as there:
+        address = there.stdout.readline().strip()
+        with Cluster(scheduler=address) as workers:
+            threading.Timer(2.5, there.kill).start()
+            with pytest.raises(ClusterError, match="went away"):
+                collect(Fake(pause_s=1e-2), 16 * 10_000, executor=workers, store=tmp_path)
+    resumed = collect(WORK, N, store=tmp_path)
+    assert same(resumed)
+    assert resumed.from_store > 0
