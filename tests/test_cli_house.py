@@ -1,0 +1,196 @@
+"""`radarsim doctor` and `radarsim clean`: every damage named, nothing but blocks removed."""
+
+import json
+import os
+import random
+import shutil
+
+import pytest
+
+from radarsim import selftest
+from tests.engine.test_engine_audit import damage
+from tests.engine.test_engine_damage import reforged
+from tests.test_cli import csv_bytes
+from tests.test_cli import radarsim as command
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A finished run of two cases: its --out directory."""
+    out = tmp_path_factory.mktemp("results")
+    command("run", "rls1", "rls2", "-n", 50_001, "--no-figures", "--quiet", "--out", out)
+    return out
+
+
+@pytest.fixture
+def out(made, tmp_path):
+    """A copy of it, to be damaged."""
+    shutil.copytree(made, tmp_path / "r")
+    return tmp_path / "r"
+
+
+def block_files(out):
+    """Every stored block."""
+    return sorted((out / ".blocks").rglob("*.sums"))
+
+
+def contents(out):
+    """Every file, by path."""
+    return {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+
+
+def test_a_whole_result_is_told_so_and_nothing_is_changed(out):
+    before = contents(out)
+    result = command("doctor", out / "rls2", "--recompute", 3)
+    assert "all whole" in result.stdout
+    assert "computed again: 3 pieces" in result.stdout
+    assert contents(out) == before
+
+
+def test_every_stored_block_may_be_computed_again(out):
+    (found,) = [json.loads(command("doctor", out / "rls2", "--recompute", 99, "--json").stdout)]
+    assert found["realisations"] == 50_001
+    assert (found["faults"], found["notes"]) == ([], [])
+
+
+def test_a_hundred_of_a_hundred_damaged_files_are_named_and_come_again(out):
+    good, draw = contents(out), random.Random(1)
+    identity = json.loads((out / "rls2" / "run.json").read_text())["identities"]["rls2"]
+    outputs = [path for path in (out / "rls2").iterdir() if path.name != "run.json"]
+    files = [*(path for path in block_files(out) if identity in str(path)), *outputs]
+    from radarsim.doctor import inspected
+
+    for _ in range(100):
+        path = draw.choice(files)
+        kind = damage(path, draw)
+        faults = inspected(out / "rls2").faults
+        assert [fault.split(":")[0] for fault in faults] == [str(path)], (kind, path, faults)
+        path.write_bytes(good[path])
+    for path in files:
+        damage(path, draw)
+    result = command("doctor", out / "rls2", code=4)
+    assert {line.split(":")[0] for line in result.stderr.splitlines()} == set(map(str, files))
+    command("run", "rls2", "-n", 50_001, "--no-figures", "--quiet", "--out", out)
+    assert csv_bytes(out / "rls2") == {p.name: good[p] for p in outputs if p.suffix == ".csv"}
+    assert "all whole" in command("doctor", out / "rls2").stdout
+
+
+def test_forged_sums_are_found_by_computing_them_again(out):
+    identity = json.loads((out / "rls2" / "run.json").read_text())["identities"]["rls2"]
+    for total in (out / ".blocks" / identity).glob("T*"):
+        total.unlink()
+    (cut,) = (out / ".blocks" / identity).glob("P*")
+    from radarsim.engine.store import decoded
+
+    reforged(cut, values=decoded(cut.read_bytes())[1] * 1.000001)
+    result = command("doctor", out / "rls2", "--recompute", 1, code=4)
+    assert f"{cut}: computed again, the sums are others" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("spoil", "code", "words"),
+    [
+        (lambda path: path.unlink(), 2, "no run.json in it"),
+        (lambda path: path.write_text("{"), 4, "run.json: damaged"),
+        (lambda path: path.write_text("[]"), 4, "run.json: damaged"),
+        (lambda path: path.write_text(path.read_text().replace('"r+Vr"', '"r+vr"')), 4, "run.json: damaged"),
+        (
+            lambda path: path.write_text(path.read_text().replace('"curves.csv"', '"../../etc"')),
+            4,
+            "outside the folder",
+        ),
+    ],
+)
+def test_a_spoiled_record_is_told(out, spoil, code, words):
+    spoil(out / "rls2" / "run.json")
+    assert words in command("doctor", out / "rls2", code=code).stderr
+
+
+def test_a_result_without_blocks_stands_on_its_own(out):
+    command("clean", "--out", out)
+    result = command("doctor", out / "rls2")
+    assert "no blocks of rls2 are stored" in result.stdout
+
+
+def test_blocks_of_other_sources_cannot_be_computed_again(out, monkeypatch):
+    from radarsim import studies
+
+    monkeypatch.setattr(studies, "identity", lambda case: "ab12")
+    command("doctor", out / "rls2")
+    assert "the sources that compute have changed" in command("doctor", out / "rls2", "--recompute", 1, code=2).stderr
+
+
+def test_doctor_is_told_what_it_looks_at(tmp_path):
+    assert "no run.json" in command("doctor", tmp_path, code=2).stderr
+    assert "no run.json" in command("doctor", tmp_path / "nowhere", code=2).stderr
+    assert "--recompute needs a RESULT" in command("doctor", "--recompute", 1, code=2).stderr
+
+
+def test_the_self_test_says_so_where_numbers_differ(monkeypatch):
+    made = {name: (selftest.KNOWN / f"range_doppler.{name}.csv").read_bytes() for name in selftest.TABLES}
+    assert selftest.verdict("range_doppler", made, True).words == "the known bytes"
+    line = made["curves"].split(b"\n")[5]
+    cells = line.split(b",")
+    for factor, same, good in ((1 + 1e-14, True, False), (1 + 1e-14, False, True), (1 + 1e-9, False, False)):
+        sigma = repr(float(cells[7]) * factor).encode()
+        changed = made | {"curves": made["curves"].replace(line, b",".join([*cells[:7], sigma, *cells[8:]]))}
+        assert selftest.verdict("range_doppler", changed, same).good is good
+    for spoiled in (made["curves"].replace(b"r+Vr", b"r+vr"), made["curves"][: len(made["curves"]) // 2]):
+        assert not selftest.verdict("range_doppler", made | {"curves": spoiled}, False).good
+    monkeypatch.setattr(selftest, "verdicts", lambda: [selftest.Verdict("sonar", False, "differs")])
+    assert "self-test: sonar: differs" in command("doctor", code=4).stderr
+
+
+def test_doctor_names_the_machine_and_passes_its_self_test():
+    told = json.loads(command("doctor", "--json").stdout)
+    assert {"machine", "instructions", "threads", "cache", "versions", "cluster"} <= told.keys()
+    assert [(one["study"], one["good"]) for one in told["self-test"]] == [
+        (study, True) for study in ("range_doppler", "multimodel", "sonar", "discriminator")
+    ]
+
+
+def test_clean_drops_blocks_and_nothing_else(out):
+    (out / ".blocks" / "notes.txt").write_text("mine")
+    (out / ".blocks" / "ab12").mkdir()
+    (out / ".blocks" / "ab12" / "mine.txt").write_text("mine")
+    files, size = len(block_files(out)), sum(path.stat().st_size for path in block_files(out))
+    dry = command("clean", "--dry-run", "--out", out)
+    assert dry.stdout == f"would drop {files} files of 3 cases, {size / 1e6:.1f} MB in {out / '.blocks'}\n"
+    assert len(block_files(out)) == files
+    command("clean", "rls1", "--out", out)
+    assert 0 < len(block_files(out)) < files
+    command("clean", "--out", out)
+    assert block_files(out) == []
+    left = {str(path.relative_to(out / ".blocks")) for path in (out / ".blocks").rglob("*")}
+    assert left == {"notes.txt", "ab12", "ab12/mine.txt"}
+    assert (out / "rls2" / "curves.csv").exists()
+    assert "dropped 0 files" in command("clean", "--out", out).stdout
+
+
+def test_clean_follows_no_link(out, tmp_path):
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "T16.sums").write_bytes(b"mine")
+    os.symlink(elsewhere, out / ".blocks" / "ab12")
+    (identity,) = [path for path in (out / ".blocks").iterdir() if path.is_dir() and not path.is_symlink()][:1]
+    os.symlink(elsewhere / "T16.sums", identity / "T16.sums")
+    command("clean", "--out", out)
+    assert (elsewhere / "T16.sums").read_bytes() == b"mine"
+    shutil.rmtree(out / ".blocks")
+    os.symlink(elsewhere, out / ".blocks")
+    assert "is a link" in command("clean", "--out", out, code=2).stderr
+    assert (elsewhere / "T16.sums").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [(["--out", "nowhere"], "no such directory"), (["rls7"], "no such config"), (["--seed", "1"], "need a CONFIG")],
+)
+def test_clean_refuses_what_it_does_not_know(tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    assert words in command("clean", *arguments, code=2).stderr
+
+
+@pytest.mark.parametrize("name", ["doctor", "clean"])
+def test_help_teaches_with_an_example(name):
+    assert f"  radarsim {name}" in command(name, "--help").stdout
