@@ -6,7 +6,7 @@ RADARSIM := $(BIN)/radarsim
 # Smoke runs keep out of results/, which holds what was made at full size.
 SMOKE := $(VENV)/smoke
 
-.PHONY: run test slow mutants lint smoke reproduce-figures bench schema known docs docs-numbers docs-examples clean
+.PHONY: run test slow mutants lint smoke reproduce-figures claims-page bench schema known docs docs-numbers docs-examples clean
 
 run: $(VENV)/installed
 	$(RADARSIM) run configs/rls2.yaml
@@ -28,9 +28,14 @@ smoke: $(VENV)/installed
 	$(RADARSIM) run configs/*.yaml -n 200 --out $(SMOKE) --quiet
 	@echo "every config ran with 200 realisations; results in $(SMOKE)"
 
+# All the papers at their full size; what was finished before is taken from results/.blocks.
 reproduce-figures: $(VENV)/installed
-	$(RADARSIM) run configs/*.yaml --out results
-	$(RADARSIM) claims --out results
+	$(BIN)/python -m radarsim.reproduce results
+
+# docs/claims.md, from what reproduce-figures left.
+claims-page: $(VENV)/installed
+	$(RADARSIM) claims --out results --markdown > docs/claims.md.new
+	mv docs/claims.md.new docs/claims.md
 
 bench: $(VENV)/installed
 	$(BIN)/python benchmarks/w1.py

@@ -3,12 +3,12 @@
 import math
 import sys
 import time
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 SILENT_S = 2.0  # a run shorter than this shows no progress
 PIPED_WIDTH = 10_000  # whatever reads it wraps it, or not
+ROOMY = 110  # columns of a terminal from which claims are told with place and config
 MOST_ROWS = 36  # of the last scan's table; a larger experiment speaks by its answer and files
 
 
@@ -22,7 +22,7 @@ def console(stderr: bool = False):
 
 
 class Progress:
-    """Realisations done, rate and time left, on stderr, once a run has lasted two seconds."""
+    """Realisations done, rate and time left, on stderr if that is a terminal, once a run has lasted two seconds."""
 
     def __init__(self, title: str, quiet: bool):
         self.title, self.quiet = title, quiet
@@ -38,7 +38,7 @@ class Progress:
     def update(self, done: int, total: int, from_store: int) -> None:
         """Realisations done, of how many, and how many of them were read from the store, over all cases."""
         elapsed = time.monotonic() - self.started
-        if self.quiet or elapsed < SILENT_S:
+        if self.quiet or elapsed < SILENT_S or not sys.stderr.isatty():
             return
         if self.bar is None:
             self._begin(total)
@@ -83,7 +83,8 @@ def show(
     from rich.table import Table
     from rich.text import Text
 
-    screen, cells = console(), [[printable(str(cell)) for cell in row] for row in rows]
+    screen = console()
+    cells = [["\n".join(map(printable, str(cell).split("\n"))) for cell in row] for row in rows]
     shown = fitting(columns, cells, spare, screen.width)
     terminal = sys.stdout.isatty()
     table = Table(title=title or None, title_justify="left", box=box.SIMPLE_HEAD if terminal else None, pad_edge=False)
@@ -99,7 +100,10 @@ def show(
 
 def fitting(columns: Sequence[str], cells: Sequence[Sequence[str]], spare: Sequence[str], width: int) -> list[int]:
     """The places of the columns that fit into a width, the spare ones left out one by one."""
-    wide = [max(len(text) for text in (name, *(row[i] for row in cells))) for i, name in enumerate(columns)]
+    wide = [
+        max(len(line) for text in (name, *(row[i] for row in cells)) for line in text.split("\n"))
+        for i, name in enumerate(columns)
+    ]
     places, leave = list(range(len(columns))), list(spare)
     while leave and sum(wide[i] + 2 for i in places) > width:
         places.remove(list(columns).index(leave.pop(0)))
@@ -231,7 +235,27 @@ def print_cleaned(cleaned, dry_run: bool) -> None:
 
 
 def print_claims(rows: Sequence[dict]) -> None:
-    """Each claim with its verdict, and below it what was measured, or the command that would judge it."""
+    """Each claim with its verdict, and below it what was measured, or the command that would judge it.
+
+    On a terminal a table; where it is piped, lines that can be searched.
+    """
+    from radarsim.report.claims import page
+
+    if sys.stdout.isatty():
+        cells = []
+        for claim in dict.fromkeys(row["claim"] for row in rows):
+            own = [row for row in rows if row["claim"] == claim]
+            first, done = own[0], own[0]["overall"] != "not run"
+            told = "\n".join(page.measured(row) for row in own) if done else f"radarsim run {first['config']}"
+            cells.append((claim, first["statement"], first["place"], told, first["overall"], first["config"]))
+        columns = ("claim", "statement", "place", "measured", "verdict", "config")
+        show("", columns, cells, spare=() if console().width >= ROOMY else ("place", "config"))
+    else:
+        _print_claim_lines(rows, page.measured)
+    say(page.counted(rows) or "no claims are judged by this")
+
+
+def _print_claim_lines(rows: Sequence[dict], measured: Callable[[Mapping], str]) -> None:
     last = None
     for row in rows:
         if row["claim"] != last:
@@ -240,13 +264,8 @@ def print_claims(rows: Sequence[dict]) -> None:
             if row["overall"] == "not run":
                 say(f"       radarsim run {row['config']}")
         if row["overall"] != "not run":
-            measured = f"{row['measured']:.4g} [{row['lo']:.4g}, {row['hi']:.4g}] {row['unit']}".rstrip()
-            say(f"       {row['verdict']:<20} {row['case']}: {row['what']} {measured}; expected {row['expected']}")
-    overall = {row["claim"]: row["overall"] for row in rows}
-    say(
-        ", ".join(f"{count} {verdict}" for verdict, count in Counter(overall.values()).items())
-        or "no claims are judged by this"
-    )
+            words = f"{row['case']}: {row['what']} {measured(row)}; expected {row['expected']}"
+            say(f"       {row['verdict']:<20} {words}")
 
 
 def print_inventory(inventory) -> None:

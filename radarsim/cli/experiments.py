@@ -171,7 +171,8 @@ def report(configs, realisations, seed, overrides, out, no_figures, as_json):
 @click.argument("configs", nargs=-1, metavar="[CONFIG…]")
 @out_option
 @json_option
-def claims(configs, out, as_json):
+@click.option("--markdown", is_flag=True, help="The page docs/claims.md on stdout in place of words.")
+def claims(configs, out, as_json, markdown):
     """The papers' claims: stated, measured with interval, verdict; computes nothing.
 
     Without CONFIG all claims of all papers; those without stored results are listed as not run, with the command that
@@ -187,5 +188,9 @@ def claims(configs, out, as_json):
     rows = experiment.claims(configs, out)
     if as_json:
         click.echo(documents.text(rows))
+    elif markdown:
+        from radarsim.report.claims import page
+
+        click.echo(page.page(rows), nl=False)
     else:
         console.print_claims(rows)

@@ -16,6 +16,7 @@ from radarsim.report.drawing import Figure
 WAVELENGTHS_M = (("metre", 1.8), ("decimetre", 0.15), ("centimetre", 0.03))  # P1's five radars have these three
 QUANTILES = (0.05, 0.5, 0.95)
 EXACT = False  # exact_sigma is the bound, which an estimator reaches or does not
+SWEPT = True  # lock is what is swept for, and has figures of its own
 
 
 def tables(results: Sequence[CaseResult]) -> dict:

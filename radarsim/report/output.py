@@ -1,8 +1,8 @@
 """From finished cases to files: tables, figures, claims, run.json and report.html of one experiment.
 
 A study adds to this by report/<study>.py (`tables`, `figures`, `question`, `answer`, `inputs` where it has a table of
-them, and EXACT = False where its exact_sigma is a bound and not the error of its filters) and report/claims/<study>.py,
-both found by the study's name.
+them, EXACT = False where its exact_sigma is a bound and not the error of its filters, SWEPT = True where it draws its
+own sweeps) and report/claims/<study>.py, both found by the study's name.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import agreement, claims, files, notes, provenance
+from radarsim.report import agreement, claims, files, notes, provenance, sweeps
 from radarsim.report import tables as common
 from radarsim.report.drawing import Figure
 
@@ -39,8 +39,12 @@ def curves(results: Sequence[CaseResult]):
 
 
 def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
-    """The figures of an experiment, described, by the stem of their file."""
-    return study(results[0].study).figures(results, made, experiment)
+    """The figures of an experiment, described, by the stem of their file: the study's own, and of sweeps."""
+    own = study(results[0].study)
+    drawn = own.figures(results, made, experiment)
+    if getattr(own, "SWEPT", False):
+        return drawn
+    return drawn | sweeps.figures(results, common.groups(made["curves"], "case", "filter", "component"))
 
 
 @dataclass(frozen=True)
