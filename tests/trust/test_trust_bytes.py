@@ -26,6 +26,7 @@ from tests.test_cli import csv_bytes
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.filterwarnings("ignore")  # Dask's own
 REALISATIONS = {"range_doppler": 70_001, "multimodel": 777, "sonar": 20_001, "discriminator": 333}
+LONGER = {"range_doppler": 20_000_001, "multimodel": 30_001, "sonar": 60_001, "discriminator": 6_001}  # some seconds
 
 
 class Shuffled(Serial):
@@ -43,8 +44,8 @@ class Shuffled(Serial):
 
 
 def options(study):
-    """The experiment and how often, as the command takes them."""
-    return [str(KNOWN / f"{study}.yaml"), "-n", str(REALISATIONS[study]), "--no-figures", "--quiet"]
+    """The experiment, some seconds of it, as the command takes them."""
+    return [str(KNOWN / f"{study}.yaml"), "-n", str(LONGER[study]), "--no-figures", "--quiet"]
 
 
 def tables(study, **means):
@@ -53,9 +54,9 @@ def tables(study, **means):
     return {name: to_csv(table) for name, table in experiment.run(loaded, **means).tables.items()}
 
 
-def command(study, out, *more):
+def command(study, out):
     """The command in a process of its own; its exit code."""
-    program = [sys.executable, "-m", "radarsim", "run", *options(study), "--out", str(out), *more]
+    program = [sys.executable, "-m", "radarsim", "run", *options(study), "--out", str(out)]
     return subprocess.run(program, cwd=ROOT, capture_output=True, check=False).returncode
 
 
@@ -114,15 +115,13 @@ def test_shares(expected, study, of, tmp_path):
     assert {name: to_csv(table) for name, table in result.tables.items()} == expected(study)
 
 
-def killed(study, out, after_s, number=signal.SIGKILL):
-    """Start the command and send it a signal; seconds until it was gone, and its exit status."""
+def killed(study, out, after_s):
+    """Start the command and kill it; its exit status."""
     program = [sys.executable, "-m", "radarsim", "run", *options(study), "--out", str(out)]
     with subprocess.Popen(program, cwd=ROOT, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as process:
         time.sleep(after_s)
-        process.send_signal(number)
-        since = time.perf_counter()
-        status = process.wait(timeout=30)
-        return time.perf_counter() - since, status
+        process.kill()
+        return process.wait(timeout=30)
 
 
 def duration(study, out):
@@ -137,17 +136,16 @@ def duration(study, out):
 def test_twenty_kills_of_the_run(study, tmp_path):
     """At moments spread over all that a run does, its start and the writing of its tables too; every one on the store
     and the results that the last one left."""
+    duration(study, tmp_path / "compiled")
     whole = duration(study, tmp_path / "whole")
     draw = random.Random(study)
     interrupted = 0
     for _ in range(20):
-        _, status = killed(study, tmp_path / "killed", draw.uniform(0.3, 1.0) * whole)
+        status = killed(study, tmp_path / "killed", draw.uniform(0.3, 1.0) * whole)
         interrupted += status == -signal.SIGKILL
     assert interrupted >= 5
     assert command(study, tmp_path / "killed") == 0
     assert csv_bytes(tmp_path / "killed" / study) == csv_bytes(tmp_path / "whole" / study)
-    left = [path for path in (tmp_path / "killed" / study).rglob("*.tmp")]
-    assert len(left) <= 20
 
 
 @pytest.mark.slow
