@@ -11,8 +11,10 @@ COLUMN_TOLERANCE = 1e-9  # of a column's sum from one
 MOST_STEPS = 2.0**52  # of a power: whatever is not forgotten by then never is, and more would not fit a whole number
 
 # Additions, subtractions, multiplications, divisions, roots and exponentials of one step, all three axes, counted on
-# the formulas of `kernels.blocks` and `kernels.hypothesis` (a test counts them again).
-PREDICT, UPDATE, LIKELIHOOD, MERGE, MERGE_ONCE = 282, 456, 8, 208, -9
+# the formulas of `kernels.blocks` and `kernels.hypothesis` (a test counts them again). PREDICT and UPDATE by whether the
+# model accelerates: the zeros of one that does not are left out.
+PREDICT, UPDATE = {True: 282, False: 99}, {True: 456, False: 267}
+LIKELIHOOD, MERGE, MERGE_ONCE = 8, 208, -9
 
 
 def bank(motions: Sequence[str], sigmas: Sequence[float]) -> np.ndarray:
@@ -86,13 +88,14 @@ def start_weights(t: np.ndarray, acceleration_spread: float) -> np.ndarray:
     return np.concatenate([a, b, acceleration_spread * np.array([a @ bent, b @ bent, -1.0])])
 
 
-def operations(family: str, transition: np.ndarray) -> tuple[float, float, float]:
+def operations(family: str, transition: np.ndarray, accelerates: Sequence[bool]) -> tuple[float, float, float]:
     """Arithmetic operations of one scan: fixed ones, and those of each merged hypothesis and of each merge.
 
-    transition (N, N) is that of N models. Merges of a single hypothesis are copies and cost nothing.
+    accelerates (M,): whether each model has an acceleration. Merges of a single hypothesis are copies and cost nothing.
     """
     size = len(transition)
-    advanced = np.count_nonzero(transition) if family == "gpb2" else size
+    times = np.count_nonzero(transition, axis=1) if family == "gpb2" else np.ones(size, dtype=int)
+    advanced = sum(n * (PREDICT[bool(a)] + UPDATE[bool(a)]) for n, a in zip(times, accelerates, strict=True))
     foretold = size * (2 * size - 1) if size > 1 else 0
-    likelihoods = advanced * LIKELIHOOD if size > 1 else 0
-    return advanced * (PREDICT + UPDATE) + likelihoods + foretold, MERGE, MERGE_ONCE
+    likelihoods = times.sum() * LIKELIHOOD if size > 1 else 0
+    return float(advanced + likelihoods + foretold), MERGE, MERGE_ONCE

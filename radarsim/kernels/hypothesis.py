@@ -19,7 +19,7 @@ from radarsim.kernels.blocks import (
     whitened,
 )
 from radarsim.kernels.compile import inline, part
-from radarsim.kernels.lanes import full, get, put, row, rows, where_greater
+from radarsim.kernels.lanes import any_greater, full, get, put, row, rows, where_greater
 
 MOST = 5  # models in a bank
 MEAN, OWN, CROSS, PROBABILITY = 0, 9, 27, 54  # rows within a hypothesis; mean and own blocks by axis, cross: xy, xz, yz
@@ -196,12 +196,22 @@ def advanced(work, listed, count, target, model, result, plot, noise):
 
     target, plot, noise: addresses of a hypothesis, of the plot (PLOT rows) and of its covariance (6 rows). Rows
     result and result + 1 take the normalised innovation squared and the determinant of its covariance (0, 1 where
-    the plot is
-    missed).
+    the plot is missed).
     """
     f = get(work, model), get(work, model + 1), get(work, model + 2), get(work, model + 3), get(work, model + 4)
-    q = get6(work, model + 5)
-    means, own, cross = mixed(work, listed, count)
+    q, merge, zero = get6(work, model + 5), mixed(work, listed, count), full(0.0)
+    if any_greater(f[4], zero):
+        updated(work, merge, f, q, target, result, plot, noise)
+    else:
+        # A model without acceleration: with these zeros the compiler leaves out half of the operations.
+        f, q = (f[0], zero, f[2], zero, zero), (q[0], q[1], zero, q[3], zero, zero)
+        updated(work, merge, f, q, target, result, plot, noise)
+
+
+@inline
+def updated(work, merge, f, q, target, result, plot, noise):
+    """Predict a merge (means, own and cross blocks) with F and Q, update it with a plot, write it: see `advanced`."""
+    means, own, cross = merge
     a, b, c = predicted_own(own[0], f, q), predicted_own(own[1], f, q), predicted_own(own[2], f, q)
     d, e, g = predicted_cross(cross[0], f), predicted_cross(cross[1], f), predicted_cross(cross[2], f)
     x, y, z = predicted_axis(means[0], f), predicted_axis(means[1], f), predicted_axis(means[2], f)

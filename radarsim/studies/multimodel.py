@@ -145,9 +145,15 @@ def axes(spec, t: np.ndarray, x: np.ndarray, reported: np.ndarray, names: tuple[
             "transitions": tuple(transition(f) for f in spec.filters),
             "intervals_s": np.array([f.transition_interval_s for f in spec.filters]),
             "powers": powers_hold(spec),
-            "operations": np.array([filters.operations(f.family, transition(f)) for f in spec.filters]),
+            "operations": np.array([operations(f) for f in spec.filters]),
         },
     )
+
+
+def operations(options) -> tuple[float, float, float]:
+    """See `filters.multimodel.operations`."""
+    accelerates = [filters.MOTIONS[model.motion][1] > 0 for model in options.models]
+    return filters.operations(options.family, transition(options), accelerates)
 
 
 def powers_hold(spec) -> np.ndarray:
