@@ -12,7 +12,7 @@ from radarsim.report import tables as common
 
 PHASES = np.array(["steady", "manoeuvre", "after"], dtype=object)
 EVENTS = np.array(["false alarm", "alarm", "all clear"], dtype=object)  # the first of a phase
-JOINT = "all"
+JOINT = "joint"
 NEAR = "fails: near zero"
 NEAR_ZERO = 3.0  # σ within which speed and distances, which cannot be negative, are not of first order
 
@@ -143,15 +143,14 @@ def _classes(result: CaseResult) -> dict:
     picked = np.concatenate(last)
     steady = rows["event"][picked] == EVENTS[0]
     one = {name: values[picked] for name, values in rows.items()}
-    wrong = [
-        np.where(steady, one[a], 1 - one[b])
-        for a, b in zip(("probability", "lo", "hi", "exact"), ("probability", "hi", "lo", "exact"), strict=True)
-    ]
+    wrong = np.where(steady, one["probability"], 1 - one["probability"])
+    of = statistics.rate(np.rint(wrong * one["n"]), one["n"])
     return {name: one[name] for name in CLASSES[:9]} | {
         "truth": PHASES[np.where(steady, 0, 1)],
         "duration_s": one["delay_s"],
         "called_manoeuvring": one["probability"],
-        **dict(zip(("error_probability", "lo", "hi", "exact"), wrong, strict=True)),
+        **dict(zip(("error_probability", "lo", "hi"), of, strict=True)),
+        "exact": np.where(steady, one["exact"], 1 - one["exact"]),
     }
 
 

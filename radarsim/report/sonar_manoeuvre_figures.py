@@ -170,22 +170,21 @@ def delay_figure(results: Sequence[CaseResult], delays) -> Figure | None:
 
 def response_figure(results: Sequence[CaseResult], curves, quantities: Mapping) -> Figure | None:
     """σ of the first coordinate through the manoeuvre, a line for each filter."""
-    component = results[0].axes.components[0][0]
-    groups = common.groups(curves[curves["component"] == component], "case", "filter")
+    groups = common.groups(curves, "case", "filter", "component")
     drawn = []
     for result in results:
-        marks = _ends(result)
+        (component, unit), marks = result.axes.components[0], _ends(result)
         for n, f in enumerate(result.axes.filters):
-            rows = groups.get((result.name, f))
+            rows = groups.get((result.name, f, component))
             if rows is None:
                 continue
             v = [rows[key].to_numpy(dtype=float) for key in ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")]
             known = v[4] if np.isfinite(v[4]).any() else None
             marks.append(Line(*v[:2], f, Style(n, n, n), *v[2:4], known))
-        y = Axis(f"$\\sigma$ of {quantities[component].symbol}, {rows['unit'].iloc[0]}", "log")
+        y = Axis(f"$\\sigma$ of {quantities[component].symbol}, {unit}", "log")
         drawn.append(Panel(Axis(panels.TIME, limits=(0, None)), y, tuple(marks), _title(result), direct=False))
     caption = (
-        f"Root-mean-square error of the {quantities[component].name} about the truth on the same plots, of "
+        f"Root-mean-square error of the first coordinate about the truth on the same plots, of "
         f"{results[0].count:,} realisations. Dashed: the manoeuvre begins and ends. Crosses: exact values."
     )
     return _figure("response", "Filters through a manoeuvre", caption, _one_legend(drawn))
@@ -193,13 +192,12 @@ def response_figure(results: Sequence[CaseResult], curves, quantities: Mapping) 
 
 def modes_figure(results: Sequence[CaseResult], modes) -> Figure | None:
     """Probability of a manoeuvre that filters live by, against time."""
-    component = results[0].axes.components[0][0]
-    groups = common.groups(modes[modes["component"] == component], "case", "filter")
+    groups = common.groups(modes, "case", "filter", "component")
     drawn = []
     for result in results:
-        marks = _ends(result)
+        component, marks = result.axes.components[0][0], _ends(result)
         for n, f in enumerate(result.axes.filters):
-            rows = groups.get((result.name, f))
+            rows = groups.get((result.name, f, component))
             if rows is not None:
                 v = [rows[key].to_numpy(dtype=float) for key in ("t_s", "probability", "lo", "hi")]
                 marks.append(Line(*v[:2], f, Style(n, n, n), *v[2:]))
@@ -244,9 +242,10 @@ def _ends(result: CaseResult) -> list:
 
 
 def _title(result: CaseResult) -> str:
-    """The swept values, keys without the way to them."""
-    words = [f"{STRENGTHS.get(last := key.rpartition('.')[2], last)}: {panels.number(v)}" for key, v in result.swept]
-    return "; ".join(words)
+    """The swept values, a strength with its unit."""
+    units = {key: words.rpartition(", ")[2] for key, words in STRENGTHS.items()}
+    words = [f"{panels.number(v)} {units.get(key.rpartition('.')[2], '')}".rstrip() for key, v in result.swept]
+    return ", ".join(words)
 
 
 def _one_legend(drawn: list[Panel]) -> list[Panel]:

@@ -7,8 +7,11 @@ from scipy.stats import binom
 import radarsim
 from radarsim.config.load import load
 from radarsim.exact import detector as exact
+from radarsim.exact import least_squares
 from radarsim.report.tables import to_csv
 from radarsim.studies import sonar as study
+from radarsim.studies import sonar_manoeuvre as manoeuvres
+from radarsim.studies.sonar_scene import scene
 from tests.kernels.test_kernels_sonar_manoeuvre import DETECTORS, FILTERS, SCANS, SIGMA, TARGET, VESSEL, T, config, twin
 
 N = 16_384
@@ -82,6 +85,25 @@ def test_a_walking_velocity_bends_courses():
     plan, sums = simulated(made)
     assert plan.axes.extra["exact_alarms"][0, 0, 2, -1] > 0.015
     assert compared(plan, sums, ALL) > 50
+
+
+def test_pushes_are_what_the_motion_makes_of_them():
+    """Variance of an acceleration under random pushes, one interval's push after the other, moved step by step."""
+    target = {"kind": "polynomial", "frame": "polar", "range_m": [6e3, -5], "bearing_deg": [10, 0.01]}
+    spec = load(config(filters=PLAIN) | {"target": target | {"fluctuation_mps2": 0.2}}).cases[0].spec
+    seen = scene(spec)
+    _, variance, believed = manoeuvres.shift_laws(seen, 0, np.ones((1, SCANS)), 6, 20)
+    weights, _ = least_squares.generalised_least_squares(seen.t[15:21], np.eye(6), 3)
+    total = 100.0 * weights[2] @ weights[2]
+    assert believed == pytest.approx(total)
+    for pushed in range(1, 6):
+        place, rate, course = 0.0, 0.0, np.zeros(6)
+        for j in range(1, 6):
+            a = 0.2 if j == pushed else 0.0
+            place, rate = place + T * rate + a * T**2 / 2, rate + a * T
+            course[j] = place
+        total += (weights[2] @ course) ** 2
+    assert variance == pytest.approx(total)
 
 
 def test_first_events_of_independent_tests_are_exact_and_alarms_come_in_runs():
