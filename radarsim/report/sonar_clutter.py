@@ -280,8 +280,8 @@ def _said(row) -> str:
     if np.isfinite(row["life_s"]):
         life += f" [{row['life_lo']:.3g}, {row['life_hi']:.3g}]"
     return (
-        f"{row['filter']} confirms {100 * row['confirmed']:.1f} % "
-        f"[{100 * row['confirmed_lo']:.1f}, {100 * row['confirmed_hi']:.1f}] after {row['time_to_confirm_s']:.3g} s in "
+        f"{row['filter']} confirms {100 * row['confirmed']:.4g} % "
+        f"[{100 * row['confirmed_lo']:.4g}, {100 * row['confirmed_hi']:.4g}] after {row['time_to_confirm_s']:.3g} s in "
         f"the mean, {life}, {row['false_tracks_per_hour']:.3g} false tracks an hour "
         f"[{row['false_lo']:.3g}, {row['false_hi']:.3g}]"
     )

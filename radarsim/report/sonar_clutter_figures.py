@@ -42,11 +42,20 @@ def axis_over(words: str, values) -> Axis:
 
 
 def swept_over(tracking) -> tuple[str, str] | None:
-    """The column that cases differ in, and its words: density, detection probability or gate; None for one case."""
-    for column, (_, words) in KEYS.items():
-        if tracking[column].nunique() > 1 and tracking.groupby(["filter", column]).size().max() == 1:
-            return column, words
-    return None
+    """The column that cases differ in most, and its words: density, detection probability or gate; None if in none."""
+    values = {column: tracking[column].nunique() for column in KEYS}
+    column = max(values, key=values.get)
+    return (column, KEYS[column][1]) if values[column] > 1 else None
+
+
+def lined(tracking, column: str) -> dict[tuple[str, str], str]:
+    """What the line is called that a tracker of a case is a point of: the tracker, and what else is swept beside."""
+    others = [other for other in KEYS if other != column and tracking[other].nunique() > 1]
+    names = {}
+    for _, row in tracking.iterrows():
+        beside = "".join(f", {KEYS[other][1]} {row[other]:g}" for other in others)
+        names[row["case"], row["filter"]] = row["filter"] + beside
+    return names
 
 
 def confirmation_figure(results: Sequence[CaseResult], tracks) -> Figure | None:
@@ -95,6 +104,8 @@ def life_figure(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     if over is None:
         return None
     column, words = over
+    names = lined(tracking, column)
+    shown_rows = tracking.assign(filter=[names[key] for key in zip(tracking["case"], tracking["filter"], strict=True)])
     axis = axis_over(words, tracking[column])
     shown = {
         "life": ("life_s", Axis("track life, s", "log")),
@@ -102,10 +113,10 @@ def life_figure(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
         "wrong": ("wrong_share", Axis("share of wrong plots", limits=(0, None))),
     }
     found = tuple(
-        Panel(axis, y, tuple(_lines(tracking, column, value, ends)), direct=False) for ends, (value, y) in shown.items()
+        Panel(axis, y, tuple(_lines(shown_rows, column, value, ends)), direct=False)
+        for ends, (value, y) in shown.items()
     )
-    values = [(result.name, row) for result in results for row in [_place(tracking, result.name, column)]]
-    accuracy = _lines(_at_end(results, made["curves"], dict(values), column), column, "sigma", "sigma")
+    accuracy = _lines(_at_end(results, made["curves"], tracking, column), column, "sigma", "sigma")
     y = Axis("$\\sigma$ of $r$ of kept tracks, m", limits=(0, None))
     found += (Panel(axis, y, tuple(accuracy), direct=False),)
     caption = (
@@ -116,16 +127,13 @@ def life_figure(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     return Figure("track_life", "Track life and accuracy", caption, found, 2, PAGE_MM, 58)
 
 
-def _place(tracking, case: str, column: str) -> float:
-    """The swept value of a case."""
-    rows = tracking[tracking["case"] == case]
-    return float(rows[column].iloc[0])
-
-
-def _at_end(results: Sequence[CaseResult], curves, values: Mapping, column: str):
-    """Rows of the range's σ at the last scan, with the swept value of their case."""
+def _at_end(results: Sequence[CaseResult], curves, tracking, column: str):
+    """Rows of the range's σ at the last scan, with the swept value and the line of their case."""
     rows = curves[(curves["component"] == "r") & (curves["k"] == results[0].axes.k[-1])]
-    return rows.assign(**{column: rows["case"].map(values)})
+    at = tracking.groupby("case")[column].first()
+    beside = {case: name.removeprefix(f) for (case, f), name in lined(tracking, column).items()}
+    names = [f + beside[case] for case, f in zip(rows["case"], rows["filter"], strict=True)]
+    return rows.assign(**{column: rows["case"].map(at), "filter": names})
 
 
 def _lines(table, x: str, value: str, ends: str) -> list[Line]:
@@ -146,8 +154,11 @@ def false_figure(results: Sequence[CaseResult], tracking) -> Figure | None:
     if over is None or rows.empty:
         return None
     column, words = over
+    names, rules = lined(tracking, column), {}
+    for _, row in rows.iterrows():
+        rules[names[row["case"], row["filter"]]] = f"{row['m']:.0f} of {row['of']:.0f}"
+    rows = rows.assign(filter=[names[key] for key in zip(rows["case"], rows["filter"], strict=True)])
     lines = [Line(m.x, m.y, m.label, m.style, np.maximum(m.lo, m.y / 10), m.hi) for m in _lines(rows, column, *FALSE)]
-    rules = {row["filter"]: f"{row['m']:.0f} of {row['of']:.0f}" for _, row in rows.iterrows()}
     lines = [Line(m.x, m.y, f"{m.label} ({rules[m.label]})", m.style, m.lo, m.hi) for m in lines]
     caption = (
         "False tracks confirmed in an hour in the whole sector, every false plot beginning a tentative track, of "
