@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from radarsim import simulation, studies
+from radarsim import simulation, studies, timing
 from radarsim.config import lookup
 from radarsim.config.load import Experiment, load
 from radarsim.engine import stopping
@@ -154,6 +154,29 @@ def report(
 
     Where overrides do not say how many realisations, it is as many as the last run reported, else as the config asks.
     """
+    result = from_store(experiment, out, overrides)
+    result.write(out, figures)
+    return result
+
+
+def load_result(config, *, out: str | os.PathLike = RESULTS, overrides: Sequence[str] = ()) -> Result:
+    """The result of an experiment that was run into `out`, from what is stored there: computes and writes nothing.
+
+    config and overrides as for `run`. Raises ConfigError where something is missing, with the command that computes it.
+
+    >>> import radarsim, tempfile
+    >>> with tempfile.TemporaryDirectory() as out:
+    ...     ran = radarsim.run("rls2", realisations=2000, out=out, figures=False)
+    ...     loaded = radarsim.load("rls2", out=out)
+    >>> loaded.curves.equals(ran.curves)
+    True
+    """
+    experiment = config if isinstance(config, Experiment) else load(config, overrides)
+    return from_store(experiment, out, overrides)
+
+
+def from_store(experiment: Experiment, out: str | os.PathLike, overrides: Sequence[str]) -> Result:
+    """The result from stored blocks alone; as many realisations as the last run, where overrides do not say."""
     if not any(override.split("=")[0].strip() == "realisations" for override in overrides):
         experiment = as_last_run(experiment, Path(out))
     held, missing = Gathered(), []
@@ -168,9 +191,7 @@ def report(
             held.cases.append((case, work, collected))
     if missing:
         raise ConfigError(*missing, f"`{command(experiment, overrides, out)}` computes them")
-    result = Result(experiment, finished(held), facts_of(held, 0, 0.0) | repeated(experiment, overrides))
-    result.write(out, figures)
-    return result
+    return Result(experiment, finished(held), facts_of(held, 0, 0.0) | repeated(experiment, overrides))
 
 
 def as_last_run(experiment: Experiment, out: Path) -> Experiment:
@@ -205,6 +226,8 @@ def facts_of(gathered: Gathered, threads: int, seconds: float) -> dict:
         "warnings": list(dict.fromkeys(warning for c in collected for warning in c.warnings)),
         "identities": {case.name: work.identity for case, work, _ in gathered.cases},
     }
+    if measured := timing.seconds_per_update(work for _, work, _ in gathered.cases):
+        facts["seconds_per_update"] = measured
     if gathered.precision is None:
         return facts
     widest = {name: asdict(cell) | {"percent": finite(cell.percent)} for name, cell in gathered.cells.items()}

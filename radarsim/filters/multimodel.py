@@ -11,7 +11,7 @@ COLUMN_TOLERANCE = 1e-9  # of a column's sum from one
 MOST_STEPS = 2.0**52  # of a power: whatever is not forgotten by then never is, and more would not fit a whole number
 
 # Additions, subtractions, multiplications, divisions, roots and exponentials of one step, all three axes, counted on
-# the formulas of `kernels.blocks` and `kernels.hypothesis` (a test counts them again). PREDICT and UPDATE by whether the
+# the formulas of `kernels.blocks` and `kernels.hypothesis` (a test counts them again); PREDICT, UPDATE by whether the
 # model accelerates: the zeros of one that does not are left out.
 PREDICT, UPDATE = {True: 282, False: 99}, {True: 456, False: 267}
 LIKELIHOOD, MERGE, MERGE_ONCE = 8, 208, -9

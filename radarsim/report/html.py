@@ -32,10 +32,12 @@ def page(
     *,
     inputs=None,
     agreement=None,
+    cost=None,
 ) -> str:
     """The page of an experiment: question, answer, what was asked, figures, claims, exact values, tables, provenance.
 
-    figures are described ones (none with --no-figures); record is run.json's; inputs and agreement tables, or None.
+    figures are described ones (none with --no-figures); record is run.json's; inputs, agreement and cost (against
+    accuracy) are tables, or None.
     """
     claims = _claims(made["claims"])
     counts: dict[str, int] = {}
@@ -49,6 +51,7 @@ def page(
         inputs=None if inputs is None else _table("inputs", inputs),
         asked=[_table(title, table) for title, table in asked.asked(experiment.cases).items()],
         agreement=None if agreement is None else _table("exact against Monte-Carlo", agreement),
+        cost=None if cost is None else _table("cost against accuracy", cost),
         yaml=yaml_of(record["resolved"]),
         record=record,
         extent=provenance.extent(record),

@@ -3,7 +3,7 @@
 Its figures stand in multimodel_figures.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from radarsim.report import panels, statistics
 from radarsim.report import tables as common
 from radarsim.report.multimodel_figures import figures
 
-__all__ = ["answer", "figures", "question", "tables"]
+__all__ = ["answer", "cost", "figures", "question", "tables"]
 
 NEES, NIS, MERGED, MERGES = 9, 10, 11, 12  # places in the sums of a stage, after the nine mean squares
 FREEDOM = 3  # degrees of freedom of a position's or a plot's normalised error squared
@@ -158,6 +158,24 @@ def operations(results: Sequence[CaseResult]):
                 count = fixed + each * merged + once * merges
                 rows.append((result.name, label, *what, stage, float(merged), float(merges), float(count)))
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(OPERATIONS)})
+
+
+def cost(made: Mapping, run: Mapping):
+    """Operations counted and nanoseconds measured of one update, with σ of the height by stage; None if not measured.
+
+    run: the facts of the run, with `seconds_per_update`.
+    """
+    measured = run.get("seconds_per_update")
+    if not measured:
+        return None
+    counted = made["operations"][made["operations"]["stage"] == "whole"]
+    table = counted[["case", "filter", "family", "merge", "models", "operations"]].reset_index(drop=True)
+    table["measured, ns"] = [1e9 * measured[c][f] for c, f in zip(table["case"], table["filter"], strict=True)]
+    height = made["stages"][made["stages"]["component"] == "y"]
+    wide = height.pivot(index=["case", "filter"], columns="stage", values="sigma")
+    stages = list(dict.fromkeys(height["stage"]))
+    wide = wide[stages].rename(columns={stage: f"σ of y, {stage}, m" for stage in stages})
+    return table.merge(wide, left_on=["case", "filter"], right_index=True, how="left")
 
 
 def question(experiment) -> str:

@@ -97,6 +97,7 @@ def write(
         answer,
         own.question(experiment),
         inputs=getattr(own, "inputs", lambda results: None)(results),
+        cost=getattr(own, "cost", lambda made, run: None)(made, run),
         agreement=agreement.agreement(made["curves"]) if getattr(own, "EXACT", True) else None,
     )
     contents["report.html"] = page.encode()

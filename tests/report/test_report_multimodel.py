@@ -1,10 +1,12 @@
 """P2's tables, figures and claims, on a small run of the shipped config."""
 
+import json
+
 import numpy as np
 import pytest
 
 import radarsim
-from radarsim.report import claims, multimodel
+from radarsim.report import claims, html, multimodel
 from radarsim.report.claims.multimodel import CLAIMS
 from radarsim.report.claims.multimodel_measures import MMA2_122, RIVALS, Evidence
 
@@ -96,3 +98,17 @@ def test_bytes_are_the_same_for_any_number_of_threads(tmp_path):
         found.append({path.name: path.read_bytes() for path in folder.glob("*.csv")})
     assert found[0] == found[1] == found[2]
     assert {"curves.csv", "gains.csv", "probabilities.csv", "stages.csv"} <= set(found[0])
+
+
+def test_time_per_update_stands_in_the_record_and_the_report_alone(tmp_path):
+    """Counted operations are a table; what a clock measured is none."""
+    radarsim.run("multimodel_1hz", realisations=8, out=tmp_path, figures=False)
+    folder = tmp_path / "multimodel_1hz"
+    (measured,) = json.loads((folder / "run.json").read_text())["seconds_per_update"].values()
+    assert list(measured) == ["MMA2-122", "MMA2-11", "Kalman-1 20", "Kalman-1 5", "Kalman-2 20", "Kalman-2 1"]
+    assert all(1e-9 < seconds < 1e-4 for seconds in measured.values())
+    assert measured["MMA2-122"] > measured["Kalman-1 5"]
+    page = (folder / "report.html").read_text()
+    assert "Cost against accuracy" in page
+    assert html.number(1e9 * measured["Kalman-2 1"]) in page
+    assert not any("measured, ns" in path.read_text() for path in folder.glob("*.csv"))
