@@ -20,7 +20,7 @@ STRENGTHS = {"acceleration_mps2": "acceleration, m/s²", "rate_radps": "turn rat
 
 def figures(results: Sequence[CaseResult], made: Mapping, quantities: Mapping) -> dict[str, Figure | None]:
     """The figures of cases with detectors, filters that answer to manoeuvres, or uses."""
-    watched = [result for result in results if result.spec.detectors]
+    watched = [result for result in results if result.spec.detectors and "detections" in made]
     moving = [result for result in watched if result.axes.extra["manoeuvre_s"]]
     answering = [result for result in results if "modes" in result.sums]
     found = {

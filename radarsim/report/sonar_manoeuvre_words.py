@@ -20,7 +20,7 @@ def question(specs: Sequence) -> str:
 def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
     """Sentences with 95 % intervals: what detectors see of each manoeuvre, how σ from the covariance bears the test."""
     moving = [result for result in results if result.spec.detectors and result.axes.extra["manoeuvre_s"]]
-    told = [_seen(result, made["detections"]) for result in moving[: panels.MOST]]
+    told = [_seen(result, made["detections"]) for result in moving[: panels.MOST] if "detections" in made]
     return [words for words in [*told, _first_order(made)] if words]
 
 

@@ -130,6 +130,17 @@ def test_cases_in_several_frames_stand_side_by_side():
     assert result.tables["detections"]["exact"].isna().mean() == 0.5
 
 
+def test_a_detector_that_never_has_its_plots():
+    missed = "sensor.missed_scans=[3, 4, 5, 6]"
+    changes = ["scans=6", "detectors=[{name: d, plots: 5, threshold_k: [1.0]}]", "uses={horizon_s: 60}", missed]
+    changes += ["filters=[{name: g, kind: growing_memory}]", "target.start_s=10", "realisations=64"]
+    made = load("sonar_manoeuvre", [*changes, "sweep.target.acceleration_mps2=[0.8]"])
+    result = radarsim.run(made)
+    assert "detections" not in result.tables
+    assert set(output.figures(result.cases, result.tables, made)) & OWN == {"uses"}
+    assert sonar.answer(result.cases, result.tables)
+
+
 def test_claims_are_judged(result, tables):
     rows = tables["claims"]
     assert set(rows["claim"]) == {"P3.8", "P3.9", "P3.10"}
