@@ -209,6 +209,9 @@ class Discriminator(Study):
     def _schedule_fits(self, i: int, estimator: Estimator):
         if estimator.schedule != "designed" and estimator.schedule[-1] > self.burst.duration_s * (1 + 1e-9):
             yield at(f"estimators.{i}.schedule", "must not reach beyond the burst")
+        fewest = self.truth.parameters
+        if estimator.schedule != "designed" and estimator.schedule[0] < (fewest - 0.5) * self.burst.pulse_period_s:
+            yield at(f"estimators.{i}.schedule", f"no window must be shorter than {fewest} pulses, one a parameter")
 
     def _ridge_fits(self, i: int, estimator: Estimator):
         if estimator.method == "ridge" and self.burst.pulse_length_s > 1.5 * self.burst.sampling_period_s:

@@ -68,8 +68,13 @@ def fisher_sums(burst: Burst, size: int, windows: list[int], theta: np.ndarray |
 
 
 def spreads(information: np.ndarray) -> np.ndarray:
-    """Potential standard deviations (size,) that an information matrix allows."""
-    return np.sqrt(np.diag(balanced_inverse(information)))
+    """Potential standard deviations (size,) that an information matrix allows; infinite where it is singular."""
+    try:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            variance = np.diag(balanced_inverse(information))
+    except np.linalg.LinAlgError:
+        return np.full(len(information), np.inf)
+    return np.sqrt(np.where(variance > 0.0, variance, np.inf))
 
 
 def prior_information(sigma: np.ndarray) -> np.ndarray:

@@ -17,7 +17,12 @@ from radarsim.models.burst import Burst, balanced_inverse
 
 Tail = Literal["gaussian", "exact"]
 PAPER_PROBABILITY, PAPER_FACTOR = 0.99, 3.0
+MOST_WINDOWS = 200
 NODES = 600  # of the tail integral: 10⁻¹² is reached from about 300 on
+
+
+class NoSchedule(ValueError):
+    """No sequence of windows follows from the burst and the forecast."""
 
 
 @dataclass(frozen=True)
@@ -111,16 +116,21 @@ class Designer:
 
         if criterion(self.burst.duration_s) <= 0.0:
             return self.burst.pulses
+        if criterion(shortest_s) >= 0.0:
+            return self.burst.pulses_in(shortest_s)
         root = brentq(criterion, shortest_s, self.burst.duration_s, xtol=1e-4 * self.burst.pulse_period_s)
         return self.burst.pulses_in(root)
 
     def windows(self, least_s: float = 0.0) -> list[int]:
-        """Window lengths in pulses from T₀ (15), at least `least_s` long, over (16) to the whole burst."""
-        period = self.burst.pulse_period_s
-        shortest = max(2.0 * period, 1e-9)
-        first = self.longest(self.first_excess, shortest) if self.first_excess(shortest) < 0.0 else 2
-        sequence = [max(first, self.burst.pulses_in(least_s), 2)]
+        """Window lengths in pulses from T₀ (15), at least `least_s` long, over (16) to the whole burst.
+
+        None is shorter than there are parameters. Raises NoSchedule where over 200 are needed.
+        """
+        period, fewest = self.burst.pulse_period_s, max(len(self.sigma), self.burst.pulses_in(least_s))
+        sequence = [max(self.longest(self.first_excess, fewest * period), fewest)]
         while sequence[-1] < self.burst.pulses:
+            if len(sequence) == MOST_WINDOWS:
+                raise NoSchedule(f"it needs over {MOST_WINDOWS} windows")
             before = sequence[-1] * period
             following = self.longest(
                 lambda after, before=before: self.next_excess(before, after), before * (1.0 + 1e-9)

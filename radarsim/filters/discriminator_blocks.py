@@ -1,6 +1,5 @@
 """How a burst is cut into blocks, and the blocks of every window in terms of those drawn."""
 
-import itertools
 import math
 
 import numpy as np
@@ -42,10 +41,13 @@ def merged(edges: np.ndarray, pulses: int, per_window: int) -> list[int]:
     return ends
 
 
-def moments(sums: np.ndarray, row: int, shift: np.ndarray) -> np.ndarray:
-    """Sums over blocks of a quantity times 1, s, s² (3,), s now from a centre `shift` before theirs; rows as drawn."""
+def moments(sums: np.ndarray, row: int, shift: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Sums of a quantity times 1, s, s² over joined blocks (3, joined), from those over the blocks drawn.
+
+    s is now counted from a centre `shift` before theirs; joined blocks begin at starts.
+    """
     z0, z1, z2 = (sums[row + 2 * n] + 1j * sums[row + 2 * n + 1] for n in range(3))
-    return np.array([z0.sum(), (z1 + shift * z0).sum(), (z2 + 2.0 * shift * z1 + shift**2 * z0).sum()])
+    return np.add.reduceat([z0, z1 + shift * z0, z2 + 2.0 * shift * z1 + shift**2 * z0], starts, axis=1)
 
 
 class Tables:
@@ -54,48 +56,47 @@ class Tables:
     def __init__(self, edges: np.ndarray, sums: np.ndarray, per_window: int):
         self.edges, self.sums, self.per_window = edges, sums, per_window
         self.pulses = int(edges[-1])
-        self.rows, self.parts = [], []
+        self.rows, self.weights = [np.zeros((0, COLUMNS))], [np.zeros((0, WEIGHTS))]
         self.known: dict[int, tuple[int, int, int]] = {}
 
     def window(self, pulses: int) -> tuple[int, int, int]:
         """First row in the table, first weight and number of blocks of a window; rows are made where they are new."""
         if pulses not in self.known:
             ends = merged(self.edges, pulses, self.per_window)
-            self.known[pulses] = len(self.rows), len(self.parts), len(ends)
-            for begin, end in itertools.pairwise([0, *ends]):
-                self._add(begin, end, pulses / self.pulses)
+            self.known[pulses] = sum(map(len, self.rows)), sum(map(len, self.weights)), len(ends)
+            self._add(np.array(ends), pulses / self.pulses)
         return self.known[pulses]
 
     def drawn(self, pulses: int) -> tuple[int, int, int]:
         """As `window` where blocks are used as drawn and no tables are needed."""
         return 0, 0, int(np.searchsorted(self.edges, pulses))
 
-    def _add(self, begin: int, end: int, share: float) -> None:
-        part = self.sums[:, begin:end]
-        count = np.diff(self.edges[begin : end + 1])
-        centre = np.average(part[CENTRE], weights=count)
-        shift = part[CENTRE] - centre
-        square = np.average(2.0 * part[HALF] + shift**2, weights=count)
-        rms = math.sqrt(square)
-        ratio = 1.0 / rms if rms > 0.0 else 0.0  # a block of one sample has no slope
-        t, orders, row = centre / share, np.arange(1, SIZE), np.zeros(COLUMNS)
-        bend = np.where(orders > 1, orders * (orders - 1) * t ** np.maximum(orders - 2, 0), 0.0)
-        row[M : M + SIZE - 1] = t**orders + 0.5 * bend * square / share**2  # the mean of τ^j over the block
-        row[S : S + SIZE - 1] = orders * t ** (orders - 1) * rms / share
-        echo, image = moments(part, SUM_Z, shift), moments(part, SUM_W, shift)
-        image = image * ratio ** np.arange(3)
-        for column, value in ((Z2, echo[2] * ratio**2), (W0, image[0]), (W1, image[1]), (W2, image[2])):
-            row[column : column + 2] = value.real, value.imag
-        row[END] = end
-        self.rows.append(row)
-        self.parts += [self._weight(ratio, s) for s in shift]
+    def _add(self, ends: np.ndarray, share: float) -> None:
+        starts, drawn = np.append(0, ends[:-1]), self.sums[:, : ends[-1]]
+        count = np.diff(self.edges[: ends[-1] + 1])
 
-    @staticmethod
-    def _weight(ratio: float, shift: float) -> np.ndarray:
-        weight = np.zeros(WEIGHTS)
-        weight[RATIO], weight[SHIFT] = ratio, shift * ratio
-        return weight
+        def mean(x):
+            return np.add.reduceat(count * x, starts) / np.add.reduceat(count, starts)
+
+        joined = np.repeat(np.arange(len(ends)), ends - starts)
+        centre = mean(drawn[CENTRE])
+        shift = drawn[CENTRE] - centre[joined]
+        rms = np.sqrt(mean(2.0 * drawn[HALF] + shift**2))
+        ratio = 1.0 / np.where(rms > 0.0, rms, np.inf)  # a block of one sample has no slope
+        t, width, orders, rows = centre / share, rms / share, np.arange(1, SIZE), np.zeros((len(ends), COLUMNS))
+        bend = np.where(orders > 1, orders * (orders - 1) * t[:, None] ** np.maximum(orders - 2, 0), 0.0)
+        rows[:, M : M + SIZE - 1] = t[:, None] ** orders + 0.5 * bend * width[:, None] ** 2  # means of τ^j
+        rows[:, S : S + SIZE - 1] = orders * t[:, None] ** (orders - 1) * width[:, None]
+        echo, image = (moments(drawn, row, shift, starts) for row in (SUM_Z, SUM_W))
+        image = image * ratio ** np.arange(3)[:, None]
+        for column, value in ((Z2, echo[2] * ratio**2), (W0, image[0]), (W1, image[1]), (W2, image[2])):
+            rows[:, column], rows[:, column + 1] = value.real, value.imag
+        rows[:, END] = ends
+        weights = np.zeros((len(joined), WEIGHTS))
+        weights[:, RATIO], weights[:, SHIFT] = ratio[joined], shift * ratio[joined]
+        self.rows.append(rows)
+        self.weights.append(weights)
 
     def arrays(self) -> tuple[np.ndarray, np.ndarray]:
         """Both tables, flat."""
-        return np.array(self.rows).ravel(), np.array(self.parts).ravel()
+        return np.concatenate(self.rows).ravel(), np.concatenate(self.weights).ravel()

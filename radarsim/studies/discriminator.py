@@ -8,6 +8,7 @@ import numpy as np
 from radarsim.config.load import Case
 from radarsim.engine.moments import Layout
 from radarsim.engine.results import Axes
+from radarsim.errors import ConfigError
 from radarsim.exact import burst as exact
 from radarsim.filters import discriminator as schedules
 from radarsim.filters import discriminator_blocks as cuts
@@ -129,6 +130,16 @@ def mode_of(spec) -> int:
 
 def prepare(case: Case) -> Plan:
     """Schedules, block sums' law, step matrices and bounds of a case."""
+    try:
+        return prepared(case)
+    except schedules.NoSchedule as error:
+        raise ConfigError(f"{case.name}: estimators: no designed schedule: {error}") from None
+    except np.linalg.LinAlgError:
+        raise ConfigError(f"{case.name}: prior: too wide, equations (15) and (16) cannot be solved") from None
+
+
+def prepared(case: Case) -> Plan:
+    """`prepare`, with the errors of those who compute."""
     spec = case.spec
     burst, mode = burst_of(spec), mode_of(spec)
     phase, sigma = phase_of(spec, burst), forecast(spec, burst)
@@ -148,6 +159,8 @@ def prepare(case: Case) -> Plan:
     whole = np.ones(SIZE)
     whole[:size] = model.turns_per_parameter(size, burst.duration_s)
     potential, posterior = bounds(burst, windows, phase.theta, sigma)
+    if not (np.isfinite(potential).all() and np.isfinite(posterior).all()):
+        raise ConfigError(f"{case.name}: truth: the samples of a window do not determine the {size} parameters")
     count, most = records.shape
     return Plan(
         layout=Layout(

@@ -104,3 +104,8 @@ def test_many_windows_at_once_are_as_one_by_one(theta):
         scale = np.sqrt(np.diag(information))
         alone = exact.fisher_sum(PAPER, 5, window, theta)
         assert information / np.outer(scale, scale) == pytest.approx(alone / np.outer(scale, scale), abs=1e-9)
+
+
+def test_what_is_not_determined_has_no_bound():
+    assert np.all(np.isinf(exact.spreads(np.zeros((3, 3)))))
+    assert np.all(np.isinf(exact.spreads(np.ones((2, 2)))))

@@ -350,6 +350,7 @@ def test_a_case_knows_its_identity_and_pickles():
         ({"burst": BASE["burst"] | {"pulses": 1e6, "sampling_period_s": 1e-7}}, "samples"),
         ({"estimators": [{"name": "a", "schedule": [0.2, 0.1]}]}, "rise"),
         ({"estimators": [{"name": "a", "schedule": [0.4]}]}, "beyond"),
+        ({"estimators": [{"name": "a", "schedule": [4e-5, 0.3]}]}, "shorter than 5 pulses"),
         ({"estimators": [{"name": "a", "lock_probability": 1.0}]}, "lock_probability"),
         ({"estimators": [{"name": "a"}, {"name": "a"}]}, "differ"),
     ],
@@ -357,3 +358,19 @@ def test_a_case_knows_its_identity_and_pickles():
 def test_faults_of_a_config(change, words):
     with pytest.raises(ConfigError, match=words):
         load(BASE | {"estimators": [SEQUENCE]} | change)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"burst": {"noise_variance": 1e12}}, "over 200 windows"),
+        ({"truth": {"doppler_derivatives": [0.0, 0.0, 0.0, 0.0]}}, "do not determine"),
+    ],
+)
+def test_faults_that_only_the_schedule_shows(change, words):
+    with pytest.raises(ConfigError, match=words):
+        plan_of(SEQUENCE, **change)
+
+
+def test_a_burst_of_sixteen_pulses_is_finite():
+    assert np.isfinite(study.simulate(plan_of(SEQUENCE, CURED, burst={"pulses": 16}), 0, 20)).all()
