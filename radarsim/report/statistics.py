@@ -187,8 +187,12 @@ def rate(count, n) -> Estimate:
 
 
 def difference(a: Estimate, b: Estimate) -> Estimate:
-    """a − b of independent estimates: the half-widths add in squares, each end with the ends that make it."""
-    value = np.subtract(a.value, b.value)
-    down = np.hypot(np.subtract(a.value, a.lo), np.subtract(b.hi, b.value))
-    up = np.hypot(np.subtract(a.hi, a.value), np.subtract(b.value, b.lo))
-    return Estimate(value, value - down, value + up)
+    """a − b of independent estimates: the half-widths add in squares, each end with the ends that make it.
+
+    Not-a-number where infinite ones (a filter that never settles) leave nothing to be said.
+    """
+    with np.errstate(invalid="ignore"):
+        value = np.subtract(a.value, b.value)
+        down = np.hypot(np.subtract(a.value, a.lo), np.subtract(b.hi, b.value))
+        up = np.hypot(np.subtract(a.hi, a.value), np.subtract(b.value, b.lo))
+        return Estimate(value, value - down, value + up)

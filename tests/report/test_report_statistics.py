@@ -130,6 +130,11 @@ def test_difference_adds_in_squares():
     assert statistics.difference(one, other) == (9.0, 9.0 - 5.0, 9.0 + 5.0)
 
 
+def test_difference_with_what_never_settles_says_nothing_and_warns_of_nothing():
+    one, never = statistics.Estimate(12.0, 7.0, np.inf), statistics.Estimate(np.inf, 0.0, np.inf)
+    assert np.isnan([statistics.difference(one, never).lo, statistics.difference(never, never).value]).all()
+
+
 def test_bias_far_over_spread():
     e = 1e6 + np.random.default_rng(7).normal(size=10_000)
     of = statistics.errors(moments(e), e.size)
