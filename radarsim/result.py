@@ -26,7 +26,7 @@ class Result:
         """Every table by the stem of its file: `curves`, `gains`, `claims`, and the study's own."""
         from radarsim.report import output
 
-        return output.tables(self.cases)
+        return output.tables(self.cases, self.experiment.control_variate)
 
     @property
     def curves(self):

@@ -5,7 +5,7 @@ import re
 from radarsim.config.fields import in_degrees
 from radarsim.config.json_schema import schema
 
-COMMON = ("include", "sweep", "realisations", "seed", "figures")
+COMMON = ("include", "sweep", "realisations", "seed", "figures", "control_variate")
 BOUNDS = {"minimum": "≥ {}", "exclusiveMinimum": "> {}", "maximum": "≤ {}", "exclusiveMaximum": "< {}"}
 
 

@@ -79,6 +79,7 @@ class Expander:
             realisations=common.realisations or max(case.realisations for case in cases),
             seed=cases[0].seed if common.seed is None else common.seed,
             figures=dict(common.figures),
+            control_variate=common.control_variate,
         )
 
     def _expand(self, document: Document, chain: tuple[FilePath, ...]) -> tuple[Common, list[Draft]]:

@@ -35,7 +35,8 @@ class Case:
 class Experiment:
     """What a config asks for.
 
-    figures holds, for a figure, names or patterns of the cases that it shows.
+    figures holds, for a figure, names or patterns of the cases that it shows; control_variate asks for the table
+    `controlled`.
     """
 
     stem: str
@@ -45,6 +46,7 @@ class Experiment:
     realisations: int
     seed: int
     figures: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    control_variate: bool = False
 
     @cached_property
     def resolved(self) -> dict:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from radarsim.config.fields import Anything, Model, Name, Stem, Study, whole
+from radarsim.config.fields import Anything, Flag, Model, Name, Stem, Study, whole
 
 STUDIES = {
     "range_doppler": "radarsim.config.range_doppler:RangeDoppler",
@@ -37,6 +37,10 @@ class Common(Model):
     seed: whole(0, LARGEST_SEED) | None = Field(None, description="seed of the noise; default 1")
     figures: dict[Name, Annotated[tuple[Name, ...], Field(min_length=1)]] = Field(
         {}, description="for a figure the cases it shows: names, or patterns with * and ?"
+    )
+    control_variate: Flag = Field(
+        False,
+        description="a further table, controlled.csv: σ of each filter with the baseline, exactly known, as control",
     )
 
 

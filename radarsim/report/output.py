@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import agreement, claims, files, notes, provenance, sweeps
+from radarsim.report import agreement, claims, controlled, files, notes, provenance, sweeps
 from radarsim.report import tables as common
 from radarsim.report.drawing import Figure
 
@@ -21,14 +21,17 @@ def study(name: str):
     return import_module(f"radarsim.report.{name}")
 
 
-def tables(results: Sequence[CaseResult]) -> dict:
-    """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims.
+def tables(results: Sequence[CaseResult], control_variate: bool = False) -> dict:
+    """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims; if asked for,
+    `controlled`.
 
     A study whose errors are not of all realisations at common scans makes its own curves and gains.
     """
     own = study(results[0].study).tables(results)
     shared = {"curves": common.curves, "gains": common.gains}
     made = {name: own[name] if name in own else table(results) for name, table in shared.items()} | own
+    if control_variate and getattr(study(results[0].study), "EXACT", True):
+        made["controlled"] = controlled.controlled(results)
     made["claims"] = claims.judged(results[0].study, results, made)
     return notes.noted(made, results)
 
