@@ -4,18 +4,26 @@
 >>> result = radarsim.run("rls2", realisations=1e4)
 >>> result.gains.columns[0]
 'case'
+>>> result.figure("gain_r")  # doctest: +ELLIPSIS
+<Figure size ...>
+
+In a notebook a result shows its answer and the last scan; `radarsim.load("rls2")` gives one that was run before.
 """
 
 from importlib import import_module
 
 __version__ = "0.1.0"
-__all__ = ["ConfigError", "RadarsimError", "Result", "__version__", "run"]
+__all__ = ["ConfigError", "RadarsimError", "Result", "__version__", "load", "run"]
 
-_HOMES = {"run": "experiment", "Result": "result", "ConfigError": "errors", "RadarsimError": "errors"}
+_HOMES = {
+    **{"run": "experiment:run", "load": "experiment:load_result", "Result": "result:Result"},
+    **{"ConfigError": "errors:ConfigError", "RadarsimError": "errors:RadarsimError"},
+}
 
 
 def __getattr__(name: str):
     # Imported on first use, so that `radarsim --help` loads neither NumPy nor Numba.
     if name in _HOMES:
-        return getattr(import_module(f"radarsim.{_HOMES[name]}"), name)
+        module, _, attribute = _HOMES[name].partition(":")
+        return getattr(import_module(f"radarsim.{module}"), attribute)
     raise AttributeError(f"module 'radarsim' has no attribute {name!r}")

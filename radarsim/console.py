@@ -131,10 +131,11 @@ def print_result(result) -> None:
         for verdict, names in verdicts.items():
             say(f"claims   {len(names)} {verdict}: {', '.join(names)}")
         say(f"         `radarsim claims {result.experiment.stem}` says what each of them is")
-    drawn = sum(name.endswith(".svg") for name in written.files)
+    drawn = [Path(name) for name in written.files if name.startswith("figures/")]
     say(f"tables   {written.folder / 'curves.csv'} and {sum(n.endswith('.csv') for n in written.files) - 1} more there")
     if drawn:
-        say(f"figures  {written.folder / 'figures'} ({drawn}, each as SVG and PNG)")
+        kinds = " and ".join(sorted({path.suffix[1:].upper() for path in drawn}, reverse=True))
+        say(f"figures  {written.folder / 'figures'} ({len({path.stem for path in drawn})}, each as {kinds})")
     say(f"report   {written.folder / 'report.html'}")
     for warning in result.warnings:
         sys.stderr.write(f"warning: {printable(warning)}\n")

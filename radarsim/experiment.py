@@ -138,7 +138,8 @@ def repeated(experiment: Experiment, overrides: Sequence[str]) -> dict[str, str]
 
 def command(experiment: Experiment, overrides: Sequence[str], out: str | os.PathLike) -> str:
     """The command that runs an experiment; a shipped config by its stem."""
-    shipped = experiment.path and Path(experiment.path).resolve().is_relative_to(lookup.SHIPPED.resolve())
+    # In a checkout the shipped folder is a link to configs/.
+    shipped = experiment.path and Path(experiment.path).resolve().parent == (lookup.SHIPPED / "configs").resolve()
     path = os.fsencode(experiment.path or "").decode("utf-8", "backslashreplace")
     words = ["radarsim", "run", experiment.stem if shipped else path]
     for override in overrides:

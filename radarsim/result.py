@@ -9,6 +9,8 @@ from pathlib import Path
 from radarsim.config.load import Experiment
 from radarsim.engine.results import CaseResult
 
+MOST_ROWS = 40  # that a notebook shows
+
 
 class Result:
     """A finished experiment: its cases, tables (pandas), figures (Matplotlib). Nothing is written unless asked for."""
@@ -21,16 +23,61 @@ class Result:
         each = f"{counts[0]:,}" if len(counts) == 1 else f"{counts[0]:,} to {counts[-1]:,}"
         return f"<radarsim result {self.experiment.stem}: {len(self.cases)} cases of {each} realisations>"
 
+    def _repr_html_(self):
+        """What a notebook shows: question, answer, realisations, σ and gain at the last scan; text escaped."""
+        from html import escape
+
+        from radarsim.report import provenance
+
+        shown = ("case", "filter", "component", "unit", "t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")
+        columns = [*shown, *(name for name in ("gain_percent", "gain_lo", "gain_hi") if len(self.gains))]
+        rows = self.last_scan[columns].dropna(axis=1, how="all")
+        table = rows.to_html(index=False, border=0, float_format=lambda v: f"{v:.4g}", max_rows=MOST_ROWS)
+        said = "".join(f"<p>{escape(line)}</p>" for line in self.answer)
+        count = escape(provenance.span(sorted({case.count for case in self.cases})))
+        return f"<h4>{escape(self.question)}</h4>{said}<p>{count} realisations; 95 % intervals.</p>{table}"
+
+    @property
+    def question(self) -> str:
+        """What the experiment asks, in one sentence."""
+        from radarsim.report import output
+
+        return output.study(self.experiment.study).question(self.experiment)
+
+    @cached_property
+    def answer(self) -> tuple[str, ...]:
+        """Sentences with numbers and 95 % intervals.
+
+        >>> import radarsim
+        >>> radarsim.run("rls2", realisations=2000).answer[0].split(":")[0]
+        'Range'
+        """
+        from radarsim.report import output
+
+        return tuple(output.study(self.experiment.study).answer(self.cases, self.tables))
+
     @cached_property
     def tables(self) -> dict:
-        """Every table by the stem of its file: `curves`, `gains`, `claims`, and the study's own."""
+        """Every table by the stem of its file: `curves`, `gains`, `claims`, and the study's own.
+
+        >>> import radarsim
+        >>> sorted(radarsim.run("rls2", realisations=2000).tables)
+        ['claims', 'consistency', 'curves', 'gains', 'radar', 'steady']
+        """
         from radarsim.report import output
 
         return output.tables(self.cases, self.experiment.control_variate)
 
     @property
     def curves(self):
-        """sigma(k), bias and spread of every case, filter and component: a DataFrame with the columns of curves.csv."""
+        """sigma(k), bias and spread of every case, filter and component: a DataFrame with the columns of curves.csv.
+
+        >>> import radarsim
+        >>> curves = radarsim.run("rls2", realisations=2000).curves
+        >>> first = curves[(curves["filter"] == "r") & (curves["component"] == "r")].iloc[0]
+        >>> bool(first["sigma_lo"] < first["exact_sigma"] < first["sigma_hi"])
+        True
+        """
         return self.tables["curves"]
 
     @property
@@ -57,24 +104,33 @@ class Result:
         return tuple(self._described)
 
     def figure(self, name: str):
-        """A Matplotlib figure by its name; KeyError names those there are."""
+        """A Matplotlib figure by its name; KeyError names those there are.
+
+        >>> import radarsim
+        >>> result = radarsim.run("rls2", realisations=2000)
+        >>> result.figures[:2]
+        ('sigma_r', 'gain_r')
+        >>> result.figure("sigma_r").axes[0].get_xlabel()
+        'time from the first plot, s'
+        """
         from radarsim.report import figures
 
         if name not in self._described:
             raise KeyError(f"no figure {name!r}; there are: {', '.join(self._described)}")
         return figures.render(self._described[name])
 
-    def write(self, out: str | os.PathLike, figures: bool = True, formats: Sequence[str] = ("svg", "png")):
+    def write(self, out: str | os.PathLike, figures: bool | Sequence[str] = True):
         """Write tables, figures, claims, run.json and report.html into out/<stem>/, and out/index.html anew.
 
-        formats are those of the figures' files: svg, png, pdf. What was written comes back.
+        figures may name the formats of their files: svg, png, pdf. What was written comes back.
         """
         from radarsim.report import index, output
 
         folder = Path(out) / self.experiment.stem
         facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
+        formats = ("svg", "png") if isinstance(figures, bool) else tuple(figures)
         self.written = output.write(
-            self.experiment, self.cases, folder, facts, draw=figures, made=self.tables, formats=formats
+            self.experiment, self.cases, folder, facts, draw=bool(figures), made=self.tables, formats=formats
         )
         index.write(Path(out))
         return self.written

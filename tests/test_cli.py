@@ -238,7 +238,7 @@ def test_claims_of_a_config_not_yet_run_are_listed_as_such(tmp_path):
 def test_the_command_that_computes_what_is_missing_is_whole(tmp_path):
     arguments = ("rls3", "-n", 500, "--seed", 4, "--set", "radar.sigma_range_m=300", "--out", tmp_path)
     result = radarsim("report", *arguments, code=2)
-    assert f"rls3.yaml --set radar.sigma_range_m=300 -n 500 --seed 4 --out {tmp_path}`" in result.stderr
+    assert f"radarsim run rls3 --set radar.sigma_range_m=300 -n 500 --seed 4 --out {tmp_path}`" in result.stderr
 
 
 def test_a_spoiled_table_of_claims_is_told(tmp_path):

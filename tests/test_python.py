@@ -69,3 +69,30 @@ def test_realisation_i_is_the_same_in_any_run():
     work = CaseWork(load(CONFIG).cases[0])
     whole, parts = work.simulate(0, 9000), work.simulate(0, 5000) + work.simulate(5000, 4000)
     np.testing.assert_allclose(parts, whole, rtol=1e-9, atol=1e-6 * np.abs(whole).max())
+
+
+def test_load_gives_what_was_run_and_writes_nothing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ran = radarsim.run("rls2", realisations=3000, out="results", figures=False)
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
+    loaded = radarsim.load("rls2")
+    assert loaded.curves.equals(ran.curves)
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()} == before
+    with pytest.raises(radarsim.ConfigError, match="radarsim run rls3"):
+        radarsim.load("rls3")
+
+
+def test_a_notebook_shows_the_answer_and_no_markup_of_a_users():
+    hostile = copy.deepcopy(CONFIG)
+    hostile["filters"][1]["name"] = "<script>x</script>"
+    shown = radarsim.run(hostile)._repr_html_()
+    assert "<script" not in shown
+    assert "&lt;script&gt;" in shown
+    assert "lower than with range alone" in shown
+    assert "exact_sigma" in shown
+
+
+def test_a_figure_as_pdf(tmp_path):
+    result = radarsim.run(CONFIG)
+    result.write(tmp_path, figures=["pdf"])
+    assert {path.suffix for path in (tmp_path / "config" / "figures").iterdir()} == {".pdf"}

@@ -7,6 +7,7 @@ from radarsim.cli.group import (
     Share,
     configs_argument,
     figures_option,
+    format_option,
     json_option,
     main,
     out_option,
@@ -31,6 +32,7 @@ from radarsim.errors import TargetUnmet
 @click.option("--scheduler", metavar="ADDR", help="Address of a Dask scheduler whose workers compute: tcp://host:8786.")
 @out_option
 @figures_option
+@format_option
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @json_option
 def run(
@@ -46,6 +48,7 @@ def run(
     scheduler,
     out,
     no_figures,
+    formats,
     quiet,
     as_json,
 ):
@@ -93,7 +96,11 @@ def run(
                             done = experiment.share(one, *shard, **means)
                         else:
                             done = experiment.run(
-                                one, overrides=overrides, precision=precision, figures=not no_figures, **means
+                                one,
+                                overrides=overrides,
+                                precision=precision,
+                                figures=not no_figures and (formats or True),
+                                **means,
                             )
                     except TargetUnmet as error:
                         unmet += error.lines
@@ -145,8 +152,9 @@ def check(configs, realisations, seed, overrides, precision, as_json):
 @set_option
 @out_option
 @figures_option
+@format_option
 @json_option
-def report(configs, realisations, seed, overrides, out, no_figures, as_json):
+def report(configs, realisations, seed, overrides, out, no_figures, formats, as_json):
     """Tables, figures and report from what is stored; computes nothing.
 
     \b
@@ -159,7 +167,7 @@ def report(configs, realisations, seed, overrides, out, no_figures, as_json):
     overrides = experiment.merged(overrides, realisations, seed)
     told = []
     for one in experiment.load_all(configs, overrides):
-        result = experiment.report(one, out=out, overrides=overrides, figures=not no_figures)
+        result = experiment.report(one, out=out, overrides=overrides, figures=not no_figures and (formats or True))
         told.append(documents.result(result))
         if not as_json:
             console.print_result(result)

@@ -126,4 +126,11 @@ precision_option = click.option(
     help="Run until the 95 % half-width of every σ is under PCT %, at most N; looks at 2000, 4000, 8000, …",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout in place of words.")
+format_option = click.option(
+    "--format",
+    "formats",
+    type=click.Choice(["svg", "png", "pdf"]),
+    multiple=True,
+    help="Formats of the figures' files, repeatable; default: svg and png.",
+)
 figures_option = click.option("--no-figures", is_flag=True, help="Draw no figures; tables and report only.")

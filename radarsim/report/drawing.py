@@ -107,6 +107,7 @@ class Panel:
 
     direct: lines are named at their ends where the names fit; else always in the legend, at its place, "none", or
     "right", beside the panel. A remark stands above the panel, at its right. Without marks a panel is its legend alone.
+    crosses is what the crosses of exact values are called.
     """
 
     x: Axis
@@ -118,6 +119,7 @@ class Panel:
     direct: bool = True
     legend: str = "best"
     remark: str = ""
+    crosses: str = "exact"
 
 
 @dataclass(frozen=True)

@@ -245,7 +245,7 @@ def _name(axes, panel: Panel, crosses: bool) -> list:
 def _legend(axes, panel: Panel, handles: list, crosses: bool) -> list:
     """A legend of words and styles, with the exact crosses where asked; of a panel without marks in its middle."""
     look = [Line2D([], [], **_look(style)) for _, style in handles] + [Line2D([], [], **EXACT)] * crosses
-    words = [words for words, _ in handles] + ["exact"] * crosses
+    words = [words for words, _ in handles] + [panel.crosses] * crosses
     if not words:
         return []
     place = {"loc": "best" if panel.legend == "none" else panel.legend}

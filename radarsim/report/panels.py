@@ -77,6 +77,27 @@ def label(result: CaseResult) -> str:
     return " ".join(filter(None, (device(result), swept(result))))
 
 
+def in_legend(drawn: Sequence[Panel]) -> list[Panel]:
+    """Panels of many lines with one legend in a cell of its own, the names taken from the lines."""
+    keys = {mark.label: mark.style for panel in drawn for mark in panel.marks if isinstance(mark, Line) and mark.label}
+    blank = [
+        replace(
+            panel,
+            marks=tuple(
+                replace(m, label="", name=m.name or m.label) if isinstance(m, Line) else m for m in panel.marks
+            ),
+        )
+        for panel in drawn
+    ]
+    return [*blank, Panel(drawn[0].x, drawn[0].y, (), keys=tuple(keys.items()))]
+
+
+def counts(label: str, highest: float) -> Axis:
+    """An axis of whole numbers from nought, ticks at whole numbers alone."""
+    step = next(s * 10**p for p in range(9) for s in (1, 2, 5) if highest / (s * 10**p) <= 8)
+    return Axis(label, limits=(0, None), ticks=tuple((float(n), str(n)) for n in range(0, int(highest) + 1, step)))
+
+
 def plain_label(result: CaseResult) -> str:
     """`label` for text: letters plain."""
     return plain(label(result))
@@ -110,6 +131,14 @@ def shown(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[Cas
     wanted = [result for result in results if result.name in set(names)]
     left = len(wanted) - MOST
     return wanted[:MOST], f" {left} further cases are in the tables alone." if left > 0 else ""
+
+
+def shown_families(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
+    """The results of a figure with a panel for each config: at most eight configs, of each at most eight cases."""
+    wanted = [result for result in results if result.name in set(names)]
+    some = [result for members in list(families(wanted).values())[:MOST] for result in members[:MOST]]
+    left = len(wanted) - len(some)
+    return some, f" {left} further cases are in the tables alone." if left > 0 else ""
 
 
 def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity) -> Figure:
@@ -235,7 +264,7 @@ def per_component(
             ("dynamic", dynamic_figure, curves),
         ):
             name = f"{kind}_{component}"
-            some, left_out = shown(results, chosen(name))
+            some, left_out = (shown_families if kind == "sigma" else shown)(results, chosen(name))
             figure = draw(name, some, rows, component, of) if some else None
             if figure and any(isinstance(mark, Line) for panel in figure.panels for mark in panel.marks):
                 made[name] = replace(figure, caption=figure.caption + left_out)

@@ -44,10 +44,14 @@ def consistency_figure(results: Sequence[CaseResult], table, left_out: str) -> F
         "believes; one (dotted) for a filter that is right about itself, less for one that is better than it thinks."
     )
     columns = min(2, len(drawn))
+    if len(results) > panels.MOST_AT_ENDS or any(len(panels.label(result)) > LONG for result in results):
+        drawn = tuple(panels.in_legend(drawn))
+        columns = min(3, len(drawn))
     width = COLUMN_MM if columns == 1 else PAGE_MM
     return Figure("consistency", "What the filters believe of themselves", caption + left_out, drawn, columns, width)
 
 
+LONG = 16  # letters of a label from which names do not fit beside half a page
 WIDE = 100  # largest over least NEES from which its axis is logarithmic
 
 

@@ -35,6 +35,7 @@ QUANTITIES = {
 }
 UNITS = {"rad": "rad", "rad/s": "rad/s", "rad/s2": "rad/s²", "m/s2": "m/s²"}
 WIDE = 150.0
+MOST_IN_PANEL = 5  # filters whose legend leaves room for the curves
 
 
 def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
@@ -90,6 +91,8 @@ def sigma_figure(name, results, curves: Mapping, component: str, of: panels.Quan
         f"Root-mean-square error of the {of.name} about the truth against time, of {results[0].count:,} realisations. "
         "Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact values." + left_out
     )
+    if len(results[0].axes.filters) > MOST_IN_PANEL:
+        drawn = panels.in_legend(drawn)
     columns = min(2, len(drawn))
     return Figure(name, f"σ of the {of.name}", caption, tuple(drawn), columns, 95.0 if columns == 1 else PAGE_MM, 62)
 
@@ -108,7 +111,7 @@ def plots_figure(table) -> Figure | None:
         accuracy.append(Line(x, own_rows["ratio"].to_numpy(), what, Style(n, n, n), lo, hi, formula))
         take = own_rows["bought_percent"].to_numpy()[1:], own_rows["formula_bought_percent"].to_numpy()[1:]
         bought.append(Line(x[1:], take[0], what, Style(n, n, n), exact=take[1]))
-    x = Axis("plots n", limits=(0, None))
+    x = panels.counts("plots n", float(rows["plots"].max()))
     caption = (
         "Left: σ of the position at the last plot (smoothed) and one scan ahead (extrapolated) in σ of a single plot, "
         "growing memory of degree 1. Crosses: the paper's formulas. Right: by how much the n-th plot lowers that σ."
@@ -118,7 +121,14 @@ def plots_figure(table) -> Figure | None:
         "What each further plot buys",
         caption,
         (
-            Panel(x, Axis("$\\sigma$ / $\\sigma$ of a plot", limits=(0, None)), tuple(accuracy), direct=False),
+            Panel(
+                x,
+                Axis("$\\sigma$ / $\\sigma$ of a plot", limits=(0, None)),
+                tuple(accuracy),
+                key_title="measured",
+                direct=False,
+                crosses="the paper's formula",
+            ),
             Panel(x, Axis("bought by the n-th plot, %", limits=(0, None)), tuple(bought), direct=False),
         ),
         2,
@@ -149,7 +159,10 @@ def gains_figure(table) -> Figure | None:
         "Weights of the residual in position and velocity of growing memory, from the measured errors (var r / σ² and "
         "T₀ cov(r, v) / σ²). Crosses: the paper's (14). They go to zero: new plots count less and less."
     )
-    panel = Panel(Axis("plots n", limits=(0, None)), Axis("gain", "log"), tuple(marks))
+    if table["case"].nunique() > 1:
+        caption += f" Case: {first['case']}."
+    x = panels.counts("plots n", float(x.max()))
+    panel = Panel(x, Axis("gain", "log"), tuple(marks), crosses="the paper's (14)")
     return Figure("smoothing_gains", "Gains of growing memory", caption, (panel,))
 
 
@@ -170,7 +183,8 @@ def believed_figure(results: Sequence[CaseResult], believed, consistency) -> Fig
     for n, f in enumerate(cases[0].axes.filters):
         rows = at_end["believed"].loc[[(r.name, f) for r in cases]]
         true = rows["sigma"].to_numpy() / sigma
-        left.append(Line(rho, true, f, Style(n, n, n)))
+        ends = ((rows[key] * rows["believed_sigma"]).to_numpy() / sigma for key in ("ratio_lo", "ratio_hi"))
+        left.append(Line(rho, true, f, Style(n, n, n), *ends))
         claimed = rows["believed_sigma"].to_numpy() / sigma
         if np.max(np.abs(claimed / true - 1)) > 0.05:
             left.append(Line(rho, claimed, f"{f}: believed", Style(n, None, n)))
@@ -218,9 +232,10 @@ def missed_figure(results: Sequence[CaseResult], curves) -> Figure | None:
                 continue
             v = [rows[key].to_numpy(dtype=float) for key in ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")]
             words = f"{result.spec.sensor.detection_probability:g}"
-            marks.append(Line(*v[:2], words, Style(n / max(1, len(cases) - 1), n, n), v[2], v[3], v[4]))
+            style = Style(n / max(1, len(cases) - 1), n, n)
+            marks.append(Line(*v[:2], words, style, v[2], v[3], v[4], name=f"$P_D$ = {words}"))
         y = Axis(f"$\\sigma$ of {QUANTITIES[component].symbol}, {rows['unit'].iloc[0]}", limits=(0, None))
-        drawn.append(Panel(Axis(panels.TIME, limits=(0, None)), y, tuple(marks), f, direct=False))
+        drawn.append(Panel(Axis(panels.TIME, limits=(0, None)), y, tuple(marks), f, key_title="$P_D$", direct=False))
     gap = cases[0].spec.sensor.missed_scans
     caption = (
         f"σ of the {QUANTITIES[component].name} for several detection probabilities (legend), one panel a filter, of "
