@@ -39,6 +39,7 @@ html_theme = "furo"
 html_title = f"radarsim {version}"
 html_copy_source = False
 html_show_sourcelink = False
+html_show_copyright = False
 html_static_path = ["style"]
 html_css_files = ["page.css"]
 
@@ -47,6 +48,7 @@ def setup(app):
     """What is made while building: the contents from the index, pages from the program, a front page."""
     app.connect("source-read", contents.add)
     app.connect("source-read", generated.fill)
+    app.connect("env-get-outdated", generated.outdated)
     app.connect("autodoc-process-docstring", modules.plain)
     app.connect("build-finished", contents.front_page)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

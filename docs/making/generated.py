@@ -1,6 +1,7 @@
 """Parts of pages that are read off the program while building: `<!-- generated: NAME -->` on a line of its own."""
 
 import re
+from pathlib import Path
 
 from making import commands, keys, modules
 
@@ -15,3 +16,8 @@ PARTS = {
 def fill(app, name: str, source: list[str]) -> None:
     """Put each part in the place of its mark; KeyError for a mark that nothing makes."""
     source[0] = MARK.sub(lambda found: PARTS[found[1]](), source[0])
+
+
+def outdated(app, env, added: set[str], changed: set[str], removed: set[str]) -> list[str]:
+    """Pages with marks are read anew in every build: what they are made of is no file that Sphinx looks at."""
+    return [name for name in env.found_docs if MARK.search(Path(env.doc2path(name)).read_text(encoding="utf-8"))]

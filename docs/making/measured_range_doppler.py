@@ -9,8 +9,8 @@ COMPONENTS = {"r": "range", "Vr": "velocity", "ar": "acceleration"}
 
 
 def title(case: str) -> str:
-    """RLS 2 of the case rls2."""
-    return case.replace("rls", "RLS ")
+    """RLS 2 of the case rls2, never broken over lines."""
+    return case.replace("rls", "RLS\N{NO-BREAK SPACE}")
 
 
 def gains(results: Results) -> list[tuple]:
@@ -24,7 +24,7 @@ def gains(results: Results) -> list[tuple]:
         for component in COMPONENTS:
             own = table[(table["case"] == radar) & (table["component"] == component)]
             highest = own.loc[own["gain_percent"].idxmax()]
-            cells += [f"{bounded(highest)}, at {highest['t_s']:g} s", bounded(own.iloc[-1])]
+            cells += [f"{bounded(highest)}, at {highest['t_s']:g}\N{NO-BREAK SPACE}s", bounded(own.iloc[-1])]
         rows.append(tuple(cells))
     return rows
 
