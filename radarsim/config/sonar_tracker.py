@@ -8,6 +8,7 @@ from pydantic import Field
 from radarsim.config.fields import Model, NonNegative, Number, Positive, Probability, at, cross_check, whole
 
 ASSOCIATIONS = ("nearest", "pda", "known")
+MOST_FALSE = 1e7  # in a scan of the whole sector
 DEFAULTS = {
     "gate_probability": 0.99,
     "drop_after_misses": 3,
@@ -101,6 +102,8 @@ def tracker_misfits(spec):
         return
     if sensor.sector is None:
         yield at("sensor.sector", "is needed by filters with an association")
+    elif sensor.false_plots_per_km2 * sensor.sector.area_m2() / 1e6 > MOST_FALSE:
+        yield at("sensor.false_plots_per_km2", f"must give at most {MOST_FALSE:.0e} false plots a scan in the sector")
     if spec.frame != "polar":
         yield at("frame", "must be polar for filters with an association")
     if sensor.error_correlation != 0.0:

@@ -35,6 +35,10 @@ def config(sensor=(), first=(), **top):
         (config({"sector": SECTOR | {"bearing_deg": [0, 361]}}), "sensor.sector.bearing_deg: must be a smaller and a"),
         (config({"false_plots_per_km2": -1}), "sensor.false_plots_per_km2: must be >= 0, got -1"),
         (config({"false_plots_per_km2": 1e5}), "sensor.false_plots_per_km2: must be <= 10000"),
+        (
+            config({"false_plots_per_km2": 1e4, "sector": SECTOR | {"range_m": [0, 1e5]}}),
+            "sensor.false_plots_per_km2: must give at most 1e+07 false plots a scan in the sector",
+        ),
         (config({"error_correlation": 0.5}), "sensor.error_correlation: must be 0 for filters with an association"),
         (config({"sigma_elevation_rad": 0.01}), "sensor.sigma_elevation_rad: must not be given for filters with an"),
         (
