@@ -93,7 +93,15 @@ def test_marks_are_replaced_and_unknown_ones_refused():
         generated.fill(None, "page", ["<!-- generated: nothing -->"])
 
 
-CONFIGS = ("rls2", "sonar_smoothing", "sonar_conversion", "sonar_manoeuvre", "multimodel", "discriminator")
+CONFIGS = (
+    "rls2",
+    "sonar_smoothing",
+    "sonar_conversion",
+    "sonar_manoeuvre",
+    "sonar_clutter",
+    "multimodel",
+    "discriminator",
+)
 
 
 @pytest.mark.slow
