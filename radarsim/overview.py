@@ -1,5 +1,6 @@
 """What running an experiment would take, and what there is to run."""
 
+import ast
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -127,12 +128,22 @@ def described(file: Path) -> str:
     return ""
 
 
+def words_of(study: str) -> tuple[str, dict[str, str]]:
+    """A study's docstring and FILTERS, read off its source: importing it would load every kernel, for a second."""
+    tree = ast.parse((studies.PACKAGE / "studies" / f"{study}.py").read_text(encoding="utf-8"))
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "FILTERS":
+            return ast.get_docstring(tree) or "", ast.literal_eval(node.value)
+    return ast.get_docstring(tree) or "", {}
+
+
 def inventory() -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
     """What `radarsim list` shows: title, columns and rows of each kind of thing at hand."""
     configs = [(stem, described(lookup.config_file(stem))) for stem in lookup.stems("configs")]
     scenarios = [(stem, described(lookup.scenario_file(stem, None))) for stem in lookup.stems("scenarios")]
-    about = [(name, (studies.study(name).__doc__ or "").split("\n")[0]) for name in studies.STUDIES]
-    filters = [(name, key, words) for name in studies.STUDIES for key, words in studies.study(name).FILTERS.items()]
+    told = {name: words_of(name) for name in studies.STUDIES}
+    about = [(name, doc.split("\n")[0]) for name, (doc, _) in told.items()]
+    filters = [(name, key, words) for name, (_, known) in told.items() for key, words in known.items()]
     return [
         ("Configs (radarsim run NAME)", ("name", "what it is"), configs),
         ("Scenarios (target: NAME)", ("name", "what it is"), scenarios),

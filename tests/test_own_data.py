@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from radarsim import accuracy, experiment, plots, recorded, studies
-from radarsim.cli import main
+from radarsim.cli import group, main
 from radarsim.config import load, lookup, own
 from radarsim.config.identity import canonical
 from radarsim.errors import ConfigError
@@ -300,3 +300,39 @@ def test_new_comments_every_key_and_never_overwrites(tmp_path, monkeypatch):
     assert Path("mine.yaml").read_text() == "precious"
     assert "must be a plain name" in radarsim("new", "../mine", "--like", "rls1", code=2).stderr
     assert "no such config" in radarsim("new", "other", "--like", "rls9", code=2).stderr
+
+
+@pytest.mark.parametrize("command", ["new", "simulate", "track"])
+def test_help_of_ones_own_data_teaches_with_an_example(command):
+    assert f"Example\n  radarsim {command} " in radarsim(command, "--help").stdout.replace("      ", "  ").replace(
+        "    ", "  "
+    )
+
+
+def test_help_is_grouped():
+    text = radarsim("--help").stdout
+    order = [text.index(f"\n{title}:\n") for title in ("Run", "Read", "Own data", "House")]
+    assert order == sorted(order)
+    assert set(main.commands) == {name for names in group.SECTIONS.values() for name in names}
+
+
+def test_no_colour_when_asked(tmp_path):
+    """On a terminal, with and without."""
+    shell = f"{sys.executable} -m radarsim {{}} claims rls2 --out {tmp_path}"
+    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "120"}
+    environment.pop("NO_COLOR", None)
+    shown = [
+        subprocess.run(
+            ["script", "-qec", shell.format(option), "/dev/null"], capture_output=True, env=environment, check=True
+        )
+        for option in ("", "--no-color")
+    ]
+    for one in shown:
+        assert b"not run" in one.stdout or b"no claims" in one.stdout
+    assert b"\x1b[3" not in shown[1].stdout
+
+
+@pytest.mark.parametrize("name", ["=1+1", "+cmd", "-x", "@sum"])
+def test_a_name_that_a_spreadsheet_would_run_is_refused(name):
+    result = radarsim("check", "rls2", "--set", f"filters.0.name={name!r}", code=2)
+    assert "must not begin with = + - or @" in result.stderr

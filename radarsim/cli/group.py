@@ -11,7 +11,13 @@ import click
 import radarsim
 from radarsim.errors import Interrupted, RadarsimError, StoreError
 
-ORDER = ("run", "check", "report", "claims", "new", "simulate", "track", "list", "schema", "doctor", "clean")
+SECTIONS = {
+    "Run": ("run", "check"),
+    "Read": ("report", "claims"),
+    "Own data": ("new", "simulate", "track"),
+    "House": ("list", "schema", "doctor", "clean"),
+}
+ORDER = tuple(name for names in SECTIONS.values() for name in names)
 SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 
 
@@ -20,6 +26,13 @@ class Commands(click.Group):
 
     def list_commands(self, ctx):
         return sorted(self.commands, key=ORDER.index)
+
+    def format_commands(self, ctx, formatter):
+        width = max(map(len, ORDER))
+        for title, names in SECTIONS.items():
+            rows = [(name.ljust(width), self.commands[name].get_short_help_str(100)) for name in names]
+            with formatter.section(title):
+                formatter.write_dl(rows)
 
     def invoke(self, ctx):
         try:
@@ -94,8 +107,17 @@ class Share(click.ParamType):
         return int(match[1]), int(match[2])
 
 
+def _plain(ctx, param, value):
+    """Take colours from the terminal's tables for this run."""
+    if value:
+        os.environ["NO_COLOR"] = "1"
+
+
 @click.group(cls=Commands, context_settings=SETTINGS)
 @click.version_option(radarsim.__version__, prog_name="radarsim")
+@click.option(
+    "--no-color", is_flag=True, expose_value=False, is_eager=True, callback=_plain, help="No colours; as NO_COLOR=1."
+)
 def main():
     """Monte-Carlo experiments on radar and sonar track processing.
 
@@ -107,6 +129,10 @@ def main():
       radarsim run rls2                          the first paper's decimetre radar
       radarsim run rls2 --set radar.sigma_velocity_mps=5 -n 1e6
       radarsim claims                            what the papers claim, and what came out
+      radarsim new mine --like rls2              a radar of one's own
+
+    Commands and options complete with the tab key after
+    `eval "$(_RADARSIM_COMPLETE=bash_source radarsim)"` (bash; zsh_source, fish_source likewise).
     """
 
 

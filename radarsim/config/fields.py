@@ -193,13 +193,21 @@ def _printable(value: str) -> str:
     return value
 
 
+def _no_formula(value: str) -> str:
+    """A name that no spreadsheet takes for a formula when it opens a table of results."""
+    if value.startswith(("=", "+", "-", "@")):
+        raise PydanticCustomError("text", "must not begin with = + - or @: a spreadsheet takes that for a formula")
+    return value
+
+
 Number = Annotated[float, Strict(), AfterValidator(_moderate)]
 Positive = Annotated[float, Strict(), Field(gt=0), AfterValidator(_moderate)]
 NonNegative = Annotated[float, Strict(), Field(ge=0), AfterValidator(_moderate)]
 Probability = Annotated[float, Strict(), Field(ge=0, le=1), AfterValidator(_moderate)]
 Correlation = Annotated[float, Strict(), Field(gt=-1, lt=1), AfterValidator(_moderate)]
 Flag = Annotated[bool, Strict()]
-Name = Annotated[str, Strict(), StringConstraints(min_length=1, max_length=64), AfterValidator(_printable)]
+Label = Annotated[str, Strict(), StringConstraints(min_length=1, max_length=64), AfterValidator(_printable)]
+Name = Annotated[Label, AfterValidator(_no_formula)]
 Stem = Annotated[str, Strict(), StringConstraints(min_length=1, max_length=100)]
 Anything = Annotated[Any, WithJsonSchema({})]
 

@@ -7,17 +7,20 @@ deterministic course.
 """
 
 import numpy as np
-from scipy import stats
 from scipy.special import ndtr
 
 
 def threshold(false_alarm, coordinates: int = 1):
     """Threshold k whose tests give an alarm with that probability without a manoeuvre; broadcasts."""
+    from scipy import stats  # here, for it takes a second to load
+
     return stats.chi2.isf(false_alarm, coordinates)
 
 
 def false_alarm(k, coordinates: int = 1):
     """Probability of an alarm a test without a manoeuvre: 0.317 at the paper's k = 1; broadcasts."""
+    from scipy import stats  # here, for it takes a second to load
+
     return stats.chi2.sf(k, coordinates)
 
 
@@ -26,6 +29,8 @@ def detection(k, shift, coordinates: int = 1):
 
     Of several coordinates the shift is the root of the sum of squares.
     """
+    from scipy import stats  # here, for it takes a second to load
+
     if coordinates == 1:
         return ndtr(shift - np.sqrt(k)) + ndtr(-shift - np.sqrt(k))
     centred = np.asarray(shift) == 0
