@@ -33,7 +33,7 @@ def test_every_page_is_in_the_index():
 def test_pages_that_are_named_without_a_link_exist():
     """`docs/results.md` and the like in code font, in pages and docstrings."""
     named = re.compile(r"\b(?:docs|configs|scenarios|benchmarks)/[\w/]+\.(?:md|json|yaml|py)\b")
-    files = PAGES
+    files = [*PAGES, *sorted((ROOT / "radarsim").rglob("*.py"))]
     missing = {
         (str(file.relative_to(ROOT)), name)
         for file in files
