@@ -148,7 +148,8 @@ def _look(style: Style) -> dict:
 def _line(axes, line: Line) -> None:
     line = _thinned(line)
     step = 1 if line.style.dash is None else max(1, -(-len(line.x) // MARKED))
-    every = step if line.exact is None else 2 * step  # markers and crosses by turns
+    scattered = line.style.dash is None
+    every = step if line.exact is None or scattered else 2 * step  # markers and crosses by turns
     axes.plot(line.x, line.y, markevery=every, zorder=3, **_look(line.style))
     if line.lo is not None and line.hi is not None:
         if line.style.dash is None:
@@ -156,7 +157,8 @@ def _line(axes, line: Line) -> None:
         else:
             axes.fill_between(line.x, line.lo, line.hi, color=_colour(line.style), alpha=0.25, linewidth=0, zorder=2)
     if line.exact is not None:
-        axes.plot(line.x[step::every], line.exact[step::every], zorder=4, **EXACT)
+        first = 0 if scattered else step
+        axes.plot(line.x[first::every], line.exact[first::every], zorder=4, **EXACT)
 
 
 def _thinned(line: Line) -> Line:

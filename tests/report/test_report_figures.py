@@ -129,3 +129,46 @@ def test_numbers_for_people():
     assert [panels.number(v) for v in (1e-3, 0.1, 1, 10, 1e5, 250.0, 0.00025, -2.5, "turn", True)] == [
         *("10⁻³", "0.1", "1", "10", "10⁵", "250", "0.00025", "-2.5", "turn", "True")
     ]
+
+
+def test_scattered_points_are_all_drawn():
+    axes = drawn(one(line(60, dash=None, marker=1)))
+    curve = axes.lines[0]
+    assert curve.get_markevery() in (None, 1)
+    assert len(curve.get_xdata()) == 60
+
+
+def test_many_lines_have_their_legend_in_a_cell_of_its_own():
+    marks = tuple(Line(np.arange(3.0), np.full(3, float(i)), f"filter {i}", Style(i, i, i)) for i in range(7))
+    whole = panels.in_legend([Panel(Axis("x"), Axis("y"), marks), Panel(Axis("x"), Axis("y"), marks)])
+    assert [words for words, _ in whole[-1].keys] == [f"filter {i}" for i in range(7)]
+    assert not whole[-1].marks
+    assert [mark.name for mark in whole[1].marks] == [f"filter {i}" for i in range(7)]
+    assert not any(mark.label for panel in whole for mark in panel.marks)
+    canvas = figures.render(Figure("f", "", "", tuple(whole), columns=2))
+    legend = canvas.axes[2].get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == [f"filter {i}" for i in range(7)]
+    assert all(axes.get_legend() is None for axes in canvas.axes[:2])
+
+
+@pytest.mark.parametrize(("highest", "last"), [(3, 3), (20, 20), (40, 40), (95, 80), (1000, 1000)])
+def test_counts_have_ticks_at_whole_numbers(highest, last):
+    ticks = [value for value, _ in panels.counts("n", highest).ticks]
+    assert all(value == int(value) for value in ticks)
+    assert ticks[-1] == last
+    assert len(ticks) <= 9
+
+
+def test_a_sweep_is_shown_whole_in_figures_with_a_panel_for_each_config(expected_radar):
+    results = [expected_radar(stem, 10.0**-n, f"{stem} D={n}") for stem in ("rls1", "rls2") for n in range(1, 6)]
+    names = [result.name for result in results]
+    shown, left_out = panels.shown_families(results, names)
+    assert [result.name for result in shown] == names
+    assert left_out == ""
+    assert panels.shown(results, names)[1] == " 2 further cases are in the tables alone."
+
+
+def test_crosses_have_the_name_of_what_they_are():
+    panel = Panel(Axis("x"), Axis("y"), (line(),), crosses="formula")
+    axes = figures.render(Figure("f", "", "", (panel,))).axes[0]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["formula"]
