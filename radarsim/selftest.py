@@ -10,6 +10,7 @@ import csv
 import io
 import json
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 
 from radarsim import experiment, studies
@@ -32,11 +33,7 @@ class Verdict:
 
 def platform() -> dict[str, str]:
     """What decides the last bits: instruction set and the versions of what compiles and computes."""
-    import llvmlite
-    import numba
-    import numpy
-
-    versions = {module.__name__: module.__version__ for module in (numba, llvmlite, numpy)}
+    versions = {name: metadata.version(name) for name in ("numba", "llvmlite", "numpy")}
     return {"instruction_set": instruction_set()} | versions
 
 
