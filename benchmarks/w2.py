@@ -3,7 +3,8 @@
     python benchmarks/w2.py [--processes 3] [--limit DIR]
 
 Each figure is the median over fresh processes; inside a process a ratio is the median over pairs timed one after the
-other. DIR holds limit.c and w2_c.py, see w1.py. The C limit draws its own noise; `given` is our filter on given plots.
+other. DIR holds limit.c, w2_c.py and common.py with the workload, see w1.py; where the limit does not build here the
+ratios to it are left out. The C limit draws its own noise; `given` is our filter on given plots.
 """
 
 import argparse
@@ -88,40 +89,33 @@ def per_step(seconds: float, realisations: int = GROUP) -> float:
     return realisations * SCANS / seconds / 1e6
 
 
+def c_limit(folder):
+    """The C limit's module and its workload's (common), None where they are not there, and the reason."""
+    if not (folder / "w2_c.py").exists():
+        return None, None, f"no w2_c.py in {folder}"
+    cores = os.sched_getaffinity(0)
+    sys.path.insert(0, str(folder))
+    try:
+        import common
+        import w2_c
+    except Exception as error:
+        return None, sys.modules.get("common"), f"the C limit does not build: {error}"
+    finally:
+        os.sched_setaffinity(0, cores)  # common.py pins the process to a core of its own choice
+    return w2_c, common, None
+
+
 def measure_speed(folder) -> dict:
     """One core: filter on given plots, rules, families, whole chain, each against C or against IMM `moment`."""
     cores = sorted(os.sched_getaffinity(0))
-    sys.path.insert(0, str(folder))
-    import common
-    import w2_c
-
+    limit, common, reason = c_limit(folder)
     os.sched_setaffinity(0, cores[-1:])
-    given = Given(common)
-    out = {"difference": float(np.abs(given.run() - w2_c.run(GROUP, SCANS, z=given.z)).max())}
-
-    def reference():
-        w2_c.run(REALISATIONS)
-
-    def kernel(count=REALISATIONS // GROUP, **options):
-        return lambda: [given.run(**options) for _ in range(count)]
-
+    out = {} if reason is None else {"skipped": reason}
     with ThreadPoolExecutor(1) as pool:
-        pool.submit(w1.paired, reference, kernel()).result()
-        t, ratio = pool.submit(w1.paired, kernel(), reference).result()
-        out |= {"given_msteps": per_step(t, REALISATIONS), "given_of_c": 1 / ratio}
-        out["c_msteps"] = out["given_msteps"] / out["given_of_c"]
-        for rule in ("best", "combined", "modified_combined"):
-            same = {"rule": rule, "output": "best"}
-            out[f"{rule}_to_moment"] = pool.submit(w1.paired, kernel(**same), kernel(output="best")).result()[1]
-        for size in (2, 3, 5):
-            bank = {"models": MODELS[:size], "T": full_matrix(size)}
-            function = kernel(family="gpb2", **bank)
-            out[f"gpb2_to_imm_{size}"] = pool.submit(w1.paired, function, kernel(**bank)).result()[1]
+        if common is not None:
+            out |= measure_given(pool, limit, Given(common))
         for every in (1, 10):
-            made = work(every)
-            made.simulate(0, GROUP)
-            chain = lambda made=made: made.simulate(0, REALISATIONS)  # noqa: E731
-            out[f"chain_to_c_every_{every}"] = pool.submit(w1.paired, chain, reference).result()[1]
+            out |= measure_chain(pool, limit, every)
     if len(cores) > 1:
         from radarsim.engine.collect import collect
 
@@ -132,12 +126,56 @@ def measure_speed(folder) -> dict:
     return out
 
 
+def measure_given(pool, limit, given: Given) -> dict:
+    """The filter on given plots: against C where there is one, rules and families against each other."""
+
+    def kernel(count=REALISATIONS // GROUP, **options):
+        return lambda: [given.run(**options) for _ in range(count)]
+
+    if limit is None:
+        pool.submit(w1.cpu, kernel()).result()
+        out = {"given_msteps": per_step(pool.submit(w1.cpu, kernel()).result(), REALISATIONS)}
+    else:
+        out = {"difference": float(np.abs(given.run() - limit.run(GROUP, SCANS, z=given.z)).max())}
+        reference = lambda: limit.run(REALISATIONS)  # noqa: E731
+        pool.submit(w1.paired, reference, kernel()).result()
+        t, ratio = pool.submit(w1.paired, kernel(), reference).result()
+        out |= {"given_msteps": per_step(t, REALISATIONS), "given_of_c": 1 / ratio}
+        out["c_msteps"] = out["given_msteps"] / out["given_of_c"]
+    for rule in ("best", "combined", "modified_combined"):
+        same = {"rule": rule, "output": "best"}
+        out[f"{rule}_to_moment"] = pool.submit(w1.paired, kernel(**same), kernel(output="best")).result()[1]
+    for size in (2, 3, 5):
+        bank = {"models": MODELS[:size], "T": full_matrix(size)}
+        function = kernel(family="gpb2", **bank)
+        out[f"gpb2_to_imm_{size}"] = pool.submit(w1.paired, function, kernel(**bank)).result()[1]
+    return out
+
+
+def measure_chain(pool, limit, every: int) -> dict:
+    """Noise, plots, conversion, the first filter of the shipped config and sums at every such scan."""
+    made = work(every)
+    made.simulate(0, GROUP)
+    chain = lambda: made.simulate(0, REALISATIONS)  # noqa: E731
+    if limit is None:
+        return {f"chain_msteps_every_{every}": per_step(pool.submit(w1.cpu, chain).result(), REALISATIONS)}
+    reference = lambda: limit.run(REALISATIONS)  # noqa: E731
+    return {f"chain_to_c_every_{every}": pool.submit(w1.paired, chain, reference).result()[1]}
+
+
 def measure_start() -> dict:
-    """First block of a process: compiling where the cache is empty, loading where it is not."""
+    """First block of a process and first pass over given plots: compiling where the cache is empty, loading else."""
+    from radarsim.studies.multimodel_timing import seconds_per_update
+
     made = work(10, filters=6)
     started = time.process_time(), time.perf_counter()
     made.simulate(0, GROUP)
-    return {"cpu_s": time.process_time() - started[0], "wall_s": time.perf_counter() - started[1]}
+    first = time.process_time() - started[0]
+    seconds_per_update(made.plan)
+    return {"first_block_cpu_s": first} | {
+        "cpu_s": time.process_time() - started[0],
+        "wall_s": time.perf_counter() - started[1],
+    }
 
 
 def measure_experiment() -> dict:
@@ -182,7 +220,9 @@ def main() -> None:
         loads = [fresh("start", arguments, RADARSIM_CACHE_DIR=empty) for _ in range(arguments.processes)]
         print("load      ", json.dumps(w1.median(loads)))
     rows = [fresh("speed", arguments) for _ in range(arguments.processes)]
-    for name in rows[0]:
+    if "skipped" in rows[0]:
+        print("skipped   ", rows[0]["skipped"])
+    for name in [name for name in rows[0] if name != "skipped"]:
         values = [row[name] for row in rows]
         print(f"{name:28s} {statistics.median(values):8.3g}   of", *(f"{value:.3g}" for value in values))
     print("experiment", json.dumps(w1.median([fresh("experiment", arguments) for _ in range(arguments.processes)])))
