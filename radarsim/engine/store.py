@@ -124,13 +124,20 @@ class Store:
             "size": work.size,
         }
 
+    def make(self) -> None:
+        """Make the directory, where there is none."""
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise StoreError(f"{error.filename or self.path}: cannot be written: {error.strerror}") from error
+
     def write(self, pieces: Mapping[Piece, Sums]) -> None:
         """Put pieces on disk; on return they outlive a power cut. StoreError, with the old files intact, if the disk is
         full or cannot be written."""
         if not pieces:
             return
+        self.make()
         try:
-            self.path.mkdir(parents=True, exist_ok=True)
             for piece, sums in pieces.items():
                 described = self._described(piece, *piece.realisations(self._work.block))
                 header = described | {"platforms": sorted(self.platforms), "versions": versions()}

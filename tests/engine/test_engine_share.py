@@ -37,8 +37,7 @@ def test_united_by_copying_they_give_the_bytes_of_one_run(tmp_path_factory, real
     draw.shuffle(numbers)
     for number in numbers:
         share(WORK, realisations, number, of, store=root / str(number), threads=0)
-        if (root / str(number)).exists():
-            shutil.copytree(root / str(number), root / "all", dirs_exist_ok=True)
+        shutil.copytree(root / str(number), root / "all", dirs_exist_ok=True)
     united = collect(WORK, realisations, store=root / "all", threads=0)
     assert same(united, realisations)
     assert united.computed == 0
