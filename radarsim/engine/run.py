@@ -250,7 +250,7 @@ class Share(Run):
         return self.asked - missing - (self.rest if self.partial is None else 0)
 
     def finished(self, stopped: str | None) -> Shared:
-        """What came of it, once it is stored; of a share without a block an empty directory, to be copied like others."""
+        """What came of it, once it is stored; without a block an empty directory, to be copied too."""
         self._keeper.store.make()
         self.keep(self.pieces())
         self._report(last=True)
