@@ -207,16 +207,15 @@ PASSES = ("case", "filter", "n", "passes", "passes_lo", "passes_hi")
 def _passes(result: CaseResult) -> dict[str, np.ndarray]:
     """Passes over a window's data a burst, the measure of an estimator's cost: mean with its interval."""
     n, total = result.count, result.sums["passes"]
-    mean = total[:, 0] / n
-    half = statistics.Z95 * np.sqrt(np.maximum(total[:, 1] / n - mean**2, 0.0) / max(n - 1, 1))
-    count = len(mean)
+    of = statistics.mean(total[:, 0], total[:, 1], n)
+    count = len(of.value)
     return {
         "case": np.full(count, result.name, dtype=object),
         "filter": np.array(result.axes.filters, dtype=object),
         "n": np.full(count, n),
-        "passes": mean,
-        "passes_lo": mean - half,
-        "passes_hi": mean + half,
+        "passes": of.value,
+        "passes_lo": of.lo,
+        "passes_hi": of.hi,
     }
 
 

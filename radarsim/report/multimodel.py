@@ -108,32 +108,43 @@ def _stages(result: CaseResult) -> list[tuple]:
     return rows
 
 
-CONSISTENCY = ("case", "filter", "stage", "n", "nees", "nees_lo", "nees_hi", "nis", "nis_lo", "nis_hi")
+CONSISTENCY = (
+    *("case", "filter", "stage", "n", "nees", "nees_lo", "nees_hi", "nis", "nis_lo", "nis_hi"),
+    *("nees_verdict", "nis_verdict"),
+)
 
 
 def consistency(results: Sequence[CaseResult]):
     """Mean normalised errors squared by stage, per degree of freedom: 1 where a filter is right about itself.
 
     NEES of the position with the filter's own covariance, at the reported scans; NIS of the plot against what the
-    hypothesis foretold that was the most probable before it, at all scans.
+    hypothesis foretold that was the most probable before it, at all scans. The verdicts are by wider intervals, of
+    which all of a case's filters and stages hold in 95 % of runs.
     """
     rows = []
     for result in results:
         places = {name: s for s, name in enumerate(result.axes.extra["stages"])}
+        bounds = stage_bounds(result)
         for f, label in enumerate(result.axes.filters):
-            for stage, *_ in stage_bounds(result):
+            for stage, *_ in bounds:
                 sums = np.asarray(result.sums["stage"])[f, places[stage]]
-                found = [value for c in (NEES, NIS) for value in mean(sums[c], result.count, FREEDOM)]
-                rows.append((result.name, label, stage, result.count, *found))
+                found = [float(value) for c in (NEES, NIS) for value in normalised(sums[c], result.count)]
+                looks = len(bounds) * len(result.axes.filters)
+                said = [verdict(normalised(sums[c], result.count, looks)) for c in (NEES, NIS)]
+                rows.append((result.name, label, stage, result.count, *found, *said))
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(CONSISTENCY)})
 
 
-def mean(sums: np.ndarray, n: int, scale: float = 1.0) -> statistics.Estimate:
-    """Mean / scale with its 95 % interval from Σx, Σx² over n realisations."""
-    value = sums[0] / n
-    spread = np.sqrt(max(sums[1] / n - value**2, 0.0) / max(n - 1, 1))
-    half = float(statistics.student(n - 1)) * spread
-    return statistics.Estimate(float(value / scale), float((value - half) / scale), float((value + half) / scale))
+def normalised(sums: np.ndarray, n: int, looks: int = 1) -> statistics.Estimate:
+    """Mean normalised error squared per degree of freedom from Σq, Σq² over n realisations."""
+    return statistics.mean_square(sums[0] / FREEDOM, sums[1] / FREEDOM**2, n, looks)
+
+
+def verdict(of: statistics.Estimate) -> str:
+    """What a normalised error squared says of a filter's covariance."""
+    if of.lo > 1:
+        return "optimistic"
+    return "pessimistic" if of.hi < 1 else "consistent"
 
 
 OPERATIONS = ("case", "filter", "family", "merge", "models", "stage", "merged", "merges", "operations")

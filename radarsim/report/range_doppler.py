@@ -4,7 +4,6 @@ Its figures stand in range_doppler_figures.
 """
 
 from collections.abc import Sequence
-from statistics import NormalDist
 
 import numpy as np
 
@@ -150,17 +149,15 @@ def normalised_error(result: CaseResult) -> statistics.Estimate:
     variance = np.diagonal(P, axis1=2, axis2=3)
     scale = np.where(variance > 0, variance, np.inf) ** -0.5  # m, m/s and m/s² brought to one size before solving
     unit = scale[..., :, None] * scale[..., None, :]
-    mean, ninth = np.full(P.shape[:2], np.nan), np.full(P.shape[:2], np.nan)
+    mean, freedom = np.full(P.shape[:2], np.nan), np.full(P.shape[:2], np.nan)
     for pattern in np.unique(axes.available.reshape(-1, 3), axis=0):
         known, where = np.flatnonzero(pattern), np.all(axes.available == pattern, axis=2)
         if known.size:
             one, other = ((part * unit)[where][:, known][:, :, known] for part in (P, second))
             mean[where] = np.trace(np.linalg.solve(one, other), axis1=1, axis2=2) / known.size
-            ninth[where] = 2 / (9 * known.size * result.count)
-    looks = np.maximum(np.sum(np.isfinite(mean), axis=1, keepdims=True), 1)
-    z = np.vectorize(lambda n: NormalDist().inv_cdf(1 - 0.025 / n), otypes=[float])(looks)
-    step = z * np.sqrt(ninth)
-    return statistics.Estimate(mean, (1 - ninth - step) ** 3, (1 - ninth + step) ** 3)
+            freedom[where] = known.size * result.count
+    looks = np.sum(np.isfinite(mean), axis=1, keepdims=True)
+    return statistics.Estimate(mean, *statistics.normalised_bounds(freedom, looks))
 
 
 RADAR = ("case", "C_theta", "doppler_hz", "doppler_per_repetition_rate", "unambiguous_velocity_mps")

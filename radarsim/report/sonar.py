@@ -130,28 +130,18 @@ CONSISTENCY = (
 )
 
 
-def mean_with_interval(total, square, n) -> statistics.Estimate:
-    """Mean of independent numbers with its 95 % interval, from their sum and sum of squares."""
-    n = np.asarray(n, dtype=float)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = total / n
-        half = statistics.student(n - 1) * np.sqrt(np.maximum(square / n - mean**2, 0) / np.maximum(n - 1, 0))
-    return statistics.Estimate(mean, mean - half, mean + half)
-
-
 def _consistency(result: CaseResult) -> dict:
     """Normalised squared error eᵀP⁻¹e of a coordinate's state per component: 1 for a filter that is right about itself.
 
-    `honest_lo`, `honest_hi` hold 95 % of such filters' means over as many realisations (chi-square, Wilson-Hilferty).
+    In 95 % of runs of such a filter all its scans' means over as many realisations lie from `honest_lo` to `honest_hi`.
     """
     n = complete(result)
     at, columns = coordinate_rows(result, n > 0)
+    looks = np.sum(n > 0, axis=1)[at[0], at[2]]
     size, n = result.axes.extra["sizes"][at[0]], n[at]
     joint = result.sums["joint"][at]
-    mean = mean_with_interval(joint[:, 0] / size, joint[:, 1] / size**2, n)
-    ninth = 2 / (9 * size * n)
-    step = statistics.Z95 * np.sqrt(ninth)
-    low, high = (1 - ninth - step) ** 3, (1 - ninth + step) ** 3
+    mean = statistics.mean_square(joint[:, 0] / size, joint[:, 1] / size**2, n)
+    low, high = statistics.normalised_bounds(size * n, looks)
     return columns | {
         "n": n.astype(np.int64),
         "nees": mean.value,
@@ -238,7 +228,7 @@ def _gains(result: CaseResult) -> dict:
             unit = axes.extra["sigma"][c] ** 2
             of = statistics.root_mean_square(*result.sums["error"][f, 1:, width * c, 1::2].T, result.count)
             joint = result.sums["joint"][f, 1:, c]
-            both = mean_with_interval(joint[:, 2], joint[:, 3], result.count)
+            both = statistics.mean(joint[:, 2], joint[:, 3], result.count)
             parts.append(
                 {"case": [result.name] * len(n), "filter": [choice.name] * len(n), "component": [name] * len(n)}
                 | {"plots": n, "A_formula": A, "B_formula": B}

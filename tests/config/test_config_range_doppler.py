@@ -178,7 +178,7 @@ REQUIRED = [
 ]
 RADAR = "name, band, wavelength_m, sigma_range_m, sigma_velocity_mps, scan_period_s, repetition_rate_hz"
 FILTER = "name, observes, manoeuvre_variance, initial_scans"
-TOP = "radar, target, filters, baseline, scans, study, include, sweep, realisations, seed, figures"
+TOP = "radar, target, filters, baseline, scans, study, include, sweep, realisations, seed, figures, control_variate"
 UNKNOWN = [
     ("radar.sigma_rnge_m", f"unknown key; did you mean sigma_range_m? allowed: {RADAR}"),
     ("filters.0.manoeuver_variance", f"unknown key; did you mean manoeuvre_variance? allowed: {FILTER}"),

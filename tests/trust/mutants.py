@@ -259,8 +259,8 @@ NUMBERS = (
     *mutants(
         "radarsim/report/statistics.py",
         (
-            "np.maximum(excess, 0) / (9 * n)",
-            "np.maximum(excess, 0) / (18 * n)",
+            "np.maximum(relative, 0) / 9",
+            "np.maximum(relative, 0) / 18",
             f"{COVERAGE}::test_coverage_at_the_least_sizes_without_a_note",
         ),
         (
@@ -273,6 +273,11 @@ NUMBERS = (
             "np.hypot(np.subtract(a.value, a.lo), np",
             "np.maximum(np.subtract(a.value, a.lo), np",
             f"{STATISTICS}::test_difference_adds_in_squares",
+        ),
+        (
+            "(b - exact_square)",
+            "(exact_square - b)",
+            "trust/test_trust_statistics_control.py::test_mean_coverage_and_factor",
         ),
         ("inv_cdf(1 - 0.025 / n)", "inv_cdf(1 - 0.025)", f"{COVERAGE}::test_bounds_for_many_looks"),
         ("np.sqrt(variance / np.abs(n - 1)), np.nan)", "np.sqrt(variance / n), np.nan)", f"{STATISTICS}::test_by_hand"),
