@@ -45,6 +45,13 @@ def test_the_printed_matrix_has_no_markov_root():
     assert change.max() < 5e-6
 
 
+def test_rates_are_those_of_a_process():
+    """The logarithm of the printed matrix has negative rates."""
+    Q = filters.generator(PRINTED)
+    assert (Q - np.diag(np.diag(Q))).min() == 0
+    assert np.abs(Q.sum(axis=0)).max() < 1e-16
+
+
 def test_start_is_least_squares_with_its_covariance():
     t, spread = np.array([0.0, 0.9, 2.1]), 30.0
     a, b, g = filters.start_weights(t, spread).reshape(3, 3)
