@@ -39,6 +39,6 @@ def test_pages_that_are_named_without_a_link_exist():
         (str(file.relative_to(ROOT)), name)
         for file in files
         for name in named.findall(file.read_text(encoding="utf-8"))
-        if not (ROOT / name).exists() and "NAME" not in name and name not in made
+        if not (ROOT / name).exists() and not re.search("[A-Z]{4}", name) and name not in made
     }
     assert not missing
