@@ -126,3 +126,20 @@ def test_the_table_is_made_where_it_is_asked_for(tmp_path):
     assert "controlled" not in plain.tables
     for name in ("curves", "gains"):
         assert asked.tables[name].equals(plain.tables[name])
+
+
+def test_antithetic_pairs_double_the_variance():
+    """Why they are not offered: a linear filter errs on mirrored noise by the same, mirrored: one square for two."""
+    from radarsim.kernels import linear
+
+    plan = range_doppler.prepare(load("rls2", ["scans=8"]).cases[0])
+    plots = linear.simulate_plots(plan.key, 0, 20_000, plan.truth, plan.sigma)
+    schedule = plan.dt, plan.observes, plan.start, plan.weights, plan.gains
+    error, mirrored = (
+        linear.estimate(p, *schedule)[:, :, -1] - plan.truth[-1] for p in (plots, 2 * plan.truth[:, :2] - plots)
+    )
+    scale = error.std(axis=0)
+    assert np.abs((error**2 - mirrored**2) / scale**2).max() < 1e-6
+    plain = np.square(error).reshape(200, 100, 2, 3).mean(axis=1).var(axis=0)
+    paired = ((error**2 + mirrored**2) / 2).reshape(400, 50, 2, 3).mean(axis=1).var(axis=0)
+    np.testing.assert_allclose(paired / plain, 2, rtol=8 / math.sqrt(200))
