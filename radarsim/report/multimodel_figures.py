@@ -15,6 +15,8 @@ TIME = Axis(panels.TIME, limits=(0, None))
 SIGMAS = {"y": ("height $y$", "m"), "vy": ("rate of climb $\\dot y$", "m/s")}
 RULES = ("moment", "best", "combined", "modified_combined")
 FAMILIES = {"gpb1": "MMA1", "imm": "MMA2", "gpb2": "MMA3"}
+SPREAD = 0.5  # of the points of a stage, stages being one apart
+MOST_LOOKS = 8  # filters, each of a colour, dash and marker of its own
 
 
 def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
@@ -34,11 +36,21 @@ def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[st
 
 
 def _several(name: str, title: str, caption: str, drawn: Sequence[Panel], height: float = 62.0) -> Figure | None:
-    """A figure of one panel, or of more in two columns."""
+    """A figure of one panel, or of more in two columns, in three where that fills the page better."""
     if not drawn:
         return None
     width = panels.WIDE_MM if len(drawn) == 1 else PAGE_MM
-    return Figure(name, title, caption, tuple(drawn), 1 if len(drawn) == 1 else 2, width, height)
+    columns = 1 if len(drawn) == 1 else 3 if len(drawn) in (5, 6, 9) else 2
+    return Figure(name, title, caption, tuple(drawn), columns, width, height)
+
+
+def _styles(result: CaseResult) -> list[Style]:
+    """A look for each filter of a case: its own where there are few, else the rule's colour and the family's marks."""
+    families, rules = result.axes.extra["families"], result.axes.extra["rules"]
+    if len(families) <= MOST_LOOKS:
+        return [Style(n, n, n) for n in range(len(families))]
+    kinds = list(dict.fromkeys(families))
+    return [Style(RULES.index(r), kinds.index(f), kinds.index(f)) for f, r in zip(families, rules, strict=True)]
 
 
 def _title(result: CaseResult, results: Sequence[CaseResult]) -> str:
@@ -46,7 +58,8 @@ def _title(result: CaseResult, results: Sequence[CaseResult]) -> str:
     if len(results) == 1:
         return ""
     one = len(panels.families(results)) == 1
-    return ", ".join(panels.number(value) for _, value in result.swept) if one else panels.label(result)
+    words = ", ".join(panels.number(value) for _, value in result.swept) if one else panels.label(result)
+    return words.replace("_", " ")
 
 
 def trajectory(results: Sequence[CaseResult]) -> Figure | None:
@@ -92,15 +105,15 @@ def sigma(results: Sequence[CaseResult], curves, component: str) -> Figure | Non
     drawn = []
     for result in results:
         marks: list = list(_stage_lines([result]))
-        for n, f in enumerate(result.axes.filters):
+        for f, style in zip(result.axes.filters, _styles(result), strict=True):
             own = rows.get((result.name, f))
             if own is not None:
                 t, value, lo, hi = (own[key].to_numpy(float) for key in ("t_s", "sigma", "sigma_lo", "sigma_hi"))
-                marks.append(Line(t, value, panels.literal(f), Style(n, n), lo, hi))
-        if drawn:
-            marks = _unnamed(marks)
+                marks.append(Line(t, value, panels.literal(f), replace(style, marker=None), lo, hi))
         y = Axis(f"$\\sigma$ of {words}, {unit}", "log")
         drawn.append(Panel(TIME, y, tuple(marks), _title(result, results), direct=len(results) == 1))
+    if len(drawn) > 1 or any(len(result.axes.filters) > MOST_LOOKS for result in results):
+        drawn = panels.in_legend(drawn) if drawn else []
     caption = (
         f"Root-mean-square error of {words.split(' $')[0]} about the truth, of {results[0].count if results else 0:,} "
         "realisations; bands: 95 % intervals. Dotted: ends of the stages."
@@ -126,6 +139,9 @@ def probabilities(results: Sequence[CaseResult], table) -> Figure | None:
                 marks.append(Line(t, value, f"{m + 1} {motion}", Style(m, m), lo, hi))
             title = panels.literal(name) if len(results) == 1 else f"{_title(result, results)}: {panels.literal(name)}"
             drawn.append(Panel(TIME, Axis("mean probability", limits=(0, 1)), tuple(marks), title, direct=False))
+    banks = {tuple(mark.label for mark in panel.marks if isinstance(mark, Line)) for panel in drawn}
+    if len(drawn) > 2 and len(banks) == 1:
+        drawn = panels.in_legend(drawn)
     caption = (
         "Mean posterior probabilities of the models (figure 7); the numbers behind the motions are the spreads of the "
         "random acceleration, m/s². Dotted: ends of the stages."
@@ -170,14 +186,17 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     rows = made["stages"]
     rows = rows[(rows["case"] == result.name) & (rows["component"] == "y")]
     drawn = []
+    styles = dict(zip(result.axes.filters, _styles(result), strict=True))
     for stage, own in rows.groupby("stage", sort=False):
         marks = []
-        for n, (_, row) in enumerate(own.iterrows()):
+        for _, row in own.iterrows():
+            style = replace(styles[row["filter"]], dash=None, size_pt=4.5)
             count = operations[(result.name, stage, row["filter"])]["operations"].to_numpy(float)
             lo, hi, value = (np.array([row[key]]) for key in ("sigma_lo", "sigma_hi", "sigma"))
-            marks.append(Line(count, value, panels.literal(row["filter"]), Style(n, None, n, size_pt=4.5), lo, hi))
-        x, y = Axis("operations per update", "log"), Axis("$\\sigma$ of $y$, m", "log")
-        drawn.append(Panel(x, y, tuple(marks) if not drawn else tuple(_unnamed(marks)), stage, direct=False))
+            marks.append(Line(count, value, panels.literal(row["filter"]), style, lo, hi))
+        x, y = Axis("operations per update", limits=(0, None)), Axis("$\\sigma$ of $y$, m", "log")
+        drawn.append(Panel(x, y, tuple(marks), stage, direct=False))
+    drawn = panels.in_legend(drawn)
     caption = (
         "Accuracy against cost: σ of the height over a stage (whiskers: 95 %) and the mean count of arithmetic "
         f"operations of one update. {panels.plain_label(result)}."
@@ -200,15 +219,18 @@ def consistency(results: Sequence[CaseResult], table) -> Figure | None:
     for key, title in (("nees", "NEES of the position"), ("nis", "NIS of the plot")):
         marks: list = [Reference(1.0)]
         stages: tuple = ()
-        for n, f in enumerate(result.axes.filters):
+        for n, (f, style) in enumerate(zip(result.axes.filters, _styles(result), strict=True)):
             own = rows[(f,)]
             stages = tuple(own["stage"])
-            x = np.arange(len(own)) + 0.08 * (n - (len(result.axes.filters) - 1) / 2)
+            x = np.arange(len(own)) + SPREAD / len(result.axes.filters) * (n - (len(result.axes.filters) - 1) / 2)
             value, lo, hi = (own[name].to_numpy(float) for name in (key, f"{key}_lo", f"{key}_hi"))
-            label = panels.literal(f) if key == "nees" else ""
-            marks.append(Line(x, value, label, Style(n, None, n), lo, hi))
+            marks.append(Line(x, value, panels.literal(f), replace(style, dash=None), lo, hi))
         axis = Axis("stage", ticks=tuple(enumerate(stages)))
         drawn.append(Panel(axis, Axis("mean per degree of freedom", "log"), tuple(marks), title, direct=False))
+    if len(result.axes.filters) > MOST_LOOKS:
+        drawn = panels.in_legend(drawn)
+    else:
+        drawn[1] = replace(drawn[1], marks=tuple(_unnamed(drawn[1].marks)))
     caption = (
         "Normalised errors squared, per degree of freedom, by stage: 1 where the filter's own covariance is right, "
         f"more where it is too sure of itself. {panels.plain_label(result)}."

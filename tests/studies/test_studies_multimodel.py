@@ -289,3 +289,18 @@ def test_coarse_angles_err_but_stay_finite():
     filters = [FILTERS[0], FILTERS[1], {**FILTERS[0], "name": "there", "covariance_at": "prediction"}]
     case = work(sensor=sensor, filters=filters, target="ballistic", scans=1500)
     assert np.isfinite(case.simulate(0, 16)).all()
+
+
+def test_the_shipped_plots_are_tracked_with_errors_that_fit_sigma():
+    """On the ballistic part, where the bank is right: 315 errors within 5.85 σ, and innovations of the stated size."""
+    path = Path(__file__).parents[2] / "docs" / "examples" / "multimodel.csv"
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    columns = {name: table[name] for name in ("t_s", "range_m", "elevation_rad", "azimuth_rad")}
+    found = multimodel_plots.track(load("multimodel_1hz").cases[0], columns)
+    f, ballistic = found.filters.index("MMA2-122"), (table["t_s"] >= 20) & (table["t_s"] < 125)
+    truth = np.stack([table[f"true_{axis}_m"] for axis in "xyz"], axis=1)
+    e = (found.estimate[f, :, 0::3] - truth)[ballistic] / found.sigma[f, :, 0::3][ballistic]
+    assert np.abs(e).max() < 5.85
+    freedom = 3 * ballistic.sum()
+    assert found.tested == (("plot", 3),)
+    assert abs(found.nis[f, ballistic, 0].sum() / freedom - 1) < 5.85 * np.sqrt(2 / freedom)
