@@ -11,7 +11,7 @@ import numpy as np
 
 from radarsim.filters.sonar_tracker import Choice, trackers
 from radarsim.kernels import sonar_clutter as kernels
-from radarsim.kernels.sonar_field import PDA, Rule, weighed
+from radarsim.kernels.sonar_field import CLOSEST, PDA, Rule, weighed
 from radarsim.kernels.sonar_steps import CHUNK
 from radarsim.kernels.sonar_tracks import Tracks, foretell, forget, no_tracks, take
 
@@ -85,7 +85,7 @@ class Chart:
             if not self._settled(life):
                 reach = self.choice.speed * life.since
                 row[2] += reach**2
-                row[4] += (reach / row[0]) ** 2
+                row[4] += (reach / max(row[0], CLOSEST)) ** 2
         return out
 
     def _settled(self, life: Life) -> bool:

@@ -15,7 +15,18 @@ from radarsim.kernels.compile import aligned_zeros, inline, kernel, part
 from radarsim.kernels.lanes import address
 from radarsim.kernels.random import uniforms
 from radarsim.kernels.sonar import move_and_measure
-from radarsim.kernels.sonar_field import KNOWN, OPEN, PDA, Rule, decided, false_plots, inverse_two, nothing_seen, seen
+from radarsim.kernels.sonar_field import (
+    CLOSEST,
+    KNOWN,
+    OPEN,
+    PDA,
+    Rule,
+    decided,
+    false_plots,
+    inverse_two,
+    nothing_seen,
+    seen,
+)
 from radarsim.kernels.sonar_patterns import detect
 from radarsim.kernels.sonar_steps import CHUNK
 from radarsim.kernels.sonar_sums import add_sums, ahead_sums
@@ -86,7 +97,7 @@ def look(k0, k1, share, grid, density, rule, realisation, scan, settled, z, plac
         if settled:
             sector = grid[1] * grid[2] * grid[4] * grid[5]
             counts[FALSE] += near[1]
-            counts[EXPECTED] += density * min(place[0] * np.pi * rule.gate * np.sqrt(det), sector)
+            counts[EXPECTED] += density * min(max(place[0], 0.0) * np.pi * rule.gate * np.sqrt(det), sector)
         so_far = so_far if known else near
     if settled:
         counts[LOOKED] += 1.0
@@ -120,7 +131,7 @@ def associate(field, rule, first, scan, n, dt, tracks, life, came, z, again, for
         r, S, settled = foretold[0, i], (foretold[2, i], foretold[3, i], foretold[4, i]), tracks.plots[i] > 1.5
         if not settled:  # of one plot: nothing is known of its velocity but how fast targets are
             reach = speed * life[SINCE, i]
-            S = (S[0] + reach * reach, S[1], S[2] + (reach / r) ** 2)
+            S = (S[0] + reach * reach, S[1], S[2] + (reach / max(r, CLOSEST)) ** 2)
         nr, nb, rr, rb, bb, took, wrong, score = look(
             *(k0, k1, share, grid, field.density, rule, first + i, scan, settled, (came[i], z[0, i], z[1, i])),
             *((r, foretold[1, i]), S, tally),

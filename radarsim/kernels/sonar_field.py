@@ -19,6 +19,9 @@ DRAW_BITS = 12  # of a draw's number: the draw in its cell
 HALF = U(0xFFFFFFFF)
 SCORED = 1e-9  # per m²: the least density a score reckons with; without false plots it would be infinite
 OPEN = 1e30  # χ² of a gate that lets everything in
+CLOSEST = 1.0  # m: the least range that densities and gates are reckoned at, should a track pass through the sonar
+TURN = 2.0 * math.pi
+LEAST = 1e-300  # likelihood that counts: the reciprocal of a smaller one may be infinite
 NEAREST, PDA, KNOWN = range(3)
 
 
@@ -82,9 +85,12 @@ def place_in(word):
 
 @inline
 def cells(low, high, least, step, count):
-    """First and last of `count` cells of size step from `least` on that low … high touches."""
-    first = min(max(math.floor((low - least) / step), 0.0), count - 1.0)
-    last = min(max(math.floor((high - least) / step), -1.0), count - 1.0)
+    """First and last of `count` cells of size step from `least` on that low … high touches.
+
+    Floors as floating numbers: an open gate reaches further than an integer does.
+    """
+    first = min(max(np.floor((low - least) / step), 0.0), count - 1.0)
+    last = min(max(np.floor((high - least) / step), -1.0), count - 1.0)
     return int(first), int(last)
 
 
@@ -119,7 +125,7 @@ def seen(so_far, r, b, false, irr, irb, ibb, gate):
     if d < least:
         least, nr, nb, false_one = d, r, b, false
     e = math.exp(-0.5 * d)
-    if e > 0.0:
+    if e > LEAST:
         weight, astray = weight + e, astray + e * false
         share, r_off, b_off = e / weight, r - mr, b - mb
         mr, mb = mr + share * r_off, mb + share * b_off
@@ -143,9 +149,10 @@ def false_plots(k0, k1, share, grid, realisation, scan, gate, place, S, so_far):
     i_first, i_last = cells(least, most, q0, dq, nq)
     if ring:
         high = min(high, 0.5 * nb * db)
-        j_first = math.floor((b - high - b0) / db)
-        j_last = min(math.floor((b + high - b0) / db), j_first + nb - 1)
+        j_first, j_last = math.floor((b - high - b0) / db), math.floor((b + high - b0) / db)
+        j_last = min(j_last, j_first + nb)  # the same column at both ends of a full turn: half a turn to either side
     else:
+        b -= TURN * np.floor((b - b0) / TURN - 0.5 * nb * db / TURN + 0.5)  # whole turns off the sector's middle
         j_first, j_last = cells(b - high, b + high, b0, db, nb)
     for i in range(i_first, i_last + 1):
         for j in range(j_first, j_last + 1):
@@ -177,17 +184,18 @@ def decided(so_far, rule, r, S, settled):
     likelihood ratio of all plots in the gate, target against none. A track of one plot (not settled) takes the nearest.
     """
     count, _, _, nr, nb, false_one, weight, astray, mr, mb, rr, rb, bb = so_far
+    r = max(r, CLOSEST)
     density, root = rule.density * r, 2.0 * math.pi * math.sqrt(S[0] * S[2] - S[1] * S[1])
     missed = 1.0 - rule.detection * rule.inside
     ratio = missed + rule.detection * weight / (root * max(density, SCORED * r))
     score = math.log(max(ratio, 1e-12))
     if count == 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, score
-    if rule.association != PDA or not settled or weight == 0.0:
-        return nr, nb, 0.0, 0.0, 0.0, 1.0, false_one, score
     none = density * root * missed / rule.detection
+    if rule.association != PDA or not settled or none + weight == 0.0:
+        return nr, nb, 0.0, 0.0, 0.0, 1.0, false_one, score
     none = none / (none + weight)
-    some, per = 1.0 - none, 1.0 / weight
+    some, per = 1.0 - none, 1.0 / weight if weight > 0.0 else 0.0  # of an open gate all may lie out of all likelihood
     return (
         some * mr,
         some * mb,

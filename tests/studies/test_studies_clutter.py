@@ -148,6 +148,39 @@ def test_a_target_outside_the_sector_is_not_seen():
     assert kept.tolist() == [0, 0] + [512] * 8
 
 
+@pytest.mark.parametrize("first", [-360, 0, 360])
+def test_whole_turns_of_the_sector_change_nothing(first):
+    sector = {"range_m": [7e3, 11e3], "bearing_deg": [first + 5, first + 40]}
+    plan = prepared([tracker("a"), tracker("b", "pda")], density=2.0, sector=sector)
+    counts = simulated(plan, 512)["counts"]
+    false, expected = (counts[..., place].sum(axis=1) for place in (kernels.FALSE, kernels.EXPECTED))
+    assert (np.abs(false / expected - 1) < 3.9 / np.sqrt(expected)).all()
+
+
+@pytest.mark.parametrize("bearing_deg", [[5, 40], [-180, 180], [20, 380]])
+def test_an_open_gate_holds_the_whole_field(bearing_deg):
+    """Every false plot of the sector, across the seam of a full circle too, and no likelihood of them is too small."""
+    sector = {"range_m": [7e3, 11e3], "bearing_deg": bearing_deg}
+    plan = prepared([tracker("a", gate=1), tracker("b", "pda", gate=1)], density=0.3, detection=0.9, sector=sector)
+    found = simulated(plan, 1024)
+    assert all(np.isfinite(values).all() for values in found.values())
+    counts = found["counts"].sum(axis=1)
+    area = np.ptp(np.radians(bearing_deg)) * (11e3**2 - 7e3**2) / 2
+    np.testing.assert_allclose(counts[:, kernels.EXPECTED], counts[:, kernels.LOOKED] * area * 0.3e-6, rtol=1e-12)
+    expected = counts[:, kernels.EXPECTED]
+    assert (np.abs(counts[:, kernels.FALSE] / expected - 1) < 6 / np.sqrt(expected)).all()
+
+
+def test_a_target_that_passes_through_the_sonar_leaves_numbers():
+    """Tracks are foretold at negative ranges there, where there is no density of false plots in range and bearing."""
+    given = config([tracker("a"), tracker("b", "pda")], density=10.0, detection=0.9, scans=30)
+    given["sensor"]["sector"] = {"range_m": [0, 15e3], "bearing_deg": [0, 360]}
+    course = {"x_m": 500, "y_m": 0, "speed_mps": 10, "course_deg": 180}
+    given["target"] = {"kind": "accelerating", **course, "acceleration_mps2": 0, "start_s": 0}
+    found = simulated(study.prepare(load(given).cases[0]), 2048)
+    assert all(np.isfinite(values).all() for values in found.values())
+
+
 def test_bytes_do_not_depend_on_threads():
     case = load(config([tracker("a"), tracker("b", "pda")], density=2.0, detection=0.9)).cases[0]
     sums = [collect(studies.CaseWork(case), 10_000, threads=threads).values for threads in (0, 1, 2)]
