@@ -14,7 +14,7 @@ USUAL = 0.01  # false alarms a test at which detectors are compared, or what com
 MOST_PANELS = 4
 BESIDE_LEGEND = 3  # panels of a figure whose legend takes the place of one
 SYMBOLS = {"course": "course", "speed": "speed", "x_ahead": "$x$ ahead", "y_ahead": "$y$ ahead"}
-SYMBOLS |= {"cpa": "CPA", "t_cpa": "time to CPA"}
+SYMBOLS |= {"cpa": "CPA", "t_cpa": "$t$ to CPA"}
 STRENGTHS = {"acceleration_mps2": "acceleration, m/s²", "rate_radps": "turn rate, rad/s"}
 
 
@@ -125,7 +125,7 @@ def detection_figure(results: Sequence[CaseResult], detections) -> Figure | None
             marks.append(Line(strength, v["probability"], name, Style(n, n, n), v["lo"], v["hi"], known))
         title = ", ".join(f"{panels.symbol_of(k)} = {panels.number(v)}" for k, v in others)
         x, y = Axis(STRENGTHS[key.rpartition(".")[2]]), Axis("detection probability", limits=(0, 1.02))
-        drawn.append(Panel(x, y, tuple(marks), title, direct=False))
+        drawn.append(Panel(x, y, tuple(marks), title, direct=False, legend="right"))
     caption = (
         f"Probability of an alarm of detectors in the range at about {USUAL:g} false alarms a test, at the last scan "
         "of the manoeuvre (of a steady target, at the last of all), against the manoeuvre's strength. Bands: 95 % "
@@ -228,7 +228,7 @@ def uses_figure(results: Sequence[CaseResult], uses) -> Figure | None:
         f"σ about the truth over the one reckoned from the track's covariance to first order{_of(result)}, of "
         f"{result.count:,} realisations, with 95 % intervals."
     )
-    return _figure("uses", "What a track is used for", caption + left_out([result], results), _one_legend(drawn))
+    return _figure("uses", "What a track is used for", caption + left_out([result], results), _one_legend(drawn), 2)
 
 
 def _of(result: CaseResult) -> str:
@@ -255,8 +255,8 @@ def _one_legend(drawn: list[Panel]) -> list[Panel]:
     return [*bare, Panel(Axis(""), Axis(""), (), keys=keys)]
 
 
-def _figure(name: str, title: str, caption: str, drawn: list[Panel]) -> Figure | None:
+def _figure(name: str, title: str, caption: str, drawn: list[Panel], most: int = 3) -> Figure | None:
     if not drawn:
         return None
-    columns = 2 if len(drawn) in (2, 4) else min(3, len(drawn))
+    columns = 2 if len(drawn) in (2, 4) else min(most, len(drawn))
     return Figure(name, title, caption, tuple(drawn), columns, 95.0 if columns == 1 else PAGE_MM, 58)
