@@ -38,7 +38,7 @@ class Signals:
     """While entered, SIGINT and SIGTERM ask for a stop; calling it says whether one came.
 
     The main thread of a process may enter it. A run that asks it between tasks ends by itself. If the process is still
-    there 1.7 s after the signal, whatever it is doing, or if a second signal comes, it exits on the spot with status
+    there 1.5 s after the signal, whatever it is doing, or if a second signal comes, it exits on the spot with status
     128 + signal: files appear by renaming only, so none is ever half written.
 
     Python runs handlers between two bytecodes of the main thread, which may be far away inside compiled code. So
@@ -46,7 +46,7 @@ class Signals:
     """
 
     grace_s = 1.0
-    limit_s = 1.7
+    limit_s = 1.5
     numbers = (signal.SIGINT, signal.SIGTERM)
 
     def __init__(self) -> None:

@@ -78,8 +78,10 @@ def test_a_signal_is_answered_in_time_and_leaves_what_was_done(tmp_path, mode):
 def test_fifty_signals_at_any_moment_are_answered_in_time(tmp_path, mode):
     """Ten in each way of running: while it starts, while it runs, and when it goes on with what is stored."""
     draw = random.Random(mode)
-    for number in (signal.SIGINT, signal.SIGTERM) * 5:
+    for turn, number in enumerate((signal.SIGINT, signal.SIGTERM) * 5):
         process = started(tmp_path, *MODES[mode])
+        if turn == 5:
+            until_stored(process, tmp_path)
         time.sleep(draw.uniform(0.5, 8.0))
         seconds, status = answered(process, number)
         assert (seconds < 2, status) == (True, 128 + number)
