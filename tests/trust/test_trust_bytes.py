@@ -18,29 +18,15 @@ import pytest
 from radarsim import experiment
 from radarsim.config.load import load
 from radarsim.engine.cluster import Cluster
-from radarsim.engine.executors import Serial
 from radarsim.report.tables import to_csv
 from radarsim.selftest import KNOWN
+from tests.engine.test_engine_collect import Shuffled
 from tests.test_cli import csv_bytes
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.filterwarnings("ignore")  # Dask's own
 REALISATIONS = {"range_doppler": 70_001, "multimodel": 777, "sonar": 20_001, "discriminator": 333}
 LONGER = {"range_doppler": 20_000_001, "multimodel": 30_001, "sonar": 60_001, "discriminator": 6_001}  # some seconds
-
-
-class Shuffled(Serial):
-    """Hands tasks back in an order of its own."""
-
-    workers, depth = 4, 40
-
-    def __init__(self, seed):
-        super().__init__()
-        self._random = random.Random(seed)
-
-    def finished(self, timeout_s):
-        self._random.shuffle(self._tasks)
-        return super().finished(timeout_s)
 
 
 def options(study):
