@@ -40,17 +40,40 @@ def _several(name: str, title: str, caption: str, drawn: Sequence[Panel], height
     if not drawn:
         return None
     width = panels.WIDE_MM if len(drawn) == 1 else PAGE_MM
-    columns = 1 if len(drawn) == 1 else 3 if len(drawn) in (5, 6, 9) else 2
+    columns = 1 if len(drawn) == 1 else 3 if len(drawn) in (3, 5, 6, 9) else 2
     return Figure(name, title, caption, tuple(drawn), columns, width, height)
+
+
+def _many(result: CaseResult) -> bool:
+    """Whether a case has more filters than there are looks."""
+    return len(result.axes.filters) > MOST_LOOKS
 
 
 def _styles(result: CaseResult) -> list[Style]:
     """A look for each filter of a case: its own where there are few, else the rule's colour and the family's marks."""
     families, rules = result.axes.extra["families"], result.axes.extra["rules"]
-    if len(families) <= MOST_LOOKS:
+    if not _many(result):
         return [Style(n, n, n) for n in range(len(families))]
     kinds = list(dict.fromkeys(families))
     return [Style(RULES.index(r), kinds.index(f), kinds.index(f)) for f, r in zip(families, rules, strict=True)]
+
+
+def _keys(result: CaseResult, **look) -> tuple[tuple[str, Style], ...]:
+    """What the looks of many filters say: colours of rules, marks of families; look: how they differ from _styles."""
+    styles, extra = _styles(result), result.axes.extra
+    rules = {rule: replace(style, dash=0, marker=0) for rule, style in zip(extra["rules"], styles, strict=True)}
+    kinds = {f: replace(style, colour=0) for f, style in zip(extra["families"], styles, strict=True)}
+    named = [(rule.replace("_", " "), style) for rule, style in rules.items()]
+    named += [(FAMILIES.get(family, family), style) for family, style in kinds.items()]
+    return tuple((words, replace(style, **look)) for words, style in named)
+
+
+def _beside(drawn: Sequence[Panel], result: CaseResult, **look) -> list[Panel]:
+    """Panels with one legend in a cell of its own; look: see `_keys`."""
+    made = panels.in_legend(drawn)
+    if _many(result):
+        made[-1] = replace(made[-1], keys=_keys(result, **look))
+    return made
 
 
 def _title(result: CaseResult, results: Sequence[CaseResult]) -> str:
@@ -112,8 +135,12 @@ def sigma(results: Sequence[CaseResult], curves, component: str) -> Figure | Non
                 marks.append(Line(t, value, panels.literal(f), replace(style, marker=None), lo, hi))
         y = Axis(f"$\\sigma$ of {words}, {unit}", "log")
         drawn.append(Panel(TIME, y, tuple(marks), _title(result, results), direct=len(results) == 1))
-    if len(drawn) > 1 or any(len(result.axes.filters) > MOST_LOOKS for result in results):
-        drawn = panels.in_legend(drawn) if drawn else []
+    if len(drawn) > 1:
+        drawn = _beside(drawn, results[0], marker=None)
+    elif drawn and _many(results[0]):
+        (panel,) = drawn
+        keys = _keys(results[0], marker=None)
+        drawn = [replace(panel, marks=tuple(_unnamed(panel.marks)), keys=keys, direct=False, legend="right")]
     caption = (
         f"Root-mean-square error of {words.split(' $')[0]} about the truth, of {results[0].count if results else 0:,} "
         "realisations; bands: 95 % intervals. Dotted: ends of the stages."
@@ -186,6 +213,7 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     rows = made["stages"]
     rows = rows[(rows["case"] == result.name) & (rows["component"] == "y")]
     drawn = []
+    most = made["operations"].loc[made["operations"]["case"] == result.name, "operations"].max()
     styles = dict(zip(result.axes.filters, _styles(result), strict=True))
     for stage, own in rows.groupby("stage", sort=False):
         marks = []
@@ -194,9 +222,9 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
             count = operations[(result.name, stage, row["filter"])]["operations"].to_numpy(float)
             lo, hi, value = (np.array([row[key]]) for key in ("sigma_lo", "sigma_hi", "sigma"))
             marks.append(Line(count, value, panels.literal(row["filter"]), style, lo, hi))
-        x, y = Axis("operations per update", limits=(0, None)), Axis("$\\sigma$ of $y$, m", "log")
+        x, y = Axis("operations per update", limits=(0, 1.06 * float(most))), Axis("$\\sigma$ of $y$, m", "log")
         drawn.append(Panel(x, y, tuple(marks), stage, direct=False))
-    drawn = panels.in_legend(drawn)
+    drawn = _beside(drawn, result, dash=None)
     caption = (
         "Accuracy against cost: σ of the height over a stage (whiskers: 95 %) and the mean count of arithmetic "
         f"operations of one update. {panels.plain_label(result)}."
@@ -227,10 +255,7 @@ def consistency(results: Sequence[CaseResult], table) -> Figure | None:
             marks.append(Line(x, value, panels.literal(f), replace(style, dash=None), lo, hi))
         axis = Axis("stage", ticks=tuple(enumerate(stages)))
         drawn.append(Panel(axis, Axis("mean per degree of freedom", "log"), tuple(marks), title, direct=False))
-    if len(result.axes.filters) > MOST_LOOKS:
-        drawn = panels.in_legend(drawn)
-    else:
-        drawn[1] = replace(drawn[1], marks=tuple(_unnamed(drawn[1].marks)))
+    drawn = _beside(drawn, result, dash=None)
     caption = (
         "Normalised errors squared, per degree of freedom, by stage: 1 where the filter's own covariance is right, "
         f"more where it is too sure of itself. {panels.plain_label(result)}."

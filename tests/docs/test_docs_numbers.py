@@ -65,6 +65,13 @@ def test_range_and_radial_velocity(run):
 
 
 @pytest.mark.slow
+def test_multimodel(run):
+    for stem in ("", "_trajectories", "_rules", "_transition", "_banks", "_covariance"):
+        results = run(f"multimodel{stem}", 1000)
+    check("multimodel", results)
+
+
+@pytest.mark.slow
 def test_sonar(run):
     for stem in SONAR:
         results = run(f"sonar_{stem}", 1000)

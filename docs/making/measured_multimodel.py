@@ -1,0 +1,150 @@
+"""Numbers of docs/multimodel.md."""
+
+from collections.abc import Callable
+
+from making.numbers import Results, signed, with_bounds
+
+SIX = ("MMA2-122", "MMA2-11", "Kalman-1 20", "Kalman-1 5", "Kalman-2 20", "Kalman-2 1")
+STAGES = ("start", "ballistic", "manoeuvre", "after")
+CLAIMS = ("multimodel", "multimodel_trajectories", "multimodel_rules", "multimodel_transition", "multimodel_banks")
+VERDICTS = ("confirmed", "refuted", "not distinguishable")
+HEIGHT, CLIMB = "height", "rate of climb"
+
+
+def sigma(component: str) -> Callable[[Results], list[tuple]]:
+    """σ of a component by stage and algorithm, the least of each stage in bold."""
+
+    def made(results: Results) -> list[tuple]:
+        table = results.table("multimodel", "stages")
+        own = table[table["component"] == component].set_index(["stage", "filter"])
+        rows: list[tuple] = [("stage", *SIX)]
+        for stage in STAGES:
+            least = min(SIX, key=lambda name: own.loc[(stage, name), "sigma"])
+            cells = (with_bounds(*own.loc[(stage, name), ["sigma", "sigma_lo", "sigma_hi"]]) for name in SIX)
+            rows.append(
+                (stage, *(f"**{cell}**" if name == least else cell for name, cell in zip(SIX, cells, strict=True)))
+            )
+        return rows
+
+    return made
+
+
+def costs(results: Results) -> list[tuple]:
+    """Operations of one update by family and rule, at 20 Hz and at 1 Hz."""
+    rows: list[tuple] = [("family", "rule", "at 20 Hz", "at 1 Hz")]
+    fast, slow = (
+        results.table("multimodel_rules", "operations").query(f"stage == 'whole' and case == 'multimodel_{case}'")
+        for case in ("families", "families_1hz")
+    )
+    for one in fast.itertuples():
+        (other,) = slow[slow["filter"] == one.filter]["operations"]
+        rows.append((one.family, one.merge.replace("_", " "), f"{one.operations:.0f}", f"{other:.0f}"))
+    return rows
+
+
+def verdicts(results: Results) -> list[tuple]:
+    """Each claim by case: the verdicts of its parts there, counted."""
+    rows: list[tuple] = [("claim", "flight", *VERDICTS)]
+    for stem in CLAIMS:
+        for (claim, case), own in results.table(stem, "claims").groupby(["claim", "case"], sort=False):
+            counts = own["verdict"].value_counts()
+            flight = case.rpartition("target=")[2].replace("_", " ") if "target=" in case else "aeroballistic"
+            flight += ", 1 Hz" if case.endswith("_1hz") else ""
+            rows.append((claim, flight, *(str(counts.get(verdict, "")) for verdict in VERDICTS)))
+    return sorted(rows[:1]) + sorted(rows[1:], key=lambda row: (_number(row[0]), row[0]))
+
+
+def _number(claim: str) -> int:
+    return int("".join(filter(str.isdigit, claim.partition(".")[2])))
+
+
+def part(stem: str, claim: str, what: str, unit: str = " %") -> Callable[[Results], str]:
+    """The measured value of one part of a claim."""
+
+    def made(results: Results) -> str:
+        table = results.table(stem, "claims")
+        (row,) = table[(table["claim"] == claim) & (table["what"] == what)].itertuples()
+        value = signed(f"{row.measured:.3g}") if row.lo == row.hi else with_bounds(row.measured, row.lo, row.hi)
+        return value + unit
+
+    return made
+
+
+def rival(stage: str, words: str) -> Callable[[Results], str]:
+    """The paired gain of MMA2-122 over the best of the other five."""
+    return part("multimodel", "P2.1", f"gain over the best other one, {words}, aeroballistic, stage {stage}")
+
+
+def largest(stem: str, claim: str, begins: str, sign: int = 0) -> Callable[[Results], str]:
+    """The largest (sign 1), the least (-1) or the farthest from nought (0) among the parts of a claim that begin so."""
+
+    def made(results: Results) -> str:
+        table = results.table(stem, "claims")
+        own = table[(table["claim"] == claim) & table["what"].str.startswith(begins)]
+        row = own.loc[(sign * own["measured"] if sign else own["measured"].abs()).idxmax()]
+        words, stage = row["what"].split(", ")[-2:]
+        return f"{with_bounds(row['measured'], row['lo'], row['hi'])} % ({words}, {stage.removeprefix('stage ')})"
+
+    return made
+
+
+def combined(pure: str, stage: str) -> Callable[[Results], str]:
+    """The gain in height of the combined rule over a pure one."""
+    return part("multimodel_rules", "P2.8", f"gain of combined over {pure}, 20 Hz, {HEIGHT}, stage {stage}")
+
+
+def conversion(case: dict, base: dict, component: str = "y") -> Callable[[Results], str]:
+    """By how much σ over the ballistic stage is larger than that of another case or filter, in per cent."""
+
+    def value(results: Results, of: dict) -> float:
+        table = results.table("multimodel_covariance", "stages")
+        own = table[(table["stage"] == "ballistic") & (table["component"] == component)]
+        angle, kind = f"sigma_elevation_deg={of['angle']} ", f"conversion={of['conversion']}"
+        own = own[(own["case"] + " ").str.contains(angle) & (own["case"] + " ").str.contains(f"{kind} ")]
+        (sigma,) = own[own["filter"] == of["filter"]]["sigma"]
+        return sigma
+
+    def made(results: Results) -> str:
+        change = 100 * (value(results, case) / value(results, base) - 1)
+        return signed(f"{change:.0f} %" if abs(change) > 10 else f"{change:.2g} %")
+
+    return made
+
+
+PLAIN = {"angle": "0.1", "conversion": "plain", "filter": "at the plot"}
+COARSE = PLAIN | {"angle": "1"}
+AHEAD = {"filter": "at the prediction"}
+UNBIASED = {"conversion": "unbiased"}
+
+MEASURED = {
+    "multimodel_sigma_y": sigma("y"),
+    "multimodel_sigma_vy": sigma("vy"),
+    "multimodel_costs": costs,
+    "multimodel_verdicts": verdicts,
+    **{f"multimodel_rival_{stage}_y": rival(stage, HEIGHT) for stage in STAGES},
+    **{f"multimodel_rival_{stage}_vy": rival(stage, CLIMB) for stage in STAGES},
+    "multimodel_weak": part("multimodel", "P2.5", "mean probability of model 1, aeroballistic, stage whole", ""),
+    "multimodel_modified_most": largest("multimodel_rules", "P2.6", "gain of modified over combined, 20 Hz"),
+    "multimodel_modified_manoeuvre_y": part(
+        "multimodel_rules", "P2.6", f"gain of modified, 1 Hz, {HEIGHT}, stage manoeuvre"
+    ),
+    "multimodel_modified_manoeuvre_vy": part(
+        "multimodel_rules", "P2.6", f"gain of modified, 1 Hz, {CLIMB}, stage manoeuvre"
+    ),
+    "multimodel_mma2_cost": part("multimodel_rules", "P2.7", "operations of MMA2 / MMA3, 20 Hz", ""),
+    "multimodel_mma2_worst": largest("multimodel_rules", "P2.7", "gain of MMA2 over MMA3, 20 Hz", -1),
+    "multimodel_mma2_worst_1hz": largest("multimodel_rules", "P2.7", "gain of MMA2 over MMA3, 1 Hz", -1),
+    "multimodel_mma1_best": largest("multimodel_rules", "P2.7", "gain of MMA1 over MMA3, 20 Hz", 1),
+    **{f"multimodel_combined_moment_{stage}": combined("moment", stage) for stage in STAGES[1:]},
+    "multimodel_combined_best_least": largest("multimodel_rules", "P2.8", "gain of combined over best", -1),
+    "multimodel_combined_best_most": largest("multimodel_rules", "P2.8", "gain of combined over best", 1),
+    "multimodel_modified_cost": part("multimodel_rules", "P2.10", "operations of modified / combined, 20 Hz", ""),
+    "multimodel_modified_cost_1hz": part("multimodel_rules", "P2.10", "operations of modified / combined, 1 Hz", ""),
+    "multimodel_often": largest("multimodel_transition", "P2.12", "gain of changes ten times as frequent"),
+    "multimodel_rare": largest("multimodel_transition", "P2.12", "gain of changes ten times rarer"),
+    "multimodel_ahead_y": conversion(PLAIN | AHEAD, PLAIN),
+    "multimodel_ahead_vy": conversion(PLAIN | AHEAD, PLAIN, "vy"),
+    "multimodel_unbiased": conversion(PLAIN | UNBIASED, PLAIN),
+    "multimodel_unbiased_coarse": conversion(COARSE | UNBIASED, COARSE),
+    "multimodel_ahead_coarse": conversion(COARSE | AHEAD, COARSE),
+}
