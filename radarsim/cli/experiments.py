@@ -16,7 +16,7 @@ from radarsim.cli.group import (
     seed_option,
     set_option,
 )
-from radarsim.errors import TargetUnmet
+from radarsim.errors import ClusterError, TargetUnmet
 
 
 @main.command()
@@ -102,6 +102,8 @@ def run(
                                 figures=not no_figures and (formats or True),
                                 **means,
                             )
+                    except ClusterError:
+                        raise  # for the other experiments too
                     except TargetUnmet as error:
                         unmet += error.lines
                         continue
