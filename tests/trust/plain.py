@@ -120,13 +120,13 @@ def uncompiled():
 BURST = {"carrier_hz": 10e9, "pulse_period_s": 1e-5, "pulse_length_s": 2e-6, "sampling_period_s": 1e-6, "pulses": 64}
 DISCRIMINATOR = {
     "study": "discriminator",
-    "burst": BURST | {"amplitude": 1.0, "noise_variance": 0.2},
+    "burst": BURST | {"amplitude": 1.0, "noise_variance": 0.05},
     "truth": {"phase_rad": 0.7, "doppler_derivatives": [300.0, -2000.0, 0.0, 0.0]},
-    "prior": {"spread_over_potential": [3.0, 3.0, 3.0, 3.0, 3.0]},
+    "prior": {"spread_over_potential": [2.0, 2.0, 2.0, 2.0, 2.0]},
     "estimators": [
-        {"name": "sequence", "schedule": [2e-4, 6.4e-4]},
+        {"name": "sequence", "schedule": [4e-4, 6.4e-4]},
         {"name": "steps", "schedule": [6.4e-4], "phases": 4, "steps": 3},
-        {"name": "cured", "schedule": [2e-4, 6.4e-4], "coherence_step": True, "search_points": 2, "search_margin": 0},
+        {"name": "cured", "schedule": [4e-4, 6.4e-4], "coherence_step": True, "search_points": 2, "search_margin": 0},
     ],
     "realisations": 10,
 }
@@ -140,6 +140,9 @@ EVEN = ["sensor.sigma_range_m=2500", "sensor.sigma_elevation_deg=2", "sensor.sig
 SHORT = ["scans=9", "report_every=3", *EVEN]
 SWEPT = [word if "elevation" not in word else "sweep.sensor.sigma_elevation_deg=[2]" for word in SHORT]
 NEAR = "target={kind: polynomial, frame: polar, range_m: [900, -4], bearing_deg: [2, 0.01]}"
+DETECTORS = "{name: a, plots: 4, false_alarm_probability: [0.1]}, {name: b, plots: 4, test_every: 4, threshold_k: [2]}"
+HELD = ["scans=9", "target.x_m=900", "uses.at_s=[35]"]  # near: ranges beside their σ
+MANOEUVRE = [*HELD, "sweep.target.acceleration_mps2=[0.2]", f"detectors=[{DETECTORS}]"]
 # What is run: name → config, overrides, realisations; of several cases the last.
 RUNS = {
     "linear": ("rls2", ["scans=9"], 11),
@@ -148,6 +151,8 @@ RUNS = {
     "sonar missed": ("sonar_missed", ["scans=12", "sweep.sensor.detection_probability=[0.7]", NEAR], 9),
     "sonar converted": ("sonar_conversion", ["scans=6"], 9),
     "sonar fluctuating": ("sonar_fluctuating", ["scans=7", "sweep.target=[sonar_fluctuating]"], 9),
+    "sonar manoeuvre": ("sonar_manoeuvre", MANOEUVRE, 9),
+    "sonar clutter": ("sonar_clutter", ["scans=8", "sweep.sensor.false_plots_per_km2=[0.3]"], 9),
     "multimodel families": ("multimodel_families", SHORT, 8),
     "multimodel irregular": ("multimodel_irregular", SHORT, 8),
     "multimodel at prediction": ("multimodel_covariance", SWEPT, 8),
@@ -194,7 +199,7 @@ def sums(config, overrides, count):
 def tracks():
     """Plots that are drawn by themselves, and estimates over recorded ones."""
     from radarsim.kernels import linear
-    from radarsim.studies import multimodel, multimodel_plots
+    from radarsim.studies import multimodel, multimodel_plots, range_doppler_plots, sonar_clutter_plots, sonar_plots
 
     made = {}
     plan = work(*RUNS["linear"][:2]).plan
@@ -202,6 +207,9 @@ def tracks():
     made["linear plots"] = plots
     schedule = plan.observes, plan.start, plan.weights, plan.gains
     made["linear estimates"] = np.nan_to_num(linear.estimate(plots, plan.dt, *schedule))
+    one = work(*RUNS["linear"][:2])
+    tracker = range_doppler_plots.Tracker(one.case)
+    made["linear track"] = np.nan_to_num(tracker.feed(range_doppler_plots.simulated(one.case, 3)).estimate)
     one = work(*RUNS["multimodel families"][:2])
     z, R, _ = multimodel.measured(one.plan, 0)
     made["multimodel plots"], made["multimodel covariances"] = z, R
@@ -211,6 +219,11 @@ def tracks():
     recorded = dict(zip(("t_s", "range_m", "elevation_rad", "azimuth_rad"), columns, strict=True))
     track = multimodel_plots.track(one.case, recorded)
     made["multimodel track"] = np.nan_to_num(track.estimate)
+    one = work(*RUNS["sonar clutter"][:2])
+    recorded = sonar_plots.simulated(one.case, 3)
+    made["clutter plots"] = np.stack([np.nan_to_num(recorded[name]) for name in ("t_s", "range_m", "bearing_rad")])
+    measured = {name: recorded[name] for name in ("t_s", "range_m", "bearing_rad")}
+    made["clutter track"] = np.nan_to_num(sonar_clutter_plots.track(one.case, measured).estimate)
     return made
 
 

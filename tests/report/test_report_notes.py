@@ -1,0 +1,37 @@
+"""Notes where an interval rests on too little: by realisations, by events, and none elsewhere."""
+
+import numpy as np
+import pytest
+
+import radarsim
+from radarsim.report import notes
+from radarsim.report.statistics import FEW, FEW_EVENTS, FEW_HEAVY
+
+
+def test_words():
+    n = np.array([1.0, FEW - 1, FEW, FEW_HEAVY - 1, FEW_HEAVY])
+    assert list(map(bool, notes.words_on(n))) == [True, True, True, True, False]
+    assert notes.words_on(n)[1] == f"under {FEW} realisations"
+    assert "heavy tails" in notes.words_on(n)[2]
+    events = np.array([0.0, FEW_EVENTS - 1, FEW_EVENTS])
+    assert list(map(bool, notes.words_on(np.full(3, 1e6), events))) == [True, True, False]
+
+
+@pytest.mark.parametrize(("count", "noted"), [(50, "under 200"), (500, "heavy tails?"), (1000, None)])
+def test_tables_say_so(count, noted):
+    made = radarsim.run("rls2", realisations=count, overrides=["scans=5"]).tables
+    for name in ("curves", "gains", "consistency"):
+        if noted is None:
+            assert "note" not in made[name]
+        else:
+            assert made[name].columns[-1] == "note"
+            assert made[name]["note"].str.contains(noted, regex=False).all()
+
+
+def test_rare_locks_are_noted_row_by_row():
+    import pandas as pd
+
+    rates = [0.0, 0.001, 0.02, 0.5, 0.99, 1.0]
+    table = pd.DataFrame({"case": "a", "n": 1000, "probability": rates, "probability_lo": 0.0, "probability_hi": 1.0})
+    noted = notes.noted({"probabilities": table}, [])["probabilities"]
+    assert list(noted["note"] == f"under {FEW_EVENTS} events") == [True, True, False, False, True, True]
