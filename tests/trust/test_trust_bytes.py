@@ -16,34 +16,26 @@ from pathlib import Path
 import pytest
 
 from radarsim import experiment
-from radarsim.config.load import load
 from radarsim.engine.cluster import Cluster
 from radarsim.report.tables import to_csv
-from radarsim.selftest import KNOWN
 from tests.engine.test_engine_collect import Shuffled
 from tests.test_cli import csv_bytes
+from tests.trust.cases import CASES
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.filterwarnings("ignore")  # Dask's own
-REALISATIONS = {"range_doppler": 70_001, "multimodel": 777, "sonar": 20_001, "discriminator": 333}
-LONGER = {"range_doppler": 20_000_001, "multimodel": 30_001, "sonar": 60_001, "discriminator": 6_001}  # some seconds
+every_study = pytest.mark.parametrize("study", CASES)
 
 
-def options(study):
-    """The experiment, some seconds of it, as the command takes them."""
-    return [str(KNOWN / f"{study}.yaml"), "-n", str(LONGER[study]), "--no-figures", "--quiet"]
-
-
-def tables(study, **means):
+def tables(study, realisations=None, **means):
     """The bytes of all tables of a run in this process, by name."""
-    loaded = load(KNOWN / f"{study}.yaml", [f"realisations={REALISATIONS[study]}"])
-    return {name: to_csv(table) for name, table in experiment.run(loaded, **means).tables.items()}
+    result = experiment.run(CASES[study].loaded(realisations), **means)
+    return {name: to_csv(table) for name, table in result.tables.items()}
 
 
-def command(study, out):
-    """The command in a process of its own; its exit code."""
-    program = [sys.executable, "-m", "radarsim", "run", *options(study), "--out", str(out)]
-    return subprocess.run(program, cwd=ROOT, capture_output=True, check=False).returncode
+def program(study, out):
+    """The command that runs some seconds of a study."""
+    return [sys.executable, "-m", "radarsim", "run", *CASES[study].options(), "--out", str(out)]
 
 
 @pytest.fixture(scope="module")
@@ -59,14 +51,14 @@ def expected():
     return of
 
 
-@pytest.mark.parametrize("study", REALISATIONS)
+@every_study
 def test_threads_and_order(expected, study):
     assert tables(study, threads=3) == expected(study)
     assert tables(study, executor=Shuffled(1)) == expected(study)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("study", REALISATIONS)
+@every_study
 @pytest.mark.parametrize("threads", [1, 2, 3, 4])
 def test_five_repeats_of_any_number_of_threads(expected, study, threads):
     for _ in range(5):
@@ -74,7 +66,7 @@ def test_five_repeats_of_any_number_of_threads(expected, study, threads):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("study", REALISATIONS)
+@every_study
 def test_twenty_orders_of_the_blocks(expected, study):
     for seed in range(20):
         assert tables(study, executor=Shuffled(seed)) == expected(study)
@@ -84,15 +76,15 @@ def test_twenty_orders_of_the_blocks(expected, study):
 @pytest.mark.parametrize("workers", [1, 2, 4])
 def test_workers(expected, workers):
     with Cluster(workers) as pool:
-        for study in REALISATIONS:
+        for study in CASES:
             assert tables(study, executor=pool) == expected(study)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("study", REALISATIONS)
+@every_study
 @pytest.mark.parametrize("of", [1, 3, 7])
 def test_shares(expected, study, of, tmp_path):
-    loaded = load(KNOWN / f"{study}.yaml", [f"realisations={REALISATIONS[study]}"])
+    loaded = CASES[study].loaded()
     for number in random.Random(of).sample(range(1, of + 1), of):
         experiment.share(loaded, number, of, out=tmp_path / str(number), threads=2)
         shutil.copytree(tmp_path / str(number), tmp_path / "all", dirs_exist_ok=True)
@@ -101,58 +93,63 @@ def test_shares(expected, study, of, tmp_path):
     assert {name: to_csv(table) for name, table in result.tables.items()} == expected(study)
 
 
-def killed(study, out, after_s):
-    """Start the command and kill it; its exit status."""
-    program = [sys.executable, "-m", "radarsim", "run", *options(study), "--out", str(out)]
-    with subprocess.Popen(program, cwd=ROOT, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as process:
-        time.sleep(after_s)
-        process.kill()
-        return process.wait(timeout=30)
-
-
-def duration(study, out):
-    """Seconds that an undisturbed run of the command takes."""
-    since = time.perf_counter()
-    assert command(study, out) == 0
-    return time.perf_counter() - since
+def killed(study, out, after_s=None):
+    """The command's exit status, when it was killed after so many seconds."""
+    with subprocess.Popen(program(study, out), cwd=ROOT, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL) as process:
+        try:
+            _, said = process.communicate(timeout=after_s)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            _, said = process.communicate()
+    assert b"Traceback" not in said
+    return process.returncode
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("study", REALISATIONS)
+@every_study
 def test_twenty_kills_of_the_run(study, tmp_path):
     """At moments spread over all that a run does, its start and the writing of its tables too; every one on the store
-    and the results that the last one left."""
-    duration(study, tmp_path / "compiled")
-    whole = duration(study, tmp_path / "whole")
-    draw = random.Random(study)
-    interrupted = 0
-    for _ in range(20):
-        status = killed(study, tmp_path / "killed", draw.uniform(0.3, 1.0) * whole)
-        interrupted += status == -signal.SIGKILL
-    assert interrupted >= 5
-    assert command(study, tmp_path / "killed") == 0
-    assert csv_bytes(tmp_path / "killed" / study) == csv_bytes(tmp_path / "whole" / study)
+    and the results that the last one left. One that ended before its kill is compared, and the next begins anew."""
+    assert killed(study, tmp_path / "compiled") == 0
+    since = time.perf_counter()
+    assert killed(study, tmp_path / "whole") == 0
+    whole_s, draw, kills = time.perf_counter() - since, random.Random(study), 0
+    expected = csv_bytes(tmp_path / "whole" / study)
+    while kills < 20:
+        status = killed(study, tmp_path / "killed", draw.uniform(0.3, 1.0) * whole_s)
+        assert status in (0, -signal.SIGKILL)
+        kills += status != 0
+        if status == 0:
+            assert csv_bytes(tmp_path / "killed" / study) == expected
+            shutil.rmtree(tmp_path / "killed")
+    assert killed(study, tmp_path / "killed") == 0
+    assert csv_bytes(tmp_path / "killed" / study) == expected
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("study", REALISATIONS)
-def test_six_kills_of_workers(expected, study):
+@every_study
+def test_six_kills_of_workers(study):
+    """Of those that live, while they compute."""
+    longer = CASES[study].longer
+    expected = tables(study, longer, threads=1)
     with Cluster(2) as pool:
-        ended, killed_workers = threading.Event(), []
+        ended, kills = threading.Event(), []
 
         def kill():
             draw = random.Random(study)
-            while len(killed_workers) < 6 and not ended.wait(draw.uniform(0.2, 0.8)):
-                process = draw.choice(pool._own._running)
-                os.kill(process.pid, signal.SIGKILL)
-                killed_workers.append(process.pid)
+            while len(kills) < 6 and not ended.wait(draw.uniform(0.2, 0.8)):
+                living = [process for process in pool._own._running if process.poll() is None]
+                if living:
+                    kills.append(draw.choice(living))
+                    os.kill(kills[-1].pid, signal.SIGKILL)
 
         killer = threading.Thread(target=kill)
         killer.start()
-        rounds = 0
-        while len(killed_workers) < 6:
-            assert tables(study, executor=pool) == expected(study)
-            rounds += 1
-        killer.join()
-        assert tables(study, executor=pool) == expected(study)
-        assert rounds < 100
+        try:
+            while len(kills) < 6:
+                assert tables(study, longer, executor=pool) == expected
+        finally:
+            ended.set()
+            killer.join()
+        assert tables(study, longer, executor=pool) == expected
+    assert len({process.pid for process in kills}) == 6

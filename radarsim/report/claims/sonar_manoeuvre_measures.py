@@ -19,7 +19,7 @@ def case(results: Sequence[CaseResult], key: str) -> CaseResult:
     found = [
         r for r in results if r.spec.frame == "polar" and r.spec.detectors and r.spec.target.kind == "accelerating"
     ]
-    found = [r for r in found if r.axes.extra["manoeuvre_s"]]
+    found = [r for r in found if r.axes.extra["manoeuvre_s"] and (r.axes.extra["phase"] == 1).any()]
     found.sort(key=lambda r: abs(r.spec.target.acceleration_mps2))
     if key == EQUAL:
         found = [r for r in found if abs(_shift_of_five(r) - 1) < 0.01]

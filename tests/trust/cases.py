@@ -1,0 +1,43 @@
+"""A small case of every study, and of every part of the sonar's that has kernels and tables of its own."""
+
+from typing import NamedTuple
+
+from radarsim.config.experiment import Experiment
+from radarsim.config.load import load
+from radarsim.selftest import KNOWN
+
+
+class Small(NamedTuple):
+    """A config and its overrides; realisations of at least eight blocks and a cut one, and as many as take seconds."""
+
+    config: str
+    overrides: tuple[str, ...]
+    realisations: int
+    longer: int
+
+    def loaded(self, realisations: int | None = None) -> Experiment:
+        """The experiment, of its realisations or of so many."""
+        return load(self.config, [*self.overrides, f"realisations={realisations or self.realisations}"])
+
+    def options(self, realisations: int | None = None) -> list[str]:
+        """What `radarsim run` takes for it, of as many realisations as take seconds or of so many."""
+        words = [word for override in self.overrides for word in ("--set", override)]
+        return [self.config, *words, "-n", str(realisations or self.longer), "--no-figures", "--quiet"]
+
+
+def known(study: str, realisations: int, longer: int) -> Small:
+    """The case that `radarsim doctor` knows."""
+    return Small(str(KNOWN / f"{study}.yaml"), (), realisations, longer)
+
+
+DETECTORS = "{name: a, plots: 5, threshold_k: [1, 2]}, {name: b, plots: 4, test_every: 4, threshold_k: [2]}"
+MANOEUVRE = ("sweep.target.acceleration_mps2=[0.4]", "scans=30", "uses.at_s=[140]", f"detectors=[{DETECTORS}]")
+TRACKERS = ("sweep.sensor.false_plots_per_km2=[1]", "scans=12")
+CASES = {
+    "range_doppler": known("range_doppler", 70_001, 10_000_001),
+    "multimodel": known("multimodel", 777, 250_001),
+    "sonar": known("sonar", 36_001, 1_200_001),
+    "sonar_manoeuvre": Small("sonar_manoeuvre", MANOEUVRE, 36_001, 90_001),
+    "sonar_clutter": Small("sonar_clutter", TRACKERS, 36_001, 80_001),
+    "discriminator": known("discriminator", 601, 50_001),
+}
