@@ -1,57 +1,183 @@
-"""`make reproduce-figures`: every shipped config at its full size, a line each, and what came of the papers' claims."""
+"""`make reproduce-figures`: every shipped config at its full size, a line each, and what came of the papers' claims.
 
+    python -m radarsim.reproduce [OUT [CONFIG…]]      OUT is results where none is given, CONFIG all
+
+Two processes share the configs, so that one computes while the other draws: drawing keeps a single core busy, and takes
+about as long as computing. They are programs started anew, which take a line of JSON for each config and answer with
+one; the store is safe with both.
+"""
+
+import json
+import os
+import subprocess
 import sys
+import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from queue import SimpleQueue
 
 from radarsim import console, experiment
 from radarsim.config import lookup
-from radarsim.config.load import Experiment
 from radarsim.engine.stopping import Signals
 from radarsim.errors import Interrupted, RadarsimError
+
+PROCESSES = 2
+LOOK_S = 0.1  # how often a signal is looked for
 
 
 @dataclass(frozen=True)
 class Done:
-    """One config: its seconds, and its faults if it could not be finished."""
+    """One config: its seconds, what it made in words, and its faults if it could not be finished."""
 
     stem: str
     seconds: float
+    words: str
     faults: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class Task:
+    """What a process is asked for: a config by its name, where to, and how."""
+
+    stem: str
+    out: str
+    overrides: tuple[str, ...] = ()
+    figures: bool = True
+
+
 def reproduce(
-    experiments: Sequence[Experiment],
+    stems: Sequence[str],
     out: str,
     say: Callable[[str], None],
     stop: Signals | None = None,
+    overrides: Sequence[str] = (),
     figures: bool = True,
 ) -> list[Done]:
-    """Run every experiment, telling a line as each is done; a fault of one does not keep the others from running."""
+    """Run every config, telling a line as each is done; a fault of one does not keep the others from running.
+
+    Raises Interrupted, with all that was done stored, if `stop` saw a signal.
+    """
     done: list[Done] = []
-    for number, one in enumerate(experiments, 1):
-        started = time.perf_counter()
-        try:
-            result = experiment.run(one, out=out, stop=stop, figures=figures)
-            verdicts = ", ".join(f"{len(names)} {verdict}" for verdict, names in result.verdicts().items())
-            drawn = sum(name.endswith(".svg") for name in result.written.files)
-            words = [console.plural(drawn, "figure")] if figures else []
-            words, faults = [*words, *([f"claims: {verdicts}"] if verdicts else [])], ()
-        except Interrupted:
-            raise
-        except RadarsimError as error:
-            words, faults = [f"FAILED: {error.lines[0]}"], error.lines
-        seconds = time.perf_counter() - started
-        done.append(Done(one.stem, seconds, tuple(faults)))
-        say(f"[{number:>2}/{len(experiments)}] {one.stem:<26} {seconds:6.1f} s  {'; '.join(words)}")
+    tasks = [Task(stem, str(out), tuple(overrides), figures) for stem in stems]
+    for one in _finished(tasks, stop):
+        done.append(one)
+        say(f"[{len(done):>2}/{len(stems)}] {one.stem:<26} {one.seconds:6.1f} s  {one.words}")
     return done
 
 
-def summary(done: Sequence[Done], out: str) -> list[str]:
+def _finished(tasks: Sequence[Task], stop: Signals | None) -> Iterator[Done]:
+    """What is done, as it is done, by processes that are gone at the end."""
+    count = min(PROCESSES, len(tasks))
+    idle: SimpleQueue[_Process] = SimpleQueue()
+    processes = [_Process() for _ in range(count)]
+    for process in processes:
+        idle.put(process)
+
+    def run(task: Task) -> Done:
+        process = idle.get()
+        try:
+            return process.done(task)
+        finally:
+            idle.put(process)
+
+    with ThreadPoolExecutor(max(1, count)) as pool:
+        pending: set[Future] = {pool.submit(run, task) for task in tasks}
+        try:
+            while pending:
+                ready, pending = wait(pending, LOOK_S, FIRST_COMPLETED)
+                if stop is not None:
+                    stop.raise_if_received()
+                yield from (future.result() for future in ready)
+        finally:
+            for future in pending:
+                future.cancel()
+            for process in processes:
+                process.end()
+
+
+class _Process:
+    """A process that runs one config after another; in a session of its own, so that Ctrl-C is for this one alone."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._ended = False
+        self._start()
+
+    def _start(self) -> None:
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        command = [sys.executable, "-c", "from radarsim.reproduce import answer; answer()"]
+        self._popen = subprocess.Popen(command, env=environment, start_new_session=True, **pipes)
+
+    def done(self, task: Task) -> Done:
+        """Have it run a config. One that dies under it is told as that config's fault, and another is started."""
+        began = time.perf_counter()
+        with suppress(OSError):
+            self._popen.stdin.write(json.dumps(asdict(task)) + "\n")
+            self._popen.stdin.flush()
+        if line := self._popen.stdout.readline():
+            told = json.loads(line)
+            return Done(**told | {"faults": tuple(told["faults"])})
+        code = self._popen.wait()
+        with self._lock:
+            if not self._ended:
+                self._close()
+                self._start()
+        fault = f"{task.stem}: its process ended with {code}; run again, what it had done is stored"
+        return Done(task.stem, time.perf_counter() - began, f"FAILED: {fault}", (fault,))
+
+    def end(self) -> None:
+        """Have it store what it has, and end."""
+        with self._lock:
+            self._ended = True
+            self._popen.terminate()
+        self._popen.wait()
+        self._close()
+
+    def _close(self) -> None:
+        self._popen.stdout.close()
+        with suppress(OSError):  # a config that it never read
+            self._popen.stdin.close()
+
+
+def answer() -> None:
+    """The program of a process: a Task on each line of stdin, a Done on each of stdout."""
+    with Signals() as stop:
+        try:
+            for line in sys.stdin:
+                asked = json.loads(line)
+                told = _run(Task(**asked | {"overrides": tuple(asked["overrides"])}), stop)
+                sys.stdout.write(json.dumps(asdict(told)) + "\n")
+                sys.stdout.flush()
+        except Interrupted as ended:
+            sys.exit(ended.exit_code)
+
+
+def _run(task: Task, stop: Signals) -> Done:
+    started = time.perf_counter()
+    try:
+        result = experiment.run(task.stem, overrides=task.overrides, out=task.out, stop=stop, figures=task.figures)
+        verdicts = ", ".join(f"{len(names)} {verdict}" for verdict, names in result.verdicts().items())
+        drawn = sum(name.endswith(".svg") for name in result.written.files)
+        words = [console.plural(drawn, "figure")] if task.figures else []
+        words, faults = [*words, *([f"claims: {verdicts}"] if verdicts else [])], ()
+    except Interrupted:
+        raise
+    except RadarsimError as error:
+        words, faults = [f"FAILED: {error.lines[0]}"], error.lines
+    return Done(task.stem, time.perf_counter() - started, "; ".join(words), tuple(faults))
+
+
+def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
     """The closing words: claims by verdict, time, where all lies."""
+    from radarsim.report import index
+
+    index.write(Path(out))  # two processes may have written it at once, one without the other's run
     rows = experiment.claims((), out)
     overall = Counter({row["claim"]: row["overall"] for row in rows}.values())
     longest = max(done, key=lambda one: one.seconds)
@@ -59,20 +185,21 @@ def summary(done: Sequence[Done], out: str) -> list[str]:
     return [
         "",
         f"claims   {sum(overall.values())}: " + ", ".join(f"{count} {verdict}" for verdict, count in overall.items()),
-        f"time     {console.clock(sum(one.seconds for one in done))} for {console.plural(len(done), 'config')}, "
+        f"time     {console.clock(seconds)} for {console.plural(len(done), 'config')}, "
         f"the longest {longest.stem}, {longest.seconds:.0f} s",
         f"where    {Path(out) / 'index.html'} leads to every report; {Path(out) / 'README.md'} says what lies where",
         *([f"failed   {', '.join(failed)}"] if failed else []),
     ]
 
 
-def main(out: str = "results") -> int:
-    """All shipped configs into `out`; the exit code."""
+def main(out: str = "results", *names: str) -> int:
+    """The shipped configs of these names, or all, into `out`; the exit code."""
+    started = time.perf_counter()
     with Signals() as stop:
         try:
-            experiments = experiment.load_all(lookup.stems("configs"))
-            done = reproduce(experiments, out, console.say, stop)
-            for line in summary(done, out):
+            stems = [one.stem for one in experiment.load_all(names or lookup.stems("configs"))]
+            done = reproduce(stems, out, console.say, stop)
+            for line in summary(done, out, time.perf_counter() - started):
                 console.say(line)
         except RadarsimError as error:
             sys.stderr.write("".join(f"{line}\n" for line in error.lines))
@@ -81,4 +208,4 @@ def main(out: str = "results") -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:2]))
+    sys.exit(main(*sys.argv[1:]))

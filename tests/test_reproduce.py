@@ -1,25 +1,63 @@
 """`make reproduce-figures` in small: a line for each config, the rest goes on after a fault, a summary at the end."""
 
-from radarsim import experiment, reproduce
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from radarsim import reproduce
+
+SMALL = ["realisations=100"]
 
 
 def test_a_line_each_and_a_summary(tmp_path):
     told = []
-    experiments = experiment.load_all(["rls2", "rls4"], ["realisations=100"])
-    done = reproduce.reproduce(experiments, str(tmp_path), told.append, figures=False)
-    assert [line[:14] for line in told] == ["[ 1/2] rls2   ", "[ 2/2] rls4   "]
-    assert "claims: " in told[0]
-    summary = reproduce.summary(done, str(tmp_path))
+    done = reproduce.reproduce(["rls2", "rls4"], str(tmp_path), told.append, overrides=SMALL, figures=False)
+    assert [line[:7] for line in told] == ["[ 1/2] ", "[ 2/2] "]
+    assert {line.split()[2] for line in told} == {"rls2", "rls4"}
+    assert any("rls2" in line and "claims: " in line for line in told)
+    summary = reproduce.summary(done, str(tmp_path), 1.0)
     assert any(line.startswith("claims   ") and "not run" in line for line in summary)
-    assert any(line.startswith("time     0:00:") and "2 configs" in line for line in summary)
-    assert (tmp_path / "index.html").exists()
+    assert any(line.startswith("time     0:00:01") and "2 configs" in line for line in summary)
+    index = (tmp_path / "index.html").read_text()
+    assert "rls2/report.html" in index
+    assert "rls4/report.html" in index
 
 
 def test_a_fault_is_told_and_the_rest_runs(tmp_path):
     (tmp_path / "rls2").write_text("a file where a folder should be")
     told = []
-    experiments = experiment.load_all(["rls2", "rls4"], ["realisations=100"])
-    done = reproduce.reproduce(experiments, str(tmp_path), told.append, figures=False)
-    assert "FAILED: " in told[0]
-    assert [bool(one.faults) for one in done] == [True, False]
-    assert "failed   rls2" in reproduce.summary(done, str(tmp_path))
+    done = reproduce.reproduce(["rls2", "rls4"], str(tmp_path), told.append, overrides=SMALL, figures=False)
+    assert any("rls2" in line and "FAILED: " in line for line in told)
+    assert {one.stem: bool(one.faults) for one in done} == {"rls2": True, "rls4": False}
+    assert "failed   rls2" in reproduce.summary(done, str(tmp_path), 1.0)
+
+
+def test_a_process_that_dies_is_told_and_replaced(tmp_path):
+    process = reproduce._Process()
+    try:
+        os.kill(process._popen.pid, signal.SIGKILL)
+        lost = process.done(reproduce.Task("rls2", str(tmp_path), tuple(SMALL), figures=False))
+        again = process.done(reproduce.Task("rls2", str(tmp_path), tuple(SMALL), figures=False))
+    finally:
+        process.end()
+    assert "ended with -9" in lost.faults[0]
+    assert not again.faults
+    assert "claims: " in again.words
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_and_its_processes_in_time(tmp_path, number):
+    command = [sys.executable, "-m", "radarsim.reproduce", str(tmp_path), "rls2", "range_doppler"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as run:
+        while not list(tmp_path.glob(".blocks/*")):
+            assert run.poll() is None
+            time.sleep(0.05)
+        run.send_signal(number)
+        sent = time.monotonic()
+        assert run.wait(10) == 128 + number
+        assert time.monotonic() < sent + 3
+        assert "run the same command again to continue" in run.stderr.read()

@@ -83,8 +83,8 @@ def _laid_out(figure: Figure) -> Canvas:
         ended.append(_draw(axes, panel, crosses) if panel.marks else _legend(axes, panel, list(panel.keys), False))
     for axes in grid.flat[len(figure.panels) :]:
         axes.set_visible(False)
-    canvas.draw_without_rendering()
-    canvas.set_layout_engine("none")
+    canvas.get_layout_engine().execute(canvas)
+    canvas.set_layout_engine(None)  # not "none": an engine that does nothing still has savefig draw everything twice
     for texts in ended:
         _spread(texts)
     return canvas
