@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from making.numbers import Results, signed, with_bounds
+from making.pick import part
 
 SIX = ("MMA2-122", "MMA2-11", "Kalman-1 20", "Kalman-1 5", "Kalman-2 20", "Kalman-2 1")
 STAGES = ("start", "ballistic", "manoeuvre", "after")
@@ -56,18 +57,6 @@ def verdicts(results: Results) -> list[tuple]:
 
 def _number(claim: str) -> int:
     return int("".join(filter(str.isdigit, claim.partition(".")[2])))
-
-
-def part(stem: str, claim: str, what: str, unit: str = " %") -> Callable[[Results], str]:
-    """The measured value of one part of a claim."""
-
-    def made(results: Results) -> str:
-        table = results.table(stem, "claims")
-        (row,) = table[(table["claim"] == claim) & (table["what"] == what)].itertuples()
-        value = signed(f"{row.measured:.3g}") if row.lo == row.hi else with_bounds(row.measured, row.lo, row.hi)
-        return value + unit
-
-    return made
 
 
 def rival(stage: str, words: str) -> Callable[[Results], str]:

@@ -3,20 +3,12 @@
 from collections.abc import Callable
 
 from making.numbers import Results, signed, with_bounds
+from making.pick import rows
 
 COURSES = {"straight": "steady", "fluctuating": "fluctuating, 0.05 m/s²", "turning": "75 s into a turn of 1°/s"}
 DETECTION = (1, 0.9, 0.7, 0.5)
 CORRELATIONS = (-0.5, 0, 0.3, 0.6, 0.9, 0.99)
 BEARINGS_DEG = (0.5, 1, 2, 4, 8)
-
-
-def rows(results: Results, stem: str, name: str, **wanted):
-    """The rows of a table with these values; `case` by its end."""
-    table = results.table(stem, name)
-    for column, value in wanted.items():
-        held = table[column]
-        table = table[held.str.endswith(value) if column == "case" else held == value]
-    return table
 
 
 def last(results: Results, stem: str, **wanted):

@@ -73,8 +73,15 @@ def table(rows: list[tuple]) -> str:
 
 
 def with_bounds(value: float, low: float, high: float) -> str:
-    """A value with the half-width of its interval, to the first figure of that; its ends where uneven."""
+    """A value with the half-width of its interval, to the first figure of that; its ends where uneven.
+
+    Half-widths of a hundred and more are rounded to two figures, and the value with them.
+    """
     half = (high - low) / 2
+    if half >= 100:
+        place = 10 ** (math.floor(math.log10(half)) - 1)
+        value, low, high = (round(bound / place) * place for bound in (value, low, high))
+        half = round(half / place) * place
     digits = max(0, -math.floor(math.log10(half))) if half > 0 else 1
     if abs((high + low) / 2 - value) > half / 5:
         return signed(f"{value:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]")

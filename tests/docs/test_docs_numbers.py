@@ -7,6 +7,7 @@ from making import numbers
 
 PAGES = numbers.pages()
 PARTS = {"range_doppler": 5000, "manoeuvre_variance": 5000}
+DISCRIMINATOR = ("paper", "maps", "region", "rival", "crossing", "profile")
 SONAR = ("smoothing", "fluctuating", "missed", "correlated", "conversion")
 
 
@@ -15,9 +16,9 @@ def every_mark():
 
 
 def shape(kind, text):
-    """Heads and first column of a table; a value without its digits. Not the numbers, which results decide."""
+    """Heads and first column of a table; a value without digits, interval and what is in brackets: results decide."""
     if kind == "value":
-        return re.sub(r"[\d.]+", "0", text)
+        return re.sub(r"−?[\d.]+", "0", re.sub(r" (± [\d.]+|\[[^]]*\]|\([^)]*\))", "", text))
     lines = [line.strip("| ").split(" | ") for line in text.strip().split("\n")]
     return [lines[0], *(line[0] for line in lines[2:])]
 
@@ -76,6 +77,27 @@ def test_sonar(run):
     for stem in SONAR:
         results = run(f"sonar_{stem}", 1000)
     check("sonar", results)
+
+
+@pytest.mark.slow
+def test_sonar_manoeuvres(run):
+    for stem in ("", "_turning"):
+        results = run(f"sonar_manoeuvre{stem}", 500)
+    check("manoeuvre_(?!variance)", results)
+
+
+@pytest.mark.slow
+def test_sonar_false_plots(run):
+    for stem in ("", "_gate"):
+        results = run(f"sonar_clutter{stem}", 1000)
+    check("clutter", results)
+
+
+@pytest.mark.slow
+def test_discriminator(run):
+    for stem in DISCRIMINATOR:
+        results = run(f"discriminator_{stem}", 64)
+    check("doppler", results)
 
 
 def test_missing_results_are_told_with_the_command(tmp_path):
