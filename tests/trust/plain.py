@@ -196,6 +196,13 @@ def sums(config, overrides, count):
     return one.plan.layout.unpack(one.simulate(8, count))
 
 
+def bursts(config, overrides, count):
+    """Errors in potential spreads of each burst by itself, locked or not, (realisation, estimator, time, component)."""
+    one = work(config, overrides)
+    each = [one.plan.layout.unpack(one.simulate(8 + i, 1))["error_all"][..., 0] for i in range(count)]
+    return {"bursts/each": np.stack(each)}
+
+
 def tracks():
     """Plots that are drawn by themselves, and estimates over recorded ones."""
     from radarsim.kernels import linear
@@ -231,6 +238,7 @@ def numbers():
     """All arrays: {run/name: array}."""
     made = {f"random/{name}": array for name, array in words().items()}
     made |= {f"tracks/{name}": array for name, array in tracks().items()}
+    made |= bursts(*RUNS["discriminator on block sums"])
     for run, arguments in RUNS.items():
         made |= {f"{run}/{name}": array for name, array in sums(*arguments).items()}
     return made
