@@ -22,10 +22,10 @@ def console(stderr: bool = False):
 
 
 class Progress:
-    """Realisations done, rate and time left, on stderr if that is a terminal, once a run has lasted two seconds."""
+    """What is done, its rate and the time left, on stderr if that is a terminal, once it has lasted two seconds."""
 
-    def __init__(self, title: str, quiet: bool):
-        self.title, self.quiet = title, quiet
+    def __init__(self, title: str, quiet: bool, what: str = "realisations"):
+        self.title, self.quiet, self.what = title, quiet, what
         self.started, self.bar = time.monotonic(), None
 
     def __enter__(self):
@@ -36,7 +36,7 @@ class Progress:
             self.bar.stop()
 
     def update(self, done: int, total: int, from_store: int) -> None:
-        """Realisations done, of how many, and how many of them were read from the store, over all cases."""
+        """How many are done, of how many, and how many of them were read from the store."""
         elapsed = time.monotonic() - self.started
         if self.quiet or elapsed < SILENT_S or not sys.stderr.isatty():
             return
@@ -53,7 +53,9 @@ class Progress:
         columns = (
             TextColumn("{task.description}"),
             BarColumn(),
-            TextColumn("{task.percentage:5.1f} %  {task.fields[rate]:,.0f} realisations/s  {task.fields[left]} left"),
+            TextColumn(
+                "{task.percentage:5.1f} %  {task.fields[rate]:,.0f} " + f"{self.what}/s  {{task.fields[left]}} left"
+            ),
         )
         self.bar = Bar(*columns, console=console(stderr=True), transient=True)
         self.task = self.bar.add_task(self.title, total=total, rate=0.0, left="–")

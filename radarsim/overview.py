@@ -2,6 +2,7 @@
 
 import ast
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from radarsim.engine.collect import collect
 from radarsim.engine.executors import available_cores
 from radarsim.simulation import check_precision, result_of
 
-PILOT_S = 0.3
+PILOT_S = 0.3  # of all cases together, unless single realisations take longer
 PILOT_OF_PRECISION_S, LEAST, MOST = 1.0, 256, 16_384  # realisations that a precision is judged from
 
 
@@ -51,27 +52,35 @@ class Outlook:
     precision: float | None = None
 
 
-def outlook(experiment: Experiment, threads: int | None = None, precision: float | None = None) -> Outlook:
+def outlook(
+    experiment: Experiment,
+    threads: int | None = None,
+    precision: float | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
+) -> Outlook:
     """Prepare every case and time a few realisations of it, compiled beforehand, and say what the whole would take.
 
-    With a precision, in per cent: a case ends when that is reached, or at the last look before its N.
+    With a precision, in per cent: a case ends when that is reached, or at the last look before its N. progress(done,
+    total, 0) is called after each case.
     """
     threads = threads or available_cores()
     if precision is not None:
         check_precision([experiment], precision)
     cases, largest, preparing = [], 0, 0.0
-    for case in experiment.cases:
-        work = studies.CaseWork(case)
-        work.simulate(0, 1)
-        started = time.perf_counter()
-        studies.study(case.study).prepare(case)
+    studies.study(experiment.study).prepare(experiment.cases[0])  # what it loads is not to be timed
+    for done, case in enumerate(experiment.cases, 1):
+        work, started = studies.CaseWork(case), time.perf_counter()
+        work.plan  # noqa: B018  (prepares it)
         preparing += time.perf_counter() - started
-        each = seconds_each(work, case.realisations)
+        work.simulate(0, 1)
+        each = seconds_each(work, case.realisations, PILOT_S / len(experiment.cases))
         need = None if precision is None else needed(work, precision, each)
         count = case.realisations if need is None else ending(need, case.realisations)
         axes = work.plan.axes
         cases.append(CaseOutlook(case.name, ", ".join(axes.filters), len(axes.k), count, each * count, need))
         largest = max(largest, work.size)
+        if progress is not None:
+            progress(done, len(experiment.cases), 0)
     # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter and its libraries.
     memory = 200 + 8e-6 * largest * (2 * threads + 32)
     return Outlook(tuple(cases), threads, preparing + sum(c.seconds for c in cases) / threads, memory, precision)
@@ -101,10 +110,10 @@ def ending(need: Need, most: int) -> int:
     return max(n for n in precision.looks(most) if need.realisations is None or n <= need.realisations)
 
 
-def seconds_each(work: studies.CaseWork, realisations: int) -> float:
-    """Seconds of one thread for one realisation: of a block, or of as many as a third of a second allows."""
+def seconds_each(work: studies.CaseWork, realisations: int, pilot_s: float) -> float:
+    """Seconds of one thread for one realisation: of a block, or of as many as two runs in pilot_s allow."""
     alone = timed(work, 1)
-    count = work.block if alone * work.block < PILOT_S else max(1, int(PILOT_S / alone))
+    count = work.block if alone * work.block < pilot_s / 2 else max(1, int(pilot_s / 2 / alone))
     count = min(count, work.block, realisations)
     return min(timed(work, count) for _ in range(2)) / count
 

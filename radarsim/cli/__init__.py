@@ -1,5 +1,6 @@
 """The command `radarsim`: parse, call one function, print; a file for each part of `radarsim --help`."""
 
+import gc
 import os
 import sys
 
@@ -17,4 +18,5 @@ def entry():
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
         elif hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
+    gc.set_threshold(100_000)  # a tenth of a start went into looking at objects of Numba and pandas that stay
     main()

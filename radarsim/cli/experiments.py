@@ -139,7 +139,8 @@ def check(configs, realisations, seed, overrides, precision, as_json):
 
     told = []
     for one in experiment.load_all(configs, experiment.merged(overrides, realisations, seed)):
-        outlook = overview.outlook(one, precision=precision)
+        with console.Progress(one.stem, quiet=as_json, what="cases") as bar:
+            outlook = overview.outlook(one, precision=precision, progress=bar.update)
         told.append(documents.outlook(one, outlook))
         if not as_json:
             console.print_outlook(one, outlook)

@@ -7,7 +7,6 @@ deterministic course.
 """
 
 import numpy as np
-from scipy.special import ndtr
 
 
 def threshold(false_alarm, coordinates: int = 1):
@@ -29,10 +28,10 @@ def detection(k, shift, coordinates: int = 1):
 
     Of several coordinates the shift is the root of the sum of squares.
     """
-    from scipy import stats  # here, for it takes a second to load
+    from scipy import special, stats  # here, for they take a second to load
 
     if coordinates == 1:
-        return ndtr(shift - np.sqrt(k)) + ndtr(-shift - np.sqrt(k))
+        return special.ndtr(shift - np.sqrt(k)) + special.ndtr(-shift - np.sqrt(k))
     centred = np.asarray(shift) == 0
     off = np.where(centred, 1.0, np.square(shift))
     return np.where(centred, stats.chi2.sf(k, coordinates), stats.ncx2.sf(k, coordinates, off))

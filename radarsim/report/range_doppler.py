@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from radarsim.engine.results import CaseResult
+from radarsim.exact import linear
 from radarsim.report import panels, statistics
 from radarsim.report import tables as common
 from radarsim.report.range_doppler_figures import PERIODS, QUANTITIES, figures
@@ -62,16 +63,18 @@ def _steady(result: CaseResult) -> list[tuple]:
     of = statistics.errors(result.sums["error"], common.realisations(result)).sigma
     t, period, rows = np.asarray(axes.t_s, dtype=float), extra["scan_period_s"], []
     for f, name in enumerate(axes.filters):
+        variance = float(extra["manoeuvre_variance"][f])
+        _, true = linear.steady_state(int(extra["observes"][f]), variance, extra["sigma"], period)
         for c, (component, unit) in enumerate(axes.components):
             at = np.flatnonzero(axes.available[f, :, c])
             if not at.size:
                 continue
             value, lo, hi = (part[f, at, c] for part in of)
-            last = extra["steady_sigma"][f, c]
+            last = np.sqrt(true[c, c])
             when = settling(statistics.Estimate(value, lo, hi), t[at], last)
             rows.append(
                 (
-                    *(result.name, name, float(extra["manoeuvre_variance"][f]), component, unit, float(last)),
+                    *(result.name, name, variance, component, unit, float(last)),
                     *(value[-1], lo[-1], hi[-1], when.value / period, when.value, when.lo, when.hi),
                     bool(when.value < PERIODS * period * (1 - 1e-9)),
                 )

@@ -94,10 +94,6 @@ def axes(spec, designs: list[filters.LinearFilter], x: np.ndarray, sigma: np.nda
     bias = np.stack([b for b, _ in errors])
     variance = np.stack([np.diagonal(S, axis1=1, axis2=2) for _, S in errors])
     available = np.stack([d.available for d in designs])
-    steady = [
-        exact.steady_state(d.observes, f.manoeuvre_variance, sigma, dt)
-        for d, f in zip(designs, spec.filters, strict=True)
-    ]
     return Axes(
         filters=names,
         components=COMPONENTS,
@@ -111,8 +107,8 @@ def axes(spec, designs: list[filters.LinearFilter], x: np.ndarray, sigma: np.nda
             "believed": np.stack([d.believed for d in designs]),
             "start": np.array([d.start for d in designs]),
             "manoeuvre_variance": np.array([f.manoeuvre_variance for f in spec.filters]),
-            "steady_sigma": np.stack([np.sqrt(np.diagonal(true)) for _, true in steady]),
-            "steady_believed": np.stack([np.sqrt(np.diagonal(believed)) for believed, _ in steady]),
+            "observes": np.array([d.observes for d in designs]),
+            "sigma": sigma,
             "C_theta": float(sigma[0] ** 2 / (dt**2 * sigma[1] ** 2)),
             "scan_period_s": dt,
             "wavelength_m": spec.radar.wavelength_m,

@@ -202,6 +202,6 @@ def test_all_claims_are_listed_run_or_not(table):
     assert [row["claim"] for row in rows] == ids
     assert {row["verdict"] for row in rows} == {"not run"}
     assert {row["config"] for row in rows if row["paper"].startswith("Gorshkov")} == {"range_doppler"}
-    rows = claims.listed({"range_doppler": table})
+    rows = claims.listed({"range_doppler": table.to_dict("records")})
     assert sum(row["claim"].startswith("P1.") for row in rows) == len(table)
     assert all(row["config"] for row in rows)

@@ -252,6 +252,7 @@ CLAIMED = (
     *("claim", "paper", "statement", "case", "measured", "lo", "hi", "expected", "verdict"),
     *("expected_lo", "expected_hi", "what", "unit", "place", "reading", "overall"),
 )
+NUMBERS = ("measured", "lo", "hi", "expected_lo", "expected_hi")  # of these columns; empty where there is none
 
 
 def judged(study: str, results: Sequence[CaseResult], made: Mapping):
@@ -292,15 +293,14 @@ def all_claims() -> list[Claim]:
     return [claim for study in STUDIES for claim in import_module(f"radarsim.report.claims.{study}").CLAIMS]
 
 
-def listed(stored: Mapping[str, object]) -> list[dict]:
+def listed(stored: Mapping[str, Sequence[Mapping]]) -> list[dict]:
     """Rows of all claims with the columns of claims.csv and `config`: as stored, or once as not run.
 
-    stored: config stem → its claims.csv as a DataFrame (read with keep_default_na=False for text).
+    stored: config stem → the rows of its claims.csv.
     """
     rows = []
     for claim in all_claims():
-        table = stored.get(claim.config)
-        own = [] if table is None else table[table["claim"] == claim.id].to_dict("records")
+        own = [dict(row) for row in stored.get(claim.config, ()) if row["claim"] == claim.id]
         blank = dict.fromkeys(CLAIMED, "") | {"claim": claim.id, "paper": PAPERS[claim.paper]}
         blank |= {"place": claim.place, "reading": claim.reading}
         rows += own or [blank | {"statement": claim.statement, "verdict": NOT_RUN, "overall": NOT_RUN}]
