@@ -61,22 +61,40 @@ def test_no_sweep_no_figure(expected_radar):
 
 ROW = {
     **{"claim": "P1.1", "paper": claims.PAPERS["P1"], "statement": "a | b < c", "place": "table", "reading": ""},
-    **{"overall": "confirmed", "verdict": "confirmed", "what": "gain", "measured": 1.23456, "lo": 1.2, "hi": 1.3},
-    **{"unit": "%", "config": "rls2"},
+    **{"overall": "confirmed", "verdict": "confirmed", "what": "gain", "measured": -1.23456, "lo": -1.3, "hi": -1.2},
+    **{"unit": "%", "config": "rls2", "case": "rls2", "expected": "< 0"},
 }
 
 
 def test_the_page_of_claims():
     counted = {**ROW, "claim": "P1.2", "what": "operations", "measured": 7.0, "lo": 7.0, "hi": 7.0, "unit": ""}
     never = {**ROW, "claim": "P1.3", "overall": "not run", "measured": "", "reading": "so"}
-    parts = [{**ROW, "claim": "P1.4", "overall": "refuted", "verdict": v} for v in ("refuted", "confirmed")]
+    verdicts = ("refuted", *["confirmed"] * 3)
+    parts = [
+        {**ROW, "claim": "P1.4", "overall": "refuted", "verdict": v, "case": f"rls{i}"} for i, v in enumerate(verdicts)
+    ]
     text = page.page([ROW, counted, never, *parts])
     lines = [line for line in text.split("\n") if line.startswith("| P1")]
     assert lines == [
-        "| P1.1 | a \\| b &lt; c | table | gain: 1.235 [1.2, 1.3] % | **confirmed** | `rls2` |",
+        "| P1.1 | a \\| b &lt; c | table | gain: −1.235 [−1.300, −1.200] % | **confirmed** | `rls2` |",
         "| P1.2 | a \\| b &lt; c | table | operations: 7 | **confirmed** | `rls2` |",
         "| P1.3 | a \\| b &lt; c *Read as: so.* | table |  | not run | `rls2` |",
-        "| P1.4 | a \\| b &lt; c | table | gain: 1.235 [1.2, 1.3] %<br>gain: 1.235 [1.2, 1.3] % (confirmed) "
+        "| P1.4 | a \\| b &lt; c | table | `rls0`: gain: −1.235 [−1.300, −1.200] %<br>(1 of 4 parts refuted) "
         "| **refuted** | `rls2` |",
+        "| P1.1 | gain | −1.235 [−1.300, −1.200] % | &lt; 0 % | **confirmed** |",
+        "| P1.2 | operations | 7 | &lt; 0 | **confirmed** |",
+        "| P1.4 | `rls0`: gain | −1.235 [−1.300, −1.200] % | &lt; 0 % | **refuted** |",
+        *(f"| P1.4 | `rls{i}`: gain | −1.235 [−1.300, −1.200] % | &lt; 0 % | **confirmed** |" for i in (1, 2, 3)),
     ]
     assert "In all: 2 confirmed, 1 not run, 1 refuted." in text
+
+
+def test_measured_values_are_written_to_two_figures_of_their_half_width():
+    def said(value, lo, hi, unit="%"):
+        return page.measured({"measured": value, "lo": lo, "hi": hi, "unit": unit})
+
+    assert said(82.7032, 82.33, 83.07) == "82.70 [82.33, 83.07] %"
+    assert said(-6.5e-5, -1.3e-4, 4e-7) == "−0.000065 [−0.000130, 0.000000] %"
+    assert said(9.0, 9.0, 10.0, "Δt") == "9 [9, 10] Δt"
+    assert said(np.inf, np.inf, np.inf, "Δt") == "∞ Δt"
+    assert said(0.53452248, 0.53452248, 0.53452248, "") == "0.5345"
