@@ -16,6 +16,7 @@ from radarsim.cli import group, main
 from radarsim.config import load, lookup, own
 from radarsim.config.identity import canonical
 from radarsim.errors import ConfigError
+from radarsim.studies import range_doppler_plots
 
 RUNS = {  # config, overrides, filters' tolerance in their own σ: rules that choose among models amplify a rounding
     "rls2": ((), 1e-10),
@@ -126,13 +127,14 @@ def test_a_row_without_a_value_is_extrapolated():
         assert np.isnan(track.nis[f, 4]).all()
 
 
-def test_velocities_alone_never_start_a_track_of_ranges():
+def test_velocities_alone_never_start_a_track_of_ranges(monkeypatch):
     one = loaded("rls2")
-    t = np.arange(500.0)
-    columns = {"t_s": t, "range_m": np.full(500, np.nan), "velocity_mps": np.full(500, 7.0)}
+    monkeypatch.setattr(range_doppler_plots, "LONGEST_START", 40)
+    t = np.arange(150.0)  # more than a start looks back
+    columns = {"t_s": t, "range_m": np.full(150, np.nan), "velocity_mps": np.full(150, 7.0)}
     track = recorded.module_of("range_doppler").Tracker(one.cases[0]).feed(columns)
     assert np.isnan(track.estimate[0]).all()
-    assert np.array_equal(np.isfinite(track.estimate[1]), np.tile([False, True, False], (500, 1)))
+    assert np.array_equal(np.isfinite(track.estimate[1]), np.tile([False, True, False], (150, 1)))
 
 
 def followed(tmp_path, config, overrides, stated=()):
@@ -147,7 +149,7 @@ def followed(tmp_path, config, overrides, stated=()):
     [
         ("rls2", ("scans=2000", "manoeuvre_variance=1e-7"), "radar.sigma_range_m", 250),
         ("rls2", ("scans=2000", "manoeuvre_variance=1e-7"), "radar.sigma_velocity_mps", 15),
-        ("sonar_smoothing", ("scans=300",), "sensor.sigma_bearing_rad", math.radians(1)),
+        ("sonar_smoothing", ("scans=150",), "sensor.sigma_bearing_rad", math.radians(1)),
     ],
 )
 @pytest.mark.parametrize("factor", [0.5, 2])
