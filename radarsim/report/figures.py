@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
 
 from radarsim.report.drawing import Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 
@@ -21,9 +22,10 @@ MM = 1 / 25.4
 PNG_DPI = 200
 COLOURS = ("#14213d", "#0a6ebd", "#c8440b", "#1b8a5a", "#a65fa8", "#c98a00", "#4aa3c7", "#8a8a8a")
 DASHES = ("-", (0, (5, 1.8)), (0, (1.3, 1.3)), (0, (6, 1.6, 1.3, 1.6)), (0, (9, 2.5)), (0, (3, 1.2, 1, 1.2, 1, 1.2)))
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", "h", ">", "d", "p")  # no multiple of the colours
 POINTS = 2000  # of a line; longer ones are drawn at every n-th scan
 LONGEST_AT_END = 28  # letters of a name that may stand at a line's end
+TITLE_LETTERS_PER_MM = 0.49  # of a panel's cell with its axis, in the bold of titles
 MOST_IN_COLUMN = 10  # names in one column of a legend
 MARKED = 16  # at most about so many markers or crosses a line
 EXACT = {"linestyle": "none", "marker": "+", "color": "black", "markersize": 4.2, "markeredgewidth": 0.6}
@@ -77,7 +79,9 @@ def _laid_out(figure: Figure) -> Canvas:
     canvas.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.05)
     grid = canvas.subplots(rows, figure.columns, squeeze=False, sharey=figure.share_y)
     ended, told = [], False  # crosses are told once a figure
+    letters = TITLE_LETTERS_PER_MM * figure.width_mm / figure.columns
     for axes, panel in zip(grid.flat, figure.panels, strict=False):
+        panel = replace(panel, title=wrapped(panel.title, letters))
         crosses = not told and any(isinstance(m, Line) and m.exact is not None for m in panel.marks)
         told |= crosses
         ended.append(_draw(axes, panel, crosses) if panel.marks else _legend(axes, panel, list(panel.keys), False))
@@ -88,6 +92,17 @@ def _laid_out(figure: Figure) -> Canvas:
     for texts in ended:
         _spread(texts)
     return canvas
+
+
+def wrapped(title: str, letters: float) -> str:
+    """A title in lines of at most so many letters, broken after commas alone."""
+    lines: list[str] = []
+    for words in title.split(", "):
+        if lines and len(lines[-1]) + 2 + len(words) <= letters:
+            lines[-1] += f", {words}"
+        else:
+            lines.append(words)
+    return ",\n".join(lines)
 
 
 def save(figure: Figure, formats=("svg", "png")) -> dict[str, bytes]:
@@ -123,6 +138,7 @@ def _draw(axes, panel: Panel, crosses: bool) -> list:
         if axis.ticks:
             where, words = zip(*axis.ticks, strict=True)
             (axes.set_xticks if axis is panel.x else axes.set_yticks)(where, words)
+            (axes.xaxis if axis is panel.x else axes.yaxis).set_minor_formatter(NullFormatter())
     if panel.remark:
         axes.set_title(panel.remark, loc="right", fontsize=7)
     return _name(axes, panel, crosses)

@@ -15,6 +15,7 @@ MOST_PANELS = 4
 BESIDE_LEGEND = 3  # panels of a figure whose legend takes the place of one
 SYMBOLS = {"course": "course", "speed": "speed", "x_ahead": "$x$ ahead", "y_ahead": "$y$ ahead"}
 SYMBOLS |= {"cpa": "CPA", "t_cpa": "$t$ to CPA"}
+RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # ticks of a measured over a predicted σ
 STRENGTHS = {"acceleration_mps2": "acceleration, m/s²", "rate_radps": "turn rate, rad/s"}
 
 
@@ -222,7 +223,9 @@ def uses_figure(results: Sequence[CaseResult], uses) -> Figure | None:
             v = [part[key].to_numpy(dtype=float) for key in ("ratio", "ratio_lo", "ratio_hi")]
             marks.append(Line(x, v[0], f, Style(n, None, n), *v[1:]))
         ticks = tuple((float(i), words) for i, words in enumerate(SYMBOLS.values()))
-        y = Axis("measured / predicted $\\sigma$", "log")
+        low, high = own["ratio"].min(), own["ratio"].max()
+        seen = tuple((value, f"{value:g}") for value in RATIOS if low <= value <= high or value == 1)
+        y = Axis("measured / predicted $\\sigma$", "log", ticks=seen)
         drawn.append(Panel(Axis("", ticks=ticks), y, tuple(marks), f"t = {when:g} s", direct=False))
     caption = (
         f"σ about the truth over the one reckoned from the track's covariance to first order{_of(result)}, of "

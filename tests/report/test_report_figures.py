@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarsim.report import figures, panels, range_doppler, tables
+from radarsim.report import chart_look, figures, panels, range_doppler, tables
 from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 
 
@@ -172,3 +172,18 @@ def test_crosses_have_the_name_of_what_they_are():
     panel = Panel(Axis("x"), Axis("y"), (line(),), crosses="formula")
     axes = figures.render(Figure("f", "", "", (panel,))).axes[0]
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["formula"]
+
+
+def test_titles_are_broken_after_commas_alone():
+    words = "gate_probability = 0.5, sensor.detection_probability = 0.7, $D_M$ = 1"
+    assert figures.wrapped(words, 200) == words
+    assert figures.wrapped(words, 50) == "gate_probability = 0.5,\nsensor.detection_probability = 0.7, $D_M$ = 1"
+    assert figures.wrapped(words, 5) == words.replace(", ", ",\n")
+    assert figures.wrapped("", 5) == ""
+
+
+def test_no_two_of_many_scattered_series_look_alike():
+    looks = [figures._look(Style(n, None, n)) for n in range(40)]
+    assert len({(look["color"], look["marker"]) for look in looks}) == 40
+    assert len({look["marker"] for look in looks}) == len(figures.MARKERS) == len(chart_look.MARKERS)
+    assert len(set(chart_look.MARKERS)) == len(chart_look.MARKERS)
