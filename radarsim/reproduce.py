@@ -1,12 +1,13 @@
 """`make reproduce-figures`: every shipped config at its full size, a line each, and what came of the papers' claims.
 
-    python -m radarsim.reproduce [OUT [CONFIG…]]      OUT is results where none is given, CONFIG all
+    python -m radarsim.reproduce [OUT [CONFIG…]] [--set KEY=VALUE] [--no-figures]
 
 Two processes share the configs, so that one computes while the other draws: drawing keeps a single core busy, and takes
 about as long as computing. They are programs started anew, which take a line of JSON for each config and answer with
 one; the store is safe with both.
 """
 
+import argparse
 import json
 import os
 import subprocess
@@ -97,7 +98,7 @@ def _finished(tasks: Sequence[Task], stop: Signals | None) -> Iterator[Done]:
             for future in pending:
                 future.cancel()
             for process in processes:
-                process.end()
+                process.end(at_once=bool(pending))
 
 
 class _Process:
@@ -126,21 +127,23 @@ class _Process:
         code = self._popen.wait()
         with self._lock:
             if not self._ended:
-                self._close()
+                self._popen.stdout.close()
+                self._close_stdin()
                 self._start()
         fault = f"{task.stem}: its process ended with {code}; run again, what it had done is stored"
         return Done(task.stem, time.perf_counter() - began, f"FAILED: {fault}", (fault,))
 
-    def end(self) -> None:
-        """Have it store what it has, and end."""
+    def end(self, at_once: bool) -> None:
+        """Have it end: in the midst of a config it stores what it has."""
         with self._lock:
             self._ended = True
-            self._popen.terminate()
+            if at_once:
+                self._popen.terminate()
+            self._close_stdin()
         self._popen.wait()
-        self._close()
-
-    def _close(self) -> None:
         self._popen.stdout.close()
+
+    def _close_stdin(self) -> None:
         with suppress(OSError):  # a config that it never read
             self._popen.stdin.close()
 
@@ -192,14 +195,20 @@ def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
     ]
 
 
-def main(out: str = "results", *names: str) -> int:
-    """The shipped configs of these names, or all, into `out`; the exit code."""
-    started = time.perf_counter()
+def main(arguments: Sequence[str]) -> int:
+    """The shipped configs of some names, or all, into a directory; the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m radarsim.reproduce", description=__doc__.splitlines()[0])
+    parser.add_argument("out", nargs="?", default=experiment.RESULTS, help="directory; results where none is given")
+    parser.add_argument("configs", nargs="*", help="names of configs; all where none is given")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="of every config")
+    parser.add_argument("--no-figures", action="store_true", help="tables, claims and reports without them")
+    asked, started = parser.parse_args(arguments), time.perf_counter()
     with Signals() as stop:
         try:
-            stems = [one.stem for one in experiment.load_all(names or lookup.stems("configs"))]
-            done = reproduce(stems, out, console.say, stop)
-            for line in summary(done, out, time.perf_counter() - started):
+            loaded = experiment.load_all(asked.configs or lookup.stems("configs"), asked.set)
+            stems = [one.stem for one in loaded]
+            done = reproduce(stems, asked.out, console.say, stop, asked.set, not asked.no_figures)
+            for line in summary(done, asked.out, time.perf_counter() - started):
                 console.say(line)
         except RadarsimError as error:
             sys.stderr.write("".join(f"{line}\n" for line in error.lines))
@@ -208,4 +217,4 @@ def main(out: str = "results", *names: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))
+    sys.exit(main(sys.argv[1:]))

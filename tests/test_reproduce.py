@@ -41,7 +41,7 @@ def test_a_process_that_dies_is_told_and_replaced(tmp_path):
         lost = process.done(reproduce.Task("rls2", str(tmp_path), tuple(SMALL), figures=False))
         again = process.done(reproduce.Task("rls2", str(tmp_path), tuple(SMALL), figures=False))
     finally:
-        process.end()
+        process.end(at_once=False)
     assert "ended with -9" in lost.faults[0]
     assert not again.faults
     assert "claims: " in again.words
