@@ -98,7 +98,9 @@ def _finished(tasks: Sequence[Task], stop: Signals | None) -> Iterator[Done]:
             for future in pending:
                 future.cancel()
             for process in processes:
-                process.end(at_once=bool(pending))
+                process.stop(at_once=bool(pending))
+            for process in processes:
+                process.wait()
 
 
 class _Process:
@@ -133,13 +135,16 @@ class _Process:
         fault = f"{task.stem}: its process ended with {code}; run again, what it had done is stored"
         return Done(task.stem, time.perf_counter() - began, f"FAILED: {fault}", (fault,))
 
-    def end(self, at_once: bool) -> None:
-        """Have it end: in the midst of a config it stores what it has."""
+    def stop(self, at_once: bool) -> None:
+        """Ask it to end: in the midst of a config, which it stores as far as it is, or else after it."""
         with self._lock:
             self._ended = True
             if at_once:
                 self._popen.terminate()
             self._close_stdin()
+
+    def wait(self) -> None:
+        """Until it has ended."""
         self._popen.wait()
         self._popen.stdout.close()
 
@@ -158,7 +163,9 @@ def answer() -> None:
                 sys.stdout.write(json.dumps(asdict(told)) + "\n")
                 sys.stdout.flush()
         except Interrupted as ended:
-            sys.exit(ended.exit_code)
+            os._exit(ended.exit_code)  # as the command does: whoever sent the signal need not wait for an orderly end
+        except BrokenPipeError:  # whoever asked is gone
+            os._exit(1)
 
 
 def _run(task: Task, stop: Signals) -> Done:

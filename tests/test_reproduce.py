@@ -41,7 +41,8 @@ def test_a_process_that_dies_is_told_and_replaced(tmp_path):
         lost = process.done(reproduce.Task("rls2", str(tmp_path), tuple(SMALL), figures=False))
         again = process.done(reproduce.Task("rls2", str(tmp_path), tuple(SMALL), figures=False))
     finally:
-        process.end(at_once=False)
+        process.stop(at_once=False)
+        process.wait()
     assert "ended with -9" in lost.faults[0]
     assert not again.faults
     assert "claims: " in again.words
@@ -57,4 +58,5 @@ def test_a_signal_ends_it_and_its_processes_in_time(tmp_path):
         sent = time.monotonic()
         assert run.wait(10) == 128 + signal.SIGINT
         assert time.monotonic() < sent + 3
-        assert "run the same command again to continue" in run.stderr.read()
+        assert "run the same command again to continue" in run.stderr.read()  # until the last process has closed it
+        assert time.monotonic() < sent + 4
