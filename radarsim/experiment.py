@@ -37,6 +37,7 @@ def load_all(sources: Sequence, overrides: Sequence[str] = ()) -> list[Experimen
 
 
 RESULTS = "results"  # the command's default directory
+NO_CONTROL = "control_variate: no filter beside a baseline whose sigma is known exactly: no controlled.csv"
 SHORT = {"realisations": "-n", "seed": "--seed"}
 
 
@@ -88,7 +89,7 @@ def run(
     if not gathered.cases:
         raise TargetUnmet(f"{experiment.stem}: {gathered.stopped}: nothing was done by then")
     facts = facts_of(gathered, threads, time.perf_counter() - started)
-    result = Result(experiment, finished(gathered), facts | repeated(experiment, overrides))
+    result = result_of(experiment, gathered, facts, overrides)
     if out is not None:
         result.write(out, figures)
     return result
@@ -192,7 +193,15 @@ def from_store(experiment: Experiment, out: str | os.PathLike, overrides: Sequen
             held.cases.append((case, work, collected))
     if missing:
         raise ConfigError(*missing, f"`{command(experiment, overrides, out)}` computes them")
-    return Result(experiment, finished(held), facts_of(held, 0, 0.0) | repeated(experiment, overrides))
+    return result_of(experiment, held, facts_of(held, 0, 0.0), overrides)
+
+
+def result_of(experiment: Experiment, gathered: Gathered, facts: dict, overrides: Sequence[str]) -> Result:
+    """The result; with a warning where a control variate is asked for and no case has one."""
+    result = Result(experiment, finished(gathered), facts | repeated(experiment, overrides))
+    if experiment.control_variate and not len(result.tables.get("controlled", ())):
+        facts["warnings"].append(NO_CONTROL)
+    return result
 
 
 def as_last_run(experiment: Experiment, out: Path) -> Experiment:

@@ -16,6 +16,8 @@ from radarsim.engine.executors import available_cores
 from radarsim.simulation import check_precision, result_of
 
 PILOT_S = 0.3  # of all cases together, unless single realisations take longer
+LADDER, FOR_NOTHING = 8, 1.2  # so many times more realisations at a look; times as good as equal
+SHORT_S = 0.01
 PILOT_OF_PRECISION_S, LEAST, MOST = 1.0, 256, 16_384  # realisations that a precision is judged from
 
 
@@ -111,18 +113,28 @@ def ending(need: Need, most: int) -> int:
 
 
 def seconds_each(work: studies.CaseWork, realisations: int, pilot_s: float) -> float:
-    """Seconds of one thread for one realisation: of a block, or of as many as two runs in pilot_s allow."""
-    alone = timed(work, 1)
-    count = work.block if alone * work.block < pilot_s / 2 else max(1, int(pilot_s / 2 / alone))
-    count = min(count, work.block, realisations)
-    return min(timed(work, count) for _ in range(2)) / count
+    """Seconds of one thread for one realisation, from ever more of them, at most a block, in about pilot_s.
+
+    Kernels calculate whole chunks: one realisation may take as long as hundreds, and more are tried while they come for
+    nothing, whatever that takes.
+    """
+    most, count, taken, free = min(work.block, realisations), 1, timed(work, 1), True
+    while count < most and (free or LADDER * taken < pilot_s):
+        more = min(LADDER * count, most)
+        longer = timed(work, more)
+        free = longer < FOR_NOTHING * taken
+        count, taken = more, longer
+    return taken / count
 
 
 def timed(work: studies.CaseWork, count: int) -> float:
-    """Seconds that `count` realisations take."""
-    started = time.perf_counter()
-    work.simulate(0, count)
-    return time.perf_counter() - started
+    """Seconds of the processor that `count` realisations take; of short ones the lesser of two."""
+    taken = []
+    while not taken or (len(taken) < 2 and taken[0] < SHORT_S):
+        started = time.thread_time()
+        work.simulate(0, count)
+        taken.append(time.thread_time() - started)
+    return min(taken)
 
 
 def described(file: Path) -> str:

@@ -2,12 +2,14 @@
 
 import json
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import radarsim
+from radarsim import overview
 from radarsim.errors import ConfigError, TargetUnmet
 from tests.test_cli import csv_bytes
 from tests.test_cli import radarsim as command
@@ -178,6 +180,24 @@ def test_a_pilot_and_exact_values_say_about_the_same(tmp_path):
         for case in check["cases"]:
             assert case["need"]["known_by"] == "exact"
             assert 0.5 <= case["need"]["realisations"] / done[case["name"]]["done"] <= 2
+
+
+@pytest.mark.parametrize("chunk", [1, 8, 512])
+def test_a_pilot_knows_that_kernels_calculate_chunks(monkeypatch, chunk):
+    """One realisation costs as much as a chunk of them, and stands for no more than its share."""
+    monkeypatch.setattr(overview, "timed", lambda work, count: 0.02 * -(-count // chunk))
+    for pilot_s in (0.3, 0.06):
+        seconds = overview.seconds_each(SimpleNamespace(block=4096), 100_000, pilot_s)
+        assert seconds == pytest.approx(0.02 / chunk, rel=1e-9)
+
+
+def test_a_control_variate_that_is_none_is_told(tmp_path):
+    """Where no baseline's σ is known exactly there is no table, and a warning says so."""
+    for config, there in (("sonar_clutter", False), ("discriminator_pair", False), ("rls2", True)):
+        result = command("run", config, "-n", 50, "--set", "control_variate=true", "--no-figures", "--out", tmp_path)
+        assert (tmp_path / config / "controlled.csv").exists() is there
+        assert ("control_variate: no" in result.output) is not there
+        assert any("control_variate: no" in line for line in record(tmp_path / config)["warnings"]) is not there
 
 
 def test_what_no_number_of_realisations_reaches_is_told():

@@ -1,25 +1,12 @@
 """Planted faults: one small wrong change each, and the tests that must notice it. `make mutants` runs them all.
 
 Each is a place of the program where a slip would give plausible, wrong numbers: a sign, a transposed index, a lost
-term, a bound one off. A test of the ordinary suite keeps the list in step with the sources.
+term, a bound one off. A test of the ordinary suite keeps the list in step with the sources. The list goes on in
+`mutants_further`.
 """
 
-from typing import NamedTuple
-
-
-class Mutant(NamedTuple):
-    """In the file `path`, the text `original`, there once, becomes `mutated`; one of `tests` must then fail."""
-
-    path: str
-    original: str
-    mutated: str
-    tests: tuple[str, ...]
-
-
-def mutants(path: str, *faults: tuple[str, str, str]) -> list[Mutant]:
-    """Faults (original, mutated, tests after tests/, separated by blanks) of one file."""
-    return [Mutant(path, a, b, tuple(f"tests/{test}" for test in tests.split())) for a, b, tests in faults]
-
+from tests.trust.mutant import mutants
+from tests.trust.mutants_further import FURTHER
 
 LINEAR, RANDOM = "kernels/test_kernels_linear.py", "kernels/test_kernels_random.py"
 TEXTBOOK = f"{LINEAR}::test_estimates_are_the_textbook_filter"
@@ -344,4 +331,4 @@ ENGINE = (
     ),
 )
 
-ALL = (*KERNELS, *FILTERS, *FRAMES_AND_MODELS, *EXACT_VALUES, *NUMBERS, *ENGINE)
+ALL = (*KERNELS, *FILTERS, *FRAMES_AND_MODELS, *EXACT_VALUES, *NUMBERS, *ENGINE, *FURTHER)

@@ -14,7 +14,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import SimpleQueue
 
-from tests.trust.mutants import ALL, Mutant
+from tests.trust.mutant import Mutant
+from tests.trust.mutants import ALL
 
 ROOT = Path(__file__).parents[2]
 TREE = ("radarsim", "tests", "configs", "scenarios", "docs", "pyproject.toml", "Makefile", "README.md")
