@@ -198,16 +198,22 @@ def question(experiment) -> str:
 
 
 def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
-    """For each case and stage which filter has the least σ of the height, and how the baseline compares."""
-    told = []
-    for result in results[: panels.MOST]:
-        rows = made["stages"]
-        rows = rows[(rows["case"] == result.name) & (rows["component"] == "y")]
-        parts = []
-        for stage, own in rows.groupby("stage", sort=False):
-            best = own.loc[own["sigma"].idxmin()]
-            parts.append(
-                f"{stage} {best['filter']}, {best['sigma']:.3g} m [{best['sigma_lo']:.3g}, {best['sigma_hi']:.3g}]"
-            )
-        told.append(f"{panels.plain_label(result)}: least σ of the height by stage: {'; '.join(parts)}.")
-    return told
+    """Which filter has the least σ of the height in each stage, by case; of a single case of the rate of climb too."""
+    shown, others = panels.told(results, 4)
+    told = [f"{panels.plain_label(result)}: {_least(result, made, 'y', 'the height')}" for result in shown]
+    climb = [f"{panels.plain_label(results[0])}: {_least(results[0], made, 'vy', 'the rate of climb')}"]
+    return [*told, *(climb if len(results) == 1 else []), *others]
+
+
+def _least(result: CaseResult, made: dict, component: str, words: str) -> str:
+    """The filter of the least σ in each stage, with the interval."""
+    rows = made["stages"]
+    rows = rows[(rows["case"] == result.name) & (rows["component"] == component)]
+    parts = []
+    for stage, own in rows.groupby("stage", sort=False):
+        best = own.loc[own["sigma"].idxmin()]
+        value, low, high = (f"{float(f'{best[name]:.3g}'):,.10g}" for name in ("sigma", "sigma_lo", "sigma_hi"))
+        parts.append(
+            f"{stage} {best['filter']}, {value} {panels.UNITS.get(best['unit'], best['unit'])} [{low}, {high}]"
+        )
+    return f"least σ of {words} by stage: {'; '.join(parts)}."

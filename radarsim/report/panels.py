@@ -103,6 +103,15 @@ def plain_label(result: CaseResult) -> str:
     return plain(label(result))
 
 
+def told(results: Sequence[CaseResult], most: int = 3) -> tuple[list[CaseResult], list[str]]:
+    """The cases that an answer tells: all, or of more than so many the first and the last; and words on the others."""
+    if len(results) <= most:
+        return list(results), []
+    between = len(results) - 2
+    words = f"The {between} cases" if between > 1 else "The case"
+    return [results[0], results[-1]], [f"{words} between: in the report and its tables."]
+
+
 def plain(text: str) -> str:
     """A figure's words without the marks of mathematical text."""
     return text.replace(r"\$", "\0").replace("$", "").replace("\0", "$")

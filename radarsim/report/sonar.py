@@ -317,10 +317,11 @@ def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
     tracked = [result for result in results if result.spec.tracking]
     if tracked:
         return clutter.answer(tracked, made)
-    told = [_best(result, made["curves"]) for result in results[: panels.MOST]]
+    shown, others = panels.told(results)
+    best = [_best(result, made["curves"]) for result in shown]
     wrong = _overconfident(results, made)
     seen = words.answer([result for result in results if result.spec.manoeuvring], made)
-    return [*seen, *told, *([wrong] if wrong else [])]
+    return [*seen, *best, *([wrong] if wrong else []), *others]
 
 
 def _best(result: CaseResult, curves) -> str:
@@ -331,10 +332,11 @@ def _best(result: CaseResult, curves) -> str:
     order = last["exact_sigma"].round(9) if last["exact_sigma"].notna().all() else last["sigma"]
     last = last.loc[order.sort_values(kind="stable").index]
     low, high = last.iloc[0], last.iloc[-1]
-    where = panels.swept(result)
+    where = panels.plain(panels.swept(result))
     said = f"{low['filter']} {low['sigma']:.4g} {low['unit']} [{low['sigma_lo']:.4g}, {low['sigma_hi']:.4g}]"
     if len(last) > 1:
-        said += f", {high['filter']} {high['sigma']:.4g} [{high['sigma_lo']:.4g}, {high['sigma_hi']:.4g}]"
+        worst = f"{high['sigma']:.4g} {high['unit']} [{high['sigma_lo']:.4g}, {high['sigma_hi']:.4g}]"
+        said = f"least with {said}, largest with {high['filter']} {worst}"
     return f"{where + ': ' if where else ''}σ of the {NAMES[first].name} after {low['t_s']:g} s: {said}."
 
 
@@ -345,8 +347,9 @@ def _overconfident(results: Sequence[CaseResult], made: dict) -> str:
     if worst["ratio_lo"] <= 1.05:
         return ""
     result = next(result for result in results if result.name == worst["case"])
+    where = f" at {panels.plain(panels.swept(result))}" if result.swept else ""
     return (
-        f"Most overconfident: {worst['filter']}{' at ' if result.swept else ''}{panels.swept(result)}, whose true σ is "
+        f"Most overconfident: {worst['filter']}{where}, whose true σ is "
         f"{worst['true_to_believed']:.2f} [{worst['ratio_lo']:.2f}, {worst['ratio_hi']:.2f}] times the one it claims "
         f"({NAMES[worst['component']].name}, scan {worst['k']})."
     )

@@ -265,23 +265,27 @@ QUESTION = (
 
 
 def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
-    """A sentence for each case: time to a confirmed track, track life, false tracks an hour, by tracker."""
+    """A sentence for each case told: time to a confirmed track, track life, false tracks an hour, by tracker."""
     told = []
-    for result in results[: panels.MOST]:
+    shown, others = panels.told(results, 2)
+    for result in shown:
         rows = made["tracking"][made["tracking"]["case"] == result.name]
         said = "; ".join(_said(row) for _, row in rows.iterrows())
-        where = panels.swept(result)
+        where = panels.plain(panels.swept(result))
         told.append(f"{where + ': ' if where else ''}{said}.")
-    return told
+    return [*told, *others]
 
 
 def _said(row) -> str:
-    life = "no track lost" if not np.isfinite(row["life_s"]) else f"life {row['life_s']:.3g} s"
-    if np.isfinite(row["life_s"]):
-        life += f" [{row['life_lo']:.3g}, {row['life_hi']:.3g}]"
+    life = "no track lost" if not np.isfinite(row["life_s"]) else f"life {_bounded(row, 'life_s', 'life', ' s')}"
+    confirmed = f"{100 * row['confirmed']:.4g} % [{100 * row['confirmed_lo']:.4g}, {100 * row['confirmed_hi']:.4g}]"
     return (
-        f"{row['filter']} confirms {100 * row['confirmed']:.4g} % "
-        f"[{100 * row['confirmed_lo']:.4g}, {100 * row['confirmed_hi']:.4g}] after {row['time_to_confirm_s']:.3g} s in "
-        f"the mean, {life}, {row['false_tracks_per_hour']:.3g} false tracks an hour "
-        f"[{row['false_lo']:.3g}, {row['false_hi']:.3g}]"
+        f"{row['filter']} confirms {confirmed} after {_bounded(row, 'time_to_confirm_s', 'time', ' s')} in the mean, "
+        f"{life}, {_bounded(row, 'false_tracks_per_hour', 'false')} false tracks an hour"
     )
+
+
+def _bounded(row, name: str, stem: str, unit: str = "") -> str:
+    """A column's value with its interval, to three figures."""
+    value, low, high = (f"{float(f'{row[key]:.3g}'):,.10g}" for key in (name, f"{stem}_lo", f"{stem}_hi"))
+    return f"{value}{unit} [{low}, {high}]"

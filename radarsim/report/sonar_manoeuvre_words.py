@@ -20,7 +20,7 @@ def question(specs: Sequence) -> str:
 def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
     """Sentences with 95 % intervals: what detectors see of each manoeuvre, how σ from the covariance bears the test."""
     moving = [result for result in results if result.spec.detectors and result.axes.extra["manoeuvre_s"]]
-    told = [_seen(result, made["detections"]) for result in moving[: panels.MOST] if "detections" in made]
+    told = [_seen(result, made["detections"]) for result in panels.told(moving, 2)[0] if "detections" in made]
     return [words for words in [*told, _first_order(made)] if words]
 
 
@@ -36,10 +36,11 @@ def _seen(result: CaseResult, detections) -> str:
         f"{row['filter']} {row['probability']:.3g} [{row['lo']:.3g}, {row['hi']:.3g}]"
         for row in found[:: len(found) - 1 or 1]
     ]
-    where = panels.swept(result)
+    where = panels.plain(panels.swept(result))
+    ends = said[0] if len(said) == 1 else f"most with {said[-1]}, least with {said[0]}"
     return (
         f"{where + ': ' if where else ''}alarms a test at the end of the manoeuvre, at about {USUAL:g} false alarms: "
-        f"{', '.join(reversed(said))}."
+        f"{ends}."
     )
 
 
@@ -52,7 +53,9 @@ def _first_order(made: Mapping) -> str:
     rows = rows[(rows["case"] == first["case"]) & (rows["filter"] == first["filter"])]
     rows = rows[rows["k"] == rows["k"].max()]
     told = [
-        f"{row.component} {row.ratio:.3g}{' (near zero)' if row.first_order == NEAR else ''}"
+        f"{row.component} {row.ratio:.3f} [{row.ratio_lo:.3f}, {row.ratio_hi:.3f}]"
+        f"{' (near zero)' if row.first_order == NEAR else ''}"
         for row in rows.itertuples()
     ]
-    return f"Measured σ over that from the covariance, {first['case']}, {first['filter']}: {', '.join(told)}."
+    where = f"{first['filter']}, {rows.iloc[0]['t_s']:g} s, {first['case']}"
+    return f"Measured σ of the track's uses over that from its covariance ({where}): {', '.join(told)}."

@@ -85,9 +85,11 @@ def test_figures_are_described(result):
 
 
 def test_answer_names_the_best_filter_of_each_stage(result):
-    (told,) = multimodel.answer(result.cases, result.tables)
+    height, climb = multimodel.answer(result.cases, result.tables)
     for stage in ("start", "ballistic", "manoeuvre", "after"):
-        assert stage in told
+        assert stage in height
+        assert stage in climb
+    assert "m/s [" in climb
 
 
 def test_bytes_are_the_same_for_any_number_of_threads(tmp_path):

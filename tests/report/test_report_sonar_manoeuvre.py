@@ -7,7 +7,7 @@ import radarsim
 from radarsim.config.load import load
 from radarsim.exact import detector as exact
 from radarsim.exact.least_squares import sigma_acceleration
-from radarsim.report import claims, figures, output, sonar
+from radarsim.report import claims, figures, output, panels, sonar
 from radarsim.report import sonar_manoeuvre_figures as drawn
 from radarsim.report.claims import sonar_manoeuvre_measures as measured
 
@@ -161,10 +161,19 @@ def test_words(result, tables):
     told = sonar.answer(result.cases, tables)
     assert sonar.question(result.experiment).startswith("How surely and how soon is a manoeuvre seen")
     assert any("10 plots" in sentence for sentence in told)
-    assert any(sentence.startswith("Measured σ over that from the covariance") for sentence in told)
+    assert any(
+        sentence.startswith("Measured σ of the track's uses over that from its covariance (growing, ")
+        for sentence in told
+    )
     assert all(sentence.endswith(".") for sentence in told)
 
 
 def test_of_many_cases_the_ends_are_shown():
     assert drawn.spread_out(list(range(10)), 3) == [0, 4, 9]
     assert drawn.spread_out([1, 2], 3) == [1, 2]
+
+
+def test_an_answer_of_many_cases_tells_the_ends():
+    assert panels.told([1, 2, 3]) == ([1, 2, 3], [])
+    assert panels.told([1, 2, 3], 2) == ([1, 3], ["The case between: in the report and its tables."])
+    assert panels.told([1, 2, 3, 4]) == ([1, 4], ["The 2 cases between: in the report and its tables."])
