@@ -12,7 +12,7 @@ DETECTOR, INITIATION = "exact/test_exact_detector.py", "exact/test_exact_clutter
 MANOEUVRES = (
     *mutants(
         "radarsim/kernels/sonar_detector.py",
-        ("one, two = zero - age, 0.5 * age * age", "one, two = zero - age, age * age", ALARMS),
+        ("one, two = zero - age, 0.5 * age * age", "one, two = zero - age, age * age", ANSWERS),
         ("first = alarms + alarm, first + new", "first = alarms + alarm, first + event", ALARMS),
         ("where_greater(calm, patience - 0.5, zero, mode)", "where_greater(calm, patience + 0.5, zero, mode)", ANSWERS),
     ),

@@ -7,11 +7,18 @@ from click.testing import CliRunner
 from radarsim import studies
 from radarsim.cli import main
 
+MANOEUVRE = ("scans=12", "uses.at_s=[35]")
 SMALL = {
-    "range_doppler": ("rls2", ["scans=6"]),
-    "multimodel": ("multimodel", ["scans=8", "report_every=2"]),
-    "sonar": ("sonar_smoothing", ["scans=6"]),
-    "discriminator": ("discriminator_pair", ["burst.pulses=3000"]),
+    "range_doppler": ("range_doppler", "rls2", ["scans=6"]),
+    "multimodel": ("multimodel", "multimodel", ["scans=8", "report_every=2"]),
+    "sonar": ("sonar", "sonar_smoothing", ["scans=6"]),
+    "sonar_manoeuvre": (
+        "sonar",
+        "sonar_manoeuvre",
+        ["scans=12", "uses.at_s=[35]", "sweep.target.acceleration_mps2=[0]"],
+    ),
+    "sonar_clutter": ("sonar", "sonar_clutter", ["scans=6", "sweep.sensor.false_plots_per_km2=[1]"]),
+    "discriminator": ("discriminator", "discriminator_pair", ["burst.pulses=3000"]),
 }
 BAD, FILTER = 37, 1  # which realisation, and which filter, is spoiled
 
@@ -40,13 +47,13 @@ def spoil(monkeypatch, name, number):
 @pytest.mark.parametrize("number", [np.nan, np.inf])
 @pytest.mark.parametrize("name", SMALL)
 def test_counted_and_told(name, number, monkeypatch, tmp_path):
-    config, overrides = SMALL[name]
-    spoil(monkeypatch, name, number)
+    study, config, overrides = SMALL[name]
+    spoil(monkeypatch, study, number)
     done = run(tmp_path, config, overrides)
     assert done.exit_code == 5, done.output
     assert "not finite" in done.stderr.splitlines()[0]
     (told,) = [line for line in done.stderr.splitlines() if "filter" in line]
-    assert f"1 of {min(100, studies.study(name).BLOCK)} realisations not finite" in told
+    assert f"1 of {min(100, studies.study(study).BLOCK)} realisations not finite" in told
     assert "scan " in told
     assert not list(tmp_path.glob("*/curves.csv"))
 
