@@ -72,13 +72,19 @@ def excess(weights: np.ndarray, condition: Condition) -> float:
     return float(weights.sum()) + spread_factor(condition.probability) * spread - condition.threshold
 
 
-def form(covariance: np.ndarray, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues (size,), ascending, and directions (size, size, by column) of R_Δ H; a direction is one σ long."""
-    scale = np.sqrt(np.diag(curvature))
-    root = np.linalg.cholesky(curvature / np.outer(scale, scale))
-    values, vectors = np.linalg.eigh(root.T @ (covariance * np.outer(scale, scale)) @ root)
-    values = np.maximum(values, 0.0)
-    return values, np.linalg.solve(root.T, vectors * np.sqrt(values)) / scale[:, None]
+class Form:
+    """The quadratic form R_Δ H: its eigenvalues (size,), ascending."""
+
+    def __init__(self, covariance: np.ndarray, curvature: np.ndarray):
+        self._scale = np.sqrt(np.diag(curvature))
+        balance = self._scale[:, None] * self._scale
+        self._root = np.linalg.cholesky(curvature / balance)
+        values, self._vectors = np.linalg.eigh(self._root.T @ (covariance * balance) @ self._root)
+        self.values = np.maximum(values, 0.0)
+
+    def leading(self) -> np.ndarray:
+        """The direction (size,) of the largest eigenvalue, one σ long."""
+        return np.linalg.solve(self._root.T, self._vectors * np.sqrt(self.values))[:, -1] / self._scale
 
 
 @dataclass(frozen=True)
@@ -99,16 +105,17 @@ class Designer:
         """Condition (15). The phase, unknown at first, is left out of the form, though not out of the estimate."""
         information, ratio = self.posterior(duration_s)
         error = np.diag(self.sigma[1:] ** 2) - balanced_inverse(information)[1:, 1:]
-        return excess(form(error, information[1:, 1:] / (2.0 * ratio))[0], self.condition)
+        return excess(Form(error, information[1:, 1:] / (2.0 * ratio)).values, self.condition)
 
-    def handover(self, before_s: float, after_s: float) -> tuple[np.ndarray, np.ndarray]:
-        """Eigenvalues and directions of the error form when a window of one length hands over to another (16)."""
-        information, ratio = self.posterior(after_s)
-        error = balanced_inverse(self.posterior(before_s)[0]) - balanced_inverse(information)
-        return form(error, information / (2.0 * ratio))
+    def handover(self, before_s: float) -> Callable[[float], Form]:
+        """The error form when a window hands over to another, as a function of the latter's length (16)."""
+        covariance = balanced_inverse(self.posterior(before_s)[0])
 
-    def next_excess(self, before_s: float, after_s: float) -> float:
-        return excess(self.handover(before_s, after_s)[0], self.condition)
+        def form(after_s: float) -> Form:
+            information, ratio = self.posterior(after_s)
+            return Form(covariance - balanced_inverse(information), information / (2.0 * ratio))
+
+        return form
 
     def longest(self, criterion: Callable[[float], float], shortest_s: float) -> int:
         """Pulses of the longest window that meets a criterion: its root, rounded to the nearest whole pulse."""
@@ -132,8 +139,9 @@ class Designer:
             if len(sequence) == MOST_WINDOWS:
                 raise NoSchedule(f"it needs over {MOST_WINDOWS} windows")
             before = sequence[-1] * period
+            form = self.handover(before)
             following = self.longest(
-                lambda after, before=before: self.next_excess(before, after), before * (1.0 + 1e-9)
+                lambda after, form=form: excess(form(after).values, self.condition), before * (1.0 + 1e-9)
             )
             sequence.append(max(following, sequence[-1] + 1))
         return sequence
@@ -155,6 +163,6 @@ def handover_directions(designer: Designer, windows: list[int]) -> np.ndarray:
     period = designer.burst.pulse_period_s
     directions = np.zeros((len(windows), len(designer.sigma)))
     for k in range(1, len(windows)):
-        values, vectors = designer.handover(windows[k - 1] * period, windows[k] * period)
-        directions[k] = vectors[:, -1] / math.sqrt(values[-1])
+        form = designer.handover(windows[k - 1] * period)(windows[k] * period)
+        directions[k] = form.leading() / math.sqrt(form.values[-1])
     return directions

@@ -49,7 +49,7 @@ def test_tail_of_unequal_weights_against_sampling():
 def test_gaussian_condition_is_equation_14():
     d = designer()
     before, after = 462e-5, 948e-5
-    values, _ = d.handover(before, after)
+    values = d.handover(before)(after).values
     (one, _), (other, mu) = d.posterior(before), d.posterior(after)
     assert filters.excess(values, d.condition) == pytest.approx(naive.handover_form(one, other, mu) - 1.0, rel=1e-6)
 
@@ -74,20 +74,28 @@ def test_each_designed_window_is_the_longest_safe_one():
     d, period = designer(), 1e-5
     windows = d.windows()
     for a, b in itertools.pairwise(windows[:-1]):
-        assert d.next_excess(a * period, (b - 1) * period) < 0 < d.next_excess(a * period, (b + 1) * period)
+        form = d.handover(a * period)
+        shorter, longer = (filters.excess(form(after * period).values, d.condition) for after in (b - 1, b + 1))
+        assert shorter < 0 < longer
+
+
+def losses(d, windows):
+    """The probability of each hand-over's loss, as the form's tail has it."""
+    forms = [d.handover(a * 1e-5)(b * 1e-5) for a, b in itertools.pairwise(windows)]
+    return [filters.tail_probability(form.values, 1.0) for form in forms]
 
 
 def test_hand_overs_of_the_paper_are_less_safe_than_designed():
     """The factor 3 gives 0.978 a hand-over, not 0.99: the form is one chi-square, not a Gaussian."""
     d, windows = designer(), designer().windows()
-    lost = [filters.tail_probability(d.handover(a * 1e-5, b * 1e-5)[0], 1.0) for a, b in itertools.pairwise(windows)]
+    lost = losses(d, windows)
     assert np.median(lost) == pytest.approx(0.022, abs=0.001)
 
 
 def test_exact_tail_keeps_its_probability():
     d = designer(tail="exact", probability=0.999)
     windows = d.windows()
-    lost = [filters.tail_probability(d.handover(a * 1e-5, b * 1e-5)[0], 1.0) for a, b in itertools.pairwise(windows)]
+    lost = losses(d, windows)
     assert max(lost[:-1]) == pytest.approx(1e-3, rel=0.05)
     assert len(windows) == 16
 
@@ -122,7 +130,7 @@ def test_direction_is_the_leading_error_of_a_handover():
     direction = filters.handover_directions(d, windows)[k]
     information, mu = d.posterior(windows[k] * period)
     assert direction @ information @ direction / (2 * mu) == pytest.approx(1.0)
-    values, _ = d.handover(windows[k - 1] * period, windows[k] * period)
+    values = d.handover(windows[k - 1] * period)(windows[k] * period).values
     assert np.sqrt(values[-1]) == pytest.approx(0.437, abs=0.005)
     assert np.sqrt(values[-2]) < 0.1 * np.sqrt(values[-1])
 
