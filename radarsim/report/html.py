@@ -16,6 +16,7 @@ from radarsim.report.drawing import Figure, Line
 
 NOT_SETTLED = "not settled in the run"
 ROWS = 200  # of a table shown in the page
+ALL_ROWS = 1200  # of all of them together: the page stays under 1.5 MB
 MOST_POINTS = 16_000  # of all curves of a page together, which keeps it small
 LEAST_POINTS = 60  # of one curve, however many there are
 MOST_CASES = 12  # written out as YAML
@@ -58,7 +59,7 @@ def page(
         claims=claims,
         verdicts=list(counts.items()),
         figures=_figures(figures),
-        tables=[_table(name, table) for name, table in made.items() if name != "claims" and len(table)],
+        tables=_tables({name: table for name, table in made.items() if name != "claims" and len(table)}),
         facts=[(name.replace("_", " "), number(record[name])) for name in SHOWN_FACTS if name in record],
         command=command(experiment, record),
     )
@@ -135,15 +136,23 @@ def _cell(column: str, value: object) -> str:
     return NOT_SETTLED if endless else number(value)
 
 
-def _table(name: str, table) -> dict:
+def _tables(made: Mapping) -> list[dict]:
+    """The tables as far as they are shown: the long ones share what room the short ones leave."""
+    rows, most = [len(table) for table in made.values()], ROWS
+    while most > 10 and sum(min(count, most) for count in rows) > ALL_ROWS:
+        most -= 10
+    return [_table(name, table, most) for name, table in made.items()]
+
+
+def _table(name: str, table, most: int = ROWS) -> dict:
     order = list(table.columns)
     if {"sigma", "exact_sigma"} <= set(order):  # side by side, to be compared
         order.remove("exact_sigma")
         order.insert(order.index("sigma") + 1, "exact_sigma")
-    rows = table[order].head(ROWS)
+    rows = table[order].head(most)
     columns = [{"name": column, "numeric": table[column].dtype.kind in "iuf"} for column in order]
     cells = [list(map(_cell, order, row)) for row in rows.astype(object).itertuples(index=False, name=None)]
-    return {"name": name, "columns": columns, "rows": cells, "count": len(table), "cut": len(table) > ROWS}
+    return {"name": name, "columns": columns, "rows": cells, "count": len(table), "cut": len(table) > most}
 
 
 def _figures(figures: Sequence[Figure]) -> list[dict]:

@@ -11,7 +11,7 @@ from markupsafe import escape
 
 from radarsim.config.load import load
 from radarsim.errors import StoreError
-from radarsim.report import files, output, provenance
+from radarsim.report import files, html, output, provenance
 
 TABLES = {"curves.csv", "gains.csv", "steady.csv", "consistency.csv", "radar.csv", "claims.csv"}
 FIGURES = {f"figures/{k}_{c}.{f}" for k in ("sigma", "gain") for c in ("r", "Vr", "ar") for f in ("svg", "png")}
@@ -174,3 +174,12 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "taken").write_text("a file")
     with pytest.raises(StoreError, match="cannot be written"):
         files.replace_all(tmp_path / "taken", {"x.csv": b""})
+
+
+def test_many_long_tables_share_the_room_of_a_page():
+    long = pd.DataFrame({"k": range(5000), "sigma": 1.0})
+    shown = html._tables({f"table {i}": long for i in range(15)} | {"short": long.head(30)})
+    assert sum(len(table["rows"]) for table in shown) <= html.ALL_ROWS
+    assert len(shown[-1]["rows"]) == 30
+    assert all(table["cut"] and table["count"] == 5000 for table in shown[:-1])
+    assert len(html._tables({"alone": long})[0]["rows"]) == html.ROWS
