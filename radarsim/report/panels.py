@@ -14,6 +14,7 @@ from radarsim.report.statistics import Z95
 WIDE_MM = 120.0  # one panel of many lines
 MOST_AT_ENDS = 6  # lines of one panel named at their ends; more by colour and dash
 MOST = 8  # cases a figure shows; more are told in its caption
+LONGEST_INSIDE = 28  # letters of a name that may stand in a legend inside a panel of many lines
 TIME = "time from the first plot, s"
 SYMBOLS = {"manoeuvre_variance": "$D_M$"}
 POWERS = ("manoeuvre_variance",)  # swept keys that are read as powers of ten
@@ -159,7 +160,10 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
     panels = [panel for panel in panels if panel.marks]
     single = len(panels) == 1
     if not single and all(panel.keys == panels[0].keys for panel in panels):
-        panels[1:] = [replace(panel, keys=()) for panel in panels[1:]]
+        if panels[0].legend == "right":
+            own = Panel(panels[0].x, panels[0].y, (), keys=panels[0].keys, key_title=panels[0].key_title)
+            panels = [replace(panel, keys=(), key_title="", legend="none") for panel in panels] + [own]
+        panels[1:] = [replace(panel, keys=()) if panel.marks else panel for panel in panels[1:]]
     caption = (
         f"Root-mean-square error of the {of.name} about the truth against time, of {realisations(results)}. "
         "Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact values."
@@ -167,11 +171,12 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
     title = f"σ of the {of.name}"
     beside = single and panels[0].legend == "right"
     if not single:
-        panels = [replace(panel, legend="best") for panel in panels]
+        panels = [replace(panel, legend="none" if panel.legend == "none" else "best") for panel in panels]
+    wordy = panels and not panels[-1].marks and any(len(words) > LONGEST_INSIDE for words, _ in panels[-1].keys)
     shape = (
         {"width_mm": WIDE_MM if beside else COLUMN_MM}
         if single
-        else {"columns": min(3, len(panels)), "width_mm": PAGE_MM}
+        else {"columns": 2 if wordy else min(3, len(panels)), "width_mm": PAGE_MM}
     )
     return Figure(name, title, caption, tuple(panels), **shape, panel_height_mm=64 if single else 56)
 
@@ -252,10 +257,12 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
         f"Relative gain in σ of the {of.name} against filter {base}, paired on common noise, of "
         f"{realisations(results)}. Bands: 95 % intervals. Crosses: exact values. Below zero: a loss."
     )
-    panel = Panel(Axis(TIME, limits=(0, None)), Axis(f"gain in $\\sigma$ of {of.symbol}, %"), tuple(marks))
-    return Figure(
-        name, f"Gain in σ of the {of.name}", caption, (panel,), width_mm=COLUMN_MM if len(results) < 3 else 120.0
-    )
+    # Many long names would cover the lines: they stand beside the panel.
+    long = len(marks) > 4 and any(isinstance(mark, Line) and len(mark.label) > LONGEST_INSIDE for mark in marks)
+    y = Axis(f"gain in $\\sigma$ of {of.symbol}, %")
+    panel = Panel(Axis(TIME, limits=(0, None)), y, tuple(marks), direct=not long, legend="right" if long else "best")
+    width = PAGE_MM if long else COLUMN_MM if len(results) < 3 else 120.0
+    return Figure(name, f"Gain in σ of the {of.name}", caption, (panel,), width_mm=width)
 
 
 def per_component(
