@@ -43,9 +43,10 @@ def test_acceleration_of_a_window_has_the_papers_variance():
 
 
 def test_a_random_push_adds_to_the_variance():
-    weights, pushes = np.array([[1.0, -2.0, 1.0]]), np.array([[0.0], [1.0], [4.0]])
+    """Pushes are independent: each adds the square of what it moves."""
+    weights, pushes = np.array([[1.0, -2.0, 1.0]]), np.array([[0.0, 0.0], [1.0, 0.0], [4.0, 3.0]])
     _, variance = exact.acceleration_law(weights, np.zeros(3), np.eye(3), pushes)
-    assert variance == pytest.approx(6 + 2**2)
+    assert variance == pytest.approx(6 + 2**2 + 3**2)
 
 
 def test_first_of_independent_tests():
