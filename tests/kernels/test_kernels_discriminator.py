@@ -106,6 +106,19 @@ def test_score_of_samples_is_the_likelihood_and_its_gradient(complex_samples, pe
         assert gradient[j] == pytest.approx(numeric, rel=1e-5, abs=1e-3)
 
 
+@pytest.mark.parametrize("complex_samples", [False, True])
+@pytest.mark.parametrize("per_pulse", [1, 3])
+def test_the_coherent_sum_of_a_clean_burst_is_its_amplitude(complex_samples, per_pulse):
+    """Half of it a sample where samples are real: their image is taken off to the last pulse."""
+    burst = burst_of(complex_samples=complex_samples, per_pulse=per_pulse)
+    pulses, state = 400, np.zeros(1, scoring.STATE)[0]
+    clean = model.signal(burst, model.phase_turns(THETA, model.sample_times(burst, burst.pulses)))
+    state["amplitude"], state["x"] = burst.amplitude, turns(THETA, burst)
+    kernels.evaluate(physics_of(burst), rows(clean), np.zeros((1, 1)), window_of(burst, pulses), state)
+    whole = burst.amplitude * pulses * per_pulse * (1 if complex_samples else 0.5)
+    assert state["out"][1] == pytest.approx(whole, rel=1e-9)
+
+
 def demodulated(burst, theta, reference, per_block=20, image=True, seed=1):
     t, u = noisy(burst, theta, seed)
     edges = np.arange(0, burst.pulses + 1, per_block)

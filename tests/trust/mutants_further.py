@@ -7,6 +7,7 @@ ALARMS, ANSWERS = f"{TWINS}::test_alarms_and_first_events_are_the_twins", f"{TWI
 CLUTTER, LAWS = "kernels/test_kernels_clutter.py", "studies/test_studies_clutter.py"
 AMONG = f"{CLUTTER}::test_estimates_are_the_twins"
 SCORE = "kernels/test_kernels_discriminator.py::test_score_of_samples_is_the_likelihood_and_its_gradient"
+CLEAN = "kernels/test_kernels_discriminator.py::test_the_coherent_sum_of_a_clean_burst_is_its_amplitude"
 DETECTOR, INITIATION = "exact/test_exact_detector.py", "exact/test_exact_clutter.py"
 
 MANOEUVRES = (
@@ -68,7 +69,7 @@ FALSE_PLOTS = (
 SCORES = (
     *mutants(
         "radarsim/kernels/discriminator_scoring.py",
-        ("image = amplitude * (cc - 0.5 * pulses)", "image = amplitude * (cc - pulses)", SCORE),
+        ("image = amplitude * (cc - 0.5 * pulses)", "image = amplitude * (cc - pulses)", CLEAN),
         ("e = y * c - x * s", "e = y * c + x * s", SCORE),
     ),
     *mutants(
