@@ -32,7 +32,7 @@ class Result:
         shown = ("case", "filter", "component", "unit", "t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")
         columns = [*shown, *(name for name in ("gain_percent", "gain_lo", "gain_hi") if len(self.gains))]
         rows = self.last_scan[columns].dropna(axis=1, how="all")
-        table = rows.to_html(index=False, border=0, float_format=lambda v: f"{v:.4g}", max_rows=MOST_ROWS)
+        table = rows.to_html(index=False, border=0, float_format=lambda v: f"{v:.4g}", na_rep="", max_rows=MOST_ROWS)
         said = "".join(f"<p>{escape(line)}</p>" for line in self.answer)
         count = escape(provenance.span(sorted({case.count for case in self.cases})))
         return f"<h4>{escape(self.question)}</h4>{said}<p>{count} realisations; 95 % intervals.</p>{table}"

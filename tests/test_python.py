@@ -96,3 +96,9 @@ def test_a_figure_as_pdf(tmp_path):
     result = radarsim.run(CONFIG)
     result.write(tmp_path, figures=["pdf"])
     assert {path.suffix for path in (tmp_path / "config" / "figures").iterdir()} == {".pdf"}
+
+
+def test_a_value_that_is_not_known_stays_empty_in_a_notebook():
+    result = radarsim.run("sonar_missed", realisations=20)
+    assert result.last_scan["exact_sigma"].isna().any()
+    assert ">NaN<" not in result._repr_html_()
