@@ -1,4 +1,4 @@
-"""Merging of blocks against exact addition."""
+"""Sums of one realisation against its error, merging of blocks against exact addition."""
 
 import math
 import random
@@ -6,8 +6,10 @@ import random
 import numpy as np
 import pytest
 
+from radarsim import studies
 from radarsim.engine.blocks import Forest, Node
 from radarsim.engine.moments import Sums
+from tests.trust.cases import CASES
 
 BLOCKS, SIZE = 2**13, 4
 
@@ -45,3 +47,12 @@ def test_moments_of_a_large_bias_keep_their_spread():
     exact = math.fsum((x - math.fsum(e) / BLOCKS) ** 2 for x in e) / BLOCKS
     found = statistics.errors(total.values, BLOCKS)
     assert found.spread**2 == pytest.approx(exact, abs=1e8 * 2.0**-53 * math.log2(BLOCKS))
+
+
+@pytest.mark.parametrize("study", CASES)
+def test_sums_of_one_realisation_are_the_powers_of_its_error(study):
+    work = studies.CaseWork(CASES[study].loaded().cases[-1])
+    for number in (0, 13):
+        error = work.plan.layout.unpack(work.simulate(number, 1))["error"]
+        assert np.count_nonzero(error) > error.size / 3
+        np.testing.assert_allclose(error, error[..., :1] ** np.arange(1, 5), rtol=1e-11)
