@@ -4,6 +4,8 @@ Radars are keyed by their number; a case counts as the paper's radar when its ac
 variance are the paper's, whatever its name.
 """
 
+import math
+
 import numpy as np
 
 from radarsim.engine.results import CaseResult
@@ -25,7 +27,7 @@ class Evidence(claims.Evidence):
         """key: the number of a radar (at D_M = 10⁻³), or (number, D_M)."""
         radar, variance = key if isinstance(key, tuple) else (key, VARIANCE)
         for result in self.results:
-            if self._radar(result) == radar and np.isclose(variance, self._variance(result), rtol=1e-9, atol=0):
+            if self._radar(result) == radar and math.isclose(variance, self._variance(result)):
                 return result
         raise claims.Missing(key)
 
@@ -36,7 +38,7 @@ class Evidence(claims.Evidence):
         own = (radar.sigma_range_m, radar.sigma_velocity_mps, radar.scan_period_s)
         fits = target.kind == "polynomial" and not any(target.coefficients[3:])
         long_enough = result.axes.t_s[-1] >= DURATION - 1e-6
-        found = [number for number, row in RADARS.items() if np.allclose(own, row, rtol=1e-9)]
+        found = [number for number, row in RADARS.items() if all(map(math.isclose, own, row))]
         return found[0] if found and fits and long_enough else None
 
     @staticmethod
