@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import radarsim
 from radarsim.report import claims, range_doppler, tables
 from radarsim.report.claims import CONFIRMED, REFUTED, UNCLEAR, Range, Series
 from radarsim.report.statistics import Estimate
@@ -205,3 +206,9 @@ def test_all_claims_are_listed_run_or_not(table):
     rows = claims.listed({"range_doppler": table.to_dict("records")})
     assert sum(row["claim"].startswith("P1.") for row in rows) == len(table)
     assert all(row["config"] for row in rows)
+
+
+def test_a_manoeuvre_that_begins_after_the_last_scan_is_no_claim():
+    overrides = ["scans=12", "uses.at_s=[35]", "sweep.target.acceleration_mps2=[0.2138, 0.4]"]
+    made = radarsim.run("sonar_manoeuvre", overrides=overrides, realisations=50).tables["claims"]
+    assert len(made) == 0
