@@ -1,6 +1,6 @@
-"""P1's own tables (steady state, consistency, radar) and the words of its report.
+"""P1's own tables: steady state, consistency, radar.
 
-Its figures stand in range_doppler_figures.
+Its figures stand in range_doppler_figures, the words of its report in range_doppler_words.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,8 @@ from radarsim.engine.results import CaseResult
 from radarsim.exact import linear
 from radarsim.report import panels, statistics
 from radarsim.report import tables as common
-from radarsim.report.range_doppler_figures import PERIODS, QUANTITIES, figures
+from radarsim.report.range_doppler_figures import PERIODS, figures
+from radarsim.report.range_doppler_words import answer, follows_the_model, question
 
 __all__ = ["answer", "figures", "question", "tables"]
 
@@ -28,12 +29,6 @@ STEADY = (
     *("case", "filter", "manoeuvre_variance", "component", "unit", "steady_sigma", "last_sigma", "last_lo", "last_hi"),
     *("settling_periods", "settling_s", "settling_lo_s", "settling_hi_s", "under_10_periods", "best"),
 )
-
-
-def follows_the_model(result: CaseResult) -> bool:
-    """Whether the target moves as the filters take it to, by no more than a square of the time."""
-    target = result.spec.target
-    return target.kind == "polynomial" and not any(target.coefficients[3:])
 
 
 def steady(results: Sequence[CaseResult]):
@@ -178,149 +173,19 @@ def radar(results: Sequence[CaseResult]):
 
 
 def inputs(results: Sequence[CaseResult]):
-    """What was put in, for the page: a row for each radar, with its C_θ and the manoeuvre variances D_M tried."""
-    rows = []
+    """What was put in, for the page: a row for each radar that differs from the others, with the D_M tried on it."""
+    radars: dict[tuple, list[CaseResult]] = {}
     for members in panels.families(results).values():
-        radar, extra = members[0].spec.radar, members[0].axes.extra
+        for result in members:
+            of, theta = result.spec.radar, float(result.axes.extra["C_theta"])
+            given = (of.sigma_range_m, of.sigma_velocity_mps, of.scan_period_s, of.wavelength_m, theta)
+            radars.setdefault((panels.stem(result), panels.plain(panels.device(result)), *given), []).append(result)
+    rows = []
+    for (_, *radar), members in radars.items():
         tried = sorted({f.manoeuvre_variance for result in members for f in result.spec.filters})
         scans = sorted({result.spec.scans for result in members})
-        rows.append(
-            (
-                *(panels.plain(panels.device(members[0])), radar.sigma_range_m, radar.sigma_velocity_mps),
-                *(radar.scan_period_s, radar.wavelength_m, float(extra["C_theta"])),
-                *(", ".join(panels.number(v, powers=True) for v in tried), ", ".join(map(str, scans))),
-            )
-        )
+        rows.append((*radar, ", ".join(panels.number(v, powers=True) for v in tried), ", ".join(map(str, scans))))
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(INPUTS)})
 
 
 INPUTS = ("radar", "σ_r, m", "σ_V, m/s", "Δt, s", "λ, m", "C_θ", "D_M, (m/s³)²", "scans")
-
-
-def question(experiment) -> str:
-    """What the experiment asks, in one sentence."""
-    filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
-    names = list(dict.fromkeys(getattr(case.spec.radar, "name", None) or case.stem for case in experiment.cases))
-    if any("velocity" in f.observes for case in experiment.cases for f in case.spec.filters):
-        return f"How much does observing the radial velocity lower the errors of {listed(names)}?"
-    return f"How large are the errors of {listed(names)} with {listed(filters)}?"
-
-
-def listed(names: Sequence[str]) -> str:
-    """Names in a sentence: a, b and c."""
-    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
-
-
-def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
-    """Sentences with numbers and 95 % intervals: the gains at the last scan, component by component.
-
-    Of cases that nothing is swept in, where there are such. Further: the best D_M where several are tried, and the
-    worst error where a target breaks the model.
-    """
-    return [*_gain_sentences(results, made), *_best_sentences(results, made), *_broken_sentences(results, made)]
-
-
-def _gain_sentences(results: Sequence[CaseResult], made: dict) -> list[str]:
-    plain = panels.unswept(results)
-    rows = made["gains"][made["gains"]["case"].isin([result.name for result in plain])]
-    gains = common.groups(rows, "component")
-    told = [_gain_sentence(plain, gains[(c,)], of.name) for c, of in QUANTITIES.items() if (c,) in gains]
-    return told or [_sigma_sentence(results[0], made["curves"])]
-
-
-def _gain_sentence(results: Sequence[CaseResult], rows, quantity: str) -> str:
-    labels = {result.name: panels.plain_label(result) for result in results}
-    last = rows.loc[rows.groupby(["case", "filter"], sort=False)["k"].idxmax()]
-    several = rows["filter"].nunique() > 1
-    base = _baseline(results)
-    if len(last) > 1:
-        early, late = last["t_s"].min(), last["t_s"].max()
-        when = f"at {late:g} s" if early == late else f"at the last scan (after {early:g} to {late:g} s)"
-        low, high = (last.loc[last["gain_percent"].agg(pick)] for pick in ("idxmin", "idxmax"))
-        ends = " to ".join(f"{_gain(row)} ({_who(row, labels, several)})" for row in (low, high))
-        return f"{quantity.capitalize()}: {when} σ is {ends} {base}."
-    row = last.iloc[0]
-    best = rows.loc[rows["gain_percent"].idxmax()]
-    peak = "" if best["k"] == row["k"] else f"; at best {_gain(best)}, at {best['t_s']:g} s"
-    return f"{quantity.capitalize()}: at {row['t_s']:g} s, the last scan, σ is {_gain(row)} {base}{peak}."
-
-
-def _baseline(results: Sequence[CaseResult]) -> str:
-    """Than what a gain is: range alone only where the baseline filter observes no more."""
-    bases = [result.spec.filters[result.axes.baseline] for result in results]
-    if all(base.observes == ("range",) for base in bases):
-        return "than with range alone"
-    names = {base.name for base in bases}
-    return f"than with filter '{bases[0].name}'" if len(names) == 1 else "than with the baseline filter"
-
-
-def _best_sentences(results: Sequence[CaseResult], made: dict) -> list[str]:
-    """The best manoeuvre variance of each radar and filter, in words, where several were tried."""
-    table, told = made["steady"], []
-    for members in panels.families(results).values():
-        rows = table[table["case"].isin([r.name for r in members]) & (table["component"] == "r")]
-        if rows.groupby("filter")["manoeuvre_variance"].nunique().max() > 1:
-            chosen = [_best(rows[rows["filter"] == name], name) for name in members[0].axes.filters]
-            told.append(f"{panels.plain(panels.device(members[0]))}: {'; '.join(chosen)}")
-    if not told:
-        return []
-    rule = f"least steady σ of the range among those that settle in under {PERIODS} scan periods"
-    return [f"Best manoeuvre variance D_M, (m/s³)² ({rule}). {'. '.join(told)}."]
-
-
-def _best(rows, name: str) -> str:
-    best = rows[rows["best"]]
-    if not len(best):
-        return f"{name} none of those tried"
-    row = best.iloc[0]
-    variance = panels.number(float(row["manoeuvre_variance"]), powers=True)
-    return f"{name} {variance} (σ {row['steady_sigma']:.4g} m, settled after {row['settling_s']:g} s)"
-
-
-MOST_TOLD = 4  # cases with a broken model told in the answer
-
-
-def _broken_sentences(results: Sequence[CaseResult], made: dict) -> list[str]:
-    """Where a target breaks the model: the worst σ of the range over the run, and the largest bias, of each filter."""
-    broken = [result for result in results if not follows_the_model(result)]
-    rows = common.groups(made["curves"][made["curves"]["component"] == "r"], "case", "filter")
-    told = []
-    for result in broken[:MOST_TOLD]:
-        words = [f"{name} {_worst(rows[result.name, name])}" for name in result.axes.filters]
-        told.append(f"{panels.plain_label(result)}, a target that breaks the filters' model: {'; '.join(words)}.")
-    left = len(broken) - len(told)
-    return told + ([f"{left} further cases break the model: see curves.csv."] if left else [])
-
-
-def _worst(rows) -> str:
-    worst, bias = rows.loc[rows["sigma"].idxmax()], rows.loc[rows["bias"].abs().idxmax()]
-    text = (
-        f"worst σ of the range {worst['sigma']:.4g} m [{worst['sigma_lo']:.4g}, {worst['sigma_hi']:.4g}] "
-        f"at {worst['t_s']:g} s, largest bias {bias['bias']:.4g} m at {bias['t_s']:g} s"
-    )
-    return text.replace("-", "−")
-
-
-def _gain(row) -> str:
-    """A gain in words: lower, higher, or neither for certain."""
-    value, lo, hi = (row[name] for name in ("gain_percent", "gain_lo", "gain_hi"))
-    if lo <= 0 <= hi:
-        return f"neither lower nor higher (gain {value:.1f} % [{lo:.1f}, {hi:.1f}])".replace("-", "−")
-    if value < 0:
-        value, lo, hi = -value, -hi, -lo
-        return f"{value:.1f} % [{lo:.1f}, {hi:.1f}] higher"
-    return f"{value:.1f} % [{lo:.1f}, {hi:.1f}] lower"
-
-
-def _who(row, labels: dict[str, str], several: bool) -> str:
-    return labels[row["case"]] + (f", {row['filter']}" if several else "")
-
-
-def _sigma_sentence(result: CaseResult, curves) -> str:
-    """For experiments without a second filter: σ of the range at the end."""
-    rows = curves[(curves["case"] == result.name) & (curves["component"] == "r")]
-    row = rows.iloc[-1]
-    return (
-        f"{panels.plain_label(result)}, {row['filter']}: σ of the range at {row['t_s']:g} s is {row['sigma']:.4g} m "
-        f"[{row['sigma_lo']:.4g}, {row['sigma_hi']:.4g}]."
-    )

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarsim.report import range_doppler, statistics, tables
+from radarsim.report import range_doppler, range_doppler_words, statistics, tables
 from radarsim.report.drawing import Line, Style
 
 
@@ -182,8 +182,68 @@ def test_answer_names_a_baseline_that_observes_more(expected_radar):
     assert "than with filter 'D 0.001'" in range_doppler.answer(results, made_of(results))[0]
 
 
+def test_inputs_have_a_row_for_each_radar_that_differs(expected_radar, swept):
+    values = (1, 4, 16)
+    results = [
+        expected_radar("rls2", name=f"rls2 radar.sigma_velocity_mps={v}", radar={"sigma_velocity_mps": v})
+        for v in values
+    ]
+    table = range_doppler.inputs(results)
+    assert list(table["σ_V, m/s"]) == list(values)
+    np.testing.assert_array_equal(table["C_θ"], range_doppler.radar(results)["C_theta"])
+    (row,) = range_doppler.inputs(swept).to_dict("records")
+    assert row["D_M, (m/s³)²"] == "10⁻⁵, 10⁻⁴, 10⁻³, 10⁻², 10⁻¹"
+
+
+BRAKING = {"kind": "acceleration_start", "coefficients": [1e5, -250], "start_s": 50, "acceleration_mps2": 20}
+
+
+def greatest_loss(made):
+    rows = made["gains"][made["gains"]["component"] == "r"]
+    row = rows.loc[rows["gain_percent"].idxmin()]
+    assert row["gain_hi"] < -10
+    words = f"; at worst {-row['gain_percent']:.1f} % [{-row['gain_hi']:.1f}, {-row['gain_lo']:.1f}] higher"
+    return f"{words}, at {row['t_s']:g} s"
+
+
+def test_answer_tells_the_greatest_loss(expected_radar):
+    """One case, and the one of several that is no case of the last scan's ends."""
+    sharp = {"sigma_range_m": 80, "sigma_velocity_mps": 4, "scan_period_s": 6}
+    results = [expected_radar("rls2", 1e-4, target=BRAKING, radar=sharp)]
+    made = made_of(results)
+    words = greatest_loss(made)
+    assert range_doppler.answer(results, made)[0].endswith(f"{words}.")
+    others = [expected_radar("rls2", name="calm"), expected_radar("rls5", name="fine"), *results]
+    made = made_of(others)
+    words = greatest_loss(made)
+    assert range_doppler.answer(others, made)[0].endswith(f"{words}, with RLS 2.")
+
+
+def test_answer_is_silent_of_a_loss_that_is_none(paper):
+    one = paper[3:4]
+    made = made_of(one)
+    first = made["gains"][made["gains"]["component"] == "r"]
+    assert (first["gain_hi"] > -1).all()
+    assert "at worst" not in range_doppler.answer(one, made)[0]
+
+
+@pytest.mark.parametrize(
+    ("gain", "words"),
+    [
+        ((0.03, 0.01, 0.04), "no lower nor higher by 0.1 %"),
+        ((-0.01, -0.04, 0.02), "no lower nor higher by 0.1 %"),
+        ((-0.04, -0.2, 0.1), "neither lower nor higher for certain (gain 0.0 % [−0.2, 0.1])"),
+        ((-0.4, -0.8, -0.01), "0.4 % [0.0, 0.8] higher"),
+        ((33.04, 32.7, 33.4), "33.0 % [32.7, 33.4] lower"),
+    ],
+)
+def test_a_gain_in_words(gain, words):
+    row = dict(zip(("gain_percent", "gain_lo", "gain_hi"), gain, strict=True))
+    assert range_doppler_words._gain(row) == words
+
+
 def test_answer_tells_the_best_variance(swept):
-    told = range_doppler.answer(swept, made_of(swept))[-1]
+    told = range_doppler.answer(swept, made_of(swept))[0]  # before the gains: it is what is asked
     assert told.startswith("Best manoeuvre variance D_M")
     assert "RLS 2: r 10⁻³ (σ 189.1 m, settled after 90 s); r+Vr 10⁻³ (σ 154." in told
 
