@@ -150,11 +150,11 @@ def show_last_scan(last) -> None:
     rows = [
         (
             *(row.case, row.filter, row.component, f"{row.t_s:g} s"),
-            f"{row.sigma:#.4g} {row.unit.replace('s2', 's²')}",
-            f"{row.sigma_lo:#.4g} … {row.sigma_hi:#.4g}",
-            known(row.exact_sigma, "{:#.4g}"),
-            known(row.gain_percent, "{:.2f} %"),
-            known(row.gain_lo, "{:.2f} … ") + known(row.gain_hi, "{:.2f}"),
+            f"{figures(row.sigma)} {row.unit.replace('s2', 's²')}",
+            f"{figures(row.sigma_lo)} … {figures(row.sigma_hi)}",
+            known(row.exact_sigma),
+            known(row.gain_percent, ".2f", " %"),
+            known(row.gain_lo, ".2f", " … ") + known(row.gain_hi, ".2f"),
         )
         for row in last.itertuples()
     ]
@@ -162,9 +162,15 @@ def show_last_scan(last) -> None:
     show("", columns, rows, right=columns[3:], spare=("95 % of gain", "exact", "95 %", "gain"))
 
 
-def known(value: float, form: str) -> str:
-    """A number in a form, or nothing for not-a-number."""
-    return form.format(round(value, 12) + 0.0) if value == value else ""
+def figures(value: float, form: str = "#.4g") -> str:
+    """A number in a form, of four figures, as sentences have it: no point at its end, no zero below zero, a minus."""
+    text = format(value, form).removesuffix(".")
+    return (text if float(text) else text.removeprefix("-")).replace("-", "−")
+
+
+def known(value: float, form: str = "#.4g", after: str = "") -> str:
+    """`figures` of a number and what follows it, or nothing for not-a-number."""
+    return figures(value, form) + after if value == value else ""
 
 
 def print_outlook(experiment, outlook) -> None:
@@ -256,6 +262,10 @@ def print_claims(rows: Sequence[dict]) -> None:
     else:
         _print_claim_lines(rows, page.measured)
     say(page.counted(rows) or "no claims are judged by this")
+    if rows and all(row["overall"] == "not run" for row in rows):
+        say(
+            "nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has what came out at full size"
+        )
 
 
 def _print_claim_lines(rows: Sequence[dict], measured: Callable[[Mapping], str]) -> None:

@@ -1,5 +1,6 @@
 """Figures that every study needs, made from the tables alone: σ against time, gain against time."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -17,9 +18,10 @@ MOST = 8  # cases a figure shows; more are told in its caption
 LONGEST_INSIDE = 28  # letters of a name that may stand in a legend inside a panel of many lines
 TIME = "time from the first plot, s"
 SYMBOLS = {"manoeuvre_variance": "$D_M$"}
+GREEK = {"b": "\\beta", "e": "\\varepsilon"}  # bearing and elevation, as the components' names begin or end
 POWERS = ("manoeuvre_variance",)  # swept keys that are read as powers of ten
 KEY_UNITS = {"manoeuvre_variance": "(m/s³)²"}
-UNITS = {"m/s2": "m/s²", "m/s3": "m/s³", "hz": "Hz"}
+UNITS = {"m/s2": "m/s²", "rad/s2": "rad/s²", "m/s3": "m/s³", "hz": "Hz"}
 
 
 class Quantity(NamedTuple):
@@ -61,6 +63,15 @@ def device(result: CaseResult) -> str:
 def swept(result: CaseResult) -> str:
     """The swept keys of a case in short: "D_M = 10⁻³"."""
     return ", ".join(f"{symbol_of(key)} = {number(value, key in POWERS)}" for key, value in result.swept)
+
+
+def letter(component: str) -> str:
+    """A component of the tables as a figure's axis names it: "vb" as $v_\\beta$; a longer name as it is."""
+    found = re.fullmatch(r"([vVa]?)([a-z])", component)
+    if not found:
+        return literal(component)
+    base = GREEK.get(found[2], found[2])
+    return f"${found[1]}_{base}$" if found[1] else f"${base}$"
 
 
 def with_unit(words: str, unit: str) -> str:

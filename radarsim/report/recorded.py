@@ -53,7 +53,7 @@ def estimates(track: Track) -> Figure:
                 words = panels.literal(name)
                 marks.append(Line(track.t_s, x, "", Style(f, f), x - half, x + half, name=words))
         if marks:
-            y = Axis(panels.with_unit(component, unit), limits=_usual(track.estimate[..., c]))
+            y = Axis(panels.with_unit(panels.letter(component), unit), limits=_usual(track.estimate[..., c]))
             made.append(Panel(TIME, y, tuple(marks), direct=False))
     caption = (
         "Estimates over the recorded plots; bands: twice the standard deviation that each filter believes "

@@ -33,7 +33,6 @@ QUANTITIES = {
     "ve": panels.Quantity("$v_\\varepsilon$", "rate of elevation"),
     "ae": panels.Quantity("$a_\\varepsilon$", "second rate of elevation"),
 }
-UNITS = {"rad": "rad", "rad/s": "rad/s", "rad/s2": "rad/s²", "m/s2": "m/s²"}
 WIDE = 150.0
 MOST_IN_PANEL = 5  # filters whose legend leaves room for the curves
 
@@ -81,7 +80,7 @@ def sigma_figure(name, results, curves: Mapping, component: str, of: panels.Quan
             known = v["exact_sigma"] if np.isfinite(v["exact_sigma"]).any() else None
             marks.append(Line(v["t_s"], v["sigma"], f, Style(n, n, n), v["sigma_lo"], v["sigma_hi"], known))
         if marks:
-            y = Axis(f"$\\sigma$ of {of.symbol}, {UNITS.get(unit, unit)}", limits=(0, None))
+            y = Axis(panels.with_unit(f"$\\sigma$ of {of.symbol}", unit), limits=(0, None))
             drawn.append(
                 Panel(Axis(panels.TIME, limits=(0, None)), y, tuple(marks), panels.swept(result), direct=False)
             )

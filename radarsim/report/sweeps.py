@@ -79,7 +79,7 @@ def line_figure(name: str, key: str, members: Sequence[CaseResult], curves: Mapp
                 label = words if n == 0 else ""
                 marks.append(Line(x[order], found[:, 0], label, style, found[:, 1], found[:, 2], exact, words))
         if marks:
-            y = Axis(panels.with_unit(f"$\\sigma$ of {component} at the end", unit), limits=(0, None))
+            y = Axis(panels.with_unit(f"$\\sigma$ of {panels.letter(component)} at the end", unit), limits=(0, None))
             made.append(Panel(axis, y, tuple(marks), direct=False))
     if not made:
         return None
@@ -105,7 +105,7 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
             column, row = (ranked[i].index(_hashable(dict(result.swept)[key])) for i, key in enumerate(keys))
             grid[row, column] = last(result, f, component, curves)[0]
         if np.isfinite(grid).any():
-            heat = Heat(x, y, grid, panels.with_unit(f"$\\sigma$ of {component}", unit))
+            heat = Heat(x, y, grid, panels.with_unit(f"$\\sigma$ of {panels.letter(component)}", unit))
             ticks = [tuple((float(i), panels.number(v)) for i, v in enumerate(values)) for values in ranked]
             axes = (Axis(axis.label, ticks=t) for axis, t in zip((x_axis, y_axis), ticks, strict=True))
             made.append(Panel(*axes, (heat,), panels.literal(f)))

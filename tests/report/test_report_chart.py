@@ -114,6 +114,7 @@ def test_text_is_escaped_everywhere():
 
 def test_mathematical_text():
     assert chart_text.spoken("$\\sigma$ of $V_r$, $\\dot y$, 5 \\$, $10^{-3}$") == "σ of V_r, y\u0307, 5 $, 10^-3"
+    assert chart_text.html("$v_\\beta$") == "<i>v</i><sub>β</sub>"
     assert chart_text.html("$D_M$ & co") == "<i>D</i><sub>M</sub> &amp; co"
     assert chart_text.tspans("a $b_c$ d", 10) == (
         'a <tspan font-style="italic">b</tspan><tspan dy="2.5" font-size="7.5">c</tspan><tspan dy="-2.5"> d</tspan>'

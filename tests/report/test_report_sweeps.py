@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from radarsim import experiment
-from radarsim.report import claims, output, sweeps
+from radarsim.report import chart_text, claims, output, panels, sweeps
 from radarsim.report import tables as common
 from radarsim.report.claims import page
 
@@ -27,6 +27,14 @@ def test_one_key_is_a_family_of_curves():
             np.testing.assert_array_equal(mark.y, [row["sigma"] for row in last])
             np.testing.assert_array_equal(mark.lo, [row["sigma_lo"] for row in last])
             np.testing.assert_array_equal(mark.exact, [row["exact_sigma"] for row in last])
+
+
+@pytest.mark.parametrize(
+    ("component", "words"),
+    [("r", "r"), ("Vr", "V_r"), ("b", "β"), ("vb", "v_β"), ("ab", "a_β"), ("ve", "v_ε"), ("speed", "speed")],
+)
+def test_axes_name_components_by_their_letters(component, words):
+    assert chart_text.spoken(panels.letter(component)) == words
 
 
 def test_two_keys_are_a_map():
