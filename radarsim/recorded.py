@@ -1,6 +1,8 @@
 """The filters of an experiment over recorded plots, and a realisation's plots to try them on."""
 
+import json
 import os
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import import_module
@@ -10,12 +12,16 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from radarsim import plots
+from radarsim.config import lookup
+from radarsim.config.experiment import in_name
 from radarsim.config.load import Case, Experiment
+from radarsim.digits import Twin
 from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
 
 MOST_DRAWN = 2000  # rows kept for figures; of more, every second is dropped again and again
 GAP = 3.0  # intervals' median lengths that make a gap
+MOST_NAMED = 12  # configs or values told where one must be chosen
 HEAD = 5000  # rows that a better σ is looked for on
 
 
@@ -30,16 +36,48 @@ def module_of(study: str):
         return None
 
 
-def one_case(experiment: Experiment, what: str) -> Case:
-    """The one case of an experiment, of a study with plots; raises ConfigError."""
+def one_case(experiment: Experiment, what: str, command: str) -> Case:
+    """The one case of an experiment, of a study with plots; raises ConfigError.
+
+    what is to be done with it, and by which command, its config as {}: a fault names what there is to choose from.
+    """
     place = experiment.path or experiment.stem
     if len(experiment.cases) > 1:
         count = len(experiment.cases)
-        raise ConfigError(f"{place}: must be one case to {what}, got {count}; choose: --set sweep.KEY=[VALUE]")
+        raise ConfigError(f"{place}: must be one case to {what}, got {count}; {choice(experiment, command)}")
     (case,) = experiment.cases
     if module_of(case.study) is None:
         raise ConfigError(f"{place}: study: {case.study} has no filters for recorded plots")
     return case
+
+
+def choice(experiment: Experiment, command: str) -> str:
+    """What cases there are to choose from, and the command for the first: configs put together, or swept values."""
+    stems = list(dict.fromkeys(case.stem for case in experiment.cases))
+    if len(stems) > 1:
+        name = named(str(Path(experiment.path or "").parent / f"{stems[0]}.yaml"))
+        return f"choose one of {listed(stems)}: {command.format(name)}"
+    values: dict[str, list] = {}
+    for case in experiment.cases:
+        for key, value in case.swept:
+            values.setdefault(key, []).append(value)
+    each = {key: list({in_name(value): value for value in found}.values()) for key, found in values.items()}
+    there = "; ".join(f"{key} = {listed([in_name(value) for value in found])}" for key, found in each.items())
+    first = [shlex.quote(f"sweep.{key}={json.dumps(found[:1], ensure_ascii=False)}") for key, found in each.items()]
+    words = " ".join([command.format(named(experiment.path or experiment.stem)), *(f"--set {s}" for s in first)])
+    return f"choose of {there}: {words}"
+
+
+def named(path: str) -> str:
+    """A config as a command names it: by its stem where that finds the same file, or where there is none."""
+    file = Path(path)
+    found = lookup.config_file(file.stem)
+    return shlex.quote(path if file.is_file() and not (found and found.samefile(file)) else file.stem)
+
+
+def listed(words: list[str]) -> str:
+    """Words one after the other; of very many the first."""
+    return ", ".join([*words[:MOST_NAMED], *(["…"] if len(words) > MOST_NAMED else [])])
 
 
 def simulated(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndarray]:
@@ -47,7 +85,7 @@ def simulated(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndar
 
     Columns of equal length, not-a-number where a plot is missed.
     """
-    case = one_case(experiment, "simulate")
+    case = one_case(experiment, "simulate", "radarsim simulate {} -o PLOTS.csv")
     return module_of(case.study).simulated(case, realisation)
 
 
@@ -154,9 +192,12 @@ def follow(
     Memory does not grow with the file where the study's filters go from row to row; others take so many rows at most.
     Raises ConfigError for an experiment of several cases, a study without recorded plots, and faults in the file.
     """
-    case = one_case(experiment, "track with")
+    plots_named = shlex.quote(os.fspath(source)).replace("{", "{{").replace("}", "}}")
+    case = one_case(experiment, "track with", f"radarsim track {{}} {plots_named}")
     study = module_of(case.study)
     tracker, followed = study.Tracker(case), Followed(case)
+    sensor = case.spec.radar if hasattr(case.spec, "radar") else case.spec.sensor
+    twin = Twin(study.Tracker(case), sensor.scan_period_s)
     size = getattr(tracker, "whole", plots.CHUNK)
     try:
         several = getattr(tracker, "several", False)
@@ -164,6 +205,11 @@ def follow(
             if followed.rows and hasattr(tracker, "whole"):
                 raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
             track = tracker.feed(columns)
+            if twin.lost(columns, track):
+                where = f"{source}:{plots.line_of(source, twin.gap_row)}"
+                raise ConfigError(
+                    f"{where}: t_s: after a gap of {twin.gap_s:g} s the filters' numbers are lost in rounding; split the file here"
+                )
             sink(track)
             followed.take(columns, track)
     except LinAlgError as error:

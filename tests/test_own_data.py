@@ -3,6 +3,7 @@
 import csv
 import math
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -239,10 +240,38 @@ def test_studies_without_plots_say_so(tmp_path):
         ("track", "discriminator", tmp_path / "x"),
     ):
         assert "has no filters for recorded plots" in radarsim(*command, code=2).stderr
-    assert (
-        "must be one case to simulate, got 5"
-        in radarsim("simulate", "rls2_manoeuvre_variance", "-o", tmp_path / "x.csv", code=2).stderr
-    )
+
+
+def advised(fault):
+    """The command that a fault ends with."""
+    return shlex.split(fault.strip().rpartition(": radarsim ")[2])
+
+
+def test_one_of_several_cases_is_named_and_the_command_given_works(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fault = radarsim("simulate", "rls2_manoeuvre_variance", "-o", "x.csv", code=2).stderr
+    assert "got 5; choose of manoeuvre_variance = 1e-5, 0.0001, 0.001, 0.01, 0.1: " in fault
+    radarsim(*advised(fault))
+    fault = radarsim("track", "range_doppler", "PLOTS.csv", code=2).stderr
+    assert "must be one case to track with, got 30; choose one of rls1, rls2, rls3, rls4, rls5: " in fault
+    assert advised(fault) == ["track", "rls1", "PLOTS.csv"]
+    radarsim(*advised(fault))
+
+
+def test_the_choice_of_swept_mappings_and_of_configs_elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    radarsim("simulate", "rls2", "-o", "a {b}.csv")
+    away = tmp_path / "away"
+    away.mkdir()
+    turn = "{kind: polynomial, coefficients: [1e5, -100]}"
+    (away / "targets.yaml").write_text(f"include: [rls2]\nsweep:\n  target: [{turn}, turn]\n  scans: [12, 15]\n")
+    radarsim(*advised(radarsim("track", "away/targets.yaml", "a {b}.csv", code=2).stderr))
+    own.new("mine", "rls2")
+    (tmp_path / "mine.yaml").rename(away / "mine.yaml")
+    (away / "both.yaml").write_text("include: [mine, rls2]\n")
+    fault = radarsim("track", "away/both.yaml", "a {b}.csv", code=2).stderr
+    assert advised(fault) == ["track", "away/mine.yaml", "a {b}.csv"]
+    radarsim(*advised(fault))
 
 
 @pytest.mark.slow
