@@ -3,7 +3,9 @@
 import hashlib
 import json
 import os
+import re
 import shutil
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,6 +16,8 @@ from radarsim.engine.blocks import Node, Partial, simulated
 from radarsim.engine.executors import available_cores
 from radarsim.engine.machine import instruction_set
 from radarsim.errors import ConfigError, RadarsimError, StoreError
+
+LOOKS, LOOK_S = 4, 0.25
 
 
 def machine() -> dict[str, str]:
@@ -66,8 +70,7 @@ def inspected(folder: str | os.PathLike, recompute: int = 0) -> Inspection:
     is no folder of results, and where blocks cannot be computed again because the sources that compute have changed.
     """
     found = Inspection(Path(folder))
-    record = _record(found.folder)
-    _outputs(found, record["outputs"])
+    record = _settled(found)
     if hashlib.sha256(_json(record["resolved"])).hexdigest() != record["resolved_sha256"]:
         found.faults.append(f"{found.folder / 'run.json'}: damaged: the config in it is not the one that ran")
     elsewhere = []
@@ -90,6 +93,17 @@ def inspected(folder: str | os.PathLike, recompute: int = 0) -> Inspection:
     return found
 
 
+def _settled(found: Inspection) -> dict:
+    """The record, and its outputs looked at; a few times, where a run beside us may be writing others just now."""
+    for look in range(LOOKS):
+        time.sleep(LOOK_S if look else 0)
+        record, found.outputs, found.faults = _record(found.folder), 0, []
+        _outputs(found, record["outputs"])
+        if not found.faults:
+            break
+    return record
+
+
 def _record(folder: Path) -> dict:
     path = folder / "run.json"
     try:
@@ -97,13 +111,16 @@ def _record(folder: Path) -> dict:
         for key, kind in (("outputs", dict), ("identities", dict), ("cases", dict), ("resolved", dict)):
             if not isinstance(record[key], kind):
                 raise ValueError(f"{key} is no table")
-        record["resolved_sha256"], record["study"], [record["cases"][name]["done"] for name in record["identities"]]
+        record["resolved_sha256"], record["study"]
+        for name, identity in record["identities"].items():
+            if not isinstance(record["cases"][name]["done"], int) or not re.fullmatch("[0-9a-f]{2,128}", identity):
+                raise ValueError(f"identity or realisations of {name} are none")
     except (FileNotFoundError, NotADirectoryError) as error:
         raise ConfigError(f"{folder}: no run.json in it, so it is no folder of results") from error
     except OSError as error:
         raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError) as error:
-        raise StoreError(f"{path}: damaged: {error}; `radarsim report` makes it anew") from error
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise StoreError(f"{path}: damaged, it is no record of a run; `radarsim run` makes it anew") from error
     return record
 
 

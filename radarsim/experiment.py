@@ -211,8 +211,12 @@ def as_last_run(experiment: Experiment, out: Path) -> Experiment:
         numbers = {name: int(case["done"]) for name, case in done.items()}
     except FileNotFoundError:
         return experiment
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise StoreError(f"{out / experiment.stem / 'run.json'}: cannot be read: {error}") from error
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        said = getattr(error, "strerror", None) or "damaged"
+        raise StoreError(
+            f"{out / experiment.stem / 'run.json'}: cannot be read: {said}; `radarsim run` makes it anew, "
+            "and so does `radarsim report` with -n"
+        ) from error
     cases = tuple(replace(case, realisations=numbers.get(case.name, case.realisations)) for case in experiment.cases)
     return replace(experiment, cases=cases, realisations=max(case.realisations for case in cases))
 

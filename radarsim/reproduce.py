@@ -10,6 +10,7 @@ one; the store is safe with both.
 import argparse
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -25,7 +26,7 @@ from queue import SimpleQueue
 from radarsim import console, experiment
 from radarsim.config import lookup
 from radarsim.engine.stopping import Signals
-from radarsim.errors import Interrupted, RadarsimError
+from radarsim.errors import Interrupted, RadarsimError, StoreError
 
 PROCESSES = 2
 LOOK_S = 0.1  # how often a signal is looked for
@@ -33,12 +34,13 @@ LOOK_S = 0.1  # how often a signal is looked for
 
 @dataclass(frozen=True)
 class Done:
-    """One config: its seconds, what it made in words, and its faults if it could not be finished."""
+    """One config: its seconds, what it made in words; its faults and the exit code they deserve, if it has any."""
 
     stem: str
     seconds: float
     words: str
     faults: tuple[str, ...] = ()
+    code: int = 0
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,7 @@ class _Process:
                 self._close_stdin()
                 self._start()
         fault = f"{task.stem}: its process ended with {code}; run again, what it had done is stored"
-        return Done(task.stem, time.perf_counter() - began, f"FAILED: {fault}", (fault,))
+        return Done(task.stem, time.perf_counter() - began, f"FAILED: {fault}", (fault,), 1)
 
     def stop(self, at_once: bool) -> None:
         """Ask it to end: in the midst of a config, which it stores as far as it is, or else after it."""
@@ -155,6 +157,7 @@ class _Process:
 
 def answer() -> None:
     """The program of a process: a Task on each line of stdin, a Done on each of stdout."""
+    threading.Thread(target=_follow, args=(os.getppid(),), daemon=True).start()
     with Signals() as stop:
         try:
             for line in sys.stdin:
@@ -168,6 +171,13 @@ def answer() -> None:
             os._exit(1)
 
 
+def _follow(parent: int) -> None:
+    """End this process, which stores what it has, once the one that asked is gone."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
 def _run(task: Task, stop: Signals) -> Done:
     started = time.perf_counter()
     try:
@@ -175,12 +185,12 @@ def _run(task: Task, stop: Signals) -> Done:
         verdicts = ", ".join(f"{len(names)} {verdict}" for verdict, names in result.verdicts().items())
         drawn = sum(name.endswith(".svg") for name in result.written.files)
         words = [console.plural(drawn, "figure")] if task.figures else []
-        words, faults = [*words, *([f"claims: {verdicts}"] if verdicts else [])], ()
+        words, faults, code = [*words, *([f"claims: {verdicts}"] if verdicts else [])], (), 0
     except Interrupted:
         raise
     except RadarsimError as error:
-        words, faults = [f"FAILED: {error.lines[0]}"], error.lines
-    return Done(task.stem, time.perf_counter() - started, "; ".join(words), tuple(faults))
+        words, faults, code = [f"FAILED: {error.lines[0]}"], error.lines, error.exit_code
+    return Done(task.stem, time.perf_counter() - started, "; ".join(words), tuple(faults), code)
 
 
 def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
@@ -192,12 +202,14 @@ def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
     overall = Counter({row["claim"]: row["overall"] for row in rows}.values())
     longest = max(done, key=lambda one: one.seconds)
     failed = [one.stem for one in done if one.faults]
+    guide = Path(out) / "README.md"
+    told = f"; {guide} says what lies where" if guide.is_file() else ""
     return [
         "",
         f"claims   {sum(overall.values())}: " + ", ".join(f"{count} {verdict}" for verdict, count in overall.items()),
         f"time     {console.clock(seconds)} for {console.plural(len(done), 'config')}, "
         f"the longest {longest.stem}, {longest.seconds:.0f} s",
-        f"where    {Path(out) / 'index.html'} leads to every report; {Path(out) / 'README.md'} says what lies where",
+        f"where    {Path(out) / 'index.html'} leads to every report{told}",
         *([f"failed   {', '.join(failed)}"] if failed else []),
     ]
 
@@ -213,14 +225,22 @@ def main(arguments: Sequence[str]) -> int:
     with Signals() as stop:
         try:
             loaded = experiment.load_all(asked.configs or lookup.stems("configs"), asked.set)
-            stems = [one.stem for one in loaded]
+            stems = list(dict.fromkeys(one.stem for one in loaded))
             done = reproduce(stems, asked.out, console.say, stop, asked.set, not asked.no_figures)
             for line in summary(done, asked.out, time.perf_counter() - started):
                 console.say(line)
+            sys.stdout.flush()
         except RadarsimError as error:
             sys.stderr.write("".join(f"{line}\n" for line in error.lines))
             return error.exit_code
-    return 1 if any(one.faults for one in done) else 0
+        except BrokenPipeError:  # its reader has seen enough
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+            return 0
+        except OSError as error:
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+            sys.stderr.write(f"output: cannot be written: {error.strerror or error}\n")
+            return StoreError.exit_code
+    return max((one.code for one in done), default=0)
 
 
 if __name__ == "__main__":

@@ -3,11 +3,12 @@
 import json
 import os
 import random
+import re
 import shutil
 
 import pytest
 
-from radarsim import selftest
+from radarsim import doctor, selftest
 from tests.engine.test_engine_audit import damage
 from tests.engine.test_engine_damage import reforged
 from tests.test_cli import csv_bytes
@@ -93,6 +94,8 @@ def test_forged_sums_are_found_by_computing_them_again(out):
         (lambda path: path.unlink(), 2, "no run.json in it"),
         (lambda path: path.write_text("{"), 4, "run.json: damaged"),
         (lambda path: path.write_text("[]"), 4, "run.json: damaged"),
+        (lambda path: path.write_text("[" * 100_000), 4, "run.json: damaged"),
+        (lambda path: path.write_text(re.sub('"rls2": "[0-9a-f]+"', '"rls2": "../x"', path.read_text())), 4, "damaged"),
         (lambda path: path.write_text(path.read_text().replace('"r+Vr"', '"r+vr"')), 4, "run.json: damaged"),
         (
             lambda path: path.write_text(path.read_text().replace('"curves.csv"', '"../../etc"')),
@@ -104,6 +107,38 @@ def test_forged_sums_are_found_by_computing_them_again(out):
 def test_a_spoiled_record_is_told(out, spoil, code, words):
     spoil(out / "rls2" / "run.json")
     assert words in command("doctor", out / "rls2", code=code).stderr
+
+
+def test_a_record_beyond_reading_is_made_anew_as_told(out):
+    whole = contents(out / "rls2").keys()
+    (out / "rls2" / "run.json").write_text("[" * 100_000)
+    told = command("report", "rls2", "--no-figures", "--out", out, code=4).stderr
+    assert "`radarsim run` makes it anew, and so does `radarsim report` with -n" in told
+    command("report", "rls2", "-n", 50_001, "--no-figures", "--out", out)
+    command("run", "rls1", "-n", 50_001, "--no-figures", "--quiet", "--out", out)  # the index reads all records
+    assert contents(out / "rls2").keys() == whole
+    assert "all whole" in command("doctor", out / "rls2").stdout
+
+
+def test_what_is_no_file_is_not_waited_for(out):
+    identity = json.loads((out / "rls2" / "run.json").read_text())["identities"]["rls2"]
+    pipe, device = sorted((out / ".blocks" / identity).glob("*.sums"))[:2]
+    pipe.unlink()
+    os.mkfifo(pipe)
+    device.unlink()
+    device.symlink_to("/dev/zero")
+    told = command("doctor", out / "rls2", code=4).stderr
+    assert f"{pipe}: damaged: no regular file" in told
+    assert f"{device}: damaged: no regular file" in told
+    command("run", "rls2", "-n", 60_001, "--no-figures", "--quiet", "--out", out)
+
+
+def test_outputs_that_a_run_is_writing_are_looked_at_again(out, monkeypatch):
+    path = out / "rls2" / "curves.csv"
+    whole = path.read_bytes()
+    path.write_bytes(whole + b"\n")
+    monkeypatch.setattr(doctor.time, "sleep", lambda seconds: path.write_bytes(whole) if seconds else None)
+    assert "all whole" in command("doctor", out / "rls2").stdout
 
 
 def test_a_result_without_blocks_stands_on_its_own(out):

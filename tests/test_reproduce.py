@@ -30,7 +30,7 @@ def test_a_fault_is_told_and_the_rest_runs(tmp_path):
     told = []
     done = reproduce.reproduce(["rls2", "rls4"], str(tmp_path), told.append, overrides=SMALL, figures=False)
     assert any("rls2" in line and "FAILED: " in line for line in told)
-    assert {one.stem: bool(one.faults) for one in done} == {"rls2": True, "rls4": False}
+    assert {one.stem: (bool(one.faults), one.code) for one in done} == {"rls2": (True, 4), "rls4": (False, 0)}
     assert "failed   rls2" in reproduce.summary(done, str(tmp_path), 1.0)
 
 
@@ -60,3 +60,31 @@ def test_a_signal_ends_it_and_its_processes_in_time(tmp_path):
         assert time.monotonic() < sent + 3
         assert "run the same command again to continue" in run.stderr.read()  # until the last process has closed it
         assert time.monotonic() < sent + 4
+
+
+def test_output_that_nobody_can_take(tmp_path):
+    shell = f"{sys.executable} -m radarsim.reproduce {tmp_path} rls2 rls2 --no-figures --set realisations=100"
+    full = subprocess.run(f"{shell} > /dev/full", shell=True, capture_output=True, text=True, check=False)
+    assert full.returncode == 4
+    assert full.stderr == "output: cannot be written: No space left on device\n"
+    piped = subprocess.run(["bash", "-c", f"{shell} | head -0"], capture_output=True, text=True, check=False)
+    assert piped.stderr == ""
+
+
+def test_its_processes_end_with_it(tmp_path):
+    command = [
+        sys.executable,
+        "-m",
+        "radarsim.reproduce",
+        str(tmp_path),
+        "manoeuvre_variance",
+        "--set",
+        "realisations=1e9",
+    ]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as run:
+        time.sleep(3)
+        run.kill()
+        run.wait()
+        killed = time.monotonic()
+        run.stderr.read()  # ends when the last process has closed it
+        assert time.monotonic() < killed + 5

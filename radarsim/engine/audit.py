@@ -12,7 +12,7 @@ import numpy as np
 
 from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, added, maximal, widest
 from radarsim.engine.moments import Sums
-from radarsim.engine.store import SUFFIX, Damage, decoded, piece_named
+from radarsim.engine.store import SUFFIX, Damage, content, decoded, piece_named
 from radarsim.errors import StoreError
 
 LEFT = re.compile(r"\.[LPT][\d-]+\.sums\.[0-9a-f]+\.tmp")  # by a run that was killed while it wrote
@@ -59,7 +59,7 @@ def _names(path: Path) -> list[str]:
 def _read(found: Audit, piece: Piece) -> None:
     path = found.path / (piece.name + SUFFIX)
     try:
-        header, values = decoded(path.read_bytes())
+        header, values = decoded(content(path))
         _check(header, values, piece, found.path.name)
     except OSError as error:
         found.faults.append(f"{path}: cannot be read: {error.strerror}")

@@ -18,6 +18,7 @@ import hashlib
 import json
 import os
 import re
+import stat
 import time
 import uuid
 from collections.abc import Collection, Mapping
@@ -85,8 +86,7 @@ class Store:
         """
         path = self.path / (piece.name + SUFFIX)
         try:
-            raw = path.read_bytes()
-            header, values = decoded(raw)
+            header, values = decoded(content(path))
             self._check(header, values, piece)
         except FileNotFoundError:
             return None
@@ -205,6 +205,15 @@ def encoded(header: Mapping, values: np.ndarray) -> bytes:
     """The content of a file."""
     body = MAGIC + json.dumps(header, sort_keys=True).encode() + b"\n" + values.astype("<f8").tobytes()
     return body + hashlib.sha256(body).digest()
+
+
+def content(path: Path) -> bytes:
+    """What a stored file holds; Damage for a pipe, a device or a directory, which nobody here has put there."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # or a pipe would wait for a writer
+    with open(descriptor, "rb") as file:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise Damage("no regular file")
+        return file.read()
 
 
 def decoded(raw: bytes) -> tuple[dict, np.ndarray]:

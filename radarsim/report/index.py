@@ -33,7 +33,7 @@ def _run(path: Path) -> dict | None:
             "realisations": provenance.span(sorted({int(case["done"]) for case in record["cases"].values()})),
             "finished": _finished(record, path),
         }
-    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
     return made | {"claims": _claims(path.parent / "claims.csv")}
 

@@ -60,7 +60,7 @@ def outputs(folder: Path) -> list[str]:
     """The outputs that an earlier run.json of the folder names; none where there is no such record."""
     try:
         named = json.loads((folder / "run.json").read_bytes())["outputs"]
-    except (OSError, ValueError, LookupError, TypeError):
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
         return []
     return [path for path in named if isinstance(path, str)] if isinstance(named, dict) else []
 
