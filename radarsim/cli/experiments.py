@@ -5,6 +5,7 @@ import click
 from radarsim.cli.group import (
     Positive,
     Share,
+    completed,
     configs_argument,
     figures_option,
     format_option,
@@ -179,7 +180,7 @@ def report(configs, realisations, seed, overrides, out, no_figures, formats, as_
 
 
 @main.command()
-@click.argument("configs", nargs=-1, metavar="[CONFIG…]")
+@click.argument("configs", nargs=-1, metavar="[CONFIG…]", shell_complete=completed)
 @out_option
 @json_option
 @click.option("--markdown", is_flag=True, help="The page docs/claims.md on stdout in place of words.")

@@ -1,5 +1,6 @@
 """The group of commands: what all share of options, faults and exit codes."""
 
+import contextlib
 import math
 import os
 import re
@@ -131,12 +132,32 @@ def main():
       radarsim claims                            what the papers claim, and what came out
       radarsim new mine --like rls2              a radar of one's own
 
-    Commands and options complete with the tab key after
+    Commands, options and configs complete with the tab key after
     `eval "$(_RADARSIM_COMPLETE=bash_source radarsim)"` (bash; zsh_source, fish_source likewise).
     """
 
 
-configs_argument = click.argument("configs", nargs=-1, required=True, metavar="CONFIG…")
+def completed(ctx, param, incomplete):
+    """What may stand for a config on the command line: the stems that are found, YAML files, and folders to look in."""
+    from click.shell_completion import CompletionItem
+
+    from radarsim.config import lookup
+
+    folder, begun = os.path.split(incomplete)
+    found = [CompletionItem(stem) for stem in lookup.stems("configs") if not folder and stem.startswith(begun)]
+    with contextlib.suppress(OSError), os.scandir(folder or ".") as entries:
+        for entry in sorted(entries, key=lambda one: one.name):
+            if entry.name.startswith(begun) and (begun.startswith(".") or not entry.name.startswith(".")):
+                path = os.path.join(folder, entry.name)
+                if entry.is_dir():
+                    found.append(CompletionItem(path, type="dir"))
+                elif entry.name.endswith(".yaml"):
+                    found.append(CompletionItem(path))
+    return found
+
+
+configs_argument = click.argument("configs", nargs=-1, required=True, metavar="CONFIG…", shell_complete=completed)
+config_argument = click.argument("config", metavar="CONFIG", shell_complete=completed)
 out_option = click.option("--out", default="results", show_default=True, metavar="DIR", help="Where results are kept.")
 set_option = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key by its dotted path; repeatable."

@@ -2,12 +2,18 @@
 
 import click
 
-from radarsim.cli.group import Count, main, set_option
+from radarsim.cli.group import Count, completed, config_argument, main, set_option
 
 
 @main.command()
 @click.argument("name", metavar="NAME")
-@click.option("--like", required=True, metavar="CONFIG", help="The config to begin from: `radarsim list` names them.")
+@click.option(
+    "--like",
+    required=True,
+    metavar="CONFIG",
+    shell_complete=completed,
+    help="The config to begin from: `radarsim list` names them.",
+)
 def new(name, like):
     """A commented config of one's own: ./NAME.yaml.
 
@@ -26,7 +32,7 @@ def new(name, like):
 
 
 @main.command()
-@click.argument("config", metavar="CONFIG")
+@config_argument
 @click.option("-o", "--output", required=True, metavar="PLOTS.csv", help="Where the plots are written.")
 @click.option("-i", "--realisation", type=Count(), default=0, show_default=True, help="Which realisation, from 0.")
 @set_option
@@ -51,7 +57,7 @@ def simulate(config, output, realisation, overrides):
 
 
 @main.command()
-@click.argument("config", metavar="CONFIG")
+@config_argument
 @click.argument("plots", metavar="PLOTS.csv")
 @click.option("-o", "--output", metavar="TRACK.csv", help="Where the track is written; default: to the terminal.")
 @click.option("--figures", metavar="DIR", help="Draw track, residuals and probabilities of the models into DIR.")
