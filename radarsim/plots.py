@@ -6,6 +6,7 @@ fall), an empty cell means missing, other columns are ignored.
 
 import contextlib
 import csv
+import itertools
 import math
 import os
 import tempfile
@@ -47,6 +48,14 @@ def chunks(
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is not UTF-8 text") from error
+
+
+def line_of(path: str | os.PathLike, row: int) -> int:
+    """The line in which a row of numbers, counted from 0, ends."""
+    with open(path, encoding="utf-8-sig", newline="") as file:
+        rows = csv.reader(file, strict=True)
+        numbers = (rows.line_num for cells in rows if cells)
+        return next(itertools.islice(numbers, row + 1, None))
 
 
 class _Reader:

@@ -206,10 +206,9 @@ def follow(
                 raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
             track = tracker.feed(columns)
             if twin.lost(columns, track):
-                where = f"{source}:{plots.line_of(source, twin.gap_row)}"
-                raise ConfigError(
-                    f"{where}: t_s: after a gap of {twin.gap_s:g} s the filters' numbers are lost in rounding; split the file here"
-                )
+                line = plots.line_of(source, twin.gap_row)
+                fault = f"after a gap of {twin.gap_s:g} s a filter's numbers are lost in rounding: split the file here"
+                raise ConfigError(f"{source}:{line}: t_s: {fault}")
             sink(track)
             followed.take(columns, track)
     except LinAlgError as error:
