@@ -3,6 +3,7 @@
 import csv
 import math
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -307,6 +308,15 @@ def test_the_example_files_are_what_simulate_writes(tmp_path, name):
     assert made[0] == kept[0]
     to_numbers = [np.array([[float(cell or "nan") for cell in row] for row in rows[1:]]) for rows in (made, kept)]
     np.testing.assert_allclose(*to_numbers, rtol=1e-12, atol=1e-9)
+
+
+def test_the_page_names_a_config_for_every_example_file(tmp_path):
+    page = Path("docs/howto/own_plots.md").read_text(encoding="utf-8")
+    named = dict(re.findall(r"^\| `(\w+\.csv)` \| `([^`]+)` \|$", page, re.MULTILINE))
+    assert set(named) == {path.name for path in Path("docs/examples").iterdir()}
+    for name, config in named.items():
+        first, *options = shlex.split(config)
+        radarsim("track", first, Path("docs/examples") / name, *options, "-o", tmp_path / "track.csv")
 
 
 @pytest.mark.parametrize("like", lookup.stems("configs"))
