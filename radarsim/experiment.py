@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from radarsim import simulation, studies, timing
+from radarsim import simulation, stored_claims, studies, timing
 from radarsim.config import lookup
 from radarsim.config.load import Experiment, load
 from radarsim.engine import stopping
@@ -261,7 +261,7 @@ def claims(configs: Sequence[str], out: str | os.PathLike) -> list[dict]:
     from radarsim.report import claims as papers
 
     stems = [one.stem for one in load_all(configs)] or sorted({claim.config for claim in papers.all_claims()})
-    held = {stem: rows for stem in stems if (rows := _stored_claims(Path(out) / stem / "claims.csv")) is not None}
+    held = {stem: rows for stem in stems if (rows := stored_claims.stored(Path(out) / stem / "claims.csv")) is not None}
     if not configs:
         return papers.listed(held)
     rows = []
@@ -271,25 +271,3 @@ def claims(configs: Sequence[str], out: str | os.PathLike) -> list[dict]:
         else:
             rows += [row for row in papers.listed({}) if row["config"] == stem]
     return rows
-
-
-def _stored_claims(path: Path) -> list[dict] | None:
-    """The rows of a stored claims.csv, numbers as such; None if there is none."""
-    import csv  # and not pandas, which takes half a second to load
-
-    from radarsim.report.claims import NUMBERS
-
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            table = csv.DictReader(file, strict=True)
-            rows, names = list(table), set(table.fieldnames or ())
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError, csv.Error) as error:
-        raise StoreError(f"{path}: cannot be read: {error}") from error
-    try:
-        if {"claim", "verdict", "overall", *NUMBERS} <= names:
-            return [row | {name: float(row[name]) if row[name] else "" for name in NUMBERS} for row in rows]
-    except (LookupError, TypeError, ValueError):
-        pass  # it is told like any other spoiled table
-    raise StoreError(f"{path}: is no table of claims; `radarsim report` makes it anew")
