@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from radarsim import simulation, stored_claims, studies, timing
+from radarsim import arguments, simulation, stored_claims, studies, timing
 from radarsim.config import lookup
 from radarsim.config.load import Experiment, load
 from radarsim.engine import stopping
@@ -74,6 +74,10 @@ def run(
     >>> len(result.curves) > 50
     True
     """
+    arguments.check(
+        **{"threads": threads, "workers": workers, "precision": precision, "time_limit": time_limit},
+        **{"executor": executor, "out": out},
+    )
     overrides = merged(overrides, realisations, seed)
     experiment = config if isinstance(config, Experiment) else load(config, overrides)
     if precision is not None:
@@ -81,7 +85,7 @@ def run(
     limit = time_limit if time_limit is None or callable(time_limit) else stopping.time_limit(time_limit)
     started = time.perf_counter()
     with cluster(workers, scheduler) if executor is None else nullcontext(executor) as pool:
-        threads = pool.workers if pool else threads or available_cores()
+        threads = pool.workers if pool else int(threads or available_cores())
         means = Means(out, threads, stopping.Either(stop, limit), pool)
         gathered = simulation.simulated(experiment, means, progress=progress, precision=precision)
         if stop is not None:
@@ -179,6 +183,7 @@ def load_result(config, *, out: str | os.PathLike = RESULTS, overrides: Sequence
 
 def from_store(experiment: Experiment, out: str | os.PathLike, overrides: Sequence[str]) -> Result:
     """The result from stored blocks alone; as many realisations as the last run, where overrides do not say."""
+    arguments.directory(out)
     if not any(override.split("=")[0].strip() == "realisations" for override in overrides):
         experiment = as_last_run(experiment, Path(out))
     held, missing = Gathered(), []

@@ -96,6 +96,17 @@ class Positive(click.ParamType):
         return number
 
 
+class Directory(click.ParamType):
+    """The name of a directory, there or not: an empty one would be the working directory."""
+
+    name = "DIR"
+
+    def convert(self, value, param, ctx):
+        if not value:
+            self.fail("must name a directory, got ''", param, ctx)
+        return value
+
+
 class Share(click.ParamType):
     """Which share of how many: 2/3."""
 
@@ -158,7 +169,9 @@ def completed(ctx, param, incomplete):
 
 configs_argument = click.argument("configs", nargs=-1, required=True, metavar="CONFIG…", shell_complete=completed)
 config_argument = click.argument("config", metavar="CONFIG", shell_complete=completed)
-out_option = click.option("--out", default="results", show_default=True, metavar="DIR", help="Where results are kept.")
+out_option = click.option(
+    "--out", type=Directory(), default="results", show_default=True, metavar="DIR", help="Where results are kept."
+)
 set_option = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override a key by its dotted path; repeatable."
 )

@@ -29,7 +29,13 @@ def load(source: str | os.PathLike | Mapping, overrides: Iterable[str] = ()) -> 
     """
     faults = Faults()
     settings = [setting for text in overrides if (setting := _setting(str(text), faults))]
-    document = _from_mapping(source, faults) if isinstance(source, Mapping) else _from_user(source, faults)
+    if isinstance(source, Mapping):
+        document = _from_mapping(source, faults)
+    elif isinstance(source, str | bytes | os.PathLike):
+        document = _from_user(source, faults)
+    else:
+        document = None
+        faults.add(Origin("config"), (), f"must be a path, a name or a mapping, got {repr(source)[:60]}")
     experiment = document and Expander(read, settings, faults).experiment(document)
     faults.raise_if_any()
     return experiment

@@ -1,0 +1,84 @@
+"""What Python gives to `run` is refused as the command refuses its options: a ConfigError with a line for each."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import radarsim
+from radarsim.cli import main
+from radarsim.engine.executors import Threads
+
+COUNT, ABOVE = "must be a whole number from 1 to 1024, got", "must be > 0"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ({"threads": -1}, f"threads: {COUNT} -1"),
+        ({"threads": 0}, f"threads: {COUNT} 0"),
+        ({"threads": "2"}, f"threads: {COUNT} '2'"),
+        ({"threads": 1.5}, f"threads: {COUNT} 1.5"),
+        ({"threads": True}, f"threads: {COUNT} True"),
+        ({"workers": 0}, f"workers: {COUNT} 0"),
+        ({"workers": "a"}, f"workers: {COUNT} 'a'"),
+        ({"time_limit": math.nan}, f"time_limit: {ABOVE}, got nan"),
+        ({"time_limit": 0}, f"time_limit: {ABOVE}, got 0"),
+        ({"time_limit": -1}, f"time_limit: {ABOVE}, got -1"),
+        ({"time_limit": "1"}, f"time_limit: {ABOVE}, got '1'"),
+        ({"precision": "a"}, f"precision: {ABOVE} and ≤ 100 %, got 'a'"),
+        ({"precision": 101}, f"precision: {ABOVE} and ≤ 100 %, got 101"),
+        ({"executor": 5}, "executor: must be an executor of radarsim.engine, got 5"),
+        ({"out": ""}, "out: must name a directory, got ''"),
+        ({"out": 5}, "out: must name a directory, got 5"),
+        ({"out": b"x"}, "out: must name a directory, got b'x'"),
+    ],
+)
+def test_an_argument_that_is_none(arguments, line):
+    with pytest.raises(radarsim.ConfigError) as caught:
+        radarsim.run("rls2", realisations=10, **arguments)
+    assert caught.value.lines == (line,)
+
+
+def test_all_of_them_at_once():
+    with pytest.raises(radarsim.ConfigError) as caught:
+        radarsim.run("rls2", threads=0, workers=0, out="")
+    assert [line.split(":")[0] for line in caught.value.lines] == ["threads", "workers", "out"]
+
+
+def test_numbers_of_numpy_paths_and_executors_are_taken(tmp_path):
+    ran = {"realisations": np.int64(10), "threads": np.int64(1), "time_limit": np.float64(60), "figures": False}
+    assert radarsim.run("rls2", out=Path(tmp_path), **ran).written
+    with_pool = Threads(1)
+    try:
+        assert len(radarsim.run("rls2", realisations=10, executor=with_pool).curves)
+    finally:
+        with_pool.close()
+
+
+@pytest.mark.parametrize("config", [None, 5, [], [1], math.nan])
+def test_a_config_that_is_none(config):
+    with pytest.raises(radarsim.ConfigError) as caught:
+        radarsim.run(config)
+    (line,) = caught.value.lines
+    assert line.startswith("config: must be a path, a name or a mapping, got ")
+    assert repr(config) in line
+
+
+def test_a_key_that_is_no_text_is_named():
+    with pytest.raises(radarsim.ConfigError) as caught:
+        radarsim.run({"study": "range_doppler", 1: 2})
+    assert any(line.startswith("config: 1: unknown key") for line in caught.value.lines)
+
+
+@pytest.mark.parametrize("words", [["run", "rls2", "-n", "10"], ["report", "rls2"], ["claims"], ["clean"]])
+def test_no_directory_without_a_name(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ended = CliRunner().invoke(main, [*words, "--out", ""])
+    assert ended.exit_code == 2
+    assert "'--out': must name a directory, got ''" in ended.output
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(radarsim.ConfigError, match="out: must name a directory"):
+        radarsim.load("rls2", out="")
