@@ -38,7 +38,7 @@ def number(value, powers: bool = False) -> str:
     power = f"{value:.0e}".partition("e")[2]
     if value != 0 and float(f"1e{power}") == value and (abs(int(power)) > 1 or (powers and int(power) < 0)):
         return "10" + str(int(power)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"{value:.4g}"
+    return f"{value:.4g}".replace("-", "−")
 
 
 def literal(text: str) -> str:

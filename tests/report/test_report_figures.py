@@ -127,7 +127,7 @@ def test_any_name_can_be_drawn(name, expected_radar):
 def test_numbers_for_people():
     assert [panels.number(v, powers=True) for v in (1e-3, 0.1, 1, 250.0)] == ["10⁻³", "10⁻¹", "1", "250"]
     assert [panels.number(v) for v in (1e-3, 0.1, 1, 10, 1e5, 250.0, 0.00025, -2.5, "turn", True)] == [
-        *("10⁻³", "0.1", "1", "10", "10⁵", "250", "0.00025", "-2.5", "turn", "True")
+        *("10⁻³", "0.1", "1", "10", "10⁵", "250", "0.00025", "−2.5", "turn", "True")
     ]
 
 
