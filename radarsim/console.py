@@ -187,9 +187,12 @@ def print_outlook(experiment, outlook) -> None:
     seconds = "under a second" if outlook.seconds < 1 else "about " + clock(outlook.seconds)
     realisations = sum(case.realisations for case in outlook.cases)
     say(
-        f"total    {plural(len(outlook.cases), 'case')}, {realisations:,} realisations, {seconds} on "
-        f"{plural(outlook.threads, 'thread')}, {outlook.memory_mb:.0f} MB; figures and tables take some seconds more"
+        f"total    {plural(len(outlook.cases), 'case')}, {realisations:,} realisation{'s' * (realisations != 1)}, "
+        f"{seconds} on {plural(outlook.threads, 'thread')}, {outlook.memory_mb:.0f} MB; "
+        "figures and tables take some seconds more"
     )
+    for warning in outlook.warnings:
+        sys.stderr.write(f"warning: {printable(warning)}\n")
 
 
 def print_needs(experiment, outlook) -> None:
@@ -263,9 +266,7 @@ def print_claims(rows: Sequence[dict]) -> None:
         _print_claim_lines(rows, page.measured)
     say(page.counted(rows) or "no claims are judged by this")
     if rows and all(row["overall"] == "not run" for row in rows):
-        say(
-            "nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has what came out at full size"
-        )
+        say("nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has what came out at full size")
 
 
 def _print_claim_lines(rows: Sequence[dict], measured: Callable[[Mapping], str]) -> None:

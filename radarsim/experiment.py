@@ -37,7 +37,6 @@ def load_all(sources: Sequence, overrides: Sequence[str] = ()) -> list[Experimen
 
 
 RESULTS = "results"  # the command's default directory
-NO_CONTROL = "control_variate: no filter beside a baseline whose sigma is known exactly: no controlled.csv"
 SHORT = {"realisations": "-n", "seed": "--seed"}
 
 
@@ -205,7 +204,7 @@ def result_of(experiment: Experiment, gathered: Gathered, facts: dict, overrides
     """The result; with a warning where a control variate is asked for and no case has one."""
     result = Result(experiment, finished(gathered), facts | repeated(experiment, overrides))
     if experiment.control_variate and not len(result.tables.get("controlled", ())):
-        facts["warnings"].append(NO_CONTROL)
+        facts["warnings"].append(simulation.NO_CONTROL)
     return result
 
 

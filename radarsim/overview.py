@@ -13,7 +13,7 @@ from radarsim.config import lookup
 from radarsim.config.load import Experiment
 from radarsim.engine.collect import collect
 from radarsim.engine.executors import available_cores
-from radarsim.simulation import check_precision, result_of
+from radarsim.simulation import NO_CONTROL, check_precision, result_of
 
 PILOT_S = 0.3  # of all cases together, unless single realisations take longer
 LADDER, FOR_NOTHING = 8, 1.2  # so many times more realisations at a look; times as good as equal
@@ -52,6 +52,7 @@ class Outlook:
     seconds: float
     memory_mb: float
     precision: float | None = None
+    warnings: tuple[str, ...] = ()
 
 
 def outlook(
@@ -68,7 +69,7 @@ def outlook(
     threads = threads or available_cores()
     if precision is not None:
         check_precision([experiment], precision)
-    cases, largest, preparing = [], 0, 0.0
+    cases, largest, preparing, control = [], 0, 0.0, False
     studies.study(experiment.study).prepare(experiment.cases[0])  # what it loads is not to be timed
     for done, case in enumerate(experiment.cases, 1):
         work, started = studies.CaseWork(case), time.perf_counter()
@@ -80,12 +81,21 @@ def outlook(
         count = case.realisations if need is None else ending(need, case.realisations)
         axes = work.plan.axes
         cases.append(CaseOutlook(case.name, ", ".join(axes.filters), len(axes.k), count, each * count, need))
+        control |= experiment.control_variate and controls(axes)
         largest = max(largest, work.size)
         if progress is not None:
             progress(done, len(experiment.cases), 0)
     # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter and its libraries.
     memory = 200 + 8e-6 * largest * (2 * threads + 32)
-    return Outlook(tuple(cases), threads, preparing + sum(c.seconds for c in cases) / threads, memory, precision)
+    seconds = preparing + sum(c.seconds for c in cases) / threads
+    warnings = (NO_CONTROL,) if experiment.control_variate and not control else ()
+    return Outlook(tuple(cases), threads, seconds, memory, precision, warnings)
+
+
+def controls(axes) -> bool:
+    """Whether the baseline's σ is known exactly somewhere where another filter has one too."""
+    known = axes.available[axes.baseline] & np.isfinite(np.asarray(axes.exact_sigma, dtype=float)[axes.baseline])
+    return bool((np.delete(axes.available, axes.baseline, axis=0) & known).any())
 
 
 def needed(work: studies.CaseWork, percent: float, seconds_each: float) -> Need:

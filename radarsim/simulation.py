@@ -14,6 +14,7 @@ from radarsim.engine.run import Collected, Shared
 from radarsim.errors import ConfigError
 
 Progress = Callable[[int, int, int], None]
+NO_CONTROL = "control_variate: no filter beside a baseline whose sigma is known exactly: no controlled.csv"
 
 
 @dataclass

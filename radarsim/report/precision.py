@@ -14,7 +14,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import output
 
 FIRST = 2000
-MOST = 2**40 * FIRST
+MOST = 10**12  # realisations, as in a config
 
 
 @dataclass(frozen=True)
