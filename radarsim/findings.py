@@ -27,6 +27,8 @@ def _rows(followed) -> list[str]:
     missing = ", ".join(f"{count} of {name}" for name, count in followed.missing.items() if count)
     if missing:
         lines.append(f"missing  {missing}")
+    if followed.silent:
+        lines.append(f"no rows  {', '.join(followed.silent)}: never an estimate from these plots")
     if followed.gaps:
         longest = f"the longest {followed.longest_gap_s:g} s, after {followed.longest_gap_at_s:g} s"
         lines.append(

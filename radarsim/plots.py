@@ -9,6 +9,7 @@ import csv
 import itertools
 import math
 import os
+import re
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -20,6 +21,8 @@ from radarsim.errors import ConfigError, StoreError
 
 MOST_FAULTS = 20  # told at once; a file of the wrong kind would have one in each row
 LARGEST = 1e18  # of any number, as in configs
+SEPARATORS = {";": "semicolons", "\t": "tabulators"}  # of other programs
+DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
 CHUNK = 20_000  # rows read, filtered and written at a time
 
 
@@ -141,7 +144,8 @@ class _Reader:
             value = math.nan
         if not abs(value) <= LARGEST or "_" in text:
             where = f"{self.path}:{line}:{place + 1}: {name}"
-            self.faults.append(f"{where}: must be a finite number, got {text[:60]!r}")
+            hint = " (a decimal point, not a comma)" if DECIMAL_COMMA.fullmatch(text) else ""
+            self.faults.append(f"{where}: must be a finite number, got {text[:60]!r}{hint}")
             return math.nan
         return value
 
@@ -167,7 +171,9 @@ def _chosen(path: str, header: list[str], choices: Sequence[Sequence[str]]) -> l
             return list(choice)
     allowed = " or ".join(", ".join(choice) for choice in choices)
     given = "".join(c if c.isprintable() else "�" for c in ", ".join(header)[:200])
-    raise ConfigError(f"{path}:1: must have the columns {allowed}; got {given or 'nothing'}")
+    between = next((words for sign, words in SEPARATORS.items() if len(header) == 1 and sign in header[0]), None)
+    hint = f" (commas must stand between cells, not {between}, and a point in numbers)" if between else ""
+    raise ConfigError(f"{path}:1: must have the columns {allowed}; got {given or 'nothing'}{hint}")
 
 
 def header_of(track: Track) -> tuple[str, ...]:

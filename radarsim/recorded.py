@@ -118,6 +118,7 @@ class Followed:
     longest_gap_s: float = 0.0
     longest_gap_at_s: float = np.nan
     tallies: dict[tuple[str, str], Tally] = field(default_factory=dict)
+    estimating: set[str] = field(default_factory=set)
     drawn: list[Track] = field(default_factory=list)
     stride: int = 1
     head: dict[str, np.ndarray] = field(default_factory=dict)
@@ -127,6 +128,8 @@ class Followed:
         """Count one more piece of the file."""
         t = columns["t_s"]
         self._gaps(np.unique(t))
+        estimates = np.isfinite(track.estimate).any(axis=(1, 2))
+        self.estimating |= {name for name, some in zip(track.filters, estimates, strict=True) if some}
         for name, column in list(columns.items())[1:]:
             self.missing[name] = self.missing.get(name, 0) + int(np.isnan(column).sum())
         for q, (name, freedom) in enumerate(track.tested):
@@ -139,6 +142,11 @@ class Followed:
             self.head = {name: column[:HEAD] for name, column in columns.items()}
         self._draw(track)
         self.rows += len(t)
+
+    @property
+    def silent(self) -> list[str]:
+        """The filters of the config that never had an estimate."""
+        return [one.name for one in self.case.spec.filters if one.name not in self.estimating]
 
     def _gaps(self, t: np.ndarray) -> None:
         if self.rows == 0:

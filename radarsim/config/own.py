@@ -4,16 +4,23 @@ import os
 from pathlib import Path
 
 from radarsim.config import load
-from radarsim.config.faults import Faults
+from radarsim.config.faults import Faults, one_line
 from radarsim.config.lookup import is_stem
 from radarsim.config.starter import starter
 from radarsim.errors import ConfigError, StoreError
 
 
 def new(name: str, like: str | os.PathLike, folder: str | os.PathLike = ".") -> Path:
-    """Write folder/NAME.yaml after a known config; its path. Raises ConfigError where it is there already."""
+    """Write folder/NAME.yaml, the suffix given or not, after a known config; its path.
+
+    Raises ConfigError where it is there already.
+    """
+    name = name.removesuffix(".yaml")
     if not is_stem(name):
-        raise ConfigError(f"{name}: must be a plain name of letters, digits and _ + = - . without folder or suffix")
+        raise ConfigError(
+            f"{one_line(name)}: must be a plain name of letters, digits and _ + = - . without folder or suffix, that "
+            "begins with a letter, a digit or _"
+        )
     path = Path(folder) / f"{name}.yaml"
     experiment = load.load(like)
     faults = Faults()
