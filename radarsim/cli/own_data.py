@@ -72,7 +72,8 @@ def track(config, plots, output, figures, quiet, overrides):
     (multimodel).
 
     Told beside: gaps and missing values, and whether the accuracies that the config states fit the plots: the filters'
-    own innovations are tested (NIS, 1 for a filter that is right about its errors).
+    own innovations are tested (NIS, 1 for a filter that is right about its errors). A gap so long that
+    a filter's numbers after it would be rounding alone ends in a fault with its line: split the file there.
 
     \b
     Example
