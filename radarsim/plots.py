@@ -4,20 +4,18 @@ A plots file has a header; `t_s` must rise from row to row (or, for studies that
 fall), an empty cell means missing, other columns are ignored.
 """
 
-import contextlib
 import csv
 import itertools
 import math
 import os
 import re
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from radarsim.engine.results import Track
-from radarsim.errors import ConfigError, StoreError
+from radarsim.errors import ConfigError
+from radarsim.report.files import Writer
 
 MOST_FAULTS = 20  # told at once; a file of the wrong kind would have one in each row
 LARGEST = 1e18  # of any number, as in configs
@@ -201,56 +199,15 @@ def _cell(value: float) -> str:
     return "" if math.isnan(value) else repr(value)
 
 
-class Writer:
-    """A CSV file that is there whole or not at all: rows go to a temporary file beside it, renamed at a good end.
-
-    Faults of the disk become StoreError.
-    """
-
-    def __init__(self, path: str | os.PathLike):
-        self.path = Path(path)
-
-    def __enter__(self):
-        try:
-            number, self.temporary = tempfile.mkstemp(prefix=f".{self.path.name}.", dir=self.path.parent)
-        except OSError as error:
-            raise self._told(error) from error
-        os.chmod(self.temporary, 0o644)
-        self.file = os.fdopen(number, "w", encoding="utf-8", newline="")
-        self.rows = csv.writer(self.file, lineterminator="\n")
-        return self
-
-    def write(self, rows: Iterable[Sequence]) -> None:
-        """Write rows of text."""
-        try:
-            self.rows.writerows(rows)
-        except OSError as error:
-            raise self._told(error) from error
-
-    def __exit__(self, kind, *_):
-        try:
-            self.file.close()
-            if kind is None:
-                os.replace(self.temporary, self.path)
-        except OSError as error:
-            raise self._told(error) from error
-        finally:
-            with contextlib.suppress(FileNotFoundError):
-                os.unlink(self.temporary)
-
-    def _told(self, error: OSError) -> StoreError:
-        return StoreError(f"{self.path}: cannot be written: {error.strerror}")
-
-
 def write(track: Track, path: str | os.PathLike) -> None:
-    """Write a track as CSV, whole or not at all; raises StoreError."""
+    """Write a track as CSV; errors of `Writer`."""
     with Writer(path) as file:
         file.write([header_of(track)])
         file.write(rows_of(track))
 
 
 def write_columns(columns: Mapping[str, np.ndarray], path: str | os.PathLike) -> None:
-    """Write columns (n,) of numbers as CSV, an empty cell for not-a-number, whole or not at all; raises StoreError."""
+    """Write columns (n,) of numbers as CSV, an empty cell for not-a-number; errors of `Writer`."""
     with Writer(path) as file:
         file.write([tuple(columns)])
         file.write(zip(*([_cell(v) for v in column.tolist()] for column in columns.values()), strict=True))

@@ -6,6 +6,7 @@ import random
 import re
 import shutil
 
+import numpy as np
 import pytest
 
 from radarsim import doctor, selftest
@@ -168,19 +169,47 @@ def test_doctor_is_told_what_it_looks_at(tmp_path):
     assert "--recompute needs a RESULT" in command("doctor", "--recompute", 1, code=2).stderr
 
 
+def altered(tables, column, change):
+    """The tables with one number of the discriminator's curves changed, in a row in the middle."""
+    lines = tables["curves"].decode().splitlines()
+    header, cells = lines[0].split(","), lines[30].split(",")
+    cells[header.index(column)] = repr(change(float(cells[header.index(column)])))
+    return tables | {"curves": "\n".join([*lines[:30], ",".join(cells), *lines[31:], ""]).encode()}
+
+
 def test_the_self_test_says_so_where_numbers_differ(monkeypatch):
-    made = {name: (selftest.KNOWN / f"range_doppler.{name}.csv").read_bytes() for name in selftest.TABLES}
-    assert selftest.verdict("range_doppler", made, True).words == "the known bytes"
-    line = made["curves"].split(b"\n")[5]
-    cells = line.split(b",")
-    for factor, same, good in ((1 + 1e-14, True, False), (1 + 1e-14, False, True), (1 + 1e-9, False, False)):
-        sigma = repr(float(cells[7]) * factor).encode()
-        changed = made | {"curves": made["curves"].replace(line, b",".join([*cells[:7], sigma, *cells[8:]]))}
-        assert selftest.verdict("range_doppler", changed, same).good is good
-    for spoiled in (made["curves"].replace(b"r+Vr", b"r+vr"), made["curves"][: len(made["curves"]) // 2]):
-        assert not selftest.verdict("range_doppler", made | {"curves": spoiled}, False).good
+    made = {name: (selftest.KNOWN / f"discriminator.{name}.csv").read_bytes() for name in selftest.TABLES}
+    assert selftest.verdict("discriminator", made, True).words == "the known bytes"
+    # Rounding is forgiven where platforms differ, as far as its conditioning allows, and nowhere else.
+    for column, factor, elsewhere in (
+        ("sigma", 1 + 1e-10, True),
+        ("sigma", 1 + 1e-7, False),
+        ("exact_sigma", 1 + 2e-11, True),
+        ("exact_sigma", 1 + 1e-9, False),
+        ("sigma_hi", 1 + 1e-10, True),
+        ("sigma_hi", 1 + 1e-6, False),
+        ("spread", 1 + 1e-7, False),
+    ):
+        changed = altered(made, column, lambda value, factor=factor: value * factor)
+        assert not selftest.verdict("discriminator", changed, True).good, column
+        assert selftest.verdict("discriminator", changed, False).good is elsewhere, (column, factor)
+    for spoiled in (made["curves"].replace(b"cured", b"cursed"), made["curves"][: len(made["curves"]) // 2]):
+        assert not selftest.verdict("discriminator", made | {"curves": spoiled}, False).good
     monkeypatch.setattr(selftest, "verdicts", lambda: [selftest.Verdict("sonar", False, "differs")])
     assert "self-test: sonar: differs" in command("doctor", code=4).stderr
+
+
+def test_the_tolerances_are_what_conditioning_allows():
+    """κ of the known case's balanced information, times half a rounding, and no more than a few times that."""
+    from radarsim.config.load import load
+    from radarsim.exact.burst import fisher
+    from radarsim.studies.discriminator import burst_of
+
+    burst = burst_of(load(selftest.KNOWN / "discriminator.yaml").cases[0].spec)
+    information = fisher(burst, 5, burst.duration_s)
+    scale = np.sqrt(np.diag(information))
+    rounding = np.linalg.cond(information / np.outer(scale, scale)) * np.finfo(float).eps / 2
+    assert rounding < selftest.TOLERANCES["discriminator"].exact < 10 * rounding
 
 
 def test_doctor_names_the_machine_and_passes_its_self_test():

@@ -1,11 +1,15 @@
 """Recorded plots: what is read, what is refused and where, what is written."""
 
+import os
+import stat
+
 import numpy as np
 import pytest
 
 from radarsim import plots
 from radarsim.engine.results import Track
 from radarsim.errors import ConfigError, StoreError
+from radarsim.report.files import Writer
 
 CHOICES = (("t_s", "range_m", "bearing_rad"), ("t_s", "x_m", "y_m"))
 
@@ -112,3 +116,65 @@ def test_intervals_that_no_filter_can_take_are_a_fault_of_the_file(tmp_path):
     (config,) = experiment.load_all(["sonar_smoothing"])
     with pytest.raises(ConfigError, match="t_s: intervals so different"):
         recorded.track(config, path)
+
+
+def test_an_existing_file_keeps_its_mode_and_a_new_one_heeds_the_umask(tmp_path):
+    old, new = tmp_path / "old.csv", tmp_path / "new.csv"
+    old.write_text("before")
+    old.chmod(0o640)
+    mask = os.umask(0o077)
+    try:
+        for path in (old, new):
+            plots.write_columns({"t_s": np.zeros(1)}, path)
+    finally:
+        os.umask(mask)
+    assert [stat.S_IMODE(path.stat().st_mode) for path in (old, new)] == [0o640, 0o600]
+
+
+def test_a_link_stays_and_its_file_is_replaced(tmp_path):
+    (tmp_path / "real.csv").write_text("before")
+    (tmp_path / "link.csv").symlink_to("real.csv")
+    plots.write_columns({"t_s": np.zeros(1)}, tmp_path / "link.csv")
+    assert (tmp_path / "link.csv").is_symlink()
+    assert (tmp_path / "real.csv").read_text() == "t_s\n0.0\n"
+
+
+def test_a_stream_is_written_through_and_stays(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    plots.write_columns({"t_s": np.zeros(1)}, pipe)
+    assert os.read(reader, 100) == b"t_s\n0.0\n"
+    os.close(reader)
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    plots.write_columns({"t_s": np.zeros(1)}, "/dev/null")
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+
+
+def test_what_is_no_file_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="must be a file, got a directory"):
+        plots.write_columns({"t_s": np.zeros(1)}, tmp_path)
+
+
+def test_a_fault_on_the_way_leaves_the_old_file_and_nothing_beside_it(tmp_path):
+    path = tmp_path / "track.csv"
+    path.write_text("before")
+
+    def interrupted():
+        with Writer(path) as file:
+            file.write([("half",)])
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        interrupted()
+    assert {one.name: one.read_text() for one in tmp_path.iterdir()} == {"track.csv": "before"}
+
+
+@pytest.mark.parametrize("name", ["plots.csv", "link.csv", "./plots.csv"])
+def test_the_recorded_plots_are_never_the_output(tmp_path, name):
+    source = tmp_path / "plots.csv"
+    source.write_text("before")
+    (tmp_path / "link.csv").symlink_to("plots.csv")
+    with pytest.raises(ConfigError, match="must be another file than the plots"):
+        Writer(tmp_path / name, source)
+    assert source.read_text() == "before"

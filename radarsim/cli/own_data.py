@@ -83,6 +83,7 @@ def track(config, plots, output, figures, quiet, overrides):
 
     from radarsim import accuracy, experiment, findings, recorded
     from radarsim import plots as files
+    from radarsim.report.files import Writer
 
     (loaded,) = experiment.load_all([config], overrides)
     started = False
@@ -95,7 +96,7 @@ def track(config, plots, output, figures, quiet, overrides):
         write(files.rows_of(piece))
 
     with contextlib.ExitStack() as stack:
-        write = stack.enter_context(files.Writer(output)).write if output else findings.echo
+        write = stack.enter_context(Writer(output, plots)).write if output else findings.echo
         followed = recorded.follow(loaded, plots, sink)
     drawn = recorded.draw(followed, figures) if figures else []
     if not quiet:

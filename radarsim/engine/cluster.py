@@ -25,6 +25,7 @@ CONNECT_S = 10
 WORKERS_S = 30  # how long a scheduler may be without a worker
 DEATHS = 20  # of workers under one task, after which it is taken for their cause
 LOOK_S = 1.0
+LOOPBACK = "127.0.0.1"  # what this machine starts for itself listens to nobody else
 HINT = "--workers and --scheduler need Dask: pip install 'radarsim[cluster]'"
 QUIET = ("distributed", "distributed.nanny", "distributed.worker", "distributed.scheduler", "distributed.comm")
 SETTINGS = {
@@ -80,7 +81,12 @@ class Cluster:
             if scheduler is not None:
                 _check(distributed, scheduler)
             else:
-                options = {"dashboard_address": None, "host": "127.0.0.1", "protocol": "tcp", "processes": False}
+                options = {
+                    "host": LOOPBACK,
+                    "dashboard_address": f"{LOOPBACK}:0",
+                    "protocol": "tcp",
+                    "processes": False,
+                }
                 self._scheduler = distributed.LocalCluster(n_workers=0, silence_logs=logging.CRITICAL, **options)
             try:
                 where = scheduler or self._scheduler.scheduler_address
@@ -225,8 +231,10 @@ class _Processes:
     """
 
     def __init__(self, workers: int, address: str):
-        options = ["--no-nanny", "--no-dashboard", "--nthreads", "1", "--memory-limit", "0", "--death-timeout", "10"]
-        self._command = [sys.executable, "-m", "distributed.cli.dask_worker", address, *options]
+        options = ["--no-nanny", "--nthreads", "1", "--memory-limit", "0", "--death-timeout", "10"]
+        # Without the latter a worker serves HTTP to the whole network even with --no-dashboard.
+        closed = ["--host", LOOPBACK, "--no-dashboard", "--dashboard-address", f"{LOOPBACK}:0"]
+        self._command = [sys.executable, "-m", "distributed.cli.dask_worker", address, *options, *closed]
         self._environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         self._running = [self._started() for _ in range(workers)]
 

@@ -31,6 +31,34 @@ def _flags() -> list[str]:
     return next((line.split() for line in lines if line.startswith(("flags", "Features"))), [])
 
 
+@functools.cache
+def processor() -> str:
+    """The processor's name; empty where the system does not say."""
+    try:
+        with open("/proc/cpuinfo", encoding="ascii", errors="replace") as file:
+            names = [line.partition(":")[2].strip() for line in file.read(8192).splitlines() if "model name" in line]
+    except OSError:
+        names = []
+    return names[0] if names else platform.processor()
+
+
+@functools.cache
+def linear_algebra() -> str:
+    """The BLAS library NumPy has loaded, and the processor that its kernels are made for, like `openblas SkylakeX`.
+
+    The processor, or OPENBLAS_CORETYPE, chooses the kernels; the order of sums differs between them.
+    """
+    import numpy  # noqa: F401  (loads the library)
+    from threadpoolctl import threadpool_info
+
+    found = {
+        f"{library['internal_api']} {library.get('architecture', '')}".strip()
+        for library in threadpool_info()
+        if library["user_api"] == "blas"
+    }
+    return ", ".join(sorted(found))
+
+
 def versions() -> dict[str, str]:
     """Versions of Python and of the libraries that compute, as far as they are loaded."""
     libraries = {name: sys.modules[name].__version__ for name in ("numpy", "numba") if name in sys.modules}

@@ -61,7 +61,10 @@ def fisher_sums(burst: Burst, size: int, windows: list[int], theta: np.ndarray |
         turns = phase_turns(theta, t)
         weight = np.sin(2.0 * math.pi * (turns - np.rint(turns))) ** 2
     ends = np.array(windows) - 1
-    moments = [np.cumsum((weight * x**p).sum(axis=0))[ends] for p in range(2 * size - 1)]
+    moments = []
+    for _ in range(2 * size - 1):
+        moments.append(np.cumsum(weight.sum(axis=0))[ends])
+        weight = weight * x  # products are the same on every processor, powers are not
     c, order = sensitivities(size, burst.duration_s), np.arange(size)
     level = burst.amplitude**2 / burst.noise_variance
     return [level * np.outer(c, c) * np.array(moments)[order[:, None] + order, w] for w in range(len(windows))]

@@ -83,8 +83,10 @@ class Form:
         self.values = np.maximum(values, 0.0)
 
     def leading(self) -> np.ndarray:
-        """The direction (size,) of the largest eigenvalue, one σ long."""
-        return np.linalg.solve(self._root.T, self._vectors * np.sqrt(self.values))[:, -1] / self._scale
+        """The direction (size,) of the largest eigenvalue, one σ long; its largest element, balanced, is positive."""
+        direction = np.linalg.solve(self._root.T, self._vectors[:, -1] * np.sqrt(self.values[-1]))
+        # An eigenvector's sign is LAPACK's choice.
+        return direction * np.sign(direction[np.argmax(np.abs(direction))]) / self._scale
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,7 @@ PHYSICS = np.dtype(
     align=True,
 )
 BLOCK_SUMS, SAMPLES, DEMODULATED = 0, 1, 2
+NO_PIVOT = 1e-12  # of the variance: below it is rounding, and a σ under 10⁻⁶ of the row's
 
 
 CHUNK = 2048  # samples made at a time, so that noise is still in the first cache when the signal is added
@@ -187,9 +188,8 @@ def block_table(
     """Exact mean (ROWS, blocks padded to eights) and covariance root (blocks, 10) of sums about a reference phase.
 
     reference (samples per pulse, pulses) in turns; clean alike, the noise-free samples. Z₂ is put at its mean: its
-    noise meets only the square of a small slope. The root holds the lower triangle by rows for Re and Im of Z₀ and Z₁;
-    where a block has fewer than four samples the covariance is singular, so the root is that of the eigenvalues, made
-    triangular.
+    noise meets only the square of a small slope. The root holds the lower triangle by rows for Re and Im of Z₀ and Z₁,
+    see `triangular_root`.
     """
     blocks = len(edges) - 1
     padded = -(-blocks // 8) * 8  # so that loops over blocks have no remainder
@@ -213,7 +213,23 @@ def block_table(
         if physics["complex_samples"]:
             rows = np.stack([-e.imag, e.real, -e.imag * s, e.real * s])
             covariance = covariance + rows @ rows.T
-        values, vectors = np.linalg.eigh(covariance)
-        root = np.linalg.qr((vectors * np.sqrt(np.maximum(values, 0.0))).T)[1].T
+        root = triangular_root(covariance)
         factor[i] = physics["sigma"] * root[np.tril_indices(4)]
     return mean, factor
+
+
+def triangular_root(covariance: np.ndarray) -> np.ndarray:
+    """The lower triangular root L (n, n), L Lᵀ = covariance, whose diagonal is not negative; singular ones too.
+
+    Such a root is unique when a column without a pivot is zero. Roots from eigenvectors or QR are not: LAPACK chooses
+    their signs, and chooses otherwise on other processors, so that the same words gave other noise. A block of fewer
+    than four samples has a singular covariance; a pivot within rounding of zero then stands for zero.
+    """
+    n = len(covariance)
+    root = np.zeros((n, n))
+    for j in range(n):
+        pivot = covariance[j, j] - root[j, :j] @ root[j, :j]
+        if pivot > NO_PIVOT * covariance[j, j]:
+            root[j, j] = np.sqrt(pivot)
+            root[j + 1 :, j] = (covariance[j + 1 :, j] - root[j + 1 :, :j] @ root[j, :j]) / root[j, j]
+    return root

@@ -12,6 +12,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import psutil
 import pytest
 
 from radarsim.engine import cluster
@@ -43,6 +44,19 @@ def test_workers_give_the_bytes_of_the_textbook(two, tmp_path):
         assert same(collect(WORK, realisations, executor=two), realisations)
     assert same(collect(WORK, N, executor=two, store=tmp_path))
     assert collect(WORK, N, executor=two, store=tmp_path).computed == 0
+
+
+def test_nothing_listens_beyond_this_machine(two):
+    """A worker runs what it is sent: RPC and HTTP, of workers and scheduler, are for this machine alone."""
+    collect(WORK, N, executor=two)
+    listening = [
+        connection.laddr.ip
+        for pid in (*alive(two), os.getpid())
+        for connection in psutil.Process(pid).net_connections(kind="inet")
+        if connection.status == psutil.CONN_LISTEN
+    ]
+    assert len(listening) >= 2 + 2 + 1  # each worker's RPC and HTTP, the scheduler
+    assert set(listening) == {"127.0.0.1"}
 
 
 def test_a_stop_leaves_the_workers_fit_for_the_next_run(two, tmp_path):
