@@ -27,6 +27,7 @@ from pathlib import Path
 
 import numba
 import numpy as np
+from llvmlite.binding import Linkage
 from numba import _dynfunc, config, njit
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -48,6 +49,27 @@ class Untranslated(JITCodeLibrary):
 
     def _finalize_final_module(self):
         self._finalized = True
+
+
+class SelfContained(JITCodeLibrary):
+    """A kernel's machine code, in which all that it calls is its own.
+
+    Numba leaves the functions of a kernel weak: where another kernel has a function of that name in memory, its code is
+    run instead. Which there are depends on what this process has compiled, and what it has read from the cache; they
+    differ in the order of their sums, as each is optimised with its callers. So the last bits were others in the
+    process that compiled.
+    """
+
+    def _finalize_final_module(self):
+        shared = self._final_module.clone()  # what other kernels link, as Numba has it
+        for function in shared.functions:
+            if not function.is_declaration and function.linkage == Linkage.external:
+                function.linkage = "linkonce_odr"
+        self._shared_module = shared
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.linkonce_odr:
+                function.linkage = "internal"
+        super()._finalize_final_module()
 
 
 # Where Python lands when it calls a function without an entry: it raises TypeError instead of crashing.
@@ -74,6 +96,8 @@ class WideLowering(NativeLowering):
 
     def run_pass(self, state):
         if not state.flags.no_cpython_wrapper:
+            state.library = SelfContained(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.library.enable_object_caching()
             return super().run_pass(state)
         state.library = Untranslated(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.inlined = state.flags.forceinline

@@ -106,3 +106,30 @@ def test_nothing_of_ours_forks_or_asks_for_it():
         }
         assert not names & {"fork", "forkpty"}, path
         assert "multiprocessing" not in modules, path
+
+
+SUMS = """
+import sys
+from radarsim.config.load import load
+from radarsim.studies import CaseWork
+for stem in sys.argv[1:]:
+    print(CaseWork(load(stem).cases[0]).simulate(0, 72).tobytes().hex())
+"""
+OTHER_STUDIES = [
+    "rls2",
+    "multimodel_families",
+    "sonar_manoeuvre",
+    "sonar_clutter",
+    "discriminator",
+    "discriminator_rival",
+]
+
+
+@pytest.mark.parametrize("stems", [["sonar_smoothing"], pytest.param(OTHER_STUDIES, marks=pytest.mark.slow)], ids=len)
+def test_a_process_that_compiles_gives_the_bytes_of_one_that_reads_the_cache(tmp_path, stems):
+    """Each kernel runs its own copies of what it calls, whatever else is in memory; see `compile.SelfContained`."""
+    environment = os.environ | {"RADARSIM_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", SUMS, *stems]
+    cold, warm = (subprocess.run(command, env=environment, capture_output=True, check=True).stdout for _ in range(2))
+    assert cold == warm
+    assert len(cold.split()) == len(stems)
