@@ -27,12 +27,12 @@ lint: $(VENV)/tested
 	$(BIN)/ruff format --check .
 
 smoke: $(VENV)/installed
-	$(BIN)/python -m radarsim.reproduce $(SMOKE) --set realisations=200 $(SMOKE_FLAGS)
+	$(BIN)/python -m radarsim.cli.reproduce $(SMOKE) --set realisations=200 $(SMOKE_FLAGS)
 	@echo "every config ran with 200 realisations; results in $(SMOKE)"
 
 # All the papers at their full size; what was finished before is taken from results/.blocks.
 reproduce-figures: $(VENV)/installed
-	$(BIN)/python -m radarsim.reproduce results
+	$(BIN)/python -m radarsim.cli.reproduce results
 
 # docs/claims.md, from what reproduce-figures left.
 claims-page: $(VENV)/installed
@@ -47,7 +47,7 @@ schema: $(VENV)/installed
 
 # The tables that `radarsim doctor` compares with: made anew after a change that is meant to change numbers.
 known: $(VENV)/installed
-	$(BIN)/python -m radarsim.selftest
+	$(BIN)/python -m radarsim.app.selftest
 
 # Every warning is an error: a link that leads nowhere, a page in no contents, a docstring that does not read.
 docs: $(VENV)/documented

@@ -33,7 +33,7 @@ SONAR = {
 
 def work(config, **sensor):
     """A case as the engine sees it, and its filter-scans a realisation."""
-    from radarsim.config.load import load
+    from radarsim.app.configs import load
     from radarsim.studies import CaseWork
 
     if sensor:

@@ -38,7 +38,7 @@ def config(association: str, density: float) -> dict:
 
 def measure(n: int) -> dict:
     """Figures of one process."""
-    from radarsim.config.load import load
+    from radarsim.app.configs import load
     from radarsim.studies import CaseWork
 
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-1:])

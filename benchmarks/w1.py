@@ -46,7 +46,7 @@ def c_limit(folder: Path):
 
 def work():
     """RLS 2 as the engine sees it."""
-    from radarsim.config.load import load
+    from radarsim.app.configs import load
     from radarsim.studies import CaseWork
 
     (case,) = load(CONFIG).cases

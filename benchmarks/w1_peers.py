@@ -134,7 +134,7 @@ def serve(name: str, path: str, repeats: int) -> None:
 
 def problem_of(made) -> dict[str, np.ndarray]:
     """The case as plain arrays."""
-    from radarsim.models.motion import manoeuvre_covariance, transition
+    from radarsim.physics.motion import manoeuvre_covariance, transition
 
     plan, axes = made.plan, made.plan.axes
     dt, before = axes.extra["scan_period_s"], ~axes.available.all(axis=2)

@@ -32,8 +32,8 @@ class Given:
     """The kernel on given plots of eight realisations, with any bank, family and rule; the C workload's start."""
 
     def __init__(self, common):
-        from radarsim.kernels import hypothesis
         from radarsim.kernels.lanes import rows
+        from radarsim.studies.multimodel.kernels import hypothesis
 
         self.layout = hypothesis
         self.z, self.start, self.P0 = common.w2_meas(GROUP), common.w2_truth()[0] + common.W2_X0_OFF, common.W2_P0
@@ -44,7 +44,7 @@ class Given:
 
     def run(self, models=MODELS[:3], T=T3, family="imm", rule="moment", output="moment"):
         """All scans; estimates (SCANS, 9, GROUP)."""
-        from radarsim.kernels import multimodel_strip
+        from radarsim.studies.multimodel.kernels import strip as multimodel_strip
 
         layout, size = self.layout, len(models)
         work, numbers = layout.work_arrays()
@@ -74,7 +74,7 @@ def full_matrix(size: int) -> np.ndarray:
 
 def work(every: int, name: str = "multimodel", filters: int = 1):
     """The whole chain of a shipped config, its first filters."""
-    from radarsim.config.load import load
+    from radarsim.app.configs import load
     from radarsim.studies import CaseWork
 
     (case,) = load(name, (f"report_every={every}", f"scans={SCANS}")).cases
@@ -165,7 +165,7 @@ def measure_chain(pool, limit, every: int) -> dict:
 
 def measure_start() -> dict:
     """First block of a process and first pass over given plots: compiling where the cache is empty, loading else."""
-    from radarsim.studies.multimodel_timing import seconds_per_update
+    from radarsim.studies.multimodel.timing import seconds_per_update
 
     made = work(10, filters=6)
     started = time.process_time(), time.perf_counter()

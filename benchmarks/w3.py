@@ -48,8 +48,8 @@ def c_limit(folder: Path):
 
 def plan(engine: str, estimator: dict, variance: float = 2.25, prior: dict | None = None, truth: dict | None = None):
     """A prepared plan of one estimator on the paper's burst."""
-    from radarsim.config.load import load
-    from radarsim.studies import discriminator
+    from radarsim.app.configs import load
+    from radarsim.studies.discriminator import study as discriminator
 
     config = {
         "study": "discriminator",
@@ -75,7 +75,7 @@ def timed(function) -> float:
 
 def scoring(w3) -> dict:
     """Seconds a burst of the limit's workload, in Numba and in C."""
-    from radarsim.studies import discriminator
+    from radarsim.studies.discriminator import study as discriminator
 
     windows = [float(w) * 1e-5 for w in (w3.WIN if w3 else WINDOWS)]
     estimator = {"name": "w3", "schedule": windows, "steps": 4, "tolerance": 1e-12}
@@ -103,7 +103,7 @@ def scoring(w3) -> dict:
 
 def engines(w3) -> dict:
     """Bursts a second of the engines, and that over bursts a second of the C limit in the same run."""
-    from radarsim.studies import discriminator
+    from radarsim.studies.discriminator import study as discriminator
 
     found = {}
     cases = [

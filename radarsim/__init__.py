@@ -16,7 +16,7 @@ __version__ = "0.1.0"
 __all__ = ["ConfigError", "RadarsimError", "Result", "__version__", "load", "run"]
 
 _HOMES = {
-    **{"run": "experiment:run", "load": "experiment:load_result", "Result": "result:Result"},
+    **{"run": "app.run:run", "load": "app.run:load_result", "Result": "app.result:Result"},
     **{"ConfigError": "errors:ConfigError", "RadarsimError": "errors:RadarsimError"},
 }
 

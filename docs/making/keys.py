@@ -4,6 +4,7 @@ import re
 
 from radarsim.config.fields import in_degrees
 from radarsim.config.json_schema import schema
+from radarsim.studies import registry
 
 COMMON = ("include", "sweep", "realisations", "seed", "figures", "control_variate")
 BOUNDS = {"minimum": "≥ {}", "exclusiveMinimum": "> {}", "maximum": "≤ {}", "exclusiveMaximum": "< {}"}
@@ -11,7 +12,7 @@ BOUNDS = {"minimum": "≥ {}", "exclusiveMinimum": "> {}", "maximum": "≤ {}", 
 
 def markdown() -> str:
     """A heading for each study and for each kind of mapping in it, with a table of the keys."""
-    definitions = schema()["$defs"]
+    definitions = schema(registry)["$defs"]
     common = {key: definitions["include"]["properties"][key] for key in COMMON}
     parts = ["## Keys of every config", table(common, definitions, ())]
     for study in definitions["include"]["properties"]["study"]["enum"]:

@@ -80,7 +80,9 @@ def run(
 
     limit = stopping.time_limit(time_limit) if time_limit else None
     with stopping.Signals() as stop:
-        from radarsim import console, documents, experiment, simulation
+        from radarsim.app import documents, simulation
+        from radarsim.app import run as experiment
+        from radarsim.cli import console
 
         overrides = experiment.merged(overrides, realisations, seed)
         loaded = experiment.load_all(configs, overrides)
@@ -136,7 +138,10 @@ def check(configs, realisations, seed, overrides, precision, as_json):
       radarsim check configs/range_doppler.yaml -n 1e7
       radarsim check multimodel --precision 1
     """
-    from radarsim import console, documents, experiment, overview
+    from radarsim.app import documents
+    from radarsim.app import outlook as overview
+    from radarsim.app import run as experiment
+    from radarsim.cli import console
 
     told = []
     for one in experiment.load_all(configs, experiment.merged(overrides, realisations, seed)):
@@ -166,7 +171,9 @@ def report(configs, realisations, seed, overrides, out, no_figures, formats, as_
       radarsim report rls2
       radarsim report rls2 --json --no-figures
     """
-    from radarsim import console, documents, experiment
+    from radarsim.app import documents
+    from radarsim.app import run as experiment
+    from radarsim.cli import console
 
     overrides = experiment.merged(overrides, realisations, seed)
     told = []
@@ -195,7 +202,9 @@ def claims(configs, out, as_json, markdown):
       radarsim claims range_doppler
       radarsim claims --json
     """
-    from radarsim import console, documents, experiment
+    from radarsim.app import documents
+    from radarsim.app import run as experiment
+    from radarsim.cli import console
 
     rows = experiment.claims(configs, out)
     if as_json:

@@ -16,7 +16,9 @@ def list_(as_json):
       radarsim list
       radarsim list --json | jq -r '.configs[].name'
     """
-    from radarsim import console, documents, overview
+    from radarsim.app import documents
+    from radarsim.app import outlook as overview
+    from radarsim.cli import console
 
     if as_json:
         click.echo(documents.text(documents.inventory(overview.inventory())))
@@ -32,7 +34,7 @@ def schema():
     Example
       radarsim schema > schema.json
     """
-    from radarsim.config.json_schema import schema_json
+    from radarsim.app.configs import schema_json
 
     click.echo(schema_json(), nl=False)
 
@@ -56,10 +58,11 @@ def doctor(result, recompute, as_json):
     """
     if recompute and result is None:
         raise click.UsageError("--recompute needs a RESULT: a folder such as results/rls2")
-    from radarsim import console, doctor, documents
+    from radarsim.app import doctor, documents
+    from radarsim.cli import console
 
     if result is None:
-        from radarsim import selftest
+        from radarsim.app import selftest
 
         facts = doctor.machine()
         if not as_json:
@@ -98,7 +101,10 @@ def clean(configs, seed, overrides, out, dry_run, as_json):
       radarsim clean --dry-run
       radarsim clean rls2 --out results
     """
-    from radarsim import cleaning, console, documents, experiment
+    from radarsim.app import clean as cleaning
+    from radarsim.app import documents
+    from radarsim.app import run as experiment
+    from radarsim.cli import console
 
     if not configs and (overrides or seed is not None):
         raise click.UsageError("--set and --seed need a CONFIG whose blocks they mean")

@@ -24,9 +24,9 @@ def new(name, like):
     Example
       radarsim new mine --like rls2
     """
-    from radarsim.config import own
+    from radarsim.app import configs
 
-    path = own.new(name, like)
+    path = configs.new(name, like)
     click.echo(f"config   {path}")
     click.echo(f"         change its numbers, then `radarsim check {path}` and `radarsim run {path}`")
 
@@ -47,7 +47,9 @@ def simulate(config, output, realisation, overrides):
       radarsim simulate rls2 -o plots.csv
       radarsim track rls2 plots.csv -o track.csv
     """
-    from radarsim import experiment, plots, recorded
+    from radarsim.app import run as experiment
+    from radarsim.track import follow as recorded
+    from radarsim.track import plots
 
     (loaded,) = experiment.load_all([config], overrides)
     columns = recorded.simulated(loaded, realisation)
@@ -81,9 +83,12 @@ def track(config, plots, output, figures, quiet, overrides):
     """
     import contextlib
 
-    from radarsim import accuracy, experiment, findings, recorded
-    from radarsim import plots as files
+    from radarsim.app import run as experiment
+    from radarsim.cli import findings
     from radarsim.report.files import Writer
+    from radarsim.track import accuracy
+    from radarsim.track import follow as recorded
+    from radarsim.track import plots as files
 
     (loaded,) = experiment.load_all([config], overrides)
     started = False

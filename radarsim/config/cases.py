@@ -13,7 +13,7 @@ from radarsim.config.experiment import Case, Experiment, in_name, matches
 from radarsim.config.faults import Faults, Origin, one_line
 from radarsim.config.lookup import config_file, did_you_mean, is_stem, stems
 from radarsim.config.place import NoSuchKey, data_files_found, key_paths, place, scenarios_inlined
-from radarsim.config.schema import COMMON_KEYS, STUDIES, Common, study_model
+from radarsim.config.schema import COMMON_KEYS, Common, Studies
 
 DOTTED = ("sweep", "figures")  # the common keys that are mappings; what follows the first dot is one key of theirs
 MOST_CASES = 10_000
@@ -47,8 +47,8 @@ class Expander:
     `read(file, faults)` gives the document in a file, or notes a fault and gives None.
     """
 
-    def __init__(self, read: Callable, settings: Iterable[Setting], faults: Faults):
-        self.read, self.faults = cache(read), faults
+    def __init__(self, read: Callable, settings: Iterable[Setting], faults: Faults, studies: Studies):
+        self.read, self.faults, self.studies = cache(read), faults, studies
         settings = list(settings)
         self.common = [s for s in settings if s.key.split(".")[0] in COMMON_KEYS]
         self.settings = [s for s in settings if s.key.split(".")[0] not in COMMON_KEYS]
@@ -102,19 +102,22 @@ class Expander:
 
     def _own(self, document: Document, common: Common) -> list[Draft]:
         """The one draft of a config with a study of its own."""
-        if common.study not in STUDIES:
+        if common.study is None or not self.studies.has(common.study):
             if "study" not in document.data:
                 self.faults.add(
-                    document.origin(()), ("study",), f"required key is missing: one of {', '.join(STUDIES)}"
+                    document.origin(()),
+                    ("study",),
+                    f"required key is missing: one of {', '.join(self.studies.names())}",
                 )
             elif common.study is not None:
-                message = f"must be one of {', '.join(STUDIES)}{did_you_mean(common.study, STUDIES)}"
+                known = self.studies.names()
+                message = f"must be one of {', '.join(known)}{did_you_mean(common.study, known)}"
                 self.faults.add(document.origin(("study",)), ("study",), message, common.study)
             return []
         own = document.without(COMMON_KEYS)
         for setting in self.settings:
             own = self._placed(own, common.study, setting)
-        own = scenarios_inlined(own, study_model(common.study), self.read, self.faults)
+        own = scenarios_inlined(own, self.studies.keys(common.study), self.read, self.faults)
         stem = document.file.stem if document.file else "config"
         return [Draft(own, stem, common.study, (), common.realisations, common.seed)]
 
@@ -174,20 +177,22 @@ class Expander:
             self.faults.add(origin, ("sweep", key), "cannot be swept")
             return False
         try:
-            swept = {path for draft in drafts for path in key_paths(draft.document, study_model(draft.study), key)}
+            swept = {
+                path for draft in drafts for path in key_paths(draft.document, self.studies.keys(draft.study), key)
+            }
         except NoSuchKey as error:
             self.faults.add(origin, ("sweep", key), str(error))
             return False
         before = list(itertools.takewhile(lambda other: other != key, common.sweep))
         for draft in drafts:
             for other in (*(swept_key for swept_key, _ in draft.swept), *before):
-                taken = key_paths(draft.document, study_model(draft.study), other, missing_ok=True)
+                taken = key_paths(draft.document, self.studies.keys(draft.study), other, missing_ok=True)
                 if any(overlap(path, one) for path in taken for one in swept):
                     self.faults.add(origin, ("sweep", key), f"sweeps what {other} sweeps as well")
                     return False
         for setting in self.settings:
             for draft in drafts:
-                set_here = key_paths(draft.document, study_model(draft.study), setting.key, missing_ok=True)
+                set_here = key_paths(draft.document, self.studies.keys(draft.study), setting.key, missing_ok=True)
                 if any(path[: len(s)] == s for path in set_here for s in swept):
                     self.faults.add(setting.origin, (), f"the config sweeps it: set sweep.{key}=[...] instead")
                     return False
@@ -202,14 +207,14 @@ class Expander:
 
     def _placed(self, document: Document, study: str, setting: Setting) -> Document:
         try:
-            return place(document, study_model(study), setting, self.read, self.faults)
+            return place(document, self.studies.keys(study), setting, self.read, self.faults)
         except NoSuchKey as error:
             self.faults.add(setting.origin, (), str(error))
             return document
 
     def _case(self, draft: Draft) -> Case | None:
         """The checked case of a draft; None if faults were noted."""
-        model = study_model(draft.study)
+        model = self.studies.keys(draft.study)
         document = scenarios_inlined(draft.document, model, self.read, self.faults)
         document = data_files_found(document, model, self.faults)
         spec = check(model, document, self.faults, also=COMMON_KEYS)
@@ -240,7 +245,7 @@ class Expander:
 
     def _check_figure_names(self, common: Common, drafts: list[Draft], document: Document) -> None:
         """A figure must be one that the study may draw, where its schema says which these are."""
-        known = [study_model(study).figure_names for study in {draft.study for draft in drafts}]
+        known = [self.studies.keys(study).figure_names for study in {draft.study for draft in drafts}]
         if len(known) != 1 or known[0] is None:
             return
         for figure in common.figures:

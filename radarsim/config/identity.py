@@ -1,12 +1,19 @@
 """What of a checked configuration changes its numbers, as plain JSON-able data."""
 
 import hashlib
+import json
 from pathlib import Path
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from radarsim.config.fields import DataFile, Design, Display, NameIn
+
+
+def digest(value: object) -> str:
+    """SHA-256 in hexadecimal of a JSON-able value; numbers by their shortest exact form, keys sorted."""
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def canonical(spec: BaseModel) -> dict:

@@ -1,20 +1,19 @@
 """The schema of the YAML as JSON Schema, for editors and for `radarsim schema`."""
 
 import json
-import sys
 
 from pydantic.json_schema import models_json_schema
 
 from radarsim.config.fields import Scenario
-from radarsim.config.schema import STUDIES, Common, study_model
+from radarsim.config.schema import Common, Studies
 
 TITLE = "radarsim experiment"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def schema() -> dict:
+def schema(studies: Studies) -> dict:
     """JSON Schema of a config, of one of the studies or an `include` of others, and of a scenario."""
-    models = {name: study_model(name) for name in STUDIES}
+    models = {name: studies.keys(name) for name in studies.names()}
     wanted = [(model, "validation") for model in (Common, *models.values())]
     references, whole = models_json_schema(wanted, ref_template="#/$defs/{model}")
     definitions = tidy(whole["$defs"])
@@ -94,10 +93,6 @@ def _idle(key: str, value: object) -> bool:
     return key == "discriminator" or (key == "default" and value in (None, {}))
 
 
-def schema_json() -> str:
+def schema_json(studies: Studies) -> str:
     """The schema as text; docs/schema.json holds it."""
-    return json.dumps(schema(), indent=1, ensure_ascii=False)
-
-
-if __name__ == "__main__":
-    sys.stdout.write(schema_json() + "\n")
+    return json.dumps(schema(studies), indent=1, ensure_ascii=False)

@@ -8,20 +8,18 @@ import yaml
 
 from radarsim.config.cases import Expander, Setting
 from radarsim.config.document import Document
-from radarsim.config.experiment import Case, Experiment
+from radarsim.config.experiment import Experiment
 from radarsim.config.faults import Faults, Origin, Path
-from radarsim.config.identity import canonical, world
 from radarsim.config.lookup import config_file, did_you_mean, is_stem, stems
+from radarsim.config.schema import Studies
 from radarsim.config.values import DEEPEST, NotFinite, from_python, from_text
-
-__all__ = ["Case", "Experiment", "canonical", "load", "schema_json", "world"]
 
 LARGEST_FILE = 256_000  # bytes
 OPTIONS = ("realisations", "seed")  # overrides that are options of their own on the command line
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same events and marks, ten times faster
 
 
-def load(source: str | os.PathLike | Mapping, overrides: Iterable[str] = ()) -> Experiment:
+def load(source: str | os.PathLike | Mapping, overrides: Iterable[str], studies: Studies) -> Experiment:
     """The experiment that a config describes, all of it checked.
 
     source is a path, the stem of a config (here, in ./configs, or shipped), or a mapping as YAML would give it;
@@ -36,7 +34,7 @@ def load(source: str | os.PathLike | Mapping, overrides: Iterable[str] = ()) -> 
     else:
         document = None
         faults.add(Origin("config"), (), f"must be a path, a name or a mapping, got {repr(source)[:60]}")
-    experiment = document and Expander(read, settings, faults).experiment(document)
+    experiment = document and Expander(read, settings, faults, studies).experiment(document)
     faults.raise_if_any()
     return experiment
 
@@ -51,13 +49,6 @@ class _Plain(yaml.SafeDumper):
 
     def ignore_aliases(self, data):
         return True
-
-
-def schema_json() -> str:
-    """JSON Schema of the YAML, as text."""
-    from radarsim.config import json_schema  # here, because a run has no use for it
-
-    return json_schema.schema_json()
 
 
 def _from_mapping(source: Mapping, faults: Faults) -> Document:

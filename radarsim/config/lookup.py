@@ -9,10 +9,18 @@ SHIPPED = Path(__file__).parent.parent / "shipped"
 STEM = re.compile(r"\w[\w+=-]*(?:\.[\w+=-]+)*")
 
 
+def no_folders() -> tuple[Path, ...]:
+    """Folders with configs/ and scenarios/ beside the shipped one: none, but see radarsim.app.configs."""
+    return ()
+
+
+further_folders: Callable[[], tuple[Path, ...]] = no_folders
+
+
 def config_file(name: str, beside: Path | None = None) -> Path | None:
     """The file of a config: beside the including one (or here), in ./configs, among the shipped; None if nowhere."""
     folders = [Path(), Path("configs")] if beside is None else [beside.parent, Path("configs")]
-    return _first(name, [*folders, SHIPPED / "configs"])
+    return _first(name, [*folders, SHIPPED / "configs"]) or _first(name, _further("configs"))
 
 
 def scenario_file(name: str, config: Path | None) -> Path | None:
@@ -21,7 +29,12 @@ def scenario_file(name: str, config: Path | None) -> Path | None:
     A config of that name beside the config is no scenario.
     """
     folders = [] if config is None else [config.parent, next_to(config.parent) / "scenarios"]
-    return _first(name, [*folders, Path("scenarios"), SHIPPED / "scenarios"], refused=_is_config)
+    found = _first(name, [*folders, Path("scenarios"), SHIPPED / "scenarios"], refused=_is_config)
+    return found or _first(name, _further("scenarios"), refused=_is_config)
+
+
+def _further(kind: str) -> list[Path]:
+    return [folder / kind for folder in further_folders()]
 
 
 def next_to(folder: Path) -> Path:
@@ -48,7 +61,8 @@ def _is_config(file: Path) -> bool:
 
 def stems(kind: str) -> tuple[str, ...]:
     """Stems of the configs or scenarios that can be named here: those of the working directory and the shipped ones."""
-    return tuple(sorted({file.stem for folder in (Path(kind), SHIPPED / kind) for file in folder.glob("*.yaml")}))
+    folders = (Path(kind), SHIPPED / kind, *_further(kind))
+    return tuple(sorted({file.stem for folder in folders for file in folder.glob("*.yaml")}))
 
 
 def is_stem(name: str) -> bool:

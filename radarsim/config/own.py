@@ -6,11 +6,12 @@ from pathlib import Path
 from radarsim.config import load
 from radarsim.config.faults import Faults, one_line
 from radarsim.config.lookup import is_stem
+from radarsim.config.schema import Studies
 from radarsim.config.starter import starter
 from radarsim.errors import ConfigError, StoreError
 
 
-def new(name: str, like: str | os.PathLike, folder: str | os.PathLike = ".") -> Path:
+def new(name: str, like: str | os.PathLike, studies: Studies, folder: str | os.PathLike = ".") -> Path:
     """Write folder/NAME.yaml, the suffix given or not, after a known config; its path.
 
     Raises ConfigError where it is there already.
@@ -22,11 +23,11 @@ def new(name: str, like: str | os.PathLike, folder: str | os.PathLike = ".") -> 
             "begins with a letter, a digit or _"
         )
     path = Path(folder) / f"{name}.yaml"
-    experiment = load.load(like)
+    experiment = load.load(like, (), studies)
     faults = Faults()
     document = load.read(Path(experiment.path), faults)
     faults.raise_if_any()
-    text = starter(document.data, experiment.study, name, experiment.stem)
+    text = starter(document.data, studies.keys(experiment.study), name, experiment.stem)
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)

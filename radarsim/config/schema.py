@@ -1,22 +1,11 @@
-"""Every YAML key: the common ones here, each study's own in a file of its name beside this one.
+"""The YAML keys that every config may have, and what config knows of the studies: their names and their keys."""
 
-To add a study: write config/<study>.py with one subclass of `fields.Study` (parts from fields.py, every field with a
-description, units in the keys, fields marked with Display, Design, Scenario or NameIn), and add its line to STUDIES.
-"""
-
-from importlib import import_module
-from typing import Annotated
+from typing import Annotated, Protocol
 
 from pydantic import Field
 
 from radarsim.config.fields import Anything, Flag, Model, Name, Stem, Study, whole
 
-STUDIES = {
-    "range_doppler": "radarsim.config.range_doppler:RangeDoppler",
-    "multimodel": "radarsim.config.multimodel:Multimodel",
-    "sonar": "radarsim.config.sonar:Sonar",
-    "discriminator": "radarsim.config.discriminator:Discriminator",
-}
 LARGEST_REALISATIONS = 10**12
 LARGEST_SEED = 2**64 - 1
 
@@ -47,7 +36,14 @@ class Common(Model):
 COMMON_KEYS = tuple(Common.model_fields)
 
 
-def study_model(name: str) -> type[Study]:
-    """The schema of a study, imported when first asked for."""
-    module, _, model = STUDIES[name].partition(":")
-    return getattr(import_module(module), model)
+class Studies(Protocol):
+    """The studies at hand; see radarsim.studies.registry, which config does not know."""
+
+    def names(self) -> tuple[str, ...]:
+        """The values that `study:` may have."""
+
+    def has(self, name: str) -> bool:
+        """Whether there is a study of that name."""
+
+    def keys(self, name: str) -> type[Study]:
+        """The schema of a study's keys, imported when first asked for."""

@@ -10,7 +10,7 @@ from pydantic_core import PydanticUndefined
 
 from radarsim.config.faults import short
 from radarsim.config.fields import Model, in_radians
-from radarsim.config.schema import COMMON_KEYS, Common, study_model
+from radarsim.config.schema import COMMON_KEYS, Common
 
 PLAIN = re.compile(r"[A-Za-z_][\w+ .*-]*")  # text that YAML reads as text without quotes
 WORDS = {"true", "false", "null", "yes", "no", "on", "off", "none"}
@@ -20,12 +20,11 @@ DEVICES = ("radar", "sensor")  # whose display name is the config's
 DEGREES = {"rad": "degrees", "rad/s": "degrees per second"}
 
 
-def starter(data: Mapping, study: str, name: str, like: str) -> str:
+def starter(data: Mapping, study_keys: type[Model], name: str, like: str) -> str:
     """YAML of a config's data (as read, keys as written) under a new name, with the schema's words on every key.
 
     Keys that are not given but might be stand below, commented out, with their defaults.
     """
-    study_keys = study_model(study)
     lines = [
         f"# {name}.yaml — like {like}: change the numbers, then `radarsim run {name}.yaml`",
         "# Units stand in the keys: _m, _s, _mps (m/s), _mps2 (m/s²), _hz, _rad; _deg is taken wherever _rad is.",

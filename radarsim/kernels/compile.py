@@ -1,8 +1,4 @@
-"""How every kernel is compiled, and where its machine code is kept.
-
-Numba's cache on disk looks at the file of the compiled function alone: an edit of a function that it calls, in another
-file, goes unnoticed and gives silently wrong results. So the cache directory is named after a hash of all kernel
-sources.
+"""How every kernel is compiled. Where its machine code is kept: radarsim.kernels.cache.
 
 LLVM prefers registers of 256 bits on Intel processors that have 512, for the sake of programs that seldom use vectors.
 Kernels ask for 512 one by one, in an attribute of the LLVM function; elsewhere it changes nothing. Measured on a
@@ -15,17 +11,10 @@ untranslated until the kernel that calls them is compiled: the nine-state filter
 at the same speed.
 """
 
-import contextlib
 import ctypes
-import hashlib
 import math
-import os
-import stat
-import tempfile
 from collections.abc import Callable
-from pathlib import Path
 
-import numba
 import numpy as np
 from llvmlite.binding import Linkage
 from numba import _dynfunc, config, njit
@@ -34,6 +23,8 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
+
+from radarsim.kernels import cache
 
 # No `reassoc` (part of fastmath=True): it folds rounding tricks such as (x + M) - M and changes the order of sums.
 FLAGS = frozenset({"contract", "arcp", "nsz", "nnan", "ninf"})
@@ -122,49 +113,12 @@ class WideCompiler(CompilerBase):
         return [manager]
 
 
-def sources_hash() -> str:
-    """SHA-256 over the names and contents of all kernel sources, and Numba's version."""
-    digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()
-
-
-def cache_root() -> Path:
-    """The first writable of $RADARSIM_CACHE_DIR, $XDG_CACHE_HOME/radarsim, ~/.cache/radarsim, temporary directory."""
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    candidates = [os.environ.get("RADARSIM_CACHE_DIR"), os.path.join(home, "radarsim")]
-    for candidate in filter(None, candidates):
-        try:
-            Path(candidate).mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=candidate):
-                return Path(candidate)
-        except OSError:
-            continue
-    return temporary_root()
-
-
-def temporary_root() -> Path:
-    """A directory of ours alone in the common temporary one; a new one each time where another's hand may be in it."""
-    if not hasattr(os, "getuid"):
-        return Path(tempfile.mkdtemp(prefix="radarsim-"))
-    path = Path(tempfile.gettempdir()) / f"radarsim-{os.getuid()}"
-    with contextlib.suppress(FileExistsError):
-        path.mkdir(mode=0o700)
-    status = path.lstat()
-    ours = stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o022
-    return path if ours else Path(tempfile.mkdtemp(prefix="radarsim-"))
-
-
-CACHE_DIRECTORY = cache_root() / f"kernels-{sources_hash()[:16]}"
-
-
 def compiler(**options) -> Callable:
-    """A decorator that compiles with `options`, cached in CACHE_DIRECTORY; other users of Numba keep their own."""
+    """A decorator that compiles with `options`, cached in our own directory; other users of Numba keep theirs."""
 
     def decorate(function):
         before = config.CACHE_DIR
-        config.CACHE_DIR = str(CACHE_DIRECTORY)
+        config.CACHE_DIR = str(cache.directory(function.__module__))
         try:
             return njit(cache=True, **COMMON, **options)(function)
         finally:

@@ -5,14 +5,18 @@ stop at the first one at which chance made the intervals narrow, and where that 
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import output
 
+if TYPE_CHECKING:
+    import pandas
+
+Curves = Callable[[Sequence[CaseResult]], "pandas.DataFrame"]  # a study's table of curves
 FIRST = 2000
 MOST = 10**12  # realisations, as in a config
 
@@ -46,9 +50,9 @@ def looks(most: int) -> Iterator[int]:
         n *= 2
 
 
-def worst(result: CaseResult) -> Cell | None:
+def worst(result: CaseResult, table: Curves) -> Cell | None:
     """The σ of a case with the widest interval relative to itself; None where a case has no σ."""
-    curves = output.curves([result])
+    curves = table([result])
     if not len(curves):
         return None
     sigma, lo, hi = (curves[name].to_numpy(dtype=float) for name in ("sigma", "sigma_lo", "sigma_hi"))
@@ -60,19 +64,22 @@ def worst(result: CaseResult) -> Cell | None:
     return Cell(float(percent[row]), *names, int(curves["k"].iloc[row]), result.count)
 
 
-def needed(result: CaseResult, percent: float) -> int | None:
+def needed(result: CaseResult, percent: float, table: Curves) -> int | None:
     """At which look the precision is likely met, from the sums of a pilot; None if beyond all bounds.
 
     The sums are taken as those of more realisations, in proportion.
     """
-    cell = worst(result)
+    cell = worst(result, table)
     if cell is None:
         return FIRST
     if not math.isfinite(cell.percent):
         return None
     for n in looks(MOST):
         # Half-widths go with 1/√n: what is far from enough need not be looked at.
-        if cell.percent * math.sqrt(result.count / n) < 2 * percent and worst(grown(result, n)).percent < percent:
+        if cell.percent * math.sqrt(result.count / n) >= 2 * percent:
+            continue
+        wide = worst(grown(result, n), table)
+        if wide is not None and wide.percent < percent:
             return n
     return None
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from radarsim import experiment
+from radarsim.app import run as experiment
 from tests.browser.chromium import Chromium, found
 
 

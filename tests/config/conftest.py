@@ -5,7 +5,7 @@ import textwrap
 
 import pytest
 
-from radarsim.config.load import load
+from radarsim.app.configs import load
 from radarsim.errors import ConfigError
 
 GOOD = {

@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
+from radarsim.app.configs import load
+from radarsim.app.selftest import KNOWN
 from radarsim.config.experiment import Experiment
-from radarsim.config.load import load
-from radarsim.selftest import KNOWN
 
 
 class Small(NamedTuple):

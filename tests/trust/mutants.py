@@ -8,15 +8,15 @@ term, a bound one off. A test of the ordinary suite keeps the list in step with 
 from tests.trust.mutant import mutants
 from tests.trust.mutants_further import FURTHER
 
-LINEAR, RANDOM = "kernels/test_kernels_linear.py", "kernels/test_kernels_random.py"
+LINEAR, RANDOM = "kernels/test_linear.py", "kernels/test_random.py"
 TEXTBOOK = f"{LINEAR}::test_estimates_are_the_textbook_filter"
-TWIN = "kernels/test_kernels_multimodel.py::test_kernel_equals_its_twin"
-SONAR = "kernels/test_kernels_sonar.py::test_estimates_are_the_twins"
-BURST = "kernels/test_kernels_discriminator.py"
-EXACT, SQUARES = "exact/test_exact_linear.py", "exact/test_exact_least_squares.py"
-FRAMES, PLACES = "models/test_models_frames.py", "models/test_models_sonar.py"
-STATISTICS, COVERAGE = "report/test_report_statistics.py", "trust/test_trust_statistics.py"
-BLOCKS, STORE = "engine/test_engine_blocks.py", "engine/test_engine_store.py"
+TWIN = "studies/multimodel/test_kernels.py::test_kernel_equals_its_twin"
+SONAR = "studies/sonar/test_kernels.py::test_estimates_are_the_twins"
+BURST = "studies/discriminator/test_kernels.py"
+EXACT, SQUARES = "studies/range_doppler/test_exact.py", "studies/sonar/test_exact.py"
+FRAMES, PLACES = "physics/test_frames.py", "studies/sonar/test_world.py"
+STATISTICS, COVERAGE = "report/test_statistics.py", "trust/test_statistics.py"
+BLOCKS, STORE = "engine/test_blocks.py", "engine/test_store.py"
 
 KERNELS = (
     *mutants(
@@ -39,17 +39,17 @@ KERNELS = (
         ("if row != beside:", "if row == beside:", f"{LINEAR}::test_sums_are_those_of_the_estimates"),
     ),
     *mutants(
-        "radarsim/kernels/blocks.py",
+        "radarsim/kernels/symmetric.py",
         ("f[4] * (f[4] * p[5]) + q[5]", "f[4] * (f[4] * p[5])", TWIN),
         ("m = s[0] * s[4] - s[1] * s[2]", "m = s[0] * s[4] - s[1] * s[1]", TWIN),
     ),
     *mutants(
-        "radarsim/kernels/hypothesis.py",
+        "radarsim/studies/multimodel/kernels/hypothesis.py",
         ("p[0] + w * (q[0] + d[0] * d[0])", "p[0] + w * q[0]", TWIN),
         ("(a[1], d[3], e[3]), lower)", "(a[1], d[1], e[3]), lower)", TWIN),
     ),
     *mutants(
-        "radarsim/kernels/multimodel.py",
+        "radarsim/studies/multimodel/kernels/filters.py",
         ("TRANSITION + i * MOST + j) * get", "TRANSITION + j * MOST + i) * get", TWIN),
         (
             "where_greater(of_main, others, is_main, full(1.0))",
@@ -58,11 +58,11 @@ KERNELS = (
         ),
     ),
     *mutants(
-        "radarsim/kernels/sonar.py",
+        "radarsim/studies/sonar/kernels/shared_gains.py",
         ("step_one * one[1, i] + fresh_one * a", "step_one * one[1, i] - fresh_one * a", SONAR),
     ),
     *mutants(
-        "radarsim/kernels/sonar_steps.py",
+        "radarsim/studies/sonar/kernels/steps.py",
         (
             "where_greater(w, zero, zero, get(a, ages + i) + tau)",
             "where_greater(w, zero, zero, get(a, ages + i))",
@@ -70,7 +70,7 @@ KERNELS = (
         ),
     ),
     *mutants(
-        "radarsim/kernels/discriminator_lanes.py",
+        "radarsim/studies/discriminator/kernels/lanes.py",
         (
             "g0 + e, g1 + m1 * e + s1 * h",
             "g0 + e, g1 + m1 * e - s1 * h",
@@ -79,7 +79,7 @@ KERNELS = (
         ("1.0 - 0.5 * square, square - 1.0", "1.0 - square, square - 1.0", f"{BURST}::test_sine_and_cosine_of_lanes"),
     ),
     *mutants(
-        "radarsim/kernels/discriminator_sums.py",
+        "radarsim/studies/discriminator/kernels/sums.py",
         (
             "within[i] = 1.0 if worst < 5.0",
             "within[i] = 1.0 if worst < 4.0",
@@ -91,7 +91,7 @@ KERNELS = (
 
 FILTERS = (
     *mutants(
-        "radarsim/filters/linear.py",
+        "radarsim/studies/range_doppler/filters.py",
         ("P = F @ P @ F.T + Q", "P = F @ P @ F.T", f"{LINEAR}::test_gains_are_the_papers_closed_forms"),
         (
             "joseph @ P @ joseph.T + K @ R @ K.T",
@@ -101,54 +101,54 @@ FILTERS = (
         ("transition((k - start + 1) * dt)", "transition((k - start) * dt)", TEXTBOOK),
     ),
     *mutants(
-        "radarsim/filters/multimodel.py",
+        "radarsim/studies/multimodel/filters.py",
         (
             "rest = np.maximum(exponents - whole, 0.0)",
             "rest = np.maximum(exponents - whole, 1.0)",
-            "filters/test_filters_multimodel.py",
+            "studies/multimodel/test_filters.py",
         ),
         (
             "np.where(np.eye(len(Q), dtype=bool), 0.0, np.maximum(Q, 0.0))",
             "np.where(np.eye(len(Q), dtype=bool), 0.0, Q)",
-            "filters/test_filters_multimodel.py",
+            "studies/multimodel/test_filters.py",
         ),
         (
             "bent = tau**2 / 2",
             "bent = tau**2",
-            "filters/test_filters_multimodel.py::test_start_is_least_squares_with_its_covariance",
+            "studies/multimodel/test_filters.py::test_start_is_least_squares_with_its_covariance",
         ),
     ),
     *mutants(
-        "radarsim/filters/sonar.py",
+        "radarsim/studies/sonar/filters.py",
         (
             "h + 2 * g * step + f * step**2",
             "h + g * step + f * step**2",
-            "filters/test_filters_sonar.py::test_line_recursion_is_least_squares",
+            "studies/sonar/test_filters.py::test_line_recursion_is_least_squares",
         ),
         (
             "np.stack([np.ones(patterns), -age, age**2 / 2]",
             "np.stack([np.ones(patterns), -age, age**2]",
-            "filters/test_filters_sonar.py::test_differenced_is_generalised_least_squares",
+            "studies/sonar/test_filters.py::test_differenced_is_generalised_least_squares",
         ),
     ),
     *mutants(
-        "radarsim/filters/discriminator.py",
+        "radarsim/studies/discriminator/schedule.py",
         (
             "-0.5 * np.log(1.0 - 2.0 * weights",
             "-np.log(1.0 - 2.0 * weights",
-            "filters/test_filters_discriminator.py::test_tail_of_equal_weights_is_chi_square",
+            "studies/discriminator/test_filters.py::test_tail_of_equal_weights_is_chi_square",
         ),
         (
             "math.sqrt(2.0 * float(np.sum(weights**2)))",
             "math.sqrt(float(np.sum(weights**2)))",
-            "filters/test_filters_discriminator.py::test_gaussian_condition_is_equation_14",
+            "studies/discriminator/test_filters.py::test_gaussian_condition_is_equation_14",
         ),
     ),
 )
 
 FRAMES_AND_MODELS = (
     *mutants(
-        "radarsim/models/frames.py",
+        "radarsim/physics/frames.py",
         ("[sa * ce, -sa * se, ca]", "[sa * ce, sa * se, ca]", f"{FRAMES}::test_rotation_is_a_right_hand_turn"),
         (
             "np.stack([u, -r * np.sin(e) * np.cos(e) / u",
@@ -162,7 +162,7 @@ FRAMES_AND_MODELS = (
         ),
     ),
     *mutants(
-        "radarsim/models/sonar.py",
+        "radarsim/studies/sonar/world.py",
         (
             "y[:, 2] * sb + r * vb**2",
             "y[:, 2] * sb - r * vb**2",
@@ -180,38 +180,38 @@ FRAMES_AND_MODELS = (
         ),
     ),
     *mutants(
-        "radarsim/models/targets.py",
+        "radarsim/physics/targets.py",
         (
             "(speed**2 - radial_velocity**2 + np",
             "(speed**2 + np",
-            "models/test_models_targets.py::test_velocity_and_acceleration_are_the_derivatives",
+            "physics/test_targets.py::test_velocity_and_acceleration_are_the_derivatives",
         ),
     ),
     *mutants(
-        "radarsim/models/motion.py",
+        "radarsim/physics/motion.py",
         (
             "float(np.prod(range(1, lag + 1)))",
             "float(lag)",
-            "models/test_models_targets.py::test_manoeuvre_covariance_is_the_papers_matrix",
+            "physics/test_targets.py::test_manoeuvre_covariance_is_the_papers_matrix",
         ),
     ),
     *mutants(
-        "radarsim/models/burst.py",
+        "radarsim/studies/discriminator/world.py",
         (
             "path[i] + s * (v[i] + 0.5 * s *",
             "path[i] + s * (v[i] + s *",
-            "models/test_models_burst.py::test_profile_phase_is_the_integral_of_its_doppler",
+            "studies/discriminator/test_world.py::test_profile_phase_is_the_integral_of_its_doppler",
         ),
     ),
 )
 
 EXACT_VALUES = (
     *mutants(
-        "radarsim/exact/linear.py",
+        "radarsim/studies/range_doppler/exact.py",
         (
             "A @ bias[k - 1] + kept @ defect[k - 1]",
             "A @ bias[k - 1] - kept @ defect[k - 1]",
-            "studies/test_studies_range_doppler.py::test_bias_of_a_turning_target_is_the_exact_one",
+            "studies/range_doppler/test_study.py::test_bias_of_a_turning_target_is_the_exact_one",
         ),
         (
             "solve_discrete_lyapunov(kept @ F,",
@@ -220,7 +220,7 @@ EXACT_VALUES = (
         ),
     ),
     *mutants(
-        "radarsim/exact/least_squares.py",
+        "radarsim/studies/sonar/exact.py",
         (
             "Q[4, 4] = sigma[k] ** 2 * (1 - a * a)",
             "Q[4, 4] = sigma[k] ** 2 * (1 - a)",
@@ -233,11 +233,11 @@ EXACT_VALUES = (
         ),
     ),
     *mutants(
-        "radarsim/exact/burst.py",
+        "radarsim/studies/discriminator/exact.py",
         (
             "(order[:, None] + order + 1.0)",
             "(order[:, None] + order + 2.0)",
-            "exact/test_exact_burst.py::test_closed_form_is_the_printed_matrix",
+            "studies/discriminator/test_exact.py::test_closed_form_is_the_printed_matrix",
         ),
     ),
 )
@@ -264,18 +264,18 @@ NUMBERS = (
         (
             "(b - exact_square)",
             "(exact_square - b)",
-            "trust/test_trust_statistics_control.py::test_mean_coverage_and_factor",
+            "trust/test_statistics_control.py::test_mean_coverage_and_factor",
         ),
         ("inv_cdf(1 - 0.025 / n)", "inv_cdf(1 - 0.025)", f"{COVERAGE}::test_bounds_for_many_looks"),
         ("np.sqrt(variance / np.abs(n - 1)), np.nan)", "np.sqrt(variance / n), np.nan)", f"{STATISTICS}::test_by_hand"),
     ),
     *mutants(
         "radarsim/report/tables.py",
-        ("both[b] = False", "both[b] = True", "report/test_report_tables.py::test_gains_are_against_the_baseline"),
+        ("both[b] = False", "both[b] = True", "report/test_tables.py::test_gains_are_against_the_baseline"),
         (
             'result.sums.get("estimates")',
             'result.sums.get("estimated")',
-            "report/test_report_tables.py::test_fewer_estimates_than_realisations",
+            "report/test_tables.py::test_fewer_estimates_than_realisations",
         ),
     ),
 )
@@ -312,7 +312,7 @@ ENGINE = (
         (
             "if hashlib.sha256(body).digest() != digest:",
             "if len(digest) != DIGEST:",
-            "engine/test_engine_damage.py::test_a_hundred_of_a_hundred_flipped_bits_are_found",
+            "engine/test_damage.py::test_a_hundred_of_a_hundred_flipped_bits_are_found",
         ),
         ('"identity": work.identity,', '"identity": "",', STORE),
     ),
@@ -321,12 +321,12 @@ ENGINE = (
         (
             '"seed": case.seed,',
             '"seed": 1,',
-            "studies/test_studies_range_doppler.py::test_identity_ignores_names_and_realisations",
+            "studies/range_doppler/test_study.py::test_identity_ignores_names_and_realisations",
         ),
         (
             "digest(world(case.spec))",
             "digest(canonical(case.spec))",
-            "studies/test_studies_range_doppler.py::test_cases_that_differ_only_in_filters_share_their_noise",
+            "studies/range_doppler/test_study.py::test_cases_that_differ_only_in_filters_share_their_noise",
         ),
     ),
 )

@@ -2,31 +2,31 @@
 
 from tests.trust.mutant import mutants
 
-TWINS = "kernels/test_kernels_sonar_manoeuvre.py"
+TWINS = "studies/sonar/manoeuvre/test_kernels.py"
 ALARMS, ANSWERS = f"{TWINS}::test_alarms_and_first_events_are_the_twins", f"{TWINS}::test_filters_are_their_twins"
-CLUTTER, LAWS = "kernels/test_kernels_clutter.py", "studies/test_studies_clutter.py"
+CLUTTER, LAWS = "studies/sonar/clutter/test_kernels.py", "studies/sonar/clutter/test_study.py"
 AMONG = f"{CLUTTER}::test_estimates_are_the_twins"
-SCORE = "kernels/test_kernels_discriminator.py::test_score_of_samples_is_the_likelihood_and_its_gradient"
-CLEAN = "kernels/test_kernels_discriminator.py::test_the_coherent_sum_of_a_clean_burst_is_its_amplitude"
-POWERS = "trust/test_trust_statistics_sums.py::test_sums_of_one_realisation_are_the_powers_of_its_error"
-DETECTOR, INITIATION = "exact/test_exact_detector.py", "exact/test_exact_clutter.py"
+SCORE = "studies/discriminator/test_kernels.py::test_score_of_samples_is_the_likelihood_and_its_gradient"
+CLEAN = "studies/discriminator/test_kernels.py::test_the_coherent_sum_of_a_clean_burst_is_its_amplitude"
+POWERS = "trust/test_statistics_sums.py::test_sums_of_one_realisation_are_the_powers_of_its_error"
+DETECTOR, INITIATION = "studies/sonar/manoeuvre/test_exact.py", "studies/sonar/clutter/test_exact.py"
 
 MANOEUVRES = (
     *mutants(
-        "radarsim/kernels/sonar_detector.py",
+        "radarsim/studies/sonar/manoeuvre/kernels/detector.py",
         ("one, two = zero - age, 0.5 * age * age", "one, two = zero - age, age * age", ANSWERS),
         ("first = alarms + alarm, first + new", "first = alarms + alarm, first + event", ALARMS),
         ("where_greater(calm, patience - 0.5, zero, mode)", "where_greater(calm, patience + 0.5, zero, mode)", ANSWERS),
     ),
     *mutants(
-        "radarsim/kernels/sonar_imm.py",
+        "radarsim/studies/sonar/manoeuvre/kernels/imm.py",
         ("p * P[1] + q * Q[1] + both * d0 * d1", "p * P[1] + q * Q[1]", ANSWERS),
         ("stay[0] * p + back * q, leave * p", "stay[0] * p + leave * q, back * p", ANSWERS),
     ),
 )
 FALSE_PLOTS = (
     *mutants(
-        "radarsim/kernels/sonar_clutter.py",
+        "radarsim/studies/sonar/clutter/kernels/tracker.py",
         (
             "S = (S[0] + reach * reach, S[1]",
             "S = (S[0], S[1]",
@@ -44,7 +44,7 @@ FALSE_PLOTS = (
         ),
     ),
     *mutants(
-        "radarsim/kernels/sonar_field.py",
+        "radarsim/studies/sonar/clutter/kernels/field.py",
         ("np.floor((low - least) / step), 0.0)", "np.ceil((low - least) / step), 0.0)", f"{AMONG} {LAWS}"),
         ("return bb * per, -rb * per,", "return bb * per, rb * per,", AMONG),
         (
@@ -54,38 +54,38 @@ FALSE_PLOTS = (
         ),
     ),
     *mutants(
-        "radarsim/kernels/sonar_tracks.py",
+        "radarsim/studies/sonar/clutter/kernels/tracks.py",
         ("P[1] + u0 * K[1] + w0 * L[1],", "P[1] + u0 * K[1],", AMONG),
         ("rr * (P[0] + 1.0)", "rr * P[0]", f"{AMONG} {LAWS}::test_gates_hold_target_and_false_plots_as_they_should"),
     ),
     *mutants(
-        "radarsim/kernels/sonar_patterns.py",
+        "radarsim/studies/sonar/kernels/patterns.py",
         (
             "seen[i] = 1.0 if a < limit else 0.0",
             "seen[i] = 1.0 if a > limit else 0.0",
-            "studies/test_studies_sonar.py::test_random_misses_are_exact_as_means_over_patterns",
+            "studies/sonar/test_study.py::test_random_misses_are_exact_as_means_over_patterns",
         ),
     ),
 )
 SCORES = (
     *mutants(
-        "radarsim/kernels/discriminator_scoring.py",
+        "radarsim/studies/discriminator/kernels/scoring.py",
         ("image = amplitude * (cc - 0.5 * pulses)", "image = amplitude * (cc - pulses)", CLEAN),
         ("e = y * c - x * s", "e = y * c + x * s", SCORE),
     ),
     *mutants(
-        "radarsim/kernels/multimodel_sums.py",
+        "radarsim/studies/multimodel/kernels/sums.py",
         (
             "get(out, VARIANCE + 6),",
             "get(out, VARIANCE + 3),",
-            "kernels/test_kernels_multimodel.py::test_kernel_equals_its_twin studies/test_studies_multimodel.py",
+            "studies/multimodel/test_kernels.py::test_kernel_equals_its_twin studies/multimodel/test_study.py",
         ),
         ("error[4 * c + 2] += total(e2 * e)", "error[4 * c + 2] += total(e2)", POWERS),
     ),
 )
 LAWS_EXACT = (
     *mutants(
-        "radarsim/exact/detector.py",
+        "radarsim/studies/sonar/manoeuvre/exact.py",
         (
             "+ special.ndtr(-shift - np",
             "- special.ndtr(-shift - np",
@@ -98,7 +98,7 @@ LAWS_EXACT = (
         ),
     ),
     *mutants(
-        "radarsim/exact/tracker.py",
+        "radarsim/studies/sonar/clutter/exact.py",
         ("(n - age - 1) >= m", "(n - age) >= m", f"{INITIATION}::test_m_of_n_is_the_sum_over_all_patterns"),
         (
             "gate * (2 * sigma[0] ** 2 + reach",
@@ -113,12 +113,12 @@ RUNS = (
         (
             "blocks * bound // of, self.full)",
             "self.full * bound // of + 1, self.full)",
-            "engine/test_engine_share.py::test_shares_tile_the_blocks_and_the_last_has_the_cut_one",
+            "engine/test_share.py::test_shares_tile_the_blocks_and_the_last_has_the_cut_one",
         ),
         (
             "sums.count == self.full * self.work.block:",
             "sums.count >= 0:",
-            "engine/test_engine_store.py::test_a_stored_cut_block_counts_only_once_all_before_it_is_done",
+            "engine/test_store.py::test_a_stored_cut_block_counts_only_once_all_before_it_is_done",
         ),
     ),
     *mutants(
@@ -126,7 +126,7 @@ RUNS = (
         (
             "limit_s = 1.5",
             "limit_s = 15.0",
-            "engine/test_engine_signals.py::test_a_main_thread_that_never_asks_is_ended_within_two_seconds",
+            "engine/test_signals.py::test_a_main_thread_that_never_asks_is_ended_within_two_seconds",
         ),
     ),
     *mutants(
@@ -134,7 +134,7 @@ RUNS = (
         (
             "return one.tobytes() == other.tobytes()",
             "return True",
-            "engine/test_engine_audit.py::test_sums_that_were_forged_with_a_right_checksum_do_not_add_up",
+            "engine/test_audit.py::test_sums_that_were_forged_with_a_right_checksum_do_not_add_up",
         ),
     ),
     *mutants(
@@ -142,7 +142,7 @@ RUNS = (
         (
             "if work.identity != identity:",
             "if not identity:",
-            "engine/test_engine_cluster.py::test_workers_with_other_sources_are_refused",
+            "engine/test_cluster.py::test_workers_with_other_sources_are_refused",
         ),
     ),
     *mutants(
@@ -150,12 +150,12 @@ RUNS = (
         (
             "np.isnan(percent) | np.isnan(sigma), np.inf",
             "np.isnan(percent) | np.isnan(sigma), 0.0",
-            "report/test_report_precision.py::test_what_is_not_known_is_never_reached",
+            "report/test_precision.py::test_what_is_not_known_is_never_reached",
         ),
         (
             "row = int(np.argmax(percent))",
             "row = int(np.argmin(percent))",
-            "report/test_report_precision.py::test_the_worst_cell_is_the_widest_of_the_table",
+            "report/test_precision.py::test_the_worst_cell_is_the_widest_of_the_table",
         ),
     ),
 )

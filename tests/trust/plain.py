@@ -184,10 +184,10 @@ def words():
 
 def work(config, overrides):
     """The last case of a config, as it is run."""
-    from radarsim import studies
-    from radarsim.config.load import load
+    from radarsim.app.configs import load
+    from radarsim.app.work import CaseWork
 
-    return studies.CaseWork(load(config, overrides).cases[-1])
+    return CaseWork(load(config, overrides).cases[-1])
 
 
 def sums(config, overrides, count):
@@ -206,7 +206,11 @@ def bursts(config, overrides, count):
 def tracks():
     """Plots that are drawn by themselves, and estimates over recorded ones."""
     from radarsim.kernels import linear
-    from radarsim.studies import multimodel, multimodel_plots, range_doppler_plots, sonar_clutter_plots, sonar_plots
+    from radarsim.studies.multimodel import study as multimodel
+    from radarsim.studies.multimodel import track as multimodel_plots
+    from radarsim.studies.range_doppler import track as range_doppler_plots
+    from radarsim.studies.sonar import track as sonar_plots
+    from radarsim.studies.sonar.clutter import track as sonar_clutter_plots
 
     made = {}
     plan = work(*RUNS["linear"][:2]).plan

@@ -13,7 +13,6 @@ Exact values, where known, never enter a verdict.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +27,6 @@ PAPERS = {
     "P3": "Butyrskiy",
     "P4": "Uss, Baryshev & Djavad 2010",
 }
-STUDIES = ("range_doppler", "multimodel", "sonar", "discriminator")  # those with claims, in the order of the papers
 
 CONFIRMED, REFUTED, UNCLEAR, NOT_RUN = "confirmed", "refuted", "not distinguishable", "not run"
 
@@ -230,6 +228,14 @@ class Evidence:
         return rows.iloc[0]
 
 
+@dataclass(frozen=True)
+class PaperClaims:
+    """The claims of a paper that a study judges, and how its results are read for them."""
+
+    claims: Sequence[Claim]
+    evidence: type[Evidence]
+
+
 def verdict(of: Estimate, expected: Range) -> str:
     """Whether an interval lies inside a range, outside, or neither."""
     if not (of.lo <= of.hi):
@@ -255,13 +261,12 @@ CLAIMED = (
 NUMBERS = ("measured", "lo", "hi", "expected_lo", "expected_hi")  # of these columns; empty where there is none
 
 
-def judged(study: str, results: Sequence[CaseResult], made: Mapping):
+def judged(of: PaperClaims | None, results: Sequence[CaseResult], made: Mapping):
     """claims.csv: a row for each part of each claim that these results can judge, those of whole claims only."""
     rows: list[tuple] = []
-    if study in STUDIES:
-        module = import_module(f"radarsim.report.claims.{study}")
-        evidence = module.Evidence(results, made)
-        for claim in module.CLAIMS:
+    if of is not None:
+        evidence = of.evidence(results, made)
+        for claim in of.claims:
             rows += _rows(claim, evidence)
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(CLAIMED)})
 
@@ -288,18 +293,13 @@ def _end(value: float) -> float:
     return float(f"{value:.12g}") if math.isfinite(value) else math.nan
 
 
-def all_claims() -> list[Claim]:
-    """Every claim of every paper, in order."""
-    return [claim for study in STUDIES for claim in import_module(f"radarsim.report.claims.{study}").CLAIMS]
-
-
-def listed(stored: Mapping[str, Sequence[Mapping]]) -> list[dict]:
-    """Rows of all claims with the columns of claims.csv and `config`: as stored, or once as not run.
+def listed(claims: Sequence[Claim], stored: Mapping[str, Sequence[Mapping]]) -> list[dict]:
+    """Rows of claims with the columns of claims.csv and `config`: as stored, or once as not run.
 
     stored: config stem → the rows of its claims.csv.
     """
     rows = []
-    for claim in all_claims():
+    for claim in claims:
         own = [dict(row) for row in stored.get(claim.config, ()) if row["claim"] == claim.id]
         blank = dict.fromkeys(CLAIMED, "") | {"claim": claim.id, "paper": PAPERS[claim.paper]}
         blank |= {"place": claim.place, "reading": claim.reading}

@@ -1,0 +1,180 @@
+"""What `radarsim doctor` looks at: the machine, and everything that is stored of a result."""
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from radarsim.app.configs import load
+from radarsim.app.work import CaseWork
+from radarsim.config.experiment import Case
+from radarsim.engine.audit import Audit, agree, audited
+from radarsim.engine.blocks import Node, Partial, simulated
+from radarsim.engine.executors import available_cores
+from radarsim.engine.machine import instruction_set
+from radarsim.errors import ConfigError, RadarsimError, StoreError
+
+LOOKS, LOOK_S = 4, 0.25
+
+
+def machine() -> dict[str, str]:
+    """The machine, what runs on it, and where compiled kernels are kept, each in words."""
+    from radarsim.kernels import cache as compiled
+    from radarsim.report import provenance
+
+    facts, cache = provenance.machine(), compiled.ROOT
+    kept = [path.stat().st_size for path in cache.rglob("*") if path.is_file()] if cache.is_dir() else []
+    writable = "writable" if os.access(cache, os.W_OK) else "not writable"
+    free = shutil.disk_usage(Path.cwd()).free
+    return {
+        "machine": f"{facts['processor']}, {facts['cores']} cores; {facts['system']}",
+        "instructions": instruction_set(),
+        "threads": f"{available_cores()} by default",
+        "cache": f"{cache}: {len(kept)} files, {sum(kept) / 1e6:.1f} MB, {writable}",
+        "disk": f"{free / 1e9:.1f} GB free here",
+        "versions": ", ".join(f"{name} {version}" for name, version in provenance.versions().items()),
+        "cluster": cluster(),
+    }
+
+
+def cluster() -> str:
+    """Whether Dask is at hand, in words."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return f"Dask distributed {version('distributed')}"
+    except PackageNotFoundError:
+        return "Dask is not installed; `pip install 'radarsim[cluster]'` adds --workers and --scheduler"
+
+
+@dataclass
+class Inspection:
+    """What a look over a result found: how much was checked, faults that each name a file, and notes."""
+
+    folder: Path
+    outputs: int = 0
+    pieces: int = 0
+    realisations: int = 0
+    recomputed: list[str] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def inspected(folder: str | os.PathLike, recompute: int = 0) -> Inspection:
+    """Check a folder of results against its run.json, and all stored blocks of its cases; compute some of them again.
+
+    recompute is how many stored pieces of each case to compute again, the smallest first. Raises ConfigError for what
+    is no folder of results, and where blocks cannot be computed again because the sources that compute have changed.
+    """
+    found = Inspection(Path(folder))
+    record = _settled(found)
+    if hashlib.sha256(_json(record["resolved"])).hexdigest() != record["resolved_sha256"]:
+        found.faults.append(f"{found.folder / 'run.json'}: damaged: the config in it is not the one that ran")
+    elsewhere = []
+    for name, identity in record["identities"].items():
+        store = found.folder.parent / ".blocks" / identity
+        if not store.is_dir():
+            found.notes.append(f"{store}: no blocks of {name} are stored; the tables stand on their own")
+            continue
+        audit = audited(store, int(record["cases"][name]["done"]))
+        found.pieces += len(audit.pieces)
+        found.faults += audit.faults
+        found.notes += audit.notes
+        if recompute and not _recomputed(found, audit, _case(record, name), identity, recompute):
+            elsewhere.append(name)
+    if elsewhere and not found.faults:
+        raise ConfigError(
+            f"{found.folder}: {', '.join(elsewhere)}: cannot be computed again, the sources that compute have changed "
+            "since; all that is stored is whole"
+        )
+    return found
+
+
+def _settled(found: Inspection) -> dict:
+    """The record, and its outputs looked at; a few times, where a run beside us may be writing others just now."""
+    for look in range(LOOKS):
+        time.sleep(LOOK_S if look else 0)
+        record, found.outputs, found.faults = _record(found.folder), 0, []
+        _outputs(found, record["outputs"])
+        if not found.faults:
+            break
+    return record
+
+
+def _record(folder: Path) -> dict:
+    path = folder / "run.json"
+    try:
+        record = json.loads(path.read_bytes())
+        for key, kind in (("outputs", dict), ("identities", dict), ("cases", dict), ("resolved", dict)):
+            if not isinstance(record[key], kind):
+                raise ValueError(f"{key} is no table")
+        record["resolved_sha256"], record["study"]
+        for name, identity in record["identities"].items():
+            if not isinstance(record["cases"][name]["done"], int) or not re.fullmatch("[0-9a-f]{2,128}", identity):
+                raise ValueError(f"identity or realisations of {name} are none")
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise ConfigError(f"{folder}: no run.json in it, so it is no folder of results") from error
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise StoreError(f"{path}: damaged, it is no record of a run; `radarsim run` makes it anew") from error
+    return record
+
+
+def _json(value: object) -> bytes:
+    from radarsim.report.provenance import to_json
+
+    return to_json(value)
+
+
+def _outputs(found: Inspection, outputs: dict) -> None:
+    for name, digest in outputs.items():
+        path = found.folder / name
+        if Path(name).is_absolute() or ".." in Path(name).parts:
+            found.faults.append(f"{found.folder / 'run.json'}: damaged: an output outside the folder: {name}")
+            continue
+        try:
+            data = path.read_bytes()
+        except FileNotFoundError:
+            found.faults.append(f"{path}: missing")
+        except OSError as error:
+            found.faults.append(f"{path}: cannot be read: {error.strerror}")
+        else:
+            found.outputs += 1
+            if hashlib.sha256(data).hexdigest() != digest:
+                found.faults.append(f"{path}: altered since it was written")
+
+
+def _case(record: dict, name: str) -> Case | None:
+    """The case as run.json resolved it; None where it no longer reads as a config."""
+    labels = ("case", "swept")
+    for case in record["resolved"]["cases"]:
+        if case["case"] == name:
+            keys = {key: value for key, value in case.items() if key not in labels}
+            try:
+                return load({"study": record["study"], **keys}).cases[0]
+            except RadarsimError:
+                return None
+    return None
+
+
+def _recomputed(found: Inspection, audit: Audit, case: Case | None, identity: str, most: int) -> bool:
+    """Compute some pieces again and compare; False if this program would compute another identity."""
+    if case is None or identity(case) != identity:
+        return False
+    work = CaseWork(case)
+    own = (piece for piece in audit.pieces if isinstance(piece, Node | Partial))
+    for piece in sorted(own, key=lambda piece: piece.realisations(work.block)[1])[:most]:
+        header, values = audit.pieces[piece]
+        path = audit.path / f"{piece.name}.sums"
+        found.realisations += header["count"]
+        found.recomputed.append(str(path))
+        if header["block"] != work.block or values.size != work.size:
+            found.faults.append(f"{path}: is of other blocks than this program makes")
+        elif not agree(simulated(work, piece).values, values, {*header["platforms"], instruction_set()}):
+            found.faults.append(f"{path}: computed again, the sums are others")
+    return True

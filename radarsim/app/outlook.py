@@ -1,0 +1,174 @@
+"""What running an experiment would take, and what there is to run."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from radarsim.app.simulation import NO_CONTROL, check_precision, result_of
+from radarsim.app.work import CaseWork
+from radarsim.config import lookup
+from radarsim.config.experiment import Experiment
+from radarsim.engine.collect import collect
+from radarsim.engine.executors import available_cores
+from radarsim.studies import registry
+
+PILOT_S = 0.3  # of all cases together, unless single realisations take longer
+LADDER, FOR_NOTHING = 8, 1.2  # so many times more realisations at a look; times as good as equal
+SHORT_S = 0.01
+PILOT_OF_PRECISION_S, LEAST, MOST = 1.0, 256, 16_384  # realisations that a precision is judged from
+
+
+@dataclass(frozen=True)
+class Need:
+    """What a precision takes: realisations (None beyond all bounds), from `exact` values or a `pilot` of how many, and
+    the σ that is last to get there, in words."""
+
+    realisations: int | None
+    known_by: str
+    last: str
+
+
+@dataclass(frozen=True)
+class CaseOutlook:
+    """What running a case would take: labels, counts, seconds of one thread's work."""
+
+    name: str
+    filters: str
+    scans: int
+    realisations: int
+    seconds: float
+    need: Need | None = None
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """What running an experiment would take, on `threads` threads."""
+
+    cases: tuple[CaseOutlook, ...]
+    threads: int
+    seconds: float
+    memory_mb: float
+    precision: float | None = None
+    warnings: tuple[str, ...] = ()
+
+
+def outlook(
+    experiment: Experiment,
+    threads: int | None = None,
+    precision: float | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
+) -> Outlook:
+    """Prepare every case and time a few realisations of it, compiled beforehand, and say what the whole would take.
+
+    With a precision, in per cent: a case ends when that is reached, or at the last look before its N. progress(done,
+    total, 0) is called after each case.
+    """
+    threads = threads or available_cores()
+    if precision is not None:
+        check_precision([experiment], precision)
+    cases, largest, preparing, control = [], 0, 0.0, False
+    registry.study(experiment.study).prepare(experiment.cases[0])  # what it loads is not to be timed
+    for done, case in enumerate(experiment.cases, 1):
+        work, started = CaseWork(case), time.perf_counter()
+        work.plan  # noqa: B018  (prepares it)
+        preparing += time.perf_counter() - started
+        work.simulate(0, 1)
+        each = seconds_each(work, case.realisations, PILOT_S / len(experiment.cases))
+        need = None if precision is None else needed(work, precision, each)
+        count = case.realisations if need is None else ending(need, case.realisations)
+        axes = work.plan.axes
+        cases.append(CaseOutlook(case.name, ", ".join(axes.filters), len(axes.k), count, each * count, need))
+        control |= experiment.control_variate and controls(axes)
+        largest = max(largest, work.size)
+        if progress is not None:
+            progress(done, len(experiment.cases), 0)
+    # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter and its libraries.
+    memory = 200 + 8e-6 * largest * (2 * threads + 32)
+    seconds = preparing + sum(c.seconds for c in cases) / threads
+    warnings = (NO_CONTROL,) if experiment.control_variate and not control else ()
+    return Outlook(tuple(cases), threads, seconds, memory, precision, warnings)
+
+
+def controls(axes) -> bool:
+    """Whether the baseline's σ is known exactly somewhere where another filter has one too."""
+    known = axes.available[axes.baseline] & np.isfinite(np.asarray(axes.exact_sigma, dtype=float)[axes.baseline])
+    return bool((np.delete(axes.available, axes.baseline, axis=0) & known).any())
+
+
+def needed(work: CaseWork, percent: float, seconds_each: float) -> Need:
+    """How many realisations a precision takes: from exact values, where errors are Gaussian with these, else from a
+    pilot."""
+    from radarsim.report import precision
+
+    exact, curves = work.plan.gaussian, registry.study(work.case.study).curves
+    count = LEAST if exact else min(max(LEAST, int(PILOT_OF_PRECISION_S / seconds_each)), MOST)
+    result = result_of(work.case, work, collect(work, count))
+    if exact:
+        result = precision.gaussian(result)
+        axes = result.axes
+        exact = bool(np.isfinite(axes.exact_sigma[axes.available]).all())
+    n, cell = precision.needed(result, percent, curves), precision.worst(result, curves)
+    last = "no sigma in this case" if cell is None else f"{cell.filter}, {cell.component}, k = {cell.k}"
+    return Need(n, "exact" if exact else f"pilot of {count:,}", last)
+
+
+def ending(need: Need, most: int) -> int:
+    """Realisations at which a run to a precision would end: where it is reached, or at the last look before N."""
+    from radarsim.report import precision
+
+    return max(n for n in precision.looks(most) if need.realisations is None or n <= need.realisations)
+
+
+def seconds_each(work: CaseWork, realisations: int, pilot_s: float) -> float:
+    """Seconds of one thread for one realisation, from ever more of them, at most a block, in about pilot_s.
+
+    Kernels calculate whole chunks: one realisation may take as long as hundreds, and more are tried while they come for
+    nothing, whatever that takes.
+    """
+    most, count, taken, free = min(work.block, realisations), 1, timed(work, 1), True
+    while count < most and (free or LADDER * taken < pilot_s):
+        more = min(LADDER * count, most)
+        longer = timed(work, more)
+        free = longer < FOR_NOTHING * taken
+        count, taken = more, longer
+    return taken / count
+
+
+def timed(work: CaseWork, count: int) -> float:
+    """Seconds of the processor that `count` realisations take; of short ones the lesser of two."""
+    taken = []
+    while not taken or (len(taken) < 2 and taken[0] < SHORT_S):
+        started = time.thread_time()
+        work.simulate(0, count)
+        taken.append(time.thread_time() - started)
+    return min(taken)
+
+
+def described(file: Path) -> str:
+    """The first words of a YAML file's leading comment, without its own name."""
+    with file.open(encoding="utf-8") as lines:
+        for line in lines:
+            words = line.lstrip("#").strip()
+            if not line.startswith("#"):
+                break
+            if not words.startswith("yaml-language-server"):
+                return words.partition(" — ")[2] or words
+    return ""
+
+
+def inventory() -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
+    """What `radarsim list` shows: title, columns and rows of each kind of thing at hand."""
+    configs = [(stem, described(lookup.config_file(stem))) for stem in lookup.stems("configs")]
+    scenarios = [(stem, described(lookup.scenario_file(stem, None))) for stem in lookup.stems("scenarios")]
+    studies = [registry.study(name) for name in registry.names()]
+    about = [(study.name, study.about) for study in studies]
+    filters = [(study.name, key, words) for study in studies for key, words in study.filters.items()]
+    return [
+        ("Configs (radarsim run NAME)", ("name", "what it is"), configs),
+        ("Scenarios (target: NAME)", ("name", "what it is"), scenarios),
+        ("Studies (study: NAME)", ("name", "paper and question"), about),
+        ("Filters", ("study", "keys", "what it is"), filters),
+    ]

@@ -1,0 +1,95 @@
+"""From finished cases to files: tables, figures, claims, run.json and report.html of one experiment."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import agreement, claims, controlled, files, notes, provenance, sweeps
+from radarsim.report import tables as common
+from radarsim.report.drawing import Figure
+from radarsim.studies.registry import study
+
+
+def tables(results: Sequence[CaseResult], control_variate: bool = False) -> dict:
+    """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims; if asked for,
+    `controlled`.
+
+    A study whose errors are not of all realisations at common scans makes its own curves and gains.
+    """
+    of = study(results[0].study)
+    own = of.tables(results)
+    shared = {"curves": common.curves, "gains": common.gains}
+    made = {name: own[name] if name in own else table(results) for name, table in shared.items()} | own
+    if control_variate and of.exact_errors:
+        made["controlled"] = controlled.controlled(results)
+    made["claims"] = claims.judged(of.claims(), results, made)
+    return notes.noted(made, results)
+
+
+def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
+    """The figures of an experiment, described, by the stem of their file: the study's own, and of sweeps."""
+    own = study(results[0].study)
+    drawn = own.figures(results, made, experiment)
+    if own.draws_sweeps:
+        return drawn
+    return drawn | sweeps.figures(results, common.groups(made["curves"], "case", "filter", "component"))
+
+
+@dataclass(frozen=True)
+class Written:
+    """What was written: the folder, its files by their path in it, the tables, and the answer in words."""
+
+    folder: Path
+    files: tuple[str, ...]
+    tables: Mapping = field(repr=False)
+    answer: tuple[str, ...]
+
+
+ALWAYS = ("curves", "gains")  # tables written without a row too; others only where they have one
+
+
+def write(
+    experiment,
+    results: Sequence[CaseResult],
+    folder: Path,
+    run: Mapping,
+    *,
+    draw: bool = True,
+    made: Mapping | None = None,
+    formats: Sequence[str] = ("svg", "png"),
+) -> Written:
+    """Write all of an experiment's outputs into folder; every file at once, none half.
+
+    run holds the facts of the run for run.json: see provenance.record; made the tables, where they are at hand; formats
+    those of the figures' files. Outputs of an earlier run that this one does not write (figures without `draw`) are
+    removed, so that nothing stale stands beside new numbers; nothing else is.
+    """
+    from radarsim.report import html
+
+    made = tables(results) if made is None else made
+    contents = {f"{name}.csv": common.to_csv(table) for name, table in made.items() if len(table) or name in ALWAYS}
+    described = figures(results, made, experiment) if draw else {}
+    if draw:
+        from radarsim.report import figures as drawing  # Matplotlib
+
+        for name, figure in described.items():
+            contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.save(figure, formats).items()}
+    own = study(experiment.study)
+    answer = tuple(own.answer(results, made))
+    record = provenance.record(experiment, results, run, contents, answer)
+    page = html.page(
+        experiment,
+        made,
+        list(described.values()),
+        record,
+        answer,
+        own.question(experiment),
+        inputs=own.inputs(results),
+        cost=own.cost(made, run),
+        agreement=agreement.agreement(made["curves"]) if own.exact_errors else None,
+    )
+    contents["report.html"] = page.encode()
+    contents["run.json"] = provenance.to_json(provenance.with_output(record, "report.html", contents["report.html"]))
+    files.replace_all(folder, contents, stale=provenance.outputs(folder))
+    return Written(folder, tuple(sorted(contents)), made, answer)

@@ -1,0 +1,211 @@
+"""`make reproduce-figures`: every shipped config at its full size, a line each, and what came of the papers' claims.
+
+Two processes share the configs, so that one computes while the other draws: drawing keeps a single core busy, and takes
+about as long as computing. They are programs started anew, which take a line of JSON for each config and answer with
+one; the store is safe with both.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from queue import SimpleQueue
+
+from radarsim.app import run as experiment
+from radarsim.engine.stopping import Signals
+from radarsim.errors import Interrupted, RadarsimError
+from radarsim.report.text import clock, plural
+
+PROCESSES = 2
+LOOK_S = 0.1  # how often a signal is looked for
+
+
+@dataclass(frozen=True)
+class Done:
+    """One config: its seconds, what it made in words; its faults and the exit code they deserve, if it has any."""
+
+    stem: str
+    seconds: float
+    words: str
+    faults: tuple[str, ...] = ()
+    code: int = 0
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a process is asked for: a config by its name, where to, and how."""
+
+    stem: str
+    out: str
+    overrides: tuple[str, ...] = ()
+    figures: bool = True
+
+
+def reproduce(
+    stems: Sequence[str],
+    out: str,
+    say: Callable[[str], None],
+    stop: Signals | None = None,
+    overrides: Sequence[str] = (),
+    figures: bool = True,
+) -> list[Done]:
+    """Run every config, telling a line as each is done; a fault of one does not keep the others from running.
+
+    Raises Interrupted, with all that was done stored, if `stop` saw a signal.
+    """
+    done: list[Done] = []
+    tasks = [Task(stem, str(out), tuple(overrides), figures) for stem in stems]
+    for one in _finished(tasks, stop):
+        done.append(one)
+        say(f"[{len(done):>2}/{len(stems)}] {one.stem:<26} {one.seconds:6.1f} s  {one.words}")
+    return done
+
+
+def _finished(tasks: Sequence[Task], stop: Signals | None) -> Iterator[Done]:
+    """What is done, as it is done, by processes that are gone at the end."""
+    count = min(PROCESSES, len(tasks))
+    idle: SimpleQueue[_Process] = SimpleQueue()
+    processes = [_Process() for _ in range(count)]
+    for process in processes:
+        idle.put(process)
+
+    def run(task: Task) -> Done:
+        process = idle.get()
+        try:
+            return process.done(task)
+        finally:
+            idle.put(process)
+
+    with ThreadPoolExecutor(max(1, count)) as pool:
+        pending: set[Future] = {pool.submit(run, task) for task in tasks}
+        try:
+            while pending:
+                ready, pending = wait(pending, LOOK_S, FIRST_COMPLETED)
+                if stop is not None:
+                    stop.raise_if_received()
+                yield from (future.result() for future in ready)
+        finally:
+            for future in pending:
+                future.cancel()
+            for process in processes:
+                process.stop(at_once=bool(pending))
+            for process in processes:
+                process.wait()
+
+
+class _Process:
+    """A process that runs one config after another; in a session of its own, so that Ctrl-C is for this one alone."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._ended = False
+        self._start()
+
+    def _start(self) -> None:
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        command = [sys.executable, "-c", "from radarsim.app.reproduce import answer; answer()"]
+        self._popen = subprocess.Popen(command, env=environment, start_new_session=True, **pipes)
+
+    def done(self, task: Task) -> Done:
+        """Have it run a config. One that dies under it is told as that config's fault, and another is started."""
+        began = time.perf_counter()
+        with suppress(OSError):
+            self._popen.stdin.write(json.dumps(asdict(task)) + "\n")
+            self._popen.stdin.flush()
+        if line := self._popen.stdout.readline():
+            told = json.loads(line)
+            return Done(**told | {"faults": tuple(told["faults"])})
+        code = self._popen.wait()
+        with self._lock:
+            if not self._ended:
+                self._popen.stdout.close()
+                self._close_stdin()
+                self._start()
+        fault = f"{task.stem}: its process ended with {code}; run again, what it had done is stored"
+        return Done(task.stem, time.perf_counter() - began, f"FAILED: {fault}", (fault,), 1)
+
+    def stop(self, at_once: bool) -> None:
+        """Ask it to end: in the midst of a config, which it stores as far as it is, or else after it."""
+        with self._lock:
+            self._ended = True
+            if at_once:
+                self._popen.terminate()
+            self._close_stdin()
+
+    def wait(self) -> None:
+        """Until it has ended."""
+        self._popen.wait()
+        self._popen.stdout.close()
+
+    def _close_stdin(self) -> None:
+        with suppress(OSError):  # a config that it never read
+            self._popen.stdin.close()
+
+
+def answer() -> None:
+    """The program of a process: a Task on each line of stdin, a Done on each of stdout."""
+    threading.Thread(target=_follow, args=(os.getppid(),), daemon=True).start()
+    with Signals() as stop:
+        try:
+            for line in sys.stdin:
+                asked = json.loads(line)
+                told = _run(Task(**asked | {"overrides": tuple(asked["overrides"])}), stop)
+                sys.stdout.write(json.dumps(asdict(told)) + "\n")
+                sys.stdout.flush()
+        except Interrupted as ended:
+            os._exit(ended.exit_code)  # as the command does: whoever sent the signal need not wait for an orderly end
+        except BrokenPipeError:  # whoever asked is gone
+            os._exit(1)
+
+
+def _follow(parent: int) -> None:
+    """End this process, which stores what it has, once the one that asked is gone."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+def _run(task: Task, stop: Signals) -> Done:
+    started = time.perf_counter()
+    try:
+        result = experiment.run(task.stem, overrides=task.overrides, out=task.out, stop=stop, figures=task.figures)
+        verdicts = ", ".join(f"{len(names)} {verdict}" for verdict, names in result.verdicts().items())
+        drawn = sum(name.endswith(".svg") for name in result.written.files)
+        words = [plural(drawn, "figure")] if task.figures else []
+        words, faults, code = [*words, *([f"claims: {verdicts}"] if verdicts else [])], (), 0
+    except Interrupted:
+        raise
+    except RadarsimError as error:
+        words, faults, code = [f"FAILED: {error.lines[0]}"], error.lines, error.exit_code
+    return Done(task.stem, time.perf_counter() - started, "; ".join(words), tuple(faults), code)
+
+
+def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
+    """The closing words: claims by verdict, time, where all lies."""
+    from radarsim.report import index
+
+    index.write(Path(out))  # two processes may have written it at once, one without the other's run
+    rows = experiment.claims((), out)
+    overall = Counter({row["claim"]: row["overall"] for row in rows}.values())
+    longest = max(done, key=lambda one: one.seconds)
+    failed = [one.stem for one in done if one.faults]
+    guide = Path(out) / "README.md"
+    told = f"; {guide} says what lies where" if guide.is_file() else ""
+    return [
+        "",
+        f"claims   {sum(overall.values())}: " + ", ".join(f"{count} {verdict}" for verdict, count in overall.items()),
+        f"time     {clock(seconds)} for {plural(len(done), 'config')}, "
+        f"the longest {longest.stem}, {longest.seconds:.0f} s",
+        f"where    {Path(out) / 'index.html'} leads to every report{told}",
+        *([f"failed   {', '.join(failed)}"] if failed else []),
+    ]

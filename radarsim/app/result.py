@@ -1,0 +1,151 @@
+"""What a finished experiment gives: tables, figures, files."""
+
+import os
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from functools import cached_property
+from pathlib import Path
+
+from radarsim.config.experiment import Experiment
+from radarsim.engine.results import CaseResult
+from radarsim.studies.registry import study
+
+MOST_ROWS = 40  # that a notebook shows
+
+
+class Result:
+    """A finished experiment: its cases, tables (pandas), figures (Matplotlib). Nothing is written unless asked for."""
+
+    def __init__(self, experiment: Experiment, cases: Sequence[CaseResult], facts: Mapping):
+        self.experiment, self.cases, self.facts = experiment, tuple(cases), dict(facts)
+
+    def __repr__(self):
+        counts = sorted({case.count for case in self.cases})
+        each = f"{counts[0]:,}" if len(counts) == 1 else f"{counts[0]:,} to {counts[-1]:,}"
+        return f"<radarsim result {self.experiment.stem}: {len(self.cases)} cases of {each} realisations>"
+
+    def _repr_html_(self):
+        """What a notebook shows: question, answer, realisations, σ and gain at the last scan; text escaped."""
+        from html import escape
+
+        from radarsim.report import provenance
+
+        shown = ("case", "filter", "component", "unit", "t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")
+        columns = [*shown, *(name for name in ("gain_percent", "gain_lo", "gain_hi") if len(self.gains))]
+        rows = self.last_scan[columns].dropna(axis=1, how="all")
+        table = rows.to_html(index=False, border=0, float_format=lambda v: f"{v:.4g}", na_rep="", max_rows=MOST_ROWS)
+        said = "".join(f"<p>{escape(line)}</p>" for line in self.answer)
+        count = escape(provenance.span(sorted({case.count for case in self.cases})))
+        return f"<h4>{escape(self.question)}</h4>{said}<p>{count} realisations; 95 % intervals.</p>{table}"
+
+    @property
+    def question(self) -> str:
+        """What the experiment asks, in one sentence."""
+        return study(self.experiment.study).question(self.experiment)
+
+    @cached_property
+    def answer(self) -> tuple[str, ...]:
+        """Sentences with numbers and 95 % intervals.
+
+        >>> import radarsim
+        >>> radarsim.run("rls2", realisations=2000).answer[0].split(":")[0]
+        'Range'
+        """
+        return tuple(study(self.experiment.study).answer(self.cases, self.tables))
+
+    @cached_property
+    def tables(self) -> dict:
+        """Every table by the stem of its file: `curves`, `gains`, `claims`, and the study's own.
+
+        >>> import radarsim
+        >>> sorted(radarsim.run("rls2", realisations=2000).tables)
+        ['claims', 'consistency', 'curves', 'gains', 'radar', 'steady']
+        """
+        from radarsim.app import output
+
+        return output.tables(self.cases, self.experiment.control_variate)
+
+    @property
+    def curves(self):
+        """sigma(k), bias and spread of every case, filter and component: a DataFrame with the columns of curves.csv.
+
+        >>> import radarsim
+        >>> curves = radarsim.run("rls2", realisations=2000).curves
+        >>> first = curves[(curves["filter"] == "r") & (curves["component"] == "r")].iloc[0]
+        >>> bool(first["sigma_lo"] < first["exact_sigma"] < first["sigma_hi"])
+        True
+        """
+        return self.tables["curves"]
+
+    @property
+    def gains(self):
+        """Gains against the baseline filter: a DataFrame with the columns of gains.csv."""
+        return self.tables["gains"]
+
+    @property
+    def last_scan(self):
+        """The rows of curves at the last scan of each case, filter and component, with those of gains beside them."""
+        keys = ["case", "filter", "component"]
+        last = self.curves.groupby(keys, sort=False).tail(1)
+        return last.merge(self.gains.groupby(keys, sort=False).tail(1), on=[*keys, "k", "t_s"], how="left")
+
+    @cached_property
+    def _described(self) -> dict:
+        from radarsim.app import output
+
+        return output.figures(self.cases, self.tables, self.experiment)
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """The names that `figure` takes."""
+        return tuple(self._described)
+
+    def figure(self, name: str):
+        """A Matplotlib figure by its name; KeyError names those there are.
+
+        >>> import radarsim
+        >>> result = radarsim.run("rls2", realisations=2000)
+        >>> result.figures[:2]
+        ('sigma_r', 'gain_r')
+        >>> result.figure("sigma_r").axes[0].get_xlabel()
+        'time from the first plot, s'
+        """
+        from radarsim.report import figures
+
+        if name not in self._described:
+            raise KeyError(f"no figure {name!r}; there are: {', '.join(self._described)}")
+        return figures.render(self._described[name])
+
+    def write(self, out: str | os.PathLike, figures: bool | Sequence[str] = True):
+        """Write tables, figures, claims, run.json and report.html into out/<stem>/, and out/index.html anew.
+
+        figures may name the formats of their files: svg, png, pdf. What was written comes back.
+        """
+        from radarsim.app import output
+        from radarsim.report import index
+
+        folder = Path(out) / self.experiment.stem
+        facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
+        formats = ("svg", "png") if isinstance(figures, bool) else tuple(figures)
+        self.written = output.write(
+            self.experiment, self.cases, folder, facts, draw=bool(figures), made=self.tables, formats=formats
+        )
+        index.write(Path(out))
+        return self.written
+
+    def verdicts(self) -> dict[str, list[str]]:
+        """The claims that came out so, by verdict; empty where this experiment judges none."""
+        judged = self.tables["claims"].drop_duplicates("claim")
+        return {verdict: list(group["claim"]) for verdict, group in judged.groupby("overall", sort=False)}
+
+    @property
+    def unmet(self) -> list[str]:
+        """The targets of precision or time that the run did not reach, in words; empty if it is all that was asked."""
+        return list(self.facts.get("unmet", ()))
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader of the numbers must know: damaged or mixed blocks, too few realisations."""
+        from radarsim.report import provenance
+
+        return [*self.facts["warnings"], *provenance.few(self.cases)]

@@ -1,0 +1,293 @@
+"""One experiment from config to written results: the wiring that the command and Python share."""
+
+import json
+import math
+import os
+import shlex
+import time
+from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from radarsim.app import arguments, simulation, stored_claims
+from radarsim.app.configs import load
+from radarsim.app.result import Result
+from radarsim.app.simulation import Gathered, Means, Progress
+from radarsim.app.work import CaseWork
+from radarsim.config import lookup
+from radarsim.config.experiment import Experiment
+from radarsim.engine import stopping
+from radarsim.engine.collect import stored
+from radarsim.engine.executors import Executor, available_cores
+from radarsim.engine.results import CaseResult
+from radarsim.engine.stopping import Signals, Stop
+from radarsim.errors import ConfigError, StoreError, TargetUnmet
+from radarsim.report.claims import Claim
+from radarsim.studies import registry
+
+
+def load_all(sources: Sequence, overrides: Sequence[str] = ()) -> list[Experiment]:
+    """Every config checked before any runs; raises one ConfigError with the faults of all."""
+    loaded, faults = [], []
+    for source in sources:
+        try:
+            loaded.append(load(source, overrides))
+        except ConfigError as error:
+            faults += error.lines
+    if faults:
+        raise ConfigError(*faults)
+    return loaded
+
+
+RESULTS = "results"  # the command's default directory
+SHORT = {"realisations": "-n", "seed": "--seed"}
+
+
+def run(
+    config,
+    *,
+    realisations: float | None = None,
+    seed: int | None = None,
+    overrides: Sequence[str] = (),
+    precision: float | None = None,
+    time_limit: float | Stop | None = None,
+    threads: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    executor: Executor | None = None,
+    out: str | os.PathLike | None = None,
+    figures: bool = True,
+    progress: Progress | None = None,
+    stop: Signals | None = None,
+) -> Result:
+    """Run an experiment and give its result; nothing is written unless `out` names a directory.
+
+    config is a path, the name of a shipped config, a dict as YAML would give it, or an Experiment loaded with these
+    overrides. overrides are texts `key=value` with dotted keys. With a precision, in per cent, a case ends at the first
+    of 2000, 4000, 8000 … realisations at which the 95 % half-width of every σ is under it. time_limit is in seconds, or
+    a condition that runs already. `result.unmet` says what of the two was not reached. workers are processes of this
+    machine, scheduler the address of a Dask scheduler, executor one that is open already.
+
+    Raises ConfigError for a wrong config, StoreError for a bad disk, NonFiniteError for a filter that diverged,
+    TargetUnmet where the time did not suffice for a single block, and Interrupted, with all that was done stored, if
+    `stop` saw a signal.
+
+    >>> result = run("rls2", realisations=2000)
+    >>> len(result.curves) > 50
+    True
+    """
+    arguments.check(
+        **{"threads": threads, "workers": workers, "precision": precision, "time_limit": time_limit},
+        **{"executor": executor, "out": out},
+    )
+    overrides = merged(overrides, realisations, seed)
+    experiment = config if isinstance(config, Experiment) else load(config, overrides)
+    if precision is not None:
+        simulation.check_precision([experiment], precision)
+    limit = time_limit if time_limit is None or callable(time_limit) else stopping.time_limit(time_limit)
+    started = time.perf_counter()
+    with cluster(workers, scheduler) if executor is None else nullcontext(executor) as pool:
+        threads = pool.workers if pool else int(threads or available_cores())
+        means = Means(out, threads, stopping.Either(stop, limit), pool)
+        gathered = simulation.simulated(experiment, means, progress=progress, precision=precision)
+        if stop is not None:
+            stop.raise_if_received()
+    if not gathered.cases:
+        raise TargetUnmet(f"{experiment.stem}: {gathered.stopped}: nothing was done by then")
+    facts = facts_of(gathered, threads, time.perf_counter() - started)
+    result = result_of(experiment, gathered, facts, overrides)
+    if out is not None:
+        result.write(out, figures)
+    return result
+
+
+def share(
+    experiment: Experiment,
+    number: int,
+    of: int,
+    *,
+    out: str | os.PathLike,
+    threads: int | None = None,
+    executor: Executor | None = None,
+    time_limit: Stop | None = None,
+    progress: Progress | None = None,
+    stop: Signals | None = None,
+) -> simulation.Shares:
+    """Compute share `number` of `of` of every case into the store under out; no tables. Arguments as those of `run`."""
+    means = Means(out, threads, stopping.Either(stop, time_limit), executor)
+    done = simulation.shared(experiment, number, of, means, progress=progress)
+    if stop is not None:
+        stop.raise_if_received()
+    return done
+
+
+def cluster(workers: int | None, scheduler: str | None) -> AbstractContextManager[Executor | None]:
+    """The executor of these workers or of this scheduler, to be entered; None where neither is given."""
+    if workers is None and scheduler is None:
+        return nullcontext()
+    from radarsim.engine.cluster import Cluster
+
+    return Cluster(workers, scheduler)
+
+
+def merged(overrides: Sequence[str], realisations: float | None, seed: int | None) -> tuple[str, ...]:
+    """Overrides with realisations and seed, where given, as two more."""
+    given = {"realisations": realisations, "seed": seed}
+    return (*overrides, *(f"{key}={value}" for key, value in given.items() if value is not None))
+
+
+def repeated(experiment: Experiment, overrides: Sequence[str]) -> dict[str, str]:
+    """The command that repeats a run, as a fact of run.json; none for an experiment that is no file."""
+    if experiment.path is None:
+        return {"command": "none: the config was given in Python, and stands below"}
+    return {"command": command(experiment, overrides, RESULTS)}
+
+
+def command(experiment: Experiment, overrides: Sequence[str], out: str | os.PathLike) -> str:
+    """The command that runs an experiment; a shipped config by its stem."""
+    # In a checkout the shipped folder is a link to configs/.
+    shipped = experiment.path and Path(experiment.path).resolve().parent == (lookup.SHIPPED / "configs").resolve()
+    path = os.fsencode(experiment.path or "").decode("utf-8", "backslashreplace")
+    words = ["radarsim", "run", experiment.stem if shipped else path]
+    for override in overrides:
+        key, _, value = override.partition("=")
+        words += [SHORT[key], value] if key in SHORT else ["--set", override]
+    return shlex.join(words + (["--out", str(out)] if str(out) != RESULTS else []))
+
+
+def report(
+    experiment: Experiment, *, out: str | os.PathLike, overrides: Sequence[str] = (), figures: bool = True
+) -> Result:
+    """Tables, figures and report of a config from what is stored; raises ConfigError where something is missing.
+
+    Where overrides do not say how many realisations, it is as many as the last run reported, else as the config asks.
+    """
+    result = from_store(experiment, out, overrides)
+    result.write(out, figures)
+    return result
+
+
+def load_result(config, *, out: str | os.PathLike = RESULTS, overrides: Sequence[str] = ()) -> Result:
+    """The result of an experiment that was run into `out`, from what is stored there: computes and writes nothing.
+
+    config and overrides as for `run`. Raises ConfigError where something is missing, with the command that computes it.
+
+    >>> import radarsim, tempfile
+    >>> with tempfile.TemporaryDirectory() as out:
+    ...     ran = radarsim.run("rls2", realisations=2000, out=out, figures=False)
+    ...     loaded = radarsim.load("rls2", out=out)
+    >>> loaded.curves.equals(ran.curves)
+    True
+    """
+    experiment = config if isinstance(config, Experiment) else load(config, overrides)
+    return from_store(experiment, out, overrides)
+
+
+def from_store(experiment: Experiment, out: str | os.PathLike, overrides: Sequence[str]) -> Result:
+    """The result from stored blocks alone; as many realisations as the last run, where overrides do not say."""
+    arguments.directory(out)
+    if not any(override.split("=")[0].strip() == "realisations" for override in overrides):
+        experiment = as_last_run(experiment, Path(out))
+    held, missing = Gathered(), []
+    for case in experiment.cases:
+        work = CaseWork(case)
+        if not case.realisations:  # the last run was stopped before it came to this case
+            continue
+        collected = stored(work, case.realisations, out)
+        if collected is None:
+            missing.append(f"{case.name}: {case.realisations} realisations are not stored in {out}")
+        else:
+            held.cases.append((case, work, collected))
+    if missing:
+        raise ConfigError(*missing, f"`{command(experiment, overrides, out)}` computes them")
+    return result_of(experiment, held, facts_of(held, 0, 0.0), overrides)
+
+
+def result_of(experiment: Experiment, gathered: Gathered, facts: dict, overrides: Sequence[str]) -> Result:
+    """The result; with a warning where a control variate is asked for and no case has one."""
+    result = Result(experiment, finished(gathered), facts | repeated(experiment, overrides))
+    if experiment.control_variate and not len(result.tables.get("controlled", ())):
+        facts["warnings"].append(simulation.NO_CONTROL)
+    return result
+
+
+def as_last_run(experiment: Experiment, out: Path) -> Experiment:
+    """The experiment with each case's realisations as the run.json under `out` reports them, where there is one."""
+    try:
+        done = json.loads((out / experiment.stem / "run.json").read_text())["cases"]
+        numbers = {name: int(case["done"]) for name, case in done.items()}
+    except FileNotFoundError:
+        return experiment
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        said = getattr(error, "strerror", None) or "damaged"
+        raise StoreError(
+            f"{out / experiment.stem / 'run.json'}: cannot be read: {said}; `radarsim run` makes it anew, "
+            "and so does `radarsim report` with -n"
+        ) from error
+    cases = tuple(replace(case, realisations=numbers.get(case.name, case.realisations)) for case in experiment.cases)
+    return replace(experiment, cases=cases, realisations=max(case.realisations for case in cases))
+
+
+def finished(gathered: Gathered) -> list[CaseResult]:
+    """Cases with their sums and the labels that say what these are."""
+    return [simulation.result_of(*one) for one in gathered.cases]
+
+
+def facts_of(gathered: Gathered, threads: int, seconds: float) -> dict:
+    """The facts of a run for run.json: stop reason, threads, times, warnings, identities, the precision reached."""
+    collected = [c for _, _, c in gathered.cases]
+    facts = {
+        "stop": "; ".join(gathered.unmet) or "done",
+        "unmet": gathered.unmet,
+        "threads": threads,
+        "seconds": seconds,
+        "kernel_seconds": sum(c.kernel_seconds for c in collected),
+        "realisations_computed": sum(c.computed for c in collected),
+        "realisations_from_store": sum(c.from_store for c in collected),
+        "warnings": list(dict.fromkeys(warning for c in collected for warning in c.warnings)),
+        "identities": {case.name: work.identity for case, work, _ in gathered.cases},
+    }
+    if measured := seconds_per_update(work for _, work, _ in gathered.cases):
+        facts["seconds_per_update"] = measured
+    if gathered.precision is None:
+        return facts
+    widest = {name: asdict(cell) | {"percent": finite(cell.percent)} for name, cell in gathered.cells.items()}
+    return facts | {"precision": {"asked_percent": gathered.precision, "widest": widest}}
+
+
+def seconds_per_update(works: Iterable[CaseWork]) -> dict[str, dict[str, float]]:
+    """CPU seconds of one update of one realisation, by case and filter, of studies that measure it; never in a CSV."""
+    every = {work.case.name: dict(registry.study(work.case.study).seconds_per_update(work.plan)) for work in works}
+    return {name: seconds for name, seconds in every.items() if seconds}
+
+
+def finite(value: float) -> float | None:
+    """The number, or None where it is none that JSON knows."""
+    return value if math.isfinite(value) else None
+
+
+def all_claims() -> list[Claim]:
+    """Every claim of every paper, in the order of the studies."""
+    every = (registry.study(name).claims() for name in registry.names())
+    return [claim for of in every if of is not None for claim in of.claims]
+
+
+def claims(configs: Sequence[str], out: str | os.PathLike) -> list[dict]:
+    """Rows of the claims, as stored under `out` or as not run; of some configs only if any are given.
+
+    Each row has the columns of claims.csv and `config`. Raises ConfigError for a config that does not exist.
+    """
+    from radarsim.report import claims as papers
+
+    stems = [one.stem for one in load_all(configs)] or sorted({claim.config for claim in all_claims()})
+    held = {stem: rows for stem in stems if (rows := stored_claims.stored(Path(out) / stem / "claims.csv")) is not None}
+    if not configs:
+        return papers.listed(all_claims(), held)
+    rows = []
+    for stem in stems:
+        if stem in held:
+            rows += [row | {"config": stem} for row in held[stem]]
+        else:
+            rows += [row for row in papers.listed(all_claims(), {}) if row["config"] == stem]
+    return rows

@@ -1,0 +1,135 @@
+"""The self-test of `radarsim doctor`: a small case of every study, its tables compared with known ones.
+
+radarsim/app/known holds for each study a config and the tables that it gave on the platform of platform.json. There the
+bytes must be the same. On another platform (instruction set, compiler, BLAS) the last bits differ: an ulp here and
+there, which the arithmetic after it magnifies by its condition number κ. So a number may differ by what κ allows, see
+`Tolerance`. `make known` makes the tables anew, after a change that is meant to change numbers.
+"""
+
+import csv
+import io
+import json
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from radarsim.app import run as experiment
+from radarsim.engine.machine import instruction_set, linear_algebra, processor
+from radarsim.studies import registry
+
+KNOWN = Path(__file__).parent / "known"
+TABLES = ("curves", "gains")
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """By how much a study's numbers may differ between platforms, in σ: those of samples, and exact ones.
+
+    Spreads, standard errors and half-widths of intervals are compared by their squares, as each is the root of a
+    difference of sums: where all realisations err alike, a rounding ε of σ² makes √(2ε) |bias| of the spread.
+    """
+
+    sampled: float = 1e-12
+    exact: float = 1e-12
+
+
+TOLERANCES = {
+    # Gains of up to three states from fits with κ < 10³ when balanced: some tens of roundings, 10⁻¹² leaves a factor 5.
+    "range_doppler": Tolerance(),
+    "sonar": Tolerance(),
+    # Innovation covariances of bearings have κ of up to 3·10⁶ (kernels.blocks.factored), so κε = 7·10⁻¹⁰.
+    "multimodel": Tolerance(sampled=1e-9),
+    # Balanced information of five parameters, κ = 2.1·10⁵: its inverse is known to κε/2 = 2.3·10⁻¹¹. Estimates are
+    # found by scoring steps that use the inverse, each a fraction of σ long and ended by a threshold.
+    "discriminator": Tolerance(sampled=1e-9, exact=1e-10),
+}
+EXACT = ("exact_sigma", "exact_bias", "exact_percent", "posterior_sigma")
+LABELS_DIFFER = (float("inf"), float("inf"))
+FIRST_NUMBER = {"curves": "sigma", "gains": "gain_percent"}  # columns before it are labels and counts
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How a study's case came out: in words, and whether that is as it should be."""
+
+    study: str
+    good: bool
+    words: str
+
+
+def platform() -> dict[str, str]:
+    """What decides the last bits: processor, instruction set, BLAS, and the versions of what compiles and computes."""
+    here = {"processor": processor(), "instruction_set": instruction_set(), "linear_algebra": linear_algebra()}
+    return here | {name: metadata.version(name) for name in ("numba", "llvmlite", "numpy", "scipy")}
+
+
+def tables(study: str) -> dict[str, bytes]:
+    """The tables of a study's known case, as computed here: CSV by name."""
+    from radarsim.report.tables import to_csv
+
+    result = experiment.run(KNOWN / f"{study}.yaml", threads=1)
+    return {name: to_csv(result.tables[name]) for name in TABLES}
+
+
+def verdicts() -> list[Verdict]:
+    """One for each study."""
+    same_platform = platform() == json.loads((KNOWN / "platform.json").read_text())
+    return [verdict(study, tables(study), same_platform) for study in registry.SHIPPED]
+
+
+def verdict(study: str, made: dict[str, bytes], same_platform: bool) -> Verdict:
+    """Compare tables with the known ones."""
+    known = {name: (KNOWN / f"{study}.{name}.csv").read_bytes() for name in TABLES}
+    if made == known:
+        return Verdict(study, True, "the known bytes")
+    allowed, off = TOLERANCES[study], [distances(name, made[name], known[name]) for name in TABLES]
+    sampled, exact = (max(pair) for pair in zip(*off, strict=True))
+    if sampled > allowed.sampled or exact > allowed.exact:
+        words = f"differs from the known answer by {sampled:.1e} of sigma (exact values {exact:.1e}); "
+        return Verdict(study, False, words + f"at most {allowed.sampled:.0e} ({allowed.exact:.0e}) is rounding")
+    words = f"the known numbers to {max(sampled, exact):.1e} of sigma"
+    return Verdict(study, not same_platform, words + (", not the known bytes" if same_platform else ""))
+
+
+def distances(table: str, one: bytes, other: bytes) -> tuple[float, float]:
+    """The largest differences of two tables' sampled and exact numbers, in σ or 100 %; infinite where labels differ."""
+    first, second = (list(csv.DictReader(io.StringIO(text.decode()))) for text in (one, other))
+    if len(first) != len(second):
+        return LABELS_DIFFER
+    farthest = {False: 0.0, True: 0.0}
+    for a, b in zip(first, second, strict=True):
+        columns = list(b)
+        numbers = columns[columns.index(FIRST_NUMBER[table]) :]
+        if any(a.get(name) != b[name] for name in columns if name not in numbers):
+            return LABELS_DIFFER
+        centre = FIRST_NUMBER[table]
+        scale = float(b["sigma"] or 1) if table == "curves" else 100.0  # ends of intervals may lie far above σ
+        for name in numbers:
+            if (a.get(name) or "") == b[name]:
+                continue
+            if not (a.get(name) and b[name]):
+                return LABELS_DIFFER
+            of = max(scale, abs(float(b[name])))
+            one, other = (_compared(name, float(row[name]) / of, float(row[centre] or 0) / of) for row in (a, b))
+            exact = name in EXACT
+            farthest[exact] = max(farthest[exact], abs(one - other))
+    return farthest[False], farthest[True]
+
+
+def _compared(name: str, value: float, centre: float) -> float:
+    """What of a column is compared; see `Tolerance`."""
+    if name in ("spread", "bias_se"):
+        return value**2
+    return (value - centre) ** 2 if name.endswith(("_lo", "_hi")) else value
+
+
+def write() -> None:
+    """Make the known tables anew, of this platform."""
+    for study in registry.SHIPPED:
+        for name, content in tables(study).items():
+            (KNOWN / f"{study}.{name}.csv").write_bytes(content)
+    (KNOWN / "platform.json").write_text(json.dumps(platform(), indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    write()

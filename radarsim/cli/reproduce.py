@@ -1,0 +1,50 @@
+"""`make reproduce-figures`: every shipped config at its full size, a line each, and what came of the papers' claims.
+
+python -m radarsim.cli.reproduce [OUT [CONFIG…]] [--set KEY=VALUE] [--no-figures]
+"""
+
+import argparse
+import os
+import sys
+import time
+from collections.abc import Sequence
+
+from radarsim.app.reproduce import reproduce, summary
+from radarsim.app.run import RESULTS, load_all
+from radarsim.cli import console
+from radarsim.config import lookup
+from radarsim.engine.stopping import Signals
+from radarsim.errors import RadarsimError, StoreError
+
+
+def main(arguments: Sequence[str]) -> int:
+    """The shipped configs of some names, or all, into a directory; the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m radarsim.cli.reproduce", description=__doc__.splitlines()[0])
+    parser.add_argument("out", nargs="?", default=RESULTS, help="directory; results where none is given")
+    parser.add_argument("configs", nargs="*", help="names of configs; all where none is given")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="of every config")
+    parser.add_argument("--no-figures", action="store_true", help="tables, claims and reports without them")
+    asked, started = parser.parse_args(arguments), time.perf_counter()
+    with Signals() as stop:
+        try:
+            loaded = load_all(asked.configs or lookup.stems("configs"), asked.set)
+            stems = list(dict.fromkeys(one.stem for one in loaded))
+            done = reproduce(stems, asked.out, console.say, stop, asked.set, not asked.no_figures)
+            for line in summary(done, asked.out, time.perf_counter() - started):
+                console.say(line)
+            sys.stdout.flush()
+        except RadarsimError as error:
+            sys.stderr.write("".join(f"{line}\n" for line in error.lines))
+            return error.exit_code
+        except BrokenPipeError:  # its reader has seen enough
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+            return 0
+        except OSError as error:
+            sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+            sys.stderr.write(f"output: cannot be written: {error.strerror or error}\n")
+            return StoreError.exit_code
+    return max((one.code for one in done), default=0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,1 +1,0 @@
-"""What is known without sampling: error covariances, generalised least squares, Fisher bounds."""

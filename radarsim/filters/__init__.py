@@ -1,1 +1,0 @@
-"""Filter design: from options to the arrays that a kernel applies to every realisation."""

@@ -1,0 +1,207 @@
+"""The sequence of discriminators over block sums, eight bursts side by side: `discriminator`, for the fast engine.
+
+A window goes on until all eight bursts are done with it; those that are done earlier stay where they are, so that no
+burst's estimate depends on its neighbours.
+"""
+
+import math
+
+import numpy as np
+
+from radarsim.kernels.compile import kernel, part
+from radarsim.kernels.lanes import WIDTH, address, any_greater, full, get, put, rows, where_greater
+from radarsim.kernels.random import fill_normal_strip
+from radarsim.studies.discriminator.kernels.lanes import (
+    BEGUN,
+    BEST,
+    CHOSEN,
+    COHERENT,
+    KEPT,
+    LIVE,
+    PASSES,
+    PRIOR,
+    ROWS,
+    SLOPES,
+    SQUARED,
+    B,
+    X,
+    copy,
+    fraction,
+    lane,
+    log_posterior,
+    merge,
+    score,
+    step,
+)
+from radarsim.studies.discriminator.kernels.scoring import SIZE, TURN
+from radarsim.studies.discriminator.kernels.sequence import LEAST_COHERENCE
+
+
+@part
+def evaluate(physics, work, sums, table, window):
+    """L, the coherent sum and the gradient of a window at the estimate."""
+    for j in range(SIZE):
+        put(work, B + j, window.powers[j] * get(work, X + j))
+    score(work, sums, table, window.table, window.blocks, physics.image, physics.amplitude)
+
+
+@part
+def search(physics, work, sums, table, window, options, needed):
+    """Moves the lanes that need it to the best of the points along the direction in which hand-overs err."""
+    weight, half, points = physics.amplitude / physics.sigma**2, full(0.5), options.search
+    copy(work, X, BEGUN)
+    put(work, BEST, log_posterior(work, window, weight))
+    put(work, CHOSEN, full(0.0))
+    for point in range(-points, points + 2):
+        last = point > points
+        away = options.spacing * get(work, CHOSEN) if last else full(options.spacing * point)
+        for j in range(SIZE):
+            put(work, X + j, get(work, BEGUN + j) + window.direction[j] * away)
+        if point == 0:
+            continue
+        evaluate(physics, work, sums, table, window)
+        if not last:
+            found, best = log_posterior(work, window, weight), get(work, BEST)
+            better = where_greater(found, best, needed, full(0.0))
+            put(work, BEST, where_greater(better, half, found, best))
+            put(work, CHOSEN, where_greater(better, half, full(float(point)), get(work, CHOSEN)))
+    put(work, PASSES, get(work, PASSES) + (2.0 * points + 1.0) * needed)
+
+
+@part
+def scored(physics, work, sums, table, window, options, searching):
+    """Scoring within a window until its stop rule."""
+    numbers = window.pulses * physics.samples_per_pulse
+    share = 1.0 if physics.complex_samples else 0.5
+    level, weight = share * numbers * physics.amplitude, physics.amplitude / physics.sigma**2
+    error = physics.sigma * math.sqrt(share * numbers) / level
+    zero, one = full(0.0), full(1.0)
+    put(work, LIVE, one)
+    for number in range(options.steps):
+        evaluate(physics, work, sums, table, window)
+        put(work, PASSES, get(work, PASSES) + get(work, LIVE))
+        if number == 0 and searching:
+            enough = full(1.0 - options.margin * error)
+            needed = where_greater(enough, (1.0 / level) * get(work, COHERENT), one, zero)
+            if any_greater(needed, zero):
+                search(physics, work, sums, table, window, options, needed)
+        coherence = one
+        if options.coherent:
+            coherence = (1.0 / level) * get(work, COHERENT) + 3.0 * error  # with a margin for noise
+            coherence = where_greater(one, coherence, coherence, one)
+            coherence = where_greater(coherence, full(LEAST_COHERENCE), coherence, full(LEAST_COHERENCE))
+        step(work, window, weight, options.coherent, coherence)
+        live = where_greater(get(work, SQUARED), full(options.tolerance**2), get(work, LIVE), zero)
+        put(work, LIVE, live)
+        if not any_greater(live, zero):
+            break
+
+
+@part
+def first_phase(physics, work, sums, table, window):
+    """Puts the phase, the rest as forecast, at the argument of Σ u e^{-jψ}, where the likelihood is largest."""
+    evaluate(physics, work, sums, table, window)
+    for n in range(WIDTH):
+        work[lane(X, n)] += math.atan2(work[lane(SLOPES, n)], work[lane(COHERENT, n)]) / TURN
+    put(work, PASSES, get(work, PASSES) + 1.0)
+
+
+@part
+def best_of_phases(physics, work, sums, table, window, options):
+    """The first window scored from equally spaced phases; the end with the largest posterior is kept."""
+    weight = physics.amplitude / physics.sigma**2
+    copy(work, X, BEGUN)
+    put(work, BEST, full(-math.inf))
+    for phase in range(options.phases):
+        copy(work, BEGUN, X)
+        put(work, X, get(work, X) + phase / options.phases)
+        scored(physics, work, sums, table, window, options, False)
+        evaluate(physics, work, sums, table, window)
+        put(work, PASSES, get(work, PASSES) + 1.0)
+        found, best = log_posterior(work, window, weight), get(work, BEST)
+        for j in range(SIZE):
+            put(work, KEPT + j, where_greater(found, best, get(work, X + j), get(work, KEPT + j)))
+        put(work, BEST, where_greater(found, best, found, best))
+    copy(work, KEPT, X)
+
+
+@kernel
+def run_strip(physics, drawn, tables, windows, options, work, sums, errors):
+    """All windows (K,) of an estimator on eight bursts; writes errors (up to 8, K, 6), in turns over the burst.
+
+    drawn are rows of the blocks' sums, tables those of `filters.discriminator_plan.Tables`. Passes are left in work.
+    """
+    table, weights = address(tables[0]), address(tables[1])
+    work, sums, drawn = address(work), address(sums), address(drawn)
+    for j in range(SIZE):
+        put(work, X + j, full(0.0) if options.from_truth else get(work, PRIOR + j))
+    put(work, PASSES, full(0.0))
+    for k in range(options.windows):
+        window = windows[k]
+        merge(drawn, table, weights, window.table, window.weights, window.blocks, sums)
+        if k == 0 and not options.from_truth and options.phases > 0:
+            best_of_phases(physics, work, sums, table, window, options)
+        else:
+            if k == 0 and not options.from_truth:
+                first_phase(physics, work, sums, table, window)
+            scored(physics, work, sums, table, window, options, k > 0 and options.search > 0)
+        for j in range(SIZE):
+            error = get(work, X + j)
+            put(work, BEGUN + j, fraction(error) if j == 0 else error)
+        for n in range(errors.shape[0]):
+            for j in range(SIZE):
+                errors[n, k, j] = work[lane(BEGUN + j, n)]
+
+
+@kernel
+def draw_forecasts(key, first, sigma, work):
+    """Errors of the forecasts of realisations first … first + 7, of standard deviations sigma (6,); as `draw_prior`."""
+    a, b = np.empty(SIZE // 2 * WIDTH), np.empty(SIZE // 2 * WIDTH)
+    fill_normal_strip(key, first, 0, a, b)
+    work, a, b = address(work), address(a), address(b)
+    for pair in range(SIZE // 2):
+        put(work, PRIOR + 2 * pair, sigma[2 * pair] * get(a, pair))
+        put(work, PRIOR + 2 * pair + 1, sigma[2 * pair + 1] * get(b, pair))
+
+
+@kernel
+def draw_strip(key, first, mean, factor, a, b, drawn):
+    """Block sums of realisations first … first + 7 into rows; draws 2i and 2i + 1 make block i."""
+    fill_normal_strip(key, first, 0, a, b)
+    a, b, drawn = address(a), address(b), address(drawn)
+    for i in range(mean.shape[0]):
+        n0, n1, n2, n3 = get(a, 2 * i), get(b, 2 * i), get(a, 2 * i + 1), get(b, 2 * i + 1)
+        f = factor[i]
+        put(drawn, 4 * i, mean[i, 0] + f[0] * n0)
+        put(drawn, 4 * i + 1, mean[i, 1] + f[1] * n0 + f[2] * n1)
+        put(drawn, 4 * i + 2, mean[i, 2] + f[3] * n0 + f[4] * n1 + f[5] * n2)
+        put(drawn, 4 * i + 3, mean[i, 3] + f[6] * n0 + f[7] * n1 + f[8] * n2 + f[9] * n3)
+
+
+@kernel
+def run_strips(physics, mean, factor, tables, windows, options, keys, first, sigma, room, errors, passes):
+    """`estimate_strips` with its work arrays in room."""
+    work, sums, drawn, a, b = room
+    for start in range(0, errors.shape[0], WIDTH):
+        stop = min(start + WIDTH, errors.shape[0])
+        draw_forecasts(keys[1], first + start, sigma, work)
+        draw_strip(keys[0], first + start, mean, factor, a, b, drawn)
+        for e in range(options.size):
+            run_strip(physics, drawn, tables, windows[e], options[e], work, sums, errors[start:stop, e])
+            for n in range(stop - start):
+                passes[start + n, e] = int(work[lane(PASSES, n)])
+
+
+def room_for(blocks: int) -> tuple[np.ndarray, ...]:
+    """Work arrays for eight bursts of so many blocks: estimates, sums of a window, sums drawn, normals."""
+    return rows(ROWS), rows(4 * blocks), rows(4 * blocks), rows(2 * blocks), rows(2 * blocks)
+
+
+def estimate_strips(physics, mean, factor, tables, windows, options, keys, first, sigma, errors, passes) -> None:
+    """As `discriminator.estimate_block`, with block sums: errors (n, F, K, 6) and passes (n, F) are written.
+
+    mean (blocks, 4) and factor (blocks, 10) are the law of the sums drawn, sigma (6,) that of the forecast's errors,
+    tables those of `filters.discriminator_plan.Tables`. All is relative to the truth.
+    """
+    room = room_for(len(mean))
+    run_strips(physics, mean, factor, tables, windows, options, keys, first, sigma, room, errors, passes)

@@ -1,0 +1,171 @@
+"""What a study is: one paper's question, as the rest of radarsim sees it.
+
+A study is an object of a class derived from `Study`. Its abstract methods are required; the others are optional and do
+what their docstrings say where a study does not define them. Methods import what they need when they are called, so
+that `radarsim list` loads no kernels.
+
+The numbers come from two of them: `prepare` makes a plan of a case, once; `simulate` makes the sums of one block of
+realisations. Everything else is made of these sums.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+    from radarsim.config.experiment import Case, Experiment
+    from radarsim.config.fields import Study as Keys
+    from radarsim.engine.moments import Layout
+    from radarsim.engine.results import Axes, CaseResult, Track
+    from radarsim.report.claims import PaperClaims
+    from radarsim.report.drawing import Figure
+
+
+class Plan(Protocol):
+    """What `prepare` makes of a case; beside this it holds the arrays that the study's kernels take.
+
+    block is how many realisations a block holds: from the study alone, never from N, threads or the machine. layout
+    names the arrays of the sums and their shapes. axes say what the sums are of. gaussian: whether all errors are
+    Gaussian, with the exact bias and σ of the axes.
+    """
+
+    @property
+    def block(self) -> int: ...
+    @property
+    def layout(self) -> "Layout": ...
+    @property
+    def axes(self) -> "Axes": ...
+    @property
+    def gaussian(self) -> bool: ...
+
+
+class Tracker(Protocol):
+    """The filters of a case over recorded plots, chunk by chunk.
+
+    most_rows is how many rows it takes, all at once; None: any number, chunk by chunk in flat memory. several: whether
+    rows may have the time of the row before, as plots of one scan do.
+    """
+
+    most_rows: int | None
+    several: bool
+
+    def feed(self, columns: Mapping[str, "np.ndarray"]) -> "Track":
+        """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
+
+
+class RecordedPlots(ABC):
+    """What a study does with recorded plots: `radarsim track` and `radarsim simulate`."""
+
+    @abstractmethod
+    def columns(self, spec: Any) -> Sequence[Sequence[str]]:
+        """The columns that are read, `t_s` first; the first of these choices that a file has is taken."""
+
+    @abstractmethod
+    def sigmas(self, spec: Any) -> Mapping[str, Sequence[str]]:
+        """The keys of the standard deviations that stand behind each number that is measured."""
+
+    @abstractmethod
+    def scan_period_s(self, spec: Any) -> float:
+        """The config's time between two plots."""
+
+    @abstractmethod
+    def simulated(self, case: "Case", realisation: int) -> Mapping[str, "np.ndarray"]:
+        """The plots of one realisation, as a run draws them, and the truth in columns true_…; columns (n,)."""
+
+    @abstractmethod
+    def tracker(self, case: "Case") -> Tracker:
+        """The filters of a case, before their first plot."""
+
+
+class Study(ABC):
+    """A study. `name` is the value of `study:` in YAML, `about` one line for `radarsim list`."""
+
+    name: ClassVar[str]
+    about: ClassVar[str]
+    filters: ClassVar[Mapping[str, str]]  # what `radarsim list` says of its filters: keys, and what they make
+    exact_errors: ClassVar[bool] = True  # False: exact_sigma is a bound, which a filter may reach or not
+    draws_sweeps: ClassVar[bool] = False  # True: `figures` draws sweeps too, in place of the common figures
+
+    # ---- what is asked -------------------------------------------------------------------------------------------
+    @abstractmethod
+    def keys(self) -> "type[Keys]":
+        """The YAML keys: a subclass of `radarsim.config.fields.Study`."""
+
+    @abstractmethod
+    def computes_in(self, spec: Any) -> tuple[str, ...]:
+        """The modules, by their full names, in which the numbers of a case begin: of `prepare`, `simulate`, `keys`.
+
+        What they import counts too. An edit in any of these sources gives the stored blocks another identity.
+        """
+
+    # ---- numbers -------------------------------------------------------------------------------------------------
+    @abstractmethod
+    def prepare(self, case: "Case") -> Plan:
+        """The plan of a case: truth, matrices, gains, exact values. Raises ConfigError where there is none."""
+
+    @abstractmethod
+    def simulate(self, plan: Any, first: int, count: int) -> "np.ndarray":
+        """The sums of realisations first … first + count − 1, in the order of the plan's layout.
+
+        Realisation i has the same noise in any block, whatever N, threads or machine.
+        """
+
+    def relabelled(self, axes: "Axes", case: "Case") -> "Axes":
+        """The axes of a plan with the display names of a case that has the same identity. Default: names of filters."""
+        members = getattr(case.spec, case.spec.bare_keys)
+        return replace(axes, filters=tuple(member.name for member in members))
+
+    def seconds_per_update(self, plan: Any) -> Mapping[str, float]:
+        """CPU seconds of one update of one realisation, by filter. Default: not measured."""
+        return {}
+
+    # ---- what is shown -------------------------------------------------------------------------------------------
+    @abstractmethod
+    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
+        """The study's own tables by the stem of their file; `curves` or `gains` among them replace the common ones."""
+
+    def curves(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
+        """The table `curves` alone. Default: the common one."""
+        from radarsim.report import tables
+
+        return tables.curves(results)
+
+    @abstractmethod
+    def figures(
+        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "dict[str, Figure]":
+        """The figures, described, by the stem of their file, from results and from all tables made of them."""
+
+    @abstractmethod
+    def question(self, experiment: "Experiment") -> str:
+        """What an experiment asks, in one sentence."""
+
+    @abstractmethod
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
+        """The answer: sentences with numbers and 95 % intervals."""
+
+    def inputs(self, results: "Sequence[CaseResult]") -> "pd.DataFrame | None":
+        """A table of what was put in, for the report. Default: none."""
+        return None
+
+    def cost(self, made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
+        """A table of what the filters cost, for the report; run is as in run.json. Default: none."""
+        return None
+
+    def claims(self) -> "PaperClaims | None":
+        """The paper's claims. Default: none."""
+        return None
+
+    # ---- beside --------------------------------------------------------------------------------------------------
+    def recorded(self) -> RecordedPlots | None:
+        """What it does with recorded plots. Default: nothing; `track` and `simulate` refuse its configs."""
+        return None
+
+    def shipped(self) -> Path | None:
+        """The folder that holds `configs/` and `scenarios/` of its own. Default: none."""
+        return None

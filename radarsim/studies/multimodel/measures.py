@@ -1,0 +1,184 @@
+"""How P2's claims are measured: which case and filter are the paper's, and the numbers taken from the sums of the
+stages.
+
+Cases are found by target, scan period and what their filters are, whatever their names; filters by family, merging rule
+and bank.
+"""
+
+from functools import cache
+
+import numpy as np
+
+from radarsim.app.configs import load
+from radarsim.engine.results import CaseResult
+from radarsim.report import claims
+from radarsim.report.claims import Part, Range, certain
+from radarsim.report.statistics import Estimate
+from radarsim.studies.multimodel import tables as multimodel
+
+BANK_122 = ("uniform 0.05", "accelerated 0.05", "accelerated 30")
+BANK_11 = ("uniform 5", "uniform 30")
+MATRIX_122 = ((0.996, 0, 0.002), (0, 0.996, 0.002), (0.004, 0.004, 0.996))
+MATRIX_11 = ((0.995, 0.01), (0.005, 0.99))
+MMA2_122 = ("imm", "combined", BANK_122)
+MMA2_11 = ("imm", "combined", BANK_11)
+RIVALS = (
+    MMA2_11,
+    *(("kalman", "", (model,)) for model in ("uniform 20", "uniform 5", "accelerated 20", "accelerated 1")),
+)
+COMPONENTS = {"y": 3, "vy": 4}
+UNITS = {"y": "height", "vy": "rate of climb"}
+DURATION = 186.2  # s, of every shipped flight, as printed
+AEROBALLISTIC = ("start", "ballistic", "manoeuvre", "after")
+
+
+@cache
+def shipped(flight: str):
+    """The checked target of a scenario."""
+    plain = {"name": "any", "family": "kalman", "models": [{"motion": "uniform", "sigma_acceleration_mps2": 1}]}
+    sensor = {"sigma_range_m": 1, "sigma_elevation_rad": 1e-3, "sigma_azimuth_rad": 1e-3, "scan_period_s": 1}
+    config = {"study": "multimodel", "sensor": sensor, "target": flight, "filters": [plain], "realisations": 1}
+    return load(config).cases[0].spec.target
+
+
+class Evidence(claims.Evidence):
+    """Finds cases by (target's stages and kind, scan period), and filters by what they are."""
+
+    def case(self, key) -> CaseResult:
+        """key: (name of the flight, scan period, filters that must be there)."""
+        flight, period, wanted = key
+        for result in self.results:
+            sensor = result.spec.sensor
+            plain = sensor.detection_probability == 1 and sensor.jitter_s == 0 and sensor.conversion == "plain"
+            accurate = np.allclose(sensor.sigma, (2.5, np.radians(0.1), np.radians(0.1)))
+            if not (plain and accurate and np.isclose(sensor.scan_period_s, period) and self._flies(result, flight)):
+                continue
+            if all(self._index(result, own) is not None for own in wanted):
+                return result
+        raise claims.Missing(key)
+
+    @staticmethod
+    def _flies(result: CaseResult, flight: str) -> bool:
+        """Whether a case's target is a shipped flight, by its numbers, seen to its end."""
+        return (
+            result.spec.target == shipped(flight) and result.axes.t_s[-1] >= DURATION - result.spec.sensor.scan_period_s
+        )
+
+    @staticmethod
+    def _index(result: CaseResult, wanted: tuple) -> int | None:
+        """The number of a case's filter (family, rule, bank[, matrix]); the paper's matrix where none is named."""
+        family, rule, bank, *matrix = wanted
+        printed = {BANK_122: MATRIX_122, BANK_11: MATRIX_11}.get(bank)
+        extra = result.axes.extra
+        for f, of in enumerate(result.spec.filters):
+            same = (
+                extra["families"][f] == family
+                and extra["models"][f] == bank
+                and (not rule or extra["rules"][f] == rule)
+            )
+            expected = matrix[0] if matrix else printed
+            T = extra["transitions"][f]
+            fits = expected is None or (np.shape(expected) == T.shape and np.allclose(expected, T, atol=1e-9))
+            if same and fits and of.covariance_at == "plot":
+                return f
+        return None
+
+    def filter(self, key, wanted: tuple) -> int:
+        """The number of a filter in a case; raises Missing."""
+        found = self._index(self.case(key), wanted)
+        if found is None:
+            raise claims.Missing(wanted)
+        return found
+
+    def stage(self, key, name: str) -> int:
+        """The number of a stage of a case; raises Missing."""
+        names = self.case(key).axes.extra["stages"]
+        if name not in names:
+            raise claims.Missing(name)
+        return names.index(name)
+
+    def gain(self, key, wanted: tuple, base: tuple, stage: str, component: str) -> Estimate:
+        """Paired gain of a filter against another over a stage, %."""
+        of, s = self.case(key), self.stage(key, stage)
+        return multimodel.stage_gain(of, self.filter(key, wanted), self.filter(key, base), s, COMPONENTS[component])
+
+    def probability(self, key, wanted: tuple, stage: str, model: int) -> Estimate:
+        """Mean probability of a model (from 0) over the reported scans of a stage; ends of intervals are averaged."""
+        of, f = self.case(key), self.filter(key, wanted)
+        rows = self.tables["probabilities"]
+        t = self._bounds(of, stage)
+        own = rows[(rows["case"] == of.name) & (rows["filter"] == of.axes.filters[f]) & (rows["model"] == model + 1)]
+        own = own[(own["t_s"] >= t[0]) & (own["t_s"] < t[1])]
+        return Estimate(*(float(own[name].mean()) for name in ("probability", "probability_lo", "probability_hi")))
+
+    @staticmethod
+    def _bounds(of: CaseResult, stage: str) -> tuple[float, float]:
+        if stage == "whole":
+            return 0.0, np.inf
+        for name, begin, end in multimodel.stage_bounds(of):
+            if name == stage:
+                last = name == of.axes.extra["stages"][-1]
+                return begin, np.inf if last else end
+        raise claims.Missing(stage)
+
+    def operations(self, key, wanted: tuple) -> float:
+        """Operations of one update, mean over the whole flight."""
+        of = self.case(key)
+        name = of.axes.filters[self.filter(key, wanted)]
+        return float(self.row("operations", case=of.name, filter=name, stage="whole")["operations"])
+
+
+def rival_parts(key: tuple, stages: tuple[str, ...], expected: Range) -> tuple[Part, ...]:
+    """MMA2-122 against the best of the other five, by stage and component: the paired gain of MMA2-122 over it, %."""
+
+    def measure(stage: str, component: str):
+        def least(seen: Evidence) -> Estimate:
+            gains = [seen.gain(key, MMA2_122, rival, stage, component) for rival in RIVALS]
+            return min(gains, key=lambda of: of.value)
+
+        return least
+
+    return tuple(
+        Part(
+            (key,),
+            f"gain over the best other one, {UNITS[c]}, {key[0]}, stage {stage}",
+            "%",
+            measure(stage, c),
+            expected,
+        )
+        for stage in stages
+        for c in COMPONENTS
+    )
+
+
+def gain_part(key: tuple, wanted: tuple, base: tuple, stage: str, component: str, expected: Range, words: str) -> Part:
+    """Paired gain of one filter over another."""
+    what = f"gain of {words}, {UNITS[component]}, stage {stage}"
+    return Part((key,), what, "%", lambda seen: seen.gain(key, wanted, base, stage, component), expected)
+
+
+def probability_part(key: tuple, wanted: tuple, stage: str, model: int, expected: Range) -> Part:
+    """Mean probability of a model over a stage."""
+    what = f"mean probability of model {model + 1}, {key[0]}, stage {stage}"
+    return Part((key,), what, "", lambda seen: seen.probability(key, wanted, stage, model), expected)
+
+
+def lead_part(key: tuple, wanted: tuple, stage: str, model: int, expected: Range) -> Part:
+    """By how much a model's mean probability exceeds the largest of the others'."""
+
+    def measure(seen: Evidence) -> Estimate:
+        own = seen.probability(key, wanted, stage, model)
+        others = [seen.probability(key, wanted, stage, m) for m in range(len(wanted[2])) if m != model]
+        top = max(others, key=lambda of: of.value)
+        return Estimate(own.value - top.value, own.lo - top.hi, own.hi - top.lo)
+
+    return Part((key,), f"lead of model {model + 1} over the next, {key[0]}, stage {stage}", "", measure, expected)
+
+
+def cost_part(key: tuple, wanted: tuple, base: tuple, expected: Range, words: str) -> Part:
+    """Ratio of counted operations of two filters."""
+
+    def measure(seen: Evidence) -> Estimate:
+        return certain(seen.operations(key, wanted) / seen.operations(key, base))
+
+    return Part((key,), f"operations of {words}", "", measure, expected)

@@ -1,0 +1,219 @@
+"""P2's own tables (probabilities, stages, consistency, operations) and the words of its report.
+
+Its figures stand in multimodel_figures.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import panels, statistics
+from radarsim.report import tables as common
+from radarsim.studies.multimodel.figures import figures
+
+__all__ = ["answer", "cost", "figures", "question", "tables"]
+
+NEES, NIS, MERGED, MERGES = 9, 10, 11, 12  # places in the sums of a stage, after the nine mean squares
+FREEDOM = 3  # degrees of freedom of a position's or a plot's normalised error squared
+
+
+def tables(results: Sequence[CaseResult]) -> dict:
+    """The tables beyond curves and gains: probabilities, stages, consistency, operations."""
+    return {
+        "probabilities": probabilities(results),
+        "stages": stages(results),
+        "consistency": consistency(results),
+        "operations": operations(results),
+    }
+
+
+PROBABILITIES = (
+    *("case", "filter", "model", "k", "t_s", "n", "probability", "probability_lo", "probability_hi", "motion"),
+)
+
+
+def probabilities(results: Sequence[CaseResult]):
+    """Mean probability of each model by scan, with its interval; models count from 1 (contract: probabilities.csv)."""
+    return common.joined([_probabilities(result) for result in results], PROBABILITIES)
+
+
+def _probabilities(result: CaseResult) -> dict[str, np.ndarray]:
+    axes, models = result.axes, result.axes.extra["models"]
+    shown = [(f, m) for f, own in enumerate(models) for m in range(len(own)) if len(own) > 1]
+    scans = len(axes.k)
+    f = np.repeat([f for f, _ in shown], scans).astype(int)
+    m = np.repeat([m for _, m in shown], scans).astype(int)
+    k = np.tile(np.arange(scans), len(shown))
+    sums = np.asarray(result.sums["probability"])[f, k, m]
+    of = statistics.probability(sums[:, 0], sums[:, 1], result.count)
+    return {
+        "case": np.full(f.size, result.name, dtype=object),
+        "filter": common.names(axes.filters, f),
+        "model": m + 1,
+        "k": np.asarray(axes.k)[k],
+        "t_s": np.asarray(axes.t_s, dtype=float)[k],
+        "n": np.full(f.size, result.count),
+        "probability": of.value,
+        "probability_lo": of.lo,
+        "probability_hi": of.hi,
+        "motion": np.array([models[a][b] for a, b in zip(f, m, strict=True)], dtype=object),
+    }
+
+
+STAGES = (
+    *("case", "filter", "stage", "begin_s", "end_s", "component", "unit", "n", "sigma", "sigma_lo", "sigma_hi"),
+    *("baseline", "gain_percent", "gain_lo", "gain_hi"),
+)
+
+
+def stages(results: Sequence[CaseResult]):
+    """σ over each stage of the flight, of all its scans, and the paired gain against the baseline filter."""
+    rows = [row for result in results for row in _stages(result)]
+    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(STAGES)})
+
+
+def stage_bounds(result: CaseResult) -> list[tuple[str, float, float]]:
+    """Name, begin and end (s) of each stage of a case that has scans."""
+    extra = result.axes.extra
+    ends = [*extra["stage_ends_s"], float(result.axes.t_s[-1])]
+    bounds = zip(extra["stages"], [0.0, *ends[:-1]], ends, strict=True)
+    return [bound for bound, length in zip(bounds, extra["lengths"], strict=True) if length[0] > 0]
+
+
+def stage_sigma(result: CaseResult, f: int, s: int, c: int) -> statistics.Estimate:
+    """σ of component c of filter f over stage s: a realisation's mean square over the stage is one observation."""
+    square, fourth = np.asarray(result.sums["stage"])[f, s, c]
+    return statistics.root_mean_square(square, fourth, result.count)
+
+
+def stage_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> statistics.Estimate:
+    """Paired gain of filter f against any other in component c over stage s, %."""
+    (a, aa), (b, bb) = (np.asarray(result.sums["stage"])[i, s, c] for i in (f, base))
+    return statistics.gain(a, aa, b, bb, np.asarray(result.sums["pairs"])[f, base, s, c], result.count)
+
+
+def _stages(result: CaseResult) -> list[tuple]:
+    rows, axes, b = [], result.axes, result.axes.baseline
+    places = {name: s for s, name in enumerate(axes.extra["stages"])}
+    for f, label in enumerate(axes.filters):
+        for stage, begin, end in stage_bounds(result):
+            for c, (component, unit) in enumerate(axes.components):
+                s = places[stage]
+                sigma = stage_sigma(result, f, s, c)
+                nothing = statistics.Estimate(np.nan, np.nan, np.nan)
+                gain = stage_gain(result, f, b, s, c) if f != b else nothing
+                where = (result.name, label, stage, begin, end, component, unit, result.count)
+                rows.append((*where, *map(float, sigma), axes.filters[b], *map(float, gain)))
+    return rows
+
+
+CONSISTENCY = (
+    *("case", "filter", "stage", "n", "nees", "nees_lo", "nees_hi", "nis", "nis_lo", "nis_hi"),
+    *("nees_verdict", "nis_verdict"),
+)
+
+
+def consistency(results: Sequence[CaseResult]):
+    """Mean normalised errors squared by stage, per degree of freedom: 1 where a filter is right about itself.
+
+    NEES of the position with the filter's own covariance, at the reported scans; NIS of the plot against what the
+    hypothesis foretold that was the most probable before it, at all scans. The verdicts are by wider intervals, of
+    which all of a case's filters and stages hold in 95 % of runs.
+    """
+    rows = []
+    for result in results:
+        places = {name: s for s, name in enumerate(result.axes.extra["stages"])}
+        bounds = stage_bounds(result)
+        for f, label in enumerate(result.axes.filters):
+            for stage, *_ in bounds:
+                sums = np.asarray(result.sums["stage"])[f, places[stage]]
+                found = [float(value) for c in (NEES, NIS) for value in normalised(sums[c], result.count)]
+                looks = len(bounds) * len(result.axes.filters)
+                said = [verdict(normalised(sums[c], result.count, looks)) for c in (NEES, NIS)]
+                rows.append((result.name, label, stage, result.count, *found, *said))
+    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(CONSISTENCY)})
+
+
+def normalised(sums: np.ndarray, n: int, looks: int = 1) -> statistics.Estimate:
+    """Mean normalised error squared per degree of freedom from Σq, Σq² over n realisations."""
+    return statistics.mean_square(sums[0] / FREEDOM, sums[1] / FREEDOM**2, n, looks)
+
+
+def verdict(of: statistics.Estimate) -> str:
+    """What a normalised error squared says of a filter's covariance."""
+    if of.lo > 1:
+        return "optimistic"
+    return "pessimistic" if of.hi < 1 else "consistent"
+
+
+OPERATIONS = ("case", "filter", "family", "merge", "models", "stage", "merged", "merges", "operations")
+
+
+def operations(results: Sequence[CaseResult]):
+    """Arithmetic operations of one update of one realisation, counted: mean over the scans of each stage, and over all.
+
+    merged: hypotheses that went into merges of more than one; merges: their number; both a scan.
+    """
+    rows = []
+    for result in results:
+        extra = result.axes.extra
+        lengths = extra["lengths"][:, 0]
+        for f, label in enumerate(result.axes.filters):
+            fixed, each, once = extra["operations"][f]
+            own = np.asarray(result.sums["stage"])[f, :, [MERGED, MERGES], 0].T / result.count
+            whole = lengths @ own / lengths.sum()
+            named = [(name, own[s]) for s, name in enumerate(extra["stages"]) if lengths[s] > 0]
+            for stage, (merged, merges) in [*named, ("whole", whole)]:
+                what = (extra["families"][f], extra["rules"][f], len(extra["models"][f]))
+                count = fixed + each * merged + once * merges
+                rows.append((result.name, label, *what, stage, float(merged), float(merges), float(count)))
+    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(OPERATIONS)})
+
+
+def cost(made: Mapping, run: Mapping):
+    """Operations counted and nanoseconds measured of one update, with σ of the height by stage; None if not measured.
+
+    run: the facts of the run, with `seconds_per_update`.
+    """
+    measured = run.get("seconds_per_update")
+    if not measured:
+        return None
+    counted = made["operations"][made["operations"]["stage"] == "whole"]
+    table = counted[["case", "filter", "family", "merge", "models", "operations"]].reset_index(drop=True)
+    table["measured, ns"] = [1e9 * measured[c][f] for c, f in zip(table["case"], table["filter"], strict=True)]
+    height = made["stages"][made["stages"]["component"] == "y"]
+    wide = height.pivot(index=["case", "filter"], columns="stage", values="sigma")
+    stages = list(dict.fromkeys(height["stage"]))
+    wide = wide[stages].rename(columns={stage: f"σ of y, {stage}, m" for stage in stages})
+    return table.merge(wide, left_on=["case", "filter"], right_index=True, how="left")
+
+
+def question(experiment) -> str:
+    """What the experiment asks, in one sentence."""
+    filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
+    told = ", ".join(filters[:-1]) + (" and " if len(filters) > 1 else "") + filters[-1]
+    flights = len(experiment.cases)
+    return f"How accurately do {told} track the target" + (f" in {flights} cases?" if flights > 1 else "?")
+
+
+def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
+    """Which filter has the least σ of the height in each stage, by case; of a single case of the rate of climb too."""
+    shown, others = panels.told(results, 4)
+    told = [f"{panels.plain_label(result)}: {_least(result, made, 'y', 'the height')}" for result in shown]
+    climb = [f"{panels.plain_label(results[0])}: {_least(results[0], made, 'vy', 'the rate of climb')}"]
+    return [*told, *(climb if len(results) == 1 else []), *others]
+
+
+def _least(result: CaseResult, made: dict, component: str, words: str) -> str:
+    """The filter of the least σ in each stage, with the interval."""
+    rows = made["stages"]
+    rows = rows[(rows["case"] == result.name) & (rows["component"] == component)]
+    parts = []
+    for stage, own in rows.groupby("stage", sort=False):
+        best = own.loc[own["sigma"].idxmin()]
+        value, low, high = (f"{float(f'{best[name]:.3g}'):,.10g}" for name in ("sigma", "sigma_lo", "sigma_hi"))
+        parts.append(
+            f"{stage} {best['filter']}, {value} {panels.UNITS.get(best['unit'], best['unit'])} [{low}, {high}]"
+        )
+    return f"least σ of {words} by stage: {'; '.join(parts)}."

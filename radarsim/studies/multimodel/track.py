@@ -1,0 +1,206 @@
+"""Plots of the multimodel study: those of one realisation, and the study's filters over recorded ones."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from radarsim.config.experiment import Case
+from radarsim.engine.results import Track
+from radarsim.kernels import random
+from radarsim.kernels.lanes import WIDTH, rows
+from radarsim.studies.interface import RecordedPlots
+from radarsim.studies.multimodel import filters
+from radarsim.studies.multimodel.kernels import strip as strips
+from radarsim.studies.multimodel.kernels.hypothesis import INNOVATION, MODELS, OUTPUT, VARIANCE, work_arrays
+from radarsim.studies.multimodel.kernels.plots import NORMALS, STRIP
+from radarsim.studies.multimodel.study import COMPONENTS, banks, measured, prepare, transition
+from radarsim.studies.multimodel.world import intervals, local_plots, sensor_frame
+from radarsim.studies.multimodel.world import truth as scan_times
+
+CHUNK = 4096  # recorded plots filtered at a time
+BEGIN = 3  # whole plots that a track starts from
+TESTED = (("plot", 3),)
+
+
+def plot_columns(spec) -> tuple[tuple[str, ...], ...]:
+    """The columns that `track` reads of a file of recorded plots."""
+    if spec.sensor.sigma_range_m is None:
+        return (("t_s", "x_m", "y_m", "z_m"),)
+    return (("t_s", "range_m", "elevation_rad", "azimuth_rad"),)
+
+
+def sigmas(spec) -> dict[str, tuple[str, ...]]:
+    """Which of the sensor's standard deviations stand behind what is tested: all, for the plot is tested as a whole."""
+    biconical = ("sigma_range_m", "sigma_elevation_rad", "sigma_azimuth_rad")
+    names = biconical if spec.sensor.sigma_range_m is not None else ("sigma_x_m", "sigma_y_m", "sigma_z_m")
+    return {"plot": tuple(f"sensor.{name}" for name in names)}
+
+
+def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
+    """The plots of one realisation of the study and the truth, columns (K,); not-a-number where a plot is missed."""
+    plan = prepare(case)
+    truth, frame, count = plan.world.plot_truth, plan.world.frame, len(plan.world.truth)
+    noise = normals(plan.world.keys[0], realisation, count) * frame[9:12]
+    if case.spec.sensor.sigma_range_m is None:
+        exact = truth[:, 5:8]
+    else:
+        exact = np.stack([truth[:, 0], np.arcsin(truth[:, 1]), np.arcsin(truth[:, 3])], axis=1)
+    detected = measured(plan, realisation)[2][:, 0] > 0
+    t, *names = plot_columns(case.spec)[0]
+    found = np.where(detected[:, None], exact + noise, np.nan)
+    columns = {t: scan_times(case)[0]} | dict(zip(names, found.T, strict=True))
+    if case.spec.sensor.sigma_range_m is not None:
+        columns |= {f"true_{name}": exact[:, i] for i, name in enumerate(names)}
+    units = {"m": "m", "m/s": "mps", "m/s2": "mps2"}
+    return columns | {f"true_{name}_{units[unit]}": plan.world.truth[:, i] for i, (name, unit) in enumerate(COMPONENTS)}
+
+
+def normals(key: np.ndarray, realisation: int, count: int) -> np.ndarray:
+    """The three normals of each scan (count, 3) of a realisation, in the layout of `kernels.multimodel_plots`."""
+    half = NORMALS // 2
+    drawn = np.empty((-(-count // STRIP), NORMALS))
+    for strip, row in enumerate(drawn):
+        for j in range(half):
+            random.fill_normal_pairs(key, realisation, strip * half + j, row[j : j + 1], row[half + j : half + j + 1])
+    return drawn.reshape(-1, 3)[:count]
+
+
+class _State(NamedTuple):
+    """A filter between chunks: its keys, the kernel's memory and whole numbers."""
+
+    options: object
+    work: np.ndarray
+    numbers: np.ndarray
+
+
+class Tracker:
+    """The filters of a case over recorded plots, chunk by chunk in flat memory.
+
+    A plot counts where it is whole and in front of the antenna; the first three that count start the track. At the
+    times of the others the estimate is the extrapolated one.
+    """
+
+    most_rows = None
+    several = False
+
+    def __init__(self, case: Case):
+        self.spec = case.spec
+        self.names = tuple(f.name for f in self.spec.filters)
+        self.most = max(len(f.models) for f in self.spec.filters)
+        self.states = [_State(options, *work_arrays()) for options in self.spec.filters]
+        self.held: list[tuple[float, np.ndarray]] = []
+        self.begun, self.last = False, 0.0
+
+    def feed(self, recorded: dict[str, np.ndarray]) -> Track:
+        """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
+        t = recorded["t_s"]
+        z, R, whole = local_plots(self.spec.sensor, np.stack(list(recorded.values())[1:], axis=1))
+        shape = (len(self.names), len(t))
+        estimate, sigma = np.full((2, *shape, 9), np.nan)
+        probability, nis = np.full((*shape, self.most), np.nan), np.full((*shape, 1), np.nan)
+        plots = np.concatenate([z, R, whole[:, None]], axis=1)
+        first = self._first(t, plots)
+        for f, state in enumerate(self.states) if first < len(t) else ():
+            out, tested = self._tracked(state, t, plots, first)
+            size = len(state.options.models)
+            estimate[f, first:] = out[:, :9]
+            sigma[f, first:] = np.sqrt(np.maximum(out[:, VARIANCE : VARIANCE + 9], 0.0))
+            probability[f, first:, :size] = out[:, MODELS : MODELS + size]
+            nis[f, first:, 0] = np.where(tested, out[:, INNOVATION], np.nan)
+        self.begun, self.last = len(self.held) == BEGIN, t[-1]
+        residual = np.where(whole[:, None], z, np.nan)[None] - estimate[..., 0::3]
+        labels = (("x_m", "m"), ("y_m", "m"), ("z_m", "m"))
+        shares = probability if self.most > 1 else None
+        return Track(self.names, COMPONENTS, t, estimate, sigma, shares, labels, residual, TESTED, nis)
+
+    def _first(self, t: np.ndarray, plots: np.ndarray) -> int:
+        """The first row with an estimate: that of the third whole plot, or all once the track has begun."""
+        if self.begun:
+            return 0
+        for k in np.flatnonzero(plots[:, 9]):
+            self.held.append((t[k], plots[k]))
+            if len(self.held) == BEGIN:
+                return int(k)
+        return len(t)
+
+    def _tracked(self, state: _State, t: np.ndarray, plots: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+        """Outputs (n', OUTPUT) of one filter from row `first` on, and where an innovation was tested."""
+        found, begin = [], first
+        if not self.begun:
+            found, begin = [self._started(state)], first + 1
+        frame = sensor_frame(self.spec.sensor)
+        for start in range(begin, len(t), CHUNK):
+            stop = min(start + CHUNK, len(t))
+            before = t[start - 1] if start else self.last
+            found.append(_filtered(self.spec, state, np.append(before, t[start:stop]), plots[start:stop], frame))
+        tested = plots[first:, 9] > 0
+        if not self.begun:
+            tested[0] = False
+        return np.concatenate(found), tested
+
+    def _started(self, state: _State) -> np.ndarray:
+        """Start a filter from the three plots; its outputs (1, OUTPUT) at the third."""
+        times, began = np.array([at for at, _ in self.held]), np.stack([plot for _, plot in self.held])
+        weights = filters.start_weights(times, self.spec.start_acceleration_mps2)
+        chances = filters.stationary(transition(state.options))
+        strips.start_strip(state.work, state.numbers, _lanes(began), weights, chances)
+        out = np.zeros((1, OUTPUT))
+        out[0, :9], out[0, VARIANCE : VARIANCE + 9] = _at_start(began, weights)
+        out[0, MODELS : MODELS + len(chances)] = chances
+        return out
+
+
+def track(case: Case, recorded: dict[str, np.ndarray]) -> Track:
+    """The filters of a case over whole recorded columns (n,) at once; see `Tracker`."""
+    return Tracker(case).feed(recorded)
+
+
+def _filtered(spec, state: _State, t: np.ndarray, plots: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    """Outputs (n, OUTPUT) over the next n plots of one filter; t (n + 1,) with the time of the row before."""
+    index, times = intervals(t)
+    own = banks(spec.model_copy(update={"filters": (state.options,)}), times)
+    size, count = own.numbers[0, 4], len(plots)
+    state.numbers[1] = -1  # the intervals of this chunk are numbered anew
+    out, everything = rows(count * OUTPUT), np.ones(count, dtype=np.int64)
+    strips.filter_strip(
+        *(state.work, state.numbers, _lanes(plots), 0, count, own.models[0, : 3 * size], own.transitions[0]),
+        *(index[1:].copy(), times, own.numbers[0], frame, everything, out),
+    )
+    return out.reshape(count, OUTPUT, WIDTH)[:, :, 0].copy()
+
+
+def _at_start(began: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and variances (9,) of a track at its third plot; began (3, PLOT)."""
+    a, b, g = weights.reshape(3, 3)
+    mean, variance = np.zeros(9), np.tile(g**2, 3)
+    mean[0::3], mean[1::3] = a @ began[:, :3], b @ began[:, :3]
+    own = began[:, [3, 6, 8]]  # xx, yy, zz
+    variance[0::3] += a**2 @ own
+    variance[1::3] += b**2 @ own
+    return mean, variance
+
+
+def _lanes(plots: np.ndarray) -> np.ndarray:
+    """Plots (n, PLOT) as rows of eight equal lanes."""
+    found = rows(plots.size)
+    found.reshape(-1, WIDTH)[:] = plots.reshape(-1, 1)
+    return found
+
+
+class Recorded(RecordedPlots):
+    """The study's part in `radarsim track` and `radarsim simulate`."""
+
+    def columns(self, spec):
+        return plot_columns(spec)
+
+    def sigmas(self, spec):
+        return sigmas(spec)
+
+    def scan_period_s(self, spec):
+        return spec.sensor.scan_period_s
+
+    def simulated(self, case, realisation):
+        return simulated(case, realisation)
+
+    def tracker(self, case):
+        return Tracker(case)

@@ -1,0 +1,12 @@
+"""The names of noise streams."""
+
+import numpy as np
+
+from radarsim.config.experiment import Case
+from radarsim.config.identity import digest, world
+from radarsim.kernels.random import stream
+
+
+def noise_key(case: Case, what: str) -> np.ndarray:
+    """Key (2,) of the noise stream `what` of a case: the same for cases that differ only in their filters."""
+    return stream(case.seed, f"{case.study}:{what}:{digest(world(case.spec))}")

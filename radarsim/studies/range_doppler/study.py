@@ -1,0 +1,135 @@
+"""P1 (Gorshkov & Zavizhenets 2017): range-only against range + Doppler Kalman filters of the second order."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from radarsim.config.experiment import Case
+from radarsim.engine.moments import Layout
+from radarsim.engine.results import Axes
+from radarsim.kernels import linear as kernels
+from radarsim.physics import targets
+from radarsim.studies.noise import noise_key
+from radarsim.studies.range_doppler import exact, filters
+
+COMPONENTS = (("r", "m"), ("Vr", "m/s"), ("ar", "m/s2"))
+BLOCK = 4096  # 8 chunks of 512; 0.4 ms with two filters and 15 scans
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that a block needs, F filters over K scans; see `kernels.linear.simulate_block` for the arrays."""
+
+    layout: Layout
+    axes: Axes
+    key: np.ndarray
+    truth: np.ndarray
+    sigma: np.ndarray
+    dt: float
+    observes: np.ndarray
+    start: np.ndarray
+    weights: np.ndarray
+    gains: np.ndarray
+    block: int = BLOCK
+    gaussian = True  # the errors are, with the exact bias and σ of the axes
+
+
+def truth(target, t: np.ndarray) -> np.ndarray:
+    """Range, radial velocity and acceleration (K, 3) of a configured target at times t (K,)."""
+    match target.kind:
+        case "polynomial":
+            return targets.polynomial(target.coefficients, t)
+        case "acceleration_start":
+            return targets.acceleration_start(target.coefficients, target.acceleration_mps2, target.start_s, t)
+        case "jerk_pulse":
+            return targets.jerk_pulse(target.coefficients, target.jerk_mps3, target.start_s, target.duration_s, t)
+        case "turn":
+            return targets.turn(
+                target.range_m,
+                target.speed_mps,
+                target.aspect_rad,
+                target.acceleration_g,
+                target.start_s,
+                target.duration_s,
+                t,
+            )
+    raise ValueError(f"no such target: {target.kind}")
+
+
+def prepare(case: Case) -> Plan:
+    """Design the filters of a case, its truth, and the exact values of its errors."""
+    spec, radar = case.spec, case.spec.radar
+    dt, scans = radar.scan_period_s, spec.scans
+    sigma = np.array([radar.sigma_range_m, radar.sigma_velocity_mps])
+    t = np.arange(scans) * dt
+    x = truth(spec.target, t)
+    designs = [
+        filters.design(len(f.observes), f.initial_scans, f.manoeuvre_variance, sigma, dt, scans) for f in spec.filters
+    ]
+    longest = max(d.start for d in designs)
+    count = len(designs)
+    return Plan(
+        layout=Layout(error=(count, scans, 3, 4), paired=(count, scans, 3), cross=(count, scans, 3)),
+        axes=axes(spec, designs, x, sigma, t),
+        key=noise_key(case, "plots"),
+        truth=x,
+        sigma=sigma,
+        dt=dt,
+        observes=np.array([d.observes for d in designs]),
+        start=np.array([d.start for d in designs]),
+        weights=np.stack([np.pad(d.weights, ((0, 0), (0, 0), (0, longest - d.start))) for d in designs]),
+        gains=np.stack([d.gains for d in designs]),
+    )
+
+
+def axes(spec, designs: list[filters.LinearFilter], x: np.ndarray, sigma: np.ndarray, t: np.ndarray) -> Axes:
+    """Labels and exact values: x (K, 3) the truth, sigma (2,) of the plots, t (K,) the times."""
+    dt, names = spec.radar.scan_period_s, tuple(f.name for f in spec.filters)
+    errors = [exact.error_recursion(d.weights, d.gains, d.observes, x, sigma, dt) for d in designs]
+    bias = np.stack([b for b, _ in errors])
+    variance = np.stack([np.diagonal(S, axis1=1, axis2=2) for _, S in errors])
+    available = np.stack([d.available for d in designs])
+    return Axes(
+        filters=names,
+        components=COMPONENTS,
+        k=np.arange(1, len(t) + 1),
+        t_s=t,
+        available=available,
+        baseline=names.index(spec.baseline) if spec.baseline else 0,
+        exact_sigma=np.where(available, np.sqrt(variance + bias**2), np.nan),
+        exact_bias=np.where(available, bias, np.nan),
+        extra={
+            "believed": np.stack([d.believed for d in designs]),
+            "start": np.array([d.start for d in designs]),
+            "manoeuvre_variance": np.array([f.manoeuvre_variance for f in spec.filters]),
+            "observes": np.array([d.observes for d in designs]),
+            "sigma": sigma,
+            "C_theta": float(sigma[0] ** 2 / (dt**2 * sigma[1] ** 2)),
+            "scan_period_s": dt,
+            "wavelength_m": spec.radar.wavelength_m,
+            "repetition_rate_hz": spec.radar.repetition_rate_hz,
+        },
+    )
+
+
+def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
+    """Sums of one block, in the order of the plan's layout."""
+    shapes = plan.layout.shapes
+    error, paired, cross = (np.zeros(shapes[name]) for name in ("error", "paired", "cross"))
+    kernels.simulate_block(
+        plan.key,
+        first,
+        count,
+        plan.truth,
+        plan.sigma,
+        plan.dt,
+        plan.observes,
+        plan.start,
+        plan.weights,
+        plan.gains,
+        plan.axes.baseline,
+        error,
+        paired,
+        cross,
+    )
+    return plan.layout.pack(error=error, paired=paired, cross=cross)

@@ -1,0 +1,134 @@
+"""Plots of the range_doppler study: those of one realisation, and the study's filters over recorded ones."""
+
+import numpy as np
+
+from radarsim.config.experiment import Case
+from radarsim.engine.results import Track
+from radarsim.kernels import linear as kernels
+from radarsim.physics.motion import transition
+from radarsim.studies.interface import RecordedPlots
+from radarsim.studies.range_doppler.filters import observation
+from radarsim.studies.range_doppler.kernels import rows
+from radarsim.studies.range_doppler.study import COMPONENTS, prepare
+
+LONGEST_START = 200  # plots in which a start is looked for; a file of velocities alone never has one
+MEASURED = (("range_m", 1), ("velocity_mps", 1))
+SIGMAS = {"range_m": ("radar.sigma_range_m",), "velocity_mps": ("radar.sigma_velocity_mps",)}
+
+
+def plot_columns(spec) -> tuple[tuple[str, ...], ...]:
+    """The columns that `track` reads of a file of recorded plots."""
+    return (("t_s", "range_m", "velocity_mps"),)
+
+
+def sigmas(spec) -> dict[str, tuple[str, ...]]:
+    """Which of the sensor's standard deviations stand behind each number that is measured."""
+    return SIGMAS
+
+
+def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
+    """The plots of one realisation of the study and the truth, columns (K,)."""
+    plan = prepare(case)
+    (plots,) = kernels.simulate_plots(plan.key, realisation, 1, plan.truth, plan.sigma)
+    measured = {"t_s": plan.axes.t_s, "range_m": plots[:, 0], "velocity_mps": plots[:, 1]}
+    return measured | dict(zip(("true_r_m", "true_Vr_mps", "true_ar_mps2"), plan.truth.T, strict=True))
+
+
+class Tracker:
+    """The filters of a case over recorded plots, chunk by chunk in flat memory.
+
+    A filter starts by least squares as soon as it has taken as many plots as the config's `initial_scans` says and
+    these determine range, velocity and acceleration; before, its estimates are the plots. Then the Kalman filter of the
+    study goes from row to row, its gains reckoned for the interval and for what the row holds.
+    """
+
+    most_rows = None
+    several = False
+
+    def __init__(self, case: Case):
+        self.names = tuple(f.name for f in case.spec.filters)
+        self.sigma = np.array([case.spec.radar.sigma_range_m, case.spec.radar.sigma_velocity_mps])
+        self.filters = [_One(f, self.sigma) for f in case.spec.filters]
+
+    def feed(self, recorded: dict[str, np.ndarray]) -> Track:
+        """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
+        t, z = recorded["t_s"], np.stack([recorded["range_m"], recorded["velocity_mps"]], axis=1)
+        made = [one.feed(t, z) for one in self.filters]
+        estimate, sigma, nis = (np.stack([part[i] for part in made]) for i in range(3))
+        residual = z[None] - estimate[..., :2]
+        labels = (("range_m", "m"), ("velocity_mps", "m/s"))
+        return Track(self.names, COMPONENTS, t, estimate, sigma, None, labels, residual, MEASURED, nis)
+
+
+class _One:
+    """One filter: its state, and before the start the plots that it is to be started from."""
+
+    def __init__(self, options, sigma: np.ndarray):
+        self.observes, self.needed = len(options.observes), options.initial_scans
+        self.manoeuvre, self.sigma = options.manoeuvre_variance, sigma
+        self.x = self.P = self.last = None
+        self.held: list[tuple[float, np.ndarray]] = []
+
+    def feed(self, t: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Estimates, standard deviations (n, 3), and normalised innovations squared (n, 2) over the next rows."""
+        n = len(t)
+        estimate, sigma, nis = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full((n, 2), np.nan)
+        taken = np.isfinite(z) & (np.arange(2) < self.observes)
+        k = 0
+        while self.x is None and k < n:
+            self._begin(t[k], np.where(taken[k], z[k], np.nan))
+            if self.x is None:
+                estimate[k, :2] = np.where(taken[k], z[k], np.nan)
+                sigma[k, :2] = np.where(taken[k], self.sigma, np.nan)
+            else:
+                estimate[k], sigma[k] = self.x, np.sqrt(np.diagonal(self.P))
+            k += 1
+        if k < n:
+            dt = np.diff(t[k:], prepend=self.last if k == 0 else t[k - 1])
+            came = taken[k:].astype(float)
+            found = np.full((n - k, 2), np.nan)
+            rows.filter_rows(
+                *(self.x, self.P, dt, np.where(taken[k:], z[k:], 0.0), came, self.sigma**2, float(self.manoeuvre)),
+                *(estimate[k:], sigma[k:], found),
+            )
+            nis[k:] = found
+        self.last = t[-1]
+        return estimate, sigma, nis
+
+    def _begin(self, t: float, z: np.ndarray) -> None:
+        """Take one more plot, and start from all so far where they suffice."""
+        if np.isfinite(z).any():
+            self.held = [*self.held[-(LONGEST_START - 1) :], (t, z)]
+        if len(self.held) < self.needed or not np.isfinite(z).any():
+            return
+        times = np.array([at for at, _ in self.held]) - t
+        values = np.stack([plot for _, plot in self.held])
+        unit = max(-times[0], 1e-9) / max(len(times) - 1, 1)
+        scale = np.array([1.0, 1.0 / unit, 1.0 / unit**2])
+        whole = np.concatenate([observation(2) @ transition(lag) * scale / self.sigma[:, None] for lag in times])
+        there = np.isfinite(values).ravel()
+        if np.linalg.matrix_rank(whole[there]) < 3:
+            return
+        solution = scale[:, None] * np.linalg.pinv(whole[there])
+        self.x = solution @ (values / self.sigma).ravel()[there]
+        self.P = solution @ solution.T
+        self.held = []
+
+
+class Recorded(RecordedPlots):
+    """The study's part in `radarsim track` and `radarsim simulate`."""
+
+    def columns(self, spec):
+        return plot_columns(spec)
+
+    def sigmas(self, spec):
+        return sigmas(spec)
+
+    def scan_period_s(self, spec):
+        return spec.radar.scan_period_s
+
+    def simulated(self, case, realisation):
+        return simulated(case, realisation)
+
+    def tracker(self, case):
+        return Tracker(case)

@@ -1,0 +1,180 @@
+"""P3.1 … P3.7, P3.11 … P3.13: what Butyrskiy says of smoothing, from his words alone, before anything was measured.
+
+The paper has no experiment and prints few numbers, so most statements are formulas. A formula holds when what is
+measured is within 1 % of it in σ, within 2 % in a variance or covariance; an identity, to 10⁻⁹. Places are the
+paper's sections.
+"""
+
+from radarsim.report.claims import Claim, Part, Range, above, at_most, below, within
+from radarsim.studies.sonar import measures as measured
+from radarsim.studies.sonar.manoeuvre import claims as manoeuvres
+from radarsim.studies.sonar.measures import Evidence
+
+__all__ = ["CLAIMS", "Evidence"]
+
+IN_SIGMA = Range(0.99, 1.01, "1 within 1 %")
+IN_VARIANCE = Range(0.98, 1.02, "1 within 2 %")
+SAME = Range(1 - 1e-9, 1 + 1e-9, "1 to 10⁻⁹")
+
+
+def _claim(number: int, place: str, statement: str, *parts: Part, reading: str = "", config: str = "sonar_smoothing"):
+    return Claim(f"P3.{number}", place, statement, parts, reading, config)
+
+
+def _formula(what: str, n: int) -> Part:
+    return Part(
+        ("textbook",), f"{what} σ after {n} plots, over the formula", "", measured.over_formula(what, n), IN_SIGMA
+    )
+
+
+def _gain(letter: str, n: int) -> Part:
+    words = f"{letter}_n from the measured errors at n = {n}, over the formula"
+    return Part(("textbook",), words, "", measured.gain_over_formula(letter, n), IN_VARIANCE)
+
+
+def _optimal(rho: float) -> Part:
+    words = f"σ of the range after 20 plots at ρ = {rho:g}, over generalised least squares"
+    return Part((("rho", rho),), words, "", measured.over_optimal(("rho", rho), "kalman_augmented", "r"), IN_SIGMA)
+
+
+CLAIMS = (
+    _claim(
+        1,
+        "principle of optimal construction, after (2)",
+        "σ of a straight line through n plots: σ√(2(2n−1)/(n(n+1))) at the last, σ√(2(2n+1)/(n(n−1))) a scan ahead",
+        *(_formula("smoothed", n) for n in (2, 3, 5, 8, 20)),
+        *(_formula("extrapolated", n) for n in (2, 3, 5, 8, 20)),
+    ),
+    _claim(
+        2,
+        "equation (3)",
+        "The acceleration of a parabola through n plots has variance 720 σ²/(T₀⁴ n(n²−1)(n²−4))",
+        *(_formula("acceleration", n) for n in (3, 5, 8, 20)),
+    ),
+    _claim(
+        3,
+        "principle of optimal construction, after (2)",
+        "High accuracy of smoothing and extrapolation needs many plots: 5–6",
+        Part(
+            ("textbook",),
+            "fewest plots that extrapolate no worse than a plot measures",
+            "plots",
+            measured.enough,
+            within(5, 6),
+        ),
+        reading="the paper does not say what high accuracy is; taken: the position foretold is as good as one measured",
+    ),
+    _claim(
+        4,
+        "equation (14) and step 5",
+        "A_n = 2(2n−1)/(n(n+1)), B_n = 6/(n(n+1)); the recursion is the Kalman filter of a straight line",
+        *(_gain(letter, n) for letter in "AB" for n in (2, 5, 20)),
+        Part(
+            ("textbook",),
+            "largest relative difference in σ of recursion and Kalman filter",
+            "",
+            measured.alike,
+            at_most(1e-9),
+        ),
+        reading="var r / σ² is A_n and T₀ cov(r, v) / σ² is B_n",
+    ),
+    _claim(
+        5,
+        "step 4, after (14)",
+        "At a missed plot the estimate is the extrapolated one",
+        Part(
+            ("gap",), "σ at the missed scan over σ extrapolated to it", "", measured.at_a_miss("growing_memory"), SAME
+        ),
+        Part(("gap",), "the same of the Kalman filter", "", measured.at_a_miss("kalman"), SAME),
+        config="sonar_missed",
+    ),
+    _claim(
+        6,
+        "correlated errors",
+        "Errors estimated beside the state, and differences of plots, both solve the case of correlated errors",
+        *(
+            Part(
+                (("rho", rho),),
+                f"largest relative difference in σ of the two at ρ = {rho:g}",
+                "",
+                measured.two_ways(rho),
+                at_most(1e-9),
+            )
+            for rho in (-0.5, 0.6, 0.9)
+        ),
+        *(_optimal(rho) for rho in (-0.5, 0.6, 0.9)),
+        reading="optimal both: equal to generalised least squares",
+        config="sonar_correlated",
+    ),
+    _claim(
+        7,
+        "step 5, last sentences",
+        "With growing n new plots count less and less; the filter stops following a real, fluctuating target",
+        Part(("textbook",), "A_40 over A_5, measured", "", measured.gain_falls("A", 5, 40), below(1)),
+        Part(("textbook",), "B_40 over B_5, measured", "", measured.gain_falls("B", 5, 40), below(1)),
+        Part(
+            ("fluctuating",),
+            "σ of the range at the end over its own least, growing memory",
+            "",
+            measured.rises,
+            above(1),
+        ),
+        Part(
+            ("fluctuating",),
+            "gain in σ of the range of a window of 10 plots at the end",
+            "%",
+            measured.bounded,
+            above(0),
+        ),
+        reading="on the shipped course, whose velocity changes by 0.25 m/s at random between plots, after 40 plots",
+        config="sonar_fluctuating",
+    ),
+    *manoeuvres.CLAIMS,
+    _claim(
+        11,
+        "principle of optimal construction, sequential smoothing",
+        "The recursion keeps two numbers however many the plots, and takes fewer operations than least squares anew",
+        Part(("textbook",), "numbers kept from plot to plot", "", measured.kept("recursion (12)-(14)"), within(2, 2)),
+        *(
+            Part(
+                ("textbook",),
+                f"operations of the recursion over those of least squares on {n} plots",
+                "",
+                measured.cost("recursion (12)-(14)", f"least squares (2) on {n} plots"),
+                below(1),
+            )
+            for n in (2, 6)
+        ),
+        reading="r and v are kept; the weights' own f, g, h, K depend on no measurement. Operations are counted",
+    ),
+    _claim(
+        12,
+        "correlated errors, end of the first method",
+        "Estimating the errors beside the state complicates the calculation; differences do without",
+        Part(
+            (("rho", 0.6),),
+            "operations of the augmented filter over those of the differenced one",
+            "",
+            measured.cost("augmented", "differenced"),
+            above(1),
+        ),
+        reading="a scan of one coordinate, degree 1; operations are counted, in matrices as printed",
+        config="sonar_correlated",
+    ),
+    _claim(
+        13,
+        "conclusions, 2",
+        "Plots of any moments, in any combination and of different accuracy are handled by the same equations",
+        *(
+            Part(
+                ("asynchronous",),
+                f"σ of the {name} at the end over weighted least squares",
+                "",
+                measured.over_optimal("asynchronous", "kalman", component),
+                IN_SIGMA,
+            )
+            for component, name in (("r", "range"), ("b", "bearing"))
+        ),
+        config="sonar_asynchronous",
+    ),
+)

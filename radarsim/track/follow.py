@@ -1,0 +1,241 @@
+"""The filters of an experiment over recorded plots, and a realisation's plots to try them on."""
+
+import json
+import os
+import shlex
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.linalg import LinAlgError
+
+from radarsim.config import lookup
+from radarsim.config.experiment import Case, Experiment, in_name
+from radarsim.engine.results import Track
+from radarsim.errors import ConfigError
+from radarsim.studies.interface import RecordedPlots
+from radarsim.studies.registry import study
+from radarsim.track import plots
+from radarsim.track.rounding import Twin
+
+MOST_DRAWN = 2000  # rows kept for figures; of more, every second is dropped again and again
+GAP = 3.0  # intervals' median lengths that make a gap
+MOST_NAMED = 12  # configs or values told where one must be chosen
+HEAD = 5000  # rows that a better σ is looked for on
+
+
+def recorded_of(case: Case) -> RecordedPlots:
+    """What a case's study does with recorded plots, which `one_case` has made sure of."""
+    found = study(case.study).recorded()
+    assert found is not None
+    return found
+
+
+def one_case(experiment: Experiment, what: str, command: str) -> Case:
+    """The one case of an experiment, of a study with plots; raises ConfigError.
+
+    what is to be done with it, and by which command, its config as {}: a fault names what there is to choose from.
+    """
+    place = experiment.path or experiment.stem
+    if len(experiment.cases) > 1:
+        count = len(experiment.cases)
+        raise ConfigError(f"{place}: must be one case to {what}, got {count}; {choice(experiment, command)}")
+    (case,) = experiment.cases
+    if study(case.study).recorded() is None:
+        raise ConfigError(f"{place}: study: {case.study} has no filters for recorded plots")
+    return case
+
+
+def choice(experiment: Experiment, command: str) -> str:
+    """What cases there are to choose from, and the command for the first: configs put together, or swept values."""
+    stems = list(dict.fromkeys(case.stem for case in experiment.cases))
+    if len(stems) > 1:
+        name = named(str(Path(experiment.path or "").parent / f"{stems[0]}.yaml"))
+        return f"choose one of {listed(stems)}: {command.format(name)}"
+    values: dict[str, list] = {}
+    for case in experiment.cases:
+        for key, value in case.swept:
+            values.setdefault(key, []).append(value)
+    each = {key: list({in_name(value): value for value in found}.values()) for key, found in values.items()}
+    there = "; ".join(f"{key} = {listed([in_name(value) for value in found])}" for key, found in each.items())
+    first = [shlex.quote(f"sweep.{key}={json.dumps(found[:1], ensure_ascii=False)}") for key, found in each.items()]
+    words = " ".join([command.format(named(experiment.path or experiment.stem)), *(f"--set {s}" for s in first)])
+    return f"choose of {there}: {words}"
+
+
+def named(path: str) -> str:
+    """A config as a command names it: by its stem where that finds the same file, or where there is none."""
+    file = Path(path)
+    found = lookup.config_file(file.stem)
+    return shlex.quote(path if file.is_file() and not (found and found.samefile(file)) else file.stem)
+
+
+def listed(words: list[str]) -> str:
+    """Words one after the other; of very many the first."""
+    return ", ".join([*words[:MOST_NAMED], *(["…"] if len(words) > MOST_NAMED else [])])
+
+
+def simulated(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndarray]:
+    """The plots of one realisation of an experiment's one case, the very numbers of a run, and the truth as true_….
+
+    Columns of equal length, not-a-number where a plot is missed.
+    """
+    case = one_case(experiment, "simulate", "radarsim simulate {} -o PLOTS.csv")
+    return dict(recorded_of(case).simulated(case, realisation))
+
+
+@dataclass
+class Tally:
+    """How many tests of a filter's innovations there were, and the sum of their squares over their variances."""
+
+    filter: str
+    name: str
+    freedom: int
+    count: int = 0
+    total: float = 0.0
+
+    @property
+    def mean(self) -> float:
+        """Per degree of freedom: 1 for a filter that is right about its errors."""
+        return self.total / (self.count * self.freedom) if self.count else np.nan
+
+
+@dataclass
+class Followed:
+    """What came of a file of plots: rows, time, gaps, missing values, tests; and what figures and checks need of it."""
+
+    case: Case
+    rows: int = 0
+    first_s: float = np.nan
+    last_s: float = np.nan
+    missing: dict[str, int] = field(default_factory=dict)
+    gaps: int = 0
+    longest_gap_s: float = 0.0
+    longest_gap_at_s: float = np.nan
+    tallies: dict[tuple[str, str], Tally] = field(default_factory=dict)
+    estimating: set[str] = field(default_factory=set)
+    drawn: list[Track] = field(default_factory=list)
+    stride: int = 1
+    head: dict[str, np.ndarray] = field(default_factory=dict)
+    median_s: float = np.nan
+
+    def take(self, columns: Mapping[str, np.ndarray], track: Track) -> None:
+        """Count one more piece of the file."""
+        t = columns["t_s"]
+        self._gaps(np.unique(t))
+        estimates = np.isfinite(track.estimate).any(axis=(1, 2))
+        self.estimating |= {name for name, some in zip(track.filters, estimates, strict=True) if some}
+        for name, column in list(columns.items())[1:]:
+            self.missing[name] = self.missing.get(name, 0) + int(np.isnan(column).sum())
+        for q, (name, freedom) in enumerate(track.tested):
+            for f, filter_name in enumerate(track.filters):
+                known = track.nis[f, :, q]
+                known = known[np.isfinite(known)]
+                tally = self.tallies.setdefault((filter_name, name), Tally(filter_name, name, freedom))
+                tally.count, tally.total = tally.count + known.size, tally.total + float(known.sum())
+        if not self.head:
+            self.head = {name: column[:HEAD] for name, column in columns.items()}
+        self._draw(track)
+        self.rows += len(t)
+
+    @property
+    def silent(self) -> list[str]:
+        """The filters of the config that never had an estimate."""
+        return [one.name for one in self.case.spec.filters if one.name not in self.estimating]
+
+    def _gaps(self, t: np.ndarray) -> None:
+        if self.rows == 0:
+            self.first_s = self.last_s = float(t[0])
+            self.median_s = float(np.median(np.diff(t))) if len(t) > 1 else np.nan
+        steps = np.diff(t, prepend=self.last_s)
+        wide = steps > GAP * self.median_s
+        self.gaps += int(wide.sum())
+        if wide.any() and steps.max() > self.longest_gap_s:
+            self.longest_gap_s, at = float(steps.max()), int(steps.argmax())
+            self.longest_gap_at_s = float(t[at] - steps[at])
+        self.last_s = float(t[-1])
+
+    def _draw(self, track: Track) -> None:
+        kept = np.flatnonzero((self.rows + np.arange(len(track.t_s))) % self.stride == 0)
+        self.drawn.append(rows_of(track, kept))
+        while sum(len(part.t_s) for part in self.drawn) > MOST_DRAWN:
+            self.stride *= 2
+            whole = self.track()
+            self.drawn = [rows_of(whole, np.arange(0, len(whole.t_s), 2))]
+
+    def track(self) -> Track:
+        """The track, thinned for figures."""
+        return joined(self.drawn)
+
+
+def rows_of(track: Track, kept: np.ndarray) -> Track:
+    """Some rows of a track, copied."""
+    arrays = ("estimate", "sigma", "probability", "residual", "nis", "score")
+    some = {name: getattr(track, name)[:, kept] for name in arrays if getattr(track, name) is not None}
+    return replace(track, t_s=track.t_s[kept], **some)
+
+
+def joined(parts: list[Track]) -> Track:
+    """Tracks one after the other."""
+    arrays = ("estimate", "sigma", "probability", "residual", "nis", "score")
+    first = parts[0]
+    whole = {
+        name: np.concatenate([getattr(part, name) for part in parts], axis=1)
+        for name in arrays
+        if getattr(first, name) is not None
+    }
+    return replace(first, t_s=np.concatenate([part.t_s for part in parts]), **whole)
+
+
+def follow(
+    experiment: Experiment, source: str | os.PathLike, sink: Callable[[Track], None] = lambda track: None
+) -> Followed:
+    """The filters of an experiment's one case over the recorded plots in a CSV file, piece by piece to `sink`.
+
+    Memory does not grow with the file where the study's filters go from row to row; others take so many rows at most.
+    Raises ConfigError for an experiment of several cases, a study without recorded plots, and faults in the file.
+    """
+    plots_named = shlex.quote(os.fspath(source)).replace("{", "{{").replace("}", "}}")
+    case = one_case(experiment, "track with", f"radarsim track {{}} {plots_named}")
+    of = recorded_of(case)
+    tracker, followed = of.tracker(case), Followed(case)
+    twin = Twin(of.tracker(case), of.scan_period_s(case.spec))
+    size = tracker.most_rows or plots.CHUNK
+    try:
+        for columns in plots.chunks(source, of.columns(case.spec), size, tracker.several):
+            if followed.rows and tracker.most_rows:
+                raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
+            track = tracker.feed(columns)
+            if twin.lost(columns, track):
+                line = plots.line_of(source, twin.gap_row)
+                fault = f"after a gap of {twin.gap_s:g} s a filter's numbers are lost in rounding: split the file here"
+                raise ConfigError(f"{source}:{line}: t_s: {fault}")
+            sink(track)
+            followed.take(columns, track)
+    except LinAlgError as error:
+        raise ConfigError(
+            f"{source}: t_s: intervals so different leave a filter's equations without solution"
+        ) from error
+    return followed
+
+
+def track(experiment: Experiment, source: str | os.PathLike) -> tuple[Case, Track]:
+    """The filters of an experiment's one case over the recorded plots in a CSV file, all of it at once.
+
+    Raises ConfigError as `follow`.
+    """
+    parts: list[Track] = []
+    followed = follow(experiment, source, parts.append)
+    return followed.case, joined(parts)
+
+
+def draw(followed: Followed, folder: str | os.PathLike) -> list[str]:
+    """Figures of a track as SVG and PNG into a folder; their names. Raises StoreError."""
+    from radarsim.report import figures, files
+    from radarsim.track import figures as described
+
+    made = described.figures(followed.track())
+    contents = {f"{name}.{kind}": data for name, one in made.items() for kind, data in figures.save(one).items()}
+    files.replace_all(Path(folder), contents)
+    return list(made)

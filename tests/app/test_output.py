@@ -1,0 +1,186 @@
+"""All outputs of an experiment: what is written, whole or not at all, and what its report says."""
+
+import hashlib
+import json
+import re
+from html.parser import HTMLParser
+
+import pandas as pd
+import pytest
+from markupsafe import escape
+
+from radarsim.app import output
+from radarsim.app.configs import load
+from radarsim.errors import StoreError
+from radarsim.report import files, html, provenance
+
+TABLES = {"curves.csv", "gains.csv", "steady.csv", "consistency.csv", "radar.csv", "claims.csv"}
+FIGURES = {f"figures/{k}_{c}.{f}" for k in ("sigma", "gain") for c in ("r", "Vr", "ar") for f in ("svg", "png")}
+FIGURES |= {"figures/consistency.svg", "figures/consistency.png"}
+RUN = {"stop": "done", "threads": 2, "seconds": 1.5, "warnings": ["watch out"], "identities": {"rls2": "ab"}}
+
+
+HOSTILE = "<script>alert('x')</script> & \"{{ 1 }}\""
+
+
+@pytest.fixture(scope="module")
+def experiment(radar_config):
+    filters = radar_config("rls2")["filters"]
+    filters[0]["name"] = HOSTILE
+    return load(radar_config("rls2", filters=filters, radar={"name": HOSTILE}))
+
+
+@pytest.fixture(scope="module")
+def results(experiment, expected_case):
+    return [expected_case(case) for case in experiment.cases]
+
+
+@pytest.fixture(scope="module")
+def written(experiment, results, tmp_path_factory):
+    """All outputs, figures too, of an experiment whose names are hostile."""
+    return output.write(experiment, results, tmp_path_factory.mktemp("out") / "rls2", RUN)
+
+
+class Page(HTMLParser):
+    """Tags and addresses of a page; fails on a tag that is not closed."""
+
+    VOID = ("meta", "br", "link", "img")
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.addresses = [], [], []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.addresses += [value for name, value in attrs if name in ("src", "href", "xlink:href", "action")]
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags.append(tag)
+        self.addresses += [value for name, value in attrs if name in ("src", "href", "xlink:href", "action")]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_everything_is_written(written):
+    folder = written.folder
+    found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
+    assert found == TABLES | FIGURES | {"run.json", "report.html"} == set(written.files)
+    record = json.loads((folder / "run.json").read_bytes())
+    for path, digest in record["outputs"].items():
+        assert hashlib.sha256((folder / path).read_bytes()).hexdigest() == digest
+    assert set(record["outputs"]) == found - {"run.json"}
+    assert record["realisations_asked"] == record["realisations_done"] == 100_000
+    assert record["stop"] == "done"
+    assert record["warnings"] == ["watch out"]
+    assert record["identities"] == {"rls2": "ab"}
+    assert re.fullmatch("[0-9a-f]{64}", record["resolved_sha256"])
+    assert {"python", "numpy", "numba", "radarsim"} <= set(record["versions"])
+
+
+def test_tables_are_the_same_bytes_each_time(experiment, results, tmp_path):
+    for name in ("a", "b"):
+        output.write(experiment, results, tmp_path / name, RUN, draw=False)
+    for path in TABLES | {"report.html"}:
+        assert (tmp_path / "a" / path).read_bytes() == (tmp_path / "b" / path).read_bytes()
+
+
+def test_without_figures_old_ones_go_and_nothing_else(experiment, results, tmp_path):
+    folder = tmp_path / "rls2"
+    (folder / "figures").mkdir(parents=True)
+    for name in ("figures/sigma_r.svg", "track.csv", "figures/mine.svg", "../outside.csv"):
+        (folder / name).write_text("old")
+    named = {"figures/sigma_r.svg": "", "../outside.csv": "", str(tmp_path / "outside.csv"): ""}
+    (folder / "run.json").write_text(json.dumps({"outputs": named}))
+    written = output.write(experiment, results, folder, RUN, draw=False)
+    assert set(written.files) == TABLES | {"run.json", "report.html"}
+    assert not (folder / "figures/sigma_r.svg").exists()
+    for name in ("track.csv", "figures/mine.svg", "../outside.csv"):
+        assert (folder / name).read_text() == "old"
+    page = (folder / "report.html").read_text()
+    Page(page)
+    assert "<svg" not in page
+
+
+@pytest.mark.parametrize("damaged", [b"", b"[]", b'{"outputs": [1]}', b"\xff", b'{"outputs": null}'])
+def test_a_damaged_record_is_replaced(damaged, tmp_path):
+    (tmp_path / "run.json").write_bytes(damaged)
+    assert provenance.outputs(tmp_path) == []
+
+
+def test_no_claims_no_file(radar_config, expected_case, tmp_path):
+    experiment = load(radar_config("rls2", radar={"sigma_range_m": 251}))
+    written = output.write(experiment, [expected_case(case) for case in experiment.cases], tmp_path, RUN, draw=False)
+    assert "claims.csv" not in written.files
+    assert "Claims of the paper" not in (tmp_path / "report.html").read_text()
+
+
+def test_page_is_whole_and_leads_nowhere(written):
+    text = (written.folder / "report.html").read_text()
+    page = Page(text)
+    assert all(address.startswith("#") or address == "data:," for address in page.addresses)
+    assert "http://" not in re.sub(r'xmlns(:\w+)?="[^"]*"', "", text)
+    assert page.tags.count("script") == 7 + 1  # the numbers of each figure, and the page's own
+    assert "Content-Security-Policy" in text
+    ids = re.findall(r'\bid="([^"]+)"', text)
+    assert len(ids) == len(set(ids))
+    assert text.count('class="chart"') == 8  # two panels in the last
+    assert str(escape(written.answer[0])).replace(" %", "\u00a0%") in text
+    assert "C_θ" in text[text.index('id="asked"') : text.index('id="figures"')]
+    assert "(1 rows)" not in text
+    assert re.search(r">sigma</th><th[^>]*>exact_sigma<", text)
+    assert "watch out" in text
+    assert "P1.18" in text
+
+
+def test_names_are_escaped(written):
+    text = (written.folder / "report.html").read_text()
+    assert set(re.findall("<script[^>]*>", text)) == {"<script>", '<script type="application/json">'}
+    assert text.count("<script>") == 1
+    assert "&lt;script&gt;" in text
+    assert set(pd.read_csv(written.folder / "gains.csv")["baseline"]) == {HOSTILE}
+
+
+def test_few_realisations_are_warned_of(experiment, expected_case, tmp_path):
+    output.write(experiment, [expected_case(experiment.cases[0], count=10)], tmp_path, RUN, draw=False)
+    record = json.loads((tmp_path / "run.json").read_bytes())
+    assert "intervals of 10 realisations are rough" in record["warnings"][-1]
+    assert record["realisations_done"] == 10
+
+
+def of_cases(*cases):
+    return {"cases": {str(i): dict(zip(("asked", "done", "seed"), case, strict=True)) for i, case in enumerate(cases)}}
+
+
+def test_extent_in_words():
+    assert provenance.extent(of_cases((10_000, 10_000, 7))) == "10,000 realisations, seed 7"
+    differing = of_cases((100_000, 100_000, 2017), (200_000, 200_000, 1))
+    assert provenance.extent(differing) == "100,000 to 200,000 realisations a case, seeds 1, 2017"
+    short = of_cases((200_000, 100_000, 1), (200_000, 200_000, 1))
+    assert provenance.extent(short) == "100,000 to 200,000 realisations a case of 200,000 asked, seed 1"
+
+
+def test_a_file_is_replaced_whole(tmp_path):
+    files.replace_all(tmp_path, {"a/b.txt": b"one"})
+    files.replace_all(tmp_path, {"a/b.txt": b"two"})
+    assert (tmp_path / "a/b.txt").read_bytes() == b"two"
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["b.txt"]
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(StoreError, match="cannot be written"):
+        files.replace_all(tmp_path / "taken", {"x.csv": b""})
+
+
+def test_many_long_tables_share_the_room_of_a_page():
+    long = pd.DataFrame({"k": range(5000), "sigma": 1.0})
+    shown = html._tables({f"table {i}": long for i in range(15)} | {"short": long.head(30)})
+    assert sum(len(table["rows"]) for table in shown) <= html.ALL_ROWS
+    assert len(shown[-1]["rows"]) == 30
+    assert all(table["cut"] and table["count"] == 5000 for table in shown[:-1])
+    assert len(html._tables({"alone": long})[0]["rows"]) == html.ROWS

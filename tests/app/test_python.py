@@ -1,0 +1,104 @@
+"""radarsim from Python, as the contract promises it."""
+
+import copy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import radarsim
+
+CONFIG = {
+    "study": "range_doppler",
+    "radar": {"wavelength_m": 0.15, "sigma_range_m": 250, "sigma_velocity_mps": 15, "scan_period_s": 10},
+    "target": {"kind": "polynomial", "coefficients": [100e3, -250, 4]},
+    "filters": [
+        {"name": "r", "observes": ["range"], "manoeuvre_variance": 1e-3},
+        {"name": "r+Vr", "observes": ["range", "velocity"], "manoeuvre_variance": 1e-3},
+    ],
+    "scans": 15,
+    "realisations": 4000,
+}
+
+
+def test_runs_a_path_and_writes_nothing(tmp_path, monkeypatch):
+    config = Path("configs/rls2.yaml").resolve()
+    monkeypatch.chdir(tmp_path)
+    result = radarsim.run(config, realisations=1e4)
+    assert list(result.gains.columns)[:2] == ["case", "filter"]
+    assert set(result.curves["n"]) == {10_000}
+    assert not list(tmp_path.iterdir())
+
+
+def test_runs_a_dict_and_leaves_it_alone():
+    before = copy.deepcopy(CONFIG)
+    result = radarsim.run(CONFIG)
+    assert before == CONFIG
+    assert set(result.curves["case"]) == {"config"}
+
+
+def test_the_same_numbers_with_and_without_a_store(tmp_path):
+    one, other = radarsim.run(CONFIG), radarsim.run(CONFIG, out=tmp_path, figures=False, threads=1)
+    np.testing.assert_array_equal(one.curves["sigma"], other.curves["sigma"])
+    assert (tmp_path / "config" / "curves.csv").exists()
+
+
+def test_figures_by_the_names_of_their_files():
+    from matplotlib.figure import Figure
+
+    result = radarsim.run(CONFIG)
+    assert isinstance(result.figure("gain_r"), Figure)
+    assert {"sigma_r", "sigma_Vr", "sigma_ar", "gain_r", "gain_Vr", "gain_ar"} <= set(result.figures)
+    with pytest.raises(KeyError, match="gain_r"):
+        result.figure("gain_x")
+
+
+def test_a_wrong_config_raises_the_lines_of_the_command():
+    wrong = copy.deepcopy(CONFIG)
+    wrong["radar"]["sigma_range_m"] = -250
+    with pytest.raises(radarsim.ConfigError) as caught:
+        radarsim.run(wrong)
+    assert caught.value.lines == ("config: radar.sigma_range_m: must be > 0, got -250",)
+
+
+def test_realisation_i_is_the_same_in_any_run():
+    """Sums over the first 5000 of 5000 and of 9000 agree: the difference is the sum over the others."""
+    from radarsim.app.configs import load
+    from radarsim.studies import CaseWork
+
+    work = CaseWork(load(CONFIG).cases[0])
+    whole, parts = work.simulate(0, 9000), work.simulate(0, 5000) + work.simulate(5000, 4000)
+    np.testing.assert_allclose(parts, whole, rtol=1e-9, atol=1e-6 * np.abs(whole).max())
+
+
+def test_load_gives_what_was_run_and_writes_nothing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ran = radarsim.run("rls2", realisations=3000, out="results", figures=False)
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
+    loaded = radarsim.load("rls2")
+    assert loaded.curves.equals(ran.curves)
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()} == before
+    with pytest.raises(radarsim.ConfigError, match="radarsim run rls3"):
+        radarsim.load("rls3")
+
+
+def test_a_notebook_shows_the_answer_and_no_markup_of_a_users():
+    hostile = copy.deepcopy(CONFIG)
+    hostile["filters"][1]["name"] = "<script>x</script>"
+    shown = radarsim.run(hostile)._repr_html_()
+    assert "<script" not in shown
+    assert "&lt;script&gt;" in shown
+    assert "lower than with range alone" in shown
+    assert "exact_sigma" in shown
+
+
+def test_a_figure_as_pdf(tmp_path):
+    result = radarsim.run(CONFIG)
+    result.write(tmp_path, figures=["pdf"])
+    assert {path.suffix for path in (tmp_path / "config" / "figures").iterdir()} == {".pdf"}
+
+
+def test_a_value_that_is_not_known_stays_empty_in_a_notebook():
+    result = radarsim.run("sonar_missed", realisations=20)
+    assert result.last_scan["exact_sigma"].isna().any()
+    assert ">NaN<" not in result._repr_html_()

@@ -1,0 +1,90 @@
+"""`make reproduce-figures` in small: a line for each config, the rest goes on after a fault, a summary at the end."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+from radarsim.app import reproduce
+
+SMALL = ["realisations=100"]
+
+
+def test_a_line_each_and_a_summary(tmp_path):
+    told = []
+    done = reproduce.reproduce(["rls2", "rls4"], str(tmp_path), told.append, overrides=SMALL, figures=False)
+    assert [line[:7] for line in told] == ["[ 1/2] ", "[ 2/2] "]
+    assert {line.split()[2] for line in told} == {"rls2", "rls4"}
+    assert any("rls2" in line and "claims: " in line for line in told)
+    summary = reproduce.summary(done, str(tmp_path), 1.0)
+    assert any(line.startswith("claims   ") and "not run" in line for line in summary)
+    assert any(line.startswith("time     0:00:01") and "2 configs" in line for line in summary)
+    index = (tmp_path / "index.html").read_text()
+    assert "rls2/report.html" in index
+    assert "rls4/report.html" in index
+
+
+def test_a_fault_is_told_and_the_rest_runs(tmp_path):
+    (tmp_path / "rls2").write_text("a file where a folder should be")
+    told = []
+    done = reproduce.reproduce(["rls2", "rls4"], str(tmp_path), told.append, overrides=SMALL, figures=False)
+    assert any("rls2" in line and "FAILED: " in line for line in told)
+    assert {one.stem: (bool(one.faults), one.code) for one in done} == {"rls2": (True, 4), "rls4": (False, 0)}
+    assert "failed   rls2" in reproduce.summary(done, str(tmp_path), 1.0)
+
+
+def test_a_process_that_dies_is_told_and_replaced(tmp_path):
+    process = reproduce._Process()
+    try:
+        os.kill(process._popen.pid, signal.SIGKILL)
+        lost = process.done(reproduce.Task("rls2", str(tmp_path), tuple(SMALL), figures=False))
+        again = process.done(reproduce.Task("rls2", str(tmp_path), tuple(SMALL), figures=False))
+    finally:
+        process.stop(at_once=False)
+        process.wait()
+    assert "ended with -9" in lost.faults[0]
+    assert not again.faults
+    assert "claims: " in again.words
+
+
+def test_a_signal_ends_it_and_its_processes_in_time(tmp_path):
+    command = [sys.executable, "-m", "radarsim.app.reproduce", str(tmp_path), "rls2", "range_doppler"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as run:
+        while not list(tmp_path.glob(".blocks/*")):
+            assert run.poll() is None
+            time.sleep(0.05)
+        run.send_signal(signal.SIGINT)
+        sent = time.monotonic()
+        assert run.wait(10) == 128 + signal.SIGINT
+        assert time.monotonic() < sent + 3
+        assert "run the same command again to continue" in run.stderr.read()  # until the last process has closed it
+        assert time.monotonic() < sent + 4
+
+
+def test_output_that_nobody_can_take(tmp_path):
+    shell = f"{sys.executable} -m radarsim.cli.reproduce {tmp_path} rls2 rls2 --no-figures --set realisations=100"
+    full = subprocess.run(f"{shell} > /dev/full", shell=True, capture_output=True, text=True, check=False)
+    assert full.returncode == 4
+    assert full.stderr == "output: cannot be written: No space left on device\n"
+    piped = subprocess.run(["bash", "-c", f"{shell} | head -0"], capture_output=True, text=True, check=False)
+    assert piped.stderr == ""
+
+
+def test_its_processes_end_with_it(tmp_path):
+    command = [
+        sys.executable,
+        "-m",
+        "radarsim.app.reproduce",
+        str(tmp_path),
+        "manoeuvre_variance",
+        "--set",
+        "realisations=1e9",
+    ]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as run:
+        time.sleep(3)
+        run.kill()
+        run.wait()
+        killed = time.monotonic()
+        run.stderr.read()  # ends when the last process has closed it
+        assert time.monotonic() < killed + 5

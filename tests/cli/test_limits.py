@@ -1,0 +1,217 @@
+"""Precision, time limits, shares, clusters and JSON, from the command's outside."""
+
+import json
+import shutil
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import radarsim
+from radarsim.app import outlook as overview
+from radarsim.errors import ConfigError, TargetUnmet
+from tests.cli.test_run import csv_bytes
+from tests.cli.test_run import radarsim as command
+
+PLAIN = ("--no-figures", "--quiet")
+
+
+def record(folder):
+    """What run.json holds."""
+    return json.loads((folder / "run.json").read_text())
+
+
+def half_widths(folder):
+    """The 95 % half-widths of σ in per cent of it."""
+    curves = pd.read_csv(folder / "curves.csv")
+    return 50 * (curves["sigma_hi"] - curves["sigma_lo"]) / curves["sigma"]
+
+
+def test_a_precision_ends_at_the_first_look_that_reaches_it(tmp_path):
+    command("run", "rls2", "-n", "1e6", "--precision", 2, *PLAIN, "--out", tmp_path)
+    done = record(tmp_path / "rls2")
+    assert done["stop"] == "done"
+    assert done["realisations_done"] == 8_000
+    assert half_widths(tmp_path / "rls2").max() < 2
+    widest = done["precision"]["widest"]["rls2"]
+    assert widest["percent"] == pytest.approx(half_widths(tmp_path / "rls2").max(), rel=1e-9)
+    command("run", "rls2", "-n", 4_000, *PLAIN, "--out", tmp_path / "before")
+    assert half_widths(tmp_path / "before" / "rls2").max() >= 2
+    command("run", "rls2", "-n", 8_000, *PLAIN, "--out", tmp_path / "plain")
+    assert csv_bytes(tmp_path / "plain" / "rls2") == csv_bytes(tmp_path / "rls2")
+
+
+def test_where_a_precision_ends_depends_on_nothing_that_is_stored(tmp_path):
+    command("run", "rls2", "-n", "1e5", *PLAIN, "--out", tmp_path)
+    command("run", "rls2", "-n", "1e6", "--precision", 2, "--threads", 3, *PLAIN, "--out", tmp_path)
+    assert record(tmp_path / "rls2")["realisations_done"] == 8_000
+
+
+def test_an_unmet_precision_names_the_worst_cell_and_writes_what_is_done(tmp_path):
+    result = command("run", "rls2", "-n", 5_000, "--precision", 0.1, *PLAIN, "--out", tmp_path, code=3)
+    widths = half_widths(tmp_path / "rls2")
+    row = pd.read_csv(tmp_path / "rls2" / "curves.csv").iloc[int(np.argmax(widths))]
+    assert result.stderr == (
+        f"rls2: precision of 0.1 % not reached; worst: rls2: filter '{row['filter']}', component {row.component}, "
+        f"k = {row.k}: sigma ± {widths.max():.3g} % at 4,000 realisations\n"
+    )
+    assert record(tmp_path / "rls2")["stop"].startswith("precision of 0.1 % not reached")
+    command("report", "rls2", "--no-figures", "--out", tmp_path)
+
+
+def test_all_cases_count_for_a_precision(tmp_path):
+    result = command("run", "range_doppler", "-n", 2_000, "--precision", 3.28, *PLAIN, "--out", tmp_path, code=3)
+    assert " of 30 cases; worst: rls" in result.stderr
+    cases = record(tmp_path / "range_doppler")["precision"]["widest"]
+    assert len(cases) == 30
+    unmet = sum(case["percent"] >= 3.28 for case in cases.values())
+    assert f"in {unmet} of 30 cases" in result.stderr
+    assert 0 < unmet < 30
+
+
+def test_a_time_limit_keeps_what_is_done_and_the_same_command_goes_on(tmp_path):
+    limited = ("run", "rls2", "-n", "3e9", "--time-limit", 1.0, *PLAIN, "--out", tmp_path)
+    assert command(*limited, code=3).stderr == "rls2: time limit of 1 s\n"
+    first = record(tmp_path / "rls2")["realisations_done"]
+    assert 0 < first < 3e9
+    assert pd.read_csv(tmp_path / "rls2" / "curves.csv")["n"].unique().tolist() == [first]
+    command(*limited, code=3)
+    second = record(tmp_path / "rls2")
+    assert second["realisations_done"] > first
+    assert second["realisations_from_store"] == first
+    command("report", "rls2", "--no-figures", "--out", tmp_path)
+    assert record(tmp_path / "rls2")["realisations_done"] == second["realisations_done"]
+
+
+def test_a_time_limit_within_an_experiment_of_cases_tells_those_that_are_done(tmp_path):
+    many = ("range_doppler", "-n", "1e8", "--no-figures", "--out", tmp_path)
+    command("run", *many, "--quiet", "--time-limit", 1.5, code=3)
+    done = record(tmp_path / "range_doppler")["cases"]
+    assert len(done) == 30
+    assert done["rls1"]["done"] > 0
+    assert list(done.values())[-1]["done"] == 0
+    report = command("report", "range_doppler", "--no-figures", "--out", tmp_path, "--json")
+    assert {case["done"] for case in json.loads(report.stdout)[0]["cases"].values()} >= {0}
+
+
+def test_a_limit_too_short_for_a_block_says_that_nothing_was_done(tmp_path):
+    result = command("run", "rls1", "--time-limit", 1e-9, *PLAIN, "--out", tmp_path, code=3)
+    assert result.stderr == "rls1: time limit of 1e-09 s: nothing was done by then\n"
+    assert not (tmp_path / "rls1").exists()
+
+
+def test_a_run_that_ends_in_time_is_done(tmp_path):
+    command("run", "rls2", "-n", 3_000, "--time-limit", 600, *PLAIN, "--out", tmp_path)
+    assert record(tmp_path / "rls2")["stop"] == "done"
+
+
+@pytest.mark.parametrize("of", [1, 3])
+def test_shares_united_by_copying_are_the_whole_run(tmp_path, of):
+    for number in range(1, of + 1):
+        share = command("run", "rls2", "-n", 50_001, "--shard", f"{number}/{of}", "--out", tmp_path / str(number))
+        assert f"share    {number} of {of} of rls2" in share.stdout
+        assert {path.name for path in (tmp_path / str(number)).iterdir()} == {".blocks"}
+        shutil.copytree(tmp_path / str(number), tmp_path / "all", dirs_exist_ok=True)
+    command("run", "rls2", "-n", 50_001, *PLAIN, "--out", tmp_path / "all")
+    assert record(tmp_path / "all" / "rls2")["realisations_computed"] == 0
+    command("run", "rls2", "-n", 50_001, *PLAIN, "--out", tmp_path / "whole")
+    assert csv_bytes(tmp_path / "all" / "rls2") == csv_bytes(tmp_path / "whole" / "rls2")
+
+
+def test_a_share_may_be_limited_in_time(tmp_path):
+    limited = ("run", "rls2", "-n", "1e9", "--shard", "2/2", "--time-limit", 0.5, "--out", tmp_path)
+    assert command(*limited, code=3).stderr == "rls2: time limit of 0.5 s\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--shard", "0/3"], "i/n with i from 1 to n"),
+        (["--shard", "4/3"], "i/n with i from 1 to n"),
+        (["--shard", "1/0"], "i/n with i from 1 to n"),
+        (["--shard", "two"], "i/n with i from 1 to n"),
+        (["--shard", "1/2", "--precision", "1"], "--shard and --precision do not go together"),
+        (["--precision", "0"], "must be a number > 0"),
+        (["--precision", "-1"], "must be a number > 0"),
+        (["--precision", "nan"], "must be a number > 0"),
+        (["--precision", "101"], "≤ 100"),
+        (["--precision", "1", "-n", "1999"], "rls2.yaml: realisations: must be at least 2000 for a precision"),
+        (["--time-limit", "0"], "must be a number > 0"),
+        (["--time-limit", "inf"], "must be a number > 0"),
+        (["--workers", "0"], "--workers"),
+        (["--workers", "2", "--scheduler", "tcp://a:1"], "do not go together"),
+        (["--workers", "2", "--threads", "2"], "do not go together"),
+        (["--scheduler", "nowhere"], "must be an address such as tcp://host:8786"),
+    ],
+)
+def test_wrong_values_and_combinations_are_refused(tmp_path, arguments, words):
+    result = command("run", "rls2", *arguments, "--out", tmp_path, code=2)
+    assert words in result.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_json_is_one_document_on_stdout(tmp_path):
+    out = ("--out", tmp_path, "--json")
+    (run,) = json.loads(command("run", "rls2", "-n", 3_000, "--no-figures", *out).stdout)
+    assert run["cases"] == {"rls2": {"asked": 3_000, "done": 3_000, "seed": 2017}}
+    assert run["last_scan"][0]["sigma_lo"] < run["last_scan"][0]["sigma"]
+    assert run["last_scan"][0]["gain_percent"] is None
+    (report,) = json.loads(command("report", "rls2", "--no-figures", *out).stdout)
+    assert report["last_scan"] == run["last_scan"]
+    assert {row["config"] for row in json.loads(command("claims", "rls2", *out).stdout)} == {"rls2"}
+    assert len(json.loads(command("claims", *out).stdout)) > 25
+    (check,) = json.loads(command("check", "rls2", "--precision", 1, "--json").stdout)
+    assert check["cases"][0]["need"]["realisations"] == 32_000
+    listed = json.loads(command("list", "--json").stdout)
+    assert {"name": "range_doppler"}.items() <= listed["studies"][0].items()
+    unmet = command("run", "rls2", "-n", 2_000, "--precision", 0.1, "--no-figures", *out, code=3)
+    assert json.loads(unmet.stdout)[0]["unmet"][0] in unmet.stderr
+    (share,) = json.loads(command("run", "rls2", "-n", 3_000, "--shard", "1/2", *out).stdout)
+    assert (share["number"], share["of"]) == (1, 2)
+
+
+def test_a_pilot_and_exact_values_say_about_the_same(tmp_path):
+    """The last look that both foresee is within a doubling of where the run ends."""
+    for config, percent in (("rls2", 1), ("sonar_correlated", 2)):
+        (check,) = json.loads(command("check", config, "-n", "1e6", "--precision", percent, "--json").stdout)
+        command("run", config, "-n", "1e6", "--precision", percent, *PLAIN, "--out", tmp_path)
+        done = record(tmp_path / config)["cases"]
+        for case in check["cases"]:
+            assert case["need"]["known_by"] == "exact"
+            assert 0.5 <= case["need"]["realisations"] / done[case["name"]]["done"] <= 2
+
+
+@pytest.mark.parametrize("chunk", [1, 8, 512])
+def test_a_pilot_knows_that_kernels_calculate_chunks(monkeypatch, chunk):
+    """One realisation costs as much as a chunk of them, and stands for no more than its share."""
+    monkeypatch.setattr(overview, "timed", lambda work, count: 0.02 * -(-count // chunk))
+    for pilot_s in (0.3, 0.06):
+        seconds = overview.seconds_each(SimpleNamespace(block=4096), 100_000, pilot_s)
+        assert seconds == pytest.approx(0.02 / chunk, rel=1e-9)
+
+
+def test_a_control_variate_that_is_none_is_told(tmp_path):
+    """Where no baseline's σ is known exactly there is no table, and a warning says so."""
+    for config, there in (("sonar_clutter", False), ("discriminator_pair", False), ("rls2", True)):
+        result = command("run", config, "-n", 50, "--set", "control_variate=true", "--no-figures", "--out", tmp_path)
+        assert (tmp_path / config / "controlled.csv").exists() is there
+        assert ("control_variate: no" in result.output) is not there
+        assert any("control_variate: no" in line for line in record(tmp_path / config)["warnings"]) is not there
+
+
+def test_what_no_number_of_realisations_reaches_is_told():
+    text = command("check", "rls2", "-n", 4_000, "--precision", 0.5).stdout
+    assert "precision not within reach of 1 case: rls2; -n 128000 would do" in text
+
+
+def test_python_takes_a_precision_and_a_limit():
+    result = radarsim.run("rls2", realisations=1e6, precision=2)
+    assert result.unmet == []
+    assert result.cases[0].count == 8_000
+    assert radarsim.run("rls2", realisations=2e9, time_limit=0.5).unmet == ["time limit of 0.5 s"]
+    with pytest.raises(TargetUnmet, match="nothing was done"):
+        radarsim.run("rls2", time_limit=1e-9)
+    for wrong in (0, -1, float("nan"), 101):
+        with pytest.raises(ConfigError, match="precision: must be > 0"):
+            radarsim.run("rls2", precision=wrong)

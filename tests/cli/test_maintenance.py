@@ -1,0 +1,265 @@
+"""`radarsim doctor` and `radarsim clean`: every damage named, nothing but blocks removed."""
+
+import json
+import os
+import random
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from radarsim.app import doctor, selftest
+from tests.cli.test_run import csv_bytes
+from tests.cli.test_run import radarsim as command
+from tests.engine.test_audit import damage
+from tests.engine.test_damage import reforged
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A finished run of two cases: its --out directory."""
+    out = tmp_path_factory.mktemp("results")
+    command("run", "rls1", "rls2", "-n", 50_001, "--no-figures", "--quiet", "--out", out)
+    return out
+
+
+@pytest.fixture(autouse=True)
+def no_waiting(monkeypatch):
+    """Outputs that look altered are looked at again without the pause for a run beside us."""
+    monkeypatch.setattr(doctor, "LOOK_S", 0)
+
+
+@pytest.fixture
+def out(made, tmp_path):
+    """A copy of it, to be damaged."""
+    shutil.copytree(made, tmp_path / "r")
+    return tmp_path / "r"
+
+
+def block_files(out):
+    """Every stored block."""
+    return sorted((out / ".blocks").rglob("*.sums"))
+
+
+def contents(out):
+    """Every file, by path."""
+    return {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+
+
+def test_a_whole_result_is_told_so_and_nothing_is_changed(out):
+    before = contents(out)
+    result = command("doctor", out / "rls2", "--recompute", 3)
+    assert "all whole" in result.stdout
+    assert "computed again: 3 pieces" in result.stdout
+    assert contents(out) == before
+
+
+def test_every_stored_block_may_be_computed_again(out):
+    (found,) = [json.loads(command("doctor", out / "rls2", "--recompute", 99, "--json").stdout)]
+    assert found["realisations"] == 50_001
+    assert (found["faults"], found["notes"]) == ([], [])
+
+
+def test_a_hundred_of_a_hundred_damaged_files_are_named_and_come_again(out):
+    good, draw = contents(out), random.Random(1)
+    identity = json.loads((out / "rls2" / "run.json").read_text())["identities"]["rls2"]
+    outputs = [path for path in (out / "rls2").iterdir() if path.name != "run.json"]
+    files = [*(path for path in block_files(out) if identity in str(path)), *outputs]
+    from radarsim.app.doctor import inspected
+
+    for _ in range(100):
+        path = draw.choice(files)
+        kind = damage(path, draw)
+        faults = inspected(out / "rls2").faults
+        assert [fault.split(":")[0] for fault in faults] == [str(path)], (kind, path, faults)
+        path.write_bytes(good[path])
+    for path in files:
+        damage(path, draw)
+    result = command("doctor", out / "rls2", code=4)
+    assert {line.split(":")[0] for line in result.stderr.splitlines()} == set(map(str, files))
+    command("run", "rls2", "-n", 50_001, "--no-figures", "--quiet", "--out", out)
+    assert csv_bytes(out / "rls2") == {p.name: good[p] for p in outputs if p.suffix == ".csv"}
+    assert "all whole" in command("doctor", out / "rls2").stdout
+
+
+def test_forged_sums_are_found_by_computing_them_again(out):
+    identity = json.loads((out / "rls2" / "run.json").read_text())["identities"]["rls2"]
+    for total in (out / ".blocks" / identity).glob("T*"):
+        total.unlink()
+    (cut,) = (out / ".blocks" / identity).glob("P*")
+    from radarsim.engine.store import decoded
+
+    reforged(cut, values=decoded(cut.read_bytes())[1] * 1.000001)
+    result = command("doctor", out / "rls2", "--recompute", 1, code=4)
+    assert f"{cut}: computed again, the sums are others" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("spoil", "code", "words"),
+    [
+        (lambda path: path.unlink(), 2, "no run.json in it"),
+        (lambda path: path.write_text("{"), 4, "run.json: damaged"),
+        (lambda path: path.write_text("[]"), 4, "run.json: damaged"),
+        (lambda path: path.write_text("[" * 100_000), 4, "run.json: damaged"),
+        (lambda path: path.write_text(re.sub('"rls2": "[0-9a-f]+"', '"rls2": "../x"', path.read_text())), 4, "damaged"),
+        (lambda path: path.write_text(path.read_text().replace('"r+Vr"', '"r+vr"')), 4, "run.json: damaged"),
+        (
+            lambda path: path.write_text(path.read_text().replace('"curves.csv"', '"../../etc"')),
+            4,
+            "outside the folder",
+        ),
+    ],
+)
+def test_a_spoiled_record_is_told(out, spoil, code, words):
+    spoil(out / "rls2" / "run.json")
+    assert words in command("doctor", out / "rls2", code=code).stderr
+
+
+def test_a_record_beyond_reading_is_made_anew_as_told(out):
+    whole = contents(out / "rls2").keys()
+    (out / "rls2" / "run.json").write_text("[" * 100_000)
+    told = command("report", "rls2", "--no-figures", "--out", out, code=4).stderr
+    assert "`radarsim run` makes it anew, and so does `radarsim report` with -n" in told
+    command("report", "rls2", "-n", 50_001, "--no-figures", "--out", out)
+    command("run", "rls1", "-n", 50_001, "--no-figures", "--quiet", "--out", out)  # the index reads all records
+    assert contents(out / "rls2").keys() == whole
+    assert "all whole" in command("doctor", out / "rls2").stdout
+
+
+def test_what_is_no_file_is_not_waited_for(out):
+    identity = json.loads((out / "rls2" / "run.json").read_text())["identities"]["rls2"]
+    pipe, device = sorted((out / ".blocks" / identity).glob("*.sums"))[:2]
+    pipe.unlink()
+    os.mkfifo(pipe)
+    device.unlink()
+    device.symlink_to("/dev/zero")
+    told = command("doctor", out / "rls2", code=4).stderr
+    assert f"{pipe}: damaged: no regular file" in told
+    assert f"{device}: damaged: no regular file" in told
+    command("run", "rls2", "-n", 60_001, "--no-figures", "--quiet", "--out", out)
+
+
+def test_outputs_that_a_run_is_writing_are_looked_at_again(out, monkeypatch):
+    path = out / "rls2" / "curves.csv"
+    whole = path.read_bytes()
+    path.write_bytes(whole + b"\n")
+    looks = iter([lambda: None, lambda: path.write_bytes(whole)])
+    monkeypatch.setattr(doctor.time, "sleep", lambda seconds: next(looks)())
+    assert "all whole" in command("doctor", out / "rls2").stdout
+
+
+def test_a_result_without_blocks_stands_on_its_own(out):
+    command("clean", "--out", out)
+    result = command("doctor", out / "rls2")
+    assert "no blocks of rls2 are stored" in result.stdout
+
+
+def test_blocks_of_other_sources_cannot_be_computed_again(out, monkeypatch):
+    monkeypatch.setattr(doctor, "identity", lambda case: "ab12")
+    command("doctor", out / "rls2")
+    assert "the sources that compute have changed" in command("doctor", out / "rls2", "--recompute", 1, code=2).stderr
+
+
+def test_doctor_is_told_what_it_looks_at(tmp_path):
+    assert "no run.json" in command("doctor", tmp_path, code=2).stderr
+    assert "no run.json" in command("doctor", tmp_path / "nowhere", code=2).stderr
+    assert "--recompute needs a RESULT" in command("doctor", "--recompute", 1, code=2).stderr
+
+
+def altered(tables, column, change):
+    """The tables with one number of the discriminator's curves changed, in a row in the middle."""
+    lines = tables["curves"].decode().splitlines()
+    header, cells = lines[0].split(","), lines[30].split(",")
+    cells[header.index(column)] = repr(change(float(cells[header.index(column)])))
+    return tables | {"curves": "\n".join([*lines[:30], ",".join(cells), *lines[31:], ""]).encode()}
+
+
+def test_the_self_test_says_so_where_numbers_differ(monkeypatch):
+    made = {name: (selftest.KNOWN / f"discriminator.{name}.csv").read_bytes() for name in selftest.TABLES}
+    assert selftest.verdict("discriminator", made, True).words == "the known bytes"
+    # Rounding is forgiven where platforms differ, as far as its conditioning allows, and nowhere else.
+    for column, factor, elsewhere in (
+        ("sigma", 1 + 1e-10, True),
+        ("sigma", 1 + 1e-7, False),
+        ("exact_sigma", 1 + 2e-11, True),
+        ("exact_sigma", 1 + 1e-9, False),
+        ("sigma_hi", 1 + 1e-10, True),
+        ("sigma_hi", 1 + 1e-6, False),
+        ("spread", 1 + 1e-7, False),
+    ):
+        changed = altered(made, column, lambda value, factor=factor: value * factor)
+        assert not selftest.verdict("discriminator", changed, True).good, column
+        assert selftest.verdict("discriminator", changed, False).good is elsewhere, (column, factor)
+    for spoiled in (made["curves"].replace(b"cured", b"cursed"), made["curves"][: len(made["curves"]) // 2]):
+        assert not selftest.verdict("discriminator", made | {"curves": spoiled}, False).good
+    monkeypatch.setattr(selftest, "verdicts", lambda: [selftest.Verdict("sonar", False, "differs")])
+    assert "self-test: sonar: differs" in command("doctor", code=4).stderr
+
+
+def test_the_tolerances_are_what_conditioning_allows():
+    """κ of the known case's balanced information, times half a rounding, and no more than a few times that."""
+    from radarsim.app.configs import load
+    from radarsim.studies.discriminator.exact import fisher
+    from radarsim.studies.discriminator.study import burst_of
+
+    burst = burst_of(load(selftest.KNOWN / "discriminator.yaml").cases[0].spec)
+    information = fisher(burst, 5, burst.duration_s)
+    scale = np.sqrt(np.diag(information))
+    rounding = np.linalg.cond(information / np.outer(scale, scale)) * np.finfo(float).eps / 2
+    assert rounding < selftest.TOLERANCES["discriminator"].exact < 10 * rounding
+
+
+def test_doctor_names_the_machine_and_passes_its_self_test():
+    told = json.loads(command("doctor", "--json").stdout)
+    assert {"machine", "instructions", "threads", "cache", "versions", "cluster"} <= told.keys()
+    assert [(one["study"], one["good"]) for one in told["self-test"]] == [
+        (study, True) for study in ("range_doppler", "multimodel", "sonar", "discriminator")
+    ]
+
+
+def test_clean_drops_blocks_and_nothing_else(out):
+    (out / ".blocks" / "notes.txt").write_text("mine")
+    (out / ".blocks" / "ab12").mkdir()
+    (out / ".blocks" / "ab12" / "mine.txt").write_text("mine")
+    files, size = len(block_files(out)), sum(path.stat().st_size for path in block_files(out))
+    dry = command("clean", "--dry-run", "--out", out)
+    assert dry.stdout == f"would drop {files} files of 3 cases, {size / 1e6:.1f} MB in {out / '.blocks'}\n"
+    assert len(block_files(out)) == files
+    command("clean", "rls1", "--out", out)
+    assert 0 < len(block_files(out)) < files
+    command("clean", "--out", out)
+    assert block_files(out) == []
+    left = {str(path.relative_to(out / ".blocks")) for path in (out / ".blocks").rglob("*")}
+    assert left == {"notes.txt", "ab12", "ab12/mine.txt"}
+    assert (out / "rls2" / "curves.csv").exists()
+    assert "dropped 0 files" in command("clean", "--out", out).stdout
+
+
+def test_clean_follows_no_link(out, tmp_path):
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "T16.sums").write_bytes(b"mine")
+    os.symlink(elsewhere, out / ".blocks" / "ab12")
+    (identity,) = [path for path in (out / ".blocks").iterdir() if path.is_dir() and not path.is_symlink()][:1]
+    os.symlink(elsewhere / "T16.sums", identity / "T16.sums")
+    command("clean", "--out", out)
+    assert (elsewhere / "T16.sums").read_bytes() == b"mine"
+    shutil.rmtree(out / ".blocks")
+    os.symlink(elsewhere, out / ".blocks")
+    assert "is a link" in command("clean", "--out", out, code=2).stderr
+    assert (elsewhere / "T16.sums").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [(["--out", "nowhere"], "no such directory"), (["rls7"], "no such config"), (["--seed", "1"], "need a CONFIG")],
+)
+def test_clean_refuses_what_it_does_not_know(tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    assert words in command("clean", *arguments, code=2).stderr
+
+
+@pytest.mark.parametrize("name", ["doctor", "clean"])
+def test_help_teaches_with_an_example(name):
+    assert f"  radarsim {name}" in command(name, "--help").stdout

@@ -1,0 +1,382 @@
+"""One's own data: a realisation written as plots, tracked again, tested; a config of one's own."""
+
+import csv
+import math
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from radarsim.app import run as experiment
+from radarsim.app.work import CaseWork
+from radarsim.cli import group, main
+from radarsim.config import load, lookup, own
+from radarsim.config.identity import canonical
+from radarsim.errors import ConfigError
+from radarsim.studies.range_doppler import track as range_doppler_plots
+from radarsim.track import accuracy, plots
+from radarsim.track import follow as recorded
+
+RUNS = {  # config, overrides, filters' tolerance in their own σ: rules that choose among models amplify a rounding
+    "rls2": ((), 1e-10),
+    "rls5": ((), 1e-10),
+    "multimodel": (("scans=600",), 1e-6),
+    "multimodel_1hz": ((), 1e-6),
+    "sonar_smoothing": ((), 1e-10),
+    "sonar_missed": (("sweep.sensor.detection_probability=[0.7]",), 1e-10),
+    "sonar_correlated": (("sweep.sensor.error_correlation=[0.6]",), 1e-10),
+}
+
+
+def radarsim(*arguments, code=0):
+    result = CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
+    assert result.exit_code == code, result.output
+    return result
+
+
+def loaded(config, overrides=()):
+    return experiment.load_all([config], overrides)[0]
+
+
+def table_of(path):
+    with path.open(newline="") as file:
+        return list(csv.reader(file))
+
+
+def truth_of(columns, components):
+    units = {"m": "m", "m/s": "mps", "m/s2": "mps2", "rad": "rad", "rad/s": "radps", "rad/s2": "radps2"}
+    return np.stack([columns[f"true_{name}_{units[unit]}"] for name, unit in components], axis=1)
+
+
+@pytest.mark.parametrize("config", RUNS)
+@pytest.mark.parametrize("realisation", [0, 4099])
+def test_track_over_a_simulated_file_makes_the_errors_of_the_study(tmp_path, config, realisation):
+    overrides, tolerance = RUNS[config]
+    one = loaded(config, overrides)
+    columns = recorded.simulated(one, realisation)
+    path = tmp_path / "plots.csv"
+    plots.write_columns(columns, path)
+    case, track = recorded.track(one, path)
+    work = CaseWork(case)
+    sums = work.plan.layout.unpack(work.simulate(realisation, 1))
+    at = np.asarray(work.plan.axes.k) - 1
+    error = (track.estimate - truth_of(columns, track.components))[:, at]
+    sigma = np.where(track.sigma[:, at] > 0, track.sigma[:, at], 1.0)
+    there = np.asarray(sums["estimates"]) > 0 if "estimates" in sums else work.plan.axes.available
+    assert np.array_equal(np.isfinite(error), there)
+    assert np.max(np.abs(np.where(there, (error - sums["error"][..., 0]) / sigma, 0.0))) < tolerance
+
+
+@pytest.mark.parametrize("config", ["rls2", "multimodel"])
+def test_a_file_in_pieces_gives_the_same_track(tmp_path, config):
+    one = loaded(config, ("scans=300",))
+    columns = recorded.simulated(one)
+    rng = np.random.default_rng(5)
+    measured = [name for name in columns if not name.startswith("true_")][1:]
+    for name in measured:
+        columns[name] = np.where(rng.random(300) < 0.2, np.nan, columns[name])
+    study = recorded.module_of(one.study)
+    wanted = {name: columns[name] for name in ("t_s", *measured)}
+    whole = study.Tracker(one.cases[0]).feed(wanted)
+    for size in (1, 7, 299):
+        tracker = study.Tracker(one.cases[0])
+        pieces = [
+            tracker.feed({name: column[i : i + size] for name, column in wanted.items()}) for i in range(0, 300, size)
+        ]
+        parts = recorded.joined(pieces)
+        scale = np.where(whole.sigma > 0, whole.sigma, 1.0)
+        assert np.array_equal(np.isfinite(parts.estimate), np.isfinite(whole.estimate))
+        assert np.nanmax(np.abs(parts.estimate - whole.estimate) / scale) < 1e-5
+
+
+def test_uneven_times_and_missing_values_are_least_squares_without_a_manoeuvre():
+    """A filter that allows for no manoeuvre ends at the weighted least squares of all that it was given."""
+    rng = np.random.default_rng(1)
+    one = loaded("rls2", ("manoeuvre_variance=1e-18",))
+    t = np.cumsum(rng.uniform(1, 20, 60))
+    z = np.stack([1e5 - 250 * t + 250 * rng.normal(size=60), -250 + 15 * rng.normal(size=60)], axis=1)
+    z[rng.random(z.shape) < 0.3] = np.nan
+    z[0] = 1e5, -250
+    track = (
+        recorded.module_of("range_doppler")
+        .Tracker(one.cases[0])
+        .feed({"t_s": t, "range_m": z[:, 0], "velocity_mps": z[:, 1]})
+    )
+    s = t - t[-1]
+    rows = [np.stack([np.ones(60), s, s**2 / 2], axis=1) / 250, np.stack([np.zeros(60), np.ones(60), s], axis=1) / 15]
+    for f, observed in enumerate((1, 2)):
+        A = np.concatenate([row[np.isfinite(z[:, j])] for j, row in enumerate(rows[:observed])])
+        b = np.concatenate([(z[:, j] / (250, 15)[j])[np.isfinite(z[:, j])] for j in range(observed)])
+        expected = np.linalg.lstsq(A, b, rcond=None)[0]
+        spread = np.sqrt(np.diagonal(np.linalg.inv(A.T @ A)))
+        np.testing.assert_allclose(track.estimate[f, -1], expected, atol=1e-4 * spread.max(), rtol=1e-5)
+        np.testing.assert_allclose(track.sigma[f, -1], spread, rtol=1e-5)
+
+
+def test_a_row_without_a_value_is_extrapolated():
+    one = loaded("rls2")
+    columns = {"t_s": np.array([0.0, 10, 20, 30, 47]), "range_m": np.array([1e5, 9.7e4, 9.4e4, 9.1e4, np.nan])}
+    columns["velocity_mps"] = np.array([-300.0, -300, -300, -300, np.nan])
+    track = recorded.module_of("range_doppler").Tracker(one.cases[0]).feed(columns)
+    for f in range(2):
+        r, v, a = track.estimate[f, 3]
+        expected = [r + 17 * v + 17**2 / 2 * a, v + 17 * a, a]
+        np.testing.assert_allclose(track.estimate[f, 4], expected, rtol=1e-12)
+        assert (track.sigma[f, 4] > track.sigma[f, 3]).all()
+        assert np.isnan(track.nis[f, 4]).all()
+
+
+def test_velocities_alone_never_start_a_track_of_ranges(monkeypatch):
+    one = loaded("rls2")
+    monkeypatch.setattr(range_doppler_plots, "LONGEST_START", 40)
+    t = np.arange(150.0)  # more than a start looks back
+    columns = {"t_s": t, "range_m": np.full(150, np.nan), "velocity_mps": np.full(150, 7.0)}
+    track = recorded.module_of("range_doppler").Tracker(one.cases[0]).feed(columns)
+    assert np.isnan(track.estimate[0]).all()
+    assert np.array_equal(np.isfinite(track.estimate[1]), np.tile([False, True, False], (150, 1)))
+
+
+def followed(tmp_path, config, overrides, stated=()):
+    one = loaded(config, overrides)
+    path = tmp_path / "plots.csv"
+    plots.write_columns(recorded.simulated(one), path)
+    return recorded.follow(loaded(config, (*overrides, *stated)), path)
+
+
+@pytest.mark.parametrize(
+    ("config", "overrides", "key", "true"),
+    [
+        ("rls2", ("scans=2000", "manoeuvre_variance=1e-7"), "radar.sigma_range_m", 250),
+        ("rls2", ("scans=2000", "manoeuvre_variance=1e-7"), "radar.sigma_velocity_mps", 15),
+        ("sonar_smoothing", ("scans=150",), "sensor.sigma_bearing_rad", math.radians(1)),
+    ],
+)
+@pytest.mark.parametrize("factor", [0.5, 2])
+def test_a_wrong_accuracy_is_seen_and_the_right_one_found(tmp_path, config, overrides, key, true, factor):
+    found = followed(tmp_path, config, overrides, (f"{key}={true * factor!r}",))
+    name = {"sigma_range_m": "range_m", "sigma_velocity_mps": "velocity_mps"}.get(key.split(".")[1], "bearing_rad")
+    judged = [one for one in accuracy.judged(found) if one.name == name and one.tests]
+    assert judged
+    for one in judged:
+        assert one.verdict == (accuracy.SMALL if factor < 1 else accuracy.LARGE)
+        # σ from n residuals is known to 1/sqrt(2n), and a tenth more for what the filters leave of their freedom.
+        assert one.better[key] == pytest.approx(true, rel=5.85 / np.sqrt(2 * found.rows) + 0.1)
+
+
+def test_a_right_accuracy_is_called_so(tmp_path):
+    found = followed(tmp_path, "multimodel", ("scans=3000",))
+    verdicts = {one.filter: one for one in accuracy.judged(found)}
+    assert verdicts["Kalman-1 5"].verdict == accuracy.SMALL  # its model lags behind a target that falls
+    assert 0.9 < verdicts["MMA2-122"].nis < 1.1
+    few = followed(tmp_path, "rls2", ("scans=8",))
+    assert {one.verdict for one in accuracy.judged(few)} == {accuracy.UNKNOWN}
+
+
+def test_the_command_tells_gaps_missing_values_and_draws(tmp_path):
+    source, track, figures = tmp_path / "plots.csv", tmp_path / "track.csv", tmp_path / "figures"
+    assert "60 rows" in radarsim("simulate", "rls2", "-o", source, "--set", "scans=60").stdout
+    rows = table_of(source)
+    rows[10][2] = ""
+    del rows[20:30]
+    with source.open("w", newline="") as file:
+        csv.writer(file).writerows(rows)
+    result = radarsim("track", "rls2", source, "-o", track, "--figures", figures)
+    assert "plots    50 rows over 590 s, from 0 s" in result.stdout
+    assert "missing  1 of velocity_mps" in result.stdout
+    assert "gaps     1 of over three times the usual interval, 10 s; the longest 110 s, after 180 s" in result.stdout
+    assert "NIS" in result.stdout
+    assert {path.name for path in figures.iterdir()} == {
+        f"{n}.{k}" for n in ("track", "residuals") for k in ("svg", "png")
+    }
+    written = table_of(track)
+    assert written[0] == ["t_s", "filter", "component", "unit", "estimate", "sigma"]
+    assert len(written) - 1 == 2 * 3 * 50 - 2 - 2 - 1  # before its start a filter gives what it observes alone
+
+
+def test_the_track_alone_goes_to_the_terminal_and_words_beside_it(tmp_path):
+    source = tmp_path / "plots.csv"
+    radarsim("simulate", "rls2", "-o", source)
+    result = radarsim("track", "rls2", source)
+    assert result.stdout.startswith("t_s,filter,component,unit,estimate,sigma\n0.0,r,r,m,")
+    assert "rows" in result.stderr
+    assert "NIS" not in result.stdout
+    assert radarsim("track", "rls2", source, "--quiet").stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            "t_s,range_m,velocity_mps\n0,1e5,1\n0,1e5,1\n",
+            "plots.csv:3:1: t_s: must be later than the row before, got 0 after 0",
+        ),
+        (
+            "t_s,range_m,velocity_mps\n5,1e5,1\n0,1e5,1\n",
+            "plots.csv:3:1: t_s: must be later than the row before, got 0 after 5",
+        ),
+        ("t_s,range_m,velocity_mps\n0,x,1\n", "plots.csv:2:2: range_m: must be a finite number, got 'x'"),
+        ("t_s,range_m\n0,1\n", "plots.csv:1: must have the columns t_s, range_m, velocity_mps; got t_s, range_m"),
+    ],
+)
+def test_a_wrong_file_is_told_by_line_and_column_and_no_track_is_left(tmp_path, text, expected):
+    (tmp_path / "plots.csv").write_text(text)
+    result = radarsim("track", "rls2", tmp_path / "plots.csv", "-o", tmp_path / "track.csv", code=2)
+    assert result.stderr.splitlines() == [f"{tmp_path}/{expected}"]
+    assert [path.name for path in tmp_path.iterdir()] == ["plots.csv"]
+
+
+def test_times_are_judged_across_pieces_of_a_file(tmp_path, monkeypatch):
+    path = tmp_path / "plots.csv"
+    path.write_text("t_s,range_m,velocity_mps\n" + "".join(f"{t},1e5,1\n" for t in (0, 1, 2, 2, 3)))
+    with pytest.raises(ConfigError, match=r":5:1: t_s: must be later than the row before, got 2 after 2"):
+        list(plots.chunks(path, [("t_s", "range_m", "velocity_mps")], 3))
+
+
+def test_studies_without_plots_say_so(tmp_path):
+    for command in (
+        ("simulate", "discriminator", "-o", tmp_path / "x.csv"),
+        ("track", "discriminator", tmp_path / "x"),
+    ):
+        assert "has no filters for recorded plots" in radarsim(*command, code=2).stderr
+
+
+def advised(fault):
+    """The command that a fault ends with."""
+    return shlex.split(fault.strip().rpartition(": radarsim ")[2])
+
+
+def test_one_of_several_cases_is_named_and_the_command_given_works(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fault = radarsim("simulate", "rls2_manoeuvre_variance", "-o", "x.csv", code=2).stderr
+    assert "got 5; choose of manoeuvre_variance = 1e-5, 0.0001, 0.001, 0.01, 0.1: " in fault
+    radarsim(*advised(fault))
+    fault = radarsim("track", "range_doppler", "PLOTS.csv", code=2).stderr
+    assert "must be one case to track with, got 30; choose one of rls1, rls2, rls3, rls4, rls5: " in fault
+    assert advised(fault) == ["track", "rls1", "PLOTS.csv"]
+    radarsim(*advised(fault))
+
+
+def test_the_choice_of_swept_mappings_and_of_configs_elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    radarsim("simulate", "rls2", "-o", "a {b}.csv")
+    away = tmp_path / "away"
+    away.mkdir()
+    turn = "{kind: polynomial, coefficients: [1e5, -100]}"
+    (away / "targets.yaml").write_text(f"include: [rls2]\nsweep:\n  target: [{turn}, turn]\n  scans: [12, 15]\n")
+    radarsim(*advised(radarsim("track", "away/targets.yaml", "a {b}.csv", code=2).stderr))
+    own.new("mine", "rls2")
+    (tmp_path / "mine.yaml").rename(away / "mine.yaml")
+    (away / "both.yaml").write_text("include: [mine, rls2]\n")
+    fault = radarsim("track", "away/both.yaml", "a {b}.csv", code=2).stderr
+    assert advised(fault) == ["track", "away/mine.yaml", "a {b}.csv"]
+    radarsim(*advised(fault))
+
+
+@pytest.mark.slow
+def test_memory_does_not_grow_with_the_file(tmp_path):
+    """Peak memory over 40 000 and over 400 000 rows: the same to a few megabytes."""
+    one = loaded("rls2")
+    peaks = []
+    for rows in (40_000, 400_000):
+        path, t = tmp_path / f"{rows}.csv", np.arange(float(rows))
+        plots.write_columns({"t_s": t, "range_m": 1e5 + t, "velocity_mps": np.ones(rows)}, path)
+        code = (
+            "from radarsim import experiment, plots, recorded\n"
+            "(one,) = experiment.load_all(['rls2'])\n"
+            f"with plots.Writer({str(tmp_path / 'out.csv')!r}) as out:\n"
+            f"    recorded.follow(one, {str(path)!r}, lambda piece: out.write(plots.rows_of(piece)))\n"
+            "print(*(line.split()[1] for line in open('/proc/self/status') if line.startswith('VmHWM')))"
+        )
+        finished = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ
+        )
+        peaks.append(int(finished.stdout) / 1024)
+    assert one.study == "range_doppler"
+    assert abs(peaks[1] - peaks[0]) < 15, peaks
+
+
+EXAMPLES = {"range_doppler.csv": "rls2", "multimodel.csv": "multimodel_1hz", "sonar.csv": "sonar_smoothing"}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_example_files_are_what_simulate_writes(tmp_path, name):
+    radarsim("simulate", EXAMPLES[name], "-o", tmp_path / name)
+    made, kept = (table_of(path) for path in (tmp_path / name, Path("docs/examples") / name))
+    assert made[0] == kept[0]
+    to_numbers = [np.array([[float(cell or "nan") for cell in row] for row in rows[1:]]) for rows in (made, kept)]
+    np.testing.assert_allclose(*to_numbers, rtol=1e-12, atol=1e-9)
+
+
+def test_the_page_names_a_config_for_every_example_file(tmp_path):
+    page = Path("docs/howto/own_plots.md").read_text(encoding="utf-8")
+    named = dict(re.findall(r"^\| `(\w+\.csv)` \| `([^`]+)` \|$", page, re.MULTILINE))
+    assert set(named) == {path.name for path in Path("docs/examples").iterdir()}
+    for name, config in named.items():
+        first, *options = shlex.split(config)
+        radarsim("track", first, Path("docs/examples") / name, *options, "-o", tmp_path / "track.csv")
+
+
+@pytest.mark.parametrize("like", lookup.stems("configs"))
+def test_a_config_of_ones_own_is_the_same_experiment(tmp_path, like):
+    path = own.new("mine", like, tmp_path)
+    mine, theirs = load.load(str(path)), load.load(like)
+    assert [canonical(case.spec) for case in mine.cases] == [canonical(case.spec) for case in theirs.cases]
+    assert [(case.realisations, case.seed) for case in mine.cases] == [(c.realisations, c.seed) for c in theirs.cases]
+
+
+def test_new_comments_every_key_and_never_overwrites(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = radarsim("new", "mine", "--like", "rls2")
+    assert "radarsim run mine.yaml" in result.stdout
+    lines = Path("mine.yaml").read_text().splitlines()
+    for line in lines[2:]:
+        assert "#" in line or line.lstrip().startswith("- {"), line
+    assert any("sigma_range_m: 250" in line and "standard deviation of a measured range, m" in line for line in lines)
+    assert "  name: mine " in "\n".join(lines)
+    Path("mine.yaml").write_text("precious")
+    assert "never overwritten" in radarsim("new", "mine", "--like", "rls1", code=2).stderr
+    assert Path("mine.yaml").read_text() == "precious"
+    assert "must be a plain name" in radarsim("new", "../mine", "--like", "rls1", code=2).stderr
+    assert "no such config" in radarsim("new", "other", "--like", "rls9", code=2).stderr
+
+
+@pytest.mark.parametrize("command", ["new", "simulate", "track"])
+def test_help_of_ones_own_data_teaches_with_an_example(command):
+    assert f"Example\n  radarsim {command} " in radarsim(command, "--help").stdout.replace("      ", "  ").replace(
+        "    ", "  "
+    )
+
+
+def test_help_is_grouped():
+    text = radarsim("--help").stdout
+    order = [text.index(f"\n{title}:\n") for title in ("Run", "Read", "Own data", "House")]
+    assert order == sorted(order)
+    assert set(main.commands) == {name for names in group.SECTIONS.values() for name in names}
+
+
+def test_no_colour_when_asked(tmp_path):
+    """On a terminal, with and without."""
+    shell = f"{sys.executable} -m radarsim {{}} claims rls2 --out {tmp_path}"
+    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "120"}
+    environment.pop("NO_COLOR", None)
+    shown = [
+        subprocess.run(
+            ["script", "-qec", shell.format(option), "/dev/null"], capture_output=True, env=environment, check=True
+        )
+        for option in ("", "--no-color")
+    ]
+    for one in shown:
+        assert b"not run" in one.stdout or b"no claims" in one.stdout
+    assert b"\x1b[3" not in shown[1].stdout
+
+
+@pytest.mark.parametrize("name", ["=1+1", "+cmd", "-x", "@sum"])
+def test_a_name_that_a_spreadsheet_would_run_is_refused(name):
+    result = radarsim("check", "rls2", "--set", f"filters.0.name={name!r}", code=2)
+    assert "must not begin with = + - or @" in result.stderr

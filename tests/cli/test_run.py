@@ -1,0 +1,289 @@
+"""The command as a user meets it: what it prints, what it writes, how it fails."""
+
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from radarsim.cli import main
+from radarsim.cli.console import fitting
+
+CURVES = "case,filter,component,unit,k,t_s,n,sigma,sigma_lo,sigma_hi,bias,bias_se,spread,exact_sigma"
+GAINS = "case,filter,baseline,component,k,t_s,gain_percent,gain_lo,gain_hi,exact_percent"
+
+
+def radarsim(*arguments, code=0):
+    """Run the command in this process; its result, after checking the exit code."""
+    result = CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
+    assert result.exit_code == code, result.output
+    return result
+
+
+def csv_bytes(folder):
+    """The bytes of all tables of a result folder, by name."""
+    return {path.name: path.read_bytes() for path in sorted(folder.glob("*.csv"))}
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """A finished run of rls2 with figures: its --out directory."""
+    out = tmp_path_factory.mktemp("results")
+    radarsim("run", "rls2", "-n", "1e4", "--out", out)
+    return out
+
+
+def test_run_writes_what_the_contract_lists(done):
+    folder = done / "rls2"
+    names = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    drawn = {
+        f"{kind}_{c}.{suffix}" for kind in ("sigma", "gain") for c in ("r", "Vr", "ar") for suffix in ("svg", "png")
+    }
+    assert {"run.json", "curves.csv", "gains.csv", "report.html"} | {f"figures/{name}" for name in drawn} <= names
+    assert (folder / "curves.csv").read_text().split("\n", 1)[0] == CURVES
+    assert (folder / "gains.csv").read_text().split("\n", 1)[0] == GAINS
+    assert {path.name for path in done.iterdir()} == {"rls2", ".blocks", "index.html"}
+
+
+def test_run_json_tells_where_the_numbers_come_from(done):
+    record = json.loads((done / "rls2" / "run.json").read_text())
+    assert record["realisations_asked"] == record["realisations_done"] == 10_000
+    assert record["seed"] == 2017
+    assert record["stop"] == "done"
+    for path, digest in record["outputs"].items():
+        assert hashlib.sha256((done / "rls2" / path).read_bytes()).hexdigest() == digest
+    assert "report.html" in record["outputs"]
+
+
+def test_rows_exist_only_where_there_is_an_estimate(done):
+    import pandas as pd
+
+    curves = pd.read_csv(done / "rls2" / "curves.csv")
+    first = curves.groupby(["filter", "component"])["k"].min()
+    assert first.to_dict() == {
+        ("r", "r"): 1,
+        ("r", "Vr"): 3,
+        ("r", "ar"): 3,
+        ("r+Vr", "r"): 1,
+        ("r+Vr", "Vr"): 1,
+        ("r+Vr", "ar"): 2,
+    }
+    assert (curves["n"] == 10_000).all()
+    assert (curves["sigma_lo"] < curves["sigma"]).all()
+
+
+@pytest.mark.parametrize("threads", [2, 3, 5])
+def test_same_bytes_for_any_number_of_threads(tmp_path, threads):
+    for folder, count in (("one", 1), ("many", threads)):
+        radarsim("run", "rls3", "-n", 50_001, "--threads", count, "--no-figures", "--quiet", "--out", tmp_path / folder)
+    assert csv_bytes(tmp_path / "one" / "rls3") == csv_bytes(tmp_path / "many" / "rls3")
+
+
+def test_same_bytes_when_extended(tmp_path):
+    for n in ("1e4", "1e5"):
+        radarsim("run", "rls1", "-n", n, "--no-figures", "--quiet", "--out", tmp_path / "grown")
+    radarsim("run", "rls1", "-n", "1e5", "--no-figures", "--quiet", "--out", tmp_path / "at once")
+    assert csv_bytes(tmp_path / "grown" / "rls1") == csv_bytes(tmp_path / "at once" / "rls1")
+    record = json.loads((tmp_path / "grown" / "rls1" / "run.json").read_text())
+    assert record["realisations_from_store"] >= 8192
+
+
+def test_a_smaller_run_after_a_larger_one_reports_exactly_what_was_asked(tmp_path):
+    radarsim("run", "rls1", "-n", "1e5", "--no-figures", "--quiet", "--out", tmp_path / "a")
+    radarsim("run", "rls1", "-n", "5000", "--no-figures", "--quiet", "--out", tmp_path / "a")
+    radarsim("run", "rls1", "-n", "5000", "--no-figures", "--quiet", "--out", tmp_path / "b")
+    assert csv_bytes(tmp_path / "a" / "rls1") == csv_bytes(tmp_path / "b" / "rls1")
+
+
+def test_range_doppler_reuses_what_its_parts_made(tmp_path):
+    radarsim("run", "rls4", "-n", 5000, "--no-figures", "--quiet", "--out", tmp_path)
+    radarsim("run", "range_doppler", "-n", 5000, "--no-figures", "--quiet", "--out", tmp_path)
+    record = json.loads((tmp_path / "range_doppler" / "run.json").read_text())
+    assert record["realisations_from_store"] >= 5000
+
+
+def test_report_remakes_the_same_tables_and_computes_nothing(done):
+    folder = done / "rls2"
+    before = csv_bytes(folder)
+    (folder / "curves.csv").unlink()
+    radarsim("report", "rls2", "-n", "1e4", "--no-figures", "--out", done)
+    assert csv_bytes(folder) == before
+    (folder / "gains.csv").unlink()
+    radarsim("report", "rls2", "--no-figures", "--out", done)
+    assert csv_bytes(folder) == before
+    result = radarsim("report", "rls2", "-n", "1e6", "--out", done, code=2)
+    assert "1000000 realisations are not stored" in result.stderr
+    assert "radarsim run" in result.stderr
+
+
+def test_check_says_what_would_run():
+    result = radarsim("check", "range_doppler", "-n", "1e7")
+    for words in ("valid", "rls1", "rls5", "10,000,000", "MB"):
+        assert words in result.stdout
+
+
+def test_faults_of_all_configs_come_at_once_and_nothing_runs(tmp_path):
+    (tmp_path / "bad.yaml").write_text("study: range_doppler\nscans: true\nbogus: 1\n")
+    (tmp_path / "worse.yaml").write_text("study: range_dopler\n")
+    out = tmp_path / "out"
+    result = radarsim("run", "rls2", tmp_path / "bad.yaml", tmp_path / "worse.yaml", "--out", out, code=2)
+    lines = result.stderr.splitlines()
+    assert any(line.startswith(f"{tmp_path}/bad.yaml:2:8: scans: ") for line in lines)
+    assert any("bogus" in line for line in lines)
+    assert any("did you mean range_doppler" in line for line in lines)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "rls7"], "no such config"),
+        (["run", "rls2", "-n", "0"], "realisations"),
+        (["run", "rls2", "-n", "1e13"], "realisations"),
+        (["run", "rls2", "-n", "many"], "must be a whole number"),
+        (["run", "rls2", "--set", "radar.sigma_range_m=-1"], "radar.sigma_range_m"),
+        (["run", "rls2", "--set", "radar.sigma_rnage_m=1"], "did you mean"),
+        (["run"], "CONFIG"),
+        (["report", "rls2", "--out", "nowhere"], "not stored"),
+        (["claims", "rls7"], "no such config"),
+    ],
+)
+def test_wrong_input_exits_with_2_and_says_why(arguments, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = radarsim(*arguments, code=2)
+    assert words in result.stderr
+    assert "Traceback" not in result.output
+    assert not list(tmp_path.iterdir())
+
+
+def test_overrides_change_the_case(tmp_path):
+    import pandas as pd
+
+    out = tmp_path / "out"
+    radarsim("run", "rls2", "-n", 5000, "--seed", 5, "--set", "radar.sigma_range_m=300", "--no-figures", "--out", out)
+    curves = pd.read_csv(out / "rls2" / "curves.csv")
+    assert curves["exact_sigma"].iloc[0] == 300
+    assert json.loads((out / "rls2" / "run.json").read_text())["seed"] == 5
+
+
+def test_an_unwritable_place_exits_with_4(tmp_path):
+    (tmp_path / "out").write_text("a file where a folder should be")
+    result = radarsim("run", "rls2", "-n", 100, "--out", tmp_path / "out", code=4)
+    assert str(tmp_path / "out") in result.stderr
+
+
+def test_claims_without_results_are_not_run_with_the_command(tmp_path):
+    result = radarsim("claims", "--out", tmp_path)
+    for number in range(1, 26):
+        assert f"P1.{number} " in result.stdout + " "
+    assert "not run" in result.stdout
+    assert "radarsim run range_doppler" in result.stdout
+
+
+def test_list_names_what_is_shipped():
+    result = radarsim("list")
+    for words in ("rls1", "range_doppler", "polynomial", "observes: [range, velocity]"):
+        assert words in result.stdout
+
+
+def test_schema_is_json_schema():
+    schema = json.loads(radarsim("schema").stdout)
+    assert "$schema" in schema
+
+
+@pytest.mark.parametrize("command", ["run", "check", "report", "claims", "list", "schema"])
+def test_help_teaches_with_an_example(command):
+    text = radarsim(command, "--help").stdout
+    assert re.search(rf"Examples?\n +radarsim {command}", text)
+
+
+def test_runs_from_anywhere_as_a_module(tmp_path):
+    command = [sys.executable, "-m", "radarsim", "run", "rls2", "-n", "100", "--no-figures"]
+    finished = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert finished.returncode == 0, finished.stderr
+    assert (tmp_path / "results" / "rls2" / "curves.csv").exists()
+    assert "\x1b" not in finished.stdout
+
+
+def test_help_needs_no_heavy_import():
+    heavy = ("numpy", "numba", "pandas", "pydantic", "rich")
+    code = f"import sys, radarsim.cli; print([m for m in {heavy} if m in sys.modules])"
+    finished = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert finished.stdout.strip() == "[]"
+
+
+def test_config_outside_a_checkout_runs_by_path(tmp_path):
+    text = (
+        Path("configs/rls2.yaml")
+        .read_text()
+        .replace("target: polynomial", "target: {kind: polynomial, coefficients: [1e4]}")
+    )
+    (tmp_path / "own.yaml").write_text(text)
+    radarsim("run", tmp_path / "own.yaml", "-n", 100, "--no-figures", "--out", tmp_path / "r")
+    assert (tmp_path / "r" / "own" / "curves.csv").exists()
+
+
+def test_claims_of_a_config_not_yet_run_are_listed_as_such(tmp_path):
+    result = radarsim("claims", "range_doppler", "--out", tmp_path)
+    assert "25 not run" in result.stdout
+    radarsim("run", "rls2", "-n", 3000, "--no-figures", "--out", tmp_path)
+    assert "P1.18" in radarsim("claims", "rls2", "--out", tmp_path).stdout
+
+
+def test_the_command_that_computes_what_is_missing_is_whole(tmp_path):
+    arguments = ("rls3", "-n", 500, "--seed", 4, "--set", "radar.sigma_range_m=300", "--out", tmp_path)
+    result = radarsim("report", *arguments, code=2)
+    assert f"radarsim run rls3 --set radar.sigma_range_m=300 -n 500 --seed 4 --out {tmp_path}`" in result.stderr
+
+
+def test_a_spoiled_table_of_claims_is_told(tmp_path):
+    (tmp_path / "rls2").mkdir()
+    (tmp_path / "rls2" / "claims.csv").write_text("garbage\n")
+    assert "is no table of claims" in radarsim("claims", "rls2", "--out", tmp_path, code=4).stderr
+
+
+def command(*arguments, **options):
+    """The console script in a process of its own."""
+    return subprocess.run([sys.executable, "-m", "radarsim", *arguments], capture_output=True, check=False, **options)
+
+
+def test_output_that_cannot_be_written_and_output_that_nobody_reads():
+    shell = f"{sys.executable} -m radarsim list"
+    full = subprocess.run(f"{shell} > /dev/full", shell=True, capture_output=True, check=False)
+    assert full.returncode == 4
+    assert b"No space left" in full.stderr
+    closed = subprocess.run(f"{shell} >&-", shell=True, capture_output=True, check=False)
+    assert (closed.returncode, closed.stderr) == (0, b"")
+    piped = subprocess.run(
+        ["bash", "-c", f"{shell} | head -1; exit ${{PIPESTATUS[0]}}"], capture_output=True, check=False
+    )
+    assert (piped.returncode, piped.stderr) == (0, b"")
+
+
+def test_streams_that_know_no_greek(tmp_path):
+    environment = {**os.environ, "PYTHONIOENCODING": "latin-1"}
+    arguments = ("run", "rls2", "-n", "1000", "--no-figures", "--out", str(tmp_path))
+    finished = command(*arguments, env=environment)
+    assert (finished.returncode, finished.stderr) == (0, b"")
+
+
+def test_a_path_that_is_no_text(tmp_path):
+    folder = os.fsencode(tmp_path) + b"/d\xe9"
+    os.mkdir(folder)
+    with open(folder + b"/rls2.yaml", "wb") as file:
+        file.write(Path("configs/rls2.yaml").read_bytes())
+    finished = command("run", folder + b"/rls2.yaml", "-n", "100", "--no-figures", "--quiet", "--out", str(tmp_path))
+    assert (finished.returncode, finished.stderr) == (0, b"")
+
+
+def test_narrow_terminals_lose_columns_not_digits():
+    cells = [["rls2", "189.12 m", "188.1 … 190.2"]]
+    columns = ("case", "sigma", "95 %")
+    assert fitting(columns, cells, ("95 %",), 80) == [0, 1, 2]
+    assert fitting(columns, cells, ("95 %",), 20) == [0, 1]
+    assert fitting(columns, cells, (), 5) == [0, 1, 2]

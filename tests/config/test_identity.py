@@ -1,0 +1,145 @@
+"""Which keys make another case, and which only another label; which make other noise."""
+
+import hashlib
+import json
+import pickle
+from typing import Annotated
+
+import pytest
+from pydantic import Field
+
+from radarsim.app.configs import load
+from radarsim.config import schema
+from radarsim.config.fields import DataFile, Model, Study
+from radarsim.config.identity import canonical, world
+from radarsim.config.lookup import SHIPPED
+
+LABELS = ["radar.name=Something", "radar.band=metre", "filters.0.name=range alone"]
+SAME = [
+    "radar.repetition_rate_hz=1e3",
+    "filters.0.initial_scans=3",
+    "baseline=r",
+    "target={kind: polynomial, coefficients: [1e5, -250, 4]}",
+]
+FILTERS = [
+    "manoeuvre_variance=0.5",
+    "filters.1.observes=[range]",
+    "filters.0.initial_scans=4",
+    "baseline=r+Vr",
+    "scans=20",
+]
+WORLDS = [
+    "radar.sigma_range_m=300",
+    "radar.sigma_velocity_mps=1",
+    "radar.scan_period_s=5",
+    "radar.wavelength_m=0.2",
+    "target.coefficients.1=-251",
+    "target=turn",
+]
+
+
+def spec(*overrides):
+    return load("rls2", overrides).cases[0].spec
+
+
+@pytest.mark.parametrize("override", [*LABELS, *SAME])
+def test_labels_and_spelt_out_defaults_change_nothing(override):
+    assert canonical(spec(override)) == canonical(spec())
+    assert world(spec(override)) == world(spec())
+
+
+@pytest.mark.parametrize("override", FILTERS)
+def test_filters_and_scans_change_the_case_but_not_its_noise(override):
+    assert canonical(spec(override)) != canonical(spec())
+    assert world(spec(override)) == world(spec())
+
+
+@pytest.mark.parametrize("override", WORLDS)
+def test_the_world_changes_both(override):
+    assert canonical(spec(override)) != canonical(spec())
+    assert world(spec(override)) != world(spec())
+
+
+def test_the_baseline_is_a_place_and_no_name():
+    renamed = spec("filters.1.name=other", "baseline=other")
+    assert canonical(renamed)["baseline"] == 1
+    assert canonical(renamed) == canonical(spec("baseline=r+Vr"))
+
+
+def test_negative_zero_is_zero():
+    plus, minus = (json.dumps(canonical(spec(f"target.coefficients=[1, {zero}]"))) for zero in ("0", "-0.0"))
+    assert plus == minus
+
+
+def test_a_named_scenario_is_its_content(good):
+    good["target"] = "polynomial"
+    inline = {"kind": "polynomial", "coefficients": [100e3, -250, 4]}
+    assert canonical(load(good).cases[0].spec) == canonical(load({**good, "target": inline}).cases[0].spec)
+
+
+@pytest.mark.parametrize("stem", sorted(file.stem for file in (SHIPPED / "configs").glob("*.yaml")))
+def test_shipped_configs_go_to_json_and_back(stem):
+    experiment = load(stem)
+    assert json.loads(json.dumps(experiment.resolved, allow_nan=False)) == experiment.resolved
+    for case in experiment.cases:
+        told = json.loads(json.dumps(canonical(case.spec), allow_nan=False))
+        assert told == canonical(case.spec)
+        kept = {key: value for key, value in case.resolved().items() if key not in ("case", "swept")}
+        again = load({"study": case.study, **kept}).cases[0]
+        assert (again.spec, again.seed, again.realisations) == (case.spec, case.seed, case.realisations)
+
+
+def test_included_cases_are_the_cases_themselves():
+    alone = load("rls2").cases[0]
+    included = {case.name: case for case in load("range_doppler").cases}
+    assert included["rls2"] == alone
+    assert canonical(included["rls2 manoeuvre_variance=0.001"].spec) == canonical(alone.spec)
+
+
+def test_cases_travel_to_other_processes():
+    case = load("rls2").cases[0]
+    assert pickle.loads(pickle.dumps(case)) == case
+    assert len(pickle.dumps(case)) < 2000
+
+
+def test_checked_objects_cannot_be_changed():
+    case = load("rls2").cases[0]
+    with pytest.raises(Exception, match="frozen"):
+        case.spec.scans = 3
+    with pytest.raises(Exception, match="cannot assign"):
+        case.seed = 3
+
+
+class Flight(Model):
+    """A recorded flight."""
+
+    file: Annotated[str, DataFile()] = Field(description="CSV of the flight")
+
+
+class Recorded(Study):
+    """A study of recorded flights."""
+
+    flights: tuple[Flight, ...] = Field(description="flights")
+
+
+@pytest.fixture
+def recorded(monkeypatch):
+    monkeypatch.setitem(schema.STUDIES, "recorded", f"{__name__}:Recorded")
+    monkeypatch.setattr(schema, "study_model", lambda name: Recorded)
+    monkeypatch.setattr("radarsim.config.cases.study_model", lambda name: Recorded)
+
+
+def test_a_file_of_data_is_its_content(house, said, recorded):
+    text = "study: recorded\nrealisations: 1\nflights: [{file: flight.csv}]\n"
+    house("configs/own.yaml", text)
+    assert said("own") == ["configs/own.yaml:3:18: flights.0.file: no such file: 'configs/flight.csv'"]
+    house("configs/flight.csv", "t_s\n1\n")
+    here = load("own").cases[0].spec
+    assert here.flights[0].file == "configs/flight.csv"
+    assert canonical(here)["flights"][0]["file"] == hashlib.sha256(b"t_s\n1\n").hexdigest()
+    house("elsewhere.csv", "t_s\n1\n")
+    there = load("own", ["flights.0.file=elsewhere.csv"]).cases[0].spec
+    assert there.flights[0].file == "elsewhere.csv"
+    assert canonical(there) == canonical(here)
+    house("elsewhere.csv", "t_s\n2\n")
+    assert canonical(there) != canonical(here)

@@ -1,0 +1,253 @@
+"""The P1 kernels against a textbook twin, their sums against them, any split of a run against the whole."""
+
+import threading
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from radarsim.kernels import linear as kernels
+from radarsim.kernels.random import stream
+from radarsim.studies.range_doppler import filters
+from tests.studies.range_doppler import naive as naive
+
+KEY = stream(2017, "plots")
+RADARS = {
+    "RLS 1": (25.0, 5.0, 10.0),
+    "RLS 2": (250.0, 15.0, 10.0),
+    "RLS 3": (250.0, 15.0, 5.0),
+    "RLS 4": (50.0, 1.0, 10.0),
+    "RLS 5": (50.0, 1.0, 5.0),
+}
+FILTERS = ((1, 3, 1e-3), (2, 2, 1e-3), (2, 3, 1e-1), (1, 6, 1e-5))  # observes, initial scans, manoeuvre variance
+K = 29
+
+
+def world(radar, scans=K):
+    """Truth (K, 3), sigma (2,) and scan period of a radar of the paper."""
+    *sigma, dt = RADARS[radar]
+    t = np.arange(scans) * dt
+    truth = np.stack([1e5 - 250 * t + 2 * t**2, -250 + 4 * t, np.full(scans, 4.0)], axis=1)
+    return truth, np.array(sigma), dt
+
+
+def schedule(radar, designs=FILTERS, scans=K):
+    """observes, start, weights, gains of several filters, as the kernels take them."""
+    _, sigma, dt = world(radar)
+    made = [filters.design(observes, start, variance, sigma, dt, scans) for observes, start, variance in designs]
+    longest = max(d.start for d in made)
+    weights = np.zeros((len(made), 3, 2, longest))
+    for f, d in enumerate(made):
+        weights[f, :, :, : d.start] = d.weights
+    return (
+        np.array([d.observes for d in made]),
+        np.array([d.start for d in made]),
+        weights,
+        np.stack([d.gains for d in made]),
+    )
+
+
+def sums(radar, first, count, baseline=0, **changes):
+    """Sums of a block: error (F, K, 3, 4), paired (F, K, 3), cross (F, K, 3)."""
+    truth, sigma, dt = world(radar)
+    observes, start, weights, gains = schedule(radar)
+    shape = gains.shape[:2]
+    error, paired, cross = np.zeros((*shape, 3, 4)), np.zeros((*shape, 3)), np.zeros((*shape, 3))
+    arguments = {"key": KEY, "truth": truth, "sigma": sigma, "dt": dt, "gains": gains} | changes
+    kernels.simulate_block(
+        first=first,
+        count=count,
+        observes=observes,
+        start=start,
+        weights=weights,
+        baseline=baseline,
+        error=error,
+        paired=paired,
+        cross=cross,
+        **arguments,
+    )
+    return error, paired, cross
+
+
+@pytest.mark.parametrize("radar", RADARS)
+def test_estimates_are_the_textbook_filter(radar):
+    truth, sigma, dt = world(radar)
+    plots = kernels.simulate_plots(KEY, 77, 20, truth, sigma)
+    got = kernels.estimate(plots, dt, *schedule(radar))
+    for f, (observes, start, variance) in enumerate(FILTERS):
+        for i in range(len(plots)):
+            expected, _ = naive.kalman(plots[i], observes, start, variance, sigma, dt)
+            np.testing.assert_array_equal(np.isnan(got[i, f]), np.isnan(expected))
+            np.testing.assert_allclose(got[i, f], expected, rtol=1e-10, atol=1e-10 * sigma[0] / dt**2)
+
+
+@pytest.mark.parametrize("radar", RADARS)
+@pytest.mark.parametrize(("observes", "start", "variance"), FILTERS)
+def test_gains_are_the_papers_closed_forms(radar, observes, start, variance):
+    """Eqs. (8) and (12), written out in the twin, against the matrix design."""
+    _, sigma, dt = world(radar)
+    expected = naive.gains(observes, start, variance, sigma, dt, K)
+    units = np.array([1.0, 1.0 / dt, 1.0 / dt**2])[:, None] / np.array([1.0, 1.0 / dt])
+    got = filters.design(observes, start, variance, sigma, dt, K).gains
+    np.testing.assert_allclose(got / units, expected / units, rtol=1e-10, atol=1e-12)
+
+
+def test_plots_are_truth_and_noise():
+    truth, sigma, _ = world("RLS 2")
+    n = 200_000
+    noise = (kernels.simulate_plots(KEY, 0, n, truth[:3], sigma) - truth[:3, :2]) / sigma
+    flat = noise.reshape(n, -1)
+    assert np.abs(flat.mean(axis=0)).max() < 5 / np.sqrt(n)
+    assert np.abs(np.cov(flat.T) - np.eye(6)).max() < 5 * np.sqrt(2 / n)
+
+
+def test_sums_are_those_of_the_estimates():
+    count, radar = 1300, "RLS 3"  # two chunks and a part
+    truth, sigma, dt = world(radar)
+    estimates = kernels.estimate(kernels.simulate_plots(KEY, 5, count, truth, sigma), dt, *schedule(radar))
+    e = np.nan_to_num(estimates - truth, nan=0.0)
+    for baseline in range(len(FILTERS)):
+        error, paired, cross = sums(radar, 5, count, baseline)
+        for power in range(4):
+            scale = (np.abs(e) ** (power + 1)).sum(axis=0)
+            assert (np.abs(error[..., power] - (e ** (power + 1)).sum(axis=0)) <= 1e-12 * scale).all()
+        np.testing.assert_allclose(paired, (e**2 * e[:, [baseline]] ** 2).sum(axis=0), rtol=1e-12)
+        a, b = e[..., [0, 0, 1]], e[..., [1, 2, 2]]
+        assert (np.abs(cross - (a * b).sum(axis=0)) <= 1e-12 * np.abs(a * b).sum(axis=0)).all()
+
+
+def test_before_the_start_the_plots_are_the_estimates():
+    truth, sigma, dt = world("RLS 2")
+    plots = kernels.simulate_plots(KEY, 0, 4, truth, sigma)
+    got = kernels.estimate(plots, dt, *schedule("RLS 2"))
+    for f, (observes, start, _) in enumerate(FILTERS):
+        np.testing.assert_array_equal(got[:, f, : start - 1, :observes], plots[:, : start - 1, :observes])
+        assert np.isnan(got[:, f, : start - 1, observes:]).all()
+        assert np.isfinite(got[:, f, start - 1 :]).all()
+    # The quadratic through three points goes through the last of them.
+    np.testing.assert_allclose(got[:, 0, 2, 0], plots[:, 2, 0], rtol=1e-14)
+    error, paired, _ = sums("RLS 2", 0, 4)
+    np.testing.assert_array_equal(error[0, :2, 1:], 0.0)
+    np.testing.assert_array_equal(paired[1, :2, 1:], 0.0)  # the baseline has no velocity yet
+    assert (paired[1, 2:] > 0).all()
+
+
+@pytest.mark.parametrize("cuts", [(1,), (511, 512, 513), (100, 612, 1124), (3, 4, 999)])
+def test_any_split_gives_the_same(cuts):
+    total = 1200
+    truth, sigma, dt = world("RLS 4")
+    whole_plots = kernels.simulate_plots(KEY, 0, total, truth, sigma)
+    whole = kernels.estimate(whole_plots, dt, *schedule("RLS 4"))
+    whole_sums = sums("RLS 4", 0, total)
+    added = [np.zeros_like(s) for s in whole_sums]
+    for first, last in zip((0, *cuts), (*cuts, total), strict=True):
+        plots = kernels.simulate_plots(KEY, first, last - first, truth, sigma)
+        np.testing.assert_array_equal(plots, whole_plots[first:last])
+        np.testing.assert_array_equal(kernels.estimate(plots, dt, *schedule("RLS 4")), whole[first:last])
+        for total_sum, part in zip(added, sums("RLS 4", first, last - first), strict=True):
+            total_sum += part
+    for got, expected in zip(added, whole_sums, strict=True):
+        np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
+
+def test_sums_are_added_to_and_repeatable():
+    once = sums("RLS 5", 40, 700)
+    again = sums("RLS 5", 40, 700)
+    for a, b in zip(once, again, strict=True):
+        np.testing.assert_array_equal(a, b)
+    results, threads = [None] * 4, []
+    for i in range(4):
+        threads.append(threading.Thread(target=lambda i=i: results.__setitem__(i, sums("RLS 5", 40, 700))))
+        threads[-1].start()
+    for thread in threads:
+        thread.join()
+    for result in results:
+        for a, b in zip(once, result, strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+def test_numbers_and_arrays_say_the_same():
+    """A scan period may be given per scan, the plots' spread too; the first interval is not read."""
+    _, sigma, dt = world("RLS 2")
+    intervals = np.full(K, dt)
+    intervals[0] = np.inf
+    for a, b in zip(
+        sums("RLS 2", 0, 100), sums("RLS 2", 0, 100, dt=intervals, sigma=np.tile(sigma, (K, 1))), strict=True
+    ):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("what", ["key", "truth", "sigma", "dt", "gains"])
+def test_every_argument_counts(what):
+    truth, sigma, dt = world("RLS 2")
+    other = {
+        "key": stream(2018, "plots"),
+        "truth": truth + np.array([0, 0, 1]),
+        "sigma": sigma * [1, 1.001],
+        "dt": dt * 1.001,
+        "gains": schedule("RLS 2")[3] * 1.001,
+    }[what]
+    before, after = sums("RLS 2", 0, 64)[0], sums("RLS 2", 0, 64, **{what: other})[0]
+    assert not np.allclose(before[:, -1], after[:, -1], rtol=1e-9)
+
+
+def test_intervals_of_any_length():
+    """Unequal intervals, with gains of their own: the twin step by step."""
+    rng = np.random.default_rng(4)
+    dt, plots = rng.uniform(0.1, 9.0, 12), rng.normal(size=(3, 12, 2)) * 100
+    gains, weights = rng.uniform(0, 0.5, (1, 12, 3, 2)), rng.normal(size=(1, 3, 2, 2))
+    got = kernels.estimate(plots, dt, [2], [2], weights, gains)
+    for i in range(3):
+        x = np.einsum("cjs,sj->c", weights[0], plots[i, :2])
+        for k in range(2, 12):
+            x = naive.transition(dt[k]) @ x
+            x = x + gains[0, k] @ (plots[i, k] - x[:2])
+            np.testing.assert_allclose(got[i, 0, k], x, rtol=1e-10)
+
+
+def test_a_filter_of_the_first_order_has_no_third_gain():
+    """Value and rate (P3): the same kernels, the third row zero throughout."""
+    rng = np.random.default_rng(5)
+    plots, gains = rng.normal(size=(2, 40, 2)), np.zeros((1, 40, 3, 2))
+    n = np.arange(1, 41)
+    gains[0, :, 0, 0], gains[0, :, 1, 0] = 2 * (2 * n - 1) / (n * (n + 1)), 6 / (n * (n + 1)) / 0.5  # P3 eq. (14)
+    weights = np.zeros((1, 3, 2, 2))
+    weights[0, 0, 0, 1], weights[0, 1, 0] = 1.0, [-2.0, 2.0]
+    got = kernels.estimate(plots, 0.5, [1], [2], weights, gains)
+    np.testing.assert_array_equal(got[:, 0, 1:, 2], 0.0)
+    for i in range(2):
+        for k in range(1, 40):
+            line = np.polynomial.Polynomial.fit(np.arange(k + 1) * 0.5, plots[i, : k + 1, 0], 1)
+            assert got[i, 0, k, 0] == pytest.approx(line(k * 0.5), abs=1e-10)
+            assert got[i, 0, k, 1] == pytest.approx(line.deriv()(k * 0.5), abs=1e-10)
+
+
+def test_memory_does_not_grow_with_scans_and_count():
+    """A hundred thousand scans: beside its sums a block holds its work array alone."""
+    scans = 100_000
+    truth, gains = np.zeros((scans, 3)), np.tile([[0.5, 0.0], [0.15, 0.0], [0.01, 0.0]], (1, scans, 1, 1))
+    error, paired, cross = np.zeros((1, scans, 3, 4)), np.zeros((1, scans, 3)), np.zeros((1, scans, 3))
+    arguments = np.ones(1, dtype=np.int64), np.array([3]), np.zeros((1, 3, 2, 3)), gains, 0, error, paired, cross
+    kernels.simulate_block(KEY, 0, 1, truth[:5], np.ones(2), 1.0, *arguments[:3], gains[:, :5], *arguments[4:])
+    tracemalloc.start()
+    try:
+        kernels.simulate_block(KEY, 0, 600, truth, np.ones(2), np.ones(scans), *arguments)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 4 * kernels.CHUNK * 6 * 8 + scans * 8 * 3
+    assert np.isfinite(error).all()
+    assert error[0, -1, 0, 1] > 0
+
+
+def test_one_type_is_compiled():
+    """Lists, numbers, read-only and strided arrays are brought to one type, so nothing is compiled a second time."""
+    sums("RLS 1", 0, 8)
+    truth, sigma, dt = world("RLS 1")
+    frozen = truth.copy()
+    frozen.flags.writeable = False
+    sums("RLS 1", 0, 8, truth=frozen, sigma=list(sigma), dt=int(dt), key=tuple(KEY.tolist()))
+    sums(
+        "RLS 1", np.int32(0), np.uint8(8), truth=np.asfortranarray(truth), gains=schedule("RLS 1")[3].astype(np.float32)
+    )
+    assert len(kernels.add_block.signatures) == 1

@@ -1,0 +1,68 @@
+"""Targets: derivatives against numerical differences, geometry against a plane picture."""
+
+import numpy as np
+import pytest
+
+from radarsim.physics import targets
+from radarsim.physics.motion import manoeuvre_covariance, transition
+
+T = np.linspace(0.0, 60.0, 60001)
+TRUTHS = {
+    "polynomial": (targets.polynomial([1e5, -250.0, 4.0, 0.01], T), []),
+    "acceleration_start": (targets.acceleration_start([1e5, -250.0], 12.0, 20.0, T), [20.0]),
+    "jerk_pulse": (targets.jerk_pulse([1e5, -250.0, 4.0], 3.0, 20.0, 10.0, T), [20.0, 30.0]),
+    "turn": (targets.turn(1e5, 300.0, 2.5, 3.0, 20.0, 10.0, T), [20.0, 30.0]),
+    "turn of more than a circle": (targets.turn(4e4, 250.0, 3.0, -5.0, 5.0, 45.0, T), [5.0, 50.0]),
+}
+
+
+@pytest.mark.parametrize("name", TRUTHS)
+def test_velocity_and_acceleration_are_the_derivatives(name):
+    x, breaks = TRUTHS[name]
+    inner = np.ones(len(T), dtype=bool)
+    inner[[0, -1]] = False
+    for t in breaks:
+        inner &= np.abs(T - t) > 3e-3
+    h = T[1] - T[0]
+    for column in (0, 1):
+        difference = (x[2:, column] - x[:-2, column]) / (2 * h)
+        # Rounding of the differenced numbers, and the central difference's own error, h²/6 times the third derivative.
+        third = np.abs(np.diff(x[:, column + 1], 2)[inner[1:-1]]).max() / h**2
+        allowed = 4 * np.spacing(np.abs(x[:, column]).max()) / h + third * h**2 / 3
+        np.testing.assert_allclose(difference[inner[1:-1]], x[1:-1, column + 1][inner[1:-1]], rtol=0, atol=allowed)
+
+
+def test_a_turn_keeps_its_speed_and_its_radius():
+    """A full circle from and back to a point gives the range it began with."""
+    speed, g = 300.0, 3.0
+    period = 2 * np.pi * speed / (g * targets.STANDARD_GRAVITY_MPS2)
+    t = np.array([0.0, 10.0, 10.0 + period])
+    x = targets.turn(1e5, speed, np.pi, g, 10.0, 2 * period, t)
+    assert x[1] == pytest.approx([97000.0, -300.0, x[1, 2]])
+    assert x[2, :2] == pytest.approx(x[1, :2], rel=1e-12)
+
+
+def test_turning_starts_at_the_start():
+    """Before the turn a straight line; at aspect pi it is radial and without acceleration."""
+    t = np.array([0.0, 5.0, 9.999, 10.0])
+    x = targets.turn(1e5, 200.0, np.pi, 2.0, 10.0, 5.0, t)
+    np.testing.assert_allclose(x[:3, 2], 0.0, atol=1e-12)
+    # Across the line of sight the lateral acceleration is not radial: only its change of direction is.
+    assert x[3, 2] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_transition_is_the_papers_matrix():
+    dt = 7.0
+    np.testing.assert_array_equal(transition(dt), [[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]])
+    np.testing.assert_allclose(transition(2.0) @ transition(5.0), transition(7.0), rtol=1e-15)
+
+
+def test_manoeuvre_covariance_is_the_papers_matrix():
+    """Eq. (6), written out as printed."""
+    dt, D = 5.0, 1e-3
+    M = [
+        [dt**6 / 36, dt**5 / 12, dt**4 / 6],
+        [dt**5 / 12, dt**4 / 4, dt**3 / 2],
+        [dt**4 / 6, dt**3 / 2, dt**2],
+    ]
+    np.testing.assert_allclose(manoeuvre_covariance(D, dt), np.array(M) * D, rtol=1e-14)

@@ -1,0 +1,215 @@
+"""Verdicts by hand; and every P1 claim measured on exact values, against what another calculation found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import radarsim
+from radarsim.report import claims, tables
+from radarsim.report.claims import CONFIRMED, REFUTED, UNCLEAR, Range, Series
+from radarsim.report.statistics import Estimate
+from radarsim.studies.range_doppler import tables as range_doppler
+
+
+def judged(results):
+    made = {"curves": tables.curves(results), "gains": tables.gains(results), **range_doppler.tables(results)}
+    return claims.judged("range_doppler", results, made)
+
+
+@pytest.fixture(scope="module")
+def table(paper, swept_all):
+    return judged([*paper, *swept_all])
+
+
+def test_ranges_from_words():
+    assert claims.printed("18")[:2] == (17.5, 18.5)
+    assert claims.printed("0.33")[:2] == pytest.approx((0.325, 0.335))
+    assert claims.between("7", "15")[:2] == (6.5, 15.5)
+    assert claims.about("10")[:2] == pytest.approx((9, 11))
+    assert claims.about("20", "30")[:2] == pytest.approx((18, 33))
+    assert claims.above(50).lo > 50
+    assert claims.below(10).hi < 10
+    assert claims.within(3, 4)[:2] == (3, 4)
+
+
+def test_words_tell_the_range_tested():
+    assert claims.between("10", "50").words == "10 to 50 (9.5 … 50.5)"
+    assert claims.printed("18").words == "18 (17.5 … 18.5)"
+    assert claims.about("10").words == "about 10 (9 … 11)"
+
+
+@pytest.mark.parametrize(
+    ("lo", "hi", "said"),
+    [
+        (1.1, 1.9, CONFIRMED),
+        (1.0, 2.0, CONFIRMED),
+        (0.9, 1.5, UNCLEAR),
+        (1.5, 2.1, UNCLEAR),
+        (0.5, 2.5, UNCLEAR),
+        (2.1, 3.0, REFUTED),
+        (0.0, 0.9, REFUTED),
+        (np.nan, np.nan, UNCLEAR),
+        (3.0, np.inf, REFUTED),
+    ],
+)
+def test_verdict_is_of_the_interval(lo, hi, said):
+    assert claims.verdict(Estimate((lo + hi) / 2, lo, hi), Range(1.0, 2.0, "")) == said
+
+
+def test_verdict_of_several_parts():
+    assert claims.overall([CONFIRMED, CONFIRMED]) == CONFIRMED
+    assert claims.overall([CONFIRMED, UNCLEAR]) == UNCLEAR
+    assert claims.overall([UNCLEAR, REFUTED, CONFIRMED]) == REFUTED
+
+
+def test_series():
+    k = np.arange(1, 5)
+    value = np.array([1.0, 3.0, 2.9, 0.5])
+    series = Series(k, 10.0 * k, value, value - 0.2, value + 0.2)
+    assert series.largest() == (3.0, 2.8, 3.2)
+    assert series.least().value == 0.5
+    assert series.when_largest() == (20.0, 20.0, 30.0)
+    assert series.when_largest("k") == (2, 2, 3)
+    assert series.since(3).first().value == 2.9
+    assert series.at(4) == series.last()
+    with pytest.raises(claims.Missing):
+        series.at(9)
+    half = Series(k[:2], 20.0 * k[:2], value[:2], value[:2], value[:2])
+    a, b = claims.common_times(series, half)
+    np.testing.assert_array_equal(a.t, [20, 40])
+    np.testing.assert_array_equal(claims.minus(a, b).value, [2.0, -2.5])
+    np.testing.assert_allclose(claims.minus(a, b).lo, [1.8, -2.7])
+
+
+def test_ratio_of_estimates():
+    of = claims.ratio(Estimate(3.0, 2.7, 3.3), Estimate(2.0, 2.0, 2.0), scale=100)
+    assert of == pytest.approx((150, 135, 165))
+
+
+def test_twenty_five_claims_all_judged(table):
+    assert list(dict.fromkeys(table["claim"])) == [f"P1.{n}" for n in range(1, 26)]
+    assert ",".join(table.columns[:9]) == "claim,paper,statement,case,measured,lo,hi,expected,verdict"
+    assert not table[["statement", "what", "place", "expected"]].eq("").any(axis=None)
+    assert tuple(table.columns[9:11]) == ("expected_lo", "expected_hi")
+    above = table[table["expected"] == "> 50"].iloc[0]
+    assert above["expected_lo"] == 50
+    assert np.isnan(above["expected_hi"])
+
+
+# Claim, case, pattern of what is measured, and the exact value found by another calculation.
+FOUND = [
+    ("P1.1", "rls1", "largest", 14.1, 0.06),
+    ("P1.1", "rls1", "least", 8.0, 0.06),
+    ("P1.2", "rls1", "largest", 46.4, 0.06),
+    ("P1.2", "rls1", "least", 9.6, 0.06),
+    ("P1.3", "rls1", "5th", -2.6, 0.06),
+    ("P1.4", "rls3", "^largest range", 44.8, 0.06),
+    ("P1.4", "rls2", "^largest range", 34.6, 0.06),
+    ("P1.4", "rls3", "time", 20, 0),
+    ("P1.4", "rls2", "time", 30, 0),
+    ("P1.5", "rls2", "final", 18.3, 0.06),
+    ("P1.5", "rls3", "final", 19.5, 0.06),
+    ("P1.6", "rls2", "first", 79.6, 0.06),
+    ("P1.6", "rls3", "first", 89.4, 0.06),
+    ("P1.6", "rls2", "final", 22.9, 0.06),
+    ("P1.7", "rls2", "first acc", 82.9, 0.06),
+    ("P1.7", "rls3", "first acc", 91.4, 0.06),
+    ("P1.7", "rls2", "time", 100, 0),
+    ("P1.7", "rls3", "time", 100, 0),
+    ("P1.8", "rls4", "largest", 52.3, 0.06),
+    ("P1.8", "rls5", "largest", 57.6, 0.06),
+    ("P1.9", "rls3, rls4, rls5", "largest", 96.4, 0.06),
+    ("P1.10", "rls2", "largest", 82.9, 0.06),
+    ("P1.10", "rls3", "largest", 91.4, 0.06),
+    ("P1.10", "rls4", "largest", 89.4, 0.06),
+    ("P1.10", "rls5", "largest", 97.1, 0.06),
+    ("P1.11", "rls2, rls3", "^time", 20 / 30, 1e-9),
+    ("P1.12", "rls2, rls3", "distance", 100 * 2.4 / 79.6, 0.15),
+    ("P1.13", "rls2", "first", 15, 1e-9),
+    ("P1.13", "rls2, rls3", "first", 127.5 - 63.7, 0.11),
+    ("P1.13", "rls4, rls5", "first", 25.5 - 12.75, 0.01),
+    ("P1.14", "rls2", "settling", 9, 0),
+    ("P1.14", "rls3", "settling", 19, 0),
+    ("P1.14", "rls5", "settling", 11, 0),
+    ("P1.15", "rls2", "end, least D_M − greatest, range only", 142 - 229, 0.6),
+    ("P1.15", "rls2", "end, least D_M − greatest, range and velocity", 134 - 158.5, 0.6),
+    ("P1.15", "rls4", "settling of σ of range, least D_M − greatest, range and", 0, 0),
+    ("P1.15", "rls5", "settling of σ of range, least D_M − greatest, range and", 0, 0),
+    ("P1.16", "rls1", "Doppler", 1 / 3, 1e-9),
+    ("P1.16", "rls2", "Doppler", 4, 1e-9),
+    ("P1.16", "rls4", "Doppler", 20, 1e-9),
+    ("P1.17", "rls1", "^largest range", 14.1, 0.06),
+    ("P1.17", "rls1", "scan", 3, 0),
+    ("P1.18", "rls2", "end", 100 * 34.6 / 85, 0.3),
+    ("P1.19", "rls4, rls5, rls1, rls2", "final range", 52.3 - 18.3, 0.11),
+    ("P1.20", "rls2, rls3", "range only", 7.38 - 9.88, 0.011),
+    ("P1.20", "rls2, rls3", "and velocity", 5.75 - 7.62, 0.011),
+    ("P1.20", "rls4, rls5", "range only", 3.13 - 4.05, 0.011),
+    ("P1.20", "rls4, rls5", "and velocity", 0.79 - 0.92, 0.011),
+    ("P1.21", "rls2, rls3", "range only", 24.5 - 6.12, 0.06),
+    ("P1.21", "rls2, rls3", "and velocity", 4.24 - 2.12, 0.011),
+    ("P1.21", "rls4, rls5", "range only", 4.90 - 1.22, 0.011),
+    ("P1.21", "rls4, rls5", "and velocity", 0.28 - 0.14, 0.011),
+    ("P1.22", "rls2, rls3", "distance", 100 * 6.9 / 82.9, 0.1),
+    ("P1.22", "rls4, rls5", "distance", 100 * 5.6 / 91.3, 0.1),
+    ("P1.23", "rls2", "scans", 1, 0),
+    ("P1.24", "rls1", "rise", 12.5 - 9.6, 0.11),
+    ("P1.25", "rls3", "scans", 2, 0),
+]
+
+
+@pytest.mark.parametrize(("claim", "case", "what", "value", "slack"), FOUND)
+def test_measures_what_it_says(table, claim, case, what, value, slack):
+    rows = table[(table["claim"] == claim) & (table["case"] == case)]
+    rows = rows[rows["what"].str.contains(what)]
+    assert len(rows) == 1
+    assert rows["measured"].iloc[0] == pytest.approx(value, abs=slack)
+
+
+def test_another_radar_is_not_the_papers(paper, expected_radar):
+    assert judged([expected_radar("rls1", radar={"sigma_range_m": 30})]).empty
+    assert judged([expected_radar("rls1", variance=2e-3)]).empty
+    assert judged([expected_radar("rls1", scans=10)]).empty
+    cubic = {"kind": "polynomial", "coefficients": [1e5, -250, 4, 0.1]}
+    assert judged([expected_radar("rls1", target=cubic)]).empty
+
+
+def test_the_papers_radar_under_another_name(expected_radar):
+    found = judged([expected_radar("rls1", name="mine")])
+    assert set(found["case"]) == {"mine"}
+    assert "P1.1" in set(found["claim"])
+    assert "P1.11" not in set(found["claim"])  # needs radars 2 to 5 as well
+
+
+def test_a_longer_run_is_judged_at_the_papers_length(expected_radar):
+    short, long = (judged([expected_radar("rls1", scans=scans)]) for scans in (15, 40))
+    assert tables.to_csv(long) == tables.to_csv(short)
+
+
+def test_exact_values_never_enter_a_verdict(paper):
+    wrong = [replace(r, axes=replace(r.axes, exact_sigma=0 * r.axes.exact_sigma + 7)) for r in paper]
+    assert tables.to_csv(judged(wrong)) == tables.to_csv(judged(paper))
+
+
+def test_few_realisations_leave_it_open(expected_radar):
+    found = judged([expected_radar("rls1", count=50)])
+    assert UNCLEAR in set(found[found["claim"] == "P1.1"]["verdict"])
+
+
+def test_all_claims_are_listed_run_or_not(table):
+    ids = [claim.id for claim in claims.all_claims()]
+    assert len(ids) == len(set(ids))
+    rows = claims.listed({})
+    assert [row["claim"] for row in rows] == ids
+    assert {row["verdict"] for row in rows} == {"not run"}
+    assert {row["config"] for row in rows if row["paper"].startswith("Gorshkov")} == {"range_doppler"}
+    rows = claims.listed({"range_doppler": table.to_dict("records")})
+    assert sum(row["claim"].startswith("P1.") for row in rows) == len(table)
+    assert all(row["config"] for row in rows)
+
+
+def test_a_manoeuvre_that_begins_after_the_last_scan_is_no_claim():
+    overrides = ["scans=12", "uses.at_s=[35]", "sweep.target.acceleration_mps2=[0.2138, 0.4]"]
+    made = radarsim.run("sonar_manoeuvre", overrides=overrides, realisations=50).tables["claims"]
+    assert len(made) == 0

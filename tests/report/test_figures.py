@@ -1,0 +1,190 @@
+"""Figures: what is drawn is what is described, in the same bytes each time, and no user's name breaks them."""
+
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from radarsim.report import chart_look, figures, panels, tables
+from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
+from radarsim.studies.range_doppler import tables as range_doppler
+
+
+def one(*marks, **panel):
+    return Figure("one", "One", "A figure.", (Panel(Axis("x, s"), Axis("y, m"), marks, **panel),))
+
+
+def line(n=20, **style):
+    x = np.arange(n, dtype=float)
+    return Line(x, np.cos(x), "line", Style(**style), np.cos(x) - 0.1, np.cos(x) + 0.1, np.cos(x))
+
+
+def drawn(figure):
+    return figures.render(figure).axes[0]
+
+
+def test_the_line_is_drawn_as_given():
+    described = line()
+    axes = drawn(one(described))
+    curve, crosses = axes.lines
+    np.testing.assert_array_equal(curve.get_xdata(), described.x)
+    np.testing.assert_array_equal(curve.get_ydata(), described.y)
+    assert set(crosses.get_ydata()) <= set(described.exact)
+    band = axes.collections[0].get_paths()[0].vertices
+    assert set(described.lo) | set(described.hi) <= set(band[:, 1])
+    assert axes.get_xlabel() == "x, s"
+
+
+def test_markers_and_crosses_take_turns():
+    axes = drawn(one(line(marker=0)))
+    curve, crosses = axes.lines
+    marked = curve.get_xdata()[:: curve.get_markevery()]
+    assert not set(marked) & set(crosses.get_xdata())
+
+
+def test_all_kinds_of_marks_and_a_log_axis():
+    heat = Heat(np.arange(3.0), np.arange(2.0), np.arange(6.0).reshape(2, 3), "value")
+    bars = Bars(("a", "b"), np.array([1.0, 2.0]), np.array([0.9, 1.8]), np.array([1.1, 2.2]))
+    pair = (Panel(Axis("x"), Axis("y"), (heat,)), Panel(Axis("x"), Axis("y"), (bars,)))
+    figures.save(Figure("two", "Two", "Two kinds.", pair, columns=2))
+    scatter = line(dash=None, marker=1)
+    axis = Axis("y", "log", (0.1, None), ((0.1, "low"), (1.0, "high")))
+    marks = (scatter, Reference(0.5, "x", "half"), Reference(0.5, label="half"), Note(1.0, 1.0, "here", "sw"))
+    axes = figures.render(Figure("log", "", "", (Panel(Axis("x"), axis, marks),))).axes[0]
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["low", "high"]
+    assert axes.get_yscale() == "log"
+
+
+def test_few_lines_are_named_at_their_ends_many_in_a_legend():
+    few = drawn(one(*[Line(np.arange(3.0), np.full(3, float(i)), f"l{i}") for i in range(3)]))
+    assert [text.get_text() for text in few.texts] == ["l0", "l1", "l2"]
+    assert few.get_legend() is None
+    many = drawn(one(*[Line(np.arange(3.0), np.full(3, float(i)), f"l{i}") for i in range(30)]))
+    assert len(many.get_legend().get_texts()) == 30
+    keyed = drawn(one(line(), keys=(("solid", Style()),), key_title="what"))
+    assert keyed.get_legend().get_title().get_text() == "what"
+
+
+def test_labels_at_ends_do_not_overlap():
+    near = [Line(np.arange(3.0), np.full(3, 1 + i / 1000), f"l{i}") for i in range(5)]
+    axes = drawn(one(*near))
+    boxes = [text.get_window_extent() for text in axes.texts]
+    for lower, upper in pairwise(boxes):
+        assert upper.y0 >= lower.y0 + 0.9 * lower.height
+
+
+@pytest.mark.parametrize("wanted", [[0.0, 0.1, 0.2], [0.0, 5.0, 5.1, 9.9], [9.0, 9.1], [3.0]])
+def test_separated(wanted):
+    placed = figures.separated(np.array(wanted), 1.0, 0.0, 10.0)
+    assert np.all(np.diff(placed) >= 1 - 1e-12)
+    assert placed.min() >= 0
+    assert placed.max() <= 10
+    apart = np.array([1.0, 4.0, 8.0])
+    np.testing.assert_array_equal(figures.separated(apart, 1.0, 0.0, 10.0), apart)
+
+
+def test_same_bytes_each_time():
+    assert figures.save(one(line()), ("svg", "png", "pdf")) == figures.save(one(line()), ("svg", "png", "pdf"))
+
+
+def test_size_in_millimetres():
+    described = one(line())
+    width, height = figures.render(described).get_size_inches() * 25.4
+    assert width == pytest.approx(described.width_mm)
+    assert height == pytest.approx(described.panel_height_mm)
+
+
+def test_long_lines_are_thinned_and_short_ones_are_whole():
+    assert len(drawn(one(line(5000))).lines[0].get_xdata()) <= figures.POINTS
+    assert len(drawn(one(line(1999))).lines[0].get_xdata()) == 1999
+
+
+def test_styles_differ_in_grey():
+    """Neighbouring colours differ in lightness or dash; all dashes differ, all markers differ."""
+    assert len({str(dash) for dash in figures.DASHES}) == len(figures.DASHES)
+    assert len(set(figures.MARKERS)) == len(figures.MARKERS) >= len(figures.COLOURS)
+
+
+HOSTILE = ["<script>alert(1)</script>", r"$\frac{$", "漢 & " + 60 * "x"]
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_any_name_can_be_drawn(name, expected_radar):
+    filters = [
+        {"name": name, "observes": ["range"], "manoeuvre_variance": 1e-3},
+        {"name": "r+Vr", "observes": ["range", "velocity"], "manoeuvre_variance": 1e-3},
+    ]
+    results = [expected_radar("rls2", filters=filters, radar={"name": name})]
+    made = {"curves": tables.curves(results), "gains": tables.gains(results), **range_doppler.tables(results)}
+    shown = SimpleNamespace(shown_in=lambda figure: [SimpleNamespace(name=results[0].name)])
+    drawn = range_doppler.figures(results, made, shown)
+    for figure in (drawn["sigma_r"], drawn["gain_r"]):
+        saved = figures.save(figure, ("svg",))["svg"].decode()
+        assert "<script" not in saved
+    assert panels.plain_label(results[0]) == name
+
+
+def test_numbers_for_people():
+    assert [panels.number(v, powers=True) for v in (1e-3, 0.1, 1, 250.0)] == ["10⁻³", "10⁻¹", "1", "250"]
+    assert [panels.number(v) for v in (1e-3, 0.1, 1, 10, 1e5, 250.0, 0.00025, -2.5, "turn", True)] == [
+        *("10⁻³", "0.1", "1", "10", "10⁵", "250", "0.00025", "−2.5", "turn", "True")
+    ]
+
+
+def test_scattered_points_are_all_drawn():
+    axes = drawn(one(line(60, dash=None, marker=1)))
+    curve = axes.lines[0]
+    assert curve.get_markevery() in (None, 1)
+    assert len(curve.get_xdata()) == 60
+
+
+def test_many_lines_have_their_legend_in_a_cell_of_its_own():
+    marks = tuple(Line(np.arange(3.0), np.full(3, float(i)), f"filter {i}", Style(i, i, i)) for i in range(7))
+    whole = panels.in_legend([Panel(Axis("x"), Axis("y"), marks), Panel(Axis("x"), Axis("y"), marks)])
+    assert [words for words, _ in whole[-1].keys] == [f"filter {i}" for i in range(7)]
+    assert not whole[-1].marks
+    assert [mark.name for mark in whole[1].marks] == [f"filter {i}" for i in range(7)]
+    assert not any(mark.label for panel in whole for mark in panel.marks)
+    canvas = figures.render(Figure("f", "", "", tuple(whole), columns=2))
+    legend = canvas.axes[2].get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == [f"filter {i}" for i in range(7)]
+    assert all(axes.get_legend() is None for axes in canvas.axes[:2])
+
+
+@pytest.mark.parametrize(("highest", "last"), [(3, 3), (20, 20), (40, 40), (95, 80), (1000, 1000)])
+def test_counts_have_ticks_at_whole_numbers(highest, last):
+    ticks = [value for value, _ in panels.counts("n", highest).ticks]
+    assert all(value == int(value) for value in ticks)
+    assert ticks[-1] == last
+    assert len(ticks) <= 9
+
+
+def test_a_sweep_is_shown_whole_in_figures_with_a_panel_for_each_config(expected_radar):
+    results = [expected_radar(stem, 10.0**-n, f"{stem} D={n}") for stem in ("rls1", "rls2") for n in range(1, 6)]
+    names = [result.name for result in results]
+    shown, left_out = panels.shown_families(results, names)
+    assert [result.name for result in shown] == names
+    assert left_out == ""
+    assert panels.shown(results, names)[1] == " 2 further cases are in the tables alone."
+
+
+def test_crosses_have_the_name_of_what_they_are():
+    panel = Panel(Axis("x"), Axis("y"), (line(),), crosses="formula")
+    axes = figures.render(Figure("f", "", "", (panel,))).axes[0]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["formula"]
+
+
+def test_titles_are_broken_after_commas_alone():
+    words = "gate_probability = 0.5, sensor.detection_probability = 0.7, $D_M$ = 1"
+    assert figures.wrapped(words, 200) == words
+    assert figures.wrapped(words, 50) == "gate_probability = 0.5,\nsensor.detection_probability = 0.7, $D_M$ = 1"
+    assert figures.wrapped(words, 5) == words.replace(", ", ",\n")
+    assert figures.wrapped("", 5) == ""
+
+
+def test_no_two_of_many_scattered_series_look_alike():
+    looks = [figures._look(Style(n, None, n)) for n in range(40)]
+    assert len({(look["color"], look["marker"]) for look in looks}) == 40
+    assert len({look["marker"] for look in looks}) == len(figures.MARKERS) == len(chart_look.MARKERS)
+    assert len(set(chart_look.MARKERS)) == len(chart_look.MARKERS)

@@ -1,0 +1,75 @@
+"""Half-widths of σ and what they need: against the tables, against known laws, for every study."""
+
+import numpy as np
+import pytest
+
+import radarsim
+from radarsim.app import output
+from radarsim.app.selftest import KNOWN
+from radarsim.config.schema import LARGEST_REALISATIONS
+from radarsim.report import precision
+from radarsim.report.precision import FIRST, gaussian, grown, looks, needed, worst
+
+
+@pytest.fixture(scope="module")
+def results():
+    """A small result of each study."""
+    studies = ("range_doppler", "multimodel", "sonar", "discriminator")
+    return {study: radarsim.run(KNOWN / f"{study}.yaml").cases for study in studies}
+
+
+@pytest.mark.parametrize("study", ["range_doppler", "multimodel", "sonar", "discriminator"])
+def test_curves_alone_are_those_among_all_tables(results, study):
+    cases = results[study]
+    alone, among = output.curves(cases), output.tables(cases)["curves"]
+    assert alone.equals(among[list(alone.columns)])
+
+
+@pytest.mark.parametrize("study", ["range_doppler", "multimodel", "sonar", "discriminator"])
+def test_the_worst_cell_is_the_widest_of_the_table(results, study):
+    for case in results[study]:
+        curves = output.curves([case])
+        widths = 50 * (curves["sigma_hi"] - curves["sigma_lo"]) / curves["sigma"]
+        cell = worst(case)
+        assert cell.percent == widths.max()
+        row = curves.loc[widths.idxmax()]
+        assert (cell.filter, cell.component, cell.k) == (row["filter"], row["component"], row["k"])
+
+
+def test_looks_are_declared_doublings_up_to_n():
+    assert list(looks(FIRST - 1)) == []
+    assert list(looks(2_000)) == [2_000]
+    assert list(looks(15_999)) == [2_000, 4_000, 8_000]
+
+
+def test_what_is_needed_is_the_first_look_that_suffices(results):
+    (case,) = results["range_doppler"]
+    for percent in (0.1, 1, 3, 50):
+        n = needed(case, percent)
+        assert worst(grown(case, n)).percent < percent
+        assert n == FIRST or worst(grown(case, n // 2)).percent >= percent
+
+
+def test_gaussian_errors_need_as_many_as_their_chi_square_says(results):
+    """1.96 / √(2N) to first order, whatever the bias: a tenth of a per cent takes 1.92·10⁶."""
+    (case,) = results["range_doppler"]
+    n = needed(gaussian(case), 0.1)
+    assert n == FIRST * 2**10
+    exact = grown(gaussian(case), 1_000_000)
+    widths = worst(exact).percent
+    assert widths == pytest.approx(100 * 1.959964 / np.sqrt(2e6), rel=1e-4)
+
+
+def test_what_is_not_known_is_never_reached(results):
+    (case,) = results["range_doppler"]
+    sums = {name: array.copy() for name, array in case.sums.items()}
+    sums["error"][0, 3, 0] = np.nan
+    from dataclasses import replace
+
+    lost = replace(case, sums=sums)
+    assert worst(lost).percent == np.inf
+    assert "sigma not known" in str(worst(lost))
+    assert needed(lost, 10) is None
+    sums["error"][0, 3, 0] = 0.0
+    assert worst(replace(case, sums=sums)).percent < 10
+    assert precision.MOST == LARGEST_REALISATIONS  # more cannot be asked for

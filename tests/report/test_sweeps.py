@@ -1,0 +1,124 @@
+"""Figures that a sweep has by itself: what is drawn is σ at the last scan; and the page of claims."""
+
+import numpy as np
+import pytest
+
+from radarsim.app import output
+from radarsim.app import run as experiment
+from radarsim.report import chart_text, claims, panels, sweeps
+from radarsim.report import tables as common
+from radarsim.report.claims import page
+
+
+def swept(config, *overrides, n=200):
+    result = experiment.run(config, realisations=n, overrides=overrides)
+    return result, output.figures(result.cases, result.tables, result.experiment)
+
+
+def test_one_key_is_a_family_of_curves():
+    key = "radar.sigma_velocity_mps"
+    result, drawn = swept("rls2", f"sweep.{key}=[1,40,5,15]")
+    figure = drawn["sweep_sigma_velocity_mps"]
+    assert [panel.x.scale for panel in figure.panels] == ["log"] * 3
+    rows = common.groups(result.curves, "case", "filter", "component")
+    for panel, component in zip(figure.panels, ("r", "Vr", "ar"), strict=True):
+        for mark, name in zip(panel.marks, ("r", "r+Vr"), strict=True):
+            np.testing.assert_array_equal(mark.x, [1, 5, 15, 40])
+            last = [rows[f"rls2 {key}={v}", name, component].iloc[-1] for v in (1, 5, 15, 40)]
+            np.testing.assert_array_equal(mark.y, [row["sigma"] for row in last])
+            np.testing.assert_array_equal(mark.lo, [row["sigma_lo"] for row in last])
+            np.testing.assert_array_equal(mark.exact, [row["exact_sigma"] for row in last])
+
+
+@pytest.mark.parametrize(
+    ("component", "words"),
+    [("r", "r"), ("Vr", "V_r"), ("b", "β"), ("vb", "v_β"), ("ab", "a_β"), ("ve", "v_ε"), ("speed", "speed")],
+)
+def test_axes_name_components_by_their_letters(component, words):
+    assert chart_text.spoken(panels.letter(component)) == words
+
+
+def test_two_keys_are_a_map():
+    result, drawn = swept("rls2", "sweep.scans=[15,10]", "sweep.radar.sigma_range_m=[50,100,250]")
+    figure = drawn["sweep_scans_sigma_range_m"]
+    assert [panel.title for panel in figure.panels] == ["r", "r+Vr"]
+    rows = common.groups(result.curves, "case", "filter", "component")
+    heat = figure.panels[1].marks[0]
+    for i, r in enumerate((50, 100, 250)):
+        for j, k in enumerate((10, 15)):
+            assert heat.values[i, j] == rows[f"rls2 scans={k} radar.sigma_range_m={r}", "r+Vr", "r"]["sigma"].iloc[-1]
+
+
+@pytest.mark.parametrize(
+    ("config", "overrides", "name"),
+    [
+        ("sonar_smoothing", ("sweep.sensor.scan_period_s=[2,5]", "scans=8"), "sweep_scan_period_s"),
+        ("sonar_smoothing", ("sweep.target=[sonar_straight,sonar_fluctuating]", "scans=8"), "sweep_target"),
+        ("multimodel_1hz", ("sweep.sensor.sigma_range_m=[1,20]", "scans=30"), "sweep_sigma_range_m"),
+    ],
+)
+def test_every_study_of_tracks_draws_its_sweeps(config, overrides, name):
+    _, drawn = swept(config, *overrides, n=16)
+    marks = [mark for panel in drawn[name].panels for mark in panel.marks]
+    assert all(len(mark.x) == 2 for mark in marks)
+    assert {mark.name for mark in marks} >= {marks[0].name}
+
+
+def test_no_sweep_no_figure(expected_radar):
+    assert sweeps.figures([expected_radar("rls2")], {}) == {}
+
+
+ROW = {
+    **{"claim": "P1.1", "paper": claims.PAPERS["P1"], "statement": "a | b < c", "place": "table", "reading": ""},
+    **{"overall": "confirmed", "verdict": "confirmed", "what": "gain", "measured": -1.23456, "lo": -1.3, "hi": -1.2},
+    **{"unit": "%", "config": "rls2", "case": "rls2", "expected": "< 0"},
+}
+
+
+def test_the_page_of_claims():
+    counted = {**ROW, "claim": "P1.2", "what": "operations", "measured": 7.0, "lo": 7.0, "hi": 7.0, "unit": ""}
+    never = {**ROW, "claim": "P1.3", "overall": "not run", "measured": "", "reading": "so"}
+    verdicts = ("refuted", *["confirmed"] * 3)
+    parts = [
+        {**ROW, "claim": "P1.4", "overall": "refuted", "verdict": v, "case": f"rls{i}"} for i, v in enumerate(verdicts)
+    ]
+    text = page.page([ROW, counted, never, *parts])
+    lines = [line for line in text.split("\n") if line.startswith("| P1")]
+    assert lines == [
+        "| P1.1 | a \\| b &lt; c | table | gain: −1.235 [−1.300, −1.200] % | **confirmed** | `rls2` |",
+        "| P1.2 | a \\| b &lt; c | table | operations: 7 | **confirmed** | `rls2` |",
+        "| P1.3 | a \\| b &lt; c *Read as: so.* | table |  | not run | `rls2` |",
+        "| P1.4 | a \\| b &lt; c | table | `rls0`: gain: −1.235 [−1.300, −1.200] %<br>(1 of 4 parts refuted) "
+        "| **refuted** | `rls2` |",
+        "| P1.1 | gain | −1.235 [−1.300, −1.200] % | &lt; 0 % | **confirmed** |",
+        "| P1.2 | operations | 7 | &lt; 0 | **confirmed** |",
+        "| P1.4 | `rls0`: gain | −1.235 [−1.300, −1.200] % | &lt; 0 % | **refuted** |",
+        *(f"| P1.4 | `rls{i}`: gain | −1.235 [−1.300, −1.200] % | &lt; 0 % | **confirmed** |" for i in (1, 2, 3)),
+    ]
+    assert "In all: 2 confirmed, 1 not run, 1 refuted." in text
+
+
+def test_measured_values_are_written_to_two_figures_of_their_half_width():
+    def said(value, lo, hi, unit="%"):
+        return page.measured({"measured": value, "lo": lo, "hi": hi, "unit": unit})
+
+    assert said(82.7032, 82.33, 83.07) == "82.70 [82.33, 83.07] %"
+    assert said(-6.5e-5, -1.3e-4, 4e-7) == "−0.000065 [−0.000130, 0.000000] %"
+    assert said(9.0, 9.0, 10.0, "Δt") == "9 [9, 10] Δt"
+    assert said(np.inf, np.inf, np.inf, "Δt") == "∞ Δt"
+    assert said(0.53452248, 0.53452248, 0.53452248, "") == "0.5345"
+
+
+def test_long_names_of_two_keys_stand_beside_the_lines():
+    keys = ("sweep.radar.sigma_velocity_mps=[4, 16]", "sweep.manoeuvre_variance=[1e-4, 1e-2]")
+    _, described = swept({"include": ["rls2", "rls5"]}, *keys, n=50)
+    gain, sigma = described["gain_r"], described["sigma_r"]
+    assert gain.panels[0].legend == "right"
+    *drawn, legend = sigma.panels
+    assert [panel.legend for panel in drawn] == ["none", "none"]
+    assert not legend.marks
+    assert [words for words, _ in legend.keys] == [
+        *(f"radar.sigma_velocity_mps = {v}, $D_M$ = {d}" for v in (4, 16) for d in ("10⁻⁴", "10⁻²")),
+        *("r", "r+Vr"),
+    ]
+    assert sigma.columns == 2

@@ -1,0 +1,136 @@
+"""P4's tables, figures and claims, from a small run."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from radarsim.app import run as experiment
+from radarsim.report.drawing import Line
+from radarsim.studies.discriminator import claims, measures
+from radarsim.studies.discriminator import tables as report
+from radarsim.studies.discriminator.kernels.sums import bin_edges
+
+
+@pytest.fixture(scope="module")
+def made():
+    return experiment.run("discriminator", realisations=256, threads=1)
+
+
+def test_curves_are_of_the_locked_and_tell_of_all(made):
+    rows = made.curves[(made.curves["filter"] == "sequence") & (made.curves["component"] == "f3")]
+    last = rows.iloc[-1]
+    assert (last["k"], last["t_s"]) == (13, pytest.approx(0.3))
+    assert last["exact_sigma"] == pytest.approx(1213, rel=1e-3)
+    assert last["n"] < 256
+    assert last["sigma"] == pytest.approx(1213, rel=0.2)
+    assert last["sigma_all"] > 10 * last["sigma"]
+    assert np.all(rows["posterior_sigma"] <= rows["exact_sigma"])
+
+
+def test_locks_fall_along_the_windows(made):
+    rows = made.tables["locks"]
+    own = rows[rows["filter"] == "sequence"]
+    assert np.all(np.diff(own["always_rate_3sigma"]) <= 0)
+    assert np.all((own["lock_lo"] <= own["lock_rate"]) & (own["lock_rate"] <= own["lock_hi"] + 1e-12))
+    assert np.all(own["lock_rate_3sigma"] <= own["lock_rate"])
+    assert rows[rows["filter"] == "narrow"]["lock_rate"].item() == 0
+    assert rows[rows["filter"] == "narrow"]["k"].item() == 1
+
+
+def test_every_estimator_has_its_own_windows(made):
+    windows = made.tables["windows"].groupby("filter")["pulses"].agg(list)
+    assert windows["sequence"][0] == 199
+    assert windows["narrow"] == [30000]
+    assert set(windows["sequence"]) < set(windows["dense"])
+    assert windows["wide"] == [199]
+
+
+def test_motion_follows_from_the_wavelength(made):
+    rows = made.tables["motion"].set_index(["band", "at"])
+    centimetre, metre = rows.loc[("centimetre", "beginning")], rows.loc[("metre", "beginning")]
+    assert centimetre["sigma_velocity_mps"] == pytest.approx(0.015 * 0.4502, rel=1e-3)
+    assert metre["sigma_acceleration_mps2"] == pytest.approx(0.9 * 12.204, rel=1e-3)
+    assert rows.loc[("metre", "middle")]["sigma_velocity_mps"] < metre["sigma_velocity_mps"] / 4
+
+
+def test_quantiles_of_a_histogram():
+    values = np.abs(np.random.default_rng(1).normal(size=20_000))
+    inner = bin_edges()[1:-1]  # outer bins are open
+    counts = np.bincount(np.searchsorted(inner, values, side="right"), minlength=len(inner) + 1)[None].astype(float)
+    for share, (found,) in zip(
+        (0.05, 0.5, 0.95), report.quantiles(counts, bin_edges(), (0.05, 0.5, 0.95)), strict=True
+    ):
+        assert found == pytest.approx(np.quantile(values, share), rel=0.03)
+
+
+def test_residuals_lie_under_three_bounds(made):
+    rows = made.tables["residuals"]
+    own = rows[rows["filter"] == "cured"]
+    assert np.all(own["q05"] < own["median"])
+    assert np.all(own["q95"] < 3 * own["posterior_sigma"])
+    assert own["median"].to_numpy() / own["posterior_sigma"].to_numpy() == pytest.approx(0.6745, abs=0.15)
+
+
+def test_figures_show_the_paper_and_the_locks(made):
+    assert made.figures == ("residuals", "locks", "accuracy")
+    panels = made._described["residuals"].panels
+    assert len(panels) == 6
+    assert [mark.label for mark in panels[1].marks] == ["median", "3σ"]
+
+
+def test_swept_cases_are_drawn_against_their_key():
+    swept = {"prior.scale": [0.01, 0.1], "burst.noise_variance": [2.25, 9.0]}
+    base = experiment.load("discriminator_pair").cases[0].spec
+    config = {"study": "discriminator", "sweep": swept, "realisations": 64, "seed": 1} | _plain(base)
+    done = experiment.run(config, threads=1)
+    assert done.figures == ("lock_scale_noise_variance",)
+    heat, border = (
+        done._described["lock_scale_noise_variance"].panels[0],
+        done._described["lock_scale_noise_variance"].panels[-1],
+    )
+    assert heat.marks[0].values.shape == (2, 2)
+    assert all(isinstance(mark, Line) for mark in border.marks)
+
+
+def _plain(spec):
+    from radarsim.config.identity import complete
+
+    return complete(spec)
+
+
+def test_gains_are_left_to_studies_with_common_scans(made):
+    assert made.gains.empty
+
+
+def test_answer_names_every_estimator(made):
+    first, others = report.answer(made.cases, made.tables)
+    names = made.cases[0].axes.filters
+    assert first.startswith(f"{names[0]}: ")
+    assert all(re.search(rf"(: |, ){re.escape(name)} \d+(\.\d\d)? % \[", others) for name in names[1:])
+
+
+def test_claims_are_ten_and_find_their_estimators(made):
+    assert [claim.id for claim in claims.CLAIMS] == [f"P4.{i}" for i in range(1, 11)]
+    kinds = [measures.kind_of(e, 1.0) for e in made.cases[0].spec.estimators]
+    assert kinds == ["sequence", "other", "other", "other", "narrow", "wide", "truth", "other", "cured"]
+    dense = replace_estimator(made.cases[0].spec.estimators[0], main_lobe_threshold=0.5)
+    assert measures.kind_of(dense, 1.0) == "other"
+
+
+def replace_estimator(estimator, **change):
+    return estimator.model_copy(update=change)
+
+
+def test_another_burst_is_not_the_papers(made):
+    evidence = measures.Evidence(made.cases, made.tables)
+    assert evidence.case(measures.COMPUTED) is made.cases[0]
+    with pytest.raises(measures.Missing):
+        evidence.case(measures.PRINTED)
+    spec = made.cases[0].spec
+    other = replace(
+        made.cases[0], spec=spec.model_copy(update={"burst": spec.burst.model_copy(update={"pulses": 20000})})
+    )
+    with pytest.raises(measures.Missing):
+        measures.Evidence([other], made.tables).case(measures.COMPUTED)

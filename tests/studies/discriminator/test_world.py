@@ -1,0 +1,80 @@
+"""The burst's signal: times, phase, profiles, amplitude."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from radarsim.studies.discriminator import world as model
+
+PAPER = model.Burst(10e9, 1e-5, 1e-6, 1e-6, 30000, 1.0, 2.25)
+
+
+def test_sample_times_lie_inside_the_pulses():
+    burst = replace(PAPER, pulses=5, sampling_period_s=0.3e-6)
+    t = model.sample_times(burst, 5)
+    assert t.shape == (4, 5)  # 0, 0.3, 0.6, 0.9 µs
+    assert np.all(t % 1e-5 < 1e-6)
+    assert replace(PAPER, sampling_period_s=0.1e-6).samples_per_pulse == 10  # 1e-6/1e-7 is 9.999…
+
+
+def test_a_duration_is_rounded_to_the_nearest_pulse():
+    assert PAPER.pulses_in(0.3) == 30000  # 0.3/1e-5 is 29999.999999999996
+    assert PAPER.pulses_in(1.7877e-3) == 179
+    assert PAPER.pulses_in(1e-9) == 1
+
+
+def test_phase_is_the_printed_polynomial():
+    theta, t = np.array([0.7, 1e4, 18e4, -75e4, 1e6]), 0.123
+    by_hand = 0.7 / (2 * np.pi) + 1e4 * t + 18e4 * t**2 / 2 - 75e4 * t**3 / 6 + 1e6 * t**4 / 24
+    assert model.phase_turns(theta, t) == pytest.approx(by_hand, rel=1e-14)
+
+
+def test_coefficients_and_parameters_are_one_polynomial():
+    theta = np.array([0.7, 1e4, 18e4, -75e4, 1e6])
+    b = theta * model.turns_per_parameter(5, 0.3)
+    assert np.polynomial.polynomial.polyval(0.5, b) == pytest.approx(model.phase_turns(theta, 0.15), rel=1e-14)
+
+
+def test_signal_is_a_cosine_or_its_analytic_partner():
+    turns = np.array([0.0, 0.25, 1000.5])
+    assert model.signal(PAPER, turns) == pytest.approx([1, 0, -1], abs=1e-12)
+    assert model.signal(replace(PAPER, complex_samples=True), turns) == pytest.approx([1, 1j, -1], abs=1e-12)
+
+
+@pytest.mark.parametrize("complex_samples", [False, True])
+def test_amplitude_estimate_and_its_misprint(complex_samples):
+    burst = replace(PAPER, amplitude=1.5, noise_variance=0.25, complex_samples=complex_samples)
+    rng = np.random.default_rng(1)
+    turns = rng.random(200_000)
+    noise = rng.normal(0, 0.5, (2, turns.size))
+    samples = model.signal(burst, turns) + (noise[0] + 1j * noise[1] if complex_samples else noise[0])
+    assert model.amplitude_estimate(burst, samples) == pytest.approx(1.5, abs=0.01)
+    assert model.amplitude_estimate(burst, samples, as_printed=True) == pytest.approx(2.25, abs=0.03)
+
+
+def test_no_energy_gives_no_amplitude():
+    assert model.amplitude_estimate(PAPER, np.zeros(100)) == 0.0
+
+
+def test_profile_phase_is_the_integral_of_its_doppler():
+    profile = model.VelocityProfile((0.0, 0.1, 0.2, 0.3), (0.0, 350.0, 450.0, 475.0))
+    t = np.linspace(0, 0.3, 30001)
+    f = profile.doppler_hz(t, 0.03)
+    assert f[[0, 10000, 20000, 30000]] == pytest.approx([0, 23333.3, 30000, 31666.7], abs=0.1)
+    integral = np.concatenate([[0], np.cumsum(0.5 * (f[1:] + f[:-1]) * np.diff(t))])
+    assert profile.phase_turns(t, 0.03, 0.0) == pytest.approx(integral, abs=1e-6)
+
+
+def test_a_polynomial_phase_is_fitted_by_itself():
+    theta = np.array([0.7, 1e4, 18e4, -75e4, 1e6])
+    t = model.sample_times(PAPER, 30000)
+    assert model.fitted_parameters(model.phase_turns(theta, t), t, 5) == pytest.approx(theta, rel=1e-6)
+
+
+def test_balanced_inverse_of_a_matrix_of_many_magnitudes():
+    scale = 10.0 ** np.array([0, 4, 8, 12])
+    root = np.random.default_rng(2).normal(size=(4, 4))
+    matrix = (root @ root.T + np.eye(4)) * np.outer(scale, scale)
+    product = model.balanced_inverse(matrix) @ matrix / np.outer(1 / scale, scale)
+    assert product == pytest.approx(np.eye(4), abs=1e-10)

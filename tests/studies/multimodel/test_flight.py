@@ -1,0 +1,71 @@
+"""Flights against closed forms, laws of conservation, and what is refused."""
+
+import numpy as np
+import pytest
+
+from radarsim.studies.multimodel import flight
+from radarsim.studies.multimodel.flight import Phase, fly
+
+T = np.arange(0, 60.01, 0.5)
+VACUUM = 1e30  # ballistic coefficient without drag
+
+
+def test_without_air_it_is_a_parabola():
+    x = fly((1e5, 2e4, 0), (-800, 300, 50), VACUUM, 1.0, [Phase(0)], T)
+    g = flight.GRAVITY_MPS2
+    assert np.allclose(x[:, 0], 1e5 - 800 * T, atol=1e-3)
+    assert np.allclose(x[:, 3], 2e4 + 300 * T - g * T**2 / 2, atol=1e-3)
+    assert np.allclose(x[:, 4], 300 - g * T, atol=1e-6)
+    assert np.allclose(x[:, 2::3], [0, -g, 0], atol=1e-9)
+
+
+def test_trimmed_flight_is_straight():
+    x = fly((0, 1e4, 0), (200, 0, 30), 1e4, 1.0, [Phase(0, trimmed=True)], T)
+    assert np.allclose(x[:, 0], 200 * T)
+    assert np.allclose(x[:, 2::3], 0, atol=1e-12)
+
+
+def test_a_steady_turn_to_the_right_is_a_circle():
+    x = fly((0, 1e4, 0), (200, 0, 0), 1e4, 1e-3, [Phase(0, lateral=20, trimmed=True)], T)
+    radius = 200**2 / 20
+    centre = np.array([0, radius])  # to the right of north is east
+    assert np.allclose(np.hypot(x[:, 0] - centre[0], x[:, 6] - centre[1]), radius, rtol=1e-3)
+    assert np.allclose(np.linalg.norm(x[:, 1::3], axis=1), 200, rtol=1e-9)
+
+
+def test_commands_are_followed_with_the_lag():
+    x = fly((0, 1e4, 0), (300, 0, 0), 1e4, 2.0, [Phase(0, axial=10, trimmed=True)], T)
+    assert np.allclose(x[:, 2], 10 * (1 - np.exp(-T / 2)), atol=1e-7)
+
+
+def test_drag_is_density_times_speed_squared_over_twice_the_coefficient():
+    x = fly((0, 3e4, 0), (1500, 0, 0), 5e3, 1.0, [Phase(0)], np.array([0.0, 1.0]))
+    drag = flight.DENSITY_KGPM3 * np.exp(-3e4 / flight.SCALE_HEIGHT_M) * 1500**2 / 1e4
+    assert np.isclose(x[0, 2], -drag)
+
+
+def test_velocity_and_acceleration_are_derivatives_of_position():
+    t = np.arange(0, 50, 0.001)
+    x = fly((1e5, 4e4, 0), (-900, -200, 100), 8e3, 1.0, [Phase(0), Phase(20, lateral=50, normal=20, period_s=8)], t)
+    for axis in range(3):
+        assert np.allclose(np.gradient(x[:, 3 * axis], t)[1:-1], x[1:-1, 3 * axis + 1], atol=1e-3)
+        inner = np.abs(t - 20) > 0.01  # the acceleration of the commands sets in smoothly, its derivative does not
+        assert np.allclose(np.gradient(x[:, 3 * axis + 1], t)[inner][1:-1], x[inner, 3 * axis + 2][1:-1], atol=1e-2)
+
+
+def test_the_ground_and_the_orbit_are_refused():
+    with pytest.raises(flight.Unflyable, match="hits the ground at"):
+        fly((1e5, 1e3, 0), (-300, 0, 0), 1e4, 1.0, [Phase(0)], T)
+    with pytest.raises(flight.Unflyable, match="orbit"):
+        fly((1e5, 9e4, 0), (-8500, 0, 0), VACUUM, 1.0, [Phase(0)], T)
+
+
+def test_recorded_flight_gives_back_a_smooth_one():
+    rng = np.random.default_rng(2)
+    at = np.sort(np.concatenate([[0, 60], rng.uniform(0, 60, 150)]))
+    true = fly((1e5, 2e4, 0), (-300, 50, 50), VACUUM, 1.0, [Phase(0)], at)
+    t = np.linspace(5, 55, 101)
+    x = flight.recorded(at, true[:, 0::3] + rng.normal(size=(len(at), 3)), t)
+    exact = fly((1e5, 2e4, 0), (-300, 50, 50), VACUUM, 1.0, [Phase(0)], np.concatenate([[0], t]))[1:]
+    assert np.abs(x - exact)[:, 0::3].max() < 2
+    assert np.abs(x - exact)[:, 1::3].max() < 1.5

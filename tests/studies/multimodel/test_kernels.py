@@ -1,0 +1,207 @@
+"""The multiple-model kernel against its textbook twin, family by family, rule by rule, on random banks."""
+
+import numpy as np
+import pytest
+
+from radarsim.kernels.lanes import WIDTH, rows
+from radarsim.studies.multimodel.kernels import filters as multimodel
+from radarsim.studies.multimodel.kernels import hypothesis
+from radarsim.studies.multimodel.kernels import strip as multimodel_strip
+from radarsim.studies.multimodel.kernels.plots import frame
+from tests.studies.multimodel import naive
+
+FAMILIES = {"kalman": multimodel.KALMAN, "gpb1": multimodel.GPB1, "imm": multimodel.IMM, "gpb2": multimodel.GPB2}
+RULES = {
+    "moment": multimodel.MOMENT,
+    "best": multimodel.BEST,
+    "combined": multimodel.COMBINED,
+    "modified_combined": multimodel.MODIFIED,
+}
+UPPER = np.triu_indices(3)
+DT = 0.05
+FRAME = frame(np.eye(3), 0.0, (1.0, 1.0, 1.0), 1, False, 1.0)
+
+
+def bank(size, seed):
+    """A random bank: motions with sigmas, a column-stochastic matrix, starting probabilities."""
+    rng = np.random.default_rng(seed)
+    kinds = [("accelerated", 30.0)] + [
+        (str(rng.choice(["uniform", "accelerated", "still"], p=[0.5, 0.4, 0.1])), float(10 ** rng.uniform(-1.5, 1.5)))
+        for _ in range(size - 1)
+    ]
+    T = np.eye(size) * 40 + rng.random((size, size))
+    p = rng.random(size)
+    return kinds, T / T.sum(0), p / p.sum()
+
+
+def workload(scans, seed=1, missing=0.0):
+    """Plots (K, 3, WIDTH) of a target that manoeuvres, full covariances (K, 3, 3) that change, start x (9,) and P
+    (9, 9)."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(1, scans + 1) * DT
+    acceleration = np.stack([12 * (t % 60 > 40), -20 * (t % 50 > 30), 3 * np.sin(t)], axis=1)
+    velocity = np.cumsum(acceleration, axis=0) * DT + [-220, 60, -5]
+    position = np.cumsum(velocity, axis=0) * DT + [30e3, 20e3, 8e3]
+    root = rng.normal(size=(scans, 3, 3)) * 3 + np.eye(3) * 12
+    plots = position[:, :, None] + root @ rng.normal(size=(scans, 3, WIDTH))
+    lost = rng.random((scans, WIDTH)) < missing
+    plots = np.where(lost[:, None], np.nan, plots)
+    x = np.zeros(9)
+    x[0::3], x[1::3] = [30e3 + 20, 20e3 - 20, 8e3], [-215, 55, 0]
+    return plots, root @ np.swapaxes(root, 1, 2), x, np.diag([50.0**2, 20.0**2, 5.0**2] * 3)
+
+
+def run_kernel(family, rule, output, kinds, T, p, plots, covariances, x, P, prediction=0):
+    """Estimates (K, 9, WIDTH), variances (K, 9, WIDTH), probabilities (K, M, WIDTH), and the work rows left behind."""
+    scans, size = len(plots), len(kinds)
+    work, numbers = hypothesis.work_arrays()
+    at = work.reshape(-1, WIDTH)
+    for i in range(size):
+        h = at[i * hypothesis.HYPOTHESIS :]
+        h[:9] = x[:, None]
+        for axis in range(3):
+            block = P[3 * axis : 3 * axis + 3, 3 * axis : 3 * axis + 3]
+            h[hypothesis.OWN + 6 * axis : hypothesis.OWN + 6 * axis + 6] = block[UPPER][:, None]
+        h[hypothesis.PROBABILITY] = p[i]
+    strip = rows(scans * hypothesis.PLOT)
+    cells = strip.reshape(scans, hypothesis.PLOT, WIDTH)
+    cells[:, 9] = ~np.isnan(plots).any(axis=1)
+    cells[:, :3], cells[:, 3:9] = np.nan_to_num(plots), covariances[:, UPPER[0], UPPER[1], None]
+    out = rows(scans * hypothesis.OUTPUT)
+    models = np.array([[k != "still", k == "accelerated", s] for k, s in kinds], dtype=float).ravel()
+    rules = np.array([FAMILIES[family], RULES[rule], RULES[output], prediction])
+    intervals, times, everything = np.zeros(scans, dtype=np.int64), np.array([DT]), np.ones(scans, dtype=np.int64)
+    transitions = np.ascontiguousarray(T).ravel()
+    multimodel_strip.filter_strip(
+        work, numbers, strip, 0, scans, models, transitions, intervals, times, rules, FRAME, everything, out
+    )
+    cells = out.reshape(scans, hypothesis.OUTPUT, WIDTH)
+    return cells[:, :9], cells[:, 9:18], cells[:, 21 : 21 + size], at
+
+
+def compare(family, rule, output, size, scans, missing=0.0, lanes=(0,), seed=3):
+    kinds, T, p = bank(size, seed + size)
+    plots, covariances, x, P = workload(scans, missing=missing)
+    got = run_kernel(family, rule, output, kinds, T, p, plots, covariances, x, P)
+    for lane in lanes:
+        twin = naive.track(
+            family,
+            rule,
+            output,
+            kinds,
+            lambda t: np.linalg.matrix_power(T, round(t / DT)),
+            x,
+            P,
+            p,
+            plots[:, :, lane],
+            covariances,
+            np.full(scans, DT),
+        )
+        scale = np.abs(twin[0]).max(axis=0) + 1
+        assert np.max(np.abs(got[0][:, :, lane] - twin[0]) / scale) < 1e-8
+        variances = np.diagonal(twin[1], axis1=1, axis2=2)
+        assert np.max(np.abs(got[1][:, :, lane] - variances) / (variances.max(axis=0) + 1e-3)) < 1e-8
+        assert np.max(np.abs(got[2][:, :, lane] - twin[2])) < 1e-8
+
+
+GRID = [("kalman", "moment", 1)] + [
+    (family, rule, size) for family in ("gpb1", "imm", "gpb2") for rule in RULES for size in range(1, 6)
+]
+
+
+@pytest.mark.parametrize(("family", "rule", "size"), GRID)
+def test_kernel_equals_its_twin(family, rule, size):
+    compare(family, rule, "best" if rule == "combined" else "moment", size, 120, lanes=(0, 5))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("family", "rule", "size"), GRID)
+def test_kernel_equals_its_twin_over_3721_steps(family, rule, size):
+    compare(family, rule, "best", size, 3721)
+
+
+@pytest.mark.parametrize("family", ["kalman", "gpb1", "imm", "gpb2"])
+def test_missed_plots_are_one_prediction_over_the_real_interval(family):
+    compare(family, "combined", "best", 1 if family == "kalman" else 3, 150, missing=0.3, lanes=range(WIDTH))
+
+
+def hypothesis_of(cells, lane=0):
+    """Mean (9,) and covariance (9, 9) of the hypothesis that begins at a row."""
+    P = np.empty((9, 9))
+    for axis in range(3):
+        block = cells[hypothesis.OWN + 6 * axis :][:6, lane]
+        for value, i, j in zip(block, *UPPER, strict=True):
+            P[3 * axis + i, 3 * axis + j] = P[3 * axis + j, 3 * axis + i] = value
+    for pair, (a, b) in enumerate(((0, 1), (0, 2), (1, 2))):
+        block = cells[hypothesis.CROSS + 9 * pair :][:9, lane].reshape(3, 3)
+        P[3 * a : 3 * a + 3, 3 * b : 3 * b + 3], P[3 * b : 3 * b + 3, 3 * a : 3 * a + 3] = block, block.T
+    return cells[:9, lane], P
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_imm_equals_the_papers_form_of_n_squared_extrapolations(rule):
+    kinds, T, p = bank(3, 11)
+    plots, covariances, x, P = workload(60)
+    own = other = (np.tile(x, (3, 1)), np.tile(P, (3, 1, 1)), p)
+    models = [naive.motion(*kind, DT) for kind in kinds]
+    for z, R in zip(plots[:, :, 0], covariances, strict=True):
+        own = naive.imm(*own, models, T, z, R, rule)
+        other = naive.imm_by_extrapolations(*other, models, T, z, R, rule)
+    for one, two in zip(own, other, strict=True):
+        assert np.allclose(one, two, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("family", ["gpb1", "imm", "gpb2"])
+@pytest.mark.parametrize("size", [1, 4])
+def test_equal_models_are_one_kalman_filter(family, size):
+    plots, covariances, x, P = workload(300)
+    kinds, T, p = [("accelerated", 8.0)] * size, np.full((size, size), 1 / size), np.full(size, 1 / size)
+    got = run_kernel(family, "moment", "moment", kinds, T, p, plots, covariances, x, P)
+    kalman = run_kernel("kalman", "moment", "best", kinds[:1], np.eye(1), np.ones(1), plots, covariances, x, P)
+    for one, two in zip(got[:2], kalman[:2], strict=True):
+        assert np.allclose(one, two, rtol=1e-9, atol=1e-9)
+    assert np.allclose(got[2], 1 / size)
+
+
+@pytest.mark.parametrize(
+    ("family", "rule"), [("kalman", "best"), ("gpb1", "moment"), ("imm", "combined"), ("gpb2", "moment")]
+)
+def test_covariances_stay_positive_over_1e5_steps(family, rule):
+    kinds, T, p = bank(1 if family == "kalman" else 3, 5)
+    kinds = [("accelerated", sigma) for _, sigma in kinds]
+    plots, covariances, x, P = workload(100_000)
+    estimates, _, probabilities, cells = run_kernel(family, rule, "best", kinds, T, p, plots, covariances, x, P)
+    assert np.isfinite(estimates).all()
+    assert np.allclose(probabilities.sum(axis=1), 1)
+    for lane in range(WIDTH):
+        eigenvalues = np.linalg.eigvalsh(hypothesis_of(cells, lane)[1])
+        assert eigenvalues.min() > 1e-9 * eigenvalues.max()
+
+
+def test_rules_break_ties_by_the_lower_number():
+    assert np.argmax(naive.shares([0.4, 0.4, 0.2], 1, "best")) == 0
+    kinds, T, p = [("uniform", 5.0)] * 3, np.eye(3), np.array([0.4, 0.4, 0.2])
+    plots, covariances, x, P = workload(1)
+    for rule in RULES:
+        own = naive.track("imm", rule, "best", kinds, lambda t: T, x, P, p, plots[:, :, 0], covariances, [DT])
+        got = run_kernel("imm", rule, "best", kinds, T, p, plots, covariances, x, P)
+        assert np.allclose(got[0][0, :, 0], own[0][0])
+
+
+def test_a_model_that_cannot_be_reached_does_no_harm():
+    kinds, p = [("uniform", 5.0), ("accelerated", 5.0), ("uniform", 1.0)], np.array([0.5, 0.5, 0.0])
+    T = np.array([[0.9, 0.1, 0], [0.1, 0.9, 0], [0, 0, 1.0]])
+    plots, covariances, x, P = workload(200)
+    for family in ("gpb1", "imm", "gpb2"):
+        got = run_kernel(family, "moment", "moment", kinds, T, p, plots, covariances, x, P)
+        two = run_kernel(family, "moment", "moment", kinds[:2], T[:2, :2], p[:2], plots, covariances, x, P)
+        assert np.allclose(got[0], two[0], rtol=1e-10, atol=1e-10)
+        assert np.all(got[2][:, 2] == 0)
+
+
+def test_lanes_do_not_mix():
+    kinds, T, p = bank(3, 8)
+    plots, covariances, x, P = workload(50)
+    got = run_kernel("imm", "combined", "best", kinds, T, p, plots, covariances, x, P)
+    turned = run_kernel("imm", "combined", "best", kinds, T, p, plots[:, :, ::-1].copy(), covariances, x, P)
+    assert np.allclose(got[0], turned[0][:, :, ::-1], rtol=1e-10)

@@ -1,0 +1,117 @@
+"""P2's tables, figures and claims, on a small run of the shipped config."""
+
+import json
+
+import numpy as np
+import pytest
+
+import radarsim
+from radarsim.report import claims, html
+from radarsim.studies.multimodel import tables as multimodel
+from radarsim.studies.multimodel.claims import CLAIMS
+from radarsim.studies.multimodel.measures import MMA2_122, RIVALS, Evidence
+
+
+@pytest.fixture(scope="module")
+def result():
+    return radarsim.run("multimodel", realisations=16)
+
+
+def test_tables_have_the_contracts_columns(result):
+    columns = ["case", "filter", "model", "k", "t_s", "n", "probability", "probability_lo", "probability_hi"]
+    assert list(result.tables["probabilities"].columns[:9]) == columns
+    assert set(result.curves["component"]) == {"x", "vx", "ax", "y", "vy", "ay", "z", "vz", "az"}
+    assert list(result.curves["k"].unique()) == [*range(10, 3725, 10), 3725]
+    assert result.curves["exact_sigma"].isna().all()
+    assert set(result.gains["baseline"]) == {"MMA2-122"}
+
+
+def test_probabilities_sum_to_one(result):
+    rows = result.tables["probabilities"]
+    assert set(rows["filter"]) == {"MMA2-122", "MMA2-11"}
+    assert np.allclose(rows.groupby(["filter", "k"])["probability"].sum(), 1, atol=1e-9)
+    assert (rows["probability_lo"] <= rows["probability"]).all()
+
+
+def test_stages_are_the_mean_squares_of_the_curves(result):
+    rows = result.tables["stages"].set_index(["filter", "stage", "component"])
+    curve = result.curves[(result.curves["filter"] == "Kalman-2 1") & (result.curves["component"] == "y")]
+    inside = curve[(curve["t_s"] >= 20) & (curve["t_s"] < 125)]
+    assert np.isclose(
+        rows.loc[("Kalman-2 1", "ballistic", "y"), "sigma"], np.sqrt((inside["sigma"] ** 2).mean()), rtol=0.1
+    )
+    assert len(rows) == 6 * 4 * 9
+
+
+def test_operations_and_consistency(result):
+    rows = result.tables["operations"].set_index(["filter", "stage"])["operations"]
+    assert rows["Kalman-1 5", "whole"] == 366
+    assert rows["Kalman-2 1", "whole"] == 738
+    assert 366 + 2 * 738 < rows["MMA2-122", "ballistic"] < rows["MMA2-122", "manoeuvre"]
+    nis = result.tables["consistency"].set_index(["filter", "stage"])["nis"]
+    assert abs(nis["Kalman-2 20", "ballistic"] - 1) < 0.1
+    assert nis["Kalman-1 5", "manoeuvre"] > 10
+
+
+def test_gains_between_any_two_filters_are_paired(result):
+    seen = Evidence(result.cases, result.tables)
+    key = ("aeroballistic", 0.05, (MMA2_122, *RIVALS))
+    gain = seen.gain(key, MMA2_122, RIVALS[2], "ballistic", "y")
+    (case,) = result.cases
+    s = np.array(case.sums["stage"])[[0, 3], 1, 3, 0] / case.count
+    assert np.isclose(gain.value, 100 * (1 - np.sqrt(s[0] / s[1])))
+    assert gain.lo < gain.value < gain.hi
+
+
+def test_claims_of_this_config_are_judged_and_no_others(result):
+    rows = result.tables["claims"]
+    assert set(rows["claim"]) == {c.id for c in CLAIMS if c.config == "multimodel"}
+    assert (rows.loc[rows["claim"] == "P2.11", "verdict"] == claims.CONFIRMED).all()
+
+
+def test_all_thirteen_claims_are_there():
+    numbers = {int("".join(filter(str.isdigit, c.id.partition(".")[2]))) for c in CLAIMS}
+    assert numbers == set(range(1, 14))
+    assert all(c.parts and c.statement and c.place for c in CLAIMS)
+
+
+def test_another_flight_is_not_the_papers(result):
+    changed = radarsim.run("multimodel", realisations=8, overrides=["target.lag_s=2"])
+    assert "P2.1" not in set(changed.tables["claims"]["claim"])
+
+
+def test_figures_are_described(result):
+    assert {"trajectory", "sigma_y", "sigma_vy", "probabilities", "cost", "consistency"} <= set(result.figures)
+    assert result.figure("trajectory") is not None
+
+
+def test_answer_names_the_best_filter_of_each_stage(result):
+    height, climb = multimodel.answer(result.cases, result.tables)
+    for stage in ("start", "ballistic", "manoeuvre", "after"):
+        assert stage in height
+        assert stage in climb
+    assert "m/s [" in climb
+
+
+def test_bytes_are_the_same_for_any_number_of_threads(tmp_path):
+    found = []
+    for threads in (1, 2, 3):
+        radarsim.run("multimodel_1hz", realisations=300, threads=threads, out=tmp_path / str(threads), figures=False)
+        folder = tmp_path / str(threads) / "multimodel_1hz"
+        found.append({path.name: path.read_bytes() for path in folder.glob("*.csv")})
+    assert found[0] == found[1] == found[2]
+    assert {"curves.csv", "gains.csv", "probabilities.csv", "stages.csv"} <= set(found[0])
+
+
+def test_time_per_update_stands_in_the_record_and_the_report_alone(tmp_path):
+    """Counted operations are a table; what a clock measured is none."""
+    radarsim.run("multimodel_1hz", realisations=8, out=tmp_path, figures=False)
+    folder = tmp_path / "multimodel_1hz"
+    (measured,) = json.loads((folder / "run.json").read_text())["seconds_per_update"].values()
+    assert list(measured) == ["MMA2-122", "MMA2-11", "Kalman-1 20", "Kalman-1 5", "Kalman-2 20", "Kalman-2 1"]
+    assert all(1e-9 < seconds < 1e-4 for seconds in measured.values())
+    assert measured["MMA2-122"] > measured["Kalman-1 5"]
+    page = (folder / "report.html").read_text()
+    assert "Cost against accuracy" in page
+    assert html.number(1e9 * measured["Kalman-2 1"]) in page
+    assert not any("measured, ns" in path.read_text() for path in folder.glob("*.csv"))

@@ -1,0 +1,316 @@
+"""Every key of range_doppler, spoiled in every way, and the very words the user gets."""
+
+import math
+import random
+
+import pytest
+
+from radarsim.app.configs import load
+from radarsim.errors import ConfigError
+
+NUMBER = "must be a number"
+SIZE = "must be at least 1e-18 in size"
+POSITIVE = [
+    (0, "must be > 0, got 0"),
+    (-250, "must be > 0, got -250"),
+    (-1e-30, "must be > 0, got -1e-30"),
+    ("x", f"{NUMBER}, got 'x'"),
+    (True, f"{NUMBER}, got true"),
+    ([1], f"{NUMBER}, got [1]"),
+    ({}, f"{NUMBER}, got {{}}"),
+    ("1e5", f"{NUMBER}, got '1e5'"),
+    (1e19, "must be at most 1e18 in size, got 1e19"),
+    (1e-19, f"{SIZE}, got 1e-19"),
+    (math.nan, "must be a finite number, got nan"),
+    (math.inf, "must be a finite number, got inf"),
+    (None, "has no value"),
+    ("", f"{NUMBER}, got ''"),
+    ("0x1", f"{NUMBER}, got '0x1'"),
+]
+POSITIVE_KEYS = [
+    "radar.wavelength_m",
+    "radar.sigma_range_m",
+    "radar.sigma_velocity_mps",
+    "radar.scan_period_s",
+    "radar.repetition_rate_hz",
+    "filters.0.manoeuvre_variance",
+    "filters.1.manoeuvre_variance",
+]
+WHOLE = "must be a whole number"
+COUNT = [
+    (2.5, f"{WHOLE}, got 2.5"),
+    (True, f"{WHOLE}, got true"),
+    ("3", f"{WHOLE}, got '3'"),
+    ([3], f"{WHOLE}, got [3]"),
+    (math.inf, "must be a finite number, got inf"),
+    (None, "has no value"),
+    ({}, f"{WHOLE}, got {{}}"),
+]
+COUNTS = {
+    "scans": [
+        (1, "must be >= 2, got 1"),
+        (0, "must be >= 2, got 0"),
+        (-3, "must be >= 2, got -3"),
+        (100_001, "must be <= 100000, got 100001"),
+        (1e18, "must be <= 100000, got 1e18"),
+        (2, "must be >= 3 for the initialisation of filter r, got 2"),
+    ],
+    "realisations": [
+        (0, "must be >= 1, got 0"),
+        (-1, "must be >= 1, got -1"),
+        (1e13, "must be <= 1e12, got 1e13"),
+        (10**12 + 1, "must be <= 1e12, got 1000000000001"),
+    ],
+    "seed": [
+        (-1, "must be >= 0, got -1"),
+        (2**64, "must be <= 18446744073709551615, got 18446744073709551616"),
+        (1e300, "must be <= 18446744073709551615, got 1e300"),
+    ],
+    "filters.0.initial_scans": [
+        (1, "must be >= 2, got 1"),
+        (2, "must be >= 3 for a filter that observes range, got 2"),
+    ],
+    "filters.1.initial_scans": [(1, "must be >= 2, got 1"), (0, "must be >= 2, got 0")],
+}
+TEXT = [
+    (3, "must be text, got 3"),
+    (True, "must be text, got true"),
+    ("", "must not be empty, got ''"),
+    (["a"], "must be text, got ['a']"),
+    ("x" * 65, "must have at most 64 characters, got 'xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx…"),
+    ("a\nb", r"must be printable text on one line, without blanks around it, got 'a\nb'"),
+    ("\x1b[31m", r"must be printable text on one line, without blanks around it, got '\x1b[31m'"),
+    (" a", "must be printable text on one line, without blanks around it, got ' a'"),
+]
+OBSERVES = "must be [range] or [range, velocity]"
+OTHERS = [
+    ("radar", 3, "must be a mapping of keys, got 3"),
+    ("radar", [1], "must be a mapping of keys, got [1]"),
+    ("radar.band", "meter", "must be one of metre, decimetre, centimetre, got 'meter'"),
+    ("radar.band", 3, "must be one of metre, decimetre, centimetre, got 3"),
+    ("target", 3, "must be a mapping of keys, got 3"),
+    ("target", [], "must be a mapping of keys, got []"),
+    ("target", "../polynomial", "must be the stem of a scenario, without folder or suffix, got '../polynomial'"),
+    ("target", "/etc/passwd", "must be the stem of a scenario, without folder or suffix, got '/etc/passwd'"),
+    ("target", "a/b", "must be the stem of a scenario, without folder or suffix, got 'a/b'"),
+    ("target", "a\\b", r"must be the stem of a scenario, without folder or suffix, got 'a\\b'"),
+    ("target", "..", "must be the stem of a scenario, without folder or suffix, got '..'"),
+    ("target", "", "must be the stem of a scenario, without folder or suffix, got ''"),
+    ("target", ".hidden", "must be the stem of a scenario, without folder or suffix, got '.hidden'"),
+    ("target", "polynomal", "no such scenario; did you mean polynomial?, got 'polynomal'"),
+    ("target.kind", "jerk", "must be one of polynomial, acceleration_start, jerk_pulse, turn, got 'jerk'"),
+    ("target.kind", 3, "must be one of polynomial, acceleration_start, jerk_pulse, turn, got 3"),
+    ("target.coefficients", [], "must hold at least 1, got []"),
+    ("target.coefficients", [0] * 13, "must hold at most 12, got [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]"),
+    ("target.coefficients", 3, "must be a list, got 3"),
+    ("target.coefficients", "123", "must be a list, got '123'"),
+    ("target.coefficients", {"0": 1}, "must be a list, got {0: 1}"),
+    ("filters", [], "must hold at least 1, got []"),
+    ("filters", {}, "must be a list, got {}"),
+    ("filters", "r", "must be a list, got 'r'"),
+    ("filters.0", "r", "must be a mapping of keys, got 'r'"),
+    ("filters.0.observes", ["velocity"], f"{OBSERVES}, got ['velocity']"),
+    ("filters.0.observes", ["velocity", "range"], f"{OBSERVES}, got ['velocity', 'range']"),
+    ("filters.0.observes", ["range", "range"], f"{OBSERVES}, got ['range', 'range']"),
+    ("filters.0.observes", [], f"{OBSERVES}, got []"),
+    ("filters.0.observes", "range", "must be a list, got 'range'"),
+    ("baseline", "x", "must be the name of a filter: r, r+Vr, got 'x'"),
+    ("scans", 1e5 + 1, "must be <= 100000, got 100001"),
+    ("study", "range_dopler", "must be one of {studies}; did you mean range_doppler?, got 'range_dopler'"),
+    ("study", 3, "must be text, got 3"),
+    ("sweep", [1], "must be a mapping of keys, got [1]"),
+    ("sweep", {}, "must hold at least 1, got {}"),
+    ("sweep", {"scans": 15}, "config: sweep.scans: must be a list, got 15"),
+    ("sweep", {"scans": []}, "config: sweep.scans: must hold at least 1, got []"),
+    ("include", "rls2", "must be a list, got 'rls2'"),
+    ("figures", [], "must be a mapping of keys, got []"),
+    ("figures", {"sigma_r": "x"}, "config: figures.sigma_r: must be a list, got 'x'"),
+    ("figures", {"sigma_r": []}, "config: figures.sigma_r: must hold at least 1, got []"),
+    ("figures", {"sigma_r": ["rls*"]}, "config: figures.sigma_r.0: no case has this name, got 'rls*'"),
+]
+TABLE = [
+    *((key, value, message) for key in POSITIVE_KEYS for value, message in POSITIVE),
+    *((key, value, message) for key in COUNTS for value, message in [*COUNT, *COUNTS[key]]),
+    *((key, value, message) for key in ("radar.name", "filters.1.name") for value, message in TEXT),
+    *(("target.coefficients.1", value, message) for value, message in POSITIVE if "> 0" not in message),
+    *OTHERS,
+]
+
+
+def spoil(config: dict, key: str, value: object) -> dict:
+    """The config with another value at a dotted key."""
+    *outer, last = (int(step) if step.isdigit() else step for step in key.split("."))
+    holder = config
+    for step in outer:
+        holder = holder[step]
+    holder[last] = value
+    return config
+
+
+@pytest.mark.parametrize(("key", "value", "message"), TABLE, ids=lambda v: repr(v)[:40])
+def test_bad_value(good, said, key, value, message):
+    from radarsim.config.schema import STUDIES
+
+    message = message.replace("{studies}", ", ".join(STUDIES))
+    line = message if message.startswith("config: ") else f"config: {key}: {message}"
+    lines = said(spoil(good, key, value))
+    if key == "include":
+        assert line in lines
+    else:
+        assert lines == [line]
+
+
+REQUIRED = [
+    "radar",
+    "radar.wavelength_m",
+    "radar.sigma_range_m",
+    "radar.sigma_velocity_mps",
+    "radar.scan_period_s",
+    "target",
+    "target.kind",
+    "target.coefficients",
+    "filters",
+    "filters.0.name",
+    "filters.1.observes",
+    "filters.0.manoeuvre_variance",
+    "scans",
+    "realisations",
+]
+RADAR = "name, band, wavelength_m, sigma_range_m, sigma_velocity_mps, scan_period_s, repetition_rate_hz"
+FILTER = "name, observes, manoeuvre_variance, initial_scans"
+TOP = "radar, target, filters, baseline, scans, study, include, sweep, realisations, seed, figures, control_variate"
+UNKNOWN = [
+    ("radar.sigma_rnge_m", f"unknown key; did you mean sigma_range_m? allowed: {RADAR}"),
+    ("filters.0.manoeuver_variance", f"unknown key; did you mean manoeuvre_variance? allowed: {FILTER}"),
+    ("target.coeficients", "unknown key; did you mean coefficients? allowed: kind, coefficients"),
+    ("scan", f"unknown key; did you mean scans? allowed: {TOP}"),
+    ("realizations", f"unknown key; did you mean realisations? allowed: {TOP}"),
+    ("radar.\n\x1b[2J", f"unknown key; allowed: {RADAR}"),
+]
+
+
+@pytest.mark.parametrize("key", REQUIRED)
+def test_required_key(good, said, key):
+    *outer, last = (int(step) if step.isdigit() else step for step in key.split("."))
+    holder = good
+    for step in outer:
+        holder = holder[step]
+    del holder[last]
+    assert said(good) == [f"config: {key}: required key is missing"]
+
+
+@pytest.mark.parametrize(("key", "message"), UNKNOWN)
+def test_unknown_key(good, said, key, message):
+    shown = key.encode("unicode_escape").decode()
+    assert said(spoil(good, key, 1)) == [f"config: {shown}: {message}"]
+
+
+def test_the_contracts_example(house, said):
+    from radarsim.config.lookup import SHIPPED
+
+    text = (SHIPPED / "configs/rls2.yaml").read_text()
+    house("configs/rls2.yaml", text.replace("sigma_range_m: 250", "sigma_range_m: -250"))
+    assert said("configs/rls2.yaml") == ["configs/rls2.yaml:7:18: radar.sigma_range_m: must be > 0, got -250"]
+    assert said("rls2") == ["configs/rls2.yaml:7:18: radar.sigma_range_m: must be > 0, got -250"]
+
+
+def test_all_faults_at_once_each_at_its_place(house, said):
+    text = """
+        study: range_doppler
+        radar:
+          wavelength_m: 0
+          sigma_range: 250
+          sigma_velocity_mps: yes
+          scan_period_s: 10
+        target: {kind: polynomial, coefficients: [1, x]}
+        filters:
+          - {name: r, observes: [range], manoeuvre_variance: 0}
+          - {name: a, observes: [rnge, velocity], manoeuvre_variance: 1e-3}
+        scans: 15.5
+        realisations: true
+        """
+    assert said(house("own.yaml", text)) == [
+        "own.yaml:3:3: radar.sigma_range_m: required key is missing",
+        "own.yaml:3:17: radar.wavelength_m: must be > 0, got 0",
+        f"own.yaml:4:3: radar.sigma_range: unknown key; did you mean sigma_range_m? allowed: {RADAR}",
+        "own.yaml:5:23: radar.sigma_velocity_mps: must be a number, got 'yes'",
+        "own.yaml:7:46: target.coefficients.1: must be a number, got 'x'",
+        "own.yaml:9:54: filters.0.manoeuvre_variance: must be > 0, got 0",
+        "own.yaml:10:26: filters.1.observes.0: must be one of range, velocity, got 'rnge'",
+        "own.yaml:11:8: scans: must be a whole number, got 15.5",
+        "own.yaml:12:15: realisations: must be a whole number, got true",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "at", "limit"),
+    [
+        ("radar.sigma_velocity_mps", 1e9, "radar.sigma_velocity_mps", "_velocity_mps)² must be from 1e-12 to 1e12"),
+        ("radar.sigma_velocity_mps", 1e-9, "radar.sigma_velocity_mps", "_velocity_mps)² must be from 1e-12 to 1e12"),
+        ("filters.0.manoeuvre_variance", 1e12, "filters.0.manoeuvre_variance", "range_m² must be from 1e-28 to 1e12"),
+        ("radar.scan_period_s", 1e-4, "filters.0.manoeuvre_variance", "range_m² must be from 1e-28 to 1e12"),
+        ("radar.sigma_velocity_mps", 5e-5, "filters.1.manoeuvre_variance", "sigma_velocity_mps² must be <= 1e12"),
+    ],
+)
+def test_what_double_precision_cannot_hold_is_refused(good, said, key, value, at, limit):
+    good["filters"][1]["manoeuvre_variance"] = 1.0
+    line, *others = said(spoil(good, key, value))
+    assert all(other.startswith(("config: filters.", "config: target: ")) for other in others)
+    assert line.startswith(f"config: {at}: out of proportion: ")
+    assert limit in line
+
+
+@pytest.mark.filterwarnings("error")
+def test_what_is_accepted_can_be_designed(good):
+    from radarsim.studies import registry
+
+    rng = random.Random(1)
+    prepared = 0
+    for _ in range(100):
+        for key in ("sigma_range_m", "sigma_velocity_mps", "scan_period_s"):
+            good["radar"][key] = 10 ** rng.uniform(-3, 3)
+        for one in good["filters"]:
+            one["manoeuvre_variance"] = 10 ** rng.uniform(-9, 5)
+        try:
+            experiment = load(good)
+        except ConfigError:
+            continue
+        registry.study("range_doppler").prepare(experiment.cases[0])
+        prepared += 1
+    assert prepared > 30
+
+
+def test_filter_names_differ(good, said):
+    good["filters"][1]["name"] = "r"
+    assert said(good) == ["config: filters: names must differ: r is there twice"]
+
+
+def test_at_most_sixteen_filters(good, said):
+    good["filters"] = [{**good["filters"][0], "name": f"f{i}"} for i in range(16)]
+    assert said(good) == []
+    good["filters"].append({**good["filters"][0], "name": "one more"})
+    (line,) = said(good)
+    assert line.startswith("config: filters: must hold at most 16, got [{name: 'f0'")
+
+
+def test_whole_numbers_in_every_notation(good):
+    good.update(scans=1.5e1, realisations=1e5, seed=1e3)
+    case = load(good).cases[0]
+    assert (case.spec.scans, case.realisations, case.seed) == (15, 100_000, 1000)
+    assert all(type(n) is int for n in (case.spec.scans, case.realisations, case.seed))
+
+
+def test_defaults(good):
+    case = load(good).cases[0]
+    assert case.seed == 1
+    assert case.spec.radar.repetition_rate_hz == 1000.0
+    assert [f.initial_scans for f in case.spec.filters] == [3, 2]
+    assert case.spec.baseline is None
+
+
+def test_longest_and_shortest(good):
+    good["filters"][0]["initial_scans"] = 7
+    good["scans"] = 7
+    assert load(good).cases[0].spec.filters[0].initial_scans == 7
+    good["scans"] = 100_000
+    assert load(good).cases[0].spec.scans == 100_000

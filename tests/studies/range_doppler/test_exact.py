@@ -1,0 +1,150 @@
+"""Exact errors of the linear filters: against an outside calculation, algebra, and limits."""
+
+import numpy as np
+import pytest
+
+from radarsim.physics import targets
+from radarsim.physics.motion import transition
+from radarsim.studies.range_doppler.exact import error_recursion, steady_state
+from radarsim.studies.range_doppler.filters import design, least_squares_start, observation
+
+RADARS = {"rls1": (25, 5, 10), "rls2": (250, 15, 10), "rls3": (250, 15, 5), "rls4": (50, 1, 10), "rls5": (50, 1, 5)}
+START = {1: 3, 2: 2}
+
+
+def sigmas(radar, observes, variance=1e-3, scans=15, coefficients=(1e5, -250.0, 4.0)):
+    """Exact bias (K, 3) and σ (K, 3) of a radar's filter."""
+    *sigma, dt = RADARS[radar]
+    sigma = np.array(sigma, dtype=float)
+    made = design(observes, START[observes], variance, sigma, dt, scans)
+    x = targets.polynomial(coefficients, np.arange(scans) * dt)
+    bias, covariance = error_recursion(made.weights, made.gains, observes, x, sigma, dt)
+    return bias, np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)), made
+
+
+# From a calculation by another program: radar, filter, D_M, k, σ_r (m), σ_V (m/s), σ_a (m/s²).
+OUTSIDE = [
+    ("rls1", 1, 0.0001, 4, 24.36698589, 3.913121958, 0.2500037329),
+    ("rls1", 1, 0.001, 7, 22.92643047, 2.786164407, 0.1739554374),
+    ("rls1", 1, 0.01, 5, 23.97365971, 4.434593862, 0.4531922831),
+    ("rls1", 1, 0.001, 15, 22.93971175, 2.734737655, 0.1680410921),
+    ("rls1", 2, 0.0001, 4, 21.44923771, 2.700968809, 0.1670624167),
+    ("rls1", 2, 0.001, 7, 21.08515503, 2.436890294, 0.178429391),
+    ("rls1", 2, 0.01, 5, 21.40847253, 3.404960819, 0.4455435074),
+    ("rls1", 2, 0.001, 15, 21.07992477, 2.423337125, 0.1777127122),
+    ("rls2", 1, 0.0001, 4, 243.6698586, 39.13118961, 2.500000004),
+    ("rls2", 1, 0.001, 7, 218.2281655, 17.04707822, 0.5475353504),
+    ("rls2", 1, 0.01, 5, 235.283147, 27.88112069, 1.339663334),
+    ("rls2", 1, 0.001, 15, 189.3437389, 9.883065557, 0.2599204319),
+    ("rls2", 2, 0.0001, 4, 159.382846, 11.54308938, 0.647909883),
+    ("rls2", 2, 0.001, 7, 157.2882415, 8.537999348, 0.2882934311),
+    ("rls2", 2, 0.01, 5, 158.1676934, 10.71835871, 0.6349685713),
+    ("rls2", 2, 0.001, 15, 154.70673, 7.615483011, 0.2562505753),
+    ("rls3", 1, 0.0001, 4, 243.6698586, 78.26237921, 10),
+    ("rls3", 1, 0.001, 7, 218.2178928, 34.06926352, 2.182180929),
+    ("rls3", 1, 0.01, 5, 235.2809876, 55.7417566, 5.3452282),
+    ("rls3", 1, 0.001, 15, 170.4854702, 11.33401406, 0.3151735222),
+    ("rls3", 2, 0.0001, 4, 136.9137617, 12.24832736, 1.329726682),
+    ("rls3", 2, 0.001, 7, 124.1875019, 9.560046398, 0.5490928235),
+    ("rls3", 2, 0.01, 5, 129.8429622, 11.20004567, 0.9372707692),
+    ("rls3", 2, 0.001, 15, 120.4860665, 6.195684952, 0.1939480391),
+    ("rls4", 1, 0.0001, 4, 48.73397173, 7.826238296, 0.5000004668),
+    ("rls4", 1, 0.001, 7, 44.21899629, 4.052534242, 0.1923935267),
+    ("rls4", 1, 0.01, 5, 47.2184621, 6.298284118, 0.4546347275),
+    ("rls4", 1, 0.001, 15, 43.81226442, 4.0462822, 0.1918540135),
+    ("rls4", 2, 0.0001, 4, 26.15857354, 0.8372105486, 0.05741650711),
+    ("rls4", 2, 0.001, 7, 22.37053945, 0.9209285833, 0.1293355526),
+    ("rls4", 2, 0.01, 5, 24.53969113, 0.9784829625, 0.2815522307),
+    ("rls4", 2, 0.001, 15, 20.91510801, 0.9208438431, 0.1292880191),
+    ("rls5", 1, 0.0001, 4, 48.73397172, 15.65247584, 2),
+    ("rls5", 1, 0.001, 7, 43.64389957, 6.814630678, 0.4366851898),
+    ("rls5", 1, 0.01, 5, 47.0562643, 11.14898497, 1.069461288),
+    ("rls5", 1, 0.001, 15, 35.98558263, 3.157960652, 0.1419148076),
+    ("rls5", 2, 0.0001, 4, 25.30094242, 0.8343365248, 0.08954159168),
+    ("rls5", 2, 0.001, 7, 19.869118, 0.7864811418, 0.09794034334),
+    ("rls5", 2, 0.01, 5, 22.89992958, 0.9066973443, 0.2202627137),
+    ("rls5", 2, 0.001, 15, 16.02713655, 0.7862479252, 0.09708078126),
+]
+
+
+@pytest.mark.parametrize(("radar", "observes", "variance", "k", "r", "v", "a"), OUTSIDE)
+def test_agrees_with_an_outside_calculation(radar, observes, variance, k, r, v, a):
+    _, sigma, _ = sigmas(radar, observes, variance)
+    np.testing.assert_allclose(sigma[k - 1], [r, v, a], rtol=2e-9)
+
+
+@pytest.mark.parametrize("radar", RADARS)
+def test_first_estimates_are_the_papers_closed_forms(radar):
+    """σ_a(3) = √6 σ_r/Δt² and σ_V(3) = √26/2 σ_r/Δt for range alone; σ_a(2) = √2 σ_V/Δt with velocity."""
+    sr, sv, dt = RADARS[radar]
+    _, alone, _ = sigmas(radar, 1)
+    _, both, _ = sigmas(radar, 2)
+    assert alone[2] == pytest.approx([sr, np.sqrt(26) / 2 * sr / dt, np.sqrt(6) * sr / dt**2], rel=1e-12)
+    assert both[1, 2] == pytest.approx(np.sqrt(2) * sv / dt, rel=1e-12)
+    assert both[0, :2] == pytest.approx([sr, sv], rel=1e-15)
+
+
+def test_range_after_two_scans_with_velocity():
+    expected = {"rls1": 21.65, "rls2": 183.93, "rls3": 178.71, "rls4": 35.53, "rls5": 35.40}
+    for radar, value in expected.items():
+        assert sigmas(radar, 2)[1][1, 0] == pytest.approx(value, abs=0.005)
+
+
+@pytest.mark.parametrize("observes", [1, 2])
+@pytest.mark.parametrize("radar", RADARS)
+def test_settles_to_the_steady_state(radar, observes):
+    *sigma, dt = RADARS[radar]
+    believed, true = steady_state(observes, 1e-3, np.array(sigma, dtype=float), dt)
+    _, far, made = sigmas(radar, observes, scans=400)
+    np.testing.assert_allclose(far[-1], np.sqrt(np.diag(true)), rtol=1e-7)
+    np.testing.assert_allclose(made.believed[-1], believed, rtol=1e-7)
+
+
+def test_a_quadratic_truth_leaves_no_bias_and_a_cubic_one_does():
+    *_, dt = RADARS["rls2"]
+    quadratic, _, _ = sigmas("rls2", 1, scans=40)
+    assert np.abs(quadratic).max() < 1e-6
+    cubic, _, made = sigmas("rls2", 1, scans=400, coefficients=(1e5, -250.0, 4.0, 0.01))
+    # Steady bias of a constant jerk: b = (I - KH)(B b - j (dt³/6, dt²/2, dt)).
+    kept = np.eye(3) - made.gains[-1, :, :1] @ observation(1)
+    defect = 0.01 * np.array([dt**3 / 6, dt**2 / 2, dt])
+    steady = np.linalg.solve(np.eye(3) - kept @ transition(dt), -kept @ defect)
+    np.testing.assert_allclose(cubic[-1], steady, rtol=1e-5)
+
+
+def test_believed_covariance_without_manoeuvre_variance_is_the_true_one():
+    """With D_M = 0 the filter is least squares over all plots, and what it believes is so."""
+    sigma = np.array([250.0, 15.0])
+    for observes in (1, 2):
+        made = design(observes, START[observes], 0.0, sigma, 10.0, 15)
+        x = targets.polynomial([1e5, -250.0, 4.0], np.arange(15) * 10.0)
+        _, covariance = error_recursion(made.weights, made.gains, observes, x, sigma, 10.0)
+        # Down to the rounding of the start, whose largest terms cancel.
+        np.testing.assert_allclose(made.believed[1:], covariance[1:], rtol=1e-9, atol=1e-12)
+        _, batch = least_squares_start(observes, 15, sigma, 10.0)
+        np.testing.assert_allclose(covariance[-1], batch, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("observes", "n"), [(1, 3), (1, 7), (2, 2), (2, 5)])
+def test_start_weights_return_a_polynomial_exactly(observes, n):
+    dt = 10.0
+    weights, _ = least_squares_start(observes, n, np.array([25.0, 5.0]), dt)
+    x = targets.polynomial([3e4, 120.0, -2.0], np.arange(n) * dt)
+    np.testing.assert_allclose(np.einsum("ijk,kj->i", weights, x[:, :2]), x[-1], rtol=1e-9, atol=1e-9)
+    assert not weights[:, observes:].any()
+
+
+@pytest.mark.parametrize("observes", [1, 2])
+@pytest.mark.parametrize("variance", [1e-2, 1e-9, 1e-16])
+def test_steady_state_of_fast_radars_with_long_memory(observes, variance):
+    """A filter whose memory is hundreds of scans and more: its closed form, in the limit of continuous plots of range.
+
+    A jerk of variance D held for dt has the spectral density D·dt, plots have σ²·dt: its poles are those of the
+    third-order Butterworth filter of ω = (D/σ²)^(1/6), its transfer function (2ω s² + 2ω² s + ω³) over their product,
+    and the variance that it leaves of the plots' noise is 5/3·ω·σ²·dt (Parseval).
+    """
+    dt, sigma = 0.01, np.array([50.0, 1e6])
+    _, true = steady_state(observes, variance, sigma, dt)
+    omega = (variance / sigma[0] ** 2) ** (1 / 6)
+    assert omega * dt < 0.01
+    assert true[0, 0] == pytest.approx(5 / 3 * omega * dt * sigma[0] ** 2, rel=3 * omega * dt + 1e-4)

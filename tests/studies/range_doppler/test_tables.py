@@ -1,0 +1,269 @@
+"""P1's own tables against what is known, and its figures against the tables."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from radarsim.report import statistics, tables
+from radarsim.report.drawing import Line, Style
+from radarsim.studies.range_doppler import tables as range_doppler
+from radarsim.studies.range_doppler import words as range_doppler_words
+
+
+def made_of(results):
+    return {"curves": tables.curves(results), "gains": tables.gains(results), **range_doppler.tables(results)}
+
+
+def drawn_of(results, made=None):
+    """Its figures, each showing every case."""
+    everything = SimpleNamespace(shown_in=lambda name: [SimpleNamespace(name=r.name) for r in results])
+    return range_doppler.figures(results, made or made_of(results), everything)
+
+
+def steady_row(table, case, name, component="r"):
+    rows = table[(table["case"] == case) & (table["filter"] == name) & (table["component"] == component)]
+    return rows.iloc[0]
+
+
+# The paper's own D_M: settling of σ_r in scan periods, range only and with Doppler.
+@pytest.mark.parametrize(
+    ("case", "name", "periods"),
+    [
+        ("rls1", "r", 4),
+        ("rls2", "r", 9),
+        ("rls3", "r", 19),
+        ("rls5", "r", 11),
+        ("rls4", "r+Vr", 7),
+        ("rls5", "r+Vr", 15),
+    ],
+)
+def test_settling_of_the_papers_radars(paper, case, name, periods):
+    row = steady_row(range_doppler.steady(paper), case, name)
+    assert row["settling_periods"] == periods
+    assert row["settling_lo_s"] <= row["settling_s"] <= row["settling_hi_s"]
+    assert row["under_10_periods"] == (periods < 10)
+
+
+def test_steady_values_over_the_manoeuvre_variance(swept):
+    table = range_doppler.steady(swept)
+    rows = table[table["component"] == "r"]
+    for name, values in (("r", (142, 165, 189, 211, 229)), ("r+Vr", (134, 147, 155, 157, 158.5))):
+        np.testing.assert_allclose(rows[rows["filter"] == name]["steady_sigma"], values, atol=0.51)
+    best = rows[rows["best"]].set_index("filter")["manoeuvre_variance"]
+    assert best["r"] == 1e-3
+    assert best["r+Vr"] == 1e-3
+
+
+def test_no_best_where_nothing_is_compared(paper):
+    assert not range_doppler.steady(paper)["best"].any()
+
+
+def test_settling_for_good():
+    t = np.arange(6) * 10.0
+    value = np.array([2.0, 1.02, 1.2, 1.04, 1.0, 1.0])
+    exact = statistics.Estimate(value, value, value)
+    assert range_doppler.settling(exact, t, 1.0) == (30.0, 30.0, 30.0)
+    wide = statistics.Estimate(value, value - 0.02, value + 0.02)
+    assert range_doppler.settling(wide, t, 1.0) == (30.0, 30.0, 40.0)
+    never = statistics.Estimate(value + 1, value + 1, value + 1)
+    assert range_doppler.settling(never, t, 1.0).value == np.inf
+
+
+def test_radar_table(paper):
+    table = range_doppler.radar(paper)
+    np.testing.assert_allclose(table["C_theta"], [0.25, 25 / 9, 100 / 9, 25, 100])
+    np.testing.assert_allclose(table["doppler_hz"], [1000 / 3, 4000, 4000, 20000, 20000])
+    np.testing.assert_allclose(table["unambiguous_velocity_mps"], [900, 75, 75, 15, 15])
+
+
+def test_consistency_before_the_filter_adds_manoeuvre(paper):
+    """At its least-squares start a filter is right about itself; later it allows for manoeuvres that are not there."""
+    table = range_doppler.consistency(paper)
+    start = table[(table["filter"] == "r") & (table["k"] <= 3)]
+    np.testing.assert_allclose(start["nees"], 1, rtol=1e-9)
+    np.testing.assert_allclose(start["ratio"], 1, rtol=1e-9)
+    assert set(start["nees_verdict"]) == {"consistent"}
+    late = table[table["k"] >= 6]
+    assert set(late["nees_verdict"]) == {"pessimistic"}
+    assert (late["ratio"] >= 1 - 1e-9).all()
+
+
+def test_bounds_of_the_normalised_error(paper):
+    from scipy.special import chdtri
+
+    of = range_doppler.normalised_error(paper[0])
+    freedom = 3 * paper[0].count
+    share = 0.025 / 15  # of fifteen scans
+    assert of.lo[0, 5] == pytest.approx(chdtri(freedom, 1 - share) / freedom, rel=1e-7)
+    assert of.hi[0, 5] == pytest.approx(chdtri(freedom, share) / freedom, rel=1e-7)
+
+
+def test_figures_have_the_contracts_names(paper, swept):
+    names = {f"{kind}_{component}" for kind in ("sigma", "gain") for component in ("r", "Vr", "ar")} | {"consistency"}
+    assert set(drawn_of(paper)) == names
+    assert set(drawn_of(swept)) == names | {"settling"}
+
+
+def test_sigma_figures_draw_the_table(paper):
+    made = made_of(paper)
+    rows = tables.groups(made["curves"], "case", "filter", "component")
+    figure = drawn_of(paper, made)["sigma_Vr"]
+    assert [panel.title for panel in figure.panels] == [f"RLS {n}" for n in range(1, 6)]
+    for panel, result in zip(figure.panels, paper, strict=True):
+        lines = [mark for mark in panel.marks if isinstance(mark, Line)]
+        assert [line.label for line in lines] == list(result.axes.filters)
+        for line in lines:
+            own = rows[result.name, line.label, "Vr"]
+            for drawn, column in (
+                *((line.x, "t_s"), (line.y, "sigma"), (line.lo, "sigma_lo"), (line.hi, "sigma_hi")),
+                (line.exact, "exact_sigma"),
+            ):
+                np.testing.assert_array_equal(drawn, own[column])
+
+
+def test_gain_figures_draw_the_table(paper):
+    made = made_of(paper)
+    rows = tables.groups(made["gains"], "case", "component")
+    (panel,) = drawn_of(paper, made)["gain_ar"].panels
+    lines = [mark for mark in panel.marks if isinstance(mark, Line)]
+    assert [line.label for line in lines] == [f"RLS {n}" for n in range(1, 6)]
+    for line, result in zip(lines, paper, strict=True):
+        np.testing.assert_array_equal(line.y, rows[result.name, "ar"]["gain_percent"])
+        np.testing.assert_array_equal(line.x, rows[result.name, "ar"]["t_s"])
+
+
+def test_consistency_figure_draws_the_table(paper):
+    made = made_of(paper)
+    first, second = drawn_of(paper, made)["consistency"].panels
+    assert (first.title, second.title) == ("r", "r+Vr")
+    rows = tables.groups(made["consistency"], "case", "filter", "component")
+    lines = [mark for mark in second.marks if isinstance(mark, Line)]
+    for line, result in zip(lines, paper, strict=True):
+        np.testing.assert_array_equal(line.y, rows[result.name, "r+Vr", "r"]["nees"])
+
+
+def test_settling_figure_draws_the_table(swept):
+    made = made_of(swept)
+    (panel,) = drawn_of(swept, made)["settling"].panels
+    (line,) = [mark for mark in panel.marks if isinstance(mark, Line) and mark.style == Style(1, 1, 1)]
+    rows = made["steady"][(made["steady"]["filter"] == "r+Vr") & (made["steady"]["component"] == "r")]
+    np.testing.assert_array_equal(line.y, rows["steady_sigma"])
+    np.testing.assert_array_equal(line.x, rows["settling_s"])
+
+
+def test_dynamic_error_is_drawn_where_there_is_one(expected_radar):
+    target = {"kind": "jerk_pulse", "coefficients": [1e5, -250], "start_s": 50, "jerk_mps3": 1, "duration_s": 20}
+    results = [expected_radar("rls2", target=target)]
+    made = made_of(results)
+    (panel,) = drawn_of(results, made)["dynamic_r"].panels
+    rows = tables.groups(made["curves"], "filter", "component")["r", "r"]
+    bias, spread = [mark for mark in panel.marks if isinstance(mark, Line)][:2]
+    np.testing.assert_array_equal(bias.y, rows["bias"])
+    np.testing.assert_array_equal(spread.y, rows["spread"])
+    np.testing.assert_allclose(rows["bias"], results[0].axes.exact_bias[0, :, 0], atol=1e-6)
+
+
+def test_answer_tells_the_last_gain_of_each_component(paper):
+    made = made_of(paper[1:2])
+    told = range_doppler.answer(paper[1:2], made)
+    assert len(told) == 3
+    assert "at 140 s, the last scan, σ is 18.3 % [" in told[0]
+    assert "than with range alone" in told[0]
+    assert "at best 34.6 % [" in told[0]
+    assert "RLS 1" in range_doppler.answer(paper, made_of(paper))[2]
+    assert "higher (RLS 1)" in range_doppler.answer(paper, made_of(paper))[2]
+
+
+def test_answer_names_a_baseline_that_observes_more(expected_radar):
+    velocity = [
+        {"name": f"D {v}", "observes": ["range", "velocity"], "manoeuvre_variance": v, "initial_scans": 3}
+        for v in (1e-3, 1e-2)
+    ]
+    results = [expected_radar("rls2", filters=velocity)]
+    assert "than with filter 'D 0.001'" in range_doppler.answer(results, made_of(results))[0]
+
+
+def test_inputs_have_a_row_for_each_radar_that_differs(expected_radar, swept):
+    values = (1, 4, 16)
+    results = [
+        expected_radar("rls2", name=f"rls2 radar.sigma_velocity_mps={v}", radar={"sigma_velocity_mps": v})
+        for v in values
+    ]
+    table = range_doppler.inputs(results)
+    assert list(table["σ_V, m/s"]) == list(values)
+    np.testing.assert_array_equal(table["C_θ"], range_doppler.radar(results)["C_theta"])
+    (row,) = range_doppler.inputs(swept).to_dict("records")
+    assert row["D_M, (m/s³)²"] == "10⁻⁵, 10⁻⁴, 10⁻³, 10⁻², 10⁻¹"
+
+
+BRAKING = {"kind": "acceleration_start", "coefficients": [1e5, -250], "start_s": 50, "acceleration_mps2": 20}
+
+
+def greatest_loss(made):
+    rows = made["gains"][made["gains"]["component"] == "r"]
+    row = rows.loc[rows["gain_percent"].idxmin()]
+    assert row["gain_hi"] < -10
+    words = f"; at worst {-row['gain_percent']:.1f} % [{-row['gain_hi']:.1f}, {-row['gain_lo']:.1f}] higher"
+    return f"{words}, at {row['t_s']:g} s"
+
+
+def test_answer_tells_the_greatest_loss(expected_radar):
+    """One case, and the one of several that is no case of the last scan's ends."""
+    sharp = {"sigma_range_m": 80, "sigma_velocity_mps": 4, "scan_period_s": 6}
+    results = [expected_radar("rls2", 1e-4, target=BRAKING, radar=sharp)]
+    made = made_of(results)
+    words = greatest_loss(made)
+    assert range_doppler.answer(results, made)[0].endswith(f"{words}.")
+    others = [expected_radar("rls2", name="calm"), expected_radar("rls5", name="fine"), *results]
+    made = made_of(others)
+    words = greatest_loss(made)
+    assert range_doppler.answer(others, made)[0].endswith(f"{words}, with RLS 2.")
+
+
+def test_answer_is_silent_of_a_loss_that_is_none(paper):
+    one = paper[3:4]
+    made = made_of(one)
+    first = made["gains"][made["gains"]["component"] == "r"]
+    assert (first["gain_hi"] > -1).all()
+    assert "at worst" not in range_doppler.answer(one, made)[0]
+
+
+@pytest.mark.parametrize(
+    ("gain", "words"),
+    [
+        ((0.03, 0.01, 0.04), "no lower nor higher by 0.1 %"),
+        ((-0.01, -0.04, 0.02), "no lower nor higher by 0.1 %"),
+        ((-0.04, -0.2, 0.1), "neither lower nor higher for certain (gain 0.0 % [−0.2, 0.1])"),
+        ((-0.4, -0.8, -0.01), "0.4 % [0.0, 0.8] higher"),
+        ((33.04, 32.7, 33.4), "33.0 % [32.7, 33.4] lower"),
+    ],
+)
+def test_a_gain_in_words(gain, words):
+    row = dict(zip(("gain_percent", "gain_lo", "gain_hi"), gain, strict=True))
+    assert range_doppler_words._gain(row) == words
+
+
+def test_answer_tells_the_best_variance(swept):
+    told = range_doppler.answer(swept, made_of(swept))[0]  # before the gains: it is what is asked
+    assert told.startswith("Best manoeuvre variance D_M")
+    assert "RLS 2: r 10⁻³ (σ 189.1 m, settled after 90 s); r+Vr 10⁻³ (σ 154." in told
+
+
+def test_a_target_that_breaks_the_model(expected_radar):
+    target = {"kind": "jerk_pulse", "coefficients": [1e5, -250], "start_s": 50, "jerk_mps3": 1, "duration_s": 20}
+    results = [expected_radar("rls2", target=target)]
+    made = made_of(results)
+    assert made["steady"].empty
+    rows = made["curves"][(made["curves"]["component"] == "r") & (made["curves"]["filter"] == "r")]
+    worst = rows.loc[rows["sigma"].idxmax()]
+    told = range_doppler.answer(results, made)[-1]
+    assert f"r worst σ of the range {worst['sigma']:.4g} m [" in told
+    assert f"at {worst['t_s']:g} s, largest bias " in told
+
+
+def test_answer_of_a_single_filter(expected_radar):
+    one = {"name": "only", "observes": ["range"], "manoeuvre_variance": 1e-3}
+    results = [expected_radar("rls2", filters=[one])]
+    (sentence,) = range_doppler.answer(results, made_of(results))
+    assert "only: σ of the range at 140 s is 189.3 m" in sentence

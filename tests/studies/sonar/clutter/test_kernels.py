@@ -1,0 +1,152 @@
+"""Trackers among false plots: against a textbook twin on the same plots, against the plain filter to the last bit."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from radarsim.app.configs import load
+from radarsim.kernels import random
+from radarsim.studies.sonar import study
+from radarsim.studies.sonar.clutter import filters as design
+from radarsim.studies.sonar.clutter import track as plots
+from radarsim.studies.sonar.clutter.kernels import tracker as kernels
+from tests.studies.sonar.clutter import naive as naive
+
+T, SIGMA = 5.0, np.array([30.0, np.radians(1)])
+
+
+def tracker(association, gate=0.99, m=2, n=3, variance=1e-3, **more):
+    rules = {"gate_probability": gate, "initiation": {"m": m, "n": n}, "manoeuvre_variance": variance}
+    return {"name": association, "kind": "kalman", "association": association, **rules, **more}
+
+
+def config(filters, density=0.0, detection=1.0, scans=30, **sensor):
+    return {
+        "study": "sonar",
+        "sensor": {
+            **{"sigma_range_m": 30.0, "sigma_bearing_deg": 1.0, "scan_period_s": T},
+            **{"detection_probability": detection, "false_plots_per_km2": density},
+            **{"sector": {"range_m": [7e3, 11e3], "bearing_deg": [5, 40]}},
+            **sensor,
+        },
+        "target": "sonar_straight",
+        "filters": filters,
+        "scans": scans,
+        "realisations": 10,
+    }
+
+
+def prepared(*of, **more):
+    case = load(config(*of, **more)).cases[0]
+    return case, study.prepare(case)
+
+
+def sums_of(plan, first, count=1):
+    return plan.layout.unpack(study.simulate(plan, first, count))
+
+
+@pytest.mark.parametrize("density", [0.0, 1.0, 5.0])
+def test_estimates_are_the_twins(density):
+    """Nearest plot and PDA, with misses, drops and losses, realisation by realisation to 1e-10 of σ."""
+    filters = [tracker("nearest"), tracker("pda"), tracker("pda", 0.9, 3, 4, 1e-2, drop_after_misses=2, name="other")]
+    case, plan = prepared(filters, density=density, detection=0.8)
+    wanted, t, compared = plots.chosen(case.spec), plan.axes.t_s, 0
+    for realisation in (0, 1, 2, 3, 511, 70_000):
+        sums = sums_of(plan, realisation)
+        z, true = plots.target_plots(plan.world, plan.sight, realisation)
+        false = [plots.false_plots(plan.field, realisation, k).T for k in range(len(t))]
+        for f, choice in enumerate(wanted):
+            gate = design.gate_threshold(choice.gate_probability)
+            of = (choice, SIGMA, 0.8, choice.gate_probability, gate, density / 1e6, T)
+            for k, (state, x, P) in enumerate(naive.follow(t, z, false, true, *of)):
+                assert sums["counts"][f, k, kernels.KEPT] == (state == 2)
+                assert sums["counts"][f, k, kernels.TRYING] == (state == 1)
+                if state == 2:
+                    error = x - plan.axes.extra["truth"][k, :, :2].ravel()
+                    unit = np.sqrt(np.diag(P))
+                    assert np.abs((sums["error"][f, k, :, 0] - error) / unit).max() < 1e-10
+                    assert sums["believed"][f, k] == pytest.approx(unit**2, rel=1e-10)
+                    compared += 1
+    assert compared > 200
+
+
+def test_without_clutter_trackers_are_the_plain_filter_to_the_last_bit():
+    """With open gates and with closed ones that no plot misses: the oracle's filter, and the study's own kernel."""
+    for gate in (1.0, 1 - 1e-12):
+        filters = [tracker("known", gate), tracker("nearest", gate), tracker("pda", gate)]
+        _, plan = prepared(filters)
+        case = load(config([{"name": "plain", "kind": "kalman", "manoeuvre_variance": 1e-3}], detection=0.5)).cases[0]
+        plain = study.prepare(case)
+        plain = dataclasses.replace(
+            plain,
+            world=plain.world._replace(plots=plan.world.plots, motion=plan.world.motion),
+            sight=plain.sight._replace(certain=np.ones(30, dtype=np.int64)),
+        )
+        for realisation in (0, 5, 12345):
+            error = sums_of(plan, realisation)["error"][..., 0]
+            assert (error[1] == error[0]).all()
+            assert (error[2] == error[0]).all()
+            own = sums_of(plain, realisation)["error"][0, :, :, 0]
+            assert (own[1:] == error[0, 1:]).all()
+
+
+def test_a_lone_plot_is_certain_for_nearest_whatever_the_gate_and_density():
+    """Open gate, false plots expected but none there: the nearest plot is the plain filter; PDA doubts it."""
+    _, plan = prepared([tracker("known", 1.0), tracker("nearest", 1.0), tracker("pda", 0.999)])
+    doubting = dataclasses.replace(plan, trackers=plan.trackers._replace(density=5e-6))
+    error = sums_of(doubting, 3)["error"][..., 0]
+    assert (error[1, 2:] == error[0, 2:]).all()
+    assert np.abs(error[2, 5:] - error[0, 5:]).max() > 1e-6
+
+
+def test_the_field_is_poisson_and_even_in_area():
+    """Numbers in a sector, over realisations, and places of their plots, against their laws."""
+    _, plan = prepared([tracker("pda")], density=2.0)
+    area = plan.axes.extra["area_m2"]
+    found = [plots.false_plots(plan.field, i, 3) for i in range(2000)]
+    number = np.array([one.shape[1] for one in found])
+    mean = 2e-6 * area
+    assert abs(number.mean() - mean) < 3.9 * np.sqrt(mean / 2000)
+    assert abs(number.var() / mean - 1) < 3.9 * np.sqrt(2 / 2000)
+    r, b = np.concatenate(found, axis=1)
+    for values, low, high in ((r**2, 49e6, 121e6), (b, np.radians(5), np.radians(40))):
+        u = np.sort((values - low) / (high - low))
+        distance = np.abs(u - (np.arange(u.size) + 0.5) / u.size).max()
+        assert distance < 2.2 / np.sqrt(u.size)  # Kolmogorov: exceeded once in 10⁴
+
+
+def test_a_full_circle_has_no_seam():
+    """A target on the seam of a full circle is tracked among as many false plots as elsewhere."""
+    target = {"kind": "polynomial", "frame": "polar", "range_m": [9e3, -4.0], "bearing_deg": [0.0, 0.0]}
+    counts = []
+    for first in (0.0, -180.0):
+        one = config([tracker("known")], density=2.0)
+        one["target"], one["sensor"]["sector"] = target, {"range_m": [7e3, 11e3], "bearing_deg": [first, first + 360]}
+        plan = study.prepare(load(one).cases[0])
+        found = sums_of(plan, 0, 512)["counts"][0]
+        assert found[2:, kernels.PLOTS].sum() == 512 * 28
+        counts.append(found[:, kernels.FALSE].sum() / found[:, kernels.EXPECTED].sum())
+        expected = found[:, kernels.EXPECTED].sum()
+    assert np.abs(np.array(counts) - 1).max() < 3.9 / np.sqrt(expected)
+
+
+def test_blocks_add_up_and_realisations_are_themselves():
+    _, plan = prepared([tracker("nearest"), tracker("pda")], density=2.0, detection=0.8, scans=12)
+    whole = sums_of(plan, 0, 700)
+    parts = [sums_of(plan, *part) for part in ((0, 130), (130, 570))]
+    for name, values in whole.items():
+        assert parts[0][name] + parts[1][name] == pytest.approx(values, rel=1e-9, abs=1e-9)
+    assert whole["begun"][:, 0, 0].tolist() == [700, 700]
+
+
+def test_cells_have_draws_of_their_own():
+    """No two cells or scans share a draw: the numbers of neighbouring draws differ in the first word."""
+    words = set()
+    x, y = np.empty(1, dtype=np.uint64), np.empty(1, dtype=np.uint64)
+    key = random.stream(1, "field")
+    for scan in range(3):
+        for cell in range(10):
+            random.fill_words(key, 0, (scan * 10 + cell) << 12, x, y)
+            words.add(int(x[0]))
+    assert len(words) == 30

@@ -1,0 +1,115 @@
+"""Tables and figures of tracks among false plots: what they say of the sums, and that their intervals cover."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import radarsim
+from radarsim.studies.sonar.clutter import tables as report
+
+
+def config(**more):
+    rules = {"kind": "kalman", "manoeuvre_variance": 1e-4}
+    return {
+        "study": "sonar",
+        "sensor": {
+            **{"sigma_range_m": 30.0, "sigma_bearing_deg": 1.0, "scan_period_s": 5.0, "detection_probability": 0.8},
+            "sector": {"range_m": [5e3, 12e3], "bearing_deg": [0, 40]},
+        },
+        "target": "sonar_straight",
+        "filters": [
+            {"name": "nearest", "association": "nearest", "initiation": {"m": 2, "n": 3}, **rules},
+            {"name": "PDA", "association": "pda", **rules},
+            {"name": "told", "association": "known", **rules},
+        ],
+        "scans": 16,
+        "sweep": {"sensor.false_plots_per_km2": [0.0, 1.0, 2.0]},
+        "realisations": 2000,
+    } | more
+
+
+@pytest.fixture(scope="module")
+def result():
+    return radarsim.run(config())
+
+
+def test_tables_say_what_the_sums_hold(result):
+    tracks, tracking, gates = (result.tables[name] for name in ("tracks", "tracking", "gates"))
+    assert len(tracks) == 3 * 2 * 16
+    assert len(tracking) == 6
+    case = result.cases[2]
+    counts = case.sums["counts"][1]
+    rows = tracks[(tracks["case"] == case.name) & (tracks["filter"] == "PDA")]
+    assert rows["kept"].to_numpy() == pytest.approx(counts[:, report.KEPT] / 2000)
+    assert rows["lost"].sum() == counts[:, report.LOST].sum()
+    row = tracking[(tracking["case"] == case.name) & (tracking["filter"] == "PDA")].iloc[0]
+    held = counts[:, report.KEPT].sum() * 5.0
+    ends = counts[:, [report.LOST, report.DROPPED]].sum()
+    assert row["life_s"] == pytest.approx(held / ends)
+    assert row["ends_per_hour"] == pytest.approx(3600 * ends / held)
+    assert row["life_lo"] < row["life_s"] < row["life_hi"]
+    area = np.radians(40) * (144 - 25) / 2  # km²
+    assert row["false_tracks_per_hour"] == pytest.approx(2.0 * area * 720 * row["false_confirmed"])
+    assert set(gates["filter"]) == {"nearest", "PDA", "told"}
+    known = gates[(gates["filter"] == "told")]
+    assert (known["false_lo"] <= known["exact_false_in_gate"] * 1.2).all()
+    assert result.gains.empty
+
+
+def test_without_false_plots_there_are_no_false_tracks(result):
+    clean = result.tables["tracking"].iloc[:2]
+    assert (clean[["false_tracks_per_hour", "false_confirmed", "wrong_share"]] == 0).all().all()
+    assert (clean["exact_false_confirmed"] == 0).all()
+
+
+def test_exact_share_of_false_pairs_stands_beside_the_measured_one(result):
+    rows = result.tables["tracking"]
+    pairs = rows[(rows["filter"] == "nearest") & (rows["false_plots_per_km2"] > 0)]
+    assert np.isfinite(pairs["exact_false_confirmed"]).all()
+    off = (pairs["false_confirmed"] - pairs["exact_false_confirmed"]).abs()
+    assert (off < 4 * np.sqrt(0.25 / 2000)).all()
+    assert rows[rows["filter"] == "PDA"].iloc[1:]["exact_false_confirmed"].isna().all()
+
+
+def test_classes_fall_with_the_threshold_and_keep_the_bound(result):
+    for _, rows in result.tables["track_classes"].groupby(["case", "filter"]):
+        assert (np.diff(rows["true_called_false"]) >= 0).all()
+        if (rows["n_false"] > 0).all():
+            assert (np.diff(rows["false_called_true"]) <= 0).all()
+            assert (rows["false_lo"] <= rows["bound"]).all()
+
+
+def test_figures_are_those_of_the_experiment(result):
+    names = {"track_map", "confirmation", "track_life", "false_tracks", "track_classes", "sigma_r"}
+    assert names <= set(result.figures)
+    for name in names:
+        assert result.figure(name) is not None
+
+
+def test_intervals_of_a_ratio_and_of_a_poisson_number_cover():
+    rng, inside, n = np.random.default_rng(5), 0, 200
+    for _ in range(1000):
+        held = rng.poisson(30, n) + 1.0
+        ends = rng.poisson(0.02 * held)
+        sums = [ends.sum(), (ends**2).sum(), held.sum(), (held**2).sum(), (ends * held).sum()]
+        of = report.ratio(np.array(sums, dtype=float), n)
+        inside += of.lo <= 0.02 <= of.hi
+    assert inside >= stats.binom.ppf(5e-5, 1000, 0.94)
+    count = rng.poisson(7.0, 20_000)
+    of = report.poisson(count, 1.0)
+    assert np.mean((of.lo <= 7.0) & (of.hi >= 7.0)) >= 0.95 - 3.9 * np.sqrt(0.05 * 0.95 / 20_000)
+    assert of.lo == pytest.approx(stats.chi2.ppf(0.025, 2 * np.maximum(count, 1e-9)) / 2, abs=0.02)
+
+
+def test_ratio_without_events_or_exposure():
+    none = report.ratio(np.array([0.0, 0.0, 100.0, 1.0, 0.0]), 10)
+    assert (none.value, none.lo) == (0.0, 0.0)
+    assert none.hi == pytest.approx(3.689 / 100, rel=0.01)
+    assert np.isnan(report.ratio(np.zeros(5), 10).value)
+
+
+def test_mean_time_has_the_interval_of_its_spread():
+    of = report.mean_of_counts(np.array([0.0, 5.0, 10.0]), np.array([0.0, 300.0, 100.0]))
+    assert of.value == 6.25
+    assert of.hi - of.value == pytest.approx(1.966 * np.sqrt(4.6875 / 399), rel=1e-3)
+    assert np.isnan(report.mean_of_counts(np.array([0.0]), np.array([0.0])).value)

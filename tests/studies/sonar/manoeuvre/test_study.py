@@ -1,0 +1,231 @@
+"""P3's manoeuvres: rates against exact laws within binomial bounds, filters that answer, uses of a track, own plots."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+import radarsim
+from radarsim.app.configs import load
+from radarsim.report.tables import to_csv
+from radarsim.studies.sonar import exact as least_squares
+from radarsim.studies.sonar import study
+from radarsim.studies.sonar.manoeuvre import exact
+from radarsim.studies.sonar.manoeuvre import study as manoeuvres
+from radarsim.studies.sonar.scene import scene
+from tests.studies.sonar.manoeuvre.test_kernels import DETECTORS, FILTERS, SCANS, SIGMA, TARGET, VESSEL, T, config, twin
+
+N = 16_384
+ALL = 5e-9  # two-sided, of thousands of looks: 5.85 standard errors
+ONE = 1e-4  # two-sided, of a few: binomial 99.99 % bounds
+RATES = {"name": "rates", "plots": 6, "false_alarm_probability": [0.3, 0.1, 0.01, 0.001]}
+APART = {"name": "apart", "plots": 4, "false_alarm_probability": [0.1, 0.01], "test_every": 4}
+PLAIN = [{"name": "growing", "kind": "growing_memory"}]
+
+
+def simulated(made, count=N):
+    plan = study.prepare(load(made).cases[0])
+    blocks = range(0, count, plan.block)
+    sums = sum(study.simulate(plan, first, min(plan.block, count - first)) for first in blocks)
+    return plan, plan.layout.unpack(sums)
+
+
+def within(count, n, p, level):
+    """Whether counts of n lie within the two-sided binomial bounds of probability p."""
+    tail = np.minimum(binom.cdf(count, n, p), binom.sf(count - 1, n, p))
+    return tail > level / 2
+
+
+def compared(plan, sums, level):
+    """Check all tests with a known law; how many these are."""
+    tested, law = sums["tested"][:, :, None], plan.axes.extra["exact_alarms"]
+    known = np.isfinite(law) & (tested > 0)
+    n = np.broadcast_to(tested, law.shape)[known]
+    assert within(sums["alarms"][known], n, np.clip(law[known], 0, 1), level).all()
+    return known.sum()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"sensor": {"error_correlation": 0.5}},
+        {"sensor": {"detection_probability": 0.8, "missed_scans": [4]}, "scans": 11},
+        {"target": TARGET | {"y_m": 2000, "course_deg": 100}},
+        {"target": {"kind": "polynomial", "frame": "polar", "range_m": [6e3, -5], "bearing_deg": [10, 0.01]}},
+    ],
+    ids=["steps", "correlated", "missed", "across", "steady"],
+)
+def test_alarms_are_as_the_exact_law_says(changes):
+    made = config(filters=PLAIN, detectors=[RATES, APART]) | {}
+    for key, value in changes.items():
+        made[key] = made[key] | value if key == "sensor" else value
+    plan, sums = simulated(made)
+    assert compared(plan, sums, ALL) > 50
+    if not changes:
+        steady = slice(5, 12)
+        share = np.array(RATES["false_alarm_probability"])[:, None]
+        for g in range(3):  # each coordinate by itself, and jointly
+            assert within(sums["alarms"][0, g, :, steady], N, share, ALL).all()
+
+
+def test_laws_that_are_not_known_are_left_out():
+    """Correlations of several sizes: the joint statistic is no χ²; cartesian frames: weights go with the plots."""
+    plan, _ = simulated(config(filters=PLAIN, sensor={"error_correlation": {"range": 0.5, "bearing": 0.2}}), 16)
+    law = plan.axes.extra["exact_alarms"]
+    assert np.isfinite(law[0, :2, :2, 10]).all()
+    assert np.isnan(law[:, 2]).all()
+    plan, sums = simulated(config(filters=PLAIN) | {"frame": "cartesian_unbiased"}, 16)
+    assert np.isnan(plan.axes.extra["exact_alarms"]).all()
+    assert sums["tested"][0, 2, -1] == 16
+
+
+def test_a_walking_velocity_bends_courses():
+    target = {"kind": "polynomial", "frame": "polar", "range_m": [6e3, -5], "bearing_deg": [10, 0.01]}
+    made = config(filters=PLAIN, detectors=[RATES]) | {"target": target | {"fluctuation_mps2": 0.2}}
+    plan, sums = simulated(made)
+    assert plan.axes.extra["exact_alarms"][0, 0, 2, -1] > 0.015
+    assert compared(plan, sums, ALL) > 50
+
+
+def test_pushes_are_what_the_motion_makes_of_them():
+    """Variance of an acceleration under random pushes, one interval's push after the other, moved step by step."""
+    target = {"kind": "polynomial", "frame": "polar", "range_m": [6e3, -5], "bearing_deg": [10, 0.01]}
+    spec = load(config(filters=PLAIN) | {"target": target | {"fluctuation_mps2": 0.2}}).cases[0].spec
+    seen = scene(spec)
+    _, variance, believed = manoeuvres.shift_laws(seen, 0, np.ones((1, SCANS)), 6, 20)
+    weights, _ = least_squares.generalised_least_squares(seen.t[15:21], np.eye(6), 3)
+    total = 100.0 * weights[2] @ weights[2]
+    assert believed == pytest.approx(total)
+    for pushed in range(1, 6):
+        place, rate, course = 0.0, 0.0, np.zeros(6)
+        for j in range(1, 6):
+            a = 0.2 if j == pushed else 0.0
+            place, rate = place + T * rate + a * T**2 / 2, rate + a * T
+            course[j] = place
+        total += (weights[2] @ course) ** 2
+    assert variance == pytest.approx(total)
+
+
+def test_first_events_of_independent_tests_are_exact_and_alarms_come_in_runs():
+    plan, sums = simulated(config(filters=PLAIN, detectors=[RATES, APART]))
+    extra = plan.axes.extra
+    assert extra["independent"] == (False, True)
+    law, phase = extra["exact_alarms"], extra["phase"]
+    for part in (0, 1, 2):
+        scans = np.flatnonzero((phase == part) & (sums["tested"][1, 0] > 0))
+        for g in range(3):
+            p = law[1, g, :2][:, scans]
+            p = 1 - p if part == 2 else p
+            came = np.cumsum(sums["first"][1, g, :2][:, scans], axis=1)
+            assert within(came, N, exact.by_then(p), ALL).all()
+    # Overlapping windows on a steady leg: no oftener than if they were independent (Šidák), and by far.
+    scans = np.arange(5, 13)
+    came = sums["first"][0, 0][:, scans].sum(axis=1) / N
+    independent = exact.by_then(law[0, 0][:, scans])[:, -1]
+    assert (came < independent).all()
+    assert came[0] < independent[0] - 5.85 * 0.5 / np.sqrt(N)
+
+
+@pytest.mark.slow
+def test_rates_within_the_binomial_bounds_at_a_hundred_thousand():
+    plan, sums = simulated(config(filters=PLAIN, detectors=[RATES, APART]), 100_000)
+    law, n = plan.axes.extra["exact_alarms"], 100_000
+    for k in (8, 14, 20, 29):  # steady, during, last of it, long after
+        assert within(sums["alarms"][0, :, :, k], n, law[0, :, :, k], ONE).all()
+    compared(plan, sums, ALL)
+
+
+# ---- filters that answer ------------------------------------------------------------------------------------------
+def test_without_an_alarm_the_adaptive_filter_is_growing_memory():
+    detector = {"plots": 5, "threshold_k": 1e9}
+    filters = [PLAIN[0], {"name": "deaf", "kind": "adaptive", "detector": detector}]
+    filters += [{"name": "deaf 2", "kind": "adaptive", "response": "shorten_memory", "degree": 2, "detector": detector}]
+    filters += [{"name": "growing 2", "kind": "growing_memory", "degree": 2}]
+    _, sums = simulated(config(filters=filters, sensor={"detection_probability": 0.9}), 600)
+    for one, other in ((0, 1), (3, 2)):
+        assert sums["error"][one] == pytest.approx(sums["error"][other], rel=1e-7, abs=1e-9)
+    assert not sums["modes"][..., :2].any()
+
+
+def test_always_alarmed_a_filter_is_its_window():
+    """A threshold below all: degree 2 from the first test on; held short, a window of as many plots."""
+    detector = {"plots": 6, "threshold_k": 1e-12}
+    filters = [
+        {"name": "window", "kind": "window", "plots": 6},
+        {"name": "growing 2", "kind": "growing_memory", "degree": 2},
+    ]
+    filters += [{"name": "short", "kind": "adaptive", "response": "shorten_memory", "detector": detector}]
+    filters += [{"name": "raised", "kind": "adaptive", "detector": detector}]
+    _, sums = simulated(config(filters=filters), 600)
+    components = [0, 1, 3, 4]
+    for one, other in ((0, 2), (1, 3)):
+        expected = sums["error"][one][5:, components]
+        assert sums["error"][other][5:, components] == pytest.approx(expected, rel=1e-6, abs=1e-8)
+
+
+def test_an_imm_of_two_like_models_is_the_kalman_filter():
+    filters = [{"name": "kalman", "kind": "kalman", "manoeuvre_variance": 0.04}]
+    filters += [
+        {"name": "imm", "kind": "imm", "manoeuvre_variances": [0.04, 0.04 + 1e-15], "stay_probabilities": [0.9, 0.7]}
+    ]
+    _, sums = simulated(config(filters=filters, sensor={"detection_probability": 0.8}), 600)
+    assert sums["error"][1] == pytest.approx(sums["error"][0], rel=1e-7, abs=1e-9)
+    # The plots then tell nothing of the model: it stays at its long-run probability.
+    assert sums["modes"][1, :, :, 0] / 600 == pytest.approx(0.25, abs=1e-6)
+
+
+# ---- the same bytes -----------------------------------------------------------------------------------------------
+def test_tables_are_the_same_bytes_for_any_number_of_threads():
+    made = config(filters=FILTERS, detectors=DETECTORS, sensor={"detection_probability": 0.9})
+    made |= {"uses": {"horizon_s": 60, "at_s": [50, 145]}, "realisations": 9000}
+    one, other = (radarsim.run(made, threads=threads).tables for threads in (1, 2))
+    assert {"detections", "delays", "classes", "modes", "uses"} <= set(one)
+    for name, table in one.items():
+        assert to_csv(table) == to_csv(other[name]), name
+
+
+# ---- uses ---------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("frame", ["polar", "cartesian_unbiased"])
+def test_spread_of_uses_is_that_of_the_errors(frame):
+    """A steady vessel that comes straight in, well tracked: σ to first order is the measured one for all uses."""
+    vessel = VESSEL | {"y_m": 0, "acceleration_mps2": 0, "start_s": 0}
+    made = config(filters=PLAIN, detectors=[]) | {"target": vessel}
+    made |= {"uses": {"horizon_s": 60, "own_ship": {"speed_mps": 4, "course_deg": 90}}, "frame": frame, "scans": 60}
+    _, sums = simulated(made)
+    n, _, square, fourth, spread = np.moveaxis(sums["uses"][0, 0], -1, 0)
+    assert (n == N).all()
+    ratio, se = np.sqrt(square / spread), np.sqrt((fourth * n / square**2 - 1) / n) / 2
+    assert (np.abs(ratio - 1) < 5.85 * se + 0.01).all()
+
+
+def test_a_future_on_another_course_is_no_matter_of_spread():
+    made = config(filters=PLAIN, detectors=[]) | {"uses": {"horizon_s": 60, "at_s": [55.0]}}
+    plan, sums = simulated(made, 4096)
+    n, first, *_ = sums["uses"][0, 0, 2]
+    # Southwards the speed grows by 0.6 m/s² from 5 s on, for 40 s, and is kept for 15 s: that way goes unforeseen.
+    assert first / n == pytest.approx(0.6 * (55**2 - 15**2) / 2, rel=0.02)
+    assert plan.axes.extra["uses_true"][0, 1] == pytest.approx(5.0)
+
+
+# ---- own plots ----------------------------------------------------------------------------------------------------
+def test_recorded_plots_are_followed_as_the_twins_do():
+    case = load(config() | {"uses": {"horizon_s": 60.0}}).cases[0]
+    rng, t = np.random.default_rng(3), np.arange(SCANS) * T
+    truth = study.prepare(case).axes.extra["truth"]
+    z = truth[:, :2, 0] + SIGMA * rng.standard_normal((SCANS, 2))
+    z[[6, 17]] = np.nan
+    track = study.track(case, {"t_s": t + 100, "range_m": z[:, 0], "bearing_rad": z[:, 1]})
+    names = [name for name, _ in track.components]
+    assert names == ["r", "vr", "ar", "b", "vb", "ab", "course", "speed", "x_ahead", "y_ahead", "cpa", "t_cpa"]
+    for f, spec in enumerate(FILTERS):
+        for c in (0, 1) if spec["kind"] != "growing_memory" else ():
+            size = spec.get("degree", 1) + 1
+            x, P, _, _ = twin(spec, z, c)
+            known = np.cumsum(~np.isnan(z[:, c])) >= size
+            unit = np.sqrt(np.diagonal(P, axis1=1, axis2=2))[known, :size]
+            off = (track.estimate[f, known, 3 * c : 3 * c + size] - x[known, :size]) / unit
+            assert np.abs(off).max() < 1e-9, spec["name"]
+            assert track.sigma[f, known, 3 * c : 3 * c + size] == pytest.approx(unit, rel=1e-8)
+    speed = np.hypot(track.estimate[0, 9, 1], track.estimate[0, 9, 0] * track.estimate[0, 9, 4])
+    assert track.estimate[0, 9, 7] == pytest.approx(speed)
+    assert np.isnan(track.estimate[0, 0, 6:]).all()

@@ -1,0 +1,181 @@
+"""Tables, figures, claims and words of manoeuvres from a small run of the shipped config."""
+
+import numpy as np
+import pytest
+
+import radarsim
+from radarsim.app import output
+from radarsim.app.configs import load
+from radarsim.report import claims, figures, panels
+from radarsim.studies.sonar import tables as sonar
+from radarsim.studies.sonar.exact import sigma_acceleration
+from radarsim.studies.sonar.manoeuvre import exact
+from radarsim.studies.sonar.manoeuvre import figures as drawn
+from radarsim.studies.sonar.manoeuvre import measures as measured
+
+N = 2000
+OWN = {"roc", "detection", "delay", "response", "modes", "uses"}
+ACCELERATIONS = [0, 0.2138, 0.8]
+
+
+@pytest.fixture(scope="module")
+def result():
+    swept = f"sweep.target.acceleration_mps2={ACCELERATIONS}"
+    return radarsim.run(load("sonar_manoeuvre", [swept, f"realisations={N}"]))
+
+
+@pytest.fixture(scope="module")
+def tables(result):
+    return result.tables
+
+
+def case(acceleration):
+    return f"sonar_manoeuvre target.acceleration_mps2={acceleration}"
+
+
+def test_detections_lie_about_the_exact_law(tables):
+    rows = tables["detections"]
+    assert list(rows.columns[:9]) == [
+        *("case", "filter", "component", "plots", "threshold_k", "false_alarm_probability", "k", "t_s", "n")
+    ]
+    assert (rows["n"] == N).all()
+    inside = (rows["lo"] <= rows["exact"]) & (rows["exact"] <= rows["hi"])
+    assert 0.93 < inside.mean() < 0.985  # discrete counts: Wilson's intervals cover somewhat unevenly
+    assert set(rows["component"]) == {"r", "b", "joint"}
+    assert set(rows[rows["case"] == case(0)]["phase"]) == {"steady"}
+    assert set(rows[rows["case"] == case(0.8)]["phase"]) == {"steady", "manoeuvre", "after"}
+    whole = rows[(rows["case"] == case(0.2138)) & (rows["filter"] == "5 plots") & (rows["component"] == "r")]
+    assert whole[whole["k"] == 27]["shift"].to_numpy() == pytest.approx(1.0, abs=2e-4)
+
+
+def test_delays_grow_to_the_class(tables):
+    rows = tables["delays"]
+    one = rows[(rows["case"] == case(0.8)) & (rows["filter"] == "5 plots") & (rows["component"] == "r")]
+    one = one[(one["event"] == "alarm") & np.isclose(one["false_alarm_probability"], 0.01)]
+    assert one["delay_s"].to_list() == [5.0 * i for i in range(1, 9)]
+    assert (one["probability"].diff().dropna() >= 0).all()
+    assert one["exact"].isna().all()
+    apart = rows[(rows["filter"] == "4 plots, apart") & (rows["event"] == "alarm")]
+    assert ((apart["lo"] <= apart["exact"]) & (apart["exact"] <= apart["hi"])).mean() > 0.8
+    named = tables["classes"].set_index(["case", "filter", "component", "false_alarm_probability", "truth"])
+    row = named.loc[(case(0.8), "5 plots", "r", one["false_alarm_probability"].iloc[0], "manoeuvre")]
+    assert row["called_manoeuvring"] == one["probability"].iloc[-1]
+    assert row["error_probability"] == pytest.approx(1 - row["called_manoeuvring"])
+    assert row["lo"] <= row["error_probability"] < row["hi"]
+    assert row["duration_s"] == 40
+    assert set(tables["classes"][tables["classes"]["case"] == case(0)]["truth"]) == {"steady"}
+
+
+def test_thresholds_are_the_laws(tables):
+    rows = tables["thresholds"]
+    rows = rows[(rows["case"] == case(0)) & (rows["filter"] == "8 plots") & (rows["component"] == "r")]
+    row = rows.iloc[2]
+    assert row["threshold_k"] == pytest.approx(6.6349, abs=1e-4)
+    assert row["sigma_acceleration"] == pytest.approx(10 * sigma_acceleration(8.0, 5.0))
+    assert row["threshold_acceleration"] == pytest.approx(np.sqrt(6.6349) * row["sigma_acceleration"], rel=1e-5)
+    reach = row["acceleration_for_90_percent"] / row["sigma_acceleration"]
+    assert exact.detection(row["threshold_k"], reach) == pytest.approx(0.9)
+    assert row["threshold_to_plot_variance"] == pytest.approx(6.6349 * 720 / (5.0**4 * 8 * 63 * 60), rel=1e-4)
+
+
+def test_modes_and_memory(tables):
+    rows = tables["modes"].set_index(["case", "filter", "component", "k"])
+    assert rows.loc[(case(0), "degree by 5", "r", 4), "memory_plots"] == 4
+    assert rows.loc[(case(0), "degree by 5", "r", 4), "probability"] == 0
+    assert rows.loc[(case(0.8), "degree by 8", "r", 28), "probability"] > 0.98
+    assert rows.loc[(case(0.8), "degree by 8", "r", 28), "memory_plots"] < 15
+    assert rows.loc[(case(0), "degree by 8", "r", 45), "memory_plots"] > 25
+    assert np.isnan(rows.loc[(case(0.8), "imm", "r", 28), "memory_plots"])
+    assert rows.loc[(case(0.8), "imm", "r", 28), "probability"] > 0.8
+
+
+def test_uses_tell_where_the_first_order_holds_and_where_not(tables):
+    rows = tables["uses"].set_index(["case", "filter", "component", "t_s"]).sort_index()
+    good = rows.xs((case(0), "growing")).xs(220.0, level="t_s")
+    assert good["ratio"].to_numpy() == pytest.approx(1, abs=5.85 / np.sqrt(2 * N) + 0.02)
+    assert set(good["first_order"]) == {"holds within 5 %"}
+    near = rows.loc[(case(0), "window 5", "cpa", 220.0)]
+    assert near["first_order"] == "fails: near zero"
+    assert near["distance_in_sigma"] < 3
+    assert near["ratio"] < 0.8
+    assert (rows["n"] == N).all()
+    assert rows.loc[(case(0.8), "growing", "speed", 140.0), "first_order"] == "error larger"
+
+
+def test_figures_draw(result):
+    described = output.figures(result.cases, result.tables, result.experiment)
+    assert set(described) >= OWN
+    for name in OWN:
+        assert figures.render(described[name]).axes
+        assert described[name].caption.endswith(".")
+
+
+def test_a_case_without_detectors_has_its_own_figures_alone():
+    changes = ["detectors=[]", "sweep.target.acceleration_mps2=[0.4]", "uses.at_s=[100]", "realisations=64"]
+    made = load("sonar_manoeuvre", changes)
+    result = radarsim.run(made)
+    described = output.figures(result.cases, result.tables, result.experiment)
+    assert OWN & set(described) == {"response", "modes", "uses"}
+    assert "detections" not in result.tables
+    assert sonar.question(made).startswith("How well are course, speed")
+
+
+def test_cases_in_several_frames_stand_side_by_side():
+    result = radarsim.run(
+        load("sonar_manoeuvre_turning", ["sweep.target.turns.0.rate_radps=[0.07]", "realisations=64"])
+    )
+    described = output.figures(result.cases, result.tables, result.experiment)
+    panels = described["response"].panels
+    assert [panel.title for panel in panels[:2]] == ["0.07 rad/s, polar", "0.07 rad/s, cartesian_unbiased"]
+    assert [panel.y.label for panel in panels[:2]] == ["$\\sigma$ of $r$, m", "$\\sigma$ of $x$, m"]
+    assert {"roc", "detection", "delay", "modes"} <= set(described)
+    assert result.tables["detections"]["exact"].isna().mean() == 0.5
+
+
+def test_a_detector_that_never_has_its_plots():
+    missed = "sensor.missed_scans=[3, 4, 5, 6]"
+    changes = ["scans=6", "detectors=[{name: d, plots: 5, threshold_k: [1.0]}]", "uses={horizon_s: 60}", missed]
+    changes += ["filters=[{name: g, kind: growing_memory}]", "target.start_s=10", "realisations=64"]
+    made = load("sonar_manoeuvre", [*changes, "sweep.target.acceleration_mps2=[0.8]"])
+    result = radarsim.run(made)
+    assert "detections" not in result.tables
+    assert set(output.figures(result.cases, result.tables, made)) & OWN == {"uses"}
+    assert sonar.answer(result.cases, result.tables)
+
+
+def test_claims_are_judged(result, tables):
+    rows = tables["claims"]
+    assert set(rows["claim"]) == {"P3.8", "P3.9", "P3.10"}
+    row = rows[rows["claim"] == "P3.9"].iloc[0]
+    assert row["lo"] < 0.523 < row["hi"]
+    assert row["verdict"] == claims.REFUTED
+    ratios = rows[rows["what"].str.startswith("acceleration at the threshold")]["measured"]
+    assert ratios.to_numpy() == pytest.approx([0.5345, 0.2887], abs=1e-4)
+    strong = result.cases[2]
+    delays = tables["delays"]
+    own = delays[(delays["case"] == strong.name) & (delays["filter"] == "8 plots") & (delays["component"] == "r")]
+    own = own[(own["event"] == "alarm") & np.isclose(own["false_alarm_probability"], 0.01)]
+    # Mean of a time cut at the end: the area over the probability that it has come.
+    assert measured.mean_delay(strong, 8).value == pytest.approx(5 + 5 * (1 - own["probability"].to_numpy()[:-1]).sum())
+
+
+def test_words(result, tables):
+    told = sonar.answer(result.cases, tables)
+    assert sonar.question(result.experiment).startswith("How surely and how soon is a manoeuvre seen")
+    assert any("10 plots" in sentence for sentence in told)
+    assert any(
+        sentence.startswith("Measured σ of the track's uses over that from its covariance (growing, ")
+        for sentence in told
+    )
+    assert all(sentence.endswith(".") for sentence in told)
+
+
+def test_of_many_cases_the_ends_are_shown():
+    assert drawn.spread_out(list(range(10)), 3) == [0, 4, 9]
+    assert drawn.spread_out([1, 2], 3) == [1, 2]
+
+
+def test_an_answer_of_many_cases_tells_the_ends():
+    assert panels.told([1, 2, 3]) == ([1, 2, 3], [])
+    assert panels.told([1, 2, 3], 2) == ([1, 3], ["The case between: in the report and its tables."])
+    assert panels.told([1, 2, 3, 4]) == ([1, 4], ["The 2 cases between: in the report and its tables."])

@@ -1,0 +1,103 @@
+"""Exact values of P3: the paper's numbers, generalised least squares, and the true errors of given filters."""
+
+import numpy as np
+import pytest
+
+from radarsim.studies.sonar import exact, filters
+from radarsim.studies.sonar import world as models
+
+
+def test_sigma_formulas_have_the_digests_values():
+    n = np.arange(2, 9)
+    assert exact.sigma_smoothed(n).round(3).tolist() == [1, 0.913, 0.837, 0.775, 0.724, 0.681, 0.645]
+    assert exact.sigma_extrapolated(n).round(3).tolist() == [2.236, 1.528, 1.225, 1.049, 0.931, 0.845, 0.779]
+
+
+@pytest.mark.parametrize("n", range(3, 51))
+def test_720_formula_is_least_squares(n):
+    _, P = exact.generalised_least_squares(np.arange(n) * 5.0, 900 * np.eye(n), 3)
+    assert np.sqrt(P[2, 2]) == pytest.approx(30 * exact.sigma_acceleration(n, 5.0), rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("rho", "n", "optimal", "naive", "believed"),
+    [
+        (0.0, 10, (0.5878, 0.1101), (0.5878, 0.1101), (0.5878, 0.1101)),
+        (0.6, 10, (0.8748, 0.1503), (0.9122, 0.1582), (0.5878, 0.1101)),
+        (0.9, 20, (0.9637, 0.0689), (1.0377, 0.0761), (0.4309, 0.0388)),
+        (-0.5, 10, (0.3694, 0.0705), (0.3907, 0.0753), (0.5878, 0.1101)),
+    ],
+)
+def test_table_of_the_digest(rho, n, optimal, naive, believed):
+    t = np.arange(float(n))
+    C = models.error_covariance(np.ones(n), rho, t, 1.0)
+    _, P = exact.generalised_least_squares(t, C, 2)
+    W, plain = exact.generalised_least_squares(t, np.eye(n), 2)
+    assert np.sqrt(np.diag(P)).round(4) == pytest.approx(optimal)
+    assert np.sqrt(np.diag(exact.error_of_weights(W, C))).round(4) == pytest.approx(naive)
+    assert np.sqrt(np.diag(plain)).round(4) == pytest.approx(believed)
+
+
+@pytest.mark.parametrize("rho", [-0.5, 0.0, 0.6, 0.99])
+@pytest.mark.parametrize("size", [2, 3])
+def test_recursion_of_true_errors_is_that_of_the_weights(rho, size):
+    """The joint recursion gives W C Wᵀ for filters whose weights are read off by unit plots."""
+    rng = np.random.default_rng(3)
+    seen = rng.random((4, 12)) > 0.3
+    seen[:, :size] = True
+    t = np.arange(12) * 5.0
+    plots = filters.Plots(t, seen.astype(float), 5.0, 30.0)
+    truth = np.stack([9e3 - 4 * t + 0.01 * t**3, -4 + 0.03 * t**2, 0.06 * t], axis=1)
+    steps = models.step_correlations(rho, t, 5.0)
+    C = models.error_covariance(np.full(12, 30.0), rho, t, 5.0)
+    for design in (
+        filters.differenced(plots, size, 0.0),
+        filters.augmented(plots, size, 0.6, 1e-4),
+        filters.fixed_gain(plots, size, 1e-3),
+    ):
+        bias, S = exact.recursive_errors(design.gain, design.carry, t, truth, steps, np.full(12, 30.0), 0.0)
+        for m in range(4):
+            W = unit_weights(design, t, m)
+            for k in range(size - 1, 12):
+                kept = W[k]
+                expected = kept @ C @ kept.T
+                assert S[m, k] == pytest.approx(expected, rel=1e-8, abs=1e-12)
+                assert bias[m, k] == pytest.approx(kept @ truth[:, 0] - truth[k], rel=1e-7, abs=1e-7)
+
+
+def unit_weights(design, t, m):
+    """Weights (K, 3, K) of a recursive design: its answer to a unit plot at each scan in turn."""
+    x, e, out = np.zeros((3, len(t))), np.zeros(len(t)), []
+    for k in range(len(t)):
+        dt = t[k] - t[k - 1] if k else 0.0
+        x = np.array([[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]]) @ x
+        e = e * design.carry[k]
+        innovation = np.eye(len(t))[k] - x[0] - e
+        x = x + design.gain[m, k, :3, None] * innovation
+        e = e + design.gain[m, k, 3] * innovation
+        out.append(x)
+    return out
+
+
+def test_walk_of_velocity_by_both_ways_of_reckoning():
+    """A filter's true error under a random walk of velocity: joint recursion against explicit weights of every push."""
+    t, walk = np.arange(9) * 5.0, 0.02
+    plots = filters.Plots(t, np.ones((1, 9)), 5.0, 30.0)
+    truth = np.zeros((9, 3))
+    design = filters.line(plots)
+    _, S = exact.recursive_errors(design.gain, design.carry, t, truth, np.zeros(9), np.full(9, 30.0), walk)
+    first, W, _ = filters.window_weights(plots, 8, 9, 2)
+    C = models.error_covariance(np.full(9, 30.0), 0.0, t, 5.0)
+    _, other = exact.weighted_errors(W, first, t, truth, C, walk, first)
+    assert S[0, 8] == pytest.approx(other[0], rel=1e-9)
+
+
+def test_consistency_of_the_naive_filter():
+    """NEES of a filter that ignores ρ = 0.9: by calculation far over 2; of an honest one, 2."""
+    n, t = 20, np.arange(20.0)
+    C = models.error_covariance(np.ones(n), 0.9, t, 1.0)
+    W, plain = exact.generalised_least_squares(t, np.eye(n), 2)
+    _, P = exact.generalised_least_squares(t, C, 2)
+    zero = np.zeros(2)
+    assert exact.consistency(P, zero, P) == pytest.approx(2)
+    assert exact.consistency(plain, zero, exact.error_of_weights(W, C)) > 5

@@ -1,0 +1,165 @@
+"""Designs of the sonar filters: against textbook twins, against each other, and against closed forms."""
+
+import numpy as np
+import pytest
+
+from radarsim.studies.sonar import exact, filters
+from tests.studies.sonar import naive as naive
+
+PERIOD, SIGMA = 5.0, 30.0
+
+
+def plots(weight, t=None, sigma=SIGMA):
+    weight = np.atleast_2d(np.asarray(weight, dtype=float))
+    return filters.Plots(np.arange(weight.shape[1]) * PERIOD if t is None else t, weight, PERIOD, sigma)
+
+
+def pattern(seed, scans=40, missed=0.3):
+    seen = np.random.default_rng(seed).random(scans) > missed
+    seen[0] = True
+    return seen
+
+
+def run(design, t, z):
+    """The recursion of all filters on one realisation's plots (K,), with not-a-number where missed."""
+    x, e, out = np.zeros(3), 0.0, []
+    for k in range(len(t)):
+        x = naive.F(t[k] - t[k - 1] if k else 0.0, 3) @ x
+        e *= design.carry[k]
+        if not np.isnan(z[k]):
+            innovation = z[k] - x[0] - e
+            x = x + design.gain[0, k, :3] * innovation
+            e += design.gain[0, k, 3] * innovation
+        out.append(x)
+    return np.array(out)
+
+
+def compare(design, z, twin, relative=1e-9):
+    """Estimates and covariances equal the twin's, each component against its own size of error."""
+    x, P = twin
+    size = design.size
+    t = np.arange(len(z)) * PERIOD
+    known = ~np.isnan(x)
+    ours, spread = run(design, t, z)[:, :size], np.sqrt(np.diagonal(design.believed[0], axis1=1, axis2=2))[:, :size]
+    assert np.max(np.abs(ours - x)[known] / np.maximum(spread[known], 1e-12)) < relative
+    full = known.all(axis=1)
+    unit = spread[full][:, :, None] * spread[full][:, None, :]
+    assert np.max(np.abs(design.believed[0][full][:, :size, :size] - P[full]) / unit) < relative
+
+
+@pytest.fixture(params=[1, 2, 3])
+def observed(request):
+    """Plots of a straight track with gaps: weights (K,), plots (K,) with not-a-number where missed."""
+    rng = np.random.default_rng(request.param)
+    seen = pattern(request.param)
+    t = np.arange(len(seen)) * PERIOD
+    return seen, np.where(seen, 9e3 - 4 * t + SIGMA * rng.normal(size=len(seen)), np.nan)
+
+
+T = np.arange(40) * PERIOD
+
+
+def test_line_recursion_is_least_squares(observed):
+    seen, z = observed
+    compare(filters.line(plots(seen)), z, naive.batch(T, z, 2, SIGMA))
+
+
+@pytest.mark.parametrize("size", [2, 3])
+@pytest.mark.parametrize("rho", [-0.5, 0.0, 0.3, 0.6, 0.9, 0.99])
+def test_differenced_is_generalised_least_squares(observed, size, rho):
+    seen, z = observed
+    design = filters.differenced(plots(seen), size, rho)
+    compare(design, z, naive.batch(T, z, size, SIGMA, rho, PERIOD))
+    compare(design, z, naive.differenced(T, z, size, SIGMA, rho, PERIOD))
+
+
+@pytest.mark.parametrize("size", [2, 3])
+@pytest.mark.parametrize("rho", [-0.5, 0.0, 0.3, 0.6, 0.9, 0.99])
+def test_augmented_is_generalised_least_squares(observed, size, rho):
+    seen, z = observed
+    design = filters.augmented(plots(seen), size, rho, 0.0)
+    compare(design, z, naive.batch(T, z, size, SIGMA, rho, PERIOD))
+    other = filters.differenced(plots(seen), size, rho)
+    assert np.max(np.abs(run(design, T, z) - run(other, T, z))[:, :size] / run(other, T, z)[:, :1]) < 1e-9
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_with_manoeuvre_variance(observed, size):
+    seen, z = observed
+    variance = [None, None, 1e-3, 1e-6][size]
+    compare(filters.kalman(plots(seen), size, variance), z, naive.kalman(T, z, size, SIGMA, variance))
+    settled = filters.steady_gain(PERIOD, SIGMA, size, variance)
+    compare(filters.fixed_gain(plots(seen), size, variance), z, naive.kalman(T, z, size, SIGMA, variance, settled))
+    for rho in (0.0, 0.6):
+        twin = naive.augmented(T, z, size, SIGMA, rho, variance, PERIOD)
+        compare(filters.augmented(plots(seen), size, rho, variance), z, twin)
+
+
+@pytest.mark.parametrize("size", [2, 3])
+@pytest.mark.parametrize("length", [3, 5, 8])
+def test_window_is_least_squares_on_the_last_plots(observed, size, length):
+    seen, z = observed
+    x, P = naive.batch(T, z, size, SIGMA, last=length)
+    for k in range(len(T)):
+        first, weights, covariance = filters.window_weights(plots(seen), k, length, size)
+        ours = weights[0] @ np.nan_to_num(z[first : k + 1])
+        known = ~np.isnan(x[k])
+        assert ours[:size][known] == pytest.approx(x[k][known], rel=1e-9, abs=1e-9)
+        if known.all():
+            assert covariance[0, :size, :size] == pytest.approx(P[k], rel=1e-9)
+
+
+def test_growing_memory_kalman_and_closed_forms_agree():
+    everything = plots(np.ones(50))
+    line, kalman = filters.line(everything), filters.kalman(everything, 2, 0.0)
+    other = filters.differenced(everything, 2, 0.0)
+    n = np.arange(2, 51)
+    A, B = exact.gains_closed(n)
+    for design in (line, kalman, other):
+        assert design.gain[0, 1:, 0] == pytest.approx(A, rel=1e-10)
+        assert design.gain[0, 1:, 1] * PERIOD == pytest.approx(B, rel=1e-10)
+        assert np.sqrt(design.believed[0, 1:, 0, 0]) == pytest.approx(SIGMA * exact.sigma_smoothed(n), rel=1e-10)
+    ahead = (
+        line.believed[0, 1:, 0, 0] + 2 * PERIOD * line.believed[0, 1:, 0, 1] + PERIOD**2 * line.believed[0, 1:, 1, 1]
+    )
+    assert np.sqrt(ahead) == pytest.approx(SIGMA * exact.sigma_extrapolated(n), rel=1e-10)
+    second, n = filters.differenced(everything, 3, 0.0), n[1:]
+    kalman = filters.kalman(everything, 3, 0.0)
+    for design in (second, kalman):
+        acceleration = np.sqrt(design.believed[0, 2:, 2, 2])
+        assert acceleration == pytest.approx(SIGMA * exact.sigma_acceleration(n, PERIOD), rel=1e-10)
+
+
+def test_printed_gains_of_unequal_weights_are_wrong_and_ours_right():
+    """The print gives B_n for equal weights alone; with others only the recursion is least squares."""
+    rng = np.random.default_rng(7)
+    weight, t = rng.uniform(0.1, 4, 12), np.cumsum(rng.uniform(0.3, 2, 12)) * PERIOD
+    t -= t[0]
+    design = filters.line(plots(weight, t))
+    C = np.diag(SIGMA**2 / weight)
+    W, P = exact.generalised_least_squares(t, C, 2)
+    assert design.gain[0, -1, :2] == pytest.approx(W[:, -1], rel=1e-11)
+    assert design.believed[0, -1, :2, :2] == pytest.approx(P, rel=1e-11)
+    assert abs(design.gain[0, -1, 1] * PERIOD / (6 / (12 * 13)) - 1) > 0.05
+
+
+def test_missed_plot_has_no_gain_and_a_second_plot_at_one_time_averages():
+    seen = np.ones(10)
+    seen[[4, 5]] = 0
+    for size in (2, 3):
+        for design in (
+            filters.differenced(plots(seen), size, 0.6),
+            filters.augmented(plots(seen), size, 0.6, 1e-4),
+            filters.kalman(plots(seen), size, 1e-4),
+            filters.fixed_gain(plots(seen), size, 1e-4),
+        ):
+            assert not design.gain[0, 4:6].any()
+            assert design.gain[0, 6].any()
+    twice = filters.line(plots([1, 1, 1], np.array([0.0, 0.0, PERIOD])))
+    assert twice.gain[0, :, 0] == pytest.approx([1, 0.5, 1])
+
+
+def test_a_plot_at_the_time_of_the_last_one_tells_nothing_of_a_correlated_error():
+    design = filters.augmented(plots(np.ones(5), np.array([0.0, 5.0, 10.0, 10.0, 15.0])), 2, 0.6, 0.0)
+    assert not design.gain[0, 3].any()
+    assert np.isfinite(design.believed).all()

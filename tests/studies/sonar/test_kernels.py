@@ -1,0 +1,175 @@
+"""Sonar kernels against textbook twins, realisation by realisation on the same plots, in both kernels."""
+
+import numpy as np
+import pytest
+
+from radarsim.app.configs import load
+from radarsim.kernels.random import fill_normal_pairs, fill_uniform_pairs
+from radarsim.studies.sonar import study
+from radarsim.studies.sonar import world as models
+from tests.studies.sonar import naive as naive
+
+T, SCANS = 5.0, 18
+SIGMA = np.array([30.0, np.radians(1)])
+FILTERS = [
+    {"name": "line", "kind": "growing_memory", "degree": 1},
+    {"name": "parabola", "kind": "growing_memory", "degree": 2},
+    {"name": "window", "kind": "window", "degree": 1, "plots": 4},
+    {"name": "window 2", "kind": "window", "degree": 2, "plots": 6},
+    {"name": "kalman", "kind": "kalman", "degree": 1, "manoeuvre_variance": 1e-3},
+    {"name": "kalman 2", "kind": "kalman", "degree": 2, "manoeuvre_variance": 1e-6},
+    {"name": "fixed", "kind": "fixed_gain", "degree": 1, "manoeuvre_variance": 1e-3},
+    {"name": "fixed 2", "kind": "fixed_gain", "degree": 2, "manoeuvre_variance": 1e-6},
+    {"name": "augmented", "kind": "kalman_augmented", "degree": 1, "error_correlation": 0.6},
+    {"name": "augmented 2", "kind": "kalman_augmented", "degree": 2, "manoeuvre_variance": 1e-6},
+    {"name": "differenced", "kind": "kalman_differenced", "degree": 1, "error_correlation": 0.6},
+    {"name": "differenced 2", "kind": "kalman_differenced", "degree": 2},
+]
+
+
+def config(frame="polar", **sensor):
+    filters = FILTERS if frame == "polar" else FILTERS[:8]
+    return {
+        "study": "sonar",
+        "sensor": {"sigma_range_m": 30.0, "sigma_bearing_deg": 1.0, "scan_period_s": T, **sensor},
+        "target": {"kind": "polynomial", "frame": "polar", "range_m": [9e3, -4.0], "bearing_deg": [20.0, 0.01]},
+        "frame": frame,
+        "filters": filters,
+        "scans": SCANS,
+        "realisations": 10,
+    }
+
+
+def plots(plan, realisation, rho, probability, missed=()):
+    """Errors (K, 2) and whether the plots came (K,), drawn from the same streams by the plainest code."""
+    a, b, e = np.empty(1), np.empty(1), np.zeros((SCANS, 2))
+    came = np.ones(SCANS, dtype=bool)
+    for k in range(SCANS):
+        fill_normal_pairs(plan.world.plots, realisation, k, a, b)
+        fresh = SIGMA * np.array([a[0], b[0]])
+        e[k] = fresh if k == 0 else rho * e[k - 1] + np.sqrt(1 - rho**2) * fresh
+        if plan.sight is not None and probability < 1 and k > 0:
+            fill_uniform_pairs(plan.sight.misses, realisation, k, a, b)
+            came[k] = a[0] < probability
+    came[list(missed)] = False
+    return e, came
+
+
+def twin(spec, z, sigma, rho, scale):
+    """Estimates of one filter by its textbook twin; scale turns the manoeuvre variance to the coordinate's units."""
+    size, variance = spec["degree"] + 1, spec.get("manoeuvre_variance", 0.0) * scale
+    t = np.arange(SCANS) * T
+    rho = spec.get("error_correlation", rho)
+    match spec["kind"]:
+        case "growing_memory":
+            return naive.batch(t, z, size, sigma)
+        case "window":
+            return naive.batch(t, z, size, sigma, last=spec["plots"])
+        case "kalman":
+            return naive.kalman(t, z, size, sigma, variance)
+        case "fixed_gain":
+            return naive.kalman(t, z, size, sigma, variance, settled(size, sigma, variance))
+        case "kalman_augmented":
+            return naive.augmented(t, z, size, sigma, rho, variance, T)
+    return naive.differenced(t, z, size, sigma, rho, T)
+
+
+def settled(size, sigma, variance):
+    """Steady gains by running the Riccati recursion until it stands."""
+    P, A, N = np.eye(size) * sigma**2, naive.F(T, size), naive.Q(T, size, variance)
+    for _ in range(5000):
+        P = A @ P @ A.T + N
+        K = P[:, 0] / (P[0, 0] + sigma**2)
+        P = P - np.outer(K, P[0])
+    return K
+
+
+@pytest.mark.parametrize(
+    "sensor",
+    [
+        {"error_correlation": 0.6},
+        {"error_correlation": 0.6, "detection_probability": 0.7},
+        {"error_correlation": -0.5, "missed_scans": [4, 9, 10]},
+        {"detection_probability": 0.5, "missed_scans": [2, 12]},
+    ],
+)
+def test_estimates_are_the_twins(sensor):
+    case = load(config(**sensor)).cases[0]
+    plan = study.prepare(case)
+    rho, probability = sensor.get("error_correlation", 0.0), sensor.get("detection_probability", 1.0)
+    missed = [k - 1 for k in sensor.get("missed_scans", ())]
+    truth = plan.axes.extra["truth"]
+    for realisation in (0, 5, 12345):
+        sums = plan.layout.unpack(study.simulate(plan, realisation, 1))
+        e, came = plots(plan, realisation, rho, probability, missed)
+        for c in range(2):
+            z = np.where(came, truth[:, c, 0] + e[:, c], np.nan)
+            for f, spec in enumerate(FILTERS):
+                x, P = twin(spec, z, SIGMA[c], rho, (1.0, 9e3**-2)[c])
+                size = spec["degree"] + 1
+                error = sums["error"][f, :, 3 * c : 3 * c + size, 0]
+                known = ~np.isnan(x)
+                assert (sums["estimates"][f, :, 3 * c : 3 * c + size] == known).all()
+                unit = np.sqrt(np.diagonal(P, axis1=1, axis2=2))
+                off = np.abs(error - (x - truth[:, c, :size]))[known] / unit[known]
+                assert off.max() < 1e-8, (spec["name"], c)
+                believed = sums["believed"][f, :, 3 * c : 3 * c + size]
+                assert believed[known] == pytest.approx((unit**2)[known], rel=1e-8)
+                full = known.all(axis=1)
+                q = np.array(
+                    [v @ np.linalg.solve(p, v) for v, p in zip((x - truth[:, c, :size])[full], P[full], strict=True)]
+                )
+                assert sums["joint"][f, full, c, 0] == pytest.approx(q, rel=1e-5)
+
+
+@pytest.mark.parametrize("frame", ["cartesian", "cartesian_unbiased"])
+def test_converted_plots_and_their_weights(frame):
+    """The cartesian frame: plots converted as in models, weights by the conversion's own variances, plot by plot."""
+    case = load(config(frame, detection_probability=0.8)).cases[0]
+    plan = study.prepare(case)
+    truth, polar, t = plan.axes.extra["truth"], plan.axes.extra["polar"], np.arange(SCANS) * T
+    convert = models.converted if frame == "cartesian" else models.converted_unbiased
+    for realisation in (0, 77):
+        sums = plan.layout.unpack(study.simulate(plan, realisation, 1))
+        e, came = plots(plan, realisation, 0.0, 0.8)
+        r, b = polar[:, 0, 0] + e[:, 0], polar[:, 1, 0] + e[:, 1]
+        x, y, (xx, _, yy) = convert(r, b, *SIGMA)
+        if frame == "cartesian_unbiased":
+            xx, _, yy = np.full((3, SCANS), np.nan)
+            xx[came], _, yy[came] = convert(*models.places(r[came], b[came]), *SIGMA)[2]
+        for c, (z, variance) in enumerate(((x, xx), (y, yy))):
+            for k in range(2, SCANS):
+                at = np.flatnonzero(came[: k + 1])
+                if len(at) < 3:
+                    continue
+                for f, size in ((0, 2), (1, 3)):
+                    A = np.vander(t[at] - t[k], size, increasing=True) / np.array([1, 1, 2])[:size]
+                    w = 1 / variance[at]
+                    expected = np.linalg.solve((A.T * w) @ A, (A.T * w) @ z[at])
+                    ours = sums["error"][f, k, 3 * c : 3 * c + size, 0] + truth[k, c, :size]
+                    assert ours == pytest.approx(expected, rel=1e-7, abs=1e-7)
+
+
+def test_third_coordinate_and_walk_of_velocity_leave_the_first_two_alone():
+    """Depth is a coordinate like the others, and a walk of velocity is lateral in the bearing."""
+    one = config()
+    one["target"] |= {"fluctuation_mps2": 0.02}
+    plan = study.prepare(load(one).cases[0])
+    assert plan.world.walk[0] == 0.02
+    assert plan.world.walk[1] == pytest.approx(0.02 / 9e3)
+    other = config(sigma_depth_m=5.0)
+    other["target"] |= {"depth_m": [100.0, 0.5]}
+    plan = study.prepare(load(other).cases[0])
+    sums = plan.layout.unpack(study.simulate(plan, 0, 4096))
+    sigma = np.sqrt(sums["error"][..., 1] / 4096)
+    known = plan.axes.available
+    assert sigma[known] == pytest.approx(plan.axes.exact_sigma[known], rel=5.5 / np.sqrt(2 * 4096))
+    assert [name for name, _ in plan.axes.components] == ["r", "vr", "ar", "b", "vb", "ab", "d", "vd", "ad"]
+
+
+def test_blocks_add_up_whatever_their_bounds():
+    plan = study.prepare(load(config(detection_probability=0.7)).cases[0])
+    whole = plan.layout.unpack(study.simulate(plan, 0, 1500))
+    parts = [plan.layout.unpack(study.simulate(plan, *part)) for part in ((0, 700), (700, 800))]
+    for name, values in whole.items():
+        assert parts[0][name] + parts[1][name] == pytest.approx(values, rel=1e-9, abs=1e-9)

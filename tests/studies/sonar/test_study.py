@@ -1,0 +1,221 @@
+"""P3: Monte-Carlo against exact values over correlations, degrees, lengths and patterns of misses; faults must show."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from radarsim.app.configs import load
+from radarsim.app.work import CaseWork
+from radarsim.engine.collect import collect
+from radarsim.studies.sonar import study
+
+N = 100_000
+BOUND = 5.85 / np.sqrt(2 * N)
+RHO = [-0.5, 0.0, 0.3, 0.6, 0.9, 0.99]
+FILTERS = [
+    {"name": "line", "kind": "growing_memory", "degree": 1},
+    {"name": "parabola", "kind": "growing_memory", "degree": 2},
+    {"name": "naive", "kind": "kalman", "degree": 1},
+    {"name": "naive 2", "kind": "kalman", "degree": 2},
+    {"name": "augmented", "kind": "kalman_augmented", "degree": 1},
+    {"name": "augmented 2", "kind": "kalman_augmented", "degree": 2},
+    {"name": "differenced", "kind": "kalman_differenced", "degree": 1},
+    {"name": "differenced 2", "kind": "kalman_differenced", "degree": 2},
+    {"name": "window 3", "kind": "window", "degree": 1, "plots": 3},
+    {"name": "window 50 deg 2", "kind": "window", "degree": 2, "plots": 50},
+    {"name": "window 12", "kind": "window", "degree": 1, "plots": 12},
+    {"name": "kalman q", "kind": "kalman", "degree": 1, "manoeuvre_variance": 1e-3},
+    {"name": "fixed", "kind": "fixed_gain", "degree": 1, "manoeuvre_variance": 1e-3},
+    {"name": "fixed 2", "kind": "fixed_gain", "degree": 2, "manoeuvre_variance": 1e-5, "plots": 6},
+]
+
+
+def config(scans=50, filters=FILTERS, fluctuation=0.0, frame="polar", **sensor):
+    return {
+        "study": "sonar",
+        "sensor": {"sigma_range_m": 30.0, "sigma_bearing_deg": 1.0, "scan_period_s": 5.0, **sensor},
+        "target": {
+            "kind": "polynomial",
+            "frame": "polar",
+            "range_m": [9e3, -4.0],
+            "bearing_deg": [20.0, 0.01],
+            "fluctuation_mps2": fluctuation,
+        },
+        "frame": frame,
+        "filters": filters,
+        "scans": scans,
+        "realisations": N,
+    }
+
+
+def misses(seed, scans=50):
+    """A random pattern of scans that give no plot."""
+    found = np.flatnonzero(np.random.default_rng(seed).random(scans) < 0.3) + 1
+    return [int(k) for k in found if k > 3]
+
+
+def simulated(plan, count=N):
+    return plan.layout.unpack(sum(study.simulate(plan, b, min(4096, count - b)) for b in range(0, count, 4096)))
+
+
+def deviations(plan, sums):
+    """Relative deviation (F, K, C) of the measured from the exact σ, and its standard error for any distribution."""
+    with np.errstate(all="ignore"):
+        n = sums["estimates"]
+        m2, m4 = sums["error"][..., 1] / n, sums["error"][..., 3] / n
+        return np.sqrt(m2) / plan.axes.exact_sigma - 1, np.sqrt((m4 / m2**2 - 1) / n) / 2
+
+
+@pytest.mark.parametrize("rho", RHO)
+def test_every_linear_case_is_exact(rho):
+    """Both degrees, 3 to 50 plots, a random pattern of misses, white and correlated errors."""
+    plan = study.prepare(load(config(error_correlation=rho, missed_scans=misses(int(rho * 100) + 60))).cases[0])
+    sums = simulated(plan)
+    off, _ = deviations(plan, sums)
+    assert np.isfinite(off[plan.axes.available]).all()
+    assert np.nanmax(np.abs(off)) < BOUND
+    ahead = np.sqrt(sums["ahead"][..., 1] / N) / plan.axes.extra["exact_ahead"] - 1
+    assert np.nanmax(np.abs(ahead)) < BOUND
+
+
+def test_what_a_filter_says_of_itself_is_as_wrong_as_calculated():
+    """The naive filter's normalised error at ρ = 0.9; and 1 per component for those that know of it."""
+    plan = study.prepare(load(config(scans=20, error_correlation=0.9)).cases[0])
+    sums = simulated(plan)
+    q, qq = sums["joint"][..., 0] / N, sums["joint"][..., 1] / N
+    exact = plan.axes.extra["exact_nees"]
+    known = np.isfinite(exact)
+    assert (np.abs(q - exact) / np.sqrt((qq - q**2) / N))[known].max() < 5.85
+    names = plan.axes.filters
+    assert exact[names.index("naive"), -1, 0] > 3 * 2
+    assert exact[names.index("augmented"), -1, 0] == pytest.approx(2, rel=1e-9)
+
+
+@pytest.mark.parametrize(("rho", "probability"), [(0.0, 0.7), (0.6, 0.9)])
+def test_random_misses_are_exact_as_means_over_patterns(rho, probability):
+    plan = study.prepare(load(config(scans=10, error_correlation=rho, detection_probability=probability)).cases[0])
+    assert np.isfinite(plan.axes.exact_sigma[plan.axes.available]).all()
+    sums = simulated(plan)
+    off, own = deviations(plan, sums)
+    assert np.nanmax(np.abs(off) / np.maximum(own, 1e-9)) < 5.85
+    assert (sums["estimates"][:, :, 0] == N).all()
+    came = sums["estimates"][0, 1, 1] / N  # a velocity at the second scan: its plot came
+    assert abs(came - probability) < 5 * np.sqrt(probability * (1 - probability) / N)
+
+
+def test_walk_of_velocity_is_exact():
+    plan = study.prepare(load(config(scans=40, fluctuation=0.05, error_correlation=0.3)).cases[0])
+    off, _ = deviations(plan, simulated(plan))
+    away = np.array([name.startswith("a") for name, _ in plan.axes.components])
+    assert np.nanmax(np.abs(off[:, :, ~away])) < BOUND
+
+
+def test_mixed_sonars_are_exact():
+    further = [
+        {"sigma_bearing_deg": 2.0, "scan_period_s": 3.7, "first_s": 1.3},
+        {"sigma_range_m": 90.0, "sigma_bearing_deg": 0.5, "scan_period_s": 17.0, "first_s": 5.0},
+    ]
+    plan = study.prepare(load(config(scans=12, further=further, missed_scans=[6, 11])).cases[0])
+    off, _ = deviations(plan, simulated(plan))
+    assert np.isfinite(off[plan.axes.available]).all()
+    assert np.nanmax(np.abs(off)) < BOUND
+
+
+def test_both_kernels_agree_where_nothing_is_missed():
+    """Probability 1 - 10⁻¹² goes through the kernel of own patterns; hardly a plot is ever missed."""
+    one, other = (
+        study.prepare(load(config(scans=15, error_correlation=0.6, **more)).cases[0])
+        for more in ({}, {"detection_probability": 1 - 1e-12})
+    )
+    assert one.sight is None
+    assert other.sight is not None
+    other = dataclasses.replace(other, world=one.world)  # the same noise: probability is part of the world's name
+    a, b = (plan.layout.unpack(study.simulate(plan, 0, 1000)) for plan in (one, other))
+    for name in a:
+        unit = np.abs(a[name]).max(axis=(0, 1), keepdims=True)
+        assert (np.abs(a[name] - b[name]) <= 1e-9 * unit + 1e-300).all(), name
+
+
+FAULTS = {
+    "σ 3 % high": lambda plan: {"world": plan.world._replace(fresh=plan.world.fresh * 1.03)},
+    "ρ 5 % high": lambda plan: {"world": plan.world._replace(steps=plan.world.steps * 1.05)},
+    "gain a scan late": lambda plan: {"bank": plan.bank._replace(gain=np.roll(plan.bank.gain, 1, axis=1))},
+    "weights of the window reversed": lambda plan: {
+        "bank": plan.bank._replace(weights=plan.bank.weights[..., ::-1].copy())
+    },
+    "carried error forgotten": lambda plan: {"bank": plan.bank._replace(carry=plan.bank.carry * 0)},
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_planted_faults_show(fault):
+    plan = study.prepare(load(config(error_correlation=0.6)).cases[0])
+    off, _ = deviations(plan, simulated(dataclasses.replace(plan, **FAULTS[fault](plan))))
+    assert np.nanmax(np.abs(off)) > BOUND
+
+
+def test_bytes_do_not_depend_on_threads():
+    work = CaseWork(load(config(scans=8, detection_probability=0.8)).cases[0])
+    sums = [collect(work, 20_000, threads=threads).values.tobytes() for threads in (1, 2, 3)]
+    assert sums[0] == sums[1] == sums[2]
+
+
+def test_cases_that_differ_in_filters_share_their_plots():
+    few = load(config(filters=FILTERS[:1])).cases[0]
+    many = load(config(scans=20)).cases[0]
+    a, b = study.prepare(few), study.prepare(many)
+    assert (a.world.plots == b.world.plots).all()
+    first = a.layout.unpack(study.simulate(a, 0, 512))["error"][0, :20, 0]
+    assert first == pytest.approx(b.layout.unpack(study.simulate(b, 0, 512))["error"][0, :20, 0], rel=1e-9)
+
+
+def test_conversion_bias_and_its_cure():
+    """At 4 degrees and 15 km the plain conversion is 36 m short; the unbiased one is not, nor are its estimates."""
+    made = {}
+    for frame in ("cartesian", "cartesian_unbiased"):
+        given = config(scans=10, filters=FILTERS[:1], frame=frame) | {
+            "target": {"kind": "polynomial", "frame": "cartesian", "x_m": [15e3, -4.0], "y_m": [0.0, 3.0]}
+        }
+        given["sensor"]["sigma_bearing_deg"] = 4.0
+        plan = study.prepare(load(given).cases[0])
+        made[frame] = simulated(plan)["error"][0, :, 0] / N, plan.axes.extra["conversion_bias"]
+    (plain, formula), (mended, _) = made["cartesian"], made["cartesian_unbiased"]
+    assert formula == pytest.approx(np.expm1(-(np.radians(4) ** 2) / 2) * 15e3)
+    assert abs(plain[0, 0] - formula) < 5 * np.sqrt(plain[0, 1] / N)
+    assert abs(mended[0, 0]) < 5 * np.sqrt(mended[0, 1] / N)
+    assert abs(mended[9, 0]) < 0.25 * abs(plain[9, 0]) + 5 * np.sqrt(mended[9, 1] / N)
+
+
+def track_columns(n=6):
+    t = 100 + np.array([0.0, 5.0, 10.0, 17.0, 21.0, 26.0])[:n]
+    r = np.array([9010.0, 8975.0, np.nan, 8950.0, 8900.0, 8890.0])[:n]
+    b = np.array([3.13, -3.14, 3.14, np.nan, -3.13, -3.12])[:n]
+    return {"t_s": t, "range_m": r, "bearing_rad": b}
+
+
+def test_track_over_recorded_plots_is_least_squares():
+    case = load(config(filters=FILTERS[:1] + FILTERS[8:9])).cases[0]
+    columns = track_columns()
+    track = study.track(case, columns)
+    t, r = columns["t_s"], columns["range_m"]
+    seen = np.isfinite(r)
+    slope, value = np.polyfit(t[seen] - t[-1], r[seen], 1)
+    assert track.estimate[0, -1, :2] == pytest.approx([value, slope])
+    spread = np.sqrt(
+        np.diag(np.linalg.inv(sum(np.outer(a, a) for a in np.stack([t[seen] ** 0, t[seen] - t[-1]], axis=1))))
+    )
+    assert track.sigma[0, -1, :2] == pytest.approx(30 * spread)
+    slope, value = np.polyfit(t[3:] - t[-1], r[3:], 1)
+    assert track.estimate[1, -1, :2] == pytest.approx([value, slope])
+    assert np.isnan(track.estimate[0, 0, 1])
+    assert track.estimate[0, -1, 2] == pytest.approx(2 * np.pi - 3.12, abs=0.02)
+
+
+@pytest.mark.parametrize("frame", ["cartesian", "cartesian_unbiased"])
+def test_track_in_the_cartesian_frame(frame):
+    case = load(config(filters=FILTERS[:1], frame=frame)).cases[0]
+    track = study.track(case, track_columns())
+    assert [name for name, _ in track.components] == ["x", "vx", "y", "vy"]
+    assert track.estimate[0, -1, 0] == pytest.approx(-8890, rel=0.01)
+    assert np.isfinite(track.estimate[0, -1]).all()

@@ -1,0 +1,111 @@
+"""P3's tables, figures and claims from small runs: the right rows, the right words, verdicts from intervals."""
+
+import numpy as np
+import pytest
+
+import radarsim
+from radarsim.app import output
+from radarsim.app.configs import load
+from radarsim.report import claims, figures
+from radarsim.studies.sonar import claims as claimed
+from radarsim.studies.sonar import exact
+from radarsim.studies.sonar import tables as sonar
+from radarsim.studies.sonar.smoothing import operations
+
+FIGURES = {
+    "sonar_smoothing": {"plots", "smoothing_gains", "sigma_r", "sigma_vb"},
+    "sonar_correlated": {"believed", "sigma_r"},
+    "sonar_missed": {"missed", "sigma_b"},
+    "sonar_conversion": {"conversion", "sigma_x", "sigma_vy"},
+}
+
+
+@pytest.fixture(scope="module")
+def results():
+    return {stem: radarsim.run(stem, realisations=3000) for stem in FIGURES}
+
+
+def test_each_config_has_its_figures_and_they_draw(results):
+    for stem, wanted in FIGURES.items():
+        described = output.figures(results[stem].cases, results[stem].tables, results[stem].experiment)
+        assert wanted <= set(described)
+        for name in wanted & {"plots", "believed", "missed", "conversion", "smoothing_gains"}:
+            drawn = figures.render(described[name])
+            assert drawn.axes
+            assert described[name].caption
+
+
+def test_what_a_plot_buys_has_the_papers_formulas(results):
+    table = results["sonar_smoothing"].tables["plots"]
+    rows = table[(table["degree"] == 1) & (table["component"] == "b") & (table["what"] == "smoothed")]
+    assert rows["formula"].to_numpy() == pytest.approx(exact.sigma_smoothed(rows["plots"].to_numpy()))
+    inside = (rows["ratio_lo"] < rows["formula"]) & (rows["formula"] < rows["ratio_hi"])
+    assert inside.mean() > 0.7
+    rows = table[(table["what"] == "acceleration") & (table["component"] == "r")]
+    assert rows["ratio"].to_numpy() == pytest.approx(rows["formula"].to_numpy(), rel=0.08)
+
+
+def test_believed_and_consistency(results):
+    made = results["sonar_correlated"].tables
+    case = "sonar_correlated sensor.error_correlation=0.9"
+    rows = made["consistency"].set_index(["case", "filter", "component", "k"])
+    naive, honest = rows.loc[(case, "naive", "r", 20)], rows.loc[(case, "augmented", "r", 20)]
+    assert naive["verdict"] == "overconfident"
+    assert naive["nees_lo"] < naive["exact_nees"] < naive["nees_hi"]
+    assert honest["exact_nees"] == pytest.approx(1)
+    claimed_sigma = made["believed"].set_index(["case", "filter", "component", "k"]).loc[(case, "naive", "r", 20)]
+    assert claimed_sigma["believed_sigma"] == pytest.approx(30 * 0.4309, rel=1e-3)
+    assert claimed_sigma["true_to_believed"] == pytest.approx(1.0377 / 0.4309, rel=0.05)
+
+
+def test_conversion_table(results):
+    table = results["sonar_conversion"].tables["conversion"]
+    plain = table[table["frame"] == "cartesian"]
+    assert plain["formula_m"].to_numpy() == pytest.approx(
+        15e3 * np.expm1(-(plain["sigma_bearing_rad"].to_numpy() ** 2) / 2)
+    )
+    assert (table[table["frame"] != "cartesian"]["formula_m"] == 0).all()
+    assert ((table["bias_lo"] < table["formula_m"]) & (table["formula_m"] < table["bias_hi"])).mean() > 0.6
+
+
+def test_operations_are_counted():
+    assert operations.recursion().total == 19
+    assert operations.batch_of(6).total > 3 * operations.recursion().total
+    assert operations.augmented().total > 2 * operations.differenced().total
+
+
+def test_counted_formulas_are_the_filters():
+    """What is counted computes: recursion and batch agree with each other on numbers."""
+    numbers = operations.Number
+    tally = operations.Tally()
+
+    def wrap(values):
+        return [numbers(float(v), tally) for v in values]
+
+    times, plots, weights = [0, 1, 2.5, 3], [3.0, 5.2, 7.9, 9.1], [1.0, 0.5, 2.0, 1.0]
+    memory, estimate = wrap([1, 0, 0, 0]), wrap([3.0, 0])
+    for k in range(1, 4):
+        step = wrap([times[k] - times[k - 1]])[0]
+        u, w = wrap([plots[k]])[0], wrap([weights[k]])[0]
+        memory, estimate = operations.line_step(memory, estimate, u, w, step)
+    anew = operations.batch(wrap(times), wrap(plots), wrap(weights))
+    assert [n.value for n in estimate] == pytest.approx([n.value for n in anew])
+
+
+def test_claims_are_judged_where_their_cases_are(results):
+    found = {stem: set(result.tables["claims"]["claim"]) for stem, result in results.items()}
+    assert {"P3.1", "P3.2", "P3.3", "P3.4", "P3.11"} <= found["sonar_smoothing"]
+    assert found["sonar_correlated"] == {"P3.6", "P3.12"}
+    assert found["sonar_missed"] == {"P3.5"}
+    rows = results["sonar_missed"].tables["claims"]
+    assert set(rows["verdict"]) == {claims.CONFIRMED}
+    assert [claim.id for claim in claimed.CLAIMS] == [f"P3.{n}" for n in range(1, 14)]
+
+
+def test_words_of_the_report(results):
+    for stem, result in results.items():
+        question = sonar.question(load(stem))
+        assert question.endswith("?")
+        told = sonar.answer(result.cases, result.tables)
+        assert told
+        assert all(sentence.endswith(".") for sentence in told)

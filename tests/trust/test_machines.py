@@ -1,0 +1,72 @@
+"""The same numbers on other processors: as other BLAS kernels, NumPy loops and compiler targets give them.
+
+`radarsim doctor` compares a small case of every study with its known answer, each number to what its conditioning
+allows. The noise is part of that: another sample would differ by a σ.
+"""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from radarsim.engine.machine import _flags
+from radarsim.studies.discriminator.kernels.data import triangular_root
+
+WIDE = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR"
+NARROW = f"{WIDE} AVX2 FMA3 X86_V3 X86_V4"
+CORES = ("Haswell", "SkylakeX", "Zen", "Prescott")
+TARGETS = ("generic", "haswell", "skylake-avx512")
+
+
+def can_run(name):
+    """Whether this processor has the instructions that a BLAS kernel or a compiler target asks for."""
+    flags = set(_flags())
+    return {"SkylakeX": "avx512f" in flags, "skylake-avx512": "avx512f" in flags}.get(name, "avx2" in flags)
+
+
+def doctor(**environment):
+    """The self-test in a process of its own, under other settings."""
+    command = [sys.executable, "-W", "error::UserWarning", "-m", "radarsim", "doctor"]
+    return subprocess.run(command, env=os.environ | environment, capture_output=True, text=True, timeout=600)
+
+
+def passes(**environment):
+    done = doctor(**environment)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("the known") == 4
+
+
+@pytest.mark.parametrize("core", CORES[1:3])
+def test_another_blas_gives_the_same_answers(core):
+    if not can_run(core):
+        core = "Prescott"
+    passes(OPENBLAS_CORETYPE=core)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("core", list(filter(can_run, CORES)))
+@pytest.mark.parametrize("target", [*filter(can_run, TARGETS), "host"])
+@pytest.mark.parametrize("without", ["", NARROW], ids=["all features", "without AVX"])
+def test_other_processors_give_the_same_answers(core, target, without):
+    passes(
+        OPENBLAS_CORETYPE=core,
+        NPY_DISABLE_CPU_FEATURES=without,
+        **({} if target == "host" else {"NUMBA_CPU_NAME": target}),
+    )
+
+
+def test_the_root_of_the_noise_is_unique():
+    """What a processor may choose (signs, the order of eigenvalues, directions where they are equal) is not in it."""
+    draw = np.random.default_rng(7)
+    for rank in (4, 3, 2, 1):
+        for _ in range(50):
+            L = np.tril(draw.uniform(-1, 1, (4, 4)))
+            L[np.diag_indices(4)] = draw.uniform(0.3, 1, 4)
+            L[:, rank:] = 0.0
+            L *= 10.0 ** draw.uniform(-6, 6, (4, 1))  # rows in units of their own
+            np.testing.assert_allclose(triangular_root(L @ L.T), L, rtol=1e-11)
+    equal, L = np.zeros((4, 4)), np.zeros((4, 4))
+    equal[:2, :2], L[:2, 0] = 4.0, 2.0
+    np.testing.assert_array_equal(triangular_root(equal), L)
