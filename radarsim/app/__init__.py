@@ -1,0 +1,1 @@
+"""What the command and Python share: run, result, outlook, claims, doctor, clean, reproduce."""

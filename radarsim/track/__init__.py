@@ -1,0 +1,1 @@
+"""Recorded plots: reading, following, judging."""

@@ -49,7 +49,7 @@ def test_a_process_that_dies_is_told_and_replaced(tmp_path):
 
 
 def test_a_signal_ends_it_and_its_processes_in_time(tmp_path):
-    command = [sys.executable, "-m", "radarsim.app.reproduce", str(tmp_path), "rls2", "range_doppler"]
+    command = [sys.executable, "-m", "radarsim.cli.reproduce", str(tmp_path), "rls2", "range_doppler"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as run:
         while not list(tmp_path.glob(".blocks/*")):
             assert run.poll() is None

@@ -5,6 +5,7 @@ import pytest
 from click.testing import CliRunner
 
 from radarsim.cli import console, main
+from radarsim.report.text import significant_digits
 
 
 @pytest.mark.parametrize(
@@ -20,7 +21,7 @@ from radarsim.cli import console, main
     ],
 )
 def test_numbers_of_tables_are_those_of_sentences(value, form, text):
-    assert console.figures(value, form) == text
+    assert significant_digits(value, form) == text
 
 
 def test_a_number_that_is_not_known_has_no_unit():

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from radarsim.app import configs
 from radarsim.app import run as experiment
 from radarsim.app.work import CaseWork
 from radarsim.cli import group, main
-from radarsim.config import load, lookup, own
+from radarsim.config import lookup
 from radarsim.config.identity import canonical
 from radarsim.errors import ConfigError
 from radarsim.studies.range_doppler import track as range_doppler_plots
@@ -81,11 +82,11 @@ def test_a_file_in_pieces_gives_the_same_track(tmp_path, config):
     measured = [name for name in columns if not name.startswith("true_")][1:]
     for name in measured:
         columns[name] = np.where(rng.random(300) < 0.2, np.nan, columns[name])
-    study = recorded.module_of(one.study)
+    study = recorded.recorded_of(one.cases[0])
     wanted = {name: columns[name] for name in ("t_s", *measured)}
-    whole = study.Tracker(one.cases[0]).feed(wanted)
+    whole = study.tracker(one.cases[0]).feed(wanted)
     for size in (1, 7, 299):
-        tracker = study.Tracker(one.cases[0])
+        tracker = study.tracker(one.cases[0])
         pieces = [
             tracker.feed({name: column[i : i + size] for name, column in wanted.items()}) for i in range(0, 300, size)
         ]
@@ -103,11 +104,8 @@ def test_uneven_times_and_missing_values_are_least_squares_without_a_manoeuvre()
     z = np.stack([1e5 - 250 * t + 250 * rng.normal(size=60), -250 + 15 * rng.normal(size=60)], axis=1)
     z[rng.random(z.shape) < 0.3] = np.nan
     z[0] = 1e5, -250
-    track = (
-        recorded.module_of("range_doppler")
-        .Tracker(one.cases[0])
-        .feed({"t_s": t, "range_m": z[:, 0], "velocity_mps": z[:, 1]})
-    )
+    columns = {"t_s": t, "range_m": z[:, 0], "velocity_mps": z[:, 1]}
+    track = recorded.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(columns)
     s = t - t[-1]
     rows = [np.stack([np.ones(60), s, s**2 / 2], axis=1) / 250, np.stack([np.zeros(60), np.ones(60), s], axis=1) / 15]
     for f, observed in enumerate((1, 2)):
@@ -123,7 +121,7 @@ def test_a_row_without_a_value_is_extrapolated():
     one = loaded("rls2")
     columns = {"t_s": np.array([0.0, 10, 20, 30, 47]), "range_m": np.array([1e5, 9.7e4, 9.4e4, 9.1e4, np.nan])}
     columns["velocity_mps"] = np.array([-300.0, -300, -300, -300, np.nan])
-    track = recorded.module_of("range_doppler").Tracker(one.cases[0]).feed(columns)
+    track = recorded.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(columns)
     for f in range(2):
         r, v, a = track.estimate[f, 3]
         expected = [r + 17 * v + 17**2 / 2 * a, v + 17 * a, a]
@@ -137,7 +135,7 @@ def test_velocities_alone_never_start_a_track_of_ranges(monkeypatch):
     monkeypatch.setattr(range_doppler_plots, "LONGEST_START", 40)
     t = np.arange(150.0)  # more than a start looks back
     columns = {"t_s": t, "range_m": np.full(150, np.nan), "velocity_mps": np.full(150, 7.0)}
-    track = recorded.module_of("range_doppler").Tracker(one.cases[0]).feed(columns)
+    track = recorded.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(columns)
     assert np.isnan(track.estimate[0]).all()
     assert np.array_equal(np.isfinite(track.estimate[1]), np.tile([False, True, False], (150, 1)))
 
@@ -270,7 +268,7 @@ def test_the_choice_of_swept_mappings_and_of_configs_elsewhere(tmp_path, monkeyp
     turn = "{kind: polynomial, coefficients: [1e5, -100]}"
     (away / "targets.yaml").write_text(f"include: [rls2]\nsweep:\n  target: [{turn}, turn]\n  scans: [12, 15]\n")
     radarsim(*advised(radarsim("track", "away/targets.yaml", "a {b}.csv", code=2).stderr))
-    own.new("mine", "rls2")
+    configs.new("mine", "rls2")
     (tmp_path / "mine.yaml").rename(away / "mine.yaml")
     (away / "both.yaml").write_text("include: [mine, rls2]\n")
     fault = radarsim("track", "away/both.yaml", "a {b}.csv", code=2).stderr
@@ -324,8 +322,8 @@ def test_the_page_names_a_config_for_every_example_file(tmp_path):
 
 @pytest.mark.parametrize("like", lookup.stems("configs"))
 def test_a_config_of_ones_own_is_the_same_experiment(tmp_path, like):
-    path = own.new("mine", like, tmp_path)
-    mine, theirs = load.load(str(path)), load.load(like)
+    path = configs.new("mine", like, tmp_path)
+    mine, theirs = configs.load(str(path)), configs.load(like)
     assert [canonical(case.spec) for case in mine.cases] == [canonical(case.spec) for case in theirs.cases]
     assert [(case.realisations, case.seed) for case in mine.cases] == [(c.realisations, c.seed) for c in theirs.cases]
 

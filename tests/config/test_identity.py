@@ -9,10 +9,10 @@ import pytest
 from pydantic import Field
 
 from radarsim.app.configs import load
-from radarsim.config import schema
 from radarsim.config.fields import DataFile, Model, Study
 from radarsim.config.identity import canonical, world
 from radarsim.config.lookup import SHIPPED
+from radarsim.studies import registry
 
 LABELS = ["radar.name=Something", "radar.band=metre", "filters.0.name=range alone"]
 SAME = [
@@ -124,9 +124,8 @@ class Recorded(Study):
 
 @pytest.fixture
 def recorded(monkeypatch):
-    monkeypatch.setitem(schema.STUDIES, "recorded", f"{__name__}:Recorded")
-    monkeypatch.setattr(schema, "study_model", lambda name: Recorded)
-    monkeypatch.setattr("radarsim.config.cases.study_model", lambda name: Recorded)
+    monkeypatch.setitem(registry.SHIPPED, "recorded", __name__)
+    monkeypatch.setattr(registry, "keys", lambda name: Recorded)
 
 
 def test_a_file_of_data_is_its_content(house, said, recorded):

@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+from radarsim.app.run import all_claims
 from radarsim.report import claims
 from radarsim.report.claims import page
 
@@ -11,7 +12,7 @@ LINE = re.compile(r"^\| (P\d\.\w+) \| (.*?) \| [^|]* \| .* \| ([^|]*) \| `(\w+)`
 
 
 def test_the_page_has_all_claims_in_their_words():
-    rows = claims.listed({})
+    rows = claims.listed(all_claims(), {})
     wanted = [(row["claim"], page.page([row])) for row in rows]
     stands = {found[1]: found for found in LINE.finditer(TEXT)}
     assert list(stands) == [claim for claim, _ in wanted]

@@ -1,7 +1,6 @@
 """The compiler's settings: cache by the hash of all sources, wide registers, the same numbers in plain Python."""
 
 import os
-import shutil
 import subprocess
 import sys
 import textwrap
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 from llvmlite.binding import get_host_cpu_features
 
+from radarsim.kernels import cache
 from radarsim.kernels import compile as compiling
 
 SOURCES = Path(compiling.__file__).parent
@@ -32,21 +32,23 @@ def python(code, **environment):
 
 @pytest.fixture
 def house(tmp_path):
-    """A package with a copy of compile.py, a helper file and a kernel that uses it, and a cache of its own."""
+    """A package with copies of compile.py and what it needs, a helper file, a kernel that uses it, and a cache."""
     kernels = tmp_path / "copied" / "kernels"
     kernels.mkdir(parents=True)
-    shutil.copy(SOURCES / "compile.py", kernels)
-    (kernels / "helper.py").write_text("from .compile import inline\n@inline\ndef grown(x):\n    return x + 1.0\n")
+    for name in ("compile.py", "cache.py", "sources.py"):
+        (kernels / name).write_text((SOURCES / name).read_text().replace("radarsim.kernels", "copied.kernels"))
+    begin = "from copied.kernels"
+    (kernels / "helper.py").write_text(f"{begin}.compile import inline\n@inline\ndef grown(x):\n    return x + 1.0\n")
     (kernels / "user.py").write_text(
-        "from .compile import kernel\nfrom .helper import grown\n@kernel\ndef use(x):\n    return grown(x)\n"
+        f"{begin}.compile import kernel\n{begin}.helper import grown\n@kernel\ndef use(x):\n    return grown(x)\n"
     )
     return tmp_path
 
 
 USE = """
     from copied.kernels.user import use
-    from copied.kernels.compile import CACHE_DIRECTORY
-    print(use(1.0), sum(use.stats.cache_hits.values()), CACHE_DIRECTORY)
+    from copied.kernels import cache
+    print(use(1.0), sum(use.stats.cache_hits.values()), cache.directory("copied.kernels.user"))
 """
 
 
@@ -70,22 +72,24 @@ def test_an_edited_helper_is_noticed(house):
     assert Path(edited[2]).parent == house / "cache"
 
 
-def test_every_source_counts(house):
-    """A new file, a renamed file and a changed one each name another directory; the same sources the same one."""
+def test_the_directory_is_that_of_the_sources_a_kernel_rests_on(house):
+    """An edit of what it compiles names another directory; a comment, or a file beside, does not."""
 
     def directory():
-        code = "from copied.kernels.compile import CACHE_DIRECTORY; print(CACHE_DIRECTORY)"
+        code = "from copied.kernels import cache; print(cache.directory('copied.kernels.user'))"
         return python(code, PYTHONPATH=str(house), RADARSIM_CACHE_DIR=str(house / "cache"))
 
     kernels = house / "copied" / "kernels"
-    seen = [directory()]
+    seen = directory()
     (kernels / "further.py").write_text("")
-    seen.append(directory())
-    (kernels / "further.py").rename(kernels / "farther.py")
-    seen.append(directory())
-    (kernels / "farther.py").unlink()
-    assert directory() == seen[0]
-    assert len(set(seen)) == 3
+    helper = kernels / "helper.py"
+    text = helper.read_text()
+    helper.write_text(text + "# a comment\n")
+    assert directory() == seen
+    helper.write_text(text.replace("1.0", "5.0"))
+    assert directory() != seen
+    helper.write_text(text)
+    assert directory() == seen
 
 
 def test_the_first_writable_place(monkeypatch, tmp_path):
@@ -93,14 +97,14 @@ def test_the_first_writable_place(monkeypatch, tmp_path):
     blocked.write_text("not a directory")
     monkeypatch.setenv("RADARSIM_CACHE_DIR", str(tmp_path / "own"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    assert compiling.cache_root() == tmp_path / "own"
+    assert cache.cache_root() == tmp_path / "own"
     monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
-    assert compiling.cache_root() == tmp_path / "home" / "radarsim"
+    assert cache.cache_root() == tmp_path / "home" / "radarsim"
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
-    monkeypatch.setattr(compiling.tempfile, "tempdir", str(tmp_path))
-    shared = compiling.cache_root()
+    monkeypatch.setattr(cache.tempfile, "tempdir", str(tmp_path))
+    shared = cache.cache_root()
     assert shared.parent == tmp_path
-    assert compiling.cache_root() == shared
+    assert cache.cache_root() == shared
     if hasattr(os, "getuid"):
         assert shared.stat().st_mode & 0o777 == 0o700
 
@@ -112,10 +116,10 @@ def test_a_shared_place_that_others_can_write_is_not_trusted(monkeypatch, tmp_pa
     blocked.write_text("not a directory")
     monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
-    monkeypatch.setattr(compiling.tempfile, "tempdir", str(tmp_path))
-    planted = compiling.cache_root()
+    monkeypatch.setattr(cache.tempfile, "tempdir", str(tmp_path))
+    planted = cache.cache_root()
     planted.chmod(0o777)
-    assert compiling.cache_root() != planted
+    assert cache.cache_root() != planted
 
 
 def test_other_users_of_numba_keep_their_cache():

@@ -9,6 +9,8 @@ from radarsim.app.selftest import KNOWN
 from radarsim.config.schema import LARGEST_REALISATIONS
 from radarsim.report import precision
 from radarsim.report.precision import FIRST, gaussian, grown, looks, needed, worst
+from radarsim.report.tables import curves
+from radarsim.studies import registry
 
 
 @pytest.fixture(scope="module")
@@ -21,18 +23,18 @@ def results():
 @pytest.mark.parametrize("study", ["range_doppler", "multimodel", "sonar", "discriminator"])
 def test_curves_alone_are_those_among_all_tables(results, study):
     cases = results[study]
-    alone, among = output.curves(cases), output.tables(cases)["curves"]
+    alone, among = registry.study(study).curves(cases), output.tables(cases)["curves"]
     assert alone.equals(among[list(alone.columns)])
 
 
 @pytest.mark.parametrize("study", ["range_doppler", "multimodel", "sonar", "discriminator"])
 def test_the_worst_cell_is_the_widest_of_the_table(results, study):
     for case in results[study]:
-        curves = output.curves([case])
-        widths = 50 * (curves["sigma_hi"] - curves["sigma_lo"]) / curves["sigma"]
-        cell = worst(case)
+        table = registry.study(study).curves([case])
+        widths = 50 * (table["sigma_hi"] - table["sigma_lo"]) / table["sigma"]
+        cell = worst(case, registry.study(study).curves)
         assert cell.percent == widths.max()
-        row = curves.loc[widths.idxmax()]
+        row = table.loc[widths.idxmax()]
         assert (cell.filter, cell.component, cell.k) == (row["filter"], row["component"], row["k"])
 
 
@@ -45,18 +47,18 @@ def test_looks_are_declared_doublings_up_to_n():
 def test_what_is_needed_is_the_first_look_that_suffices(results):
     (case,) = results["range_doppler"]
     for percent in (0.1, 1, 3, 50):
-        n = needed(case, percent)
-        assert worst(grown(case, n)).percent < percent
-        assert n == FIRST or worst(grown(case, n // 2)).percent >= percent
+        n = needed(case, percent, curves)
+        assert worst(grown(case, n), curves).percent < percent
+        assert n == FIRST or worst(grown(case, n // 2), curves).percent >= percent
 
 
 def test_gaussian_errors_need_as_many_as_their_chi_square_says(results):
     """1.96 / √(2N) to first order, whatever the bias: a tenth of a per cent takes 1.92·10⁶."""
     (case,) = results["range_doppler"]
-    n = needed(gaussian(case), 0.1)
+    n = needed(gaussian(case), 0.1, curves)
     assert n == FIRST * 2**10
     exact = grown(gaussian(case), 1_000_000)
-    widths = worst(exact).percent
+    widths = worst(exact, curves).percent
     assert widths == pytest.approx(100 * 1.959964 / np.sqrt(2e6), rel=1e-4)
 
 
@@ -67,9 +69,9 @@ def test_what_is_not_known_is_never_reached(results):
     from dataclasses import replace
 
     lost = replace(case, sums=sums)
-    assert worst(lost).percent == np.inf
-    assert "sigma not known" in str(worst(lost))
-    assert needed(lost, 10) is None
+    assert worst(lost, curves).percent == np.inf
+    assert "sigma not known" in str(worst(lost, curves))
+    assert needed(lost, 10, curves) is None
     sums["error"][0, 3, 0] = 0.0
-    assert worst(replace(case, sums=sums)).percent < 10
+    assert worst(replace(case, sums=sums), curves).percent < 10
     assert precision.MOST == LARGEST_REALISATIONS  # more cannot be asked for

@@ -79,8 +79,9 @@ def test_the_gap_of_one_number_among_rows_of_the_other(tmp_path):
     """A file without long intervals, whose range fails for a long time: the filter of ranges counts its own gap."""
     columns = plots.read(file_with(tmp_path, [1000] * 100 + [10]), (("t_s", "range_m", "velocity_mps"),))
     columns["range_m"][SCANS:-1] = np.nan
-    (case,), study = load("rls2").cases, recorded.module_of("range_doppler")
-    twin, track = Twin(study.Tracker(case), 10.0), study.Tracker(case).feed(columns)
+    (case,) = load("rls2").cases
+    study = recorded.recorded_of(case)
+    twin, track = Twin(study.tracker(case), 10.0), study.tracker(case).feed(columns)
     assert not twin.lost(columns, track)
     assert (twin.gap_s, twin.gap_row) == (100_010, SCANS + 100)
     expected = exact(1, 3, [1000] * 100 + [10], unseen=range(100))
@@ -117,9 +118,10 @@ def test_other_studies_print_nothing_that_is_lost(tmp_path, config, overrides, g
 def test_pieces_of_a_file_lose_their_digits_where_the_whole_does(tmp_path):
     one = load("rls2")
     columns = plots.read(file_with(tmp_path, [1e7, 10, 10]), (("t_s", "range_m", "velocity_mps"),))
-    (case,), study = one.cases, recorded.module_of("range_doppler")
+    (case,) = one.cases
+    study = recorded.recorded_of(case)
     for size in (1, 5, 14, 100):
-        tracker, twin, lost = study.Tracker(case), Twin(study.Tracker(case), 10.0), []
+        tracker, twin, lost = study.tracker(case), Twin(study.tracker(case), 10.0), []
         for i in range(0, SCANS + 3, size):
             piece = {name: column[i : i + size] for name, column in columns.items()}
             lost.append(twin.lost(piece, tracker.feed(piece)))

@@ -317,12 +317,15 @@ ENGINE = (
         ('"identity": work.identity,', '"identity": "",', STORE),
     ),
     *mutants(
-        "radarsim/studies/__init__.py",
+        "radarsim/studies/identity.py",
         (
             '"seed": case.seed,',
             '"seed": 1,',
             "studies/range_doppler/test_study.py::test_identity_ignores_names_and_realisations",
         ),
+    ),
+    *mutants(
+        "radarsim/studies/noise.py",
         (
             "digest(world(case.spec))",
             "digest(canonical(case.spec))",

@@ -8,7 +8,16 @@ import pytest
 from tests.trust.mutants import ALL
 
 ROOT = Path(__file__).parents[2]
-PARTS = ("kernels", "filters", "models", "exact", "report", "engine")
+PARTS = (
+    "kernels",
+    "physics",
+    "report",
+    "engine",
+    "studies/range_doppler",
+    "studies/multimodel",
+    "studies/discriminator",
+    "studies/sonar",
+)
 
 
 def test_enough_faults_in_every_part():

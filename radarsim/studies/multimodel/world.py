@@ -102,7 +102,7 @@ def plot_truth(case: Case, t: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def sensor_frame(sensor) -> np.ndarray:
-    """The numbers of a sensor as the kernels take them."""
+    """The numbers (n,) of a sensor as the kernels take them; see `kernels.plots.frame`."""
     R = frames.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
     form = plots.BICONICAL if sensor.sigma_range_m is not None else plots.CARTESIAN
     unbiased = sensor.conversion == "unbiased"

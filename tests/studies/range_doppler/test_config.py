@@ -149,9 +149,9 @@ def spoil(config: dict, key: str, value: object) -> dict:
 
 @pytest.mark.parametrize(("key", "value", "message"), TABLE, ids=lambda v: repr(v)[:40])
 def test_bad_value(good, said, key, value, message):
-    from radarsim.config.schema import STUDIES
+    from radarsim.studies import registry
 
-    message = message.replace("{studies}", ", ".join(STUDIES))
+    message = message.replace("{studies}", ", ".join(registry.names()))
     line = message if message.startswith("config: ") else f"config: {key}: {message}"
     lines = said(spoil(good, key, value))
     if key == "include":

@@ -1,0 +1,1 @@
+"""P4's kernels: bursts, scoring, sequences of discriminators."""

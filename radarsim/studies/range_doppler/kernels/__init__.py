@@ -1,0 +1,1 @@
+"""P1's own kernels, beside the shared linear ones."""

@@ -1,0 +1,1 @@
+"""P3: tracks among false plots."""

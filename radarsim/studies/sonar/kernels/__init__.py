@@ -1,0 +1,1 @@
+"""P3's kernels that its three studies share."""

@@ -1,0 +1,1 @@
+"""Kernels of detectors and of interacting models."""
