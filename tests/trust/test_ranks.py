@@ -98,13 +98,13 @@ def sonar_estimates(made, z):
     """Estimates (n, K, 3) over plots z (n, K) of a designed filter, all tracks at once."""
     tracks, scans = z.shape
     now, carried, out = np.zeros((tracks, 3)), np.zeros(tracks), np.zeros((tracks, scans, 3))
-    for k, (first, weights) in enumerate(made.rows):
+    for k, (first, weights) in enumerate(made.window_rows):
         out[:, k] = z[:, first : k + 1] @ weights[0].T
-    for k in range(scans) if made.design is not None else ():
+    for k in range(scans) if made.recursion is not None else ():
         t = made.plots.t
-        now, carried = now @ transition(t[k] - t[max(k - 1, 0)]).T, made.design.carry[k] * carried
+        now, carried = now @ transition(t[k] - t[max(k - 1, 0)]).T, made.recursion.carry[k] * carried
         innovation = z[:, k] - now[:, 0] - carried
-        gain = made.design.gain[0, k]
+        gain = made.recursion.gain[0, k]
         now, carried = now + innovation[:, None] * gain[:3], carried + gain[3] * innovation
         out[:, k] = now
     return out
@@ -128,15 +128,15 @@ MATCHED = [
 def test_sonar_filters(kind, size, length, variance, rho):
     """One plot is missed."""
     period, sigma, rng = 5.0, 30.0, np.random.default_rng(size)
-    t, came = np.arange(SCANS) * period, np.ones((1, SCANS))
-    came[0, 8] = 0
-    choice = banks.Choice(kind, size, length, np.array([variance]), np.array([rho]))
-    made = banks.made(choice, 0, sonar_filters.Plots(t, came, period, sigma))
+    t, detected = np.arange(SCANS) * period, np.ones((1, SCANS))
+    detected[0, 8] = 0
+    spec = banks.FilterSpec(kind, size, length, np.array([variance]), np.array([rho]))
+    made = banks.design_filter(spec, 0, sonar_filters.Plots(t, detected, period, sigma))
     truth = random_track(rng, size, variance, period, SCANS, size)
-    z = np.where(came > 0, sonar_plots(rng, truth, rho, sigma, period, t), 0.0)
+    z = np.where(detected > 0, sonar_plots(rng, truth, rho, sigma, period, t), 0.0)
     found = sonar_estimates(made, z)
     for k in (size - 1, size + 1, 9, SCANS - 1):
-        P = made.believed[0, k, :size, :size]
+        P = made.covariance[0, k, :size, :size]
         assert calibrated(truth[:, k, :size], found[:, k, :size], P, k).min() > LEAST
 
 

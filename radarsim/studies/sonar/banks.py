@@ -1,4 +1,4 @@
-"""Sonar filters as the arrays that the kernels take: a choice of filter, its design, banks of many."""
+"""Sonar filters as the arrays that the kernels take: a filter's specification, its design, and banks of filters."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from radarsim.physics.motion import transition
 from radarsim.studies.sonar import filters
 from radarsim.studies.sonar.kernels import patterns
 from radarsim.studies.sonar.kernels import shared_gains as kernels
-from radarsim.studies.sonar.manoeuvre.filters import Models, Rule, Trials, interacting, switching
+from radarsim.studies.sonar.manoeuvre.filters import AdaptiveRule, DetectorTests, ModelPair, adaptive_rules, model_pairs
 from radarsim.studies.sonar.world import step_correlations
 
 KINDS = {
@@ -24,10 +24,10 @@ KINDS = {
 
 
 @dataclass(frozen=True)
-class Choice:
-    """A filter as chosen: kind, size of the state, length of a window or of a start.
+class FilterSpec:
+    """A configured filter: kind, size of the state, plots of a window or of a least-squares start.
 
-    By coordinate the manoeuvre variance (C,) and ρ (C,). A filter that answers to manoeuvres has its rule or models.
+    By coordinate the manoeuvre variance (C,) and ρ (C,). A filter that responds to manoeuvres has its rule or models.
     """
 
     kind: str
@@ -35,66 +35,67 @@ class Choice:
     length: int
     variance: np.ndarray
     rho: np.ndarray
-    answer: Rule | Models | None = None
+    response: AdaptiveRule | ModelPair | None = None
 
 
-def designed(choice: Choice, c: int, plots: filters.Plots) -> filters.Design:
+def recursive_design(spec: FilterSpec, c: int, plots: filters.Plots) -> filters.Design:
     """The design of a recursive filter in coordinate c."""
-    size = choice.size
-    match choice.kind:
+    size = spec.size
+    match spec.kind:
         case "growing_memory":
             return filters.line(plots) if size == 2 else filters.differenced(plots, size, 0.0)
         case "kalman":
-            return filters.kalman(plots, size, choice.variance[c])
+            return filters.kalman(plots, size, spec.variance[c])
         case "fixed_gain":
-            return filters.fixed_gain(plots, size, choice.variance[c], choice.length)
+            return filters.fixed_gain(plots, size, spec.variance[c], spec.length)
         case "kalman_augmented":
-            return filters.augmented(plots, size, choice.rho[c], choice.variance[c])
+            return filters.augmented(plots, size, spec.rho[c], spec.variance[c])
         case "kalman_differenced":
-            return filters.differenced(plots, size, choice.rho[c])
-    raise ValueError(f"no recursive filter: {choice.kind}")
+            return filters.differenced(plots, size, spec.rho[c])
+    raise ValueError(f"no recursive filter: {spec.kind}")
 
 
 @dataclass(frozen=True)
-class Made:
-    """A choice designed for one coordinate's plots: believed (M, K, 3, 3), and its recursion or, of a window, its rows.
+class FilterDesign:
+    """A filter designed for one coordinate's plots: covariance (M, K, 3, 3), and its recursion or its window rows.
 
-    rows are (first scan, weights (M, 3, n)) at every scan.
+    window_rows are (first scan, weights (M, 3, n)) at every scan.
     """
 
-    choice: Choice
+    spec: FilterSpec
     plots: filters.Plots
-    believed: np.ndarray
-    design: filters.Design | None = None
-    rows: tuple = ()
+    covariance: np.ndarray
+    recursion: filters.Design | None = None
+    window_rows: tuple = ()
 
     @property
     def known(self) -> np.ndarray:
-        """How many components (M, K) are estimated: plots of one time, however many, tell a value and no rate."""
-        return (np.diagonal(self.believed, axis1=2, axis2=3) > 0).sum(axis=2)
+        """Number (M, K) of components estimated: plots of a single time determine a value and no rate."""
+        return (np.diagonal(self.covariance, axis1=2, axis2=3) > 0).sum(axis=2)
 
 
-def made(choice: Choice, c: int, plots: filters.Plots) -> Made:
-    """Design a choice in coordinate c."""
-    if choice.kind != "window":
-        design = designed(choice, c, plots)
-        return Made(choice, plots, design.believed, design)
-    found = [filters.window_weights(plots, k, choice.length, choice.size) for k in range(len(plots.t))]
-    return Made(choice, plots, np.stack([P for _, _, P in found], axis=1), rows=tuple(row[:2] for row in found))
+def design_filter(spec: FilterSpec, c: int, plots: filters.Plots) -> FilterDesign:
+    """Design a filter for the plots of coordinate c."""
+    if spec.kind != "window":
+        design = recursive_design(spec, c, plots)
+        return FilterDesign(spec, plots, design.covariance, design)
+    found = [filters.window_weights(plots, k, spec.length, spec.size) for k in range(len(plots.t))]
+    covariance = np.stack([P for _, _, P in found], axis=1)
+    return FilterDesign(spec, plots, covariance, window_rows=tuple(row[:2] for row in found))
 
 
-def applied(choice: Choice, c: int, plots: filters.Plots, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def apply_filter(spec: FilterSpec, c: int, plots: filters.Plots, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Estimates (n, 3) and covariances (n, 3, 3) over recorded plots z (n,), any number where the weight is zero."""
-    found, x = made(choice, c, plots), np.zeros((len(plots.t), 3))
-    for k, (first, weights) in enumerate(found.rows):
+    found, x = design_filter(spec, c, plots), np.zeros((len(plots.t), 3))
+    for k, (first, weights) in enumerate(found.window_rows):
         x[k] = weights[0] @ z[first : k + 1]
-    now, e, design = np.zeros(3), 0.0, found.design
+    now, e, design = np.zeros(3), 0.0, found.recursion
     for k in range(len(plots.t)) if design is not None else ():
         now, e = transition(plots.t[k] - plots.t[max(k - 1, 0)]) @ now, design.carry[k] * e
         innovation = z[k] - now[0] - e
         now, e = now + design.gain[0, k, :3] * innovation, e + design.gain[0, k, 3] * innovation
         x[k] = now
-    return x, found.believed[0]
+    return x, found.covariance[0]
 
 
 def packed_inverse(P: np.ndarray, ready: np.ndarray, size: int) -> np.ndarray:
@@ -109,67 +110,69 @@ def packed_inverse(P: np.ndarray, ready: np.ndarray, size: int) -> np.ndarray:
     return out
 
 
-def shared(choices: list[Choice], designs: list[list[Made]]) -> kernels.Shared:
-    """Filters whose gains all realisations share: designs of each filter and coordinate, of one pattern of plots."""
+def shared_bank(specs: list[FilterSpec], designs: list[list[FilterDesign]]) -> kernels.SharedBank:
+    """The bank of filters whose gains all realisations share; designs[f][c] are for a single pattern of plots."""
     plots = [one.plots for one in designs[0]]
-    F, K, C = len(choices), len(plots[0].t), len(plots)
-    length = np.array([f.length if f.kind == "window" else 0 for f in choices])
+    F, K, C = len(specs), len(plots[0].t), len(plots)
+    length = np.array([f.length if f.kind == "window" else 0 for f in specs])
     longest = int(length.max())
     gain, carry = np.zeros((F, K, C, 4)), np.zeros((F, K, C))
     weights, inverse = np.zeros((F, K, C, 3, longest)), np.zeros((F, K, C, 6))
-    came = np.stack([p.weight[0] > 0 for p in plots], axis=1)
-    order = np.cumsum(came, axis=0) - 1
+    detected = np.stack([p.weight[0] > 0 for p in plots], axis=1)
+    order = np.cumsum(detected, axis=0) - 1
     known = np.stack([np.stack([one.known[0] for one in row], axis=1) for row in designs])
-    for f, choice in enumerate(choices):
+    for f, spec in enumerate(specs):
         for c, one in enumerate(designs[f]):
-            if one.design is None:
+            if one.recursion is None:
                 weights[f, :, c] = ring_weights(one, order[:, c], longest)
             else:
-                gain[f, :, c], carry[f, :, c] = one.design.gain[0], one.design.carry
-            inverse[f, :, c] = packed_inverse(one.believed[0], known[f, :, c] == choice.size, choice.size)
-    size = np.array([f.size for f in choices])
-    return kernels.Shared(
+                gain[f, :, c], carry[f, :, c] = one.recursion.gain[0], one.recursion.carry
+            inverse[f, :, c] = packed_inverse(one.covariance[0], known[f, :, c] == spec.size, spec.size)
+    size = np.array([f.size for f in specs])
+    return kernels.SharedBank(
         gain=gain,
         carry=carry,
         carries=gain[..., 3].any(axis=(1, 2)),
         length=length,
         weights=weights,
-        slot=np.where(came, order % max(longest, 1), -1),
+        slot=np.where(detected, order % max(longest, 1), -1),
         known=known,
         size=size,
         inverse=inverse,
     )
 
 
-def ring_weights(one: Made, order: np.ndarray, longest: int) -> np.ndarray:
+def ring_weights(one: FilterDesign, order: np.ndarray, longest: int) -> np.ndarray:
     """Weights (K, 3, longest) of a window by the places of its plots in the kernel's ring: number modulo its length."""
-    out = np.zeros((len(one.rows), 3, longest))
-    for k, (first, weights) in enumerate(one.rows):
+    out = np.zeros((len(one.window_rows), 3, longest))
+    for k, (first, weights) in enumerate(one.window_rows):
         for j in np.flatnonzero(weights[0].any(axis=0)):
             out[k, :, order[first + j] % longest] = weights[0, :, j]
     return out
 
 
-def own(choices: list[Choice], t: np.ndarray, period: float, nominal: np.ndarray, trials: Trials) -> patterns.Bank:
-    """Filters that go along with each realisation's plots; nominal (C,) σ of a plot, trials all tests there are."""
-    F, C = len(choices), len(nominal)
+def per_realisation_bank(
+    specs: list[FilterSpec], t: np.ndarray, period: float, nominal: np.ndarray, tests: DetectorTests
+) -> patterns.RealisationBank:
+    """The bank of filters with gains of each realisation's own; nominal (C,) σ of a plot, tests of all detectors."""
+    F, C = len(specs), len(nominal)
     manoeuvre, settled = np.zeros((F, C)), np.zeros((F, C, 3))
     carry = np.zeros((F, len(t), C))
-    for f, choice in enumerate(choices):
+    for f, spec in enumerate(specs):
         for c, sigma in enumerate(nominal):
-            manoeuvre[f, c] = choice.variance[c] * period ** (2 * choice.size) / sigma**2
-            carry[f, :, c] = step_correlations(choice.rho[c], t, period)
-            if choice.kind == "fixed_gain":
-                gain = filters.steady_gain(period, sigma, choice.size, choice.variance[c])
-                settled[f, c, : choice.size] = gain * period ** np.arange(choice.size)
-    return patterns.Bank(
-        kind=np.array([KINDS[f.kind] for f in choices]),
-        size=np.array([f.size for f in choices]),
-        length=np.array([f.length for f in choices]),
+            manoeuvre[f, c] = spec.variance[c] * period ** (2 * spec.size) / sigma**2
+            carry[f, :, c] = step_correlations(spec.rho[c], t, period)
+            if spec.kind == "fixed_gain":
+                gain = filters.steady_gain(period, sigma, spec.size, spec.variance[c])
+                settled[f, c, : spec.size] = gain * period ** np.arange(spec.size)
+    return patterns.RealisationBank(
+        kind=np.array([KINDS[f.kind] for f in specs]),
+        size=np.array([f.size for f in specs]),
+        length=np.array([f.length for f in specs]),
         carry=carry,
         manoeuvre=manoeuvre,
         settled=settled,
-        memory=max([trials.longest, *(f.length for f in choices if f.kind == "window")]),
-        switching=switching([f.answer for f in choices], [f.length for f in choices], trials, C),
-        interacting=interacting([f.answer for f in choices], [f.size for f in choices], period, nominal),
+        memory=max([tests.longest, *(f.length for f in specs if f.kind == "window")]),
+        switching=adaptive_rules([f.response for f in specs], [f.length for f in specs], tests, C),
+        interacting=model_pairs([f.response for f in specs], [f.size for f in specs], period, nominal),
     )

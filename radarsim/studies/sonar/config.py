@@ -26,7 +26,7 @@ from radarsim.config.fields import (
 )
 from radarsim.studies.sonar.clutter.config import Sector, Tracking, tracker_misfits
 from radarsim.studies.sonar.manoeuvre.config import (
-    ANSWERING,
+    RESPONDING_KINDS,
     Accelerating,
     Adapting,
     Detectors,
@@ -278,7 +278,7 @@ class Sonar(Study):
     @property
     def manoeuvring(self) -> bool:
         """Whether it measures detectors or uses of a track, or has filters that answer to manoeuvres."""
-        return bool(self.detectors or self.uses or any(f.kind in ANSWERING for f in self.filters))
+        return bool(self.detectors or self.uses or any(f.kind in RESPONDING_KINDS for f in self.filters))
 
     @cross_check
     def _trackers_fit(self):

@@ -9,26 +9,26 @@ from radarsim.studies.sonar import world as models
 from radarsim.studies.sonar.scene import Scene
 
 
-def true_errors(seen: Scene, one: banks.Made, c: int) -> tuple[np.ndarray, ...]:
+def true_errors(seen: Scene, one: banks.FilterDesign, c: int) -> tuple[np.ndarray, ...]:
     """Bias (M, K, 3), covariance (M, K, 3, 3) and number of plots (M, K) of one filter in one coordinate."""
     plots, scans = one.plots, len(one.plots.t)
     t, truth, sigma = plots.t, seen.truth[:scans, c], seen.sigma[:scans, c]
     sigma = np.where(np.isfinite(sigma), sigma, 0.0)
     count = one.known
-    if one.design is not None:
+    if one.recursion is not None:
         steps = models.step_correlations(seen.rho[c], t, seen.period)
-        errors = exact.recursive_errors(one.design.gain, one.design.carry, t, truth, steps, sigma, seen.walk[c])
+        errors = exact.recursive_errors(one.recursion.gain, one.recursion.carry, t, truth, steps, sigma, seen.walk[c])
         return *errors, count
     bias, covariance = np.zeros((len(count), scans, 3)), np.zeros((len(count), scans, 3, 3))
-    for k, (first, weights) in enumerate(one.rows):
+    for k, (first, weights) in enumerate(one.window_rows):
         C = models.error_covariance(sigma[first : k + 1], seen.rho[c], t[first : k + 1], seen.period)
-        origin = first if count[:, k].min() >= one.choice.size else 0
+        origin = first if count[:, k].min() >= one.spec.size else 0
         bias[:, k], covariance[:, k] = exact.weighted_errors(weights, first, t, truth, C, seen.walk[c], origin)
     return bias, covariance, count
 
 
 def exact_values(
-    seen: Scene, designs: list[list[banks.Made]], probability: np.ndarray, size: int
+    seen: Scene, designs: list[list[banks.FilterDesign]], probability: np.ndarray, size: int
 ) -> dict[str, np.ndarray]:
     """Exact σ and bias (F, K, C, size), σ one scan ahead and normalised error (F, K, C); not-a-number where not known.
 
@@ -44,16 +44,18 @@ def exact_values(
         one = designs[f][c]
         bias, S, plots = true_errors(seen, one, c)
         reach = plots.shape[1]
-        for j in range(one.choice.size):
+        for j in range(one.spec.size):
             share = probability[:, None] * (plots > j)
             with np.errstate(invalid="ignore", divide="ignore"):
                 square = (share * (S[:, :, j, j] + bias[:, :, j] ** 2)).sum(axis=0) / share.sum(axis=0)
                 found["sigma"][f, :reach, c, j] = np.sqrt(square)
                 found["bias"][f, :reach, c, j] = (share * bias[:, :, j]).sum(axis=0) / share.sum(axis=0)
-        found["ahead"][f, :reach, c] = _ahead(seen, c, bias, S, probability[:, None] * (plots >= one.choice.size))
+        found["ahead"][f, :reach, c] = _ahead(seen, c, bias, S, probability[:, None] * (plots >= one.spec.size))
         if probability.size == 1:
-            ready, n = np.flatnonzero(plots[0] >= one.choice.size), one.choice.size
-            found["nees"][f, ready, c] = _nees(one.believed[0, ready, :n, :n], bias[0, ready, :n], S[0, ready, :n, :n])
+            ready, n = np.flatnonzero(plots[0] >= one.spec.size), one.spec.size
+            found["nees"][f, ready, c] = _nees(
+                one.covariance[0, ready, :n, :n], bias[0, ready, :n], S[0, ready, :n, :n]
+            )
     return found
 
 

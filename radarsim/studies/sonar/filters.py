@@ -53,12 +53,12 @@ class Plots:
 
 @dataclass(frozen=True)
 class Design:
-    """A recursive filter: gain (M, K, 4), carry (K,), believed (M, K, 3, 3), plots (M, K) the times of plots so far."""
+    """A recursive filter: gain (M, K, 4), carry (K,), covariance (M, K, 3, 3), times of plots so far (M, K)."""
 
     size: int
     gain: np.ndarray
     carry: np.ndarray
-    believed: np.ndarray
+    covariance: np.ndarray
     plots: np.ndarray
 
 
@@ -78,8 +78,8 @@ def _finished(plots: Plots, size: int, gain: np.ndarray, carry: np.ndarray, P: n
     """From periods and nominal weights to seconds and units."""
     scale = plots.period ** -np.arange(3.0)
     gain = gain * np.append(scale, 1.0)
-    believed = P * plots.sigma**2 * np.outer(scale, scale)
-    return Design(size, gain, carry, believed, plots.moments())
+    covariance = P * plots.sigma**2 * np.outer(scale, scale)
+    return Design(size, gain, carry, covariance, plots.moments())
 
 
 def line(plots: Plots) -> Design:

@@ -18,7 +18,7 @@ class Scene:
 
     t (K,) s; truth (K, C, 3) in the working frame, polar (K, C, 3) as measured; sigma (K, C) of the plots, infinite
     where a coordinate is not measured; nominal (C,) plots' σ in the working frame; rho (C,); walk (C,) a random
-    acceleration; certain (K,) 1, 0 or -1 as in kernels.sonar_patterns.Sight.
+    acceleration; certain (K,) 1, 0 or -1 as in kernels.patterns.Observation.
     """
 
     t: np.ndarray
@@ -116,14 +116,14 @@ def angular(spec, power: int) -> np.ndarray:
 
 
 # ---- the filters --------------------------------------------------------------------------------------------------
-def choices(spec) -> list[banks.Choice]:
+def filter_specs(spec) -> list[banks.FilterSpec]:
     """The filters of a case, in the units of each coordinate."""
     found, coordinates = [], len(angular(spec, 2))
     for f in spec.filters:
         rho = spec.sensor.error_correlation if f.error_correlation is None else f.error_correlation
         known = f.kind in ("kalman_augmented", "kalman_differenced")
         found.append(
-            banks.Choice(
+            banks.FilterSpec(
                 kind=f.kind,
                 size=f.degree + 1,
                 length=f.plots or 0,
@@ -134,10 +134,10 @@ def choices(spec) -> list[banks.Choice]:
     return found
 
 
-def plots_of(seen: Scene, c: int, came: np.ndarray) -> filters.Plots:
-    """Plots of coordinate c under patterns came (M, K)."""
-    weight = came * (seen.nominal[c] / seen.sigma[: came.shape[1], c]) ** 2
-    return filters.Plots(seen.t[: came.shape[1]], weight, seen.period, seen.nominal[c])
+def plots_of(seen: Scene, c: int, detected: np.ndarray) -> filters.Plots:
+    """Plots of coordinate c under patterns `detected` (M, K)."""
+    weight = detected * (seen.nominal[c] / seen.sigma[: detected.shape[1], c]) ** 2
+    return filters.Plots(seen.t[: detected.shape[1]], weight, seen.period, seen.nominal[c])
 
 
 def patterns(seen: Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -147,7 +147,7 @@ def patterns(seen: Scene) -> tuple[np.ndarray, np.ndarray]:
     open_scans = np.cumsum(seen.certain < 0)
     reach = int(np.searchsorted(open_scans, MOST_OPEN, side="right"))
     free = np.flatnonzero(seen.certain[:reach] < 0)
-    came = np.tile(np.maximum(seen.certain[:reach], 0), (2 ** len(free), 1))
-    came[:, free] = (np.arange(2 ** len(free))[:, None] >> np.arange(len(free))) & 1
-    number = came[:, free].sum(axis=1)
-    return came, seen.probability**number * (1 - seen.probability) ** (len(free) - number)
+    detected = np.tile(np.maximum(seen.certain[:reach], 0), (2 ** len(free), 1))
+    detected[:, free] = (np.arange(2 ** len(free))[:, None] >> np.arange(len(free))) & 1
+    number = detected[:, free].sum(axis=1)
+    return detected, seen.probability**number * (1 - seen.probability) ** (len(free) - number)

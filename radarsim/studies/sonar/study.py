@@ -4,7 +4,7 @@ Sums of F filters over K scans and components (coordinate by coordinate: value, 
 acceleration): `error`, `paired`, `estimates` as everywhere; `believed` Σ of the variances that the filter claims; by
 coordinate C: `joint` Σq, Σq², Σp, Σp² of q = eᵀP⁻¹e and p the product of the errors in value and rate, and `ahead` Σe
 … Σe⁴ of the value extrapolated by one scan, in the row of the scan that it was extrapolated from. Cases with detectors,
-filters that answer to manoeuvres or uses have the sums of `sonar_manoeuvre` beside; those whose filters have to find
+filters that respond to manoeuvres or uses have the sums of `sonar_manoeuvre` beside; those whose filters have to find
 their plots among false ones are of `sonar_clutter`.
 """
 
@@ -18,14 +18,14 @@ from radarsim.engine.results import Axes, Track
 from radarsim.studies.noise import noise_key
 from radarsim.studies.sonar import banks, filters
 from radarsim.studies.sonar import world as models
-from radarsim.studies.sonar.answering import followed
 from radarsim.studies.sonar.clutter import study as clutter
 from radarsim.studies.sonar.exact_values import exact_values
 from radarsim.studies.sonar.kernels import patterns as pattern_kernels
 from radarsim.studies.sonar.kernels import shared_gains as kernels
 from radarsim.studies.sonar.manoeuvre import study as manoeuvres
-from radarsim.studies.sonar.manoeuvre.config import ANSWERING
-from radarsim.studies.sonar.scene import Scene, choices, patterns, plots_of, scene, third_of
+from radarsim.studies.sonar.manoeuvre.config import RESPONDING_KINDS
+from radarsim.studies.sonar.responding import estimate_recorded
+from radarsim.studies.sonar.scene import Scene, filter_specs, patterns, plots_of, scene, third_of
 
 BLOCK = 4096
 NAMES = {
@@ -38,22 +38,22 @@ THIRD = {"depth": ("d", "m"), "elevation": ("e", "rad")}
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a block needs; `sight` and `watched` are None where all realisations share their gains."""
+    """All that a block needs; `observation` and `detector_plan` are None where all realisations share their gains."""
 
     layout: Layout
     axes: Axes
     world: kernels.World
     bank: tuple
-    sight: tuple | None
+    observation: tuple | None
     size: int
     believed: np.ndarray | None
-    watched: manoeuvres.Watched | None = None
+    detector_plan: manoeuvres.DetectorPlan | None = None
     block: int = BLOCK
 
     @property
     def gaussian(self) -> bool:
         """Whether errors are Gaussian with the exact bias and σ of the axes, where these are known."""
-        return self.sight is None and self.watched is None
+        return self.observation is None and self.detector_plan is None
 
 
 def prepare(case: Case) -> Plan | clutter.Plan:
@@ -61,45 +61,45 @@ def prepare(case: Case) -> Plan | clutter.Plan:
     spec, seen = case.spec, scene(case.spec)
     if spec.tracking:
         return clutter.prepare(case, seen, world(case, seen))
-    wanted = manoeuvres.answered(spec, choices(spec))
-    size = max(choice.size for choice in wanted)
-    F, K, C = len(wanted), len(seen.t), seen.truth.shape[1]
+    specs = manoeuvres.with_manoeuvre_response(spec, filter_specs(spec))
+    size = max(one.size for one in specs)
+    F, K, C = len(specs), len(seen.t), seen.truth.shape[1]
     shared = spec.frame == "polar" and (seen.certain >= 0).all() and not spec.manoeuvring
     if shared:
-        came, probability = np.maximum(seen.certain, 0)[None], np.ones(1)
+        detected, probability = np.maximum(seen.certain, 0)[None], np.ones(1)
     else:
-        came, probability = patterns(seen) if spec.frame == "polar" else (np.zeros((0, 0)), np.zeros(0))
-    designs = [_designs(choice, seen, came) for choice in wanted]
-    watched = None if shared else manoeuvres.watched(spec, seen, wanted)
+        detected, probability = patterns(seen) if spec.frame == "polar" else (np.zeros((0, 0)), np.zeros(0))
+    designs = [_designs(one, seen, detected) for one in specs]
+    detector_plan = None if shared else manoeuvres.detector_plan(spec, seen, specs)
     if shared:
-        bank, claimed = banks.shared(wanted, designs), [[one.believed[0] for one in row] for row in designs]
+        bank, claimed = banks.shared_bank(specs, designs), [[one.covariance[0] for one in row] for row in designs]
     else:
-        bank, claimed = banks.own(wanted, seen.t, seen.period, seen.nominal, watched.trials), None
+        bank, claimed = banks.per_realisation_bank(specs, seen.t, seen.period, seen.nominal, detector_plan.tests), None
     layout = Layout(
         **dict.fromkeys(("paired", "estimates", "believed"), (F, K, C * size)),
         **{"error": (F, K, C * size, 4), "joint": (F, K, C, 4), "ahead": (F, K, C, 4)},
-        **(manoeuvres.shapes(watched, F) if watched else {}),
+        **(manoeuvres.shapes(detector_plan, F) if detector_plan else {}),
     )
-    made = axes(spec, seen, wanted, exact_values(seen, designs, probability, size), bank.known if shared else None)
+    made = axes(spec, seen, specs, exact_values(seen, designs, probability, size), bank.known if shared else None)
     if spec.manoeuvring:
-        made.extra.update(manoeuvres.told(watched, came, probability))
+        made.extra.update(manoeuvres.told(detector_plan, detected, probability))
     return Plan(
         layout=layout,
         axes=made,
         world=world(case, seen),
         bank=bank,
-        sight=None if shared else sight(case, seen),
+        observation=None if shared else observation(case, seen),
         size=size,
         believed=np.diagonal(claimed, axis1=3, axis2=4).transpose(0, 2, 1, 3) if shared else None,
-        watched=watched,
+        detector_plan=detector_plan,
     )
 
 
-def _designs(choice: banks.Choice, seen: Scene, came: np.ndarray) -> list[banks.Made]:
+def _designs(one: banks.FilterSpec, seen: Scene, detected: np.ndarray) -> list[banks.FilterDesign]:
     """The designs of a filter by coordinate for all patterns of plots; none where gains depend on the plots' values."""
-    if not len(came) or choice.kind in ANSWERING:
+    if not len(detected) or one.kind in RESPONDING_KINDS:
         return []
-    return [banks.made(choice, c, plots_of(seen, c, came)) for c in range(len(seen.nominal))]
+    return [banks.design_filter(one, c, plots_of(seen, c, detected)) for c in range(len(seen.nominal))]
 
 
 def world(case: Case, seen: Scene) -> kernels.World:
@@ -117,10 +117,10 @@ def world(case: Case, seen: Scene) -> kernels.World:
     return kernels.World(noise_key(case, "plots"), noise_key(case, "motion"), dt, truth, padded, fresh, walk)
 
 
-def sight(case: Case, seen: Scene) -> pattern_kernels.Sight:
+def observation(case: Case, seen: Scene) -> pattern_kernels.Observation:
     """Which plots come and how they are converted, for filters that go along with each realisation."""
     frame = ("polar", "cartesian", "cartesian_unbiased").index(case.spec.frame)
-    return pattern_kernels.Sight(
+    return pattern_kernels.Observation(
         misses=noise_key(case, "misses"),
         certain=seen.certain,
         probability=seen.probability,
@@ -133,13 +133,13 @@ def sight(case: Case, seen: Scene) -> pattern_kernels.Sight:
     )
 
 
-def axes(spec, seen: Scene, wanted: list[banks.Choice], values: dict, known: np.ndarray | None) -> Axes:
+def axes(spec, seen: Scene, specs: list[banks.FilterSpec], values: dict, known: np.ndarray | None) -> Axes:
     """Labels and exact values, as `exact_values` gives them; known (F, K, C) components, or as many as may be."""
     F, K, C, size = values["sigma"].shape
-    came = (seen.certain != 0).astype(float)[None]  # what may come
-    degree = np.array([choice.size for choice in wanted])
+    detected = (seen.certain != 0).astype(float)[None]  # what may come
+    degree = np.array([one.size for one in specs])
     if known is None:
-        most = np.stack([plots_of(seen, c, came).moments()[0] for c in range(C)], axis=1)
+        most = np.stack([plots_of(seen, c, detected).moments()[0] for c in range(C)], axis=1)
         known = np.minimum(most[None], degree[:, None, None])
     available = known[..., None] > np.arange(size)
     names = tuple(f.name for f in spec.filters)
@@ -161,7 +161,7 @@ def axes(spec, seen: Scene, wanted: list[banks.Choice], values: dict, known: np.
             "scan_period_s": seen.period,
             "sigma": seen.nominal,
             "rho": seen.rho,
-            "sigma_of_plots": np.where(came.T > 0, seen.sigma, np.inf),
+            "sigma_of_plots": np.where(detected.T > 0, seen.sigma, np.inf),
             "conversion_bias": plain_bias(spec, seen),
             "truth": seen.truth,
             "polar": seen.polar,
@@ -196,15 +196,16 @@ def simulate(plan: Plan | clutter.Plan, first: int, count: int) -> np.ndarray:
     shapes = {"error": (3, 4), "paired": (3,), "joint": (4,), "ahead": (4,), "believed": (3,), "estimates": (3,)}
     sums = kernels.Sums(**{name: np.zeros((F, K, C, *tail)) for name, tail in shapes.items()})
     added = {}
-    if plan.sight is None:
+    if plan.observation is None:
         kernels.simulate_block(plan.world, plan.bank, first, count, plan.axes.baseline, sums)
         sums.believed[:] = count * plan.believed
         sums.estimates[:] = count * (plan.bank.known[..., None] > np.arange(3))
     else:
-        world, watched = (plan.world, plan.sight, plan.bank, plan.watched.watch), plan.watched
-        alarms, further = manoeuvres.empty_sums(watched, F, count)
+        detector_plan = plan.detector_plan
+        world = plan.world, plan.observation, plan.bank, detector_plan.detectors
+        alarms, further = manoeuvres.empty_sums(detector_plan, F, count)
         pattern_kernels.simulate_block(*world, first, count, plan.axes.baseline, sums, alarms, further)
-        added = manoeuvres.added_up(watched, alarms, further)
+        added = manoeuvres.added_up(detector_plan, alarms, further)
     picked = {
         name: getattr(sums, name)[:, :, :, : plan.size].reshape(plan.layout.shapes[name])
         for name in ("error", "paired", "believed", "estimates")
@@ -226,23 +227,23 @@ def track(case: Case, recorded: dict[str, np.ndarray]) -> Track:
     needs both range and bearing. Further sonars of the config play no part: all plots are taken as the first one's.
     """
     spec, t = case.spec, recorded["t_s"] - recorded["t_s"][0]
-    wanted, columns = manoeuvres.answered(spec, choices(spec)), list(recorded.values())[1:]
+    specs, columns = manoeuvres.with_manoeuvre_response(spec, filter_specs(spec)), list(recorded.values())[1:]
     z, weight, sigma = measured(spec, columns)
     plots = [filters.Plots(t, w[None], spec.sensor.scan_period_s, unit) for w, unit in zip(weight, sigma, strict=True)]
-    size, period = max(choice.size for choice in wanted), spec.sensor.scan_period_s
-    x, P = np.zeros((len(wanted), len(t), len(z), 3)), np.zeros((len(wanted), len(t), len(z), 3, 3))
+    size, period = max(one.size for one in specs), spec.sensor.scan_period_s
+    x, P = np.zeros((len(specs), len(t), len(z), 3)), np.zeros((len(specs), len(t), len(z), 3, 3))
     known = np.zeros(x.shape, dtype=bool)
-    answering = [f for f, choice in enumerate(wanted) if choice.answer]
-    if answering:
-        x[answering], P[answering] = followed([wanted[f] for f in answering], t, period, sigma, z, weight)
-    for f, choice in enumerate(wanted):
+    responding = [f for f, one in enumerate(specs) if one.response]
+    if responding:
+        x[responding], P[responding] = estimate_recorded([specs[f] for f in responding], t, period, sigma, z, weight)
+    for f, one in enumerate(specs):
         for c in range(len(z)):
-            if not choice.answer:
-                x[f, :, c], P[f, :, c] = banks.applied(choice, c, plots[c], z[c])
-            known[f, :, c] = np.arange(3) < np.minimum(plots[c].moments()[0], choice.size)[:, None]
+            if not one.response:
+                x[f, :, c], P[f, :, c] = banks.apply_filter(one, c, plots[c], z[c])
+            known[f, :, c] = np.arange(3) < np.minimum(plots[c].moments()[0], one.size)[:, None]
     variance = np.diagonal(P, axis1=3, axis2=4)
     estimate, spread = np.where(known, x, np.nan), np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)
-    flat, components = (len(wanted), len(t), len(z) * size), labels(spec, size)
+    flat, components = (len(specs), len(t), len(z) * size), labels(spec, size)
     estimate, spread = estimate[..., :size].reshape(flat), spread[..., :size].reshape(flat)
     if spec.uses is not None:
         found = manoeuvres.uses_of(spec, t, x, P, known)
@@ -262,16 +263,16 @@ def measured(spec, columns: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, n
     z[1] = continuous(z[1])
     weight = np.isfinite(z).astype(float)
     if spec.frame != "polar":
-        came = np.flatnonzero(weight[:2].all(axis=0))
-        plain = spec.frame == "cartesian" or not len(came)
-        place = z[:2, came] if plain else models.places(*z[:2, came])
+        detected = np.flatnonzero(weight[:2].all(axis=0))
+        plain = spec.frame == "cartesian" or not len(detected)
+        place = z[:2, detected] if plain else models.places(*z[:2, detected])
         convert = models.converted if spec.frame == "cartesian" else models.converted_unbiased
-        x, y, _ = convert(*z[:2, came], *sigma[:2])
+        x, y, _ = convert(*z[:2, detected], *sigma[:2])
         xx, _, yy = convert(*place, *sigma[:2])[2]
         weight[:2], z[:2] = 0.0, 0.0
-        sigma[:2] = np.sqrt([xx[0], yy[0]]) if len(came) else 1.0
-        z[0, came], z[1, came] = x, y
-        weight[0, came], weight[1, came] = sigma[0] ** 2 / xx, sigma[1] ** 2 / yy
+        sigma[:2] = np.sqrt([xx[0], yy[0]]) if len(detected) else 1.0
+        z[0, detected], z[1, detected] = x, y
+        weight[0, detected], weight[1, detected] = sigma[0] ** 2 / xx, sigma[1] ** 2 / yy
     return np.where(weight > 0, z, 0.0), weight, sigma
 
 

@@ -48,7 +48,7 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
         values, exact = drawn[:, :C, 0], truth[..., 0]
     else:
         values, exact = seen.polar[..., 0] + error, seen.polar[..., 0]
-    there = (_came(case, seen, realisation) > 0)[:, None] & np.isfinite(seen.sigma)
+    there = (_detected(case, seen, realisation) > 0)[:, None] & np.isfinite(seen.sigma)
     t, *names = plot_columns(spec)[0]
     columns = {t: seen.t} | dict(zip(names, np.where(there, values, np.nan).T, strict=True))
     columns |= {f"true_{name}": exact[:, c] for c, name in enumerate(names)}
@@ -68,13 +68,13 @@ def _drawn(case: Case, seen: Scene, realisation: int) -> np.ndarray:
     return made
 
 
-def _came(case: Case, seen: Scene, realisation: int) -> np.ndarray:
-    """Whether each scan has a plot (K,), as `kernels.sonar_patterns.detect`."""
-    key, came, a, b = noise_key(case, "misses"), seen.certain.copy(), np.empty(1), np.empty(1)
+def _detected(case: Case, seen: Scene, realisation: int) -> np.ndarray:
+    """Whether each scan has a plot (K,), as `kernels.patterns.detect`."""
+    key, detected, a, b = noise_key(case, "misses"), seen.certain.copy(), np.empty(1), np.empty(1)
     for k in np.flatnonzero(seen.certain < 0):
         random.fill_uniform_pairs(key, realisation, int(k), a, b)
-        came[k] = int(a[0] < seen.probability)
-    return came
+        detected[k] = int(a[0] < seen.probability)
+    return detected
 
 
 class Tracker:

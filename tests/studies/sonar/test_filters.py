@@ -40,11 +40,11 @@ def compare(design, z, twin, relative=1e-9):
     size = design.size
     t = np.arange(len(z)) * PERIOD
     known = ~np.isnan(x)
-    ours, spread = run(design, t, z)[:, :size], np.sqrt(np.diagonal(design.believed[0], axis1=1, axis2=2))[:, :size]
+    ours, spread = run(design, t, z)[:, :size], np.sqrt(np.diagonal(design.covariance[0], axis1=1, axis2=2))[:, :size]
     assert np.max(np.abs(ours - x)[known] / np.maximum(spread[known], 1e-12)) < relative
     full = known.all(axis=1)
     unit = spread[full][:, :, None] * spread[full][:, None, :]
-    assert np.max(np.abs(design.believed[0][full][:, :size, :size] - P[full]) / unit) < relative
+    assert np.max(np.abs(design.covariance[0][full][:, :size, :size] - P[full]) / unit) < relative
 
 
 @pytest.fixture(params=[1, 2, 3])
@@ -118,15 +118,14 @@ def test_growing_memory_kalman_and_closed_forms_agree():
     for design in (line, kalman, other):
         assert design.gain[0, 1:, 0] == pytest.approx(A, rel=1e-10)
         assert design.gain[0, 1:, 1] * PERIOD == pytest.approx(B, rel=1e-10)
-        assert np.sqrt(design.believed[0, 1:, 0, 0]) == pytest.approx(SIGMA * exact.sigma_smoothed(n), rel=1e-10)
-    ahead = (
-        line.believed[0, 1:, 0, 0] + 2 * PERIOD * line.believed[0, 1:, 0, 1] + PERIOD**2 * line.believed[0, 1:, 1, 1]
-    )
+        assert np.sqrt(design.covariance[0, 1:, 0, 0]) == pytest.approx(SIGMA * exact.sigma_smoothed(n), rel=1e-10)
+    P = line.covariance[0, 1:]
+    ahead = P[:, 0, 0] + 2 * PERIOD * P[:, 0, 1] + PERIOD**2 * P[:, 1, 1]
     assert np.sqrt(ahead) == pytest.approx(SIGMA * exact.sigma_extrapolated(n), rel=1e-10)
     second, n = filters.differenced(everything, 3, 0.0), n[1:]
     kalman = filters.kalman(everything, 3, 0.0)
     for design in (second, kalman):
-        acceleration = np.sqrt(design.believed[0, 2:, 2, 2])
+        acceleration = np.sqrt(design.covariance[0, 2:, 2, 2])
         assert acceleration == pytest.approx(SIGMA * exact.sigma_acceleration(n, PERIOD), rel=1e-10)
 
 
@@ -139,7 +138,7 @@ def test_printed_gains_of_unequal_weights_are_wrong_and_ours_right():
     C = np.diag(SIGMA**2 / weight)
     W, P = exact.generalised_least_squares(t, C, 2)
     assert design.gain[0, -1, :2] == pytest.approx(W[:, -1], rel=1e-11)
-    assert design.believed[0, -1, :2, :2] == pytest.approx(P, rel=1e-11)
+    assert design.covariance[0, -1, :2, :2] == pytest.approx(P, rel=1e-11)
     assert abs(design.gain[0, -1, 1] * PERIOD / (6 / (12 * 13)) - 1) > 0.05
 
 
@@ -162,4 +161,4 @@ def test_missed_plot_has_no_gain_and_a_second_plot_at_one_time_averages():
 def test_a_plot_at_the_time_of_the_last_one_tells_nothing_of_a_correlated_error():
     design = filters.augmented(plots(np.ones(5), np.array([0.0, 5.0, 10.0, 10.0, 15.0])), 2, 0.6, 0.0)
     assert not design.gain[0, 3].any()
-    assert np.isfinite(design.believed).all()
+    assert np.isfinite(design.covariance).all()

@@ -41,18 +41,18 @@ def config(frame="polar", **sensor):
 
 
 def plots(plan, realisation, rho, probability, missed=()):
-    """Errors (K, 2) and whether the plots came (K,), drawn from the same streams by the plainest code."""
+    """Errors (K, 2) and which scans are detected (K,), drawn from the same streams by the plainest code."""
     a, b, e = np.empty(1), np.empty(1), np.zeros((SCANS, 2))
-    came = np.ones(SCANS, dtype=bool)
+    detected = np.ones(SCANS, dtype=bool)
     for k in range(SCANS):
         fill_normal_pairs(plan.world.plots, realisation, k, a, b)
         fresh = SIGMA * np.array([a[0], b[0]])
         e[k] = fresh if k == 0 else rho * e[k - 1] + np.sqrt(1 - rho**2) * fresh
-        if plan.sight is not None and probability < 1 and k > 0:
-            fill_uniform_pairs(plan.sight.misses, realisation, k, a, b)
-            came[k] = a[0] < probability
-    came[list(missed)] = False
-    return e, came
+        if plan.observation is not None and probability < 1 and k > 0:
+            fill_uniform_pairs(plan.observation.misses, realisation, k, a, b)
+            detected[k] = a[0] < probability
+    detected[list(missed)] = False
+    return e, detected
 
 
 def twin(spec, z, sigma, rho, scale):
@@ -101,9 +101,9 @@ def test_estimates_are_the_twins(sensor):
     truth = plan.axes.extra["truth"]
     for realisation in (0, 5, 12345):
         sums = plan.layout.unpack(study.simulate(plan, realisation, 1))
-        e, came = plots(plan, realisation, rho, probability, missed)
+        e, detected = plots(plan, realisation, rho, probability, missed)
         for c in range(2):
-            z = np.where(came, truth[:, c, 0] + e[:, c], np.nan)
+            z = np.where(detected, truth[:, c, 0] + e[:, c], np.nan)
             for f, spec in enumerate(FILTERS):
                 x, P = twin(spec, z, SIGMA[c], rho, (1.0, 9e3**-2)[c])
                 size = spec["degree"] + 1
@@ -131,15 +131,15 @@ def test_converted_plots_and_their_weights(frame):
     convert = models.converted if frame == "cartesian" else models.converted_unbiased
     for realisation in (0, 77):
         sums = plan.layout.unpack(study.simulate(plan, realisation, 1))
-        e, came = plots(plan, realisation, 0.0, 0.8)
+        e, detected = plots(plan, realisation, 0.0, 0.8)
         r, b = polar[:, 0, 0] + e[:, 0], polar[:, 1, 0] + e[:, 1]
         x, y, (xx, _, yy) = convert(r, b, *SIGMA)
         if frame == "cartesian_unbiased":
             xx, _, yy = np.full((3, SCANS), np.nan)
-            xx[came], _, yy[came] = convert(*models.places(r[came], b[came]), *SIGMA)[2]
+            xx[detected], _, yy[detected] = convert(*models.places(r[detected], b[detected]), *SIGMA)[2]
         for c, (z, variance) in enumerate(((x, xx), (y, yy))):
             for k in range(2, SCANS):
-                at = np.flatnonzero(came[: k + 1])
+                at = np.flatnonzero(detected[: k + 1])
                 if len(at) < 3:
                     continue
                 for f, size in ((0, 2), (1, 3)):

@@ -100,8 +100,8 @@ def test_random_misses_are_exact_as_means_over_patterns(rho, probability):
     off, own = deviations(plan, sums)
     assert np.nanmax(np.abs(off) / np.maximum(own, 1e-9)) < 5.85
     assert (sums["estimates"][:, :, 0] == N).all()
-    came = sums["estimates"][0, 1, 1] / N  # a velocity at the second scan: its plot came
-    assert abs(came - probability) < 5 * np.sqrt(probability * (1 - probability) / N)
+    detected = sums["estimates"][0, 1, 1] / N  # a velocity at the second scan: its plot was detected
+    assert abs(detected - probability) < 5 * np.sqrt(probability * (1 - probability) / N)
 
 
 def test_walk_of_velocity_is_exact():
@@ -128,8 +128,8 @@ def test_both_kernels_agree_where_nothing_is_missed():
         study.prepare(load(config(scans=15, error_correlation=0.6, **more)).cases[0])
         for more in ({}, {"detection_probability": 1 - 1e-12})
     )
-    assert one.sight is None
-    assert other.sight is not None
+    assert one.observation is None
+    assert other.observation is not None
     other = dataclasses.replace(other, world=one.world)  # the same noise: probability is part of the world's name
     a, b = (plan.layout.unpack(study.simulate(plan, 0, 1000)) for plan in (one, other))
     for name in a:

@@ -5,15 +5,15 @@ import math
 import numpy as np
 
 
-def confirmed_by(chance: np.ndarray, m: int, n: int) -> np.ndarray:
+def confirmed_by(probability: np.ndarray, m: int, n: int) -> np.ndarray:
     """Probability (K,) that a track of the target was confirmed by each scan, without false plots and with open gates.
 
-    chance (K,) of a plot at each scan. A Markov chain over the age of the track and its plots so far: a plot where
+    probability (K,) of a plot at each scan. A Markov chain over the age of the track and its plots so far: a plot where
     there is no track begins one; it is confirmed with its m-th plot, and given up once m of its first n scans cannot be
     reached. What a gate shuts out is not in it.
     """
-    idle, tracks, found, out = 1.0, np.zeros((n + 1, m + 1)), 0.0, np.zeros(len(chance))
-    for k, p in enumerate(chance):
+    idle, tracks, found, out = 1.0, np.zeros((n + 1, m + 1)), 0.0, np.zeros(len(probability))
+    for k, p in enumerate(probability):
         moved = np.zeros_like(tracks)
         begun, still = idle * p, idle * (1 - p)
         for age in range(1, n):

@@ -17,7 +17,7 @@ MOST_CELLS = 1 << 22
 
 
 @dataclass(frozen=True)
-class Choice:
+class TrackerSpec:
     """A tracker as chosen; speed in m/s, lost in σ of a plot, variance (2,) of the manoeuvre by coordinate."""
 
     association: str
@@ -68,19 +68,19 @@ def field(key: np.ndarray, sector, density: float, sigma: np.ndarray) -> Field:
 
 
 def trackers(
-    choices: Sequence[Choice], period: float, sigma: np.ndarray, detection: float, density: float
+    specs: Sequence[TrackerSpec], period: float, sigma: np.ndarray, detection: float, density: float
 ) -> kernels.Trackers:
     """Trackers that know the detection probability and the density (per m²) of false plots."""
-    variance = np.stack([c.variance for c in choices])
+    variance = np.stack([one.variance for one in specs])
     return kernels.Trackers(
-        association=np.array([ASSOCIATIONS[c.association] for c in choices]),
-        gate=np.array([gate_threshold(c.gate_probability) for c in choices]),
-        inside=np.array([c.gate_probability for c in choices]),
-        m=np.array([float(c.m) for c in choices]),
-        n=np.array([float(c.n) for c in choices]),
-        misses=np.array([float(c.misses) for c in choices]),
-        speed=np.array([c.speed for c in choices]),
-        lost=np.array([c.lost for c in choices]),
+        association=np.array([ASSOCIATIONS[one.association] for one in specs]),
+        gate=np.array([gate_threshold(one.gate_probability) for one in specs]),
+        inside=np.array([one.gate_probability for one in specs]),
+        m=np.array([float(one.m) for one in specs]),
+        n=np.array([float(one.n) for one in specs]),
+        misses=np.array([float(one.misses) for one in specs]),
+        speed=np.array([one.speed for one in specs]),
+        lost=np.array([one.lost for one in specs]),
         manoeuvre=variance * period**4 / sigma**2,
         detection=float(detection),
         density=float(density),

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from radarsim.studies.sonar.clutter.filters import Choice, trackers
+from radarsim.studies.sonar.clutter.filters import TrackerSpec, trackers
 from radarsim.studies.sonar.clutter.kernels import tracker as kernels
 from radarsim.studies.sonar.clutter.kernels.field import CLOSEST, PDA, Rule, weighed
 from radarsim.studies.sonar.clutter.kernels.tracks import Tracks, foretell, forget, no_tracks, take
@@ -17,7 +17,7 @@ from radarsim.studies.sonar.kernels.steps import CHUNK
 
 
 @dataclass
-class Life:
+class TrackHistory:
     """One track: its lane, its standing under the rules, and what was estimated at each of its scans.
 
     scans holds their numbers; states (n, 4) r, vr, b, vb with variances (n, 4), not-a-number for rates not yet known;
@@ -39,17 +39,17 @@ class Life:
     gates: list = field(default_factory=list)
 
 
-class Chart:
+class MultiTracker:
     """The tracks of one tracker, alive and ended."""
 
-    def __init__(self, choice: Choice, period: float, sigma: np.ndarray, detection: float, density: float):
-        of = trackers([choice], period, sigma, detection, density)
-        self.choice, self.period, self.sigma, self.of = choice, period, sigma, of
+    def __init__(self, spec: TrackerSpec, period: float, sigma: np.ndarray, detection: float, density: float):
+        of = trackers([spec], period, sigma, detection, density)
+        self.spec, self.period, self.sigma, self.of = spec, period, sigma, of
         self.rule = Rule(int(of.association[0]), of.gate[0], of.detection, of.inside[0], of.density)
         self.chunks: list[Tracks] = []
         self.free: list[tuple[int, int]] = []
-        self.alive: list[Life] = []
-        self.ended: list[Life] = []
+        self.alive: list[TrackHistory] = []
+        self.ended: list[TrackHistory] = []
 
     def look(self, scan: int, dt: float, r: np.ndarray, b: np.ndarray) -> None:
         """Take in the plots (n,) of a scan, dt after the last one."""
@@ -57,20 +57,20 @@ class Chart:
         innovations, distance = self._distances(foretold, r, b)
         owner = self._owners(distance)
         taken = [np.zeros((6, CHUNK)) for _ in self.chunks]
-        for a, life in enumerate(self.alive):
-            self._associate(life, foretold[a], innovations[:, a, owner == a], taken)
+        for a, track in enumerate(self.alive):
+            self._associate(track, foretold[a], innovations[:, a, owner == a], taken)
         begun = [self._begin(r[p], b[p], taken) for p in np.flatnonzero(owner < 0)]
         for chunk, rows in zip(self.chunks, taken, strict=True):
             joint = self.rule.association == PDA
             take(chunk, dt, self.period, self.sigma, self.of.manoeuvre[0], joint, rows)
-        for life, gate in zip(self.alive, foretold, strict=True):
-            self._judge(life)
-            life.gates.append(gate)
-        for life in begun:
-            life.gates.append(np.full(5, np.nan))
+        for track, gate in zip(self.alive, foretold, strict=True):
+            self._judge(track)
+            track.gates.append(gate)
+        for track in begun:
+            track.gates.append(np.full(5, np.nan))
         self.alive += begun
-        for life in self.alive:
-            self._note(life, scan)
+        for track in self.alive:
+            self._note(track, scan)
         self._bury()
 
     def _foretold(self, dt: float) -> np.ndarray:
@@ -79,17 +79,17 @@ class Chart:
         for chunk in self.chunks:
             rows.append(np.empty((5, CHUNK)))
             foretell(chunk, dt, self.period, self.sigma, self.of.manoeuvre[0], rows[-1])
-        out = np.array([rows[c][:, i] for c, i in (life.lane for life in self.alive)]).reshape(-1, 5)
-        for life, row in zip(self.alive, out, strict=True):
-            life.since += dt
-            if not self._settled(life):
-                reach = self.choice.speed * life.since
+        out = np.array([rows[c][:, i] for c, i in (track.lane for track in self.alive)]).reshape(-1, 5)
+        for track, row in zip(self.alive, out, strict=True):
+            track.since += dt
+            if not self._settled(track):
+                reach = self.spec.speed * track.since
                 row[2] += reach**2
                 row[4] += (reach / max(row[0], CLOSEST)) ** 2
         return out
 
-    def _settled(self, life: Life) -> bool:
-        chunk, i = life.lane
+    def _settled(self, track: TrackHistory) -> bool:
+        chunk, i = track.lane
         return bool(self.chunks[chunk].plots[i] > 1.5)
 
     def _distances(self, foretold: np.ndarray, r: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -105,8 +105,8 @@ class Chart:
         Only probabilistic association takes more than one plot, and only for a track of two plots or more.
         """
         owner = np.full(distance.shape[1], -1)
-        several = np.array([self.rule.association == PDA and self._settled(life) for life in self.alive])
-        confirmed = np.array([life.state == kernels.CONFIRMED for life in self.alive])
+        several = np.array([self.rule.association == PDA and self._settled(track) for track in self.alive])
+        confirmed = np.array([track.state == kernels.CONFIRMED for track in self.alive])
         busy = np.zeros(len(self.alive), dtype=bool)
         for group in (confirmed, ~confirmed) if len(self.alive) else ():
             a, p = np.nonzero((distance <= self.rule.gate) & group[:, None])
@@ -116,19 +116,21 @@ class Chart:
                     owner[plot], busy[track] = track, True
         return owner
 
-    def _associate(self, life: Life, gate: np.ndarray, innovations: np.ndarray, taken: list[np.ndarray]) -> None:
+    def _associate(
+        self, track: TrackHistory, gate: np.ndarray, innovations: np.ndarray, taken: list[np.ndarray]
+    ) -> None:
         nr, nb, rr, rb, bb, took, _, score = weighed(
-            self.rule, self._settled(life), gate[0], *gate[2:], *np.ascontiguousarray(innovations)
+            self.rule, self._settled(track), gate[0], *gate[2:], *np.ascontiguousarray(innovations)
         )
-        chunk, i = life.lane
+        chunk, i = track.lane
         taken[chunk][:, i] = took, nr, nb, rr, rb, bb
-        life.age, life.score = life.age + 1, life.score + score
+        track.age, track.score = track.age + 1, track.score + score
         if took:
-            life.hits, life.misses, life.since = life.hits + 1, 0, 0.0
+            track.hits, track.misses, track.since = track.hits + 1, 0, 0.0
         else:
-            life.misses += 1
+            track.misses += 1
 
-    def _begin(self, r: float, b: float, taken: list[np.ndarray]) -> Life:
+    def _begin(self, r: float, b: float, taken: list[np.ndarray]) -> TrackHistory:
         if not self.free:
             self.free = [(len(self.chunks), i) for i in reversed(range(CHUNK))]
             self.chunks.append(no_tracks())
@@ -136,48 +138,48 @@ class Chart:
         chunk, i = self.free.pop()
         forget(self.chunks[chunk], i)
         taken[chunk][:, i] = 1.0, r, b, 0.0, 0.0, 0.0
-        return Life((chunk, i))
+        return TrackHistory((chunk, i))
 
-    def _judge(self, life: Life) -> None:
-        rules = float(self.choice.m), float(self.choice.n), float(self.choice.misses)
-        now = kernels.followed(life.state, float(life.hits), float(life.misses), float(life.age), *rules)
-        chunk, i = life.lane
-        vague = self.chunks[chunk].P[:, 0, i].max() > self.choice.lost**2
-        life.state = kernels.NONE if life.state == kernels.CONFIRMED and vague else now
-        life.found |= life.state == kernels.CONFIRMED
+    def _judge(self, track: TrackHistory) -> None:
+        rules = float(self.spec.m), float(self.spec.n), float(self.spec.misses)
+        now = kernels.next_state(track.state, float(track.hits), float(track.misses), float(track.age), *rules)
+        chunk, i = track.lane
+        vague = self.chunks[chunk].P[:, 0, i].max() > self.spec.lost**2
+        track.state = kernels.NONE if track.state == kernels.CONFIRMED and vague else now
+        track.found |= track.state == kernels.CONFIRMED
 
-    def _note(self, life: Life, scan: int) -> None:
-        chunk, i = life.lane
+    def _note(self, track: TrackHistory, scan: int) -> None:
+        chunk, i = track.lane
         tracks, unit = self.chunks[chunk], np.repeat(self.sigma, 2) / np.tile([1.0, self.period], 2)
         x, P = tracks.x[:, :2, i].ravel(), tracks.P[:, [0, 3], i].ravel()
-        known = np.array([True, self._settled(life)] * 2)
-        life.scans.append(scan)
-        life.states.append(np.where(known, x, np.nan))
-        life.variances.append(np.where(known, P * unit**2, np.nan))
-        life.scores.append(life.score)
+        known = np.array([True, self._settled(track)] * 2)
+        track.scans.append(scan)
+        track.states.append(np.where(known, x, np.nan))
+        track.variances.append(np.where(known, P * unit**2, np.nan))
+        track.scores.append(track.score)
 
     def _bury(self) -> None:
-        over = [life for life in self.alive if life.state == kernels.NONE]
-        self.alive = [life for life in self.alive if life.state != kernels.NONE]
-        self.free += [life.lane for life in over]
+        over = [track for track in self.alive if track.state == kernels.NONE]
+        self.alive = [track for track in self.alive if track.state != kernels.NONE]
+        self.free += [track.lane for track in over]
         self.ended += over
 
-    def confirmed(self) -> list[Life]:
+    def confirmed(self) -> list[TrackHistory]:
         """The tracks that were confirmed, by their first scan."""
-        return sorted((life for life in (*self.ended, *self.alive) if life.found), key=lambda life: life.scans[0])
+        return sorted((track for track in (*self.ended, *self.alive) if track.found), key=lambda track: track.scans[0])
 
 
-def charted(
-    choice: Choice,
+def confirmed_tracks(
+    spec: TrackerSpec,
     period: float,
     sigma: np.ndarray,
     detection: float,
     density: float,
     scans: Iterable[tuple[float, np.ndarray, np.ndarray]],
-) -> list[Life]:
+) -> list[TrackHistory]:
     """The confirmed tracks over scans (t, r (n,), b (n,)) in order of time; density per m²."""
-    chart, last = Chart(choice, period, sigma, detection, density), None
+    tracker, last = MultiTracker(spec, period, sigma, detection, density), None
     for k, (t, r, b) in enumerate(scans):
-        chart.look(k, 0.0 if last is None else t - last, r, b)
+        tracker.look(k, 0.0 if last is None else t - last, r, b)
         last = t
-    return chart.confirmed()
+    return tracker.confirmed()

@@ -17,11 +17,11 @@ from radarsim.studies.sonar.clutter import exact
 from radarsim.studies.sonar.clutter import filters as design
 from radarsim.studies.sonar.clutter.kernels import tracker as kernels
 from radarsim.studies.sonar.clutter.kernels.field import Field
-from radarsim.studies.sonar.clutter.track import COMPONENTS, chosen, realised, sight_of
+from radarsim.studies.sonar.clutter.track import COMPONENTS, observation_of, realisation_map, tracker_specs
 from radarsim.studies.sonar.exact_values import exact_values
 from radarsim.studies.sonar.kernels import patterns as pattern_kernels
 from radarsim.studies.sonar.kernels import shared_gains as sonar_kernels
-from radarsim.studies.sonar.scene import Scene, choices, plots_of
+from radarsim.studies.sonar.scene import Scene, filter_specs, plots_of
 
 BLOCK = 4096
 COORDINATES = (("r", "m"), ("b", "rad"))
@@ -34,7 +34,7 @@ class Plan:
     layout: Layout
     axes: Axes
     world: sonar_kernels.World
-    sight: pattern_kernels.Sight
+    observation: pattern_kernels.Observation
     field: Field
     other_field: Field
     seeds: np.ndarray
@@ -46,10 +46,10 @@ class Plan:
 def prepare(case: Case, seen: Scene, world: sonar_kernels.World) -> Plan:
     """Design the trackers of a case, given its scene and the world of its target's plots."""
     spec = case.spec
-    sensor, wanted = spec.sensor, chosen(spec)
+    sensor, wanted = spec.sensor, tracker_specs(spec)
     F, K, T = len(wanted), len(seen.t), len(design.THRESHOLDS)
     density = sensor.false_plots_per_km2 / 1e6
-    sight = sight_of(case, seen)
+    observation = observation_of(case, seen)
     fields = [design.field(noise_key(case, name), sensor.sector, density, seen.nominal) for name in ("false", "seeds")]
     layout = Layout(
         **{"error": (F, K, 4, 4), "estimates": (F, K, 4), "believed": (F, K, 4)},
@@ -61,9 +61,15 @@ def prepare(case: Case, seen: Scene, world: sonar_kernels.World) -> Plan:
     )
     return Plan(
         layout=layout,
-        axes=axes(spec, seen, sight.certain, wanted, lambda: realised(spec, world, sight, fields[0], wanted)),
+        axes=axes(
+            spec,
+            seen,
+            observation.certain,
+            wanted,
+            lambda: realisation_map(spec, world, observation, fields[0], wanted),
+        ),
         world=world,
-        sight=sight,
+        observation=observation,
         field=fields[0],
         other_field=fields[1],
         seeds=noise_key(case, "places"),
@@ -71,7 +77,7 @@ def prepare(case: Case, seen: Scene, world: sonar_kernels.World) -> Plan:
     )
 
 
-def axes(spec, seen: Scene, certain: np.ndarray, wanted: list[design.Choice], realisation) -> Axes:
+def axes(spec, seen: Scene, certain: np.ndarray, wanted: list[design.TrackerSpec], realisation) -> Axes:
     """Labels, exact σ of an oracle's filters where every plot's coming is certain, exact laws of initiation."""
     F, K = len(wanted), len(seen.t)
     values = oracle_values(spec, seen, certain)
@@ -79,14 +85,14 @@ def axes(spec, seen: Scene, certain: np.ndarray, wanted: list[design.Choice], re
     available = np.repeat((np.arange(1, K + 1) >= least[:, None])[..., None], 4, axis=2)
     names = tuple(f.name for f in spec.filters)
     sector, density = spec.sensor.sector, spec.sensor.false_plots_per_km2 / 1e6
-    chance = np.where(certain < 0, seen.probability, certain)
+    probability = np.where(certain < 0, seen.probability, certain)
     confirmed = np.full((F, K), np.nan)
     begun = np.full((F, K), np.nan)
     for f, one in enumerate(wanted):
         if one.association == "known":
             continue
         if density == 0 and one.gate_probability == 1:
-            confirmed[f] = exact.confirmed_by(chance, one.m, one.n)
+            confirmed[f] = exact.confirmed_by(probability, one.m, one.n)
         if one.m == 2:
             begun[f] = exact.false_pairs(sector.range_m, sector.bearing_rad, density, seen.nominal, one, seen.period, K)
     return Axes(
@@ -125,8 +131,10 @@ def oracle_values(spec, seen: Scene, certain: np.ndarray) -> dict[str, np.ndarra
     known = np.array([f.association == "known" for f in spec.filters])
     if (certain < 0).any() or certain[0] == 0 or not known.any():
         return exact_values(seen, [[]] * len(known), np.zeros(0), 2)
-    came = certain[None].astype(float)
-    designs = [[banks.made(one, c, plots_of(seen, c, came)) for c in range(2)] for one in choices(spec)]
+    detected = certain[None].astype(float)
+    designs = [
+        [banks.design_filter(one, c, plots_of(seen, c, detected)) for c in range(2)] for one in filter_specs(spec)
+    ]
     values = exact_values(seen, designs, np.ones(1), 2)
     return {name: np.where(known.reshape(-1, *[1] * (v.ndim - 1)), v, np.nan) for name, v in values.items()}
 
@@ -137,15 +145,25 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     shapes = {"error": (3, 4), "paired": (3,), "joint": (4,), "ahead": (4,), "believed": (3,), "estimates": (3,)}
     sums = sonar_kernels.Sums(**{name: np.zeros((F, K, 2, *tail)) for name, tail in shapes.items()})
     own = ("counts", "begun", "ratios", "scores")
-    ways = kernels.Ways(**{name: np.zeros(plan.layout.shapes[name]) for name in own})
-    room = kernels.work(F)
-    kernels.simulate_block(plan.world, plan.sight, plan.field, plan.trackers, room, first, count, sums, ways)
+    track_sums = kernels.TrackSums(**{name: np.zeros(plan.layout.shapes[name]) for name in own})
+    workspace = kernels.workspace(F)
+    kernels.simulate_block(
+        plan.world, plan.observation, plan.field, plan.trackers, workspace, first, count, sums, track_sums
+    )
     if plan.field.density > 0:
         kernels.simulate_false(
-            plan.seeds, plan.sight, plan.other_field, plan.trackers, room, plan.world.dt, first, count, ways
+            plan.seeds,
+            plan.observation,
+            plan.other_field,
+            plan.trackers,
+            workspace,
+            plan.world.dt,
+            first,
+            count,
+            track_sums,
         )
     picked = {
         name: getattr(sums, name)[:, :, :, :2].reshape(plan.layout.shapes[name])
         for name in ("error", "believed", "estimates")
     }
-    return plan.layout.pack(**picked, joint=sums.joint, ahead=sums.ahead, **ways._asdict())
+    return plan.layout.pack(**picked, joint=sums.joint, ahead=sums.ahead, **track_sums._asdict())

@@ -8,7 +8,7 @@ from radarsim.errors import ConfigError
 from radarsim.studies.noise import noise_key
 from radarsim.studies.sonar.clutter import filters as design
 from radarsim.studies.sonar.clutter.kernels.field import Field, whole_field
-from radarsim.studies.sonar.clutter.multitrack import charted
+from radarsim.studies.sonar.clutter.multitrack import confirmed_tracks
 from radarsim.studies.sonar.kernels import patterns as pattern_kernels
 from radarsim.studies.sonar.kernels import shared_gains as sonar_kernels
 from radarsim.studies.sonar.scene import Scene, angular
@@ -18,10 +18,10 @@ NEAR_M = 2500.0  # of the target's course: what the map shows
 EVERY = 4  # scans between the gates that it shows
 
 
-def chosen(spec) -> list[design.Choice]:
+def tracker_specs(spec) -> list[design.TrackerSpec]:
     """The trackers of a case."""
     return [
-        design.Choice(
+        design.TrackerSpec(
             f.association,
             f.tracker("gate_probability"),
             *f.m_of_n(),
@@ -34,15 +34,15 @@ def chosen(spec) -> list[design.Choice]:
     ]
 
 
-def target_plots(world: sonar_kernels.World, sight: pattern_kernels.Sight, realisation: int):
+def target_plots(world: sonar_kernels.World, observation: pattern_kernels.Observation, realisation: int):
     """Plots (K, 2) of the target in one realisation, not-a-number where missed, and its true places (K, 2)."""
-    K, plots, came = len(world.dt), np.zeros((2, 4, 1)), np.empty(1)
+    K, plots, detected = len(world.dt), np.zeros((2, 4, 1)), np.empty(1)
     z, true = np.full((K, 2), np.nan), world.truth[:, :2, 0].copy()
     for k in range(K):
         sonar_kernels.move_and_measure(world, realisation, k, plots)
-        pattern_kernels.detect(sight, realisation, k, came)
+        pattern_kernels.detect(observation, realisation, k, detected)
         true[k] += plots[:, 2, 0]
-        if came[0]:
+        if detected[0]:
             z[k] = plots[:, 0, 0]
     return z, true
 
@@ -59,12 +59,12 @@ def false_plots(field: Field, realisation: int, scan: int) -> np.ndarray:
     return room[:, :n]
 
 
-def realised(spec, world, sight, field: Field, wanted: list[design.Choice]) -> dict:
+def realisation_map(spec, world, observation, field: Field, wanted: list[design.TrackerSpec]) -> dict:
     """Realisation 0 for the map, as seen by the first tracker that is not told its plots: what lies near the course.
 
     Places are (north, east) in m: truth and plots (2, K), false (2, n), tracks and gates lists of such curves.
     """
-    z, true = target_plots(world, sight, 0)
+    z, true = target_plots(world, observation, 0)
     course = _flat(*true.T)
     (south, north), (west, east) = ((side.min() - NEAR_M, side.max() + NEAR_M) for side in course)
     scans, seen = [], []
@@ -76,7 +76,7 @@ def realised(spec, world, sight, field: Field, wanted: list[design.Choice]) -> d
         own = z[k][:, None] if np.isfinite(z[k, 0]) else np.zeros((2, 0))
         scans.append((t, *np.concatenate([own, np.stack([r[near], b[near]])], axis=1)))
     f = next((i for i, one in enumerate(wanted) if one.association != "known"), None)
-    lives = [] if f is None else charted(wanted[f], *_conditions(spec), scans)
+    lives = [] if f is None else confirmed_tracks(wanted[f], *_conditions(spec), scans)
     tracks, gates = [], []
     for life in lives:
         states = np.array(life.states)
@@ -98,10 +98,10 @@ def _flat(r: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return r * np.cos(b), r * np.sin(b)
 
 
-def _ellipse(gate: np.ndarray, choice: design.Choice) -> tuple[np.ndarray, np.ndarray]:
+def _ellipse(gate: np.ndarray, tracker: design.TrackerSpec) -> tuple[np.ndarray, np.ndarray]:
     """A gate's edge on the map; of an open gate a small circle."""
     angle, (r, b, rr, rb, bb) = np.linspace(0, 2 * np.pi, 61), gate
-    size = np.sqrt(design.gate_threshold(min(choice.gate_probability, 0.9999)))
+    size = np.sqrt(design.gate_threshold(min(tracker.gate_probability, 0.9999)))
     low = rb / np.sqrt(rr)
     u, v = size * np.cos(angle), size * np.sin(angle)
     return _flat(r + np.sqrt(rr) * u, b + low * u + np.sqrt(max(bb - low**2, 0.0)) * v)
@@ -118,9 +118,9 @@ def track(case: Case, recorded: dict[str, np.ndarray]) -> Track:
     """The trackers of a case over recorded plots, several of a time: every confirmed track, from its first plot on.
 
     A row without range or bearing is no plot, but its time is a scan. A tracker that would have to be told its plots is
-    left out; raises ConfigError where there is no other. What tracks are is said in `filters.sonar_multitrack`.
+    left out; raises ConfigError where there is no other. What tracks are is said in `clutter.multitrack`.
     """
-    spec, wanted = case.spec, chosen(case.spec)
+    spec, wanted = case.spec, tracker_specs(case.spec)
     some = [f for f, one in enumerate(wanted) if one.association != "known"]
     if not some:
         raise ConfigError(
@@ -130,7 +130,9 @@ def track(case: Case, recorded: dict[str, np.ndarray]) -> Track:
     plots = np.stack([recorded["range_m"], recorded["bearing_rad"]])
     there = np.isfinite(plots).all(axis=0)
     scans = [(time, *plots[:, there & (at == k)]) for k, time in enumerate(t)]
-    lives = [(f, n + 1, life) for f in some for n, life in enumerate(charted(wanted[f], *_conditions(spec), scans))]
+    lives = [
+        (f, n + 1, life) for f in some for n, life in enumerate(confirmed_tracks(wanted[f], *_conditions(spec), scans))
+    ]
     estimate, sigma = np.full((2, len(lives), len(t), 4), np.nan)
     score = np.full((len(lives), len(t)), np.nan)
     for i, (_, _, life) in enumerate(lives):
@@ -147,9 +149,9 @@ def simulated(case: Case, seen: Scene, world, realisation: int) -> dict[str, np.
     scan without a plot has one row without values.
     """
     spec = case.spec
-    sight = sight_of(case, seen)
+    observation = observation_of(case, seen)
     field = design.field(noise_key(case, "false"), spec.sensor.sector, _conditions(spec)[3], seen.nominal)
-    z, true = target_plots(world, sight, realisation)
+    z, true = target_plots(world, observation, realisation)
     rows = []
     for k, t in enumerate(seen.t):
         own = [(z[k, 0], z[k, 1], 1.0)] if np.isfinite(z[k, 0]) else []
@@ -159,7 +161,7 @@ def simulated(case: Case, seen: Scene, world, realisation: int) -> dict[str, np.
     return dict(zip(names, np.array(rows).T, strict=True))
 
 
-def detected(spec, seen: Scene) -> np.ndarray:
+def certain_detections(spec, seen: Scene) -> np.ndarray:
     """Which scans give a plot of the target (K,): 0 never (missed, or outside the sector), 1 always, else -1."""
     sensor = spec.sensor
     certain = np.where(seen.certain == 0, 0, 1 if sensor.detection_probability == 1 else -1)
@@ -169,11 +171,11 @@ def detected(spec, seen: Scene) -> np.ndarray:
     return np.where((near <= r) & (r <= far) & (turned <= last), certain, 0)
 
 
-def sight_of(case: Case, seen: Scene) -> pattern_kernels.Sight:
+def observation_of(case: Case, seen: Scene) -> pattern_kernels.Observation:
     """When the target's plots come."""
-    return pattern_kernels.Sight(
+    return pattern_kernels.Observation(
         misses=noise_key(case, "misses"),
-        certain=detected(case.spec, seen),
+        certain=certain_detections(case.spec, seen),
         probability=seen.probability,
         weight=np.ones((len(seen.t), 2)),
         period=seen.period,

@@ -15,14 +15,14 @@ from radarsim.kernels.random import U, uniforms
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK, move_and_measure
 from radarsim.studies.sonar.kernels.steps import fit, recur, remember
 from radarsim.studies.sonar.kernels.sums import add_ahead, add_sums
-from radarsim.studies.sonar.manoeuvre.kernels.detector import MODE, PLOTS, Switching, adapt, add_alarms, examine
-from radarsim.studies.sonar.manoeuvre.kernels.imm import PROBABILITY, ROWS, Interacting, interact, mode_sums
+from radarsim.studies.sonar.manoeuvre.kernels.detector import MODE, PLOTS, AdaptiveRules, adapt, add_alarms, examine
+from radarsim.studies.sonar.manoeuvre.kernels.imm import PROBABILITY, ROWS, ModelPairs, interact, mode_sums
 
 INFORMATION, COVARIANCE, FIXED, WINDOW, ADAPTIVE, IMM = range(6)
 PLACED = 8.0  # as models.sonar.PLACED
 
 
-class Sight(NamedTuple):
+class Observation(NamedTuple):
     """Which plots come, and how they are turned into what the filters take.
 
     misses (2,) is the key of the stream of detections; certain (K,) is 1 where the plot always comes, 0 where never,
@@ -42,7 +42,7 @@ class Sight(NamedTuple):
     spread: np.ndarray
 
 
-class Bank(NamedTuple):
+class RealisationBank(NamedTuple):
     """F filters: kind (F,), size (F,) of the state, length (F,) of a window or of the start of a fixed filter.
 
     carry (F, K, C) correlation that the filter assumes, manoeuvre (F, C) variance in nominal plots and periods, settled
@@ -56,11 +56,11 @@ class Bank(NamedTuple):
     manoeuvre: np.ndarray
     settled: np.ndarray
     memory: int
-    switching: Switching
-    interacting: Interacting
+    switching: AdaptiveRules
+    interacting: ModelPairs
 
 
-class Further(NamedTuple):
+class FurtherSums(NamedTuple):
     """What is added up of filters that answer to manoeuvres, and what is kept of estimates.
 
     modes (F, K, C, 3): Σp, Σp² of the probability of a manoeuvre, and Σ of the plots in memory. at (A,) are scans, and
@@ -75,11 +75,11 @@ class Further(NamedTuple):
 
 # ---- plots --------------------------------------------------------------------------------------------------------
 @kernel
-def detect(sight, first, k, seen):
+def detect(observation, first, k, seen):
     """Whether the plot of scan k came, 1 or 0, in seen (n,)."""
-    k0, k1, start, limit = sight.misses[0], sight.misses[1], U(first), sight.probability
-    if sight.certain[k] >= 0:
-        seen[:] = float(sight.certain[k])
+    k0, k1, start, limit = observation.misses[0], observation.misses[1], U(first), observation.probability
+    if observation.certain[k] >= 0:
+        seen[:] = float(observation.certain[k])
         return
     for i in range(seen.size):
         a, _ = uniforms(k0, k1, start + U(i), k)
@@ -87,7 +87,7 @@ def detect(sight, first, k, seen):
 
 
 @kernel
-def weigh(sight, k, plots, seen, place, z, weight):
+def weigh(observation, k, plots, seen, place, z, weight):
     """Plots z (C, n) and their weights (C, n) from what was measured: plots (C', 4, n), rows 0 and 1.
 
     place (3, n) holds mean range and bearing of the last plots, and how many they are. The plain conversion has its
@@ -96,21 +96,21 @@ def weigh(sight, k, plots, seen, place, z, weight):
     predicted place). See `models.sonar.places`.
     """
     for c in range(z.shape[0]):
-        w = sight.weight[k, c]
+        w = observation.weight[k, c]
         for i in range(seen.size):
             z[c, i] = plots[c, 0, i]
             weight[c, i] = w * seen[i]
-    if sight.frame == 0:
+    if observation.frame == 0:
         return
-    sr, sb = sight.spread[0] ** 2, sight.spread[1] ** 2
-    nominal_x, nominal_y = sight.sigma[0] ** 2, sight.sigma[1] ** 2
-    grow = np.exp(sb) if sight.frame == 2 else 1.0
+    sr, sb = observation.spread[0] ** 2, observation.spread[1] ** 2
+    nominal_x, nominal_y = observation.sigma[0] ** 2, observation.sigma[1] ** 2
+    grow = np.exp(sb) if observation.frame == 2 else 1.0
     root, shrink = np.sqrt(grow), np.exp(-2.0 * sb)
     for i in range(seen.size):
-        r, b = sight.measured[k, 0] + plots[0, 1, i], sight.measured[k, 1] + plots[1, 1, i]
+        r, b = observation.measured[k, 0] + plots[0, 1, i], observation.measured[k, 1] + plots[1, 1, i]
         co, si = np.cos(b), np.sin(b)
         z[0, i], z[1, i] = root * r * co, root * r * si
-        if sight.frame == 1:
+        if observation.frame == 1:
             across = r * r * sb
             xx, yy = sr * co * co + across * si * si, sr * si * si + across * co * co
         else:
@@ -128,7 +128,7 @@ def weigh(sight, k, plots, seen, place, z, weight):
 
 
 @kernel
-def filter_scan(bank, sight, f, c, k, dt, x, y, s, memory, z, weight, before, count, q, P):
+def filter_scan(bank, observation, f, c, k, dt, x, y, s, memory, z, weight, before, count, q, P):
     """Scan k of filter f in coordinate c, in place: x (4, n), y (8, n), s (>= 10, n), memory (3, L, n).
 
     q (D, G, n) statistics of the detectors. Leaves P (6, n).
@@ -139,22 +139,22 @@ def filter_scan(bank, sight, f, c, k, dt, x, y, s, memory, z, weight, before, co
         d, length = rule.detector[f], bank.length[f]
         adapt(
             *(size, rule.raises[f], length, rule.quiet[f], rule.threshold[f, c], q[d, rule.group[f, c]]),
-            *(dt, sight.period, x, y, s, memory, z, weight, before, P),
+            *(dt, observation.period, x, y, s, memory, z, weight, before, P),
         )
         return
     if bank.kind[f] == IMM:
         models = bank.interacting
         interact(
-            *(size, models.stay[f], models.manoeuvre[f, c], dt, sight.period, sight.sigma[c]),
+            *(size, models.stay[f], models.manoeuvre[f, c], dt, observation.period, observation.sigma[c]),
             *(x, y, s, z, weight, before, P),
         )
         return
     if bank.kind[f] == WINDOW:
-        fit(x, memory, bank.length[f], size, sight.period, count, P)
+        fit(x, memory, bank.length[f], size, observation.period, count, P)
         return
     start, by_covariance = max(size, bank.length[f]), bank.kind[f] != INFORMATION
     manoeuvre, settled = bank.manoeuvre[f, c], bank.settled[f, c]
-    recur(by_covariance, size, start, dt, sight.period, carry, manoeuvre, settled, x, y, s, z, weight, before, P)
+    recur(by_covariance, size, start, dt, observation.period, carry, manoeuvre, settled, x, y, s, z, weight, before, P)
 
 
 @part
@@ -182,14 +182,14 @@ def keep(x, P, count, size, unit, period, first, n, kept):
 
 
 @kernel
-def simulate_block(world, sight, bank, watch, first, total, baseline, sums, alarms, further):
+def simulate_block(world, observation, bank, detectors, first, total, baseline, sums, alarms, further):
     """Add the sums of realisations first … first + total - 1; a partial chunk is computed in full and summed in
     part."""
     filters, scans, coordinates = bank.carry.shape
     x, y = np.empty((filters, coordinates, 4, CHUNK)), np.empty((filters, coordinates, 8, CHUNK))
     s, P = np.empty((filters, coordinates, ROWS if (bank.kind == IMM).any() else 10, CHUNK)), np.empty((6, CHUNK))
     memory = np.empty((coordinates, 3, bank.memory, CHUNK))
-    q, passed = np.empty((watch.plots.size, coordinates + 1, CHUNK)), np.empty((*watch.threshold.shape, CHUNK))
+    q, passed = np.empty((detectors.plots.size, coordinates + 1, CHUNK)), np.empty((*detectors.threshold.shape, CHUNK))
     plots, shift = np.empty((world.walk.size, 4, CHUNK)), np.zeros((coordinates, 3, CHUNK))
     z, weight, seen = np.empty((coordinates, CHUNK)), np.empty((coordinates, CHUNK)), np.empty(CHUNK)
     place, before, count = np.empty((3, CHUNK)), np.empty((coordinates, CHUNK)), np.empty((coordinates, CHUNK))
@@ -201,8 +201,8 @@ def simulate_block(world, sight, bank, watch, first, total, baseline, sums, alar
         for k in range(scans):
             dt, truth = world.dt[k], world.truth[k]
             move_and_measure(world, first + done, k, plots)
-            detect(sight, first + done, k, seen)
-            weigh(sight, k, plots, seen, place, z, weight)
+            detect(observation, first + done, k, seen)
+            weigh(observation, k, plots, seen, place, z, weight)
             shift[:, :2] = plots[:coordinates, 2:]
             if k > 0:
                 add_ahead(bank.size, x, shift, truth, count, used, k, dt, out, sums)
@@ -210,22 +210,30 @@ def simulate_block(world, sight, bank, watch, first, total, baseline, sums, alar
             count += weight > 0.0
             for c in range(coordinates):
                 if memory.shape[2] > 0:
-                    remember(memory[c], z[c], weight[c], dt / sight.period)
-            examine(watch, k, memory, sight.sigma, count, weight, q)
-            add_alarms(watch, k, q, used, passed, alarms)
+                    remember(memory[c], z[c], weight[c], dt / observation.period)
+            examine(detectors, k, memory, observation.sigma, count, weight, q)
+            add_alarms(detectors, k, q, used, passed, alarms)
             for c in range(coordinates):
                 for f in order:
                     filter_scan(
-                        *(bank, sight, f, c, k, dt, x[f, c], y[f, c], s[f, c], memory[c], z[c], weight[c]),
+                        *(bank, observation, f, c, k, dt, x[f, c], y[f, c], s[f, c], memory[c], z[c], weight[c]),
                         *(before[c], count[c], q, P),
                     )
                     add_modes(bank, s[f, c], f, c, k, used, out, further.modes)
                     for a in range(further.at.size if c < 2 else 0):
                         if further.at[a] == k:
                             shown = min(CHUNK, total - done)
-                            unit, into = sight.sigma[c], further.kept[a, f, c]
-                            keep(x[f, c], P, count[c], bank.size[f], unit, sight.period, done, shown, into)
+                            unit, into = observation.sigma[c], further.kept[a, f, c]
+                            keep(x[f, c], P, count[c], bank.size[f], unit, observation.period, done, shown, into)
                     add_sums(
-                        *(bank.size[f], sight.sigma[c], sight.period, x[f, c], x[baseline, c], bank.size[baseline], P),
+                        *(
+                            bank.size[f],
+                            observation.sigma[c],
+                            observation.period,
+                            x[f, c],
+                            x[baseline, c],
+                            bank.size[baseline],
+                            P,
+                        ),
                         *(shift[c], truth[c], count[c], used, f, k, c, out, sums),
                     )

@@ -35,7 +35,7 @@ class World(NamedTuple):
     walk: np.ndarray
 
 
-class Shared(NamedTuple):
+class SharedBank(NamedTuple):
     """Schedules of F filters, the same for all realisations.
 
     gain (F, K, C, 4), carry (F, K, C), and whether it carries at all (F,); length (F,) plots of a window, 0 for a

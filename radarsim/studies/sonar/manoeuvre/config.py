@@ -23,7 +23,7 @@ from radarsim.config.fields import (
 )
 
 MOST_TESTED = 200_000  # scans x thresholds of all detectors: 10 MB of sums a block
-ANSWERING = ("adaptive", "imm")  # kinds of filters whose gains are each realisation's own
+RESPONDING_KINDS = ("adaptive", "imm")  # kinds of filters whose gains are each realisation's own
 Rate = Annotated[Probability, Field(gt=0, lt=1)]
 Rates = Annotated[tuple[Rate, ...], Field(min_length=1, max_length=32)]
 Thresholds = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=32)]
@@ -199,7 +199,7 @@ def answer_misfits(spec: Any) -> Iterator[At]:
     def check(i: int, one: Adapting):
         if one.detector is not None and one.detector.plots > spec.scans:
             yield at(f"filters.{i}.detector.plots", f"must be <= {spec.scans}, the number of scans")
-        if one.kind in ANSWERING:
+        if one.kind in RESPONDING_KINDS:
             yield from _alone(spec, f"filters.{i}.kind")
 
     yield from of_each(spec.filters, check)

@@ -1,7 +1,7 @@
-"""P3's manoeuvres: detectors and their exact laws, filters that answer to them, and what a track is used for.
+"""P3's manoeuvres: detectors and their exact laws, filters that respond to them, and what a track is used for.
 
 Sums by D detectors, G groups (each coordinate, then all jointly), T thresholds and K scans: `tested`, `alarms`, `first`
-as in kernels.sonar_detector.Alarms; `modes` (F, K, C, 3) and, at A moments, `uses` (F, A, U, 5): n, Σe, Σe², Σe⁴ and Σ
+as in kernels.detector.Alarms; `modes` (F, K, C, 3) and, at A moments, `uses` (F, A, U, 5): n, Σe, Σe², Σe⁴ and Σ
 of the first-order variance.
 """
 
@@ -13,12 +13,18 @@ import numpy as np
 
 from radarsim.studies.sonar import filters
 from radarsim.studies.sonar import world as models
-from radarsim.studies.sonar.banks import Choice
+from radarsim.studies.sonar.banks import FilterSpec
 from radarsim.studies.sonar.kernels import patterns
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre import uses as tracks
-from radarsim.studies.sonar.manoeuvre.config import ANSWERING
-from radarsim.studies.sonar.manoeuvre.filters import Models, Rule, Trials, trials_of, watch
+from radarsim.studies.sonar.manoeuvre.config import RESPONDING_KINDS
+from radarsim.studies.sonar.manoeuvre.filters import (
+    AdaptiveRule,
+    DetectorTests,
+    ModelPair,
+    detector_arrays,
+    detector_tests,
+)
 from radarsim.studies.sonar.manoeuvre.kernels import detector as kernels
 from radarsim.studies.sonar.scene import Scene, angular, courses, plots_of
 
@@ -26,13 +32,13 @@ QUANTITIES = tracks.QUANTITIES
 
 
 @dataclass(frozen=True)
-class Watched:
-    """What a case watches for: all tests, of which the first are measured, their kernels' form, scans (A,) of uses."""
+class DetectorPlan:
+    """Detector tests of a case, of which the first are measured, the same as kernel arrays, and scans (A,) of uses."""
 
     spec: Any
     seen: Scene
-    trials: Trials
-    watch: kernels.Watch
+    tests: DetectorTests
+    detectors: kernels.Detectors
     measured: int
     at: np.ndarray
 
@@ -59,20 +65,20 @@ def phases(target, t: np.ndarray) -> np.ndarray:
 
 
 # ---- from keys to rules and tests ---------------------------------------------------------------------------------
-def answered(spec, choices: list[Choice]) -> list[Choice]:
-    """The filters of a case, those that answer to manoeuvres with their rule or models."""
+def with_manoeuvre_response(spec, specs: list[FilterSpec]) -> list[FilterSpec]:
+    """The filters of a case; those that respond to manoeuvres have their rule or models."""
     found = []
-    for choice, one in zip(choices, spec.filters, strict=True):
-        length = one.detector.plots if one.detector else choice.length
-        found.append(replace(choice, answer=_answer(spec, one), length=length))
+    for filter_spec, one in zip(specs, spec.filters, strict=True):
+        length = one.detector.plots if one.detector else filter_spec.length
+        found.append(replace(filter_spec, response=_response(spec, one), length=length))
     return found
 
 
-def _answer(spec, one) -> Rule | Models | None:
+def _response(spec, one) -> AdaptiveRule | ModelPair | None:
     """What a configured filter does about manoeuvres."""
     scale = angular(spec, 2)
     if one.kind == "imm":
-        return Models(scale[:, None] * np.array(one.manoeuvre_variances), np.array(one.stay_probabilities))
+        return ModelPair(scale[:, None] * np.array(one.manoeuvre_variances), np.array(one.stay_probabilities))
     if one.kind != "adaptive":
         return None
     own, joint = one.detector, one.detector.coordinates == "joint"
@@ -80,7 +86,7 @@ def _answer(spec, one) -> Rule | Models | None:
     if limit is None:
         limit = float(exact.threshold(own.false_alarm_probability, len(scale) if joint else 1))
     raises = one.response != "shorten_memory"
-    return Rule(np.full(len(scale), limit), own.test_every, joint, raises, one.end_after or 1)
+    return AdaptiveRule(np.full(len(scale), limit), own.test_every, joint, raises, one.end_after or 1)
 
 
 def thresholds_of(one, coordinates: int) -> np.ndarray:
@@ -91,23 +97,23 @@ def thresholds_of(one, coordinates: int) -> np.ndarray:
     return exact.threshold(np.array(one.false_alarm_probability), freedom)
 
 
-def watched(spec, seen: Scene, wanted: list[Choice]) -> Watched:
-    """All that a case watches for, the tests of its filters among them."""
+def detector_plan(spec, seen: Scene, specs: list[FilterSpec]) -> DetectorPlan:
+    """The detector tests of a case, those of its adaptive filters included."""
     C = seen.truth.shape[1]
     measured = [(one.plots, one.test_every) for one in spec.detectors]
-    trials = trials_of(
-        measured, [thresholds_of(one, C) for one in spec.detectors], [(one.answer, one.length) for one in wanted]
+    tests = detector_tests(
+        measured, [thresholds_of(one, C) for one in spec.detectors], [(one.response, one.length) for one in specs]
     )
     at = np.zeros(0, dtype=np.int64)
     if spec.uses is not None:
         at = np.searchsorted(seen.t, np.array(spec.uses.at_s or [seen.t[-1]]) - 1e-9)
-    return Watched(spec, seen, trials, watch(trials, phases(spec.target, seen.t), C), len(measured), at)
+    return DetectorPlan(spec, seen, tests, detector_arrays(tests, phases(spec.target, seen.t), C), len(measured), at)
 
 
 # ---- exact laws ---------------------------------------------------------------------------------------------------
-def shift_laws(seen: Scene, c: int, came: np.ndarray, plots: int, k: int) -> tuple[np.ndarray, ...]:
+def shift_laws(seen: Scene, c: int, detected: np.ndarray, plots: int, k: int) -> tuple[np.ndarray, ...]:
     """Mean of â, true and believed variance (M,) of a coordinate's parabola through the last plots at scan k."""
-    own = plots_of(seen, c, came)
+    own = plots_of(seen, c, detected)
     first, weights, believed = filters.window_weights(own, k, plots, 3)
     row, last = weights[:, 2], k + 1
     t, sigma = seen.t[first:last], seen.sigma[first:last, c]
@@ -119,11 +125,11 @@ def shift_laws(seen: Scene, c: int, came: np.ndarray, plots: int, k: int) -> tup
     return mean, variance, believed[:, 2, 2]
 
 
-def exact_alarms(spec, seen: Scene, came: np.ndarray, probability: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def exact_alarms(spec, seen: Scene, detected: np.ndarray, probability: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Probability (D, G, T, K) of an alarm at a test, and shift (D, G, K) of its mean; not-a-number where not known.
 
-    Means over the patterns came (M, K') of plots, of these probabilities, in which there is a test. In the cartesian
-    frames weights go with the plots, and nothing is known.
+    Means over the patterns `detected` (M, K') of plots, of these probabilities, in which there is a test. In the
+    cartesian frames weights go with the plots, and nothing is known.
     """
     K, C = len(seen.t), seen.truth.shape[1]
     most = max((len(one.wanted()) for one in spec.detectors), default=0)
@@ -133,12 +139,12 @@ def exact_alarms(spec, seen: Scene, came: np.ndarray, probability: np.ndarray) -
     )
     for d, one in enumerate(spec.detectors) if probability.size else ():
         limits = thresholds_of(one, C)
-        for k in range(one.plots - 1, came.shape[1], one.test_every):
-            tested = (came[:, k] > 0) & (came[:, : k + 1].sum(axis=1) >= one.plots)
+        for k in range(one.plots - 1, detected.shape[1], one.test_every):
+            tested = (detected[:, k] > 0) & (detected[:, : k + 1].sum(axis=1) >= one.plots)
             share = probability[tested]
             if not share.sum() > 0:
                 continue
-            laws = np.array([shift_laws(seen, c, came[tested], one.plots, k) for c in range(C)])
+            laws = np.array([shift_laws(seen, c, detected[tested], one.plots, k) for c in range(C)])
             mean, true, believed = laws[:, 0], laws[:, 1], laws[:, 2]
             ratio, shift = believed / true, mean / np.sqrt(true)
             weight = share / share.sum()
@@ -158,19 +164,19 @@ def independent(one, seen: Scene) -> bool:
     return one.test_every >= one.plots and (seen.certain > 0).all() and not seen.rho.any() and not seen.walk.any()
 
 
-def told(watched: Watched, came: np.ndarray, probability: np.ndarray) -> dict:
+def told(plan: DetectorPlan, detected: np.ndarray, probability: np.ndarray) -> dict:
     """What the report needs beside the sums."""
-    spec, seen = watched.spec, watched.seen
-    alarms, shifts = exact_alarms(spec, seen, came, probability)
+    spec, seen = plan.spec, plan.seen
+    alarms, shifts = exact_alarms(spec, seen, detected, probability)
     found = {
         "exact_alarms": alarms,
         "shifts": shifts,
-        "thresholds": watched.trials.thresholds,
+        "thresholds": plan.tests.thresholds,
         "independent": tuple(independent(one, seen) for one in spec.detectors),
-        "phase": watched.watch.phase,
+        "phase": plan.detectors.phase,
         "manoeuvre_s": times_of(spec.target),
     }
-    return found | (_uses_told(spec, seen, watched.at) if spec.uses else {})
+    return found | (_uses_told(spec, seen, plan.at) if spec.uses else {})
 
 
 def _uses_told(spec, seen: Scene, at: np.ndarray) -> dict:
@@ -229,31 +235,31 @@ def use_sums(spec, seen: Scene, at: np.ndarray, kept: np.ndarray) -> np.ndarray:
 
 
 # ---- sums ---------------------------------------------------------------------------------------------------------
-def shapes(watched: Watched, F: int) -> dict[str, tuple[int, ...]]:
+def shapes(plan: DetectorPlan, F: int) -> dict[str, tuple[int, ...]]:
     """Shapes of the sums that a case has beside the common ones."""
-    D, G, T = watched.watch.threshold.shape
-    K, D = len(watched.seen.t), watched.measured
+    D, G, T = plan.detectors.threshold.shape
+    K, D = len(plan.seen.t), plan.measured
     found = {"tested": (D, G, K), "alarms": (D, G, T, K), "first": (D, G, T, K)} if D else {}
-    if any(one.kind in ANSWERING for one in watched.spec.filters):
+    if any(one.kind in RESPONDING_KINDS for one in plan.spec.filters):
         found["modes"] = (F, K, G - 1, 3)
-    if watched.spec.uses:
-        found["uses"] = (F, len(watched.at), len(tracks.QUANTITIES), 5)
+    if plan.spec.uses:
+        found["uses"] = (F, len(plan.at), len(tracks.QUANTITIES), 5)
     return found
 
 
-def empty_sums(watched: Watched, F: int, count: int) -> tuple[kernels.Alarms, patterns.Further]:
+def empty_sums(plan: DetectorPlan, F: int, count: int) -> tuple[kernels.Alarms, patterns.FurtherSums]:
     """What the kernels add to, in a block of `count` realisations."""
-    K = len(watched.seen.t)
-    D, G, T = watched.watch.threshold.shape
+    K = len(plan.seen.t)
+    D, G, T = plan.detectors.threshold.shape
     alarms = kernels.Alarms(np.zeros((D, G, K)), np.zeros((D, G, T, K)), np.zeros((D, G, T, K)))
-    kept = np.zeros((len(watched.at), F, 2, 6, count))
-    return alarms, patterns.Further(np.zeros((F, K, G - 1, 3)), watched.at, kept)
+    kept = np.zeros((len(plan.at), F, 2, 6, count))
+    return alarms, patterns.FurtherSums(np.zeros((F, K, G - 1, 3)), plan.at, kept)
 
 
-def added_up(watched: Watched, alarms: kernels.Alarms, further: patterns.Further) -> dict[str, np.ndarray]:
+def added_up(plan: DetectorPlan, alarms: kernels.Alarms, further: patterns.FurtherSums) -> dict[str, np.ndarray]:
     """The sums of a block, as `shapes` names them."""
-    D = watched.measured
+    D = plan.measured
     found = {name: values[:D] for name, values in alarms._asdict().items()} | {"modes": further.modes}
-    if watched.spec.uses:
-        found["uses"] = use_sums(watched.spec, watched.seen, watched.at, further.kept)
-    return {name: found[name] for name in shapes(watched, len(further.modes))}
+    if plan.spec.uses:
+        found["uses"] = use_sums(plan.spec, plan.seen, plan.at, further.kept)
+    return {name: found[name] for name in shapes(plan, len(further.modes))}

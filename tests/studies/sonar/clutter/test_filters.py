@@ -11,11 +11,11 @@ SIGMA, T = np.array([30.0, 0.0175]), 5.0
 
 
 def choice(association="nearest", gate=0.99, m=3, n=4, misses=3):
-    return design.Choice(association, gate, m, n, misses, 10.0, 10.0, np.array([1e-4, 1e-12]))
+    return design.TrackerSpec(association, gate, m, n, misses, 10.0, 10.0, np.array([1e-4, 1e-12]))
 
 
 def charted(of, scans, density=0.0, detection=0.9):
-    return multitrack.charted(of, T, SIGMA, detection, density, scans)
+    return multitrack.confirmed_tracks(of, T, SIGMA, detection, density, scans)
 
 
 def course(r, b, scans, seed, missed=()):

@@ -51,10 +51,10 @@ def test_estimates_are_the_twins(density):
     """Nearest plot and PDA, with misses, drops and losses, realisation by realisation to 1e-10 of σ."""
     filters = [tracker("nearest"), tracker("pda"), tracker("pda", 0.9, 3, 4, 1e-2, drop_after_misses=2, name="other")]
     case, plan = prepared(filters, density=density, detection=0.8)
-    wanted, t, compared = plots.chosen(case.spec), plan.axes.t_s, 0
+    wanted, t, compared = plots.tracker_specs(case.spec), plan.axes.t_s, 0
     for realisation in (0, 1, 2, 3, 511, 70_000):
         sums = sums_of(plan, realisation)
-        z, true = plots.target_plots(plan.world, plan.sight, realisation)
+        z, true = plots.target_plots(plan.world, plan.observation, realisation)
         false = [plots.false_plots(plan.field, realisation, k).T for k in range(len(t))]
         for f, choice in enumerate(wanted):
             gate = design.gate_threshold(choice.gate_probability)
@@ -81,7 +81,7 @@ def test_without_clutter_trackers_are_the_plain_filter_to_the_last_bit():
         plain = dataclasses.replace(
             plain,
             world=plain.world._replace(plots=plan.world.plots, motion=plan.world.motion),
-            sight=plain.sight._replace(certain=np.ones(30, dtype=np.int64)),
+            observation=plain.observation._replace(certain=np.ones(30, dtype=np.int64)),
         )
         for realisation in (0, 5, 12345):
             error = sums_of(plan, realisation)["error"][..., 0]

@@ -144,7 +144,7 @@ def test_probabilistic_association_keeps_a_track_longer():
 def test_a_target_outside_the_sector_is_not_seen():
     plan = prepared([tracker("a", "known")], sector={"range_m": [7e3, 8990.0], "bearing_deg": [5, 40]})
     kept = simulated(plan, 512)["counts"][0, :, kernels.KEPT]
-    assert plan.sight.certain.tolist() == [0] + [1] * 9  # 9000 m at first, 4 m/s less
+    assert plan.observation.certain.tolist() == [0] + [1] * 9  # 9000 m at first, 4 m/s less
     assert kept.tolist() == [0, 0] + [512] * 8
 
 

@@ -1,4 +1,4 @@
-"""P3's manoeuvres: rates against exact laws within binomial bounds, filters that answer, uses of a track, own plots."""
+"""P3's manoeuvres: rates against exact laws within binomial bounds, adaptive filters, uses of a track, own plots."""
 
 import numpy as np
 import pytest
@@ -116,14 +116,14 @@ def test_first_events_of_independent_tests_are_exact_and_alarms_come_in_runs():
         for g in range(3):
             p = law[1, g, :2][:, scans]
             p = 1 - p if part == 2 else p
-            came = np.cumsum(sums["first"][1, g, :2][:, scans], axis=1)
-            assert within(came, N, exact.by_then(p), ALL).all()
+            detected = np.cumsum(sums["first"][1, g, :2][:, scans], axis=1)
+            assert within(detected, N, exact.by_then(p), ALL).all()
     # Overlapping windows on a steady leg: no oftener than if they were independent (Šidák), and by far.
     scans = np.arange(5, 13)
-    came = sums["first"][0, 0][:, scans].sum(axis=1) / N
+    detected = sums["first"][0, 0][:, scans].sum(axis=1) / N
     independent = exact.by_then(law[0, 0][:, scans])[:, -1]
-    assert (came < independent).all()
-    assert came[0] < independent[0] - 5.85 * 0.5 / np.sqrt(N)
+    assert (detected < independent).all()
+    assert detected[0] < independent[0] - 5.85 * 0.5 / np.sqrt(N)
 
 
 @pytest.mark.slow
@@ -135,7 +135,7 @@ def test_rates_within_the_binomial_bounds_at_a_hundred_thousand():
     compared(plan, sums, ALL)
 
 
-# ---- filters that answer ------------------------------------------------------------------------------------------
+# ---- filters that respond -----------------------------------------------------------------------------------------
 def test_without_an_alarm_the_adaptive_filter_is_growing_memory():
     detector = {"plots": 5, "threshold_k": 1e9}
     filters = [PLAIN[0], {"name": "deaf", "kind": "adaptive", "detector": detector}]

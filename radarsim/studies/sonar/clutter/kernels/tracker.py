@@ -65,7 +65,7 @@ class Trackers(NamedTuple):
     thresholds: np.ndarray
 
 
-class Ways(NamedTuple):
+class TrackSums(NamedTuple):
     """What is added up besides `sonar.Sums`: counts (F, K, COUNTS), begun (F, K, FALSE_COUNTS) of false tracks, ratios
     (F, 2, 5) and scores (2, F, T + 1) of the target's first tracks and of false ones, the last their number.
 
@@ -153,7 +153,7 @@ def associate(field, rule, first, scan, n, dt, tracks, life, came, z, again, for
 
 
 @kernel
-def followed(state, hits, misses, age, m, n, most):
+def next_state(state, hits, misses, age, m, n, most):
     """State of a track after a scan, by the rules m of n and of misses."""
     if state == TENTATIVE:
         if hits >= m:
@@ -182,7 +182,7 @@ def judge(trackers, f, n, tracks, life, sigma, truth, shift, kept, counts):
             life[HELD, i] += kept[i] > 0.0
             continue
         rules = trackers.m[f], trackers.n[f], trackers.misses[f]
-        now = followed(state, life[HITS, i], life[MISSES, i], life[AGE, i], *rules)
+        now = next_state(state, life[HITS, i], life[MISSES, i], life[AGE, i], *rules)
         if now == CONFIRMED:
             off = abs(tracks.x[0, 0, i] - truth[0, 0] - shift[0, 0, i]) > lost * sigma[0]
             off |= abs(tracks.x[1, 0, i] - truth[1, 0] - shift[1, 0, i]) > lost * sigma[1]
@@ -219,7 +219,7 @@ def judge_false(trackers, f, n, tracks, life, begun):
         if state == NONE:
             continue
         rules = trackers.m[f], trackers.n[f], trackers.misses[f]
-        now = followed(state, life[HITS, i], life[MISSES, i], life[AGE, i], *rules)
+        now = next_state(state, life[HITS, i], life[MISSES, i], life[AGE, i], *rules)
         if state == CONFIRMED and max(tracks.P[0, 0, i], tracks.P[1, 0, i]) > uncertain:
             now = NONE
         begun[0] += now == TENTATIVE
@@ -261,7 +261,7 @@ def scan(trackers, f, field, first, k, n, dt, period, sigma, tracks, life, came,
     take(tracks, dt, period, sigma, trackers.manoeuvre[f], trackers.association[f] == PDA, taken)
 
 
-class Work(NamedTuple):
+class Workspace(NamedTuple):
     """Room for a chunk of F trackers: `Tracks` of each, their lives (F, ROWS, CHUNK), what is foretold and taken."""
 
     x: np.ndarray
@@ -274,10 +274,10 @@ class Work(NamedTuple):
     taken: np.ndarray
 
 
-def work(count: int) -> Work:
+def workspace(count: int) -> Workspace:
     """Room for that many trackers."""
     shapes = ((2, 4), (2, 8), (2, 6), (4,), (), (ROWS,))
-    return Work(*(aligned_zeros(count, *shape, CHUNK) for shape in shapes), *(aligned_zeros(n, CHUNK) for n in (5, 6)))
+    return Workspace(*(aligned_zeros(count, *shape, CHUNK) for shape in shapes), *(aligned_zeros(n, CHUNK) for n in (5, 6)))
 
 
 @kernel
@@ -289,7 +289,7 @@ def reset(room):
 
 
 @kernel
-def simulate_block(world, sight, field, trackers, room, first, total, sums, ways):
+def simulate_block(world, observation, field, trackers, room, first, total, sums, ways):
     """Add the sums of the target's tracks in realisations first … first + total - 1."""
     F, K, x, life = trackers.gate.size, world.dt.size, room.x, room.life
     plots, shift, z = np.empty((2, 4, CHUNK)), np.zeros((2, 3, CHUNK)), np.empty((2, CHUNK))
@@ -304,7 +304,7 @@ def simulate_block(world, sight, field, trackers, room, first, total, sums, ways
         for k in range(K):
             dt, truth = world.dt[k], world.truth[k]
             move_and_measure(world, first + done, k, plots)
-            detect(sight, first + done, k, came)
+            detect(observation, first + done, k, came)
             shift[:, :2], z[:] = plots[:, 2:], plots[:, 0]
             for f in range(F):
                 tracks = Tracks(x[f], room.y[f], room.P[f], room.across[f], room.plots[f])
@@ -315,14 +315,38 @@ def simulate_block(world, sight, field, trackers, room, first, total, sums, ways
                             sums.ahead[f, k - 1, c, q] += out[q]
                 counts[:] = 0.0
                 scan(
-                    *(trackers, f, field, first + done, k, n, dt, sight.period, sight.sigma, tracks, life[f], came, z),
+                    *(
+                        trackers,
+                        f,
+                        field,
+                        first + done,
+                        k,
+                        n,
+                        dt,
+                        observation.period,
+                        observation.sigma,
+                        tracks,
+                        life[f],
+                        came,
+                        z,
+                    ),
                     *(True, room.foretold, room.taken, counts),
                 )
-                judge(trackers, f, n, tracks, life[f], sight.sigma, truth, shift, kept[f], counts)
+                judge(trackers, f, n, tracks, life[f], observation.sigma, truth, shift, kept[f], counts)
                 ways.counts[f, k] += counts
                 for c in range(lines):
                     add_sums(
-                        *(lines, sight.sigma[c], sight.period, x[f, c], x[f, c], 0, room.P[f, c], shift[c], truth[c]),
+                        *(
+                            lines,
+                            observation.sigma[c],
+                            observation.period,
+                            x[f, c],
+                            x[f, c],
+                            0,
+                            room.P[f, c],
+                            shift[c],
+                            truth[c],
+                        ),
                         *(kept[f], used, f, k, c, out, sums),
                     )
         for f in range(F):
@@ -332,7 +356,7 @@ def simulate_block(world, sight, field, trackers, room, first, total, sums, ways
 
 
 @kernel
-def simulate_false(seeds, sight, field, trackers, room, dts, first, total, ways):
+def simulate_false(seeds, observation, field, trackers, room, dts, first, total, ways):
     """Add the sums of tracks that false plots begin: one plot a realisation, evenly over the sector, at scan 0."""
     F, K, life = trackers.gate.size, dts.size, room.life
     z, came, counts, nothing = np.empty((2, CHUNK)), np.ones(CHUNK), np.zeros(COUNTS), np.zeros(CHUNK)
@@ -350,7 +374,19 @@ def simulate_false(seeds, sight, field, trackers, room, dts, first, total, ways)
             for k in range(K):
                 there = came if k == 0 else nothing
                 scan(
-                    *(trackers, f, field, first + done, k, n, dts[k], sight.period, sight.sigma, tracks, life[f]),
+                    *(
+                        trackers,
+                        f,
+                        field,
+                        first + done,
+                        k,
+                        n,
+                        dts[k],
+                        observation.period,
+                        observation.sigma,
+                        tracks,
+                        life[f],
+                    ),
                     *(there, z, k == 0, room.foretold, room.taken, counts),
                 )
                 if not judge_false(trackers, f, n, tracks, life[f], ways.begun[f, k]):

@@ -18,7 +18,7 @@ UNTESTED = -1.0  # the statistic where there was no test: it exceeds no threshol
 MODE, QUIET, PLOTS = range(3)  # rows of an adaptive filter's memory: 1 in a manoeuvre, tests without alarm, plots used
 
 
-class Watch(NamedTuple):
+class Detectors(NamedTuple):
     """D detectors on C coordinates, and groups of them G: each coordinate, then all jointly.
 
     plots (D,) of the parabola, every (D,) scans from one test to the next; threshold (D, G, T), of which a detector has
@@ -32,7 +32,7 @@ class Watch(NamedTuple):
     phase: np.ndarray
 
 
-class Switching(NamedTuple):
+class AdaptiveRules(NamedTuple):
     """What F filters do about a manoeuvre, read of adaptive ones alone.
 
     detector (F,) and group (F, C) whose statistic is compared with threshold (F, C); raises (F,) the degree, else the
@@ -108,14 +108,14 @@ def joined(q):
 
 
 @kernel
-def examine(watch, k, memory, sigma, count, weight, q):
+def examine(detectors, k, memory, sigma, count, weight, q):
     """Statistics q (D, G, CHUNK) of all detectors at scan k; memory (C, 3, L, CHUNK), count and weight (C, CHUNK)."""
-    for d in range(watch.plots.size):
-        if (k + 1 - watch.plots[d]) % watch.every[d] != 0:
+    for d in range(detectors.plots.size):
+        if (k + 1 - detectors.plots[d]) % detectors.every[d] != 0:
             q[d] = UNTESTED
             continue
         for c in range(memory.shape[0]):
-            curvature(memory[c], watch.plots[d], sigma[c], count[c], weight[c], q[d, c])
+            curvature(memory[c], detectors.plots[d], sigma[c], count[c], weight[c], q[d, c])
         joined(q[d])
 
 
@@ -145,16 +145,16 @@ def tally(q, used):
 
 
 @part
-def add_alarms(watch, k, q, used, passed, sums):
+def add_alarms(detectors, k, q, used, passed, sums):
     """Add the tests of scan k; passed (D, G, T, CHUNK)."""
-    phase = watch.phase[k]
-    if k > 0 and phase != watch.phase[k - 1]:
+    phase = detectors.phase[k]
+    if k > 0 and phase != detectors.phase[k - 1]:
         passed[:] = 0.0
-    for d in range(watch.plots.size):
+    for d in range(detectors.plots.size):
         for g in range(q.shape[1]):
             sums.tested[d, g, k] += tally(q[d, g], used)
-            for t in range(watch.thresholds[d]):
-                alarms, first = tell(q[d, g], watch.threshold[d, g, t], phase == 2, used, passed[d, g, t])
+            for t in range(detectors.thresholds[d]):
+                alarms, first = tell(q[d, g], detectors.threshold[d, g, t], phase == 2, used, passed[d, g, t])
                 sums.alarms[d, g, t, k] += alarms
                 sums.first[d, g, t, k] += first
 

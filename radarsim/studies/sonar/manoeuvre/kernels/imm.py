@@ -18,7 +18,7 @@ from radarsim.studies.sonar.kernels.steps import GROUPS, eight, informed, put_si
 MEAN, COVARIANCE, PROBABILITY, ROWS = 0, 6, 18, 20  # rows of its memory: two means, two covariances, two probabilities
 
 
-class Interacting(NamedTuple):
+class ModelPairs(NamedTuple):
     """Models of F filters, read of interacting ones alone.
 
     manoeuvre (F, C, 2) variances in nominal plots and periods; stay (F, 2) the probability that each model lasts from

@@ -1,4 +1,4 @@
-"""Filters that answer to manoeuvres over recorded plots, by the kernels that simulate them: one track in all lanes."""
+"""Filters that respond to manoeuvres, over recorded plots, by the simulation's kernels: one track in all lanes."""
 
 import numpy as np
 
@@ -6,24 +6,27 @@ from radarsim.studies.sonar import banks
 from radarsim.studies.sonar.kernels import patterns
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK
 from radarsim.studies.sonar.kernels.steps import remember
-from radarsim.studies.sonar.manoeuvre.filters import trials_of, watch
-from radarsim.studies.sonar.manoeuvre.kernels import detector as detectors
+from radarsim.studies.sonar.manoeuvre.filters import detector_arrays, detector_tests
+from radarsim.studies.sonar.manoeuvre.kernels import detector
 from radarsim.studies.sonar.manoeuvre.kernels.imm import ROWS
 
 
-def followed(
-    choices: list[banks.Choice], t: np.ndarray, period: float, sigma: np.ndarray, z: np.ndarray, weight: np.ndarray
+def estimate_recorded(
+    specs: list[banks.FilterSpec], t: np.ndarray, period: float, sigma: np.ndarray, z: np.ndarray, weight: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Estimates (F, n, C, 3) and covariances (F, n, C, 3, 3) over plots z (C, n) of weights (C, n), zero where missing.
 
     t (n,) s; sigma (C,) of a plot of weight one. A detector that tests every so many scans counts the rows.
     """
-    F, C, n = len(choices), len(z), len(t)
-    trials = trials_of([], [], [(one.answer, one.length) for one in choices])
-    bank, tests = banks.own(choices, t, period, sigma, trials), watch(trials, np.zeros(n, dtype=np.int64), C)
+    F, C, n = len(specs), len(z), len(t)
+    tests = detector_tests([], [], [(one.response, one.length) for one in specs])
+    bank, arrays = (
+        banks.per_realisation_bank(specs, t, period, sigma, tests),
+        detector_arrays(tests, np.zeros(n, dtype=np.int64), C),
+    )
     x, y, s = (np.zeros((F, C, rows, CHUNK)) for rows in (4, 8, ROWS))
-    memory, q = np.zeros((C, 3, bank.memory, CHUNK)), np.zeros((len(trials.kinds), C + 1, CHUNK))
-    count, P, sight = np.zeros((C, CHUNK)), np.empty((6, CHUNK)), _sight(period, sigma)
+    memory, q = np.zeros((C, 3, bank.memory, CHUNK)), np.zeros((len(tests.kinds), C + 1, CHUNK))
+    count, P, observation = np.zeros((C, CHUNK)), np.empty((6, CHUNK)), _observation(period, sigma)
     estimates, covariances = np.zeros((F, n, C, 3)), np.zeros((F, n, C, 3, 3))
     scale = period ** -np.arange(3.0)
     packed = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
@@ -32,19 +35,19 @@ def followed(
         before, count = count, count + (w > 0)
         for c in range(C if bank.memory else 0):
             remember(memory[c], plot[c], w[c], dt / period)
-        detectors.examine(tests, k, memory, sigma, count, w, q)
+        detector.examine(arrays, k, memory, sigma, count, w, q)
         for f, c in np.ndindex(F, C):
             state = (x[f, c], y[f, c], s[f, c], memory[c], plot[c], w[c], before[c], count[c], q, P)
-            patterns.filter_scan(bank, sight, f, c, k, dt, *state)
+            patterns.filter_scan(bank, observation, f, c, k, dt, *state)
             estimates[f, k, c] = x[f, c, :3, 0]
             covariances[f, k, c] = P[packed, 0] * sigma[c] ** 2 * np.outer(scale, scale)
     return estimates, covariances
 
 
-def _sight(period: float, sigma: np.ndarray) -> patterns.Sight:
-    """What a scan of a filter reads of the sight: period and σ; the rest is of simulated plots."""
+def _observation(period: float, sigma: np.ndarray) -> patterns.Observation:
+    """The fields that a scan of a filter reads, period and σ; the others describe simulated plots."""
     none = np.zeros((0, 2))
-    return patterns.Sight(
+    return patterns.Observation(
         misses=np.zeros(2, dtype=np.uint64),
         certain=np.zeros(0, dtype=np.int64),
         probability=1.0,
