@@ -8,7 +8,7 @@ SMOKE := $(VENV)/smoke
 # Drawing takes twice as long as all the rest: `make smoke SMOKE_FLAGS=` draws too.
 SMOKE_FLAGS ?= --no-figures
 
-.PHONY: run test slow mutants lint smoke reproduce-figures claims-page bench schema known docs docs-numbers docs-examples clean
+.PHONY: run test slow mutants lint smoke reproduce-figures claims-page bench schema known docs docs-numbers docs-examples docs-house clean
 
 run: $(VENV)/installed
 	$(RADARSIM) run configs/rls2.yaml
@@ -61,6 +61,10 @@ docs-numbers: $(VENV)/installed
 # What the commands in the pages' examples print.
 docs-examples: $(VENV)/installed
 	PYTHONPATH=docs $(BIN)/python -m making.examples README.md docs/*.md docs/howto/*.md
+
+# The picture of the rooms, from the package's own imports.
+docs-house: $(VENV)/installed
+	PYTHONPATH=docs $(BIN)/python -m making.house docs/house.svg
 
 clean:
 	rm -rf $(VENV) docs/_build build *.egg-info .pytest_cache .ruff_cache .hypothesis

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 import radarsim
 
-FLOORS = ("models", "exact", "filters", "kernels", "studies", "engine", "report", "config")
+FLOORS = ("physics", "kernels", "studies", "engine", "report", "config", "track", "app")
 
 
 def markdown() -> str:

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from making import contents, links
+from making import contents, house, links
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "benchmarks/README.md", ROOT / "results/README.md"]
@@ -42,3 +42,12 @@ def test_pages_that_are_named_without_a_link_exist():
         if not (ROOT / name).exists() and not re.search("[A-Z]{4}", name) and name not in made
     }
     assert not missing
+
+
+def test_the_picture_of_the_house_has_every_room():
+    """Rooms that the picture lacks would be missing from its arrows, too."""
+    drawn = {room for row in house.ROWS for room in row}
+    assert drawn == set(house.ABOUT)
+    folders = {path.parent.name for path in house.PACKAGE.glob("*/__init__.py")} - {"studies"}
+    assert folders | {path.parent.name for path in house.PACKAGE.glob("studies/*/__init__.py")} <= drawn
+    assert 'class="name">cli<' in house.svg()
