@@ -116,7 +116,7 @@ def premium(over: str) -> Callable[[Results], str]:
 
 
 def use(name: str, component: str) -> Callable[[Results], str]:
-    """Measured over predicted σ of a use of the track after 220 steady seconds."""
+    """Measured over believed σ of a use of the track after 220 steady seconds."""
     wanted = {"case": "acceleration_mps2=0", "filter": name, "component": component, "t_s": 220}
     return value(STEM, "uses", "ratio", **wanted)
 

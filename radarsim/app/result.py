@@ -59,7 +59,7 @@ class Result:
 
         >>> import radarsim
         >>> sorted(radarsim.run("rls2", realisations=2000).tables)
-        ['claims', 'consistency', 'curves', 'gains', 'radar', 'steady']
+        ['believed', 'claims', 'consistency', 'curves', 'gains', 'radar', 'steady']
         """
         from radarsim.app import output
 

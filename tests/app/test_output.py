@@ -14,7 +14,8 @@ from radarsim.app.configs import load
 from radarsim.errors import StoreError
 from radarsim.report import files, html, provenance
 
-TABLES = {"curves.csv", "gains.csv", "steady.csv", "consistency.csv", "radar.csv", "claims.csv"}
+TABLES = {"curves.csv", "gains.csv", "steady.csv", "believed.csv", "consistency.csv", "radar.csv"}
+TABLES |= {"claims.csv"}
 FIGURES = {f"figures/{k}_{c}.{f}" for k in ("sigma", "gain") for c in ("r", "Vr", "ar") for f in ("svg", "png")}
 FIGURES |= {"figures/consistency.svg", "figures/consistency.png"}
 RUN = {"stop": "done", "threads": 2, "seconds": 1.5, "warnings": ["watch out"], "identities": {"rls2": "ab"}}

@@ -258,6 +258,6 @@ def consistency(results: Sequence[CaseResult], table) -> Figure | None:
     drawn = _beside(drawn, result, dash=None)
     caption = (
         "Normalised errors squared, per degree of freedom, by stage: 1 where the filter's own covariance is right, "
-        f"more where it is too sure of itself. {panels.plain_label(result)}."
+        f"more where it is optimistic, less where it is pessimistic. {panels.plain_label(result)}."
     )
     return _several("consistency", "What the filters believe of themselves", caption, drawn, 66)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import panels, statistics
+from radarsim.report import consistency, panels, statistics
 from radarsim.report import tables as common
 from radarsim.studies.multimodel.figures import figures
 
@@ -23,7 +23,7 @@ def tables(results: Sequence[CaseResult]) -> dict:
     return {
         "probabilities": probabilities(results),
         "stages": stages(results),
-        "consistency": consistency(results),
+        "consistency": normalised_errors(results),
         "operations": operations(results),
     }
 
@@ -108,43 +108,38 @@ def _stages(result: CaseResult) -> list[tuple]:
     return rows
 
 
-CONSISTENCY = (
-    *("case", "filter", "stage", "n", "nees", "nees_lo", "nees_hi", "nis", "nis_lo", "nis_hi"),
-    *("nees_verdict", "nis_verdict"),
-)
+CONSISTENCY = ("case", "filter", "stage", "n", *consistency.columns("nees"), *consistency.columns("nis"))
 
 
-def consistency(results: Sequence[CaseResult]):
-    """Mean normalised errors squared by stage, per degree of freedom: 1 where a filter is right about itself.
+def normalised_errors(results: Sequence[CaseResult]):
+    """NEES and NIS of each filter by stage, per degree of freedom, with bounds and verdicts.
 
     NEES of the position with the filter's own covariance, at the reported scans; NIS of the plot against what the
-    hypothesis foretold that was the most probable before it, at all scans. The verdicts are by wider intervals, of
-    which all of a case's filters and stages hold in 95 % of runs.
+    hypothesis predicted that was the most probable before it, at all scans. In 95 % of runs in which all of a case's
+    filters are right about themselves, all their stages lie within the bounds.
     """
-    rows = []
-    for result in results:
-        places = {name: s for s, name in enumerate(result.axes.extra["stages"])}
-        bounds = stage_bounds(result)
-        for f, label in enumerate(result.axes.filters):
-            for stage, *_ in bounds:
-                sums = np.asarray(result.sums["stage"])[f, places[stage]]
-                found = [float(value) for c in (NEES, NIS) for value in normalised(sums[c], result.count)]
-                looks = len(bounds) * len(result.axes.filters)
-                said = [verdict(normalised(sums[c], result.count, looks)) for c in (NEES, NIS)]
-                rows.append((result.name, label, stage, result.count, *found, *said))
-    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(CONSISTENCY)})
+    return common.joined([_normalised_errors(result) for result in results], CONSISTENCY)
 
 
-def normalised(sums: np.ndarray, n: int, looks: int = 1) -> statistics.Estimate:
-    """Mean normalised error squared per degree of freedom from Σq, Σq² over n realisations."""
-    return statistics.mean_square(sums[0] / FREEDOM, sums[1] / FREEDOM**2, n, looks)
-
-
-def verdict(of: statistics.Estimate) -> str:
-    """What a normalised error squared says of a filter's covariance."""
-    if of.lo > 1:
-        return "optimistic"
-    return "pessimistic" if of.hi < 1 else "consistent"
+def _normalised_errors(result: CaseResult) -> dict[str, np.ndarray]:
+    axes, n = result.axes, result.count
+    places = {name: s for s, name in enumerate(axes.extra["stages"])}
+    s = np.array([places[stage] for stage, *_ in stage_bounds(result)])
+    filters = len(axes.filters)
+    sums = np.asarray(result.sums["stage"])[:, s].reshape(filters * s.size, -1, 2)
+    found = {}
+    for quantity, place in (("nees", NEES), ("nis", NIS)):
+        total, square = sums[:, place, 0] / FREEDOM, sums[:, place, 1] / FREEDOM**2
+        bounds = consistency.bounds_from_spread(total, square, n, len(sums))
+        means = [statistics.mean_square(*pair, n) for pair in zip(total, square, strict=True)]
+        found |= consistency.normalised(quantity, statistics.Estimate(*np.transpose(means)), bounds)
+    return {
+        "case": np.full(len(sums), result.name, dtype=object),
+        "filter": common.names(axes.filters, np.repeat(np.arange(filters), s.size)),
+        "stage": common.names(axes.extra["stages"], np.tile(s, filters)),
+        "n": np.full(len(sums), n),
+        **found,
+    }
 
 
 OPERATIONS = ("case", "filter", "family", "merge", "models", "stage", "merged", "merges", "operations")

@@ -74,3 +74,27 @@ def steady_state(
     true = solve_discrete_lyapunov(kept @ F, K @ R @ K.T)
     to_units = np.outer(scale, scale)
     return believed * to_units, true * to_units
+
+
+def normalised_error(
+    believed: np.ndarray, bias: np.ndarray, moment: np.ndarray, available: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and variance of eᵀP⁻¹e per estimated component (…,) of a Gaussian error e; not-a-number without components.
+
+    believed (…, 3, 3) is P, bias (…, 3) the mean m of e, moment (…, 3, 3) its second moment M = E eeᵀ, available
+    (…, 3) the components of e that there are. The mean is tr P⁻¹M, the variance 2 tr (P⁻¹M)² - 2 (mᵀP⁻¹m)².
+    """
+    spread = np.diagonal(believed, axis1=-2, axis2=-1)
+    scale = np.where(spread > 0, spread, np.inf) ** -0.5  # m, m/s and m/s² brought to one size before solving
+    unit = scale[..., :, None] * scale[..., None, :]
+    mean, variance = np.full(available.shape[:-1], np.nan), np.full(available.shape[:-1], np.nan)
+    for pattern in np.unique(available.reshape(-1, 3), axis=0):
+        known, where = np.flatnonzero(pattern), np.all(available == pattern, axis=-1)
+        if known.size:
+            P, M = ((part * unit)[where][:, known][:, :, known] for part in (believed, moment))
+            m = (bias * scale)[where][:, known, None]
+            ratio = np.linalg.solve(P, M)
+            shift = (m * np.linalg.solve(P, m)).sum(axis=(1, 2))
+            mean[where] = np.trace(ratio, axis1=1, axis2=2) / known.size
+            variance[where] = 2 * (np.einsum("nij,nji->n", ratio, ratio) - shift**2) / known.size**2
+    return mean, variance

@@ -36,12 +36,13 @@ def figures(results: Sequence[CaseResult], made: dict, experiment) -> dict[str, 
 
 def consistency_figure(results: Sequence[CaseResult], table, left_out: str) -> Figure:
     """NEES per component against time: a panel for each filter, a line for each case."""
-    rows = common.groups(table.drop_duplicates(["case", "filter", "k"]), "case", "filter")
+    rows = common.groups(table, "case", "filter")
     names = list(dict.fromkeys(name for result in results for name in result.axes.filters))
     drawn = tuple(_consistency_panel(results, rows, name) for name in names)
     caption = (
         "Mean of the normalised squared error eᵀP⁻¹e per estimated component, P the covariance that the filter "
-        "believes; one (dotted) for a filter that is right about itself, less for one that is better than it thinks."
+        "believes; one (dotted) for a filter that is right about itself, more for an optimistic one, less for a "
+        "pessimistic one."
     )
     columns = min(2, len(drawn))
     if len(results) > panels.MOST_AT_ENDS or any(len(panels.label(result)) > LONG for result in results):

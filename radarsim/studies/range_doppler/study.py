@@ -88,7 +88,8 @@ def axes(spec, designs: list[filters.LinearFilter], x: np.ndarray, sigma: np.nda
     errors = [exact.error_recursion(d.weights, d.gains, d.observes, x, sigma, dt) for d in designs]
     bias = np.stack([b for b, _ in errors])
     variance = np.stack([np.diagonal(S, axis1=1, axis2=2) for _, S in errors])
-    available = np.stack([d.available for d in designs])
+    moment = np.stack([S for _, S in errors]) + bias[..., :, None] * bias[..., None, :]
+    available, believed = np.stack([d.available for d in designs]), np.stack([d.believed for d in designs])
     return Axes(
         filters=names,
         components=COMPONENTS,
@@ -99,7 +100,8 @@ def axes(spec, designs: list[filters.LinearFilter], x: np.ndarray, sigma: np.nda
         exact_sigma=np.where(available, np.sqrt(variance + bias**2), np.nan),
         exact_bias=np.where(available, bias, np.nan),
         extra={
-            "believed": np.stack([d.believed for d in designs]),
+            "believed": believed,
+            "exact_nees": exact.normalised_error(believed, bias, moment, available)[0],
             "start": np.array([d.start for d in designs]),
             "manoeuvre_variance": np.array([f.manoeuvre_variance for f in spec.filters]),
             "observes": np.array([d.observes for d in designs]),

@@ -1,4 +1,4 @@
-"""P1's own tables: steady state, consistency, radar.
+"""P1's own tables: steady state, believed against true σ, NEES, radar.
 
 Its figures stand in range_doppler_figures, the words of its report in range_doppler_words.
 """
@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import panels, statistics
+from radarsim.report import consistency, panels, statistics
 from radarsim.report import tables as common
-from radarsim.studies.range_doppler import exact as linear
+from radarsim.studies.range_doppler import exact
 from radarsim.studies.range_doppler.figures import PERIODS, figures
 from radarsim.studies.range_doppler.words import answer, follows_the_model, question
 
@@ -21,8 +21,13 @@ TARGET_SPEED = 300.0  # m/s, the paper's example of an ambiguous Doppler frequen
 
 
 def tables(results: Sequence[CaseResult]) -> dict:
-    """The tables beyond curves and gains: steady, consistency, radar."""
-    return {"steady": steady(results), "consistency": consistency(results), "radar": radar(results)}
+    """The tables beyond curves and gains: steady, believed, consistency, radar."""
+    return {
+        "steady": steady(results),
+        "believed": believed(results),
+        "consistency": normalised_errors(results),
+        "radar": radar(results),
+    }
 
 
 STEADY = (
@@ -59,7 +64,7 @@ def _steady(result: CaseResult) -> list[tuple]:
     t, period, rows = np.asarray(axes.t_s, dtype=float), extra["scan_period_s"], []
     for f, name in enumerate(axes.filters):
         variance = float(extra["manoeuvre_variance"][f])
-        _, true = linear.steady_state(int(extra["observes"][f]), variance, extra["sigma"], period)
+        _, true = exact.steady_state(int(extra["observes"][f]), variance, extra["sigma"], period)
         for c, (component, unit) in enumerate(axes.components):
             at = np.flatnonzero(axes.available[f, :, c])
             if not at.size:
@@ -92,70 +97,60 @@ def _for_good(settled: np.ndarray, t: np.ndarray) -> float:
     return float(t[first]) if first < len(t) else np.inf
 
 
-CONSISTENCY = (
-    *("case", "filter", "component", "unit", "k", "t_s", "sigma", "believed_sigma", "ratio", "ratio_lo", "ratio_hi"),
-    *("nees", "nees_bound_lo", "nees_bound_hi", "nees_verdict"),
-)
+CONSISTENCY = ("case", "filter", "k", "t_s", "n", *consistency.columns("nees", exact=True))
 
 
-def consistency(results: Sequence[CaseResult]):
-    """What a filter believes of its σ against what it is (ratio over 1: pessimistic), and its normalised error squared.
+def believed(results: Sequence[CaseResult]):
+    """Measured σ beside the σ that a filter believes, by component: `ratio` over 1 is optimistic."""
+    return common.joined([_believed(result) for result in results], consistency.BELIEVED)
 
-    `nees` is the mean of eᵀP⁻¹e per estimated component, 1 for a filter that is right about itself. In
-    95 % of runs of such a filter over as many realisations the means of all its scans lie within the bounds.
+
+def _believed(result: CaseResult) -> dict[str, np.ndarray]:
+    P = result.axes.extra["believed"]
+    return consistency.believed(result, np.sqrt(np.diagonal(P, axis1=2, axis2=3)))
+
+
+def normalised_errors(results: Sequence[CaseResult]):
+    """NEES of each filter's estimate by scan: the mean of eᵀP⁻¹e per estimated component, with bounds and verdict.
+
+    In 95 % of runs of a filter that is right about itself the means of all its scans lie within the bounds.
     """
-    return common.joined([_consistency(result) for result in results], CONSISTENCY)
+    return common.joined([_normalised_errors(result) for result in results], CONSISTENCY)
 
 
-def _consistency(result: CaseResult) -> dict[str, np.ndarray]:
-    axes, at = result.axes, common.shown(result)
-    f, k, c = at
-    of = statistics.errors(np.asarray(result.sums["error"])[at], result.count).sigma
-    believed = np.sqrt(np.diagonal(axes.extra["believed"], axis1=2, axis2=3))[at]
-    nees, lo, hi = (part[f, k] for part in normalised_error(result))
-    with np.errstate(divide="ignore"):
-        ratio = [believed / part for part in (of.value, of.hi, of.lo)]
+def _normalised_errors(result: CaseResult) -> dict[str, np.ndarray]:
+    axes = result.axes
+    f, k = at = np.nonzero(axes.available.any(axis=2))
+    size = axes.available.sum(axis=2)[at]
+    looks = axes.available.any(axis=2).sum(axis=1)[f]
+    bounds = statistics.normalised_bounds(size * result.count, looks)
+    mean = statistics.Estimate(*(part[at] for part in nees(result)))
     return {
         "case": np.full(f.size, result.name, dtype=object),
         "filter": common.names(axes.filters, f),
-        "component": common.names([name for name, _ in axes.components], c),
-        "unit": common.names([unit for _, unit in axes.components], c),
         "k": np.asarray(axes.k)[k],
         "t_s": np.asarray(axes.t_s, dtype=float)[k],
-        "sigma": of.value,
-        "believed_sigma": believed,
-        **dict(zip(("ratio", "ratio_lo", "ratio_hi"), ratio, strict=True)),
-        "nees": nees,
-        "nees_bound_lo": lo,
-        "nees_bound_hi": hi,
-        "nees_verdict": np.select([nees < lo, nees > hi], ["pessimistic", "optimistic"], "consistent").astype(object),
+        "n": np.full(f.size, result.count),
+        **consistency.normalised("nees", mean, bounds, axes.extra["exact_nees"][at]),
     }
 
 
-def normalised_error(result: CaseResult) -> statistics.Estimate:
-    """Mean of eᵀP⁻¹e per estimated component (F, K), P the believed covariance, and the bounds of a right filter.
+def nees(result: CaseResult) -> statistics.Estimate:
+    """Mean of eᵀP⁻¹e per estimated component (F, K), P the believed covariance, with its interval.
 
-    From Σe² and Σ of the products of two components; N·d times the mean is then chi-square of N·d degrees of freedom.
-    The bounds hold 95 % over all scans of a filter together (Bonferroni: 5 % shared among them).
+    From Σe and the Σ of products of two components. The errors of this study are Gaussian, so that these give the
+    spread too: of mean m and second moment M = E eeᵀ, var eᵀP⁻¹e = 2 tr (P⁻¹M)² - 2 (mᵀP⁻¹m)².
     """
-    axes, P = result.axes, result.axes.extra["believed"]
+    axes, P, n = result.axes, result.axes.extra["believed"], result.count
+    error, first = np.asarray(result.sums["error"]), np.asarray(result.sums["error"])[..., 0] / n
     second = np.zeros(P.shape)
     for (i, j), crossed in zip(((0, 1), (0, 2), (1, 2)), np.moveaxis(result.sums["cross"], -1, 0), strict=True):
-        second[..., i, j] = second[..., j, i] = crossed / result.count
+        second[..., i, j] = second[..., j, i] = crossed / n
     for i in range(3):
-        second[..., i, i] = result.sums["error"][..., i, 1] / result.count
-    variance = np.diagonal(P, axis1=2, axis2=3)
-    scale = np.where(variance > 0, variance, np.inf) ** -0.5  # m, m/s and m/s² brought to one size before solving
-    unit = scale[..., :, None] * scale[..., None, :]
-    mean, freedom = np.full(P.shape[:2], np.nan), np.full(P.shape[:2], np.nan)
-    for pattern in np.unique(axes.available.reshape(-1, 3), axis=0):
-        known, where = np.flatnonzero(pattern), np.all(axes.available == pattern, axis=2)
-        if known.size:
-            one, other = ((part * unit)[where][:, known][:, :, known] for part in (P, second))
-            mean[where] = np.trace(np.linalg.solve(one, other), axis1=1, axis2=2) / known.size
-            freedom[where] = known.size * result.count
-    looks = np.sum(np.isfinite(mean), axis=1, keepdims=True)
-    return statistics.Estimate(mean, *statistics.normalised_bounds(freedom, looks))
+        second[..., i, i] = error[..., i, 1] / n
+    mean, variance = exact.normalised_error(P, first, second, axes.available)
+    interval = statistics.mean_square(n * mean, n * (variance + mean**2), n)
+    return statistics.Estimate(mean, interval.lo, interval.hi)
 
 
 RADAR = ("case", "C_theta", "doppler_hz", "doppler_per_repetition_rate", "unambiguous_velocity_mps")

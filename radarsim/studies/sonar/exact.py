@@ -142,7 +142,7 @@ def weighted_errors(
 
 
 def consistency(believed: np.ndarray, bias: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Expected normalised squared error tr(P⁻¹(S + m mᵀ)) (…,): `size` for an honest filter, more for an overconfident
+    """Expected normalised squared error tr(P⁻¹(S + m mᵀ)) (…,): `size` for a consistent filter, more for an optimistic
     one.
     """
     moment = covariance + bias[..., :, None] * bias[..., None, :]

@@ -178,7 +178,7 @@ def believed_figure(results: Sequence[CaseResult], believed, consistency) -> Fig
         key: table[(table["k"] == last) & (table["component"] == component)].set_index(["case", "filter"])
         for key, table in (("believed", believed), ("consistency", consistency))
     }
-    left, right = [], [Reference(1.0, label="honest")]
+    left, right = [], [Reference(1.0, label="consistent")]
     for n, f in enumerate(cases[0].axes.filters):
         rows = at_end["believed"].loc[[(r.name, f) for r in cases]]
         true = rows["sigma"].to_numpy() / sigma
@@ -193,7 +193,7 @@ def believed_figure(results: Sequence[CaseResult], believed, consistency) -> Fig
     caption = (
         f"Left: σ of the {QUANTITIES[component].name} at plot {last} in σ of a plot, true (lines) and as the filter "
         "believes it (markers alone, where they differ by over 5 %). Right: normalised squared error per component, 1 "
-        "for an honest filter; crosses: by calculation."
+        "for a consistent filter; crosses: by calculation."
     )
     x = Axis("correlation $\\rho$ of neighbouring errors")
     return Figure(

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import panels, statistics
+from radarsim.report import consistency, panels, statistics
 from radarsim.report import tables as common
 from radarsim.studies.sonar import exact
 from radarsim.studies.sonar import figures as sonar_figures
@@ -22,8 +22,8 @@ def tables(results: Sequence[CaseResult]) -> dict:
     """The tables beyond curves and gains; one without rows is left out."""
     made = {
         "extrapolation": common.joined([_extrapolation(result) for result in results], EXTRAPOLATION),
-        "believed": common.joined([_believed(result) for result in results], BELIEVED),
-        "consistency": common.joined([_consistency(result) for result in results], CONSISTENCY),
+        "believed": common.joined([_believed(result) for result in results], consistency.BELIEVED),
+        "consistency": common.joined([_normalised_errors(result) for result in results], CONSISTENCY),
         "plots": common.joined([_plots(result) for result in results if textbook(result)], PLOTS),
         "smoothing_gains": common.joined([_gains(result) for result in results if textbook(result)], GAINS),
         "conversion": common.joined([_conversion(r) for r in results if r.spec.frame != "polar"], CONVERSION),
@@ -46,9 +46,9 @@ def textbook(result: CaseResult) -> bool:
 
 
 def coordinate_rows(result: CaseResult, mask: np.ndarray):
-    """Indices (filter, scan, coordinate), each (n,), of mask (F, K, C), ordered filter, coordinate, scan.
+    """The leading columns of a coordinate's rows, and where mask (F, K, C) has them.
 
-    And columns.
+    Returns indices (filter, scan, coordinate), each (n,), ordered filter, coordinate, scan; and the columns by name.
     """
     axes = result.axes
     f, c, k = np.nonzero(np.moveaxis(mask, 1, 2))
@@ -96,45 +96,20 @@ def _extrapolation(result: CaseResult) -> dict:
     }
 
 
-BELIEVED = (
-    *("case", "filter", "component", "unit", "k", "t_s", "n"),
-    *("sigma", "believed_sigma", "true_to_believed", "ratio_lo", "ratio_hi"),
-)
-
-
-def _believed(result: CaseResult) -> dict:
-    """σ beside the one that the filter claims (root of its mean variance); a ratio over 1 is overconfidence."""
-    axes, at = result.axes, common.shown(result)
-    f, k, c = at
-    n = common.realisations(result)[at]
-    of = statistics.errors(np.asarray(result.sums["error"])[at], n).sigma
+def _believed(result: CaseResult) -> dict[str, np.ndarray]:
+    """σ beside the one that the filter believes, the root of its mean variance."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        claimed = np.sqrt(np.asarray(result.sums["believed"])[at] / n)
-        ratio = [part / claimed for part in of]
-    return {
-        "case": np.full(f.size, result.name, dtype=object),
-        "filter": common.names(axes.filters, f),
-        "component": common.names([name for name, _ in axes.components], c),
-        "unit": common.names([unit for _, unit in axes.components], c),
-        "k": np.asarray(axes.k)[k],
-        "t_s": np.asarray(axes.t_s, dtype=float)[k],
-        "n": n.astype(np.int64),
-        "sigma": of.value,
-        "believed_sigma": claimed,
-        **dict(zip(("true_to_believed", "ratio_lo", "ratio_hi"), ratio, strict=True)),
-    }
+        return consistency.believed(result, np.sqrt(result.sums["believed"] / common.realisations(result)))
 
 
-CONSISTENCY = (
-    *("case", "filter", "component", "unit", "k", "t_s", "n", "nees", "nees_lo", "nees_hi", "exact_nees"),
-    *("honest_lo", "honest_hi", "verdict"),
-)
+CONSISTENCY = ("case", "filter", "component", "unit", "k", "t_s", "n", *consistency.columns("nees", exact=True))
 
 
-def _consistency(result: CaseResult) -> dict:
-    """Normalised squared error eᵀP⁻¹e of a coordinate's state per component: 1 for a filter that is right about itself.
+def _normalised_errors(result: CaseResult) -> dict:
+    """NEES eᵀP⁻¹e of a coordinate's state per component, where it is complete.
 
-    In 95 % of runs of such a filter all its scans' means over as many realisations lie from `honest_lo` to `honest_hi`.
+    In 95 % of runs of a filter that is right about itself all its scans' means over as many realisations lie within
+    their bounds.
     """
     n = complete(result)
     at, columns = coordinate_rows(result, n > 0)
@@ -142,19 +117,9 @@ def _consistency(result: CaseResult) -> dict:
     size, n = result.axes.extra["sizes"][at[0]], n[at]
     joint = result.sums["joint"][at]
     mean = statistics.mean_square(joint[:, 0] / size, joint[:, 1] / size**2, n)
-    low, high = statistics.normalised_bounds(size * n, looks)
-    return columns | {
-        "n": n.astype(np.int64),
-        "nees": mean.value,
-        "nees_lo": mean.lo,
-        "nees_hi": mean.hi,
-        "exact_nees": result.axes.extra["exact_nees"][at] / size,
-        "honest_lo": low,
-        "honest_hi": high,
-        "verdict": np.select([mean.value < low, mean.value > high], ["pessimistic", "overconfident"], "honest").astype(
-            object
-        ),
-    }
+    bounds = statistics.normalised_bounds(size * n, looks)
+    nees = consistency.normalised("nees", mean, bounds, result.axes.extra["exact_nees"][at] / size)
+    return columns | {"n": n.astype(np.int64), **nees}
 
 
 PLOTS = (
@@ -313,14 +278,14 @@ def _rho(spec) -> tuple[float, ...]:
 def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
     """Sentences with numbers and 95 % intervals: σ of the first coordinate at the end of the run, by filter.
 
-    Who is honest.
+    And the most optimistic filter.
     """
     tracked = [result for result in results if result.spec.tracking]
     if tracked:
         return clutter.answer(tracked, made)
     shown, others = panels.told(results)
     best = [_best(result, made["curves"]) for result in shown]
-    wrong = _overconfident(results, made)
+    wrong = _most_optimistic(results, made)
     seen = words.answer([result for result in results if result.spec.manoeuvring], made)
     return [*seen, *best, *([wrong] if wrong else []), *others]
 
@@ -341,16 +306,16 @@ def _best(result: CaseResult, curves) -> str:
     return f"{where + ': ' if where else ''}σ of the {NAMES[first].name} after {low['t_s']:g} s: {said}."
 
 
-def _overconfident(results: Sequence[CaseResult], made: dict) -> str:
-    """The worst case of a filter that believes itself better than it is, its state complete."""
+def _most_optimistic(results: Sequence[CaseResult], made: dict) -> str:
+    """The worst case of a filter that believes itself more accurate than it is, its state complete."""
     table = made["believed"].merge(made["consistency"][["case", "filter", "k"]].drop_duplicates())
-    worst = table.loc[table["true_to_believed"].idxmax()]
+    worst = table.loc[table["ratio"].idxmax()]
     if worst["ratio_lo"] <= 1.05:
         return ""
     result = next(result for result in results if result.name == worst["case"])
     where = f" at {panels.plain(panels.swept(result))}" if result.swept else ""
     return (
-        f"Most overconfident: {worst['filter']}{where}, whose true σ is "
-        f"{worst['true_to_believed']:.2f} [{worst['ratio_lo']:.2f}, {worst['ratio_hi']:.2f}] times the one it claims "
+        f"Most optimistic: {worst['filter']}{where}, whose true σ is "
+        f"{worst['ratio']:.2f} [{worst['ratio_lo']:.2f}, {worst['ratio_hi']:.2f}] times the one it believes "
         f"({NAMES[worst['component']].name}, scan {worst['k']})."
     )

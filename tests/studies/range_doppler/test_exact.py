@@ -5,7 +5,7 @@ import pytest
 
 from radarsim.physics import targets
 from radarsim.physics.motion import transition
-from radarsim.studies.range_doppler.exact import error_recursion, steady_state
+from radarsim.studies.range_doppler.exact import error_recursion, normalised_error, steady_state
 from radarsim.studies.range_doppler.filters import design, least_squares_start, observation
 
 RADARS = {"rls1": (25, 5, 10), "rls2": (250, 15, 10), "rls3": (250, 15, 5), "rls4": (50, 1, 10), "rls5": (50, 1, 5)}
@@ -148,3 +148,28 @@ def test_steady_state_of_fast_radars_with_long_memory(observes, variance):
     omega = (variance / sigma[0] ** 2) ** (1 / 6)
     assert omega * dt < 0.01
     assert true[0, 0] == pytest.approx(5 / 3 * omega * dt * sigma[0] ** 2, rel=3 * omega * dt + 1e-4)
+
+
+@pytest.mark.parametrize("pattern", [(True, True, True), (True, True, False), (True, False, False)])
+def test_normalised_error_of_gaussian_errors(pattern):
+    """Mean and variance of eᵀP⁻¹e per component against a million drawn errors, of units that differ by 10⁴."""
+    rng, known = np.random.default_rng(5), np.flatnonzero(pattern)
+    units = np.array([250.0, 15.0, 0.02])
+    P, S = (_covariance(rng, units) for _ in range(2))
+    m = 0.7 * units
+    mean, variance = normalised_error(P[None], m[None], (S + np.outer(m, m))[None], np.array([pattern]))
+    e = rng.multivariate_normal(m[known] / units[known], (S / np.outer(units, units))[np.ix_(known, known)], 10**6)
+    inverse = np.linalg.inv((P / np.outer(units, units))[np.ix_(known, known)])
+    q = np.einsum("ni,ij,nj->n", e, inverse, e) / known.size
+    assert mean.item() == pytest.approx(q.mean(), rel=0.01)
+    assert variance.item() == pytest.approx(q.var(), rel=0.02)
+
+
+def _covariance(rng, units):
+    A = rng.normal(size=(3, 3))
+    return (A @ A.T + np.eye(3)) * np.outer(units, units)
+
+
+def test_normalised_error_without_components_is_not_a_number():
+    of = normalised_error(np.zeros((1, 3, 3)), np.zeros((1, 3)), np.zeros((1, 3, 3)), np.zeros((1, 3), dtype=bool))
+    assert np.isnan(of).all()

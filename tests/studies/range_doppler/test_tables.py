@@ -79,24 +79,30 @@ def test_radar_table(paper):
 
 def test_consistency_before_the_filter_adds_manoeuvre(paper):
     """At its least-squares start a filter is right about itself; later it allows for manoeuvres that are not there."""
-    table = range_doppler.consistency(paper)
+    table, sigma = range_doppler.normalised_errors(paper), range_doppler.believed(paper)
     start = table[(table["filter"] == "r") & (table["k"] <= 3)]
     np.testing.assert_allclose(start["nees"], 1, rtol=1e-9)
-    np.testing.assert_allclose(start["ratio"], 1, rtol=1e-9)
+    np.testing.assert_allclose(sigma[(sigma["filter"] == "r") & (sigma["k"] <= 3)]["ratio"], 1, rtol=1e-9)
     assert set(start["nees_verdict"]) == {"consistent"}
-    late = table[table["k"] >= 6]
-    assert set(late["nees_verdict"]) == {"pessimistic"}
-    assert (late["ratio"] >= 1 - 1e-9).all()
+    assert set(table[table["k"] >= 6]["nees_verdict"]) == {"pessimistic"}
+    assert (sigma[sigma["k"] >= 6]["ratio"] <= 1 + 1e-9).all()
+
+
+def test_exact_values_of_the_normalised_error(paper):
+    """Sums that are their expectation give the exact NEES: to rounding, and within its interval."""
+    table = range_doppler.normalised_errors(paper)
+    np.testing.assert_allclose(table["nees"], table["exact_nees"], rtol=1e-7)
+    assert ((table["nees_lo"] < table["nees"]) & (table["nees"] < table["nees_hi"])).all()
 
 
 def test_bounds_of_the_normalised_error(paper):
     from scipy.special import chdtri
 
-    of = range_doppler.normalised_error(paper[0])
+    row = range_doppler.normalised_errors(paper).iloc[5]
     freedom = 3 * paper[0].count
     share = 0.025 / 15  # of fifteen scans
-    assert of.lo[0, 5] == pytest.approx(chdtri(freedom, 1 - share) / freedom, rel=1e-7)
-    assert of.hi[0, 5] == pytest.approx(chdtri(freedom, share) / freedom, rel=1e-7)
+    assert row["nees_bound_lo"] == pytest.approx(chdtri(freedom, 1 - share) / freedom, rel=1e-7)
+    assert row["nees_bound_hi"] == pytest.approx(chdtri(freedom, share) / freedom, rel=1e-7)
 
 
 def test_figures_have_the_contracts_names(paper, swept):
@@ -137,10 +143,10 @@ def test_consistency_figure_draws_the_table(paper):
     made = made_of(paper)
     first, second = drawn_of(paper, made)["consistency"].panels
     assert (first.title, second.title) == ("r", "r+Vr")
-    rows = tables.groups(made["consistency"], "case", "filter", "component")
+    rows = tables.groups(made["consistency"], "case", "filter")
     lines = [mark for mark in second.marks if isinstance(mark, Line)]
     for line, result in zip(lines, paper, strict=True):
-        np.testing.assert_array_equal(line.y, rows[result.name, "r+Vr", "r"]["nees"])
+        np.testing.assert_array_equal(line.y, rows[result.name, "r+Vr"]["nees"])
 
 
 def test_settling_figure_draws_the_table(swept):

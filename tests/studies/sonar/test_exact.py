@@ -93,7 +93,7 @@ def test_walk_of_velocity_by_both_ways_of_reckoning():
 
 
 def test_consistency_of_the_naive_filter():
-    """NEES of a filter that ignores ρ = 0.9: by calculation far over 2; of an honest one, 2."""
+    """NEES of a filter that ignores ρ = 0.9: by calculation far over 2; of a consistent one, 2."""
     n, t = 20, np.arange(20.0)
     C = models.error_covariance(np.ones(n), 0.9, t, 1.0)
     W, plain = exact.generalised_least_squares(t, np.eye(n), 2)

@@ -49,13 +49,13 @@ def test_believed_and_consistency(results):
     made = results["sonar_correlated"].tables
     case = "sonar_correlated sensor.error_correlation=0.9"
     rows = made["consistency"].set_index(["case", "filter", "component", "k"])
-    naive, honest = rows.loc[(case, "naive", "r", 20)], rows.loc[(case, "augmented", "r", 20)]
-    assert naive["verdict"] == "overconfident"
+    naive, aware = rows.loc[(case, "naive", "r", 20)], rows.loc[(case, "augmented", "r", 20)]
+    assert naive["nees_verdict"] == "optimistic"
     assert naive["nees_lo"] < naive["exact_nees"] < naive["nees_hi"]
-    assert honest["exact_nees"] == pytest.approx(1)
+    assert aware["exact_nees"] == pytest.approx(1)
     claimed_sigma = made["believed"].set_index(["case", "filter", "component", "k"]).loc[(case, "naive", "r", 20)]
     assert claimed_sigma["believed_sigma"] == pytest.approx(30 * 0.4309, rel=1e-3)
-    assert claimed_sigma["true_to_believed"] == pytest.approx(1.0377 / 0.4309, rel=0.05)
+    assert claimed_sigma["ratio"] == pytest.approx(1.0377 / 0.4309, rel=0.05)
 
 
 def test_conversion_table(results):

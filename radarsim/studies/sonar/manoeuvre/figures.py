@@ -15,7 +15,7 @@ MOST_PANELS = 4
 BESIDE_LEGEND = 3  # panels of a figure whose legend takes the place of one
 SYMBOLS = {"course": "course", "speed": "speed", "x_ahead": "$x$ ahead", "y_ahead": "$y$ ahead"}
 SYMBOLS |= {"cpa": "CPA", "t_cpa": "$t$ to CPA"}
-RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # ticks of a measured over a predicted σ
+RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # ticks of a measured over a believed σ
 STRENGTHS = {"acceleration_mps2": "acceleration, m/s²", "rate_radps": "turn rate, rad/s"}
 
 
@@ -212,7 +212,7 @@ def modes_figure(results: Sequence[CaseResult], modes) -> Figure | None:
 
 
 def uses_figure(results: Sequence[CaseResult], uses) -> Figure | None:
-    """Measured over predicted σ of what a track is used for, a panel for each moment."""
+    """Measured over believed σ of what a track is used for, a panel for each moment."""
     result = results[0]
     rows, names = uses[uses["case"] == result.name], list(SYMBOLS)
     drawn = []
@@ -225,10 +225,10 @@ def uses_figure(results: Sequence[CaseResult], uses) -> Figure | None:
         ticks = tuple((float(i), words) for i, words in enumerate(SYMBOLS.values()))
         low, high = own["ratio"].min(), own["ratio"].max()
         seen = tuple((value, f"{value:g}") for value in RATIOS if low <= value <= high or value == 1)
-        y = Axis("measured / predicted $\\sigma$", "log", ticks=seen)
+        y = Axis("measured / believed $\\sigma$", "log", ticks=seen)
         drawn.append(Panel(Axis("", ticks=ticks), y, tuple(marks), f"t = {when:g} s", direct=False))
     caption = (
-        f"σ about the truth over the one reckoned from the track's covariance to first order{_of(result)}, of "
+        f"σ about the truth over the one computed from the track's covariance to first order{_of(result)}, of "
         f"{result.count:,} realisations, with 95 % intervals."
     )
     return _figure("uses", "What a track is used for", caption + left_out([result], results), _one_legend(drawn), 2)

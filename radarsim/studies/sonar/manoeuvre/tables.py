@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import statistics
+from radarsim.report import consistency, statistics
 from radarsim.report import tables as common
 from radarsim.studies.sonar.exact import sigma_acceleration
 from radarsim.studies.sonar.manoeuvre import exact
@@ -231,7 +231,7 @@ def _modes(result: CaseResult) -> dict:
 QUANTITIES = (("course", "rad"), ("speed", "m/s"), ("x_ahead", "m"), ("y_ahead", "m"), ("cpa", "m"), ("t_cpa", "s"))
 USES = (
     *("case", "filter", "component", "unit", "k", "t_s", "n"),
-    *("true_value", "bias", "sigma", "sigma_lo", "sigma_hi", "predicted_sigma", "ratio", "ratio_lo", "ratio_hi"),
+    *("true_value", "bias", "sigma", "sigma_lo", "sigma_hi", "believed_sigma", "ratio", "ratio_lo", "ratio_hi"),
     *("distance_in_sigma", "first_order"),
 )
 
@@ -239,8 +239,8 @@ USES = (
 def _uses(result: CaseResult) -> dict:
     """Course, speed, predicted position, closest approach: error about the truth beside σ from the track's covariance.
 
-    predicted_sigma is the root of the mean first-order variance, ratio the measured σ over it. `distance_in_sigma`
-    tells how many predicted σ speed or closest approach lie from zero, beyond which they cannot go: within three the
+    believed_sigma is the root of the mean first-order variance, ratio the measured σ over it. `distance_in_sigma`
+    tells how many believed σ speed or closest approach lie from zero, beyond which they cannot go: within three the
     first order fails, for the course and the time of the closest approach with them.
     """
     axes, extra = result.axes, result.axes.extra
@@ -248,11 +248,11 @@ def _uses(result: CaseResult) -> dict:
     f, u, a = np.nonzero(np.moveaxis(sums[..., 0] > 0, 1, 2))
     n, first, square, fourth, spread = np.moveaxis(sums[f, a, u], -1, 0)
     of = statistics.root_mean_square(square, fourth, n)
-    predicted, true = np.sqrt(spread / n), extra["uses_true"][a, u]
+    believed, true = np.sqrt(spread / n), extra["uses_true"][a, u]
     away = _distance(sums, extra["uses_true"], extra["uses_closing"])[f, u, a]
-    ratio = [part / predicted for part in of]
+    compared = consistency.ratio_columns(of, believed)
     verdict = np.select(
-        [away < NEAR_ZERO, ratio[1] > 1.05, ratio[2] < 0.95],
+        [away < NEAR_ZERO, compared["ratio_lo"] > 1.05, compared["ratio_hi"] < 0.95],
         [NEAR, "error larger", "error smaller"],
         "holds within 5 %",
     )
@@ -267,22 +267,22 @@ def _uses(result: CaseResult) -> dict:
         "n": n.astype(np.int64),
         "true_value": true,
         "bias": first / n,
-        **dict(zip(("sigma", "sigma_lo", "sigma_hi"), of, strict=True)),
-        "predicted_sigma": predicted,
-        **dict(zip(("ratio", "ratio_lo", "ratio_hi"), ratio, strict=True)),
+        "sigma_lo": of.lo,
+        "sigma_hi": of.hi,
+        **compared,
         "distance_in_sigma": away,
         "first_order": verdict.astype(object),
     }
 
 
 def _distance(sums: np.ndarray, true: np.ndarray, closing: np.ndarray) -> np.ndarray:
-    """Distance from zero (F, U, A), in predicted σ, of what each quantity hangs on; infinite for positions.
+    """Distance from zero (F, U, A), in believed σ, of what each quantity hangs on; infinite for positions.
 
     The closest approach hangs on its distance and on the relative speed `closing` (A,), known as well as the speed.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
-        predicted = np.sqrt(sums[..., 4] / sums[..., 0])
-        speed, relative = true[:, 1] / predicted[..., 1], closing / predicted[..., 1]
-        cpa = true[:, 4] / predicted[..., 4]
+        believed = np.sqrt(sums[..., 4] / sums[..., 0])
+        speed, relative = true[:, 1] / believed[..., 1], closing / believed[..., 1]
+        cpa = true[:, 4] / believed[..., 4]
     far = np.full_like(speed, np.inf)
     return np.stack([speed, speed, far, far, np.minimum(cpa, relative), relative], axis=1)

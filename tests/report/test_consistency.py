@@ -1,0 +1,57 @@
+"""What filters believe of their errors: one direction, one set of words and columns in every study."""
+
+import numpy as np
+import pytest
+
+import radarsim
+from radarsim.report import consistency, statistics
+
+
+def test_verdicts():
+    mean = np.array([0.8, 1.0, 1.3])
+    assert list(consistency.verdict(mean, np.full(3, 0.9), np.full(3, 1.1))) == [
+        consistency.PESSIMISTIC,
+        consistency.CONSISTENT,
+        consistency.OPTIMISTIC,
+    ]
+
+
+def test_a_ratio_over_one_is_optimistic():
+    of = consistency.ratio_columns(statistics.Estimate(*np.array([[30.0], [28.0], [33.0]])), np.array([20.0]))
+    assert [of[name].item() for name in ("ratio", "ratio_lo", "ratio_hi")] == [1.5, 1.4, 1.65]
+
+
+@pytest.mark.parametrize("looks", [1, 24])
+def test_bounds_from_the_spread_judge_as_the_interval_does(looks):
+    rng, n = np.random.default_rng(3), 400
+    q = np.linspace(0.8, 1.2, 101)[:, None] * rng.chisquare(3, size=(101, n)) / 3
+    sums = q.sum(axis=1), np.square(q).sum(axis=1), n
+    verdicts = consistency.verdict(q.mean(axis=1), *consistency.bounds_from_spread(*sums, looks))
+    wide = statistics.mean_square(*sums, looks)
+    assert list(verdicts == consistency.OPTIMISTIC) == list(wide.lo > 1)
+    assert list(verdicts == consistency.PESSIMISTIC) == list(wide.hi < 1)
+    assert set(verdicts) == {consistency.PESSIMISTIC, consistency.CONSISTENT, consistency.OPTIMISTIC}
+
+
+@pytest.mark.parametrize(
+    ("config", "quantities", "exact", "sigma"),
+    [
+        ("rls2", ("nees",), True, True),
+        ("sonar_correlated", ("nees",), True, True),
+        ("multimodel", ("nees", "nis"), False, False),
+    ],
+)
+def test_every_study_has_the_same_columns(config, quantities, exact, sigma):
+    made = radarsim.run(config, realisations=1000).tables
+    columns = list(made["consistency"].columns)
+    for quantity in quantities:
+        first = columns.index(quantity)
+        wanted = consistency.columns(quantity, exact=exact)
+        assert tuple(columns[first : first + len(wanted)]) == wanted
+        known = {consistency.OPTIMISTIC, consistency.CONSISTENT, consistency.PESSIMISTIC}
+        assert set(made["consistency"][f"{quantity}_verdict"]) <= known
+    assert ("believed" in made) == sigma
+    if sigma:
+        rows = made["believed"]
+        assert tuple(rows.columns) == consistency.BELIEVED
+        np.testing.assert_allclose(rows["ratio"], rows["sigma"] / rows["believed_sigma"])
