@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -27,9 +27,14 @@ class Axes:
     extra: Mapping[str, Any] = field(default_factory=dict)
 
 
+A_co = TypeVar("A_co", bound=Axes, covariant=True)
+
+
 @dataclass(frozen=True)
-class CaseResult:
+class CaseResult(Generic[A_co]):
     """A case, how many realisations of it are done, and the named arrays of their sums.
+
+    A study's own tables take results with its own axes, `CaseResult[RangeDopplerAxes]`; a plain `CaseResult` is any.
 
     `error` (F, K, C, 4) holds the sums of e, e², e³, e⁴; `paired` (F, K, C) those of e²·e² with the baseline's error; a
     study adds its own.
@@ -41,7 +46,7 @@ class CaseResult:
     swept: tuple[tuple[str, Any], ...]
     count: int
     sums: Mapping[str, np.ndarray]
-    axes: Axes
+    axes: A_co
     seconds: float = 0.0
 
 
