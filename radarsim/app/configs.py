@@ -2,11 +2,13 @@
 
 import os
 from collections.abc import Iterable, Mapping
+from functools import cache
 from pathlib import Path
 
 from radarsim.config import json_schema, lookup, own
 from radarsim.config import load as reading
 from radarsim.config.experiment import Experiment
+from radarsim.config.fields import Model
 from radarsim.studies import registry
 
 lookup.further_folders = registry.folders
@@ -19,6 +21,19 @@ def load(source: str | os.PathLike | Mapping, overrides: Iterable[str] = ()) -> 
     overrides are texts `dotted.key=value`, the value in YAML. Raises ConfigError, one line for each fault of the whole.
     """
     return reading.load(source, overrides, registry)
+
+
+@cache
+def shipped(stem: str) -> tuple[Model, ...] | None:
+    """The checked keys of the cases of a shipped config; None where no config of that stem is shipped.
+
+    Never of a file of that name that the user has: claims are judged by what is shipped.
+    """
+    for folder in (lookup.SHIPPED, *registry.folders()):
+        file = folder / "configs" / f"{stem}.yaml"
+        if stem and file.is_file():
+            return tuple(case.spec for case in load(file).cases)
+    return None
 
 
 def new(name: str, like: str | os.PathLike, folder: str | os.PathLike = ".") -> Path:

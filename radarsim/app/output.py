@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from radarsim.app import configs
 from radarsim.engine.results import CaseResult
 from radarsim.report import agreement, claims, controlled, files, notes, provenance, sweeps
 from radarsim.report import tables as common
@@ -23,7 +24,7 @@ def tables(results: Sequence[CaseResult], control_variate: bool = False) -> dict
     made = {name: own[name] if name in own else table(results) for name, table in shared.items()} | own
     if control_variate and of.exact_errors:
         made["controlled"] = controlled.controlled(results)
-    made["claims"] = claims.judged(of.claims(), results, made)
+    made["claims"] = claims.judged(of.claims(), results, made, configs.shipped)
     return notes.noted(made, results)
 
 

@@ -13,12 +13,14 @@ Exact values, where known, never enter a verdict.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import tables as common
+from radarsim.report.claims.paper import Described, Shipped, described, own_members
 from radarsim.report.statistics import Estimate, difference
 
 PAPERS = {
@@ -190,12 +192,26 @@ def certain(value: float) -> Estimate:
 
 
 class Evidence:
-    """What an experiment measured, as the claims of its study ask for it. Studies say in `case` what a key means."""
+    """What an experiment measured, as the claims of its study ask for it. Studies say in `case` what a key means.
 
-    def __init__(self, results: Sequence[CaseResult], made: Mapping):
-        self.results, self.tables = list(results), made
-        self._curves = common.groups(made["curves"], "case", "filter", "component")
-        self._gains = common.groups(made["gains"], "case", "filter", "component")
+    results are the cases that are the paper's, no others; of their lists that may grow, `members` gives the paper's.
+    """
+
+    def __init__(self, results: Sequence[CaseResult], made: Mapping, places: Mapping[str, Mapping[str, set[int]]]):
+        """places: by the name of a case and the key of a list, which of its members are the paper's."""
+        self.results, self.tables, self._places = list(results), made, places
+
+    @cached_property
+    def _curves(self) -> Mapping:
+        return common.groups(self.tables["curves"], "case", "filter", "component")
+
+    @cached_property
+    def _gains(self) -> Mapping:
+        return common.groups(self.tables["gains"], "case", "filter", "component")
+
+    def members(self, result: CaseResult, key: str = "filters") -> list[tuple[int, Any]]:
+        """The members of a list of a case that are the paper's, each with its number; not those that were added."""
+        return [(i, one) for i, one in enumerate(getattr(result.spec, key)) if i in self._places[result.name][key]]
 
     def case(self, key) -> CaseResult:
         """The case that a key means; raises Missing where the experiment does not hold it. Here: by name."""
@@ -230,10 +246,15 @@ class Evidence:
 
 @dataclass(frozen=True)
 class PaperClaims:
-    """The claims of a paper that a study judges, and how its results are read for them."""
+    """The claims of a paper that a study judges, and how its results are read for them.
+
+    may_grow names the study's lists to which members may be added without its being another experiment than the
+    paper's; every other key must be as in the claim's config, see `radarsim.report.claims.paper`.
+    """
 
     claims: Sequence[Claim]
     evidence: type[Evidence]
+    may_grow: tuple[str, ...] = ()
 
 
 def verdict(of: Estimate, expected: Range) -> str:
@@ -261,14 +282,48 @@ CLAIMED = (
 NUMBERS = ("measured", "lo", "hi", "expected_lo", "expected_hi")  # of these columns; empty where there is none
 
 
-def judged(of: PaperClaims | None, results: Sequence[CaseResult], made: Mapping):
-    """claims.csv: a row for each part of each claim that these results can judge, those of whole claims only."""
+def judged(of: PaperClaims | None, results: Sequence[CaseResult], made: Mapping, shipped: Shipped):
+    """claims.csv: a row for each part of each claim that these results can judge, those of whole claims only.
+
+    A claim sees only the cases that are the paper's: those of its config, which `shipped` gives by its stem.
+    """
     rows: list[tuple] = []
     if of is not None:
-        evidence = of.evidence(results, made)
+        papers = _Papers(of, results, made, shipped)
         for claim in of.claims:
-            rows += _rows(claim, evidence)
+            if (evidence := papers.evidence(claim.config)) is not None:
+                rows += _rows(claim, evidence)
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(CLAIMED)})
+
+
+class _Papers:
+    """What of the results is the paper's, by the config of a claim."""
+
+    def __init__(self, of: PaperClaims, results: Sequence[CaseResult], made: Mapping, shipped: Shipped):
+        self._of, self._results, self._made, self._shipped = of, results, made, shipped
+        self._seen: dict[str, Evidence | None] = {}
+
+    def evidence(self, config: str) -> Evidence | None:
+        """The evidence that claims of a config may see; None where no case is the paper's."""
+        if config not in self._seen:
+            specs = self._shipped(config)
+            self._seen[config] = self._evidence([described(spec, self._of.may_grow) for spec in specs or ()])
+        return self._seen[config]
+
+    def _evidence(self, shipped: Sequence[Described]) -> Evidence | None:
+        every = {result.name: own_members(result.spec, shipped, self._of.may_grow) for result in self._results}
+        places = {name: own for name, own in every.items() if own is not None}
+        if not places:
+            return None
+        made = self._made
+        if len(places) < len(every):
+            made = {name: _of_cases(table, set(places)) for name, table in made.items()}
+        return self._of.evidence([result for result in self._results if result.name in places], made, places)
+
+
+def _of_cases(table, names: set[str]):
+    """The rows of a table that belong to cases of these names, or to none."""
+    return table[table["case"].isin(names)] if "case" in table else table
 
 
 def _rows(claim: Claim, evidence: Evidence) -> list[tuple]:

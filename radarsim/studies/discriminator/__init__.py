@@ -65,7 +65,7 @@ class Discriminator(Study):
         from radarsim.report.claims import PaperClaims
         from radarsim.studies.discriminator import claims, measures
 
-        return PaperClaims(claims.CLAIMS, measures.Evidence)
+        return PaperClaims(claims.CLAIMS, measures.Evidence, may_grow=("estimators",))
 
 
 STUDY = Discriminator()

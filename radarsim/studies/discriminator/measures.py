@@ -54,7 +54,7 @@ class Evidence(claims.Evidence):
     def estimator(self, key, kind: str) -> int:
         """Index of an estimator of a case by its kind: sequence, narrow, wide, cured, truth."""
         threshold = READINGS.get(key, (0, 1.0))[1] if not isinstance(key, tuple) else 1.0
-        for i, e in enumerate(self.case(key).spec.estimators):
+        for i, e in self.members(self.case(key), "estimators"):
             if kind_of(e, threshold) == kind:
                 return i
         raise Missing((key, kind))

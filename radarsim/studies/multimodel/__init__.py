@@ -69,7 +69,7 @@ class Multimodel(Study):
         from radarsim.report.claims import PaperClaims
         from radarsim.studies.multimodel import claims, measures
 
-        return PaperClaims(claims.CLAIMS, measures.Evidence)
+        return PaperClaims(claims.CLAIMS, measures.Evidence, may_grow=("filters",))
 
     def recorded(self):
         from radarsim.studies.multimodel import track

@@ -64,13 +64,12 @@ class Evidence(claims.Evidence):
             result.spec.target == shipped(flight) and result.axes.t_s[-1] >= DURATION - result.spec.sensor.scan_period_s
         )
 
-    @staticmethod
-    def _index(result: CaseResult, wanted: tuple) -> int | None:
+    def _index(self, result: CaseResult, wanted: tuple) -> int | None:
         """The number of a case's filter (family, rule, bank[, matrix]); the paper's matrix where none is named."""
         family, rule, bank, *matrix = wanted
         printed = {BANK_122: MATRIX_122, BANK_11: MATRIX_11}.get(bank)
         extra = result.axes.extra
-        for f, of in enumerate(result.spec.filters):
+        for f, of in self.members(result):
             same = (
                 extra["families"][f] == family
                 and extra["models"][f] == bank

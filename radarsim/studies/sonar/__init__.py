@@ -66,7 +66,7 @@ class Sonar(Study):
         from radarsim.report.claims import PaperClaims
         from radarsim.studies.sonar import claims, measures
 
-        return PaperClaims(claims.CLAIMS, measures.Evidence)
+        return PaperClaims(claims.CLAIMS, measures.Evidence, may_grow=("filters",))
 
     def recorded(self):
         from radarsim.studies.sonar import track

@@ -47,7 +47,7 @@ class Evidence(claims.Evidence):
 
     def filter(self, key, kind: str, degree: int = 1, plots: int | None = None) -> str:
         """The name of a case's first filter of that kind, without process noise; raises Missing."""
-        for f in self.case(key).spec.filters:
+        for _, f in self.members(self.case(key)):
             if (f.kind, f.degree) == (kind, degree) and f.plots == plots and not f.manoeuvre_variance:
                 return f.name
         raise Missing((key, kind))

@@ -117,8 +117,9 @@ def degrees_ratio(key: str, degree: int) -> Measure:
 
     def measure(seen: claims.Evidence) -> Estimate:
         result = seen.case(key)
-        held = next((f.name for f in result.spec.filters if (f.kind, f.degree) == ("growing_memory", degree)), None)
-        switched = next((f.name for f in result.spec.filters if _by_five(f)), None)
+        filters = [f for _, f in seen.members(result)]
+        held = next((f.name for f in filters if (f.kind, f.degree) == ("growing_memory", degree)), None)
+        switched = next((f.name for f in filters if _by_five(f)), None)
         if held is None or switched is None:
             raise Missing(key)
         return ratio(*(_over_run(seen.curve(key, name, "r").since(5)) for name in (held, switched)))

@@ -1,0 +1,142 @@
+"""A claim is judged in the paper's experiment alone: every other key of every study, changed one at a time."""
+
+from dataclasses import replace
+
+import pytest
+
+import radarsim
+from radarsim.app import configs, output
+from radarsim.app.run import all_claims
+from radarsim.config.check import models_in
+from radarsim.config.fields import Display, Model
+from radarsim.report import claims
+from radarsim.report.claims.paper import described, own_members
+from radarsim.studies import registry
+
+CONFIGS = sorted({claim.config for claim in all_claims()})
+MAY_GROW = {"range_doppler": (), "multimodel": ("filters",), "sonar": ("filters",), "discriminator": ("estimators",)}
+# The only keys that may have another value than in the paper's experiment: names that are displayed.
+MAY_DIFFER = {
+    "range_doppler": {"radar.name", "radar.band", "filters.name"},
+    "multimodel": {"sensor.name", "filters.name"},
+    "sonar": {"sensor.name", "filters.name", "detectors.name"},
+    "discriminator": {"estimators.name"},
+}
+
+
+def variants(value):
+    """(path, changed value) for every leaf of a checked config; lists also shorter, options also set."""
+    if isinstance(value, Model):
+        for name in type(value).model_fields:
+            for path, changed in variants(getattr(value, name)):
+                yield (name, *path), value.model_copy(update={name: changed})
+    elif isinstance(value, tuple | list):
+        if value:
+            yield (), value[:-1]
+        for i, item in enumerate(value):
+            for path, changed in variants(item):
+                yield path, (*value[:i], changed, *value[i + 1 :])
+    elif isinstance(value, bool):
+        yield (), not value
+    elif isinstance(value, int | float):
+        yield (), value * (1 + 1e-9) + (value == 0) if isinstance(value, float) else value + 1
+    else:
+        yield (), 1.0 if value is None else f"{value}x"
+
+
+def swept(spec):
+    """Names of keys that name others, such as `baseline`, must name a member: they are changed to another one."""
+    for path, changed in variants(spec):
+        if path == ("baseline",):
+            if len(spec.filters) < 2:
+                continue
+            changed = spec.model_copy(update={"baseline": spec.filters[-1].name})
+        yield ".".join(path), changed
+
+
+@pytest.mark.parametrize("config", CONFIGS)
+def test_every_key_but_the_declared_ones_makes_another_experiment(config):
+    study, specs = configs.load(config).study, configs.shipped(config)
+    may_grow = registry.study(study).claims().may_grow
+    assert may_grow == MAY_GROW[study]
+    for spec in specs[:6]:
+        papers = [described(spec, may_grow)]
+        still = {path for path, changed in swept(spec) if own_members(changed, papers, may_grow) is not None}
+        assert still == {path for path, _ in swept(spec)} & MAY_DIFFER[study]
+
+
+@pytest.mark.parametrize("study", MAY_GROW)
+def test_only_the_declared_keys_are_for_display(study):
+    def marked(model, path=()):
+        for name, info in model.model_fields.items():
+            if any(isinstance(mark, Display) for mark in info.metadata):
+                yield ".".join((*path, name))
+            for inner in models_in(info.annotation):
+                yield from marked(inner, (*path, name))
+
+    assert set(marked(registry.keys(study))) == MAY_DIFFER[study]
+
+
+@pytest.fixture(
+    scope="module", params=["rls1", "multimodel_banks", "sonar_smoothing", "sonar_correlated", "discriminator_paper"]
+)
+def result(request):
+    return radarsim.run(request.param, realisations=60)
+
+
+def test_a_run_with_any_other_key_judges_nothing(result):
+    """The numbers of the paper's run, under every other config: none of its claims."""
+    of = registry.study(result.experiment.study).claims()
+    made = {name: table for name, table in result.tables.items() if name != "claims"}
+    judged = claims.judged(of, result.cases, made, configs.shipped)
+    assert len(judged)
+    needed = {claim for claim, cases in judged.groupby("claim")["case"] if any(cases)}
+    for path, changed in swept(result.cases[0].spec):
+        if path in MAY_DIFFER[result.experiment.study]:
+            continue
+        others = [replace(result.cases[0], spec=changed), *result.cases[1:]]
+        left = claims.judged(of, others, made, configs.shipped)
+        assert result.cases[0].name not in {name for cases in left["case"] for name in cases.split(", ")}, path
+        assert set(left["claim"]) <= needed
+
+
+@pytest.mark.parametrize(
+    ("config", "override"),
+    [
+        ("multimodel", "transition_interval_s=10"),
+        ("multimodel", "start_acceleration_mps2=500"),
+        ("multimodel", "sensor.antenna_elevation_deg=0"),
+        ("discriminator_paper", "prior.scale=2"),
+        ("sonar_smoothing", "scans=60"),
+        ("rls1", "radar.sigma_range_m=30"),
+        ("rls1", "scans=10"),
+        ("rls1", "target={kind: polynomial, coefficients: [1e5, -250, 4, 0.1]}"),
+    ],
+)
+def test_a_changed_experiment_judges_nothing(config, override):
+    assert radarsim.run(config, overrides=[override], realisations=50).tables["claims"].empty
+
+
+def test_realisations_seed_names_and_further_filters_may_differ():
+    further = {"name": "mine", "kind": "window", "degree": 1, "plots": 7}
+    source = dict(configs.load("sonar_smoothing").resolved["cases"][0])
+    source = {key: value for key, value in source.items() if key not in ("case", "swept")}
+    source |= {"study": "sonar", "seed": 99, "realisations": 70, "filters": [*source["filters"], further]}
+    source["filters"][0]["name"] = "another name"
+    plain = radarsim.run("sonar_smoothing", realisations=70).tables["claims"]
+    found = radarsim.run(source).tables["claims"]
+    assert set(found["claim"]) == set(plain["claim"])
+
+
+def test_a_file_of_the_users_is_no_measure_of_the_paper(tmp_path, monkeypatch):
+    """A config of a shipped one's name in the working directory changes neither what is judged nor how."""
+    (tmp_path / "scenarios").mkdir()
+    (tmp_path / "scenarios" / "polynomial.yaml").write_text("kind: polynomial\ncoefficients: [5e4, -100]\n")
+    text = (configs.lookup.SHIPPED / "configs" / "rls1.yaml").read_text()
+    (tmp_path / "rls1.yaml").write_text(text.replace("sigma_range_m: 25", "sigma_range_m: 30"))
+    monkeypatch.chdir(tmp_path)
+    configs.shipped.cache_clear()
+    assert radarsim.run("rls1.yaml", realisations=50).tables["claims"].empty
+    assert not output.tables(radarsim.run(configs.lookup.SHIPPED / "configs" / "rls1.yaml", realisations=50).cases)[
+        "claims"
+    ].empty
