@@ -4,6 +4,7 @@ import json
 import math
 import os
 import shlex
+import sys
 import time
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -245,7 +246,7 @@ def facts_of(gathered: Gathered, threads: int, seconds: float) -> dict:
         "kernel_seconds": sum(c.kernel_seconds for c in collected),
         "realisations_computed": sum(c.computed for c in collected),
         "realisations_from_store": sum(c.from_store for c in collected),
-        "warnings": list(dict.fromkeys(warning for c in collected for warning in c.warnings)),
+        "warnings": [*dict.fromkeys(warning for c in collected for warning in c.warnings), *cache_troubles()],
         "identities": {case.name: work.identity for case, work, _ in gathered.cases},
     }
     if measured := seconds_per_update(work for _, work, _ in gathered.cases):
@@ -254,6 +255,15 @@ def facts_of(gathered: Gathered, threads: int, seconds: float) -> dict:
         return facts
     widest = {name: asdict(cell) | {"percent": finite(cell.percent)} for name, cell in gathered.cells.items()}
     return facts | {"precision": {"asked_percent": gathered.precision, "widest": widest}}
+
+
+def cache_troubles() -> list[str]:
+    """What went wrong with the cache of compiled kernels in this process, a line for each kind; nothing depends on it.
+
+    A kernel that could not be read or kept was compiled, as on a new machine.
+    """
+    cache = sys.modules.get("radarsim.kernels.cache")  # nothing is compiled where it is not loaded
+    return list(cache.troubles.values()) if cache else []
 
 
 def seconds_per_update(works: Iterable[CaseWork]) -> dict[str, dict[str, float]]:

@@ -3,7 +3,7 @@
 import math
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from radarsim.report.text import clock, known, plural, printable, significant_digits
@@ -125,7 +125,12 @@ def print_result(result) -> None:
         kinds = " and ".join(sorted({path.suffix[1:].upper() for path in drawn}, reverse=True))
         say(f"figures  {written.folder / 'figures'} ({len({path.stem for path in drawn})}, each as {kinds})")
     say(f"report   {written.folder / 'report.html'}")
-    for warning in result.warnings:
+    print_warnings(result.warnings)
+
+
+def print_warnings(warnings: Iterable[str]) -> None:
+    """One line each, on the error stream."""
+    for warning in warnings:
         sys.stderr.write(f"warning: {printable(warning)}\n")
 
 
@@ -166,8 +171,7 @@ def print_outlook(experiment, outlook) -> None:
         f"{seconds} on {plural(outlook.threads, 'thread')}, {outlook.memory_mb:.0f} MB; "
         "figures and tables take some seconds more"
     )
-    for warning in outlook.warnings:
-        sys.stderr.write(f"warning: {printable(warning)}\n")
+    print_warnings(outlook.warnings)
 
 
 def print_needs(experiment, outlook) -> None:
@@ -193,8 +197,7 @@ def print_share(share, out) -> None:
     held = sum(one.from_store for one in share.cases.values())
     say(f"share    {share.number} of {share.of} of {share.config}: {done:,} realisations, {held:,} were stored before")
     say(f"blocks   {Path(out) / '.blocks'}; copy all shares into one, and `radarsim run` finds them")
-    for warning in share.warnings:
-        sys.stderr.write(f"warning: {printable(warning)}\n")
+    print_warnings(share.warnings)
 
 
 def print_facts(facts: Mapping[str, str]) -> None:

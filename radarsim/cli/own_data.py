@@ -48,6 +48,7 @@ def simulate(config, output, realisation, overrides):
       radarsim track rls2 plots.csv -o track.csv
     """
     from radarsim.app import run as experiment
+    from radarsim.cli import console
     from radarsim.track import follow as recorded
     from radarsim.track import plots
 
@@ -56,6 +57,7 @@ def simulate(config, output, realisation, overrides):
     plots.write_columns(columns, output)
     count = len(next(iter(columns.values())))
     click.echo(f"plots    {output} ({count} rows: {', '.join(columns)})")
+    console.print_warnings(experiment.cache_troubles())
 
 
 @main.command()
@@ -84,7 +86,7 @@ def track(config, plots, output, figures, quiet, overrides):
     import contextlib
 
     from radarsim.app import run as experiment
-    from radarsim.cli import findings
+    from radarsim.cli import console, findings
     from radarsim.report.files import Writer
     from radarsim.track import accuracy
     from radarsim.track import follow as recorded
@@ -110,3 +112,4 @@ def track(config, plots, output, figures, quiet, overrides):
         click.echo(f"track    {output}")
     if drawn:
         click.echo(f"figures  {figures} ({', '.join(drawn)})")
+    console.print_warnings(experiment.cache_troubles())

@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 import numpy as np
 from llvmlite.binding import Linkage
-from numba import _dynfunc, config, njit
+from numba import _dynfunc, njit
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
@@ -115,16 +115,7 @@ class WideCompiler(CompilerBase):
 
 def compiler(**options) -> Callable:
     """A decorator that compiles with `options`, cached in our own directory; other users of Numba keep theirs."""
-
-    def decorate(function):
-        before = config.CACHE_DIR
-        config.CACHE_DIR = str(cache.directory(function.__module__))
-        try:
-            return njit(cache=True, **COMMON, **options)(function)
-        finally:
-            config.CACHE_DIR = before
-
-    return decorate
+    return lambda function: cache.kept(njit(**COMMON, **options)(function))
 
 
 # Nobody takes a kernel's C address; its wrapper is a tenth of the time to compile.

@@ -96,12 +96,14 @@ class Study(ABC):
     def keys(self) -> "type[Keys]":
         """The YAML keys: a subclass of `radarsim.config.fields.Study`."""
 
-    @abstractmethod
     def computes_in(self, spec: Any) -> tuple[str, ...]:
-        """The modules, by their full names, in which the numbers of a case begin: of `prepare`, `simulate`, `keys`.
+        """The modules, by their full names, in which the numbers of a case begin. Default: none named.
 
-        What they import counts too. An edit in any of these sources gives the stored blocks another identity.
+        An edit in these, or in any module that they import, gives the stored blocks another identity. Where none is
+        named, all that `prepare`, `simulate` and `keys` import counts, which is right for every study; one of several
+        parts names those that a case takes, so that an edit in one part leaves the blocks of the others alone.
         """
+        return ()
 
     # ---- numbers -------------------------------------------------------------------------------------------------
     @abstractmethod

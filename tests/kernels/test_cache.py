@@ -1,0 +1,232 @@
+"""The cache of compiled kernels: damage and bad disks are misses, reported once; one study's edit leaves the others."""
+
+import errno
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from importlib.util import spec_from_file_location
+from pathlib import Path
+
+import pytest
+from numba import njit
+
+from radarsim.app import selftest
+from radarsim.kernels import cache, sources
+from radarsim.kernels.compile import COMMON
+from tests.studies.test_identity import ROOT, other_number
+
+PACKAGE = Path(cache.__file__).parents[1]
+
+
+def twice(x):
+    return 2 * x
+
+
+@pytest.fixture(autouse=True)
+def troubles(monkeypatch):
+    """The lines for the user, none at first."""
+    found = {}
+    monkeypatch.setattr(cache, "troubles", found)
+    return found
+
+
+def used(path):
+    """Call a kernel that keeps its code in a directory; whether that came from there."""
+    function = njit(**COMMON)(twice)
+    function._cache = cache.KernelCache(function.py_func, path)
+    assert function(4.0) == 8.0
+    return bool(sum(function.stats.cache_hits.values()))
+
+
+def entry(path):
+    (found,) = path.glob("*.kernel")
+    return found
+
+
+def test_a_kernel_is_read_from_where_it_was_kept(tmp_path, troubles):
+    assert [used(tmp_path / "kernels") for _ in range(3)] == [False, True, True]
+    assert [path.suffix for path in (tmp_path / "kernels").iterdir()] == [".kernel"]
+    assert not troubles
+
+
+def test_flushing_removes_the_entries_of_the_kernel(tmp_path):
+    used(tmp_path)
+    cache.KernelCache(twice, tmp_path).flush()
+    assert not list(tmp_path.glob("*.kernel"))
+
+
+def altered(raw):
+    return raw[:200] + bytes([raw[200] ^ 1]) + raw[201:]
+
+
+def signed(body):
+    return cache.hashlib.sha256(body).digest() + body
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda raw: b"",
+        lambda raw: raw[: len(raw) // 2],
+        altered,
+        lambda raw: b"\x80" * 500,
+        lambda raw: signed(b"no pickle"),
+        lambda raw: signed(pickle.dumps(3)),
+        lambda raw: signed(pickle.dumps((pickle.loads(raw[cache.DIGEST :])[0], ()))),
+        lambda raw: signed(b"cno_such_module\nname\n."),
+    ],
+)
+def test_a_damaged_entry_is_a_miss_and_is_made_anew(tmp_path, troubles, damage):
+    used(tmp_path)
+    path = entry(tmp_path)
+    path.write_bytes(damage(path.read_bytes()))
+    assert not used(tmp_path)
+    assert list(troubles) == ["damaged"]
+    assert str(path) in troubles["damaged"]
+    assert used(tmp_path)
+
+
+def test_an_entry_of_other_sources_is_a_miss(tmp_path, troubles):
+    """Copied by hand from one directory to another."""
+    used(tmp_path / "one")
+    shutil.copytree(tmp_path / "one", tmp_path / "two")
+    path = entry(tmp_path / "two")
+    assert not used(tmp_path / "two")
+    names = {found.name for found in (tmp_path / "two").iterdir()}
+    assert path.name in names
+    path = next(found for found in (tmp_path / "two").iterdir() if found.name != path.name)
+    path.write_bytes(entry(tmp_path / "one").read_bytes())  # under the other's name too
+    assert not used(tmp_path / "two")
+    assert not troubles
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS, errno.EDQUOT, errno.EIO])
+def test_a_disk_that_cannot_be_written_is_reported_once_and_left_alone(tmp_path, troubles, monkeypatch, number):
+    tried = []
+
+    def refuse(path, content):
+        tried.append(path)
+        raise OSError(number, "no")
+
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+    assert [used(tmp_path / "kernels") for _ in range(3)] == [False, False, False]
+    assert (len(tried), list(troubles)) == (1, ["write"])
+
+
+def test_an_entry_that_cannot_be_read_is_a_miss(tmp_path, troubles):
+    used(tmp_path)
+    path = entry(tmp_path)
+    path.unlink()
+    path.mkdir()
+    assert not used(tmp_path)
+    assert "cannot be read" in troubles["read"]
+
+
+def test_a_directory_that_goes_during_the_run_is_made_again(tmp_path, troubles):
+    for _ in range(2):
+        assert not used(tmp_path / "kernels")
+        assert used(tmp_path / "kernels")
+        shutil.rmtree(tmp_path / "kernels")
+    assert not troubles
+
+
+def test_many_at_once(tmp_path, troubles):
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda _: used(tmp_path), range(16)))
+    assert used(tmp_path)
+    assert len(list(tmp_path.iterdir())) == 1
+    assert not troubles
+
+
+def test_nowhere_to_keep_anything(monkeypatch, tmp_path, troubles):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a directory")
+    monkeypatch.setenv("RADARSIM_CACHE_DIR", str(blocked))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
+    monkeypatch.setattr(cache.tempfile, "tempdir", str(blocked))
+    assert cache.cache_root() == blocked
+    assert "each run compiles anew" in troubles["write"]
+
+
+def test_a_function_of_no_file_is_not_kept():
+    assert cache.directory("no_such_module") is None
+
+
+def test_the_command_goes_on_and_says_so_in_one_line(tmp_path):
+    """A run whose cache cannot be used at all: the same bytes, one line on stderr, and the same in run.json."""
+    place = tmp_path / "cache"
+    options = ["--no-figures", "--out", str(tmp_path)]
+    program = [sys.executable, "-m", "radarsim", "run", str(selftest.KNOWN / "range_doppler.yaml"), *options]
+    prepared = "from radarsim.kernels import cache, linear; print(cache.directory(linear.__name__))"
+    environment = os.environ | {"RADARSIM_CACHE_DIR": str(place)}
+    found = subprocess.run(
+        [sys.executable, "-c", prepared], env=environment, capture_output=True, text=True, check=True
+    )
+    Path(found.stdout.strip()).write_text("no directory")
+    done = subprocess.run(program, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    lines = [line for line in done.stderr.splitlines() if "kernel cache" in line]
+    assert len(lines) == len(done.stderr.splitlines()) == 1, done.stderr
+    assert (tmp_path / "range_doppler" / "run.json").read_text().count("kernel cache: ") == 1
+    assert (tmp_path / "range_doppler" / "curves.csv").read_bytes() == selftest.tables("range_doppler")["curves"]
+
+
+@pytest.fixture
+def directories(tmp_path, monkeypatch):
+    """The directory of every module of kernels, with the sources of a copy of the package."""
+    folder = tmp_path / "radarsim"
+    shutil.copytree(PACKAGE, folder, ignore=shutil.ignore_patterns("__pycache__", "shipped", "known"))
+    place = spec_from_file_location("radarsim", folder / "__init__.py", submodule_search_locations=[str(folder)])
+
+    def top_spec(package):
+        return place if package == "radarsim" else sources.find_spec(package)
+
+    top_spec.cache_clear = lambda: None
+    monkeypatch.setattr(sources, "top_spec", top_spec)
+    monkeypatch.setattr(sources, "remember", lambda file: None)
+    modules = [
+        ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
+        for path in sorted(PACKAGE.rglob("kernels/*.py"))
+        if "radarsim.kernels.compile" in path.read_text()
+    ]
+
+    def seen():
+        sources.forget()
+        return {module: cache.directory.__wrapped__(module) for module in modules}
+
+    yield folder, seen
+    monkeypatch.undo()
+    sources.forget()
+
+
+def changed(directories, path, text):
+    folder, seen = directories
+    before, kept = seen(), (folder / path).read_text()
+    (folder / path).write_text(text)
+    after = seen()
+    (folder / path).write_text(kept)
+    return {module for module in before if before[module] != after[module]}
+
+
+@pytest.mark.parametrize("study", ["range_doppler", "multimodel", "sonar", "discriminator"])
+def test_an_edit_in_one_study_recompiles_no_other(directories, study):
+    for path in sorted((PACKAGE / "studies" / study).rglob("kernels/*.py")):
+        name = path.relative_to(PACKAGE)
+        module = ".".join(("radarsim", *name.with_suffix("").parts))
+        found = changed(directories, name, other_number(path.read_text()))
+        assert all(one.startswith(f"radarsim.studies.{study}.") for one in found), name
+        assert path.name == "__init__.py" or module in found or "compile" not in path.read_text(), name
+
+
+def test_shared_kernels_count_where_they_are_used_and_the_cache_itself_nowhere(directories):
+    _, seen = directories
+    text = (PACKAGE / "kernels" / "compile.py").read_text()
+    assert changed(directories, "kernels/compile.py", f"{text}\nADDED = 1\n") == seen().keys()
+    for name in ("cache", "sources", "trees"):
+        text = (PACKAGE / "kernels" / f"{name}.py").read_text()
+        assert changed(directories, f"kernels/{name}.py", f"{text}\nADDED = 1\n") == set()
+    for name in ("studies/multimodel/study.py", "studies/range_doppler/config.py", "config/fields.py"):
+        assert changed(directories, name, (ROOT / "radarsim" / name).read_text() + "\nADDED = 1\n") == set()
