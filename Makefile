@@ -8,7 +8,7 @@ SMOKE := $(VENV)/smoke
 # Drawing takes twice as long as all the rest: `make smoke SMOKE_FLAGS=` draws too.
 SMOKE_FLAGS ?= --no-figures
 
-.PHONY: run test slow mutants lint smoke reproduce-figures claims-page bench schema known docs docs-numbers docs-examples docs-house clean
+.PHONY: run test slow machines mutants lint smoke reproduce-figures claims-page bench schema known docs docs-numbers docs-examples docs-house clean
 
 run: $(VENV)/installed
 	$(RADARSIM) run configs/rls2.yaml
@@ -18,6 +18,10 @@ test: $(VENV)/tested
 
 slow: $(VENV)/tested
 	$(BIN)/python -m pytest -m slow
+
+# Two BLAS kernels, two compiler targets, NumPy with and without AVX; `make slow` tries them all.
+machines: $(VENV)/tested
+	$(BIN)/python -m pytest -m machines
 
 mutants: $(VENV)/tested
 	nice $(BIN)/python -m tests.trust.mutate

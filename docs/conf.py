@@ -30,9 +30,13 @@ autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 # Types of other libraries: their documentation is elsewhere, and the build looks nothing up outside.
 nitpick_ignore_regex = [
-    ("py:.*", r"(np|numpy|pd|pandas|matplotlib|collections|os|pathlib|types|numba|click|pydantic|markupsafe)\..*"),
-    ("py:class", r"radarsim\.config\.fields\..*"),  # their keys have a page of their own
-    ("py:class", r"dict\[.*"),  # a subscript that autodoc takes for a name
+    (
+        "py:.*",
+        r"(np|numpy|pd|pandas|matplotlib|collections|contextlib|importlib|os|pathlib|types|numba|click|pydantic|markupsafe)\..*",
+    ),
+    ("py:class", r"radarsim\.config\.(fields|schema)\..*|Keys"),  # their keys have a page of their own
+    ("py:class", r"radarsim\.engine\.results\.A_co"),  # a type variable
+    ("py:class", r"(dict|list)\[.*"),  # a subscript that autodoc takes for a name
 ]
 
 html_theme = "furo"

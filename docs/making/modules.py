@@ -44,7 +44,7 @@ def paragraph(text: str) -> str:
         return text
     if re.search(r"\S   ?\S|\n +\S", text):
         return "::\n\n" + textwrap.indent(text, "    ")
-    return re.sub(r"([|*\\])", r"\\\1", text)
+    return re.sub(r"([|*\\]|_(?=\W|$))", r"\\\1", text)
 
 
 def described(module: ModuleType) -> str:

@@ -214,7 +214,7 @@ def test_doctor_names_the_machine_and_passes_its_self_test():
     told = json.loads(command("doctor", "--json").stdout)
     assert {"machine", "instructions", "threads", "cache", "versions", "cluster"} <= told.keys()
     assert [(one["study"], one["good"]) for one in told["self-test"]] == [
-        (study, True) for study in ("range_doppler", "multimodel", "sonar", "discriminator")
+        (study, True) for study in selftest.TOLERANCES
     ]
 
 

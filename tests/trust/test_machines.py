@@ -11,6 +11,7 @@ import sys
 import numpy as np
 import pytest
 
+from radarsim.app import selftest
 from radarsim.engine.machine import _flags
 from radarsim.studies.discriminator.kernels.data import triangular_root
 
@@ -35,14 +36,19 @@ def doctor(**environment):
 def passes(**environment):
     done = doctor(**environment)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout.count("the known") == 4
+    assert done.stdout.count("the known") == len(selftest.TOLERANCES)
 
 
-@pytest.mark.parametrize("core", CORES[1:3])
-def test_another_blas_gives_the_same_answers(core):
-    if not can_run(core):
-        core = "Prescott"
-    passes(OPENBLAS_CORETYPE=core)
+def test_another_blas_gives_the_same_answers():
+    passes(OPENBLAS_CORETYPE="SkylakeX" if can_run("SkylakeX") else "Prescott")
+
+
+@pytest.mark.machines
+@pytest.mark.parametrize(
+    ("core", "target", "without"), [("Prescott", "generic", NARROW), ("Haswell", "haswell", WIDE)], ids=["old", "usual"]
+)
+def test_two_other_processors_give_the_same_answers(core, target, without):
+    passes(OPENBLAS_CORETYPE=core, NUMBA_CPU_NAME=target, NPY_DISABLE_CPU_FEATURES=without)
 
 
 @pytest.mark.slow

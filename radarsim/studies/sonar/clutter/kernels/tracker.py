@@ -277,7 +277,9 @@ class Workspace(NamedTuple):
 def workspace(count: int) -> Workspace:
     """Room for that many trackers."""
     shapes = ((2, 4), (2, 8), (2, 6), (4,), (), (ROWS,))
-    return Workspace(*(aligned_zeros(count, *shape, CHUNK) for shape in shapes), *(aligned_zeros(n, CHUNK) for n in (5, 6)))
+    return Workspace(
+        *(aligned_zeros(count, *shape, CHUNK) for shape in shapes), *(aligned_zeros(n, CHUNK) for n in (5, 6))
+    )
 
 
 @kernel
