@@ -2,7 +2,7 @@
 
 
 class RadarsimError(Exception):
-    """Any fault that is told to the user in words; `lines` are printed one to a line."""
+    """Any fault that is reported to the user; `lines` are printed one to a line."""
 
     exit_code = 1
 
@@ -10,7 +10,7 @@ class RadarsimError(Exception):
         super().__init__("\n".join(lines))
         self.lines = lines
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[type["RadarsimError"], tuple[object, ...]]:
         return type(self), self.lines
 
 
@@ -27,7 +27,7 @@ class TargetUnmet(RadarsimError):
 
 
 class ClusterError(TargetUnmet):
-    """The cluster was lost on the way: what was done is stored, the rest is not done."""
+    """The cluster was lost during the run: what was done is stored, the rest is not done."""
 
 
 class StoreError(RadarsimError):
@@ -51,5 +51,5 @@ class Interrupted(RadarsimError):
         self.signal_number = signal_number
         self.exit_code = 128 + signal_number
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[type[RadarsimError], tuple[object, ...]]:
         return type(self), (self.signal_number,)

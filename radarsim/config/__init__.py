@@ -1,1 +1,1 @@
-"""From YAML to checked, frozen objects; every fault told with its file, line, column and key."""
+"""From YAML to checked, frozen objects; every fault is reported with its file, line, column and key."""

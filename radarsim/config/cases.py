@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path as FilePath
@@ -10,9 +10,9 @@ from pathlib import Path as FilePath
 from radarsim.config.check import check, unknown_key
 from radarsim.config.document import Document
 from radarsim.config.experiment import Case, Experiment, in_name, matches
-from radarsim.config.faults import Faults, Origin, one_line
+from radarsim.config.faults import Faults, Origin, Path, one_line
 from radarsim.config.lookup import config_file, did_you_mean, is_stem, stems
-from radarsim.config.place import NoSuchKey, data_files_found, key_paths, place, scenarios_inlined
+from radarsim.config.place import NoSuchKey, Read, Setting, data_files_found, key_paths, place, scenarios_inlined
 from radarsim.config.schema import COMMON_KEYS, Common, Studies
 
 DOTTED = ("sweep", "figures")  # the common keys that are mappings; what follows the first dot is one key of theirs
@@ -21,17 +21,8 @@ DEEPEST_INCLUDE = 5
 
 
 @dataclass(frozen=True)
-class Setting:
-    """A value to be put at a key, from an override or a sweep."""
-
-    key: str
-    value: object
-    origin: Origin
-
-
-@dataclass(frozen=True)
 class Draft:
-    """A case on its way: the document as far as it is put together."""
+    """An unfinished case: the document as far as it is put together."""
 
     document: Document
     stem: str
@@ -47,8 +38,9 @@ class Expander:
     `read(file, faults)` gives the document in a file, or notes a fault and gives None.
     """
 
-    def __init__(self, read: Callable, settings: Iterable[Setting], faults: Faults, studies: Studies):
-        self.read, self.faults, self.studies = cache(read), faults, studies
+    def __init__(self, read: Read, settings: Iterable[Setting], faults: Faults, studies: Studies):
+        cached: Read = cache(read)
+        self.read, self.faults, self.studies = cached, faults, studies
         settings = list(settings)
         self.common = [s for s in settings if s.key.split(".")[0] in COMMON_KEYS]
         self.settings = [s for s in settings if s.key.split(".")[0] not in COMMON_KEYS]
@@ -137,7 +129,9 @@ class Expander:
                 return []
         return drafts
 
-    def _include(self, name: str, origin: Origin, path: tuple, beside: FilePath | None, chain: tuple) -> list[Draft]:
+    def _include(
+        self, name: str, origin: Origin, path: Path, beside: FilePath | None, chain: tuple[FilePath, ...]
+    ) -> list[Draft]:
         """The drafts of one included config."""
         file = config_file(name, beside) if is_stem(name) else None
         if not is_stem(name):
@@ -163,15 +157,18 @@ class Expander:
             self.faults.add(document.origin(("sweep",)), ("sweep",), f"more than {MOST_CASES} cases")
             return []
         axes = []
-        for key in common.sweep:
-            if not self._may_be_swept(document, common, key, drafts):
+        for n, key in enumerate(common.sweep):
+            if not self._may_be_swept(document, list(common.sweep)[:n], key, drafts):
                 continue
             values = document.data["sweep"][key]
             axes.append([Setting(key, v, document.origin(("sweep", key, i))) for i, v in enumerate(values)])
         return [self._with(draft, settings) for draft in drafts for settings in itertools.product(*axes)]
 
-    def _may_be_swept(self, document: Document, common: Common, key: str, drafts: list[Draft]) -> bool:
-        """Whether a swept key is one that this sweep, and no other and no override, decides."""
+    def _may_be_swept(self, document: Document, before: list[str], key: str, drafts: list[Draft]) -> bool:
+        """Whether a swept key is one that this sweep, and no other and no override, decides.
+
+        before: the keys that the same sweep names before it.
+        """
         origin = document.key_origin(("sweep", key))
         if key.split(".")[0] in COMMON_KEYS:
             self.faults.add(origin, ("sweep", key), "cannot be swept")
@@ -183,11 +180,10 @@ class Expander:
         except NoSuchKey as error:
             self.faults.add(origin, ("sweep", key), str(error))
             return False
-        before = list(itertools.takewhile(lambda other: other != key, common.sweep))
         for draft in drafts:
             for other in (*(swept_key for swept_key, _ in draft.swept), *before):
-                taken = key_paths(draft.document, self.studies.keys(draft.study), other, missing_ok=True)
-                if any(overlap(path, one) for path in taken for one in swept):
+                others = key_paths(draft.document, self.studies.keys(draft.study), other, missing_ok=True)
+                if any(overlap(path, one) for path in others for one in swept):
                     self.faults.add(origin, ("sweep", key), f"sweeps what {other} sweeps as well")
                     return False
         for setting in self.settings:
@@ -255,7 +251,7 @@ class Expander:
                 self.faults.add(document.key_origin(path), path, f"no such figure{near}")
 
     def _check_figures(self, common: Common, cases: list[Case], document: Document) -> None:
-        """Every pattern must mean a case, else a figure would be empty without a word."""
+        """Every pattern must match a case; otherwise a figure would be empty without an explanation."""
         if self.faults:
             return
         for figure, patterns in common.figures.items():
@@ -266,7 +262,7 @@ class Expander:
                     self.faults.add(document.origin(path), path, f"no case has this name{near}", pattern)
 
 
-def overlap(one: tuple, other: tuple) -> bool:
+def overlap(one: Path, other: Path) -> bool:
     """Whether two paths lead to the same value, or one to a part of the other's."""
     shared = min(len(one), len(other))
     return one[:shared] == other[:shared]

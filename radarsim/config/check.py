@@ -1,22 +1,23 @@
-"""A document against a schema: what pydantic finds, told in the user's words at the place where the value stands."""
+"""A document checked against a schema: pydantic's errors, reported in plain text where the value was written."""
 
 import math
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, TypeAdapter, ValidationError
+from pydantic import AfterValidator, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError
+from pydantic_core import ErrorDetails, PydanticCustomError
 
 from radarsim.config.document import Document, child
 from radarsim.config.faults import ABSENT, Faults, Path, short
-from radarsim.config.fields import At, NotRead, in_degrees, in_radians, radians
+from radarsim.config.fields import At, Model, NotRead, in_degrees, in_radians, radians
 from radarsim.config.lookup import did_you_mean
 
-WORDS = {
+M = TypeVar("M", bound=Model)
+MESSAGES = {
     "missing": "required key is missing",
     "float_type": "must be a number",
     "int_type": "must be a whole number",
@@ -46,7 +47,7 @@ BOUNDS = ("gt", "ge", "lt", "le")
 WITHOUT_VALUE = ("missing", "extra_forbidden", "unique", "union_tag_not_found")
 
 
-def check(model: type[BaseModel], document: Document, faults: Faults, also: Iterable[str] = ()) -> BaseModel | None:
+def check(model: type[M], document: Document, faults: Faults, also: Iterable[str] = ()) -> M | None:
     """The document as a checked object; None, and faults noted, if it is not one.
 
     `also` are top-level keys that are checked elsewhere and are named among the allowed ones.
@@ -58,24 +59,24 @@ def check(model: type[BaseModel], document: Document, faults: Faults, also: Iter
         errors = error.errors(include_url=False, include_input=False)
         found = [one for each in errors for one in _Found.of(each, document)]
         for each in found:
-            if not _beside_the_point(each, found, document):
-                _tell(model, document, each, faults, also)
+            if not _irrelevant(each, found, document):
+                _report(model, document, each, faults, also)
         for each in _Partial(model, document, found, faults).misfits():
-            _tell(model, document, each, faults, also)
+            _report(model, document, each, faults, also)
         return None
 
 
 @dataclass(frozen=True)
 class _Found:
-    """One of pydantic's errors: its kind, the path of the value as the user wrote it, and what its words need."""
+    """One of pydantic's errors: its kind, the path of the value as the user wrote it, and what its message needs."""
 
     kind: str
     path: Path
-    context: dict
+    context: dict[str, Any]
     text: str
 
     @classmethod
-    def of(cls, error: dict, document: Document) -> "list[_Found]":
+    def of(cls, error: ErrorDetails, document: Document) -> "list[_Found]":
         """One, or one for each fault that the cross-checks of a mapping found."""
         kind, context = error["type"], dict(error.get("ctx", {}))
         path = path_in(document.data, error["loc"], keep_last=kind in ("missing", "extra_forbidden"))
@@ -89,8 +90,8 @@ class _Found:
     @classmethod
     def misfit(cls, fault: At, path: Path, document: Document) -> "_Found":
         """A fault that a cross-check of the mapping at a path found."""
-        *outer, key = fault.key.split(".")
-        outer = [int(step) if step.isdecimal() else step for step in outer]
+        *above, key = fault.key.split(".")
+        outer = [int(step) if step.isdecimal() else step for step in above]
         return cls("at", twin(document.data, (*path, *outer), key), {"message": fault.message}, fault.message)
 
 
@@ -100,7 +101,7 @@ class _Partial:
     Where a mapping has an unknown key, its optional keys that are not given count as unread: one may be misspelt.
     """
 
-    def __init__(self, model: type[BaseModel], document: Document, found: list[_Found], faults: Faults):
+    def __init__(self, model: type[Model], document: Document, found: list[_Found], faults: Faults):
         self.model, self.document, self.faults = model, document, faults
         self.whole = {one.path for one in found if one.kind not in ("unique", "extra_forbidden")}
         self.inside = {one.path[:n] for one in found for n in range(len(one.path) + 1)}
@@ -108,13 +109,13 @@ class _Partial:
         self.more: list[_Found] = []
 
     def misfits(self) -> list[_Found]:
-        """The faults that are found beside the document's own."""
+        """The further faults that the cross-checks find."""
         with suppress(NotRead):
             self._read(())
         return self.more
 
-    def _read(self, path: Path) -> Any:
-        """The mapping at a path, without the fields that have faults; raises NotRead if it is none."""
+    def _read(self, path: Path) -> Model:
+        """The mapping at a path, without the fields that have faults; raises NotRead if it is no mapping."""
         model, data = model_at(self.model, self.document.data, path), self.document.get(path)
         if path in self.whole or model is None or not isinstance(data, dict):
             raise NotRead
@@ -136,10 +137,10 @@ class _Partial:
         misfits = list(part.misfits())
         self.more += [_Found.misfit(each, path, self.document) for each in misfits]
         for each in misfits:
-            part.__dict__.pop(each.key, None)  # what is around it must not lean on it
+            part.__dict__.pop(each.key, None)  # what is around it must not rely on it
         return part
 
-    def _field(self, path: Path, name: str, info: FieldInfo, model: type[BaseModel]) -> Any:
+    def _field(self, path: Path, name: str, info: FieldInfo, model: type[Model]) -> Any:
         data = self.document.get(path)
         if path in self.whole or self.faults.spoiled(self.document.origin(path), path):
             raise NotRead
@@ -153,7 +154,7 @@ class _Partial:
                 self._validate(mark.func, members, path)
         return members
 
-    def _validate(self, check: Callable, members: tuple, path: Path) -> None:
+    def _validate(self, check: Callable[..., Any], members: tuple[Model, ...], path: Path) -> None:
         """Let a check of the whole list see what was read of its members."""
         try:
             check(members)
@@ -164,13 +165,14 @@ class _Partial:
 
 
 @cache
-def _reader(model: type[BaseModel], name: str) -> TypeAdapter:
+def _reader(model: type[Model], name: str) -> TypeAdapter[Any]:
     """The check of one field by itself."""
     info = model.model_fields[name]
-    return TypeAdapter(Annotated[info.annotation, info])
+    annotated: Any = Annotated[info.annotation, info]
+    return TypeAdapter(annotated)
 
 
-def _beside_the_point(one: _Found, found: list[_Found], document: Document) -> bool:
+def _irrelevant(one: _Found, found: list[_Found], document: Document) -> bool:
     """Whether an error is of a choice's member that the value, by its form, was not meant to be."""
     value = document.get(one.path)
     form = MAPPING if isinstance(value, dict) else LIST if isinstance(value, list) else SCALAR
@@ -181,7 +183,7 @@ def _beside_the_point(one: _Found, found: list[_Found], document: Document) -> b
     return any(len(other.path) > depth or other.kind not in (MAPPING | LIST | SCALAR) - form for other in others)
 
 
-def _tell(model: type[BaseModel], document: Document, found: _Found, faults: Faults, also: Iterable[str]) -> None:
+def _report(model: type[Model], document: Document, found: _Found, faults: Faults, also: Iterable[str]) -> None:
     """Note one of pydantic's errors as a fault."""
     kind, path, context = found.kind, found.path, found.context
     if faults.spoiled(document.origin(path), path):
@@ -195,17 +197,17 @@ def _tell(model: type[BaseModel], document: Document, found: _Found, faults: Fau
     message = _message(kind, context, found.text, str(path[-1]) if path else "")
     value = document.get(path)
     if kind == "too_short" and isinstance(value, list | dict) and len(value) >= context["min_length"]:
-        return  # pydantic counts the good members alone; the bad ones are told one by one
+        return  # pydantic counts the good members alone; the bad ones are reported one by one
     if kind in WITHOUT_VALUE or value is ABSENT:
         faults.add(document.origin(path), path, message)
     else:
         faults.add(document.origin(path), path, message, value)
 
 
-def _message(kind: str, context: dict, original: str, key: str) -> str:
-    """What must be, in words; bounds of a `_deg` key in degrees."""
+def _message(kind: str, context: dict[str, Any], original: str, key: str) -> str:
+    """What is required, as text; bounds of a `_deg` key in degrees."""
     if kind == "at":
-        return context["message"]
+        return str(context["message"])
     if kind == "value_error":
         return str(context["error"])
     for bound in BOUNDS:
@@ -216,50 +218,52 @@ def _message(kind: str, context: dict, original: str, key: str) -> str:
         context["expected"] = context["expected"].replace("'", "").replace(" or ", ", ")
     if "expected_tags" in context:
         context["expected_tags"] = context["expected_tags"].replace("'", "")
-    if kind in WORDS:
-        return WORDS[kind].format(**context)
-    if kind.startswith("int_"):  # a whole number is due: a fraction, or more digits than there are
+    if kind in MESSAGES:
+        return MESSAGES[kind].format(**context)
+    if kind.startswith("int_"):  # a fraction, or a whole number of too many digits
         return "must be a whole number"
     return original
 
 
 def unknown_key(key: object, known: Iterable[str]) -> str:
-    """The message for a key that nobody knows."""
+    """The message for an unknown key."""
     known = list(known)
     near = did_you_mean(str(key), known) or ";"
     return f"unknown key{near} allowed: {', '.join(known)}"
 
 
-def path_in(data: Any, location: tuple, keep_last: bool) -> Path:
+def path_in(data: object, location: tuple[int | str, ...], keep_last: bool) -> Path:
     """The keys of pydantic's location as they stand in the data: without names of union members, `_deg` as written."""
     path: Path = ()
     for i, step in enumerate(location):
+        written = step
         if child(data, step) is ABSENT and isinstance(data, dict) and isinstance(step, str):
-            step = twin(data, (), step)[0]
-        below = child(data, step)
+            written = twin(data, (), step)[0]
+        below = child(data, written)
         if below is ABSENT and not (keep_last and i == len(location) - 1):
             continue
-        path, data = (*path, step), below
+        path, data = (*path, written), below
     return path
 
 
-def twin(data: Any, path: Path, key: str) -> Path:
+def twin(data: object, path: Path, key: str) -> Path:
     """The path of a key below a path, under its `_deg` name where the user wrote that."""
     for step in path:
         data = child(data, step)
     other = in_degrees(key)
-    written = other and child(data, key) is ABSENT and child(data, other) is not ABSENT
-    return (*path, other if written else key)
+    if other and child(data, key) is ABSENT and child(data, other) is not ABSENT:
+        return (*path, other)
+    return (*path, key)
 
 
-def allowed_keys(model: type[BaseModel]) -> list[str]:
+def allowed_keys(model: type[Model]) -> list[str]:
     """The keys of a mapping, with the `_deg` twins."""
     return [key for name in model.model_fields for key in (name, in_degrees(name)) if key]
 
 
-def model_at(model: type[BaseModel], data: Any, path: Path) -> type[BaseModel] | None:
+def model_at(model: type[Model], data: object, path: Path) -> type[Model] | None:
     """The schema of the mapping at a path; of a choice, the member that the data's kind names."""
-    current: type[BaseModel] | None = model
+    current: type[Model] | None = model
     candidates = [model]
     for step in path:
         data = child(data, step)
@@ -271,20 +275,20 @@ def model_at(model: type[BaseModel], data: Any, path: Path) -> type[BaseModel] |
     return current
 
 
-def models_in(annotation: Any) -> list[type[BaseModel]]:
+def models_in(annotation: object) -> list[type[Model]]:
     """All schemas named in an annotation: of a choice, a list, an optional."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+    if isinstance(annotation, type) and issubclass(annotation, Model):
         return [annotation]
     return [model for argument in get_args(annotation) for model in models_in(argument)]
 
 
-def _chosen(candidates: list[type[BaseModel]], data: Any) -> type[BaseModel] | None:
+def _chosen(candidates: list[type[Model]], data: object) -> type[Model] | None:
     fitting = [model for model in candidates if _fits(model, data)] if len(candidates) > 1 else candidates
     return fitting[0] if fitting else None
 
 
-def _fits(model: type[BaseModel], data: Any) -> bool:
-    """Whether the words that tell a choice's members apart, fields with one allowed value, are the data's."""
+def _fits(model: type[Model], data: object) -> bool:
+    """Whether the fields with one allowed value, which distinguish a choice's members, have it in the data."""
     fields = [(name, info.annotation) for name, info in model.model_fields.items()]
     tags = [(name, get_args(a)[0]) for name, a in fields if get_origin(a) is Literal and len(get_args(a)) == 1]
     return isinstance(data, dict) and all(data.get(name) == tag for name, tag in tags)
@@ -295,7 +299,9 @@ def refuse_both_units(document: Document, faults: Faults, path: Path = ()) -> No
     data = document.get(path)
     if isinstance(data, list):
         data = dict(enumerate(data))
-    for key, value in data.items() if isinstance(data, dict) else ():
+    if not isinstance(data, dict):
+        return
+    for key, value in data.items():
         if isinstance(value, dict | list):
             refuse_both_units(document, faults, (*path, key))
         elif (other := in_radians(str(key))) in data and other:

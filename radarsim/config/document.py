@@ -1,8 +1,9 @@
 """A config as plain data in which every value still knows where it was written."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
+from typing import Any
 
 from radarsim.config.faults import ABSENT, Origin, Path
 
@@ -11,10 +12,11 @@ from radarsim.config.faults import ABSENT, Origin, Path
 class Document:
     """Plain data, and the origins of values and keys by key path.
 
-    source is the file as the user named it; file is where it lies (None for a dictionary).
+    data of a config or a scenario is a mapping, of an override any value. source is the file as the user named it; file
+    is where it lies (None for a dictionary).
     """
 
-    data: dict
+    data: Any
     source: str
     file: FilePath | None = None
     values: Mapping[Path, Origin] = field(default_factory=dict)
@@ -37,11 +39,11 @@ class Document:
             value = child(value, step)
         return value
 
-    def only(self, keys) -> "Document":
+    def only(self, keys: Collection[str]) -> "Document":
         """The document with some of its top-level keys."""
         return self.with_data((), {key: value for key, value in self.data.items() if key in keys})
 
-    def without(self, keys) -> "Document":
+    def without(self, keys: Collection[str]) -> "Document":
         """The document without some of its top-level keys."""
         return self.with_data((), {key: value for key, value in self.data.items() if key not in keys})
 
@@ -54,7 +56,7 @@ class Document:
         return self._replaced(path, value, {path: origin}, {})
 
     def graft_document(self, path: Path, other: "Document") -> "Document":
-        """A document with another file's content at a path; faults below it are told in that file's own keys."""
+        """A document with another file's content at a path; faults below it are reported under that file's own keys."""
 
         def moved(origins: Mapping[Path, Origin]) -> dict[Path, Origin]:
             return {(*path, *below): origin._replace(prefix=len(path)) for below, origin in origins.items()}
@@ -62,7 +64,7 @@ class Document:
         whole = {path: Origin(other.source, prefix=len(path))}
         return self._replaced(path, other.data, whole | moved(other.values), moved(other.keys))
 
-    def _replaced(self, path: Path, value: object, values: dict, keys: dict) -> "Document":
+    def _replaced(self, path: Path, value: object, values: dict[Path, Origin], keys: dict[Path, Origin]) -> "Document":
         depth = len(path)
         made = {path[:n]: values[path] for n in range(1, depth) if not isinstance(self.get(path[:n]), dict | list)}
         kept = {p: o for p, o in self.values.items() if p[:depth] != path}
@@ -84,9 +86,9 @@ def _with(container: object, path: Path, value: object) -> object:
     """A copy of a container with another value at a path; only the containers on the way are copied."""
     if not path:
         return value
-    copy: dict | list = dict(container) if isinstance(container, dict) else {}
-    if isinstance(container, list) and isinstance(path[0], int):
-        copy = list(container)
-    below = child(container, path[0])
-    copy[path[0]] = _with({} if below is ABSENT else below, path[1:], value)
-    return copy
+    first, *rest = path
+    below = child(container, first)
+    inner = _with({} if below is ABSENT else below, tuple(rest), value)
+    if isinstance(container, list) and isinstance(first, int):
+        return [*container[:first], inner, *container[first + 1 :]]
+    return {**(container if isinstance(container, dict) else {}), first: inner}

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import cached_property
+from typing import Any
 
 from radarsim.config.faults import one_line, short
-from radarsim.config.fields import Model
 from radarsim.config.identity import complete
 
 
@@ -14,18 +14,19 @@ from radarsim.config.identity import complete
 class Case:
     """One configuration to be run: a study's checked keys, how often, and with which seed.
 
-    name is the stem of its config with ` key=value` for each swept key.
+    name is the stem of its config with ` key=value` for each swept key. spec holds the study's own keys, an object of
+    its subclass of `radarsim.config.fields.Study`.
     """
 
     name: str
     stem: str
     study: str
-    spec: Model
+    spec: Any
     swept: tuple[tuple[str, object], ...]
     realisations: int
     seed: int
 
-    def resolved(self) -> dict:
+    def resolved(self) -> dict[str, Any]:
         """The case as plain JSON-able data, names included."""
         common = {"case": self.name, "swept": dict(self.swept), "realisations": self.realisations, "seed": self.seed}
         return common | complete(self.spec)
@@ -49,7 +50,7 @@ class Experiment:
     control_variate: bool = False
 
     @cached_property
-    def resolved(self) -> dict:
+    def resolved(self) -> dict[str, Any]:
         """The whole experiment as plain JSON-able data, defaults filled and in SI units, for the record."""
         return {
             "config": self.stem,

@@ -1,5 +1,6 @@
-"""Faults of a config: where, what, what is allowed; gathered, so that the user sees all of them at once."""
+"""Faults of a config: where, what, what is allowed; collected, so that the user sees all of them at once."""
 
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from radarsim.errors import ConfigError
@@ -29,8 +30,8 @@ class Origin(NamedTuple):
 class Faults:
     """A growing list of faults; each is one line of the ConfigError."""
 
-    def __init__(self):
-        self._lines: dict[str, tuple] = {}
+    def __init__(self) -> None:
+        self._lines: dict[str, tuple[int, int, int, int]] = {}
         self._sources: list[str] = []
         self._spoiled: set[tuple[Origin, Path]] = set()
 
@@ -50,7 +51,7 @@ class Faults:
         self._lines.setdefault(": ".join(parts), (rank, origin.line, origin.column, len(self._lines)))
 
     def spoil(self, origin: Origin, path: Path, message: str, got: object = ABSENT) -> None:
-        """Note a fault that makes the value at this place unusable: nothing more is said about it."""
+        """Note a fault that makes the value at this place unusable: no further fault of it is reported."""
         self.add(origin, path, message, got)
         self._spoiled.add((origin._replace(prefix=0), path[origin.prefix :]))
 
@@ -65,7 +66,7 @@ class Faults:
 
 
 def _names(origin: Origin, key: str) -> bool:
-    """Whether the origin, `--set KEY` or `--KEY`, says the key already; a bare filter key is the end of the full."""
+    """Whether the origin, `--set KEY` or `--KEY`, names the key already; a bare filter key is the end of the full."""
     option, _, given = origin.source.partition(" ")
     return origin.source == f"--{key}" or (option == "--set" and (key == given or key.endswith(f".{given}")))
 
@@ -82,7 +83,7 @@ def shown(value: object) -> str:
 
 
 def _literal(value: object, room: int = LONGEST) -> str:
-    """Like repr, in YAML's words, and never longer to make than to show."""
+    """Like repr, with YAML's true and false, and without formatting more than is shown."""
     match value:
         case None:
             return "nothing"
@@ -100,7 +101,7 @@ def _literal(value: object, room: int = LONGEST) -> str:
     return one_line(type(value).__name__)
 
 
-def _until(parts, room: int):
+def _until(parts: Iterable[str], room: int) -> Iterator[str]:
     """The first parts, up to a little more than fits."""
     length = 0
     for part in parts:

@@ -9,22 +9,26 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, NamedTuple
+from types import FunctionType
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
     BaseModel,
-    BeforeValidator,
     ConfigDict,
     Field,
+    GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     Strict,
     StringConstraints,
     WithJsonSchema,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+T = TypeVar("T")
+V = TypeVar("V")
+Check = TypeVar("Check", bound=Callable[[Any], "Iterator[At]"])
 LARGEST = 1e18  # of any number; far beyond any sea, sky or signal, and its square and cube are still finite
 SMALLEST = 1e-18
 
@@ -54,17 +58,17 @@ class DataFile:
 class Scenario:
     """Mark of a study's field that may name a file in scenarios/ by its stem."""
 
-    def __get_pydantic_json_schema__(self, core_schema: Any, handler: GetJsonSchemaHandler) -> dict:
+    def __get_pydantic_json_schema__(self, core_schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         inline = handler(core_schema)
         return {"anyOf": [{"type": "string", "description": "stem of a file in scenarios/"}, inline]}
 
 
 class NotRead(Exception):
-    """What a cross-check asks for has a fault of its own; so nothing can be said."""
+    """A field that a cross-check reads has a fault of its own, so the check cannot be made."""
 
 
 class At(NamedTuple):
-    """A fault that a cross-check finds: at which key, dotted if deeper, and what must be."""
+    """A fault that a cross-check finds: at which key, dotted if deeper, and what is required."""
 
     key: str
     message: str
@@ -75,24 +79,27 @@ def at(key: str, message: str) -> At:
     return At(key, message)
 
 
-def cross_check(method: Callable[[Any], Iterator[At]]) -> Callable[[Any], Iterator[At]]:
+_CROSS_CHECKS: set[Callable[[Any], Iterator[At]]] = set()
+
+
+def cross_check(method: Check) -> Check:
     """Mark of a model's method that yields faults of fields that do not go together.
 
     All cross-checks of a model are run, in order. Where some fields have faults of their own they are run as well, on
     what could be read: there one that touches an unread field ends at once, so what is independent stands apart.
     """
-    method.is_cross_check = True
+    _CROSS_CHECKS.add(method)
     return method
 
 
-def of_each(members: Iterable, check: Callable[[int, Any], Iterator[At]]) -> Iterator[At]:
-    """The faults of every member of a list, `check(i, member)`; what is unread in one does not silence the others."""
+def of_each(members: Iterable[T], check: Callable[[int, T], Iterator[At]]) -> Iterator[At]:
+    """The faults of every member of a list, `check(i, member)`; what is unread in one does not stop the others."""
     for i, member in enumerate(members):
         with suppress(NotRead):
             yield from check(i, member)
 
 
-def readable(members: Iterable, value: Callable[[Any], Any]) -> list:
+def readable(members: Iterable[T], value: Callable[[T], V]) -> list[V]:
     """The value of every member of which it could be read."""
     values = []
     for member in members:
@@ -117,7 +124,7 @@ class Model(BaseModel):
         return {twins.get(key, key): radians(value) if key in twins else value for key, value in data.items()}
 
     @model_validator(mode="after")
-    def _fits_together(self):
+    def _fits_together(self) -> Self:
         found = list(self.misfits())
         if found:
             raise PydanticCustomError("at", "fields that do not go together", {"faults": found})
@@ -125,20 +132,23 @@ class Model(BaseModel):
 
     def misfits(self) -> Iterator[At]:
         """What all cross-checks find; those that need an unread field end there."""
-        seen: dict[str, Any] = {}
+        seen: dict[str, Callable[[Any], Iterator[At]]] = {}
         for klass in reversed(type(self).__mro__):
-            seen |= {name: one for name, one in vars(klass).items() if getattr(one, "is_cross_check", False)}
+            methods = {name: one for name, one in vars(klass).items() if isinstance(one, FunctionType)}
+            seen |= {name: one for name, one in methods.items() if one in _CROSS_CHECKS}
         for check in seen.values():
             with suppress(NotRead):
                 yield from check(self)
 
-    def __getattr__(self, name: str) -> Any:
-        if name in type(self).model_fields:  # only of a model read in part
-            raise NotRead(name)
-        return super().__getattr__(name)
+    if not TYPE_CHECKING:  # a type checker would take any name for an attribute
+
+        def __getattr__(self, name):
+            if name in type(self).model_fields:  # only of a model read in part
+                raise NotRead(name)
+            return super().__getattr__(name)
 
     @classmethod
-    def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> dict:
+    def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         schema = handler.resolve_ref_schema(handler(core_schema))
         for name in [name for name in schema.get("properties", {}) if in_degrees(name)]:
             twin = in_degrees(name)
@@ -212,9 +222,21 @@ Stem = Annotated[str, Strict(), StringConstraints(min_length=1, max_length=100)]
 Anything = Annotated[Any, WithJsonSchema({})]
 
 
+@dataclass(frozen=True)
+class Whole:
+    """Mark of a whole number between bounds, which may be written as 1e5: `scans: Annotated[int, Whole(3, 100)]`."""
+
+    least: int
+    most: int
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        bounded = core_schema.int_schema(strict=True, ge=self.least, le=self.most)
+        return core_schema.no_info_before_validator_function(_whole, bounded)
+
+
 def whole(least: int, most: int) -> Any:
     """A whole number between bounds; 1e5 is one."""
-    return Annotated[int, Strict(), Field(ge=least, le=most), BeforeValidator(_whole)]
+    return Annotated[int, Whole(least, most)]
 
 
 class Study(Model):
@@ -228,7 +250,7 @@ class Study(Model):
     figure_names: ClassVar[tuple[str, ...] | None] = None
 
     @cross_check
-    def _names_exist(self):
+    def _names_exist(self) -> Iterator[At]:
         for field, info in type(self).model_fields.items():
             for mark in info.metadata:
                 if isinstance(mark, NameIn) and getattr(self, field) is not None:
@@ -238,7 +260,17 @@ class Study(Model):
                         yield at(field, f"must be the name of a {one}: {', '.join(names)}")
 
 
-def unique_names(members: tuple[Any, ...]) -> tuple[Any, ...]:
+class Named(Protocol):
+    """A member of a list that is referred to by its name."""
+
+    @property
+    def name(self) -> str: ...
+
+
+N = TypeVar("N", bound=Named)
+
+
+def unique_names(members: tuple[N, ...]) -> tuple[N, ...]:
     """Check that no two members of a list have the same name; for AfterValidator."""
     seen: set[str] = set()
     for member in members:

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from pathlib import Path
+from typing import Any
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -16,25 +17,25 @@ def digest(value: object) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def canonical(spec: BaseModel) -> dict:
+def canonical(spec: BaseModel) -> dict[str, Any]:
     """All that changes a number, defaults filled, in SI units; display names are left out."""
     return _plain(spec, (Display,))
 
 
-def world(spec: BaseModel) -> dict:
+def world(spec: BaseModel) -> dict[str, Any]:
     """What is observed, without the filters and the number of scans: cases of one world share their noise."""
     return _plain(spec, (Display, Design))
 
 
-def complete(spec: BaseModel) -> dict:
+def complete(spec: BaseModel) -> dict[str, Any]:
     """Every key that has a value, names too: reads back as the same configuration."""
     return _plain(spec, ())
 
 
-def _plain(value: object, leave_out: tuple[type, ...]) -> object:
+def _plain(value: object, leave_out: tuple[type, ...]) -> Any:
     if isinstance(value, BaseModel):
         return {
-            name: _plain(_told(value, name, info) if leave_out else getattr(value, name), leave_out)
+            name: _plain(_without_names(value, name, info) if leave_out else getattr(value, name), leave_out)
             for name, info in type(value).model_fields.items()
             if not any(isinstance(mark, leave_out) for mark in info.metadata)
             and (leave_out or getattr(value, name) is not None)
@@ -46,8 +47,8 @@ def _plain(value: object, leave_out: tuple[type, ...]) -> object:
     return value
 
 
-def _told(model: BaseModel, name: str, info: FieldInfo) -> object:
-    """The value of a field, without the names that stand in it.
+def _without_names(model: BaseModel, name: str, info: FieldInfo) -> object:
+    """The value of a field, without the names in it.
 
     For the name of a member of a list the member's place, 0 where none is named; for a file of data its content's hash.
     """

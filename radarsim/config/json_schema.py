@@ -1,28 +1,31 @@
 """The schema of the YAML as JSON Schema, for editors and for `radarsim schema`."""
 
 import json
+from typing import Any, Literal
 
+from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from radarsim.config.fields import Scenario
+from radarsim.config.fields import Scenario, Study
 from radarsim.config.schema import Common, Studies
 
 TITLE = "radarsim experiment"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def schema(studies: Studies) -> dict:
+def schema(studies: Studies) -> dict[str, Any]:
     """JSON Schema of a config, of one of the studies or an `include` of others, and of a scenario."""
     models = {name: studies.keys(name) for name in studies.names()}
-    wanted = [(model, "validation") for model in (Common, *models.values())]
+    described: tuple[type[BaseModel], ...] = (Common, *models.values())
+    wanted: list[tuple[type[BaseModel], Literal["validation"]]] = [(model, "validation") for model in described]
     references, whole = models_json_schema(wanted, ref_template="#/$defs/{model}")
     definitions = tidy(whole["$defs"])
 
-    def taken(model: type) -> dict:
+    def popped(model: type[BaseModel]) -> Any:
         return definitions.pop(references[(model, "validation")]["$ref"].removeprefix("#/$defs/"))
 
-    common = taken(Common)["properties"]
-    kinds = {name: _experiment(name, taken(model), common) for name, model in models.items()}
+    common = popped(Common)["properties"]
+    kinds = {name: _experiment(name, popped(model), common) for name, model in models.items()}
     return {
         "$schema": DIALECT,
         "title": TITLE,
@@ -36,7 +39,7 @@ def schema(studies: Studies) -> dict:
     }
 
 
-def _experiment(name: str, study: dict, common: dict) -> dict:
+def _experiment(name: str, study: dict[str, Any], common: dict[str, Any]) -> dict[str, Any]:
     """A config of one study: the common keys and its own."""
     kept = {key: value for key, value in common.items() if key not in ("study", "include")}
     about = {"const": name, "description": study["description"]}
@@ -48,7 +51,7 @@ def _experiment(name: str, study: dict, common: dict) -> dict:
     }
 
 
-def _comparison(common: dict, studies: list[str]) -> dict:
+def _comparison(common: dict[str, Any], studies: list[str]) -> dict[str, Any]:
     """A config that includes others."""
     return {
         "title": "include",
@@ -60,9 +63,9 @@ def _comparison(common: dict, studies: list[str]) -> dict:
     }
 
 
-def _scenario(models: dict[str, type], kinds: dict[str, dict]) -> dict:
+def _scenario(models: dict[str, type[Study]], kinds: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """A file in scenarios/: whatever may stand inline where a config names one."""
-    inline: list[dict] = []
+    inline: list[dict[str, Any]] = []
     for name, model in models.items():
         for field, info in model.model_fields.items():
             if any(isinstance(mark, Scenario) for mark in info.metadata):
@@ -70,8 +73,8 @@ def _scenario(models: dict[str, type], kinds: dict[str, dict]) -> dict:
     return {"title": "scenario", "description": "What is observed.", "anyOf": inline}
 
 
-def tidy(part: object) -> object:
-    """A schema without what says nothing here: made-up titles, and null, which stands for a key that is not there."""
+def tidy(part: Any) -> Any:
+    """A schema without what carries no information: generated titles, and null, which stands for an absent key."""
     if isinstance(part, list):
         return [tidy(item) for item in part]
     if not isinstance(part, dict):
@@ -87,7 +90,7 @@ def tidy(part: object) -> object:
 
 
 def _idle(key: str, value: object) -> bool:
-    """Whether a keyword (and no property that happens to have its name) says nothing."""
+    """Whether a keyword (and no property that happens to have its name) carries no information."""
     if key == "title":
         return isinstance(value, str)
     return key == "discriminator" or (key == "default" and value in (None, {}))

@@ -1,8 +1,9 @@
 """YAML to checked experiments. The only file that imports yaml: it reads text, with line and column of every value."""
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path as FilePath
+from typing import Any
 
 import yaml
 
@@ -19,7 +20,7 @@ OPTIONS = ("realisations", "seed")  # overrides that are options of their own on
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same events and marks, ten times faster
 
 
-def load(source: str | os.PathLike | Mapping, overrides: Iterable[str], studies: Studies) -> Experiment:
+def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Iterable[str], studies: Studies) -> Experiment:
     """The experiment that a config describes, all of it checked.
 
     source is a path, the stem of a config (here, in ./configs, or shipped), or a mapping as YAML would give it;
@@ -27,36 +28,38 @@ def load(source: str | os.PathLike | Mapping, overrides: Iterable[str], studies:
     """
     faults = Faults()
     settings = [setting for text in overrides if (setting := _setting(str(text), faults))]
+    document: Document | None = None
     if isinstance(source, Mapping):
         document = _from_mapping(source, faults)
     elif isinstance(source, str | bytes | os.PathLike):
         document = _from_user(source, faults)
     else:
-        document = None
         faults.add(Origin("config"), (), f"must be a path, a name or a mapping, got {repr(source)[:60]}")
-    experiment = document and Expander(read, settings, faults, studies).experiment(document)
+    experiment = None if document is None else Expander(read, settings, faults, studies).experiment(document)
     faults.raise_if_any()
+    assert experiment is not None  # without one there is a fault
     return experiment
 
 
-def as_yaml(value: Mapping) -> str:
+def as_yaml(value: Mapping[str, Any]) -> str:
     """Plain data as YAML text, keys in their order, short lists in one line."""
-    return yaml.dump(value, Dumper=_Plain, sort_keys=False, allow_unicode=True, width=110, default_flow_style=None)
+    text: str = yaml.dump(value, Dumper=_Plain, sort_keys=False, allow_unicode=True, width=110, default_flow_style=None)
+    return text
 
 
 class _Plain(yaml.SafeDumper):
-    """Writes what is equal twice over, never as an alias, which this reader would refuse."""
+    """Writes equal values twice, never as an alias, which this reader would refuse."""
 
-    def ignore_aliases(self, data):
+    def ignore_aliases(self, data: object) -> bool:
         return True
 
 
-def _from_mapping(source: Mapping, faults: Faults) -> Document:
+def _from_mapping(source: Mapping[str, Any], faults: Faults) -> Document:
     origin = Origin("config")
     return Document(from_python(source, (), origin, faults), "config", None, {(): origin})
 
 
-def _from_user(source: str | os.PathLike, faults: Faults) -> Document | None:
+def _from_user(source: str | bytes | os.PathLike[str], faults: Faults) -> Document | None:
     """The config that the user named by path or stem."""
     name = os.fsdecode(source)
     file = config_file(name) if is_stem(name) and not FilePath(name).is_file() else None
@@ -146,7 +149,7 @@ def parse(text: str, source: str, faults: Faults, plain_origin: Origin | None = 
 
 
 class _Refused(Exception):
-    """The text cannot be read on."""
+    """The rest of the text cannot be read."""
 
 
 class _Reader:
@@ -157,14 +160,15 @@ class _Reader:
         self.values: dict[Path, Origin] = {}
         self.keys: dict[Path, Origin] = {}
 
-    def origin(self, mark) -> Origin:
+    def origin(self, mark: "yaml.Mark | yaml._yaml.Mark | None") -> Origin:
         """Where a mark is; in an override, the override."""
         if self.plain_origin or mark is None:
             return self.plain_origin or Origin(self.source)
         return Origin(self.source, mark.line + 1, mark.column + 1)
 
-    def document(self, events) -> object:
+    def document(self, events: Iterable[yaml.Event]) -> object:
         """The data of the one document that there must be."""
+        self.events: Iterator[Any]  # of yaml.Event; which kind follows is known from the one before
         self.events = (e for e in events if not isinstance(e, yaml.StreamStartEvent | yaml.DocumentEndEvent))
         if isinstance(next(self.events), yaml.StreamEndEvent):
             self.faults.add(self.plain_origin or Origin(self.source), (), "is empty")
@@ -175,7 +179,7 @@ class _Reader:
             self.faults.add(self.origin(extra.start_mark), (), "there must be one YAML document, here begins another")
         return data
 
-    def _node(self, event, path: Path) -> object:
+    def _node(self, event: yaml.NodeEvent, path: Path) -> object:
         origin = self.values[path] = self.origin(event.start_mark)
         if len(path) > DEEPEST:
             self.faults.add(origin, (), f"nested more than {DEEPEST} deep")
@@ -185,22 +189,23 @@ class _Reader:
             return None
         if event.anchor is not None:
             self.faults.add(origin, path, f"anchors (&{event.anchor}) are not read")
+        assert isinstance(event, yaml.CollectionStartEvent | yaml.ScalarEvent)  # beside aliases there is nothing else
         if event.tag is not None:
             self.faults.spoil(origin, path, f"tags ({event.tag}) are not read")
         if isinstance(event, yaml.SequenceStartEvent):
             return self._sequence(path)
-        if isinstance(event, yaml.MappingStartEvent):
-            return self._mapping(path)
-        return self._scalar(event, path, origin)
+        if isinstance(event, yaml.ScalarEvent):
+            return self._scalar(event, path, origin)
+        return self._mapping(path)
 
-    def _sequence(self, path: Path) -> list:
-        items: list = []
+    def _sequence(self, path: Path) -> list[object]:
+        items: list[object] = []
         while not isinstance(event := next(self.events), yaml.SequenceEndEvent):
             items.append(self._node(event, (*path, len(items))))
         return items
 
-    def _mapping(self, path: Path) -> dict:
-        mapping: dict = {}
+    def _mapping(self, path: Path) -> dict[str, object]:
+        mapping: dict[str, object] = {}
         while not isinstance(event := next(self.events), yaml.MappingEndEvent):
             origin = self.origin(event.start_mark)
             if not isinstance(event, yaml.ScalarEvent) or event.anchor or event.tag:
@@ -225,7 +230,7 @@ class _Reader:
         self._node(next(self.events), (*path, key))
         self.values, self.keys = values, keys
 
-    def _scalar(self, event, path: Path, origin: Origin) -> object:
+    def _scalar(self, event: yaml.ScalarEvent, path: Path, origin: Origin) -> object:
         if not event.implicit[0]:  # quoted, or a block of text
             return event.value
         try:

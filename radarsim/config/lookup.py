@@ -2,7 +2,7 @@
 
 import difflib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 SHIPPED = Path(__file__).parent.parent / "shipped"
@@ -70,7 +70,7 @@ def is_stem(name: str) -> bool:
     return len(name) <= 100 and STEM.fullmatch(name) is not None
 
 
-def did_you_mean(name: str, known) -> str:
+def did_you_mean(name: str, known: Iterable[str]) -> str:
     """`; did you mean X?` for the known name nearest to a mistaken one, or nothing."""
     name, known = str(name)[:100], list(known)
     begun = [full for full in known if len(name) > 2 and full.lower().startswith(name.lower())]

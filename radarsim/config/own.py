@@ -11,7 +11,7 @@ from radarsim.config.starter import starter
 from radarsim.errors import ConfigError, StoreError
 
 
-def new(name: str, like: str | os.PathLike, studies: Studies, folder: str | os.PathLike = ".") -> Path:
+def new(name: str, like: str | os.PathLike[str], studies: Studies, folder: str | os.PathLike[str] = ".") -> Path:
     """Write folder/NAME.yaml, the suffix given or not, after a known config; its path.
 
     Raises ConfigError where it is there already.
@@ -25,8 +25,9 @@ def new(name: str, like: str | os.PathLike, studies: Studies, folder: str | os.P
     path = Path(folder) / f"{name}.yaml"
     experiment = load.load(like, (), studies)
     faults = Faults()
-    document = load.read(Path(experiment.path), faults)
+    document = load.read(Path(experiment.path or like), faults)
     faults.raise_if_any()
+    assert document is not None  # a file that cannot be read is a fault
     text = starter(document.data, studies.keys(experiment.study), name, experiment.stem)
     try:
         with path.open("x", encoding="utf-8") as file:

@@ -1,27 +1,39 @@
 """Values put at the keys that overrides and sweeps name, and scenarios put in the place of their stems."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path as FilePath
 
 from radarsim.config.check import allowed_keys, model_at, models_in, unknown_key
 from radarsim.config.document import Document
-from radarsim.config.faults import ABSENT, Faults, Path, shown
+from radarsim.config.faults import ABSENT, Faults, Origin, Path, shown
 from radarsim.config.fields import DataFile, Model, Scenario, Study, in_degrees, in_radians
 from radarsim.config.lookup import did_you_mean, is_stem, scenario_file, stems
+
+Read = Callable[[FilePath, Faults], Document | None]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value to be put at a key, from an override or a sweep."""
+
+    key: str
+    value: object
+    origin: Origin
 
 
 class NoSuchKey(ValueError):
     """A key that the config has no place for; its text is the message."""
 
 
-def place(document: Document, model: type[Study], setting, read: Callable, faults: Faults) -> Document:
+def place(document: Document, model: type[Study], setting: Setting, read: Read, faults: Faults) -> Document:
     """The document with a setting's value at the places its key means. Raises NoSuchKey."""
     first = setting.key.split(".")[0]
     if "." in setting.key and isinstance(document.data.get(first), str):
         document = scenarios_inlined(document, model, read, faults, only=first)
         if isinstance(document.data.get(first), str):
-            return document  # no scenario, as noted, or a key without scenarios, as the check will say
+            return document  # no scenario, as noted, or a key without scenarios, as the check will report
     for path in key_paths(document, model, setting.key):
         document = _without_twin(document, path).graft(path, setting.value, setting.origin)
     return document
@@ -79,12 +91,13 @@ def _without_twin(document: Document, path: Path) -> Document:
     twin = in_degrees(str(path[-1])) or in_radians(str(path[-1]))
     if twin is None or document.get((*path[:-1], twin)) is ABSENT:
         return document
-    holder = {key: value for key, value in document.get(path[:-1]).items() if key != twin}
-    return document.with_data(path[:-1], holder)
+    holder = document.get(path[:-1])
+    assert isinstance(holder, dict)  # it has the twin
+    return document.with_data(path[:-1], {key: value for key, value in holder.items() if key != twin})
 
 
 def scenarios_inlined(
-    document: Document, model: type[Study], read: Callable, faults: Faults, only: str | None = None
+    document: Document, model: type[Study], read: Read, faults: Faults, only: str | None = None
 ) -> Document:
     """The document with the content of scenario files in place of their stems."""
     for field, info in model.model_fields.items():
@@ -113,7 +126,7 @@ def data_files_found(document: Document, model: type[Study], faults: Faults) -> 
     """The document with a path that can be opened for each file of data, named from the folder of its own YAML file."""
     for path, value in list(_texts(document.data, ())) if _has_data_files(model) else ():
         holder = model_at(model, document.data, path[:-1])
-        info = holder.model_fields.get(path[-1]) if holder else None
+        info = holder.model_fields.get(str(path[-1])) if holder else None
         if info is None or not any(isinstance(mark, DataFile) for mark in info.metadata):
             continue
         origin = document.origin(path)

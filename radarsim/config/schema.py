@@ -4,7 +4,7 @@ from typing import Annotated, Protocol
 
 from pydantic import Field
 
-from radarsim.config.fields import Anything, Flag, Model, Name, Stem, Study, whole
+from radarsim.config.fields import Anything, Flag, Model, Name, Stem, Study, Whole
 
 LARGEST_REALISATIONS = 10**12
 LARGEST_SEED = 2**64 - 1
@@ -20,10 +20,10 @@ class Common(Model):
     sweep: Annotated[dict[str, Annotated[tuple[Anything, ...], Field(min_length=1)]], Field(min_length=1)] | None = (
         Field(None, description="a case for each combination of values: key or dotted path, and its list of values")
     )
-    realisations: whole(1, LARGEST_REALISATIONS) | None = Field(
+    realisations: Annotated[int, Whole(1, LARGEST_REALISATIONS)] | None = Field(
         None, description="how often the experiment is repeated"
     )
-    seed: whole(0, LARGEST_SEED) | None = Field(None, description="seed of the noise; default 1")
+    seed: Annotated[int, Whole(0, LARGEST_SEED)] | None = Field(None, description="seed of the noise; default 1")
     figures: dict[Name, Annotated[tuple[Name, ...], Field(min_length=1)]] = Field(
         {}, description="for a figure the cases it shows: names, or patterns with * and ?"
     )
@@ -37,7 +37,7 @@ COMMON_KEYS = tuple(Common.model_fields)
 
 
 class Studies(Protocol):
-    """The studies at hand; see radarsim.studies.registry, which config does not know."""
+    """The available studies; see radarsim.studies.registry, which config does not know."""
 
     def names(self) -> tuple[str, ...]:
         """The values that `study:` may have."""

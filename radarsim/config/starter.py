@@ -3,27 +3,27 @@
 import json
 import re
 from collections.abc import Iterator, Mapping
-from types import UnionType
-from typing import Annotated, Union, get_args, get_origin
+from typing import Any, get_args
 
 from pydantic_core import PydanticUndefined
 
+from radarsim.config.check import models_in
 from radarsim.config.faults import short
 from radarsim.config.fields import Model, in_radians
 from radarsim.config.schema import COMMON_KEYS, Common
 
 PLAIN = re.compile(r"[A-Za-z_][\w+ .*-]*")  # text that YAML reads as text without quotes
-WORDS = {"true", "false", "null", "yes", "no", "on", "off", "none"}
+RESERVED = {"true", "false", "null", "yes", "no", "on", "off", "none"}
 COLUMN = 44  # at which comments begin
 WIDTH = 110
 DEVICES = ("radar", "sensor")  # whose display name is the config's
 DEGREES = {"rad": "degrees", "rad/s": "degrees per second"}
 
 
-def starter(data: Mapping, study_keys: type[Model], name: str, like: str) -> str:
-    """YAML of a config's data (as read, keys as written) under a new name, with the schema's words on every key.
+def starter(data: Mapping[str, Any], study_keys: type[Model], name: str, like: str) -> str:
+    """YAML of a config's data (as read, keys as written) under a new name, each key with the schema's description.
 
-    Keys that are not given but might be stand below, commented out, with their defaults.
+    Optional keys that are not given follow, commented out, with their defaults.
     """
     lines = [
         f"# {name}.yaml — like {like}: change the numbers, then `radarsim run {name}.yaml`",
@@ -44,8 +44,8 @@ def starter(data: Mapping, study_keys: type[Model], name: str, like: str) -> str
     return "\n".join(lines) + "\n"
 
 
-def _mapping(data: Mapping, model, indent: str, optional: bool) -> list[str]:
-    """The lines of a mapping, and of the keys it might have too."""
+def _mapping(data: Mapping[str, Any], model: type[Model] | None, indent: str, optional: bool) -> list[str]:
+    """The lines of a mapping, and of the optional keys it lacks."""
     lines = [line for key, value in data.items() for line in _entry(key, value, model, indent)]
     if optional and model is not None:
         given = {in_radians(key) or key for key in data} | set(data)
@@ -57,7 +57,7 @@ def _mapping(data: Mapping, model, indent: str, optional: bool) -> list[str]:
     return lines
 
 
-def _entry(key: str, value, model, indent: str) -> list[str]:
+def _entry(key: str, value: object, model: type[Model] | None, indent: str) -> list[str]:
     """The lines of one key: short values beside it, mappings and lists of mappings below."""
     about, inner = _about(model, key), _inner(model, key, value)
     if isinstance(value, Mapping) and inner is not None and key != "sweep":
@@ -71,7 +71,7 @@ def _entry(key: str, value, model, indent: str) -> list[str]:
     return [_line(f"{indent}{key}: {flow(value)}", about)]
 
 
-def _item(one: Mapping, indent: str) -> Iterator[str]:
+def _item(one: Mapping[str, Any], indent: str) -> Iterator[str]:
     """A mapping of a list: in one line where it fits, else a key a line."""
     whole = f"{indent}  - {flow(one)}"
     if len(whole) <= WIDTH:
@@ -85,51 +85,41 @@ def _line(text: str, about: str) -> str:
     return f"{text:<{COLUMN}}  # {about}" if about else text
 
 
-def _about(model, key: str) -> str:
-    """What the schema says of a key; of one in degrees with that unit."""
+def _about(model: type[Model] | None, key: str) -> str:
+    """The schema's description of a key; of one in degrees with that unit."""
     if model is None:
         return ""
     name = key if key in model.model_fields else in_radians(key)
-    if name not in model.model_fields:
+    if name is None or name not in model.model_fields:
         return ""
-    words = " ".join((model.model_fields[name].description or "").split())
+    about = " ".join((model.model_fields[name].description or "").split())
     if name != key:
         for unit, degrees in sorted(DEGREES.items(), reverse=True):
-            words = re.sub(rf"(?<=, ){re.escape(unit)}(?![\w/])", degrees, words)
-    return words
+            about = re.sub(rf"(?<=, ){re.escape(unit)}(?![\w/])", degrees, about)
+    return about
 
 
-def _inner(model, key: str, value):
+def _inner(model: type[Model] | None, key: str, value: object) -> type[Model] | None:
     """The model of a key's mapping, or of the members of its list: of several the one whose keys and kind fit."""
-    name = key if model is not None and key in model.model_fields else None
-    if name is None:
+    if model is None or key not in model.model_fields:
         return None
     members = value if isinstance(value, list) else [value]
     found = [
         one
-        for one in _models(model.model_fields[name].annotation)
+        for one in models_in(model.model_fields[key].annotation)
         if all(isinstance(member, Mapping) and _fits(one, member) for member in members)
     ]
     return found[0] if found else None
 
 
-def _fits(model: type[Model], data: Mapping) -> bool:
+def _fits(model: type[Model], data: Mapping[str, Any]) -> bool:
     kind = model.model_fields.get("kind")
     if kind is not None and "kind" in data and data["kind"] not in get_args(kind.annotation):
         return False
     return all((in_radians(key) or key) in model.model_fields or key in model.model_fields for key in data)
 
 
-def _models(annotation) -> Iterator[type[Model]]:
-    """Every model that a type may be, or hold in a list."""
-    if isinstance(annotation, type) and issubclass(annotation, Model):
-        yield annotation
-    elif get_origin(annotation) in (Annotated, Union, UnionType, tuple, list):
-        for part in get_args(annotation):
-            yield from _models(part)
-
-
-def flow(value) -> str:
+def flow(value: object) -> str:
     """A value as YAML in one line; numbers at their shortest."""
     match value:
         case bool():
@@ -141,4 +131,4 @@ def flow(value) -> str:
         case Mapping():
             return "{" + ", ".join(f"{key}: {flow(one)}" for key, one in value.items()) + "}"
     text = str(value)
-    return text if PLAIN.fullmatch(text) and text == text.strip() and text.lower() not in WORDS else json.dumps(text)
+    return text if PLAIN.fullmatch(text) and text == text.strip() and text.lower() not in RESERVED else json.dumps(text)

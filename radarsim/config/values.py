@@ -10,19 +10,19 @@ from collections.abc import Mapping
 from radarsim.config.faults import Faults, Origin, Path
 
 NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
-WORDS = {"true": True, "false": False, "": None, "~": None, "null": None}
+CONSTANTS = {"true": True, "false": False, "": None, "~": None, "null": None}
 NOT_FINITE = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
 DEEPEST = 50
 
 
 class NotFinite(ValueError):
-    """A number that is infinite or none."""
+    """A number that is infinite or not-a-number."""
 
 
 def from_text(text: str) -> object:
     """The value of a plain (unquoted) word: number, true, false, nothing, or the text itself."""
-    if text in WORDS:
-        return WORDS[text]
+    if text in CONSTANTS:
+        return CONSTANTS[text]
     if NOT_FINITE.fullmatch(text):
         raise NotFinite(text)
     if not NUMBER.fullmatch(text):
@@ -34,7 +34,7 @@ def from_text(text: str) -> object:
 
 
 def from_python(value: object, path: Path, origin: Origin, faults: Faults) -> object:
-    """A dictionary handed in from Python as YAML would have given it; NumPy scalars and arrays become plain values."""
+    """A dictionary given in Python as YAML would have given it; NumPy scalars and arrays become plain values."""
     if len(path) > DEEPEST:
         faults.spoil(origin, path[:3], f"nested more than {DEEPEST} deep")
         return None

@@ -1,5 +1,5 @@
-"""A look over stored blocks, without the work that made them: is each file what its name says, are all there that a
-total was added from, do they add up to it? Nothing is changed."""
+"""An audit of stored blocks, without the work that made them: is each file what its name says, are all the blocks there
+that a total was added from, do they add up to it? Nothing is changed."""
 
 import os
 import re
@@ -30,7 +30,7 @@ class Audit:
 
 
 def audited(path: Path, reported: int | None = None) -> Audit:
-    """Look over the blocks of one identity, and for the total of `reported` realisations among them."""
+    """Check the blocks of one identity, and that the total of `reported` realisations is among them."""
     found = Audit(path)
     for name in _names(path):
         piece = piece_named(name)
@@ -112,7 +112,7 @@ def _added_up(found: Audit, total: Total) -> None:
     if rest:
         end = Sums(*_sums(found, cut))
         sums = added(sums, end, 0) if full else end
-    used = [total, *inner, *([cut] if rest else [])]
+    used: list[Piece] = [total, *inner, *([cut] if rest else [])]
     if not agree(sums.values, values, {name for piece in used for name in found.pieces[piece][0]["platforms"]}):
         found.faults.append(f"{found.path / (total.name + SUFFIX)}: is not the sum of the blocks beside it")
 

@@ -1,4 +1,4 @@
-"""Realisations cut into blocks, blocks gathered in a fixed binary tree.
+"""Realisations cut into blocks, blocks merged in a fixed binary tree.
 
 Block b holds the realisations [b·size, (b+1)·size); the last one of a run may be cut short. A node is an aligned run of
 2^level blocks, and its sums are always those of its two halves added. The total of N realisations is the sum of the
@@ -24,9 +24,12 @@ class Work(Protocol):
     A work may also have `explain(first, count)`, which gives lines saying where numbers that are not finite came from.
     """
 
-    identity: str
-    block: int
-    size: int
+    @property
+    def identity(self) -> str: ...
+    @property
+    def block(self) -> int: ...
+    @property
+    def size(self) -> int: ...
 
     def simulate(self, first: int, count: int) -> np.ndarray:
         """Sums (size,), float64, over realisations first … first+count-1; called from several threads at once."""
@@ -167,7 +170,8 @@ def simulated(work: Work, piece: Node | Partial) -> Sums:
 
 def _merged(work: Work, first: int, count: int) -> np.ndarray:
     """Sums of one block or less, or of 2^q blocks, of which the odd one of each level meets the even one that waits."""
-    block, shape, waiting = work.block, (work.size,), []
+    block, shape = work.block, (work.size,)
+    waiting: list[np.ndarray] = []
     for number, start in enumerate(range(first, first + count, block)):
         values = work.simulate(start, min(block, count))
         if not isinstance(values, np.ndarray) or values.dtype != np.float64 or values.shape != shape:

@@ -16,10 +16,15 @@ import time
 from functools import lru_cache
 from itertools import count
 from queue import Empty, SimpleQueue
+from types import ModuleType, TracebackType
+from typing import TYPE_CHECKING, Self
 
 from radarsim.engine.blocks import Node, Partial, Work
 from radarsim.engine.executors import Outcome, attempted
 from radarsim.errors import ClusterError, ConfigError, Interrupted
+
+if TYPE_CHECKING:
+    from distributed import Future, LocalCluster
 
 CONNECT_S = 10
 WORKERS_S = 30  # how long a scheduler may be without a worker
@@ -35,7 +40,7 @@ SETTINGS = {
 }
 
 
-def _dask():
+def _dask() -> ModuleType:
     try:
         import distributed
     except ImportError as error:
@@ -43,8 +48,8 @@ def _dask():
     return distributed
 
 
-def _check(distributed, address: str) -> None:
-    """ConfigError for an address that is none: a Client that cannot read it takes half a minute to say so."""
+def _check(distributed: ModuleType, address: str) -> None:
+    """ConfigError for an invalid address: a Client that cannot read it takes half a minute to report it."""
     try:
         distributed.comm.resolve_address(address)
     except (OSError, ValueError, KeyError, TypeError) as error:
@@ -70,16 +75,18 @@ class Cluster:
         for name in QUIET:
             logging.getLogger(name).setLevel(logging.CRITICAL)
         self._dead = distributed.scheduler.KilledWorker
-        self._done: SimpleQueue = SimpleQueue()
-        self._tasks: dict[str, tuple] = {}  # by key: the future, the work, the piece
+        self._done: SimpleQueue[Future] = SimpleQueue()
+        self._tasks: dict[str, tuple[Future, Work, Node | Partial]] = {}  # by key
         self._running: set[str] = set()  # after a cancel: those let finish
         self._numbers = count()
         self._looked = self._seen = time.monotonic()
-        self._scheduler, self._own = None, None
+        self._scheduler: LocalCluster | None = None
+        self._own: _Processes | None = None
         self._place = scheduler or "this machine"
         with dask.config.set(SETTINGS):
             if scheduler is not None:
                 _check(distributed, scheduler)
+                address = scheduler
             else:
                 options = {
                     "host": LOOPBACK,
@@ -88,13 +95,13 @@ class Cluster:
                     "processes": False,
                 }
                 self._scheduler = distributed.LocalCluster(n_workers=0, silence_logs=logging.CRITICAL, **options)
+                address = self._scheduler.scheduler_address
             try:
-                where = scheduler or self._scheduler.scheduler_address
-                self._client = distributed.Client(where, timeout=CONNECT_S, set_as_default=False)
+                self._client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
             except OSError as error:
                 raise ConfigError(f"--scheduler: no Dask scheduler answers at {scheduler}: {error}") from error
         if workers is not None:
-            self._own = _Processes(workers, self._scheduler.scheduler_address)
+            self._own = _Processes(workers, address)
         self._wait_for_workers(workers or 1)
 
     def _wait_for_workers(self, wanted: int) -> None:
@@ -110,10 +117,10 @@ class Cluster:
         self.depth = 2 * self.workers + 2
         return self.workers
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind, *_):
+    def __exit__(self, kind: type[BaseException] | None, *_: BaseException | TracebackType | None) -> None:
         if self._own is not None:
             self._own.kill()
         if kind is not Interrupted:  # whose process ends at once; an orderly end would take two seconds
@@ -135,17 +142,18 @@ class Cluster:
         """
         outcomes: list[Outcome] = []
         with contextlib.suppress(Empty):
-            outcomes += self._taken(self._done.get(timeout=timeout_s))
+            outcomes += self._collected(self._done.get(timeout=timeout_s))
             while True:
-                outcomes += self._taken(self._done.get_nowait())
+                outcomes += self._collected(self._done.get_nowait())
         self._look()
         return outcomes
 
-    def _taken(self, future) -> list[Outcome]:
-        task = self._tasks.pop(future.key, None)
+    def _collected(self, future: "Future") -> list[Outcome]:
+        key = str(future.key)
+        task = self._tasks.pop(key, None)
         if task is None:  # cancelled before
             return []
-        self._running.discard(future.key)
+        self._running.discard(key)
         if future.status == "finished":
             with contextlib.suppress(Exception):  # the worker died before it was asked: once more
                 return [future.result()]
@@ -161,7 +169,7 @@ class Cluster:
         raise ClusterError(f"{self._place}: a worker cannot run the blocks: {type(error).__name__}: {error}")
 
     def _look(self) -> None:
-        """About once a second: is the scheduler there, and who works for it?"""
+        """About once a second: is the scheduler there, and which workers are connected?"""
         now = time.monotonic()
         if now < self._looked + LOOK_S:
             return
@@ -190,7 +198,7 @@ class Cluster:
         try:
             stacks = self._client.call_stack(keys=list(waiting)) if self._client.status == "running" else {}
             started = {str(key) for tasks in stacks.values() for key in tasks}
-        except Exception:  # whatever Dask has against it, nothing is then known to run
+        except Exception:  # whatever Dask raises, nothing is then known to run
             started = set()
         self._running |= waiting & started
         dropped = [self._tasks.pop(key)[0] for key in waiting - started]
@@ -238,9 +246,11 @@ class _Processes:
         self._environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         self._running = [self._started() for _ in range(workers)]
 
-    def _started(self) -> subprocess.Popen:
-        silent = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
-        return subprocess.Popen(self._command, env=self._environment, start_new_session=True, **silent)
+    def _started(self) -> subprocess.Popen[bytes]:
+        null = subprocess.DEVNULL
+        return subprocess.Popen(
+            self._command, env=self._environment, start_new_session=True, stdin=null, stdout=null, stderr=null
+        )
 
     def replace(self) -> None:
         """Start a new one for each that has died."""

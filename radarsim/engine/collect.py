@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from radarsim.engine.blocks import Work
 from radarsim.engine.executors import Executor, Serial, Threads
-from radarsim.engine.run import Collected, Run, Share, Shared
+from radarsim.engine.run import Collected, Dispatch, Run, Share, Shared
 from radarsim.engine.stopping import Stop
 from radarsim.errors import StoreError
 
@@ -20,7 +20,7 @@ def collect(
     stop: Stop | None = None,
     executor: Executor | None = None,
 ) -> Collected:
-    """Sums over realisations 0 … realisations-1 of the work; the same bytes however they are come by.
+    """Sums over realisations 0 … realisations-1 of the work; the same bytes however they are obtained.
 
     store is the results directory: what it holds of this work is used, what is computed is kept there. threads defaults
     to all cores; 0 runs everything in the calling thread. progress(done, total, from_store) is called at most ten times
@@ -55,7 +55,7 @@ def share(
     return run.finished(None if run.restored() else _computed(run, threads, stop, executor))
 
 
-def _computed(run: Run, threads: int | None, stop: Stop | None, executor: Executor | None) -> str | None:
+def _computed(run: Dispatch, threads: int | None, stop: Stop | None, executor: Executor | None) -> str | None:
     """Compute what a run lacks; the reason, if it was stopped. Whatever ends it, what is done is stored."""
     pool = executor or (Serial() if threads == 0 else Threads(threads))
     try:

@@ -1,4 +1,4 @@
-"""Where tasks run. An executor takes (work, piece) and gives back outcomes in any order; how is its own affair."""
+"""Where tasks run. An executor takes (work, piece) and gives back outcomes in any order."""
 
 import os
 import threading
@@ -18,8 +18,7 @@ class Outcome:
     """A finished task: its sums or the exception it ended in, and where it ran, the seconds and the instruction set."""
 
     piece: Node | Partial
-    sums: Sums | None
-    error: Exception | None
+    result: Sums | Exception
     seconds: float
     instruction_set: str
 
@@ -55,11 +54,12 @@ class Executor(Protocol):
 def attempted(work: Work, piece: Node | Partial) -> Outcome:
     """Run one task; a top-level function of small arguments, so that it also travels to other processes."""
     started = time.perf_counter()
+    result: Sums | Exception
     try:
-        sums, error = simulated(work, piece), None
-    except Exception as raised:
-        sums, error = None, raised
-    return Outcome(piece, sums, error, time.perf_counter() - started, instruction_set())
+        result = simulated(work, piece)
+    except Exception as error:
+        result = error
+    return Outcome(piece, result, time.perf_counter() - started, instruction_set())
 
 
 def available_cores() -> int:
@@ -80,8 +80,8 @@ class Threads:
     def __init__(self, workers: int | None = None):
         self.workers = workers or available_cores()
         self.depth = 2 * self.workers
-        self._tasks: SimpleQueue = SimpleQueue()
-        self._outcomes: SimpleQueue = SimpleQueue()
+        self._tasks: SimpleQueue[tuple[SimpleQueue[Outcome], Work, Node | Partial] | None] = SimpleQueue()
+        self._outcomes: SimpleQueue[Outcome] = SimpleQueue()
         for number in range(self.workers):
             threading.Thread(target=self._serve, name=f"block worker {number}", daemon=True).start()
 
@@ -115,7 +115,7 @@ class Threads:
             return dropped
 
     def forget(self) -> None:
-        """Drop all tasks; what still runs ends unheard."""
+        """Drop all tasks; the outcome of one that still runs is ignored."""
         self.cancel()
         self._outcomes = SimpleQueue()
 
@@ -131,14 +131,14 @@ class Serial:
     workers, depth, shortest_s, longest_s = 1, 1, Threads.shortest_s, Threads.longest_s
 
     def __init__(self) -> None:
-        self._tasks: deque = deque()
+        self._tasks: deque[tuple[Work, Node | Partial]] = deque()
 
     def submit(self, work: Work, piece: Node | Partial) -> None:
         """Keep a task until the next call of finished."""
         self._tasks.append((work, piece))
 
     def finished(self, timeout_s: float) -> list[Outcome]:
-        """Run the oldest task; the timeout has no say."""
+        """Run the oldest task; the timeout has no effect."""
         return [attempted(*self._tasks.popleft())] if self._tasks else []
 
     def cancel(self) -> int:

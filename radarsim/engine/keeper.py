@@ -24,7 +24,8 @@ class Keeper:
 
     def found(self, nodes: Mapping[Node, Sums]) -> None:
         """These were read; a merger of several is not among the files, and is written like any other."""
-        self._durable.update(self.store.pieces() & nodes.keys())
+        stored = self.store.pieces()
+        self._durable.update(node for node in nodes if node in stored)
 
     def offer(self, nodes: Mapping[Node, Sums]) -> None:
         """Start to write those that are new, if a second has passed. Raises the error of the writing before.

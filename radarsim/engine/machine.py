@@ -11,9 +11,9 @@ _DECIDING = ("avx512f", "avx2", "fma", "avx", "sse4_2", "asimd")
 
 @functools.cache
 def instruction_set() -> str:
-    """Instruction set in words, like `x86_64 avx512f avx2 fma`; sums from equal ones are equal to the last bit.
+    """The instruction set, like `x86_64 avx512f avx2 fma`; sums from equal ones are equal to the last bit.
 
-    A compiler told to aim at another processor (NUMBA_CPU_NAME) is named, since that decides instead.
+    If the compiler targets another processor (NUMBA_CPU_NAME), that is named, since it decides instead.
     """
     aimed_at = os.environ.get("NUMBA_CPU_NAME")
     found = set(_flags())

@@ -1,9 +1,9 @@
-"""One run: what is stored, what is missing, tasks handed out and taken in, and the sums that come of it."""
+"""One run: what is stored, what is missing, tasks dispatched, outcomes collected, and the resulting sums."""
 
 import math
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, Work, added, widest
@@ -20,7 +20,7 @@ PROGRESS_S = 0.1
 
 @dataclass(frozen=True)
 class Collected(Sums):
-    """The sums of realisations 0 … count-1, and how they were come by.
+    """The sums of realisations 0 … count-1, and how they were obtained.
 
     count is what was asked for unless `stopped` says why it is less. from_store and computed are realisations: those
     read, and those simulated in this call. kernel_seconds is the time inside tasks, summed over the workers.
@@ -70,14 +70,14 @@ class Pace:
         return max(0, fair, worthwhile)
 
 
-class Run:
-    """One call of collect: realisations 0 … N-1, of which blocks first … stop-1 and the cut one are its own to do."""
+class Dispatch:
+    """Tasks over realisations 0 … N-1, of which blocks first … stop-1 and the cut one are to be done here."""
 
     def __init__(
         self,
         work: Work,
         realisations: int,
-        store: str | os.PathLike | None,
+        store: str | os.PathLike[str] | None,
         progress: Callable[[int, int, int], None] | None,
     ):
         self.work, self.asked = work, realisations
@@ -85,33 +85,21 @@ class Run:
         self.first, self.stop = 0, self.full
         self.forest = Forest(work.block, work.size)
         self.partial: Sums | None = None
-        self.total: Sums | None = None
         self.from_store = self.computed = 0
         self.kernel_seconds = 0.0
         self.started = time.perf_counter()
         self._keeper = None if store is None else Keeper(Store(store, work))
         self._progress, self._progress_due = progress, 0.0
-        self._fault: Outcome | None = None
+        self._fault: tuple[Node | Partial, Exception] | None = None  # the leftmost, and what it raised
 
-    def restored(self) -> bool:
-        """Read what is stored; whether that is all."""
-        if self._keeper is None:
-            return False
-        self.total = self._keeper.store.read(Total(self.asked))
-        if self.total is None:
-            self._read_pieces()
-        held = [self.total] if self.total is not None else self.pieces().values()
-        self.from_store = sum(sums.count for sums in held)
-        return self.from_store == self.asked
-
-    def _read_pieces(self) -> None:
-        self.forest = self._keeper.store.forest(self.full)
-        self._keeper.found(self.forest.nodes)
+    def _read_pieces(self, keeper: Keeper) -> None:
+        self.forest = keeper.store.forest(self.full)
+        keeper.found(self.forest.nodes)
         if self.rest:
-            self.partial = self._keeper.store.read(Partial(self.full, self.rest))
+            self.partial = keeper.store.read(Partial(self.full, self.rest))
 
     def compute(self, executor: Executor, stop: Stop | None) -> str | None:
-        """Hand out what is missing and take it in; the reason, if stop gave one."""
+        """Dispatch what is missing and collect the outcomes; the reason, if stop gave one."""
         pace = Pace(executor)
         tasks = self._tasks(pace)
         waiting, stopped, give_up = 0, None, math.inf
@@ -133,7 +121,7 @@ class Run:
             if self._keeper is not None:
                 self._keeper.offer(self.forest.nodes)
         if self._fault is not None:
-            raise self._fault.error
+            raise self._fault[1]
         return stopped
 
     def missing(self) -> list[tuple[int, int]]:
@@ -155,18 +143,19 @@ class Run:
 
     def _take(self, outcome: Outcome, pace: Pace) -> None:
         self.kernel_seconds += outcome.seconds
-        if outcome.error is not None:
-            if self._fault is None or outcome.piece.first < self._fault.piece.first:
-                self._fault = outcome
+        sums = outcome.result
+        if isinstance(sums, Exception):
+            if self._fault is None or outcome.piece.first < self._fault[0].first:
+                self._fault = outcome.piece, sums
             return
-        self.computed += outcome.sums.count
+        self.computed += sums.count
         if self._keeper is not None:
             self._keeper.store.platforms.add(outcome.instruction_set)
         if isinstance(outcome.piece, Partial):
-            self.partial = outcome.sums
+            self.partial = sums
         else:
             pace.note(1 << outcome.piece.level, outcome.seconds)
-            self.forest.add(outcome.piece, outcome.sums)
+            self.forest.add(outcome.piece, sums)
 
     def _report(self, *, last: bool = False) -> None:
         now = time.perf_counter()
@@ -176,20 +165,52 @@ class Run:
 
     def pieces(self) -> dict[Piece, Sums]:
         """What is done, as it is stored."""
-        cut = {} if self.partial is None else {Partial(self.full, self.rest): self.partial}
-        return self.forest.nodes | cut
+        pieces: dict[Piece, Sums] = {}
+        for node, sums in self.forest.nodes.items():
+            pieces[node] = sums
+        if self.partial is not None:
+            pieces[Partial(self.full, self.rest)] = self.partial
+        return pieces
 
-    def keep(self, pieces: dict[Piece, Sums]) -> None:
+    def keep(self, pieces: Mapping[Piece, Sums]) -> None:
         """Put these into the store, if there is one."""
         if self._keeper is not None:
             self._keeper.finish(pieces)
+
+    def _warnings(self) -> tuple[str, ...]:
+        if self._keeper is None:
+            return ()
+        store = self._keeper.store
+        if len(store.platforms) < 2:
+            return tuple(store.warnings)
+        mixed = "; ".join(sorted(store.platforms))
+        return (*store.warnings, f"{store.path}: sums from several instruction sets, equal to 1e-12 only: {mixed}")
+
+
+class Run(Dispatch):
+    """One call of collect."""
+
+    total: Sums | None = None
+
+    def restored(self) -> bool:
+        """Read what is stored; whether that is all."""
+        if self._keeper is None:
+            return False
+        self.total = self._keeper.store.read(Total(self.asked))
+        if self.total is None:
+            self._read_pieces(self._keeper)
+        held = [self.total] if self.total is not None else self.pieces().values()
+        self.from_store = sum(sums.count for sums in held)
+        return self.from_store == self.asked
 
     def finished(self, stopped: str | None) -> Collected:
         """The result, once all that it rests on is stored, and itself as a total."""
         result = self.result(stopped)
         if self.total is None:
-            reported = {Total(result.count): Sums(result.count, result.values)} if result.count else {}
-            self.keep(self.pieces() | reported)
+            pieces = self.pieces()
+            if result.count:
+                pieces[Total(result.count)] = Sums(result.count, result.values)
+            self.keep(pieces)
         self._report(last=True)
         return result
 
@@ -210,18 +231,9 @@ class Run:
             warnings=self._warnings(),
         )
 
-    def _warnings(self) -> tuple[str, ...]:
-        if self._keeper is None:
-            return ()
-        store = self._keeper.store
-        if len(store.platforms) < 2:
-            return tuple(store.warnings)
-        mixed = "; ".join(sorted(store.platforms))
-        return (*store.warnings, f"{store.path}: sums from several instruction sets, equal to 1e-12 only: {mixed}")
 
-
-class Share(Run):
-    """One call of share. Its sums go into the store as nodes; a total there is none."""
+class Share(Dispatch):
+    """One call of share. Its sums go into the store as nodes; it makes no total."""
 
     def __init__(
         self,
@@ -229,10 +241,11 @@ class Share(Run):
         realisations: int,
         number: int,
         of: int,
-        store: str | os.PathLike,
+        store: str | os.PathLike[str],
         progress: Callable[[int, int, int], None] | None,
     ):
-        super().__init__(work, realisations, store, progress)
+        super().__init__(work, realisations, None, progress)
+        self._keeper: Keeper = Keeper(Store(store, work))
         blocks = self.full + (self.rest > 0)
         self.first, self.stop = (min(blocks * bound // of, self.full) for bound in (number - 1, number))
         self.rest = self.rest if number == of else 0
@@ -240,7 +253,7 @@ class Share(Run):
 
     def restored(self) -> bool:
         """Read what is stored; whether that is all of the share."""
-        self._read_pieces()
+        self._read_pieces(self._keeper)
         self.from_store = self.done()
         return self.from_store == self.asked
 
@@ -250,7 +263,7 @@ class Share(Run):
         return self.asked - missing - (self.rest if self.partial is None else 0)
 
     def finished(self, stopped: str | None) -> Shared:
-        """What came of it, once it is stored; without a block an empty directory, to be copied too."""
+        """What was done, once it is stored; without a block an empty directory, to be copied too."""
         self._keeper.store.make()
         self.keep(self.pieces())
         self._report(last=True)

@@ -1,4 +1,4 @@
-"""Reasons to stop a run: a stop condition is called between tasks and gives None or the reason in words."""
+"""Reasons to stop a run: a stop condition is called between tasks and gives None or the reason as text."""
 
 import math
 import os

@@ -28,7 +28,7 @@ def acceleration_start(coefficients: Sequence[float], acceleration: float, start
 def jerk_pulse(coefficients: Sequence[float], jerk: float, start: float, duration: float, t: np.ndarray) -> np.ndarray:
     """A polynomial with a constant jerk (m/s³) from `start` for `duration` (s), then acceleration: (K, 3) at t (K,)."""
 
-    def ramp(onset):
+    def ramp(onset: float) -> np.ndarray:
         since = np.maximum(t - onset, 0.0)
         return np.stack([since**3 / 6, since**2 / 2, since], axis=1)
 
