@@ -20,7 +20,7 @@ def held(directory):
 
 @given(st.integers(1, 5_000), st.integers(1, 40))
 def test_shares_tile_the_blocks_and_the_last_has_the_cut_one(realisations, of):
-    shares = [Share(WORK, realisations, number, of, None, None) for number in range(1, of + 1)]
+    shares = [Share(WORK, realisations, number, of, "unwritten", None) for number in range(1, of + 1)]
     assert [one.first for one in shares] == [0, *(one.stop for one in shares[:-1])]
     assert shares[-1].stop == realisations // 16
     assert [one.rest for one in shares] == [0] * (of - 1) + [realisations % 16]
