@@ -34,7 +34,7 @@ SONAR = {
 def work(config, **sensor):
     """A case as the engine sees it, and its filter-scans a realisation."""
     from radarsim.app.configs import load
-    from radarsim.studies import CaseWork
+    from radarsim.app.work import CaseWork
 
     if sensor:
         config = config | {"sensor": config["sensor"] | sensor}

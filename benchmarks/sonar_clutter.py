@@ -39,7 +39,7 @@ def config(association: str, density: float) -> dict:
 def measure(n: int) -> dict:
     """Figures of one process."""
     from radarsim.app.configs import load
-    from radarsim.studies import CaseWork
+    from radarsim.app.work import CaseWork
 
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-1:])
     out = {}

@@ -47,7 +47,7 @@ def c_limit(folder: Path):
 def work():
     """RLS 2 as the engine sees it."""
     from radarsim.app.configs import load
-    from radarsim.studies import CaseWork
+    from radarsim.app.work import CaseWork
 
     (case,) = load(CONFIG).cases
     made = CaseWork(case)

@@ -75,7 +75,7 @@ def full_matrix(size: int) -> np.ndarray:
 def work(every: int, name: str = "multimodel", filters: int = 1):
     """The whole chain of a shipped config, its first filters."""
     from radarsim.app.configs import load
-    from radarsim.studies import CaseWork
+    from radarsim.app.work import CaseWork
 
     (case,) = load(name, (f"report_every={every}", f"scans={SCANS}")).cases
     spec = case.spec.model_copy(update={"filters": case.spec.filters[:filters]})
