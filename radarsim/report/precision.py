@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 Curves = Callable[[Sequence[CaseResult]], "pandas.DataFrame"]  # a study's table of curves
 FIRST = 2000
+EQUAL = 1e-9  # relative difference of widths that is rounding
 MOST = 10**12  # realisations, as in a config
 
 
@@ -59,9 +60,10 @@ def worst(result: CaseResult, table: Curves) -> Cell | None:
     with np.errstate(divide="ignore", invalid="ignore"):
         percent = np.where(hi == lo, 0.0, 50 * (hi - lo) / sigma)
     percent = np.where(np.isnan(percent) | np.isnan(sigma), np.inf, percent)
-    row = int(np.argmax(percent))
+    # Of equal ones the first: Gaussian errors without bias are all known equally well, up to rounding.
+    row = int(np.flatnonzero(percent >= percent.max() * (1 - EQUAL))[0])
     names = (str(curves[name].iloc[row]) for name in ("case", "filter", "component"))
-    return Cell(float(percent[row]), *names, int(curves["k"].iloc[row]), result.count)
+    return Cell(float(percent.max()), *names, int(curves["k"].iloc[row]), result.count)
 
 
 def needed(result: CaseResult, percent: float, table: Curves) -> int | None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from llvmlite.binding import get_host_cpu_features
+from numba.core.registry import cpu_target
 
 from radarsim.kernels import cache
 from radarsim.kernels import compile as compiling
@@ -133,7 +133,9 @@ def test_other_users_of_numba_keep_their_cache():
     assert twice(4) == 8
 
 
-@pytest.mark.skipif(not get_host_cpu_features().get("avx512f"), reason="no registers of 512 bits")
+@pytest.mark.skipif(
+    "+avx512f" not in cpu_target.target_context.codegen()._tm_features, reason="no registers of 512 bits"
+)
 def test_loops_use_wide_registers():
     def scaled(x):
         for i in range(x.size):

@@ -72,8 +72,9 @@ def test_polynomials_against_the_library():
         assert units_off([log_polynomial(v) for v in x], np.log(x.astype(np.longdouble))) < 3
     x = (rng.random(40_000) - 0.5) * np.pi / 2
     sine, cosine = np.array([sine_cosine_polynomial(v) for v in x]).T
-    assert units_off(sine, np.sin(x.astype(np.longdouble))) < 1.5
-    assert units_off(cosine, np.cos(x.astype(np.longdouble))) < 1.5
+    # Each of the last operations rounds by half a unit: three of them with fused multiply-adds, four without.
+    assert units_off(sine, np.sin(x.astype(np.longdouble))) < 2
+    assert units_off(cosine, np.cos(x.astype(np.longdouble))) < 2
 
 
 def test_normals_are_box_and_muller_of_the_words():
