@@ -13,6 +13,7 @@ from pathlib import Path
 
 from radarsim.app import arguments, simulation, stored_claims
 from radarsim.app.configs import load
+from radarsim.app.records import made_by_other_code
 from radarsim.app.result import Result
 from radarsim.app.simulation import Gathered, Means, Progress
 from radarsim.app.work import CaseWork
@@ -88,6 +89,7 @@ def run(
         simulation.check_precision([experiment], precision)
     limit = time_limit if time_limit is None or callable(time_limit) else stopping.time_limit(time_limit)
     started = time.perf_counter()
+    renewed = made_by_other_code(experiment, Path(out)) if out is not None else []
     with cluster(workers, scheduler) if executor is None else nullcontext(executor) as pool:
         threads = pool.workers if pool else int(threads or available_cores())
         means = Means(out, threads, stopping.Either(stop, limit), pool)
@@ -97,6 +99,7 @@ def run(
     if not gathered.cases:
         raise TargetUnmet(f"{experiment.stem}: {gathered.stopped}: nothing was done by then")
     facts = facts_of(gathered, threads, time.perf_counter() - started)
+    facts["warnings"] += renewed
     result = result_of(experiment, gathered, facts, overrides)
     if out is not None:
         result.write(out, figures)

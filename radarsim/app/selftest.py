@@ -10,11 +10,10 @@ import csv
 import io
 import json
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 
 from radarsim.app import run as experiment
-from radarsim.engine.machine import instruction_set, linear_algebra, processor
+from radarsim.engine.machine import platform
 
 KNOWN = Path(__file__).parent / "known"
 TABLES = ("curves", "gains")
@@ -46,6 +45,14 @@ TOLERANCES = {
     # found by scoring steps that use the inverse, each a fraction of σ long and ended by a threshold.
     "discriminator": Tolerance(sampled=1e-9, exact=1e-10),
 }
+UNKNOWN = Tolerance(sampled=1e-9, exact=1e-9)  # of a study that another package offers
+
+
+def tolerance(study: str) -> Tolerance:
+    """By how much a study's numbers may differ between platforms."""
+    return TOLERANCES.get(study, UNKNOWN)
+
+
 EXACT = ("exact_sigma", "exact_bias", "exact_percent", "posterior_sigma")
 LABELS_DIFFER = (float("inf"), float("inf"))
 FIRST_NUMBER = {"curves": "sigma", "gains": "gain_percent"}  # columns before it are labels and counts
@@ -58,12 +65,6 @@ class Verdict:
     study: str
     good: bool
     words: str
-
-
-def platform() -> dict[str, str]:
-    """What decides the last bits: processor, instruction set, BLAS, and the versions of what compiles and computes."""
-    here = {"processor": processor(), "instruction_set": instruction_set(), "linear_algebra": linear_algebra()}
-    return here | {name: metadata.version(name) for name in ("numba", "llvmlite", "numpy", "scipy")}
 
 
 def tables(study: str) -> dict[str, bytes]:

@@ -12,11 +12,11 @@ import numpy as np
 
 from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, added, maximal, widest
 from radarsim.engine.moments import Sums
-from radarsim.engine.store import SUFFIX, Damage, content, decoded, piece_named
+from radarsim.engine.store import SUFFIX, Damage, check_platforms, content, decoded, mixture, piece_named
 from radarsim.errors import StoreError
 
 LEFT = re.compile(r"\.[LPT][\d-]+\.sums\.[0-9a-f]+\.tmp")  # by a run that was killed while it wrote
-ACROSS = 1e-9  # of sums made on several instruction sets
+ACROSS = 1e-9  # of sums made on several platforms
 
 
 @dataclass
@@ -42,6 +42,9 @@ def audited(path: Path, reported: int | None = None) -> Audit:
     if len(shapes) > 1:
         found.faults.append(f"{path}: blocks of several sizes")
         return found
+    platforms = {name for header, _ in found.pieces.values() for name in header["platforms"]}
+    if len(platforms) > 1:
+        found.notes.append(f"{path}: {mixture(platforms)}")
     if reported is not None and Total(reported) not in found.pieces:
         _missing(found, Total(reported))
     for total in sorted((piece for piece in found.pieces if isinstance(piece, Total)), key=lambda piece: piece.count):
@@ -78,6 +81,7 @@ def _check(header: dict, values: np.ndarray, piece: Piece, identity: str) -> Non
     for key, value in expected.items():
         if header.get(key) != value:
             raise Damage(f"{key}: expected {value}, got {header.get(key)}")
+    check_platforms(header)
     if not np.isfinite(values).all():
         raise Damage("not all numbers are finite")
 
@@ -118,7 +122,7 @@ def _added_up(found: Audit, total: Total) -> None:
 
 
 def agree(one: np.ndarray, other: np.ndarray, platforms: set[str]) -> bool:
-    """Whether two vectors of the same sums are equal: to the last bit, if all came from one instruction set."""
+    """Whether two vectors of the same sums are equal: to the last bit, if all came from one platform."""
     if len(platforms) < 2:
         return one.tobytes() == other.tobytes()
     return bool(np.allclose(one, other, rtol=ACROSS, atol=ACROSS * float(np.abs(other).max(initial=0.0))))

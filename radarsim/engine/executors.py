@@ -9,18 +9,18 @@ from queue import Empty, SimpleQueue
 from typing import Protocol
 
 from radarsim.engine.blocks import Node, Partial, Work, simulated
-from radarsim.engine.machine import instruction_set
+from radarsim.engine.machine import platform_name
 from radarsim.engine.moments import Sums
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A finished task: its sums or the exception it ended in, and where it ran, the seconds and the instruction set."""
+    """A finished task: its sums or the exception it ended in, the seconds, and the platform that it ran on."""
 
     piece: Node | Partial
     result: Sums | Exception
     seconds: float
-    instruction_set: str
+    platform: str
 
 
 class Executor(Protocol):
@@ -59,7 +59,7 @@ def attempted(work: Work, piece: Node | Partial) -> Outcome:
         result = simulated(work, piece)
     except Exception as error:
         result = error
-    return Outcome(piece, result, time.perf_counter() - started, instruction_set())
+    return Outcome(piece, result, time.perf_counter() - started, platform_name())
 
 
 def available_cores() -> int:

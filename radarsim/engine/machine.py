@@ -1,9 +1,10 @@
-"""What made the sums: the instruction set that decides their last bits, and versions for the record."""
+"""What made the sums: the platform that decides their last bits, and versions for the record."""
 
 import functools
 import os
-import platform
+import platform as system
 import sys
+from importlib import metadata
 
 # Those that change which fused or vector instructions a compiler chooses, from the widest.
 _DECIDING = ("avx512f", "avx2", "fma", "avx", "sse4_2", "asimd")
@@ -17,7 +18,7 @@ def instruction_set() -> str:
     """
     aimed_at = os.environ.get("NUMBA_CPU_NAME")
     found = set(_flags())
-    parts = [platform.machine(), *(flag for flag in _DECIDING if flag in found)]
+    parts = [system.machine(), *(flag for flag in _DECIDING if flag in found)]
     return " ".join([*parts, f"aiming at {aimed_at}"] if aimed_at else parts)
 
 
@@ -39,7 +40,7 @@ def processor() -> str:
             names = [line.partition(":")[2].strip() for line in file.read(8192).splitlines() if "model name" in line]
     except OSError:
         names = []
-    return names[0] if names else platform.processor()
+    return names[0] if names else system.processor()
 
 
 @functools.cache
@@ -59,7 +60,24 @@ def linear_algebra() -> str:
     return ", ".join(sorted(found))
 
 
+LIBRARIES = ("numba", "llvmlite", "numpy", "scipy")  # what compiles and computes
+
+
+@functools.cache
+def platform() -> dict[str, str]:
+    """What decides the last bits: processor, instruction set, BLAS, and the versions of what compiles and computes."""
+    here = {"processor": processor(), "instruction_set": instruction_set(), "linear_algebra": linear_algebra()}
+    return here | {name: metadata.version(name) for name in LIBRARIES}
+
+
+@functools.cache
+def platform_name() -> str:
+    """The platform in one line, as it stands in the header of stored sums: equal lines, equal bytes."""
+    libraries = ", ".join(f"{name} {platform()[name]}" for name in LIBRARIES)
+    return f"{processor() or 'unknown processor'}: {instruction_set()}; {linear_algebra()}; {libraries}"
+
+
 def versions() -> dict[str, str]:
     """Versions of Python and of the libraries that compute, as far as they are loaded."""
     libraries = {name: sys.modules[name].__version__ for name in ("numpy", "numba") if name in sys.modules}
-    return {"python": platform.python_version()} | libraries
+    return {"python": system.python_version()} | libraries

@@ -11,7 +11,7 @@ from radarsim.engine.executors import Executor, Outcome
 from radarsim.engine.keeper import Keeper
 from radarsim.engine.moments import Sums
 from radarsim.engine.stopping import Stop
-from radarsim.engine.store import Store
+from radarsim.engine.store import Store, mixture
 
 SHARES = 4
 POLL_S = 0.05
@@ -150,7 +150,7 @@ class Dispatch:
             return
         self.computed += sums.count
         if self._keeper is not None:
-            self._keeper.store.platforms.add(outcome.instruction_set)
+            self._keeper.store.platforms.add(outcome.platform)
         if isinstance(outcome.piece, Partial):
             self.partial = sums
         else:
@@ -183,8 +183,7 @@ class Dispatch:
         store = self._keeper.store
         if len(store.platforms) < 2:
             return tuple(store.warnings)
-        mixed = "; ".join(sorted(store.platforms))
-        return (*store.warnings, f"{store.path}: sums from several instruction sets, equal to 1e-12 only: {mixed}")
+        return (*store.warnings, mixture(store.platforms))
 
 
 class Run(Dispatch):

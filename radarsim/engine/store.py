@@ -57,7 +57,7 @@ def piece_named(name: str) -> Piece | None:
 class Store:
     """The pieces of one work under a results directory. Makes no directory before the first write.
 
-    `warnings` gathers what was found damaged; `platforms` the instruction sets of all sums read or computed so far.
+    `warnings` gathers what was found damaged; `platforms` the platforms of all sums read or computed so far.
     """
 
     def __init__(self, directory: str | os.PathLike, work: Work):
@@ -108,6 +108,7 @@ class Store:
         for key, value in expected.items():
             if header.get(key) != value:
                 raise Damage(f"{key}: expected {value}, got {header.get(key)}")
+        check_platforms(header)
         if values.size != self._work.size:
             raise Damage(f"expected {self._work.size} numbers, got {values.size}")
         if not np.isfinite(values).all():
@@ -201,6 +202,21 @@ class Store:
         return forest
 
 
+def check_platforms(header: Mapping) -> None:
+    """Damage for a header that does not name the platforms of its sums."""
+    named = header.get("platforms")
+    if not isinstance(named, list) or not all(isinstance(name, str) for name in named):
+        raise Damage("does not name the platforms that its sums were made on")
+
+
+def mixture(platforms: Collection[str]) -> str:
+    """What is said of sums that were not all made on one platform; the same line for every case of a run."""
+    named = "; ".join(f"({number}) {name}" for number, name in enumerate(sorted(platforms), start=1))
+    return (
+        f"stored sums were made on {len(platforms)} platforms and are equal to rounding, not to the last bit: {named}"
+    )
+
+
 def encoded(header: Mapping, values: np.ndarray) -> bytes:
     """The content of a file."""
     body = MAGIC + json.dumps(header, sort_keys=True).encode() + b"\n" + values.astype("<f8").tobytes()
@@ -226,7 +242,7 @@ def decoded(raw: bytes) -> tuple[dict, np.ndarray]:
     line, _, payload = body[len(MAGIC) :].partition(b"\n")
     try:
         header, values = json.loads(line), np.frombuffer(payload, dtype="<f8").astype(np.float64)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise Damage(f"not as this program writes: {error}") from error
     if not isinstance(header, dict):
         raise Damage("not as this program writes: no header")

@@ -177,13 +177,14 @@ def test_a_stored_cut_block_counts_only_once_all_before_it_is_done(tmp_path, blo
 def test_instruction_sets_are_recorded_and_mixing_warns(tmp_path, blocks, monkeypatch):
     collect(WORK, N, store=tmp_path)
     header, _ = decoded((blocks / "L08-0.sums").read_bytes())
-    assert header["platforms"] == [executors.instruction_set()]
+    assert header["platforms"] == [executors.platform_name()]
     assert header["versions"].keys() >= {"python", "numpy"}
-    monkeypatch.setattr(executors, "instruction_set", lambda: "abacus")
+    monkeypatch.setattr(executors, "platform_name", lambda: "abacus")
     assert collect(WORK, N, store=tmp_path).warnings == ()
     mixed = collect(WORK, 2 * N, store=tmp_path)
     assert len(mixed.warnings) == 1
-    assert "abacus; " in mixed.warnings[0]
+    assert "made on 2 platforms" in mixed.warnings[0]
+    assert "abacus" in mixed.warnings[0]
     assert collect(WORK, 2 * N, store=tmp_path).warnings == mixed.warnings
 
 
