@@ -14,14 +14,18 @@ DETECTOR, INITIATION = "studies/sonar/manoeuvre/test_exact.py", "studies/sonar/c
 MANOEUVRES = (
     *mutants(
         "radarsim/studies/sonar/manoeuvre/kernels/detector.py",
-        ("one, two = zero - age, 0.5 * age * age", "one, two = zero - age, age * age", ANSWERS),
+        ("h1, h2 = zero - age, 0.5 * age * age", "h1, h2 = zero - age, age * age", ANSWERS),
         ("first = alarms + alarm, first + new", "first = alarms + alarm, first + event", ALARMS),
-        ("where_greater(calm, patience - 0.5, zero, mode)", "where_greater(calm, patience + 0.5, zero, mode)", ANSWERS),
+        (
+            "where_greater(quiet, patience - 0.5, zero, mode)",
+            "where_greater(quiet, patience + 0.5, zero, mode)",
+            ANSWERS,
+        ),
     ),
     *mutants(
         "radarsim/studies/sonar/manoeuvre/kernels/imm.py",
-        ("p * P[1] + q * Q[1] + both * d0 * d1", "p * P[1] + q * Q[1]", ANSWERS),
-        ("stay[0] * p + back * q, leave * p", "stay[0] * p + leave * q, back * p", ANSWERS),
+        ("mu1 * P1[1] + mu2 * P2[1] + both * d0 * d1", "mu1 * P1[1] + mu2 * P2[1]", ANSWERS),
+        ("p11 * mu1 + p21 * mu2, p12 * mu1", "p11 * mu1 + p12 * mu2, p21 * mu1", ANSWERS),
     ),
 )
 FALSE_PLOTS = (
@@ -55,14 +59,18 @@ FALSE_PLOTS = (
     ),
     *mutants(
         "radarsim/studies/sonar/clutter/kernels/tracks.py",
-        ("P[1] + u0 * K[1] + w0 * L[1],", "P[1] + u0 * K[1],", AMONG),
-        ("rr * (P[0] + 1.0)", "rr * P[0]", f"{AMONG} {LAWS}::test_gates_hold_target_and_false_plots_as_they_should"),
+        ("P[1] + u0 * K[1] + v0 * L[1],", "P[1] + u0 * K[1],", AMONG),
+        (
+            "rr * (P_r[0] + 1.0)",
+            "rr * P_r[0]",
+            f"{AMONG} {LAWS}::test_gates_hold_target_and_false_plots_as_they_should",
+        ),
     ),
     *mutants(
         "radarsim/studies/sonar/kernels/patterns.py",
         (
-            "seen[i] = 1.0 if a < limit else 0.0",
-            "seen[i] = 1.0 if a > limit else 0.0",
+            "detected[i] = 1.0 if a < limit else 0.0",
+            "detected[i] = 1.0 if a > limit else 0.0",
             "studies/sonar/test_study.py::test_random_misses_are_exact_as_means_over_patterns",
         ),
     ),

@@ -20,13 +20,12 @@ def estimate_recorded(
     """
     F, C, n = len(specs), len(z), len(t)
     tests = detector_tests([], [], [(one.response, one.length) for one in specs])
-    bank, arrays = (
-        banks.per_realisation_bank(specs, t, period, sigma, tests),
-        detector_arrays(tests, np.zeros(n, dtype=np.int64), C),
-    )
-    x, y, s = (np.zeros((F, C, rows, CHUNK)) for rows in (4, 8, ROWS))
-    memory, q = np.zeros((C, 3, bank.memory, CHUNK)), np.zeros((len(tests.kinds), C + 1, CHUNK))
-    count, P, observation = np.zeros((C, CHUNK)), np.empty((6, CHUNK)), _observation(period, sigma)
+    bank = banks.per_realisation_bank(specs, t, period, sigma, tests)
+    detectors = detector_arrays(tests, np.zeros(n, dtype=np.int64), C)
+    x, Y, further = (np.zeros((F, C, rows, CHUNK)) for rows in (4, 8, ROWS))
+    filters = patterns.Filters(x, Y, further, np.empty((6, CHUNK)))
+    recent, T = np.zeros((C, 3, bank.memory, CHUNK)), np.zeros((len(tests.kinds), C + 1, CHUNK))
+    count, observation = np.zeros((C, CHUNK)), _observation(period, sigma)
     estimates, covariances = np.zeros((F, n, C, 3)), np.zeros((F, n, C, 3, 3))
     scale = period ** -np.arange(3.0)
     packed = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
@@ -34,13 +33,13 @@ def estimate_recorded(
         plot, w = (np.repeat(values[:, k : k + 1], CHUNK, axis=1) for values in (z, weight))
         before, count = count, count + (w > 0)
         for c in range(C if bank.memory else 0):
-            remember(memory[c], plot[c], w[c], dt / period)
-        detector.examine(arrays, k, memory, sigma, count, w, q)
+            remember(recent[c], plot[c], w[c], dt / period)
+        detector.detector_statistics(detectors, k, recent, sigma, count, w, T)
+        plots = patterns.Plots(plot, w, before, count, recent, T)
         for f, c in np.ndindex(F, C):
-            state = (x[f, c], y[f, c], s[f, c], memory[c], plot[c], w[c], before[c], count[c], q, P)
-            patterns.filter_scan(bank, observation, f, c, k, dt, *state)
+            patterns.filter_scan(bank, observation, f, c, k, dt, filters, plots)
             estimates[f, k, c] = x[f, c, :3, 0]
-            covariances[f, k, c] = P[packed, 0] * sigma[c] ** 2 * np.outer(scale, scale)
+            covariances[f, k, c] = filters.P[packed, 0] * sigma[c] ** 2 * np.outer(scale, scale)
     return estimates, covariances
 
 

@@ -203,9 +203,9 @@ def simulate(plan: Plan | clutter.Plan, first: int, count: int) -> np.ndarray:
     else:
         detector_plan = plan.detector_plan
         world = plan.world, plan.observation, plan.bank, detector_plan.detectors
-        alarms, further = manoeuvres.empty_sums(detector_plan, F, count)
-        pattern_kernels.simulate_block(*world, first, count, plan.axes.baseline, sums, alarms, further)
-        added = manoeuvres.added_up(detector_plan, alarms, further)
+        block = manoeuvres.empty_sums(detector_plan, sums, count)
+        pattern_kernels.simulate_block(*world, first, count, plan.axes.baseline, block)
+        added = manoeuvres.added_up(detector_plan, block)
     picked = {
         name: getattr(sums, name)[:, :, :, : plan.size].reshape(plan.layout.shapes[name])
         for name in ("error", "paired", "believed", "estimates")

@@ -84,5 +84,7 @@ def trackers(
         manoeuvre=variance * period**4 / sigma**2,
         detection=float(detection),
         density=float(density),
+        period=float(period),
+        sigma=sigma,
         thresholds=THRESHOLDS,
     )

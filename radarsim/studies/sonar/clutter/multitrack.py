@@ -1,7 +1,7 @@
 """All tracks of one tracker over the plots of many scans, among themselves: for recorded plots, and for the map.
 
-The steps are the kernels' own, a track a lane. Beside what they do for a single track, tracks compete: a plot goes to
-the track that it lies nearest to, confirmed tracks before tentative ones, and what no track took begins a track.
+The steps are the kernels' own, one track in each lane. Beyond what they do for a single track, tracks compete: a plot
+goes to the track that it is nearest to, confirmed tracks before tentative ones, and what no track took begins a track.
 """
 
 from collections.abc import Iterable
@@ -11,17 +11,17 @@ import numpy as np
 
 from radarsim.studies.sonar.clutter.filters import TrackerSpec, trackers
 from radarsim.studies.sonar.clutter.kernels import tracker as kernels
-from radarsim.studies.sonar.clutter.kernels.field import CLOSEST, PDA, Rule, weighed
-from radarsim.studies.sonar.clutter.kernels.tracks import Tracks, foretell, forget, no_tracks, take
+from radarsim.studies.sonar.clutter.kernels.field import CLOSEST, PDA, Rule, associate_innovations
+from radarsim.studies.sonar.clutter.kernels.tracks import Tracks, clear, no_tracks, predict, update
 from radarsim.studies.sonar.kernels.steps import CHUNK
 
 
 @dataclass
 class TrackHistory:
-    """One track: its lane, its standing under the rules, and what was estimated at each of its scans.
+    """One track: its lane, its state under the rules, and the estimates at each of its scans.
 
     scans holds their numbers; states (n, 4) r, vr, b, vb with variances (n, 4), not-a-number for rates not yet known;
-    scores (n,); gates (n, 5) the foretold place and its innovation covariance.
+    scores (n,); gates (n, 5) the predicted place and its innovation covariance.
     """
 
     lane: tuple[int, int]
@@ -43,42 +43,49 @@ class MultiTracker:
     """The tracks of one tracker, alive and ended."""
 
     def __init__(self, spec: TrackerSpec, period: float, sigma: np.ndarray, detection: float, density: float):
-        of = trackers([spec], period, sigma, detection, density)
-        self.spec, self.period, self.sigma, self.of = spec, period, sigma, of
-        self.rule = Rule(int(of.association[0]), of.gate[0], of.detection, of.inside[0], of.density)
+        arrays = trackers([spec], period, sigma, detection, density)
+        self.spec, self.period, self.sigma, self.arrays = spec, period, sigma, arrays
+        self.rule = Rule(
+            int(arrays.association[0]),
+            arrays.gate[0],
+            arrays.detection,
+            arrays.inside[0],
+            arrays.density,
+            arrays.speed[0],
+        )
         self.chunks: list[Tracks] = []
         self.free: list[tuple[int, int]] = []
         self.alive: list[TrackHistory] = []
         self.ended: list[TrackHistory] = []
 
-    def look(self, scan: int, dt: float, r: np.ndarray, b: np.ndarray) -> None:
-        """Take in the plots (n,) of a scan, dt after the last one."""
-        foretold = self._foretold(dt)
-        innovations, distance = self._distances(foretold, r, b)
+    def process(self, scan: int, dt: float, r: np.ndarray, b: np.ndarray) -> None:
+        """Process the plots (n,) of a scan, dt after the last one."""
+        predicted = self._predicted(dt)
+        innovations, distance = self._distances(predicted, r, b)
         owner = self._owners(distance)
         taken = [np.zeros((6, CHUNK)) for _ in self.chunks]
         for a, track in enumerate(self.alive):
-            self._associate(track, foretold[a], innovations[:, a, owner == a], taken)
-        begun = [self._begin(r[p], b[p], taken) for p in np.flatnonzero(owner < 0)]
+            self._associate(track, predicted[a], innovations[:, a, owner == a], taken)
+        new = [self._begin(r[p], b[p], taken) for p in np.flatnonzero(owner < 0)]
         for chunk, rows in zip(self.chunks, taken, strict=True):
             joint = self.rule.association == PDA
-            take(chunk, dt, self.period, self.sigma, self.of.manoeuvre[0], joint, rows)
-        for track, gate in zip(self.alive, foretold, strict=True):
+            update(chunk, dt, self.period, self.sigma, self.arrays.manoeuvre[0], joint, rows)
+        for track, gate in zip(self.alive, predicted, strict=True):
             self._judge(track)
             track.gates.append(gate)
-        for track in begun:
+        for track in new:
             track.gates.append(np.full(5, np.nan))
-        self.alive += begun
+        self.alive += new
         for track in self.alive:
-            self._note(track, scan)
-        self._bury()
+            self._record(track, scan)
+        self._remove_ended()
 
-    def _foretold(self, dt: float) -> np.ndarray:
+    def _predicted(self, dt: float) -> np.ndarray:
         """Places and innovation covariances (A, 5) of the tracks alive; of one plot the speed of targets widens it."""
         rows = []
         for chunk in self.chunks:
             rows.append(np.empty((5, CHUNK)))
-            foretell(chunk, dt, self.period, self.sigma, self.of.manoeuvre[0], rows[-1])
+            predict(chunk, dt, self.period, self.sigma, self.arrays.manoeuvre[0], rows[-1])
         out = np.array([rows[c][:, i] for c, i in (track.lane for track in self.alive)]).reshape(-1, 5)
         for track, row in zip(self.alive, out, strict=True):
             track.since += dt
@@ -92,12 +99,12 @@ class MultiTracker:
         chunk, i = track.lane
         return bool(self.chunks[chunk].plots[i] > 1.5)
 
-    def _distances(self, foretold: np.ndarray, r: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _distances(self, predicted: np.ndarray, r: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Innovations (2, A, n), bearings turned to within half a circle, and their squares (A, n) by S⁻¹."""
-        nr = r - foretold[:, :1]
-        nb = np.mod(b - foretold[:, 1:2] + np.pi, 2 * np.pi) - np.pi
-        rr, rb, bb = (foretold[:, j, None] for j in (2, 3, 4))
-        return np.stack([nr, nb]), (bb * nr**2 - 2 * rb * nr * nb + rr * nb**2) / (rr * bb - rb**2)
+        nu_r = r - predicted[:, :1]
+        nu_b = np.mod(b - predicted[:, 1:2] + np.pi, 2 * np.pi) - np.pi
+        rr, rb, bb = (predicted[:, j, None] for j in (2, 3, 4))
+        return np.stack([nu_r, nu_b]), (bb * nu_r**2 - 2 * rb * nu_r * nu_b + rr * nu_b**2) / (rr * bb - rb**2)
 
     def _owners(self, distance: np.ndarray) -> np.ndarray:
         """The track (n,) that each plot goes to, -1 for none: the nearest, confirmed tracks first.
@@ -119,24 +126,25 @@ class MultiTracker:
     def _associate(
         self, track: TrackHistory, gate: np.ndarray, innovations: np.ndarray, taken: list[np.ndarray]
     ) -> None:
-        nr, nb, rr, rb, bb, took, _, score = weighed(
-            self.rule, self._settled(track), gate[0], *gate[2:], *np.ascontiguousarray(innovations)
-        )
+        """Let a track take of the plots that it owns, by their innovations (2, n); into the rows of its chunk."""
+        nu = np.ascontiguousarray(innovations)
+        found = associate_innovations(self.rule, self._settled(track), gate[0], tuple(gate[2:]), *nu)
         chunk, i = track.lane
-        taken[chunk][:, i] = took, nr, nb, rr, rb, bb
-        track.age, track.score = track.age + 1, track.score + score
-        if took:
+        taken[chunk][:, i] = found.taken, found.nu_r, found.nu_b, found.rr, found.rb, found.bb
+        track.age, track.score = track.age + 1, track.score + found.score
+        if found.taken:
             track.hits, track.misses, track.since = track.hits + 1, 0, 0.0
         else:
             track.misses += 1
 
     def _begin(self, r: float, b: float, taken: list[np.ndarray]) -> TrackHistory:
+        """A track of one plot, in a free lane."""
         if not self.free:
             self.free = [(len(self.chunks), i) for i in reversed(range(CHUNK))]
             self.chunks.append(no_tracks())
             taken.append(np.zeros((6, CHUNK)))
         chunk, i = self.free.pop()
-        forget(self.chunks[chunk], i)
+        clear(self.chunks[chunk], i)
         taken[chunk][:, i] = 1.0, r, b, 0.0, 0.0, 0.0
         return TrackHistory((chunk, i))
 
@@ -144,11 +152,11 @@ class MultiTracker:
         rules = float(self.spec.m), float(self.spec.n), float(self.spec.misses)
         now = kernels.next_state(track.state, float(track.hits), float(track.misses), float(track.age), *rules)
         chunk, i = track.lane
-        vague = self.chunks[chunk].P[:, 0, i].max() > self.spec.lost**2
-        track.state = kernels.NONE if track.state == kernels.CONFIRMED and vague else now
+        uncertain = self.chunks[chunk].P[:, 0, i].max() > self.spec.lost**2
+        track.state = kernels.NONE if track.state == kernels.CONFIRMED and uncertain else now
         track.found |= track.state == kernels.CONFIRMED
 
-    def _note(self, track: TrackHistory, scan: int) -> None:
+    def _record(self, track: TrackHistory, scan: int) -> None:
         chunk, i = track.lane
         tracks, unit = self.chunks[chunk], np.repeat(self.sigma, 2) / np.tile([1.0, self.period], 2)
         x, P = tracks.x[:, :2, i].ravel(), tracks.P[:, [0, 3], i].ravel()
@@ -158,7 +166,7 @@ class MultiTracker:
         track.variances.append(np.where(known, P * unit**2, np.nan))
         track.scores.append(track.score)
 
-    def _bury(self) -> None:
+    def _remove_ended(self) -> None:
         over = [track for track in self.alive if track.state == kernels.NONE]
         self.alive = [track for track in self.alive if track.state != kernels.NONE]
         self.free += [track.lane for track in over]
@@ -180,6 +188,6 @@ def confirmed_tracks(
     """The confirmed tracks over scans (t, r (n,), b (n,)) in order of time; density per m²."""
     tracker, last = MultiTracker(spec, period, sigma, detection, density), None
     for k, (t, r, b) in enumerate(scans):
-        tracker.look(k, 0.0 if last is None else t - last, r, b)
+        tracker.process(k, 0.0 if last is None else t - last, r, b)
         last = t
     return tracker.confirmed()

@@ -145,25 +145,17 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     shapes = {"error": (3, 4), "paired": (3,), "joint": (4,), "ahead": (4,), "believed": (3,), "estimates": (3,)}
     sums = sonar_kernels.Sums(**{name: np.zeros((F, K, 2, *tail)) for name, tail in shapes.items()})
     own = ("counts", "begun", "ratios", "scores")
-    track_sums = kernels.TrackSums(**{name: np.zeros(plan.layout.shapes[name]) for name in own})
-    workspace = kernels.workspace(F)
-    kernels.simulate_block(
-        plan.world, plan.observation, plan.field, plan.trackers, workspace, first, count, sums, track_sums
-    )
+    track_sums = kernels.TrackSums(sums, **{name: np.zeros(plan.layout.shapes[name]) for name in own})
+    work = kernels.workspace(F)
+    kernels.simulate_block(plan.world, plan.observation, plan.field, plan.trackers, work, first, count, track_sums)
     if plan.field.density > 0:
         kernels.simulate_false(
-            plan.seeds,
-            plan.observation,
-            plan.other_field,
-            plan.trackers,
-            workspace,
-            plan.world.dt,
-            first,
-            count,
-            track_sums,
+            plan.seeds, plan.other_field, plan.trackers, work, plan.world.dt, first, count, track_sums
         )
     picked = {
         name: getattr(sums, name)[:, :, :, :2].reshape(plan.layout.shapes[name])
         for name in ("error", "believed", "estimates")
     }
-    return plan.layout.pack(**picked, joint=sums.joint, ahead=sums.ahead, **track_sums._asdict())
+    return plan.layout.pack(
+        **picked, joint=sums.joint, ahead=sums.ahead, **{name: getattr(track_sums, name) for name in own}
+    )

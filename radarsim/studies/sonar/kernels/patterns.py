@@ -1,9 +1,9 @@
-"""Sonar filters where every realisation has its own pattern of missed plots, or weights: gains go along with it.
+"""Sonar filters with gains of each realisation's own, for patterns of missed plots or weights that differ.
 
-The same filters as in `sonar`, with what `filters.sonar` reckons once now reckoned for each realisation, in chunks.
+The same filters as in `shared_gains`, with what `filters` computes once now computed for each realisation, in chunks.
 All but the windows take least squares in information form up to their start; growing memory and the differenced
-filter go on with it, the Kalman filters and those of fixed gain go over to covariances. The steps are in `sonar_steps`.
-Inside, times are in periods and weights relative to the nominal plot; a weight of zero is a missed plot.
+filter go on with it, the Kalman filters and those of fixed gain go over to covariances. The steps are in `steps`, and
+the letters too; F filters, C coordinates, K scans.
 """
 
 from typing import NamedTuple
@@ -12,21 +12,37 @@ import numpy as np
 
 from radarsim.kernels.compile import kernel, part
 from radarsim.kernels.random import U, uniforms
-from radarsim.studies.sonar.kernels.shared_gains import CHUNK, move_and_measure
-from radarsim.studies.sonar.kernels.steps import fit, recur, remember
-from radarsim.studies.sonar.kernels.sums import add_ahead, add_sums
-from radarsim.studies.sonar.manoeuvre.kernels.detector import MODE, PLOTS, AdaptiveRules, adapt, add_alarms, examine
-from radarsim.studies.sonar.manoeuvre.kernels.imm import PROBABILITY, ROWS, ModelPairs, interact, mode_sums
+from radarsim.studies.sonar.kernels.shared_gains import CHUNK, Sums, move_and_measure
+from radarsim.studies.sonar.kernels.steps import Memory, Model, Plot, fit, recur, remember
+from radarsim.studies.sonar.kernels.sums import Counted, Course, Estimate, add_ahead, add_sums
+from radarsim.studies.sonar.manoeuvre.kernels.detector import (
+    MODE,
+    PLOTS,
+    AdaptiveRule,
+    AdaptiveRules,
+    Alarms,
+    adapt,
+    add_alarms,
+    detector_statistics,
+)
+from radarsim.studies.sonar.manoeuvre.kernels.imm import (
+    PROBABILITY,
+    ROWS,
+    ModelPair,
+    ModelPairs,
+    interact,
+    mode_sums,
+)
 
 INFORMATION, COVARIANCE, FIXED, WINDOW, ADAPTIVE, IMM = range(6)
-PLACED = 8.0  # as models.sonar.PLACED
+PLACED = 8.0  # as world.PLACED
 
 
 class Observation(NamedTuple):
-    """Which plots come, and how they are turned into what the filters take.
+    """Which scans are detected, and how plots are turned into the filters' coordinates.
 
-    misses (2,) is the key of the stream of detections; certain (K,) is 1 where the plot always comes, 0 where never,
-    else -1: with `probability`. weight (K, C) of a plot that comes; period in s and nominal sigma (C,) make gains
+    misses (2,) is the key of the stream of detections; certain (K,) is 1 where the plot is always detected, 0 where
+    never, else -1: with `probability`. weight (K, C) of a detected plot; period in s and nominal sigma (C,) make gains
     physical. frame is 0 for coordinates as measured, 1 for the plain conversion of the first two, 2 for the unbiased
     one; measured (K, 2) then holds the true range and bearing and spread (2,) their standard deviations.
     """
@@ -45,8 +61,9 @@ class Observation(NamedTuple):
 class RealisationBank(NamedTuple):
     """F filters: kind (F,), size (F,) of the state, length (F,) of a window or of the start of a fixed filter.
 
-    carry (F, K, C) correlation that the filter assumes, manoeuvre (F, C) variance in nominal plots and periods, settled
-    (F, C, 3) gains of a fixed filter, likewise. memory is how many plots are kept for windows and detectors.
+    carry (F, K, C) correlation c that the filter assumes, manoeuvre (F, C) variance q in nominal plots and periods,
+    settled (F, C, 3) gains of a fixed filter, likewise. memory is how many plots are kept for windows and detectors;
+    baseline the filter that gains are against.
     """
 
     kind: np.ndarray
@@ -60,14 +77,16 @@ class RealisationBank(NamedTuple):
     interacting: ModelPairs
 
 
-class FurtherSums(NamedTuple):
-    """What is added up of filters that answer to manoeuvres, and what is kept of estimates.
+class BlockSums(NamedTuple):
+    """Sums of a block over realisations: errors, alarms, and of filters that respond to manoeuvres; and kept estimates.
 
     modes (F, K, C, 3): Σp, Σp² of the probability of a manoeuvre, and Σ of the plots in memory. at (A,) are scans, and
     kept (A, F, 2, 6, count) of the first two coordinates there: value, rate, variance of the value, covariance,
     variance of the rate, all as believed, and 1 where the state is complete.
     """
 
+    errors: Sums
+    alarms: Alarms
     modes: np.ndarray
     at: np.ndarray
     kept: np.ndarray
@@ -75,38 +94,38 @@ class FurtherSums(NamedTuple):
 
 # ---- plots --------------------------------------------------------------------------------------------------------
 @kernel
-def detect(observation, first, k, seen):
-    """Whether the plot of scan k came, 1 or 0, in seen (n,)."""
+def detect(observation, first, k, detected):
+    """Whether the plot of scan k is detected, 1 or 0, into detected (n,)."""
     k0, k1, start, limit = observation.misses[0], observation.misses[1], U(first), observation.probability
     if observation.certain[k] >= 0:
-        seen[:] = float(observation.certain[k])
+        detected[:] = float(observation.certain[k])
         return
-    for i in range(seen.size):
+    for i in range(detected.size):
         a, _ = uniforms(k0, k1, start + U(i), k)
-        seen[i] = 1.0 if a < limit else 0.0
+        detected[i] = 1.0 if a < limit else 0.0
 
 
 @kernel
-def weigh(observation, k, plots, seen, place, z, weight):
-    """Plots z (C, n) and their weights (C, n) from what was measured: plots (C', 4, n), rows 0 and 1.
+def convert(observation, k, plots, detected, place, z, weight):
+    """Plots z (C, n) in the filters' coordinates and their weights (C, n), of measured plots (C', 4, n), rows 0 and 1.
 
-    place (3, n) holds mean range and bearing of the last plots, and how many they are. The plain conversion has its
-    weights from the plot itself; the unbiased one from the plots before, lest a weight go with the error of its own
-    plot, which would be a bias again (the decorrelation of Bordonaro, Willett and Bar-Shalom 2014, who take the
-    predicted place). See `models.sonar.places`.
+    place (3, n) holds mean range and bearing of the last plots, and their number. The plain conversion takes weights
+    from the plot itself; the unbiased one from the plots before, so that a weight is not correlated with the error of
+    its own plot, which would be a bias again (the decorrelation of Bordonaro, Willett and Bar-Shalom 2014, who take
+    the predicted place). See `world.places`.
     """
     for c in range(z.shape[0]):
         w = observation.weight[k, c]
-        for i in range(seen.size):
+        for i in range(detected.size):
             z[c, i] = plots[c, 0, i]
-            weight[c, i] = w * seen[i]
+            weight[c, i] = w * detected[i]
     if observation.frame == 0:
         return
     sr, sb = observation.spread[0] ** 2, observation.spread[1] ** 2
     nominal_x, nominal_y = observation.sigma[0] ** 2, observation.sigma[1] ** 2
     grow = np.exp(sb) if observation.frame == 2 else 1.0
     root, shrink = np.sqrt(grow), np.exp(-2.0 * sb)
-    for i in range(seen.size):
+    for i in range(detected.size):
         r, b = observation.measured[k, 0] + plots[0, 1, i], observation.measured[k, 1] + plots[1, 1, i]
         co, si = np.cos(b), np.sin(b)
         z[0, i], z[1, i] = root * r * co, root * r * si
@@ -118,122 +137,157 @@ def weigh(observation, k, plots, seen, place, z, weight):
             if place[2, i] > 0.0:
                 r, b = place[0, i], place[1, i]
                 co, si = np.cos(b), np.sin(b)
-            if seen[i] > 0.0:
+            if detected[i] > 0.0:
                 place[2, i] = min(place[2, i] + 1.0, PLACED)
                 place[0, i] += (r_now - place[0, i]) / place[2, i]
                 place[1, i] += (b_now - place[1, i]) / place[2, i]
             power, twice = 0.5 * grow * (r * r + sr), shrink * (co * co - si * si)
             xx, yy = power * (1.0 + twice) - r * r * co * co, power * (1.0 - twice) - r * r * si * si
-        weight[0, i], weight[1, i] = seen[i] * nominal_x / xx, seen[i] * nominal_y / yy
+        weight[0, i], weight[1, i] = detected[i] * nominal_x / xx, detected[i] * nominal_y / yy
+
+
+class Filters(NamedTuple):
+    """What F filters keep of a chunk in C coordinates, as `steps.Memory`: x (F, C, 4, CHUNK), Y (F, C, 8, CHUNK),
+    further (F, C, >= 10, CHUNK) rows; P (6, CHUNK) of the filter that was last stepped.
+    """
+
+    x: np.ndarray
+    Y: np.ndarray
+    further: np.ndarray
+    P: np.ndarray
+
+
+class Plots(NamedTuple):
+    """Plots of a chunk at a scan: z, weight, n of plots before the scan and n_now up to it, each (C, CHUNK).
+
+    recent (C, 3, L, CHUNK) are the last plots: plot, age, weight; T (D, G, CHUNK) the statistics of the detectors.
+    """
+
+    z: np.ndarray
+    weight: np.ndarray
+    n: np.ndarray
+    n_now: np.ndarray
+    recent: np.ndarray
+    T: np.ndarray
 
 
 @kernel
-def filter_scan(bank, observation, f, c, k, dt, x, y, s, memory, z, weight, before, count, q, P):
-    """Scan k of filter f in coordinate c, in place: x (4, n), y (8, n), s (>= 10, n), memory (3, L, n).
-
-    q (D, G, n) statistics of the detectors. Leaves P (6, n).
-    """
-    size, carry = bank.size[f], bank.carry[f, k, c]
-    if bank.kind[f] == ADAPTIVE:
-        rule = bank.switching
-        d, length = rule.detector[f], bank.length[f]
-        adapt(
-            *(size, rule.raises[f], length, rule.quiet[f], rule.threshold[f, c], q[d, rule.group[f, c]]),
-            *(dt, observation.period, x, y, s, memory, z, weight, before, P),
-        )
-        return
-    if bank.kind[f] == IMM:
-        models = bank.interacting
-        interact(
-            *(size, models.stay[f], models.manoeuvre[f, c], dt, observation.period, observation.sigma[c]),
-            *(x, y, s, z, weight, before, P),
-        )
-        return
-    if bank.kind[f] == WINDOW:
-        fit(x, memory, bank.length[f], size, observation.period, count, P)
-        return
-    start, by_covariance = max(size, bank.length[f]), bank.kind[f] != INFORMATION
-    manoeuvre, settled = bank.manoeuvre[f, c], bank.settled[f, c]
-    recur(by_covariance, size, start, dt, observation.period, carry, manoeuvre, settled, x, y, s, z, weight, before, P)
+def filter_scan(bank, observation, f, c, k, dt, filters, plots):
+    """Scan k of filter f in coordinate c, in place, dt after the scan before."""
+    size, length, kind, period = bank.size[f], bank.length[f], bank.kind[f], observation.period
+    memory, P = Memory(filters.x[f, c], filters.Y[f, c], filters.further[f, c]), filters.P
+    plot = Plot(plots.z[c], plots.weight[c], plots.n[c])
+    if kind == ADAPTIVE:
+        rules = bank.switching
+        T = plots.T[rules.detector[f], rules.group[f, c]]
+        rule = AdaptiveRule(size, length, rules.raises[f], rules.threshold[f, c], rules.quiet[f])
+        adapt(rule, dt, period, memory, plot, plots.recent[c], T, P)
+    elif kind == IMM:
+        models = ModelPair(size, bank.interacting.manoeuvre[f, c], bank.interacting.stay[f])
+        interact(models, dt, period, observation.sigma[c], memory, plot, P)
+    elif kind == WINDOW:
+        fit(memory.x, plots.recent[c], length, size, period, plots.n_now[c], P)
+    else:
+        gain = bank.settled[f, c]
+        fixed = (gain[0], gain[1], gain[2])
+        model = Model(size, max(size, length), bank.carry[f, k, c], bank.manoeuvre[f, c], fixed)
+        recur(kind != INFORMATION, model, dt, period, memory, plot, P)
 
 
+# ---- sums ---------------------------------------------------------------------------------------------------------
 @part
-def add_modes(bank, s, f, c, k, used, out, modes):
-    """Add the modes of filter f in coordinate c at scan k; s its memory."""
-    if bank.kind[f] == ADAPTIVE:
-        mode_sums(s, MODE, PLOTS, used, out)
-    elif bank.kind[f] == IMM:
-        mode_sums(s, PROBABILITY + 1, -1, used, out)
+def add_modes(kind, further, used, out, modes):
+    """Add the modes of a filter of that kind with these further rows to modes (3,); out (3,) is scratch."""
+    if kind == ADAPTIVE:
+        mode_sums(further, MODE, PLOTS, used, out)
+    elif kind == IMM:
+        mode_sums(further, PROBABILITY + 1, -1, used, out)
     else:
         return
     for j in range(3):
-        modes[f, k, c, j] += out[j]
+        modes[j] += out[j]
 
 
 @part
-def keep(x, P, count, size, unit, period, first, n, kept):
-    """A coordinate's estimate and what is believed of it, of n realisations, into kept (6, total) from `first` on."""
-    for i in range(n):
+def keep(x, P, n, size, units, first, count, kept):
+    """A coordinate's estimate and its believed covariance, of `count` realisations, into kept (6, total) from `first`
+    on; n (CHUNK,) plots so far, units (σ, period).
+    """
+    sigma, period = units
+    for i in range(count):
         kept[0, first + i], kept[1, first + i] = x[0, i], x[1, i]
-        kept[5, first + i] = 1.0 if count[i] >= size else 0.0
-        kept[2, first + i] = P[0, i] * unit * unit
-        kept[3, first + i] = P[1, i] * unit * unit / period
-        kept[4, first + i] = P[3, i] * unit * unit / (period * period)
+        kept[5, first + i] = 1.0 if n[i] >= size else 0.0
+        kept[2, first + i] = P[0, i] * sigma * sigma
+        kept[3, first + i] = P[1, i] * sigma * sigma / period
+        kept[4, first + i] = P[3, i] * sigma * sigma / (period * period)
+
+
+# ---- a block ------------------------------------------------------------------------------------------------------
+class Chunk(NamedTuple):
+    """A chunk of a block at a scan: realisations from number `first` of the block on, of which `count` count, scan k
+    and its interval dt; used (CHUNK,) 1 for those that count; the course of the targets in all coordinates.
+    """
+
+    first: int
+    count: int
+    k: int
+    dt: float
+    used: np.ndarray
+    course: Course
+
+
+@part
+def step_filters(bank, observation, baseline, chunk, filters, plots, out, sums):
+    """One scan of all filters in all coordinates, and its sums; out (7,) is scratch."""
+    k, course = chunk.k, chunk.course
+    for c in range(plots.z.shape[0]):
+        units = (observation.sigma[c], observation.period)
+        course_c, counted = Course(course.truth[c], course.shift[c]), Counted(plots.n_now[c], chunk.used)
+        x_base, size_base = filters.x[baseline, c], bank.size[baseline]
+        for j in range(bank.size.size):  # the baseline first: gains of the others are against its estimates
+            f = baseline if j == 0 else (j - 1 if j <= baseline else j)
+            filter_scan(bank, observation, f, c, k, chunk.dt, filters, plots)
+            add_modes(bank.kind[f], filters.further[f, c], chunk.used, out, sums.modes[f, k, c])
+            for a in range(sums.at.size if c < 2 else 0):
+                if sums.at[a] == k:
+                    kept = sums.kept[a, f, c]
+                    keep(filters.x[f, c], filters.P, counted.n, bank.size[f], units, chunk.first, chunk.count, kept)
+            estimate = Estimate(filters.x[f, c], filters.P, bank.size[f], x_base, size_base)
+            add_sums(estimate, course_c, counted, units, (f, k, c), out, sums.errors)
 
 
 @kernel
-def simulate_block(world, observation, bank, detectors, first, total, baseline, sums, alarms, further):
-    """Add the sums of realisations first … first + total - 1; a partial chunk is computed in full and summed in
-    part."""
-    filters, scans, coordinates = bank.carry.shape
-    x, y = np.empty((filters, coordinates, 4, CHUNK)), np.empty((filters, coordinates, 8, CHUNK))
-    s, P = np.empty((filters, coordinates, ROWS if (bank.kind == IMM).any() else 10, CHUNK)), np.empty((6, CHUNK))
-    memory = np.empty((coordinates, 3, bank.memory, CHUNK))
-    q, passed = np.empty((detectors.plots.size, coordinates + 1, CHUNK)), np.empty((*detectors.threshold.shape, CHUNK))
-    plots, shift = np.empty((world.walk.size, 4, CHUNK)), np.zeros((coordinates, 3, CHUNK))
-    z, weight, seen = np.empty((coordinates, CHUNK)), np.empty((coordinates, CHUNK)), np.empty(CHUNK)
-    place, before, count = np.empty((3, CHUNK)), np.empty((coordinates, CHUNK)), np.empty((coordinates, CHUNK))
-    used, out = np.ones(CHUNK), np.empty(7)
-    order = np.append(np.array([baseline]), np.delete(np.arange(filters), baseline))  # the others are set against it
+def simulate_block(world, observation, bank, detectors, first, total, baseline, sums):
+    """Add the sums of realisations first … first + total - 1 to sums, a BlockSums.
+
+    A partial chunk is computed in full and summed in part.
+    """
+    F, K, C = bank.carry.shape
+    rows = ROWS if (bank.kind == IMM).any() else 10
+    x, Y, further = np.empty((F, C, 4, CHUNK)), np.empty((F, C, 8, CHUNK)), np.empty((F, C, rows, CHUNK))
+    filters = Filters(x, Y, further, np.empty((6, CHUNK)))
+    z, weight, n, n_now = np.empty((C, CHUNK)), np.empty((C, CHUNK)), np.empty((C, CHUNK)), np.empty((C, CHUNK))
+    recent, T = np.empty((C, 3, bank.memory, CHUNK)), np.empty((detectors.plots.size, C + 1, CHUNK))
+    plots, measured = Plots(z, weight, n, n_now, recent, T), np.empty((world.walk.size, 4, CHUNK))
+    shift, place, detected = np.zeros((C, 3, CHUNK)), np.empty((3, CHUNK)), np.empty(CHUNK)
+    passed, used, out = np.empty((*detectors.threshold.shape, CHUNK)), np.ones(CHUNK), np.empty(7)
     for done in range(0, total, CHUNK):
-        x[:], y[:], s[:], memory[:], plots[:], count[:], place[:] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        x[:], Y[:], further[:], recent[:], measured[:], n_now[:], place[:] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         used[total - done :], passed[:] = 0.0, 0.0
-        for k in range(scans):
-            dt, truth = world.dt[k], world.truth[k]
-            move_and_measure(world, first + done, k, plots)
-            detect(observation, first + done, k, seen)
-            weigh(observation, k, plots, seen, place, z, weight)
-            shift[:, :2] = plots[:coordinates, 2:]
+        for k in range(K):
+            dt, course = world.dt[k], Course(world.truth[k], shift)
+            move_and_measure(world, first + done, k, measured)
+            detect(observation, first + done, k, detected)
+            convert(observation, k, measured, detected, place, z, weight)
+            shift[:, :2] = measured[:C, 2:]
             if k > 0:
-                add_ahead(bank.size, x, shift, truth, count, used, k, dt, out, sums)
-            before[:] = count
-            count += weight > 0.0
-            for c in range(coordinates):
-                if memory.shape[2] > 0:
-                    remember(memory[c], z[c], weight[c], dt / observation.period)
-            examine(detectors, k, memory, observation.sigma, count, weight, q)
-            add_alarms(detectors, k, q, used, passed, alarms)
-            for c in range(coordinates):
-                for f in order:
-                    filter_scan(
-                        *(bank, observation, f, c, k, dt, x[f, c], y[f, c], s[f, c], memory[c], z[c], weight[c]),
-                        *(before[c], count[c], q, P),
-                    )
-                    add_modes(bank, s[f, c], f, c, k, used, out, further.modes)
-                    for a in range(further.at.size if c < 2 else 0):
-                        if further.at[a] == k:
-                            shown = min(CHUNK, total - done)
-                            unit, into = observation.sigma[c], further.kept[a, f, c]
-                            keep(x[f, c], P, count[c], bank.size[f], unit, observation.period, done, shown, into)
-                    add_sums(
-                        *(
-                            bank.size[f],
-                            observation.sigma[c],
-                            observation.period,
-                            x[f, c],
-                            x[baseline, c],
-                            bank.size[baseline],
-                            P,
-                        ),
-                        *(shift[c], truth[c], count[c], used, f, k, c, out, sums),
-                    )
+                add_ahead(bank.size, x, course, Counted(n_now, used), k, dt, out, sums.errors)
+            n[:] = n_now
+            n_now += weight > 0.0
+            for c in range(C):
+                if recent.shape[2] > 0:
+                    remember(recent[c], z[c], weight[c], dt / observation.period)
+            detector_statistics(detectors, k, recent, observation.sigma, n_now, weight, T)
+            add_alarms(detectors, k, T, used, passed, sums.alarms)
+            chunk = Chunk(done, min(CHUNK, total - done), k, dt, used, course)
+            step_filters(bank, observation, baseline, chunk, filters, plots, out, sums)

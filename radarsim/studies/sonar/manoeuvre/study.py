@@ -15,6 +15,7 @@ from radarsim.studies.sonar import filters
 from radarsim.studies.sonar import world as models
 from radarsim.studies.sonar.banks import FilterSpec
 from radarsim.studies.sonar.kernels import patterns
+from radarsim.studies.sonar.kernels.shared_gains import Sums
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre import uses as tracks
 from radarsim.studies.sonar.manoeuvre.config import RESPONDING_KINDS
@@ -247,19 +248,19 @@ def shapes(plan: DetectorPlan, F: int) -> dict[str, tuple[int, ...]]:
     return found
 
 
-def empty_sums(plan: DetectorPlan, F: int, count: int) -> tuple[kernels.Alarms, patterns.FurtherSums]:
-    """What the kernels add to, in a block of `count` realisations."""
-    K = len(plan.seen.t)
+def empty_sums(plan: DetectorPlan, errors: Sums, count: int) -> patterns.BlockSums:
+    """Zeros that the kernels add to in a block of `count` realisations; errors are the sums of errors."""
+    F, K = errors.error.shape[:2]
     D, G, T = plan.detectors.threshold.shape
     alarms = kernels.Alarms(np.zeros((D, G, K)), np.zeros((D, G, T, K)), np.zeros((D, G, T, K)))
     kept = np.zeros((len(plan.at), F, 2, 6, count))
-    return alarms, patterns.FurtherSums(np.zeros((F, K, G - 1, 3)), plan.at, kept)
+    return patterns.BlockSums(errors, alarms, np.zeros((F, K, G - 1, 3)), plan.at, kept)
 
 
-def added_up(plan: DetectorPlan, alarms: kernels.Alarms, further: patterns.FurtherSums) -> dict[str, np.ndarray]:
+def added_up(plan: DetectorPlan, sums: patterns.BlockSums) -> dict[str, np.ndarray]:
     """The sums of a block, as `shapes` names them."""
     D = plan.measured
-    found = {name: values[:D] for name, values in alarms._asdict().items()} | {"modes": further.modes}
+    found = {name: values[:D] for name, values in sums.alarms._asdict().items()} | {"modes": sums.modes}
     if plan.spec.uses:
-        found["uses"] = use_sums(plan.spec, plan.seen, plan.at, further.kept)
-    return {name: found[name] for name in shapes(plan, len(further.modes))}
+        found["uses"] = use_sums(plan.spec, plan.seen, plan.at, sums.kept)
+    return {name: found[name] for name in shapes(plan, len(sums.modes))}

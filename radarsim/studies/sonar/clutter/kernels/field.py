@@ -1,9 +1,18 @@
-"""False plots of a whole sector, of which only the parts that are looked at are drawn, and what a gate makes of them.
+"""False plots of a whole sector, of which only the parts that are looked at are drawn, and how a gate weighs them.
 
 The sector is cut into cells of equal area, uniform in q = r²/2 and in the bearing. Poisson processes on disjoint cells
 are independent, so the number in each cell (by inversion of the distribution function) and the places of its plots are
-functions of key, realisation, scan and cell: the field is all there, the same for every filter, and a gate costs the
-cells that it touches.
+functions of key, realisation, scan and cell: the field is the same for every filter, and a gate costs only the cells
+that it touches. The letters, plain numbers here:
+
+    r, b        range in m, bearing in rad
+    q           r² / 2, m²: uniform where plots are uniform in area
+    nu          innovation (r, b)
+    S           covariance of the innovation: rr, rb, bb
+    S_inverse   S⁻¹ likewise: rr, rb, bb
+    d           νᵀ S⁻¹ ν of a plot; e = exp(-d / 2), its likelihood without the constant
+    beta0       probability that no plot in the gate is the target's (PDA)
+    P_D, P_G    probabilities of detection, and that the target's plot lies in the gate
 """
 
 import math
@@ -17,9 +26,9 @@ from radarsim.kernels.random import U, threefry, uniform
 
 DRAW_BITS = 12  # of a draw's number: the draw in its cell
 HALF = U(0xFFFFFFFF)
-SCORED = 1e-9  # per m²: the least density a score reckons with; without false plots it would be infinite
+LEAST_DENSITY = 1e-9  # per m², in scores: without false plots a score would be infinite
 OPEN = 1e30  # χ² of a gate that lets everything in
-CLOSEST = 1.0  # m: the least range that densities and gates are reckoned at, should a track pass through the sonar
+CLOSEST = 1.0  # m: the least range that densities and gates are computed at, should a track pass through the sonar
 TURN = 2.0 * math.pi
 LEAST = 1e-300  # likelihood that counts: the reciprocal of a smaller one may be infinite
 NEAREST, PDA, KNOWN = range(3)
@@ -43,10 +52,29 @@ class Field(NamedTuple):
     density: float
 
 
-class Rule(NamedTuple):
-    """How a tracker chooses among the plots in its gate: association, gate (χ² of two), detection P_D and gate P_G.
+class Grid(NamedTuple):
+    """A field without its arrays, references to which would be counted at each call: the key's two words and the
+    address of the distribution function; the rest as in Field.
+    """
 
-    density is what it takes false plots to have, per m².
+    k0: int
+    k1: int
+    share: int
+    q0: float
+    dq: float
+    nq: int
+    b0: float
+    db: float
+    nb: int
+    ring: bool
+    density: float
+
+
+class Rule(NamedTuple):
+    """How a tracker chooses among the plots in its gate.
+
+    association is NEAREST, PDA or KNOWN; gate the χ² of two components; detection P_D and inside P_G; density of false
+    plots that it assumes, per m²; speed of targets, m/s, which widens the gate of a track of one plot.
     """
 
     association: int
@@ -54,11 +82,77 @@ class Rule(NamedTuple):
     detection: float
     inside: float
     density: float
+    speed: float
+
+
+class Gate(NamedTuple):
+    """Where a track looks for its plot: predicted r and b, S (rr, rb, bb), and whether it is settled (two plots)."""
+
+    r: float
+    b: float
+    S: tuple[float, float, float]
+    settled: bool
+
+
+class Gated(NamedTuple):
+    """Plots in a gate so far: how many, and how many false; the nearest one's d, innovation and whether it is false.
+
+    Then, with the likelihoods e as weights, Σe, Σe of false plots, mean innovation and scatter about it.
+    """
+
+    count: float
+    false_count: float
+    d: float
+    nu_r: float
+    nu_b: float
+    nearest_false: float
+    weight: float
+    false_weight: float
+    mean_r: float
+    mean_b: float
+    rr: float
+    rb: float
+    bb: float
+
+
+class Association(NamedTuple):
+    """What a track takes of the plots in its gate.
+
+    Innovation in r and b, further covariance V of it (rr, rb, bb), whether any plot is taken (1 or 0), the weight of
+    false plots in it, and the increment of the track's score.
+    """
+
+    nu_r: float
+    nu_b: float
+    rr: float
+    rb: float
+    bb: float
+    taken: float
+    false_share: float
+    score: float
+
+
+@inline
+def grid_of(field):
+    """The grid of a field, which must outlive it."""
+    return Grid(
+        field.key[0],
+        field.key[1],
+        address(field.share),
+        field.q0,
+        field.dq,
+        field.nq,
+        field.b0,
+        field.db,
+        field.nb,
+        field.ring,
+        field.density,
+    )
 
 
 @inline
 def number_in(share, u):
-    """How many plots a cell holds, of a uniform number: the first place where the distribution function passes it.
+    """Number of plots in a cell from a uniform number u: the first place where the distribution function exceeds it.
 
     share is the address of that function; its last value is 1.
     """
@@ -70,7 +164,7 @@ def number_in(share, u):
 
 @inline
 def cell_words(k0, k1, realisation, cell, draw):
-    """Two words: of draw 0 the first tells how many plots a cell holds, every further word is the place of one.
+    """Two random words of a cell: the first of draw 0 gives the number of plots, every further word the place of one.
 
     Cells are numbered through all scans.
     """
@@ -79,7 +173,7 @@ def cell_words(k0, k1, realisation, cell, draw):
 
 @inline
 def place_in(word):
-    """Place in a cell, each way from 0 to 1: the two halves of a word."""
+    """Place in a cell, each coordinate from 0 to 1: the two halves of a word."""
     return np.float64(word >> U(32)) * 2.0**-32 + 2.0**-33, np.float64(word & HALF) * 2.0**-32 + 2.0**-33
 
 
@@ -87,7 +181,7 @@ def place_in(word):
 def cells(low, high, least, step, count):
     """First and last of `count` cells of size step from `least` on that low … high touches.
 
-    Floors as floating numbers: an open gate reaches further than an integer does.
+    Floors are floating-point numbers: an open gate reaches further than an integer can.
     """
     first = min(max(np.floor((low - least) / step), 0.0), count - 1.0)
     last = min(max(np.floor((high - least) / step), -1.0), count - 1.0)
@@ -104,50 +198,50 @@ def inverse_two(rr, rb, bb):
 
 
 @inline
-def nothing_seen():
-    """No plot yet: plots in the gate and false ones of them; distance of the nearest, it and whether it is false; sum
-    of the likelihoods and of those of false plots, their mean (2) and scatter (3).
-    """
-    return 0.0, 0.0, OPEN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+def empty_gate():
+    """A gate without plots."""
+    return Gated(0.0, 0.0, OPEN, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inline
-def seen(so_far, r, b, false, irr, irb, ibb, gate):
-    """What is known of the plots in a gate once the innovation (r, b) of one more has been looked at.
+def distance_squared(nu_r, nu_b, S_inverse):
+    """νᵀ S⁻¹ ν."""
+    return S_inverse[0] * nu_r * nu_r + 2.0 * S_inverse[1] * nu_r * nu_b + S_inverse[2] * nu_b * nu_b
+
+
+@inline
+def with_plot(gated, nu_r, nu_b, false, S_inverse, threshold):
+    """The plots in a gate after one more of innovation (nu_r, nu_b), which counts up to the threshold of d.
 
     The weighted mean and scatter grow plot by plot (West 1979): of one plot alone the scatter is exactly zero.
     """
-    count, wrong, least, nr, nb, false_one, weight, astray, mr, mb, rr, rb, bb = so_far
-    d = irr * r * r + 2.0 * irb * r * b + ibb * b * b
-    if d > gate:
-        return so_far
-    count, wrong = count + 1.0, wrong + false
+    count, false_count, least, r, b, nearest_false, weight, false_weight, mean_r, mean_b, rr, rb, bb = gated
+    d = distance_squared(nu_r, nu_b, S_inverse)
+    if d > threshold:
+        return gated
+    count, false_count = count + 1.0, false_count + false
     if d < least:
-        least, nr, nb, false_one = d, r, b, false
+        least, r, b, nearest_false = d, nu_r, nu_b, false
     e = math.exp(-0.5 * d)
     if e > LEAST:
-        weight, astray = weight + e, astray + e * false
-        share, r_off, b_off = e / weight, r - mr, b - mb
-        mr, mb = mr + share * r_off, mb + share * b_off
-        rr, rb, bb = rr + e * (r_off * (r - mr)), rb + e * (r_off * (b - mb)), bb + e * (b_off * (b - mb))
-    return count, wrong, least, nr, nb, false_one, weight, astray, mr, mb, rr, rb, bb
+        weight, false_weight = weight + e, false_weight + e * false
+        share, off_r, off_b = e / weight, nu_r - mean_r, nu_b - mean_b
+        mean_r, mean_b = mean_r + share * off_r, mean_b + share * off_b
+        rr, rb = rr + e * (off_r * (nu_r - mean_r)), rb + e * (off_r * (nu_b - mean_b))
+        bb = bb + e * (off_b * (nu_b - mean_b))
+    return Gated(count, false_count, least, r, b, nearest_false, weight, false_weight, mean_r, mean_b, rr, rb, bb)
 
 
 @inline
-def false_plots(k0, k1, share, grid, realisation, scan, gate, place, S, so_far):
-    """Look at the false plots in a gate about place (r, b) with innovation covariance S (rr, rb, bb).
-
-    A field without its arrays, references to which would be counted at each call: the key, the address of its share,
-    and grid (q0, dq, nq, b0, db, nb, ring).
-    """
-    irr, irb, ibb, _ = inverse_two(S[0], S[1], S[2])
-    r, b = place
-    q0, dq, nq, b0, db, nb, ring = grid
-    wide, high = math.sqrt(gate * S[0]), math.sqrt(gate * S[2])
+def with_false_plots(gated, grid, realisation, scan, gate, threshold):
+    """The plots in a gate after all false ones of a scan in it."""
+    irr, irb, ibb, _ = inverse_two(gate.S[0], gate.S[1], gate.S[2])
+    r, b, q0, dq, nq, b0, db, nb = gate.r, gate.b, grid.q0, grid.dq, grid.nq, grid.b0, grid.db, grid.nb
+    wide, high = math.sqrt(threshold * gate.S[0]), math.sqrt(threshold * gate.S[2])
     near, far = max(r - wide, 0.0), r + wide
     least, most = 0.5 * near * near, 0.5 * far * far
     i_first, i_last = cells(least, most, q0, dq, nq)
-    if ring:
+    if grid.ring:
         high = min(high, 0.5 * nb * db)
         j_first, j_last = math.floor((b - high - b0) / db), math.floor((b + high - b0) / db)
         j_last = min(j_last, j_first + nb)  # the same column at both ends of a full turn: half a turn to either side
@@ -158,64 +252,64 @@ def false_plots(k0, k1, share, grid, realisation, scan, gate, place, S, so_far):
         for j in range(j_first, j_last + 1):
             column = j if 0 <= j < nb else j % nb
             cell = (scan * nq + i) * nb + column
-            u, word = cell_words(k0, k1, realisation, cell, 0)
+            u, word = cell_words(grid.k0, grid.k1, realisation, cell, 0)
             spare = word
-            for n in range(number_in(share, uniform(u))):
+            for n in range(number_in(grid.share, uniform(u))):
                 if n > 0:
                     if n % 2 == 1:
-                        word, spare = cell_words(k0, k1, realisation, cell, (n + 1) // 2)
+                        word, spare = cell_words(grid.k0, grid.k1, realisation, cell, (n + 1) // 2)
                     else:
                         word = spare
                 u_q, u_b = place_in(word)
                 q, off = q0 + dq * (i + u_q), b0 + db * (j + u_b) - b
                 if least <= q <= most and abs(off) <= high:  # roots are slow
-                    so_far = seen(so_far, math.sqrt(2.0 * q) - r, off, 1.0, irr, irb, ibb, gate)
-    return so_far
+                    gated = with_plot(gated, math.sqrt(2.0 * q) - r, off, 1.0, (irr, irb, ibb), threshold)
+    return gated
 
 
 @inline
-def decided(so_far, rule, r, S, settled):
-    """From the plots in a gate: innovation (2), extra scatter (3), whether any plot was taken, the weight of false
-    ones in it, and the score's increment.
+def associated(gated, rule, r, S, settled):
+    """The Association of a track at range r from the plots in its gate.
 
     Bar-Shalom's parametric filter (Bar-Shalom, Daum, Huang 2009): with b = λ 2π √|S| (1 - P_D P_G) / P_D no plot is
     the target's with probability β₀ = b / (b + Σe). The covariance grows by K (β₀ S + scatter) Kᵀ from that of a
     certain plot. λ is the density in range and bearing, that per m² times the range. The score is the logarithm of the
     likelihood ratio of all plots in the gate, target against none. A track of one plot (not settled) takes the nearest.
     """
-    count, _, _, nr, nb, false_one, weight, astray, mr, mb, rr, rb, bb = so_far
     r = max(r, CLOSEST)
     density, root = rule.density * r, 2.0 * math.pi * math.sqrt(S[0] * S[2] - S[1] * S[1])
     missed = 1.0 - rule.detection * rule.inside
-    ratio = missed + rule.detection * weight / (root * max(density, SCORED * r))
+    ratio = missed + rule.detection * gated.weight / (root * max(density, LEAST_DENSITY * r))
     score = math.log(max(ratio, 1e-12))
-    if count == 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, score
+    if gated.count == 0.0:
+        return Association(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, score)
     none = density * root * missed / rule.detection
-    if rule.association != PDA or not settled or none + weight == 0.0:
-        return nr, nb, 0.0, 0.0, 0.0, 1.0, false_one, score
-    none = none / (none + weight)
-    some, per = 1.0 - none, 1.0 / weight if weight > 0.0 else 0.0  # of an open gate all may lie out of all likelihood
-    return (
-        some * mr,
-        some * mb,
-        none * S[0] + some * (rr * per + none * (mr * mr)),
-        none * S[1] + some * (rb * per + none * (mr * mb)),
-        none * S[2] + some * (bb * per + none * (mb * mb)),
+    if rule.association != PDA or not settled or none + gated.weight == 0.0:
+        return Association(gated.nu_r, gated.nu_b, 0.0, 0.0, 0.0, 1.0, gated.nearest_false, score)
+    beta0 = none / (none + gated.weight)
+    # Of an open gate all plots may be so far away that their likelihoods are zero.
+    some, per = 1.0 - beta0, 1.0 / gated.weight if gated.weight > 0.0 else 0.0
+    mean_r, mean_b = gated.mean_r, gated.mean_b
+    return Association(
+        some * mean_r,
+        some * mean_b,
+        beta0 * S[0] + some * (gated.rr * per + beta0 * (mean_r * mean_r)),
+        beta0 * S[1] + some * (gated.rb * per + beta0 * (mean_r * mean_b)),
+        beta0 * S[2] + some * (gated.bb * per + beta0 * (mean_b * mean_b)),
         1.0,
-        astray * per,
+        gated.false_weight * per,
         score,
     )
 
 
 @kernel
-def weighed(rule, settled, r, rr, rb, bb, innovations_r, innovations_b):
-    """`decided` of given innovations (n,) of one track at range r, with innovation covariance (rr, rb, bb)."""
-    irr, irb, ibb, _ = inverse_two(rr, rb, bb)
-    so_far = nothing_seen()
-    for i in range(innovations_r.size):
-        so_far = seen(so_far, innovations_r[i], innovations_b[i], 0.0, irr, irb, ibb, rule.gate)
-    return decided(so_far, rule, r, (rr, rb, bb), settled)
+def associate_innovations(rule, settled, r, S, nu_r, nu_b):
+    """The Association of one track at range r with innovation covariance S (rr, rb, bb), of innovations (n,) given."""
+    irr, irb, ibb, _ = inverse_two(S[0], S[1], S[2])
+    gated = empty_gate()
+    for i in range(nu_r.size):
+        gated = with_plot(gated, nu_r[i], nu_b[i], 0.0, (irr, irb, ibb), rule.gate)
+    return associated(gated, rule, r, S, settled)
 
 
 @kernel

@@ -2,9 +2,11 @@
 
 Each tracker has one track a realisation. It looks at the target's plot, if there is one, and at the false plots of the
 field in its gate, one realisation after the other since their numbers differ; covariances then go eight realisations
-at a time (`sonar_tracks`). Every plot that no track took begins a track: of the target's plots, one at a time, of the
-false ones one in each realisation, whose place is drawn evenly over the sector. By the theorem of Slivnyak and Mecke
-the plots about it are again the field's, and the expected number of false tracks is their density times its share.
+at a time (`tracks`). Every plot that no track took begins a track: of the target's plots, one at a time, of the false
+ones one in each realisation, whose place is drawn evenly over the sector. By the theorem of Slivnyak and Mecke the
+plots about it are again the field's, and the expected number of false tracks is their density times its share.
+
+Letters as in `field` and `tracks`; f numbers trackers, i realisations of a chunk, k scans.
 """
 
 from typing import NamedTuple
@@ -19,36 +21,42 @@ from radarsim.studies.sonar.clutter.kernels.field import (
     KNOWN,
     OPEN,
     PDA,
+    Gate,
     Rule,
-    decided,
-    false_plots,
+    associated,
+    distance_squared,
+    empty_gate,
+    grid_of,
     inverse_two,
-    nothing_seen,
-    seen,
+    with_false_plots,
+    with_plot,
 )
-from radarsim.studies.sonar.clutter.kernels.tracks import Tracks, foretell, forget, take
+from radarsim.studies.sonar.clutter.kernels.tracks import Tracks, clear, predict, update
 from radarsim.studies.sonar.kernels.patterns import detect
-from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
+from radarsim.studies.sonar.kernels.shared_gains import Sums, move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK
-from radarsim.studies.sonar.kernels.sums import add_sums, ahead_sums
+from radarsim.studies.sonar.kernels.sums import Counted, Course, Estimate, add_sums, ahead_sums
 
 NONE, TENTATIVE, CONFIRMED = range(3)
-# Rows of a track's life: state, scans since its first plot, plots taken, misses in a row, time since the last plot,
+# Rows of a track's status: state, scans since its first plot, plots taken, misses in a row, time since the last plot,
 # score and its greatest value, whether it is the realisation's first track, whether one was confirmed before; then
 # sums over the realisation: ends of confirmed tracks, scans with one, weight of false plots taken, plots taken.
 ROWS = 13
 STATE, AGE, HITS, MISSES, SINCE, SCORE, BEST, FIRST, BEFORE, ENDS, HELD, WRONG, TAKEN = range(ROWS)
 # What is counted at each scan: tentative tracks, kept ones, first confirmations, lost, dropped, tentative ones dropped,
-# tracks foretold, target's plots then, those in the gate, false ones in it and their expected number.
+# tracks predicted, target's plots then, those in the gate, false ones in it and their expected number.
 COUNTS = 11
 TRYING, KEPT, FOUND, LOST, DROPPED, FAILED, LOOKED, PLOTS, INSIDE, FALSE, EXPECTED = range(COUNTS)
 FALSE_COUNTS = 3  # of tracks that false plots began: tentative, confirmed, first confirmations
 
 
 class Trackers(NamedTuple):
-    """F trackers: association (F,), gate (F,) as χ², inside (F,) its probability, m and n (F,), misses (F,) that drop,
-    speed (F,) m/s, lost (F,) in σ of a plot, manoeuvre (F, 2) in nominal plots and periods; detection and density (per
-    m²) that they reckon with; thresholds (T,) of the score.
+    """F trackers.
+
+    association (F,), gate (F,) as χ², inside (F,) its probability; m and n (F,) of the rule that confirms, misses (F,)
+    in a row that drop a track, lost (F,) in σ of a plot; speed (F,) m/s of targets; manoeuvre (F, 2) variances q in
+    nominal plots and periods. detection and density (per m²) are those that they assume; period in s and sigma (2,) of
+    a plot; thresholds (T,) of the score.
     """
 
     association: np.ndarray
@@ -62,96 +70,179 @@ class Trackers(NamedTuple):
     manoeuvre: np.ndarray
     detection: float
     density: float
+    period: float
+    sigma: np.ndarray
     thresholds: np.ndarray
 
 
 class TrackSums(NamedTuple):
-    """What is added up besides `sonar.Sums`: counts (F, K, COUNTS), begun (F, K, FALSE_COUNTS) of false tracks, ratios
+    """Sums of a block: errors of tracks kept, counts (F, K, COUNTS), begun (F, K, FALSE_COUNTS) of false tracks, ratios
     (F, 2, 5) and scores (2, F, T + 1) of the target's first tracks and of false ones, the last their number.
 
     A ratio is Σa, Σa², Σb, Σb², Σab over realisations: ends of tracks to scans held, false weight to plots taken.
     """
 
+    errors: Sums
     counts: np.ndarray
     begun: np.ndarray
     ratios: np.ndarray
     scores: np.ndarray
 
 
+class Workspace(NamedTuple):
+    """Work arrays for a chunk of F trackers: `Tracks` of each, their status (F, ROWS, CHUNK), and of one tracker what
+    is predicted (5, CHUNK) and what association gives (6, CHUNK), as in `tracks`.
+    """
+
+    x: np.ndarray
+    Y: np.ndarray
+    P: np.ndarray
+    C: np.ndarray
+    plots: np.ndarray
+    status: np.ndarray
+    predicted: np.ndarray
+    association: np.ndarray
+
+
+class Scan(NamedTuple):
+    """Scan k of a chunk, dt after the scan before: realisations from number `first` on, of which `count` count."""
+
+    first: int
+    count: int
+    k: int
+    dt: float
+
+
+class Target(NamedTuple):
+    """The target's plots at a scan: detected (CHUNK,) 1 or 0, z (2, CHUNK); begins: one without a track begins one."""
+
+    detected: np.ndarray
+    z: np.ndarray
+    begins: bool
+
+
+def workspace(count: int) -> Workspace:
+    """Work arrays of that many trackers."""
+    shapes = ((2, 4), (2, 8), (2, 6), (4,), (), (ROWS,))
+    own = [aligned_zeros(count, *shape, CHUNK) for shape in shapes]
+    return Workspace(*own, aligned_zeros(5, CHUNK), aligned_zeros(6, CHUNK))
+
+
+@part
+def reset(work):
+    """Nothing is tracked yet."""
+    work.x[:], work.Y[:], work.P[:], work.C[:] = 0.0, 0.0, 0.0, 0.0
+    work.plots[:], work.status[:], work.association[:] = 0.0, 0.0, 0.0
+    work.status[:, FIRST] = -1.0
+
+
 @inline
-def look(k0, k1, share, grid, density, rule, realisation, scan, settled, z, place, S, counts):
-    """What association makes of the plots in one gate, as `decided`; counts (a COUNTS address) of its scan.
+def tracks_of(work, f):
+    """The tracks of tracker f."""
+    return Tracks(work.x[f], work.Y[f], work.P[f], work.C[f], work.plots[f])
 
-    z (2) is the target's plot with whether it came; place (r, b) and S (rr, rb, bb) are foretold.
+
+# ---- association --------------------------------------------------------------------------------------------------
+@inline
+def associate_track(grid, rule, realisation, k, plot, gate, counts):
+    """The Association of one track at scan k; counts (a COUNTS address) of the scan.
+
+    plot is whether the target's plot is there, and its range and bearing.
     """
-    so_far, known = nothing_seen(), rule.association == KNOWN
-    nu_r, nu_b = z[1] - place[0], z[2] - place[1]
-    irr, irb, ibb, det = inverse_two(*S)
-    if z[0] > 0.0:
-        so_far = seen(so_far, nu_r, nu_b, 0.0, irr, irb, ibb, OPEN if known else rule.gate)
-        if settled:
+    gated, known = empty_gate(), rule.association == KNOWN
+    nu_r, nu_b = plot[1] - gate.r, plot[2] - gate.b
+    irr, irb, ibb, det = inverse_two(gate.S[0], gate.S[1], gate.S[2])
+    S_inverse = (irr, irb, ibb)
+    if plot[0] > 0.0:
+        gated = with_plot(gated, nu_r, nu_b, 0.0, S_inverse, OPEN if known else rule.gate)
+        if gate.settled:
             counts[PLOTS] += 1.0
-            counts[INSIDE] += irr * nu_r * nu_r + 2.0 * irb * nu_r * nu_b + ibb * nu_b * nu_b <= rule.gate
-    if density > 0.0:
-        near = false_plots(k0, k1, share, grid, realisation, scan, rule.gate, place, S, so_far)
-        if settled:
-            sector = grid[1] * grid[2] * grid[4] * grid[5]
-            counts[FALSE] += near[1]
-            counts[EXPECTED] += density * min(max(place[0], 0.0) * np.pi * rule.gate * np.sqrt(det), sector)
-        so_far = so_far if known else near
-    if settled:
+            counts[INSIDE] += distance_squared(nu_r, nu_b, S_inverse) <= rule.gate
+    if grid.density > 0.0:
+        among_false = with_false_plots(gated, grid, realisation, k, gate, rule.gate)
+        if gate.settled:
+            sector = grid.dq * grid.nq * grid.db * grid.nb
+            counts[FALSE] += among_false.false_count
+            counts[EXPECTED] += grid.density * min(max(gate.r, 0.0) * np.pi * rule.gate * np.sqrt(det), sector)
+        gated = gated if known else among_false
+    if gate.settled:
         counts[LOOKED] += 1.0
-    return decided(so_far, rule, place[0], S, settled)
+    return associated(gated, rule, gate.r, gate.S, gate.settled)
 
 
 @part
-def begin(tracks, life, i, z, taken, fresh):
+def begin(tracks, status, i, z, association):
     """A track of one plot."""
-    forget(tracks, i)
-    taken[:, i] = 0.0
-    taken[0, i], taken[1, i], taken[2, i] = 1.0, z[0, i], z[1, i]
-    life[STATE, i], life[AGE, i], life[HITS, i], life[MISSES, i] = TENTATIVE, 1.0, 1.0, 0.0
-    life[SINCE, i], life[SCORE, i], life[FIRST, i] = 0.0, 0.0, fresh
+    clear(tracks, i)
+    association[:, i] = 0.0
+    association[0, i], association[1, i], association[2, i] = 1.0, z[0, i], z[1, i]
+    status[STATE, i], status[AGE, i], status[HITS, i], status[MISSES, i] = TENTATIVE, 1.0, 1.0, 0.0
+    status[SINCE, i], status[SCORE, i], status[FIRST, i] = 0.0, 0.0, 0.0 if status[FIRST, i] >= 0.0 else 1.0
+
+
+@inline
+def gate_of(predicted, i, settled, reach):
+    """The gate of track i; of one plot nothing is known of its velocity but how fast targets are: reach in m."""
+    r, S = predicted[0, i], (predicted[2, i], predicted[3, i], predicted[4, i])
+    if not settled:
+        S = (S[0] + reach * reach, S[1], S[2] + (reach / max(r, CLOSEST)) ** 2)
+    return Gate(r, predicted[1, i], S, settled)
+
+
+@inline
+def note_association(status, i, taken, false_share, score):
+    """Enter what was associated into the status of track i."""
+    if status[STATE, i] == CONFIRMED:
+        status[WRONG, i] += false_share
+        status[TAKEN, i] += taken
+    status[AGE, i] += 1.0
+    status[SCORE, i] += score
+    if status[FIRST, i] > 0.0:
+        status[BEST, i] = max(status[BEST, i], status[SCORE, i])
+    if taken > 0.0:
+        status[HITS, i] += 1.0
+        status[MISSES, i], status[SINCE, i] = 0.0, 0.0
+    else:
+        status[MISSES, i] += 1.0
 
 
 @part
-def associate(field, rule, first, scan, n, dt, tracks, life, came, z, again, foretold, speed, taken, counts):
-    """What every track of a chunk takes of a scan's plots, into taken (6, CHUNK). again: where there is no track, the
-    target's plot begins one. n of the chunk are realisations that count.
+def associate(field, rule, scan, tracks, status, target, work, counts):
+    """What every track of a chunk takes of a scan's plots, into work.association (6, CHUNK).
+
+    Its rows: whether a plot is taken, innovations (r, b) and their further covariance V (rr, rb, bb); of a track that
+    begins here the plot itself for the innovations.
     """
-    k0, k1, share, tally = field.key[0], field.key[1], address(field.share), address(counts)
-    grid = (field.q0, field.dq, field.nq, field.b0, field.db, field.nb, field.ring)
-    for i in range(n):
-        if life[STATE, i] == NONE:
-            taken[:, i] = 0.0
-            if again and came[i] > 0.0:
-                begin(tracks, life, i, z, taken, 0.0 if life[FIRST, i] >= 0.0 else 1.0)
+    grid, out, tally = grid_of(field), work.association, address(counts)
+    for i in range(scan.count):
+        if status[STATE, i] == NONE:
+            out[:, i] = 0.0
+            if target.begins and target.detected[i] > 0.0:
+                begin(tracks, status, i, target.z, out)
             continue
-        life[SINCE, i] += dt
-        r, S, settled = foretold[0, i], (foretold[2, i], foretold[3, i], foretold[4, i]), tracks.plots[i] > 1.5
-        if not settled:  # of one plot: nothing is known of its velocity but how fast targets are
-            reach = speed * life[SINCE, i]
-            S = (S[0] + reach * reach, S[1], S[2] + (reach / max(r, CLOSEST)) ** 2)
-        nr, nb, rr, rb, bb, took, wrong, score = look(
-            *(k0, k1, share, grid, field.density, rule, first + i, scan, settled, (came[i], z[0, i], z[1, i])),
-            *((r, foretold[1, i]), S, tally),
-        )
-        taken[0, i], taken[1, i], taken[2, i] = took, nr, nb
-        taken[3, i], taken[4, i], taken[5, i] = rr, rb, bb
-        if life[STATE, i] == CONFIRMED:
-            life[WRONG, i] += wrong
-            life[TAKEN, i] += took
-        life[AGE, i] += 1.0
-        life[SCORE, i] += score
-        if life[FIRST, i] > 0.0:
-            life[BEST, i] = max(life[BEST, i], life[SCORE, i])
-        if took > 0.0:
-            life[HITS, i] += 1.0
-            life[MISSES, i], life[SINCE, i] = 0.0, 0.0
-        else:
-            life[MISSES, i] += 1.0
+        status[SINCE, i] += scan.dt
+        settled = tracks.plots[i] > 1.5
+        gate = gate_of(work.predicted, i, settled, rule.speed * status[SINCE, i])
+        plot = (target.detected[i], target.z[0, i], target.z[1, i])
+        found = associate_track(grid, rule, scan.first + i, scan.k, plot, gate, tally)
+        out[0, i], out[1, i], out[2, i] = found.taken, found.nu_r, found.nu_b
+        out[3, i], out[4, i], out[5, i] = found.rr, found.rb, found.bb
+        note_association(status, i, found.taken, found.false_share, found.score)
 
 
+@part
+def step(trackers, f, field, scan, tracks, target, work, counts):
+    """One scan of tracker f: predict, associate, update."""
+    manoeuvre, association = trackers.manoeuvre[f], trackers.association[f]
+    predict(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, work.predicted)
+    rule = Rule(
+        association, trackers.gate[f], trackers.detection, trackers.inside[f], trackers.density, trackers.speed[f]
+    )
+    associate(field, rule, scan, tracks, work.status[f], target, work, counts)
+    update(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, association == PDA, work.association)
+
+
+# ---- rules --------------------------------------------------------------------------------------------------------
 @kernel
 def next_state(state, hits, misses, age, m, n, most):
     """State of a track after a scan, by the rules m of n and of misses."""
@@ -162,32 +253,57 @@ def next_state(state, hits, misses, age, m, n, most):
     return NONE if misses >= most else CONFIRMED
 
 
+@inline
+def state_by_rules(trackers, f, status, i):
+    """State of track i of tracker f after a scan, by the rules m of n and of misses."""
+    rules = trackers.m[f], trackers.n[f], trackers.misses[f]
+    return next_state(status[STATE, i], status[HITS, i], status[MISSES, i], status[AGE, i], *rules)
+
+
+@inline
+def is_uncertain(tracks, i, limit):
+    """Whether the place of track i has a variance over the limit, in nominal plots."""
+    return max(tracks.P[0, 0, i], tracks.P[1, 0, i]) > limit
+
+
+@inline
+def is_off(tracks, i, course, limit, sigma):
+    """Whether track i is further from the target than the limit, in σ of a plot, in range or in bearing."""
+    off = abs(tracks.x[0, 0, i] - course.truth[0, 0] - course.shift[0, 0, i]) > limit * sigma[0]
+    off |= abs(tracks.x[1, 0, i] - course.truth[1, 0] - course.shift[1, 0, i]) > limit * sigma[1]
+    return off
+
+
 @part
-def judge(trackers, f, n, tracks, life, sigma, truth, shift, kept, counts):
+def judge_known(tracks, status, n, kept, counts):
+    """Of an oracle's filter every track is kept from its second plot on; arguments as for `judge`."""
+    for i in range(n):
+        kept[i] = 0.0
+        if status[STATE, i] == NONE:
+            continue
+        kept[i] = 2.0 if tracks.plots[i] > 1.5 else 0.0
+        status[STATE, i] = CONFIRMED if kept[i] > 0.0 else TENTATIVE
+        counts[KEPT] += kept[i] > 0.0
+        status[HELD, i] += kept[i] > 0.0
+
+
+@part
+def judge(trackers, f, n, tracks, status, course, kept, counts):
     """The rules over every track of the target after a scan; kept (CHUNK,) is 2 where it has one.
 
-    Of an oracle's filter every track is kept from its second plot on. A confirmed track ends as it is dropped, be it
-    for misses or because its place has grown too uncertain, or as it is lost: too far from the target.
+    A confirmed track ends as it is dropped, be it for misses or because its place has grown too uncertain, or as it is
+    lost: too far from the target. n realisations count.
     """
-    lost, uncertain = trackers.lost[f], trackers.lost[f] * trackers.lost[f]
+    limit = trackers.lost[f]
     for i in range(n):
-        state = life[STATE, i]
+        state = status[STATE, i]
         kept[i] = 0.0
         if state == NONE:
             continue
-        if trackers.association[f] == KNOWN:
-            kept[i] = 2.0 if tracks.plots[i] > 1.5 else 0.0
-            life[STATE, i] = CONFIRMED if kept[i] > 0.0 else TENTATIVE
-            counts[KEPT] += kept[i] > 0.0
-            life[HELD, i] += kept[i] > 0.0
-            continue
-        rules = trackers.m[f], trackers.n[f], trackers.misses[f]
-        now = next_state(state, life[HITS, i], life[MISSES, i], life[AGE, i], *rules)
+        now = state_by_rules(trackers, f, status, i)
         if now == CONFIRMED:
-            off = abs(tracks.x[0, 0, i] - truth[0, 0] - shift[0, 0, i]) > lost * sigma[0]
-            off |= abs(tracks.x[1, 0, i] - truth[1, 0] - shift[1, 0, i]) > lost * sigma[1]
-            vague = max(tracks.P[0, 0, i], tracks.P[1, 0, i]) > uncertain
-            if state == CONFIRMED and (off or vague):
+            off = is_off(tracks, i, course, limit, trackers.sigma)
+            if state == CONFIRMED and (off or is_uncertain(tracks, i, limit * limit)):
                 counts[LOST if off else DROPPED] += 1.0
                 now = NONE
             elif off:  # confirmed on other plots than the target's
@@ -198,46 +314,46 @@ def judge(trackers, f, n, tracks, life, sigma, truth, shift, kept, counts):
         if now == CONFIRMED:
             kept[i] = 2.0
             counts[KEPT] += 1.0
-            life[HELD, i] += 1.0
-            counts[FOUND] += life[BEFORE, i] == 0.0
-            life[BEFORE, i] = 1.0
+            status[HELD, i] += 1.0
+            counts[FOUND] += status[BEFORE, i] == 0.0
+            status[BEFORE, i] = 1.0
         elif now == TENTATIVE:
             counts[TRYING] += 1.0
         elif state == CONFIRMED:
-            life[ENDS, i] += 1.0
+            status[ENDS, i] += 1.0
         if now == NONE:
-            life[FIRST, i] = 0.0
-        life[STATE, i] = now
+            status[FIRST, i] = 0.0
+        status[STATE, i] = now
 
 
 @part
-def judge_false(trackers, f, n, tracks, life, begun):
+def judge_false(trackers, f, n, tracks, status, begun):
     """The rules over every track that a false plot began; gives whether any is left."""
-    uncertain, left = trackers.lost[f] * trackers.lost[f], False
+    limit, left = trackers.lost[f] * trackers.lost[f], False
     for i in range(n):
-        state = life[STATE, i]
+        state = status[STATE, i]
         if state == NONE:
             continue
-        rules = trackers.m[f], trackers.n[f], trackers.misses[f]
-        now = next_state(state, life[HITS, i], life[MISSES, i], life[AGE, i], *rules)
-        if state == CONFIRMED and max(tracks.P[0, 0, i], tracks.P[1, 0, i]) > uncertain:
+        now = state_by_rules(trackers, f, status, i)
+        if state == CONFIRMED and is_uncertain(tracks, i, limit):
             now = NONE
         begun[0] += now == TENTATIVE
         begun[1] += now == CONFIRMED
         begun[2] += now == CONFIRMED and state == TENTATIVE
-        life[STATE, i] = now
+        status[STATE, i] = now
         left |= now != NONE
     return left
 
 
+# ---- sums ---------------------------------------------------------------------------------------------------------
 @part
-def add_scores(thresholds, n, life, scores):
+def add_scores(thresholds, n, status, scores):
     """How many first tracks' scores reached each threshold, and how many first tracks there were."""
     for i in range(n):
-        if life[FIRST, i] >= 0.0:
+        if status[FIRST, i] >= 0.0:
             scores[thresholds.size] += 1.0
             for t in range(thresholds.size):
-                scores[t] += life[BEST, i] >= thresholds[t]
+                scores[t] += status[BEST, i] >= thresholds[t]
 
 
 @part
@@ -253,144 +369,82 @@ def add_ratio(a, b, n, ratio):
 
 
 @part
-def scan(trackers, f, field, first, k, n, dt, period, sigma, tracks, life, came, z, again, foretold, taken, counts):
-    """Scan k of tracker f: foretell, associate, update."""
-    foretell(tracks, dt, period, sigma, trackers.manoeuvre[f], foretold)
-    rule = Rule(trackers.association[f], trackers.gate[f], trackers.detection, trackers.inside[f], trackers.density)
-    associate(field, rule, first, k, n, dt, tracks, life, came, z, again, foretold, trackers.speed[f], taken, counts)
-    take(tracks, dt, period, sigma, trackers.manoeuvre[f], trackers.association[f] == PDA, taken)
+def add_errors(trackers, tracks, f, k, course, counted, out, sums):
+    """Add the errors of the tracks kept of tracker f at scan k, in range and in bearing; out (7,) is scratch."""
+    size = tracks.x.shape[0]  # two, but as a number known to the compiler all that is inlined would be compiled twice
+    for c in range(size):
+        estimate = Estimate(tracks.x[c], tracks.P[c], size, tracks.x[c], 0)
+        units = (trackers.sigma[c], trackers.period)
+        add_sums(estimate, Course(course.truth[c], course.shift[c]), counted, units, (f, k, c), out, sums)
 
 
-class Workspace(NamedTuple):
-    """Room for a chunk of F trackers: `Tracks` of each, their lives (F, ROWS, CHUNK), what is foretold and taken."""
-
-    x: np.ndarray
-    y: np.ndarray
-    P: np.ndarray
-    across: np.ndarray
-    plots: np.ndarray
-    life: np.ndarray
-    foretold: np.ndarray
-    taken: np.ndarray
+@part
+def add_ahead(tracks, f, k, dt, course, counted, out, sums):
+    """Add the errors of tracker f at scan k of what was extrapolated from scan k - 1."""
+    size = tracks.x.shape[0]
+    for c in range(size):
+        ahead_sums(tracks.x[c], size, Course(course.truth[c], course.shift[c]), counted, dt, out)
+        for power in range(4):
+            sums.ahead[f, k - 1, c, power] += out[power]
 
 
-def workspace(count: int) -> Workspace:
-    """Room for that many trackers."""
-    shapes = ((2, 4), (2, 8), (2, 6), (4,), (), (ROWS,))
-    return Workspace(
-        *(aligned_zeros(count, *shape, CHUNK) for shape in shapes), *(aligned_zeros(n, CHUNK) for n in (5, 6))
-    )
-
-
+# ---- a block ------------------------------------------------------------------------------------------------------
 @kernel
-def reset(room):
-    """Nothing is tracked yet."""
-    room.x[:], room.y[:], room.P[:], room.across[:] = 0.0, 0.0, 0.0, 0.0
-    room.plots[:], room.life[:], room.taken[:] = 0.0, 0.0, 0.0
-    room.life[:, FIRST] = -1.0
-
-
-@kernel
-def simulate_block(world, observation, field, trackers, room, first, total, sums, ways):
-    """Add the sums of the target's tracks in realisations first … first + total - 1."""
-    F, K, x, life = trackers.gate.size, world.dt.size, room.x, room.life
+def simulate_block(world, observation, field, trackers, work, first, total, sums):
+    """Add the sums of the target's tracks in realisations first … first + total - 1 to sums, TrackSums."""
+    F, K, status = trackers.gate.size, world.dt.size, work.status
     plots, shift, z = np.empty((2, 4, CHUNK)), np.zeros((2, 3, CHUNK)), np.empty((2, CHUNK))
-    came, used, kept = np.empty(CHUNK), np.ones(CHUNK), np.empty((F, CHUNK))
-    counts, out, lines = np.zeros(COUNTS), np.empty(7), x.shape[1]  # two, but as a number known to the compiler all
-    # that is inlined would be compiled twice
+    detected, used, kept = np.empty(CHUNK), np.ones(CHUNK), np.empty((F, CHUNK))
+    counts, out, target = np.zeros(COUNTS), np.empty(7), Target(detected, z, True)
     for done in range(0, total, CHUNK):
-        reset(room)
+        reset(work)
         plots[:], kept[:] = 0.0, 0.0
         n = min(CHUNK, total - done)
         used[n:] = 0.0
         for k in range(K):
-            dt, truth = world.dt[k], world.truth[k]
+            scan, course = Scan(first + done, n, k, world.dt[k]), Course(world.truth[k], shift)
             move_and_measure(world, first + done, k, plots)
-            detect(observation, first + done, k, came)
+            detect(observation, first + done, k, detected)
             shift[:, :2], z[:] = plots[:, 2:], plots[:, 0]
             for f in range(F):
-                tracks = Tracks(x[f], room.y[f], room.P[f], room.across[f], room.plots[f])
+                tracks, counted = tracks_of(work, f), Counted(kept[f], used)
                 if k > 0:
-                    for c in range(lines):
-                        ahead_sums(x[f, c], shift[c, 0], truth[c, 0], dt, kept[f], used, lines, out)
-                        for q in range(4):
-                            sums.ahead[f, k - 1, c, q] += out[q]
+                    add_ahead(tracks, f, k, scan.dt, course, counted, out, sums.errors)
                 counts[:] = 0.0
-                scan(
-                    *(
-                        trackers,
-                        f,
-                        field,
-                        first + done,
-                        k,
-                        n,
-                        dt,
-                        observation.period,
-                        observation.sigma,
-                        tracks,
-                        life[f],
-                        came,
-                        z,
-                    ),
-                    *(True, room.foretold, room.taken, counts),
-                )
-                judge(trackers, f, n, tracks, life[f], observation.sigma, truth, shift, kept[f], counts)
-                ways.counts[f, k] += counts
-                for c in range(lines):
-                    add_sums(
-                        *(
-                            lines,
-                            observation.sigma[c],
-                            observation.period,
-                            x[f, c],
-                            x[f, c],
-                            0,
-                            room.P[f, c],
-                            shift[c],
-                            truth[c],
-                        ),
-                        *(kept[f], used, f, k, c, out, sums),
-                    )
+                step(trackers, f, field, scan, tracks, target, work, counts)
+                if trackers.association[f] == KNOWN:
+                    judge_known(tracks, status[f], n, kept[f], counts)
+                else:
+                    judge(trackers, f, n, tracks, status[f], course, kept[f], counts)
+                sums.counts[f, k] += counts
+                add_errors(trackers, tracks, f, k, course, counted, out, sums.errors)
         for f in range(F):
-            add_ratio(life[f, ENDS], life[f, HELD], n, ways.ratios[f, 0])
-            add_ratio(life[f, WRONG], life[f, TAKEN], n, ways.ratios[f, 1])
-            add_scores(trackers.thresholds, n, life[f], ways.scores[0, f])
+            add_ratio(status[f, ENDS], status[f, HELD], n, sums.ratios[f, 0])
+            add_ratio(status[f, WRONG], status[f, TAKEN], n, sums.ratios[f, 1])
+            add_scores(trackers.thresholds, n, status[f], sums.scores[0, f])
 
 
 @kernel
-def simulate_false(seeds, observation, field, trackers, room, dts, first, total, ways):
-    """Add the sums of tracks that false plots begin: one plot a realisation, evenly over the sector, at scan 0."""
-    F, K, life = trackers.gate.size, dts.size, room.life
-    z, came, counts, nothing = np.empty((2, CHUNK)), np.ones(CHUNK), np.zeros(COUNTS), np.zeros(CHUNK)
+def simulate_false(key, field, trackers, work, dt, first, total, sums):
+    """Add the sums of tracks that false plots begin: one plot a realisation, evenly over the sector, at scan 0.
+
+    key (2,) of the places; dt (K,) intervals before each scan.
+    """
+    z, detected, counts, nothing = np.empty((2, CHUNK)), np.ones(CHUNK), np.zeros(COUNTS), np.zeros(CHUNK)
     for done in range(0, total, CHUNK):
-        reset(room)
+        reset(work)
         n = min(CHUNK, total - done)
         for i in range(n):
-            u, v = uniforms(seeds[0], seeds[1], first + done + i, 0)
+            u, v = uniforms(key[0], key[1], first + done + i, 0)
             z[0, i] = np.sqrt(2.0 * (field.q0 + field.dq * field.nq * u))
             z[1, i] = field.b0 + field.db * field.nb * v
-        for f in range(F):
-            tracks = Tracks(room.x[f], room.y[f], room.P[f], room.across[f], room.plots[f])
+        for f in range(trackers.gate.size):
+            tracks, status = tracks_of(work, f), work.status[f]
             if trackers.association[f] == KNOWN:
                 continue
-            for k in range(K):
-                there = came if k == 0 else nothing
-                scan(
-                    *(
-                        trackers,
-                        f,
-                        field,
-                        first + done,
-                        k,
-                        n,
-                        dts[k],
-                        observation.period,
-                        observation.sigma,
-                        tracks,
-                        life[f],
-                    ),
-                    *(there, z, k == 0, room.foretold, room.taken, counts),
-                )
-                if not judge_false(trackers, f, n, tracks, life[f], ways.begun[f, k]):
+            for k in range(dt.size):
+                target = Target(detected if k == 0 else nothing, z, k == 0)
+                step(trackers, f, field, Scan(first + done, n, k, dt[k]), tracks, target, work, counts)
+                if not judge_false(trackers, f, n, tracks, status, sums.begun[f, k]):
                     break
-            add_scores(trackers.thresholds, n, life[f], ways.scores[1, f])
+            add_scores(trackers.thresholds, n, status, sums.scores[1, f])

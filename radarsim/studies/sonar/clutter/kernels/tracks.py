@@ -1,11 +1,19 @@
-"""Tracks of range and bearing, eight at a time: foretelling with the innovation's covariance, and the update.
+"""Tracks of range and bearing, eight at a time: prediction with the innovation's covariance, and the update.
 
 The state is that of two lines, (r, vr) and (b, vb), each with the recursion of the plain Kalman filter of this study
-(`sonar_steps.informed` up to two plots, then `believed`); probabilistic association ties them by a covariance between
-them, four numbers which are zero, and change no bit, as long as every plot taken is certain. Plots are taken in one
-coordinate after the other, which their independent errors allow. Covariances are in nominal plots and periods.
+(`steps.least_squares` up to two plots, then `steps.kalman`). Probabilistic association ties them by a covariance
+between them, four numbers which are zero, and change no bit, as long as every plot taken is certain. Plots are taken in
+one coordinate after the other, which their independent errors allow. Letters as in `sonar.kernels.steps`, and
 
-Rows of the arrays are of one chunk, as in `sonar_steps`.
+    P_r, P_b    (6)   covariances of the two lines; their third component is zero
+    C           (4)   covariance between them, (r, vr) by (b, vb), packed by rows
+    nu_r, nu_b        innovations in range and bearing, in m and rad
+    S           (3)   covariance of the innovations: rr, rb, bb
+    V           (3)   further covariance of innovations that are not certain to be the target's: rr, rb, bb
+    K_rb        (2)   gain of the line in range for the innovation in bearing; likewise K_rr, K_br, K_bb
+    n, w              plots of a track before this scan; 1 where it takes a plot, else 0
+
+P, C and K are in nominal plots and periods. Arrays hold a chunk, as in `steps`.
 """
 
 from typing import NamedTuple
@@ -15,20 +23,34 @@ import numpy as np
 from radarsim.kernels.compile import aligned_zeros, inline, kernel
 from radarsim.kernels.lanes import address, full, get, put, where_greater
 from radarsim.kernels.linear import extrapolated
-from radarsim.studies.sonar.kernels.steps import CHUNK, GROUPS, believed, eight, informed, put_six, six
-
-NOWHERE = (0.0, 0.0, 0.0)
+from radarsim.studies.sonar.kernels.steps import (
+    CHUNK,
+    GROUPS,
+    KALMAN_GAIN,
+    Model,
+    eight,
+    four,
+    kalman,
+    least_squares,
+    put_eight,
+    put_four,
+    put_six,
+    six,
+    three,
+)
 
 
 class Tracks(NamedTuple):
-    """A chunk of tracks of one tracker: x (2, 4, CHUNK) estimates, as in `sonar`; y (2, 8, CHUNK) information; P (2, 6,
-    CHUNK) covariance of each line; across (4, CHUNK) that between them, (r, vr) by (b, vb); plots (CHUNK,) so far.
+    """A chunk of tracks of one tracker; lines in range and in bearing.
+
+    x (2, 4, CHUNK) states, Y (2, 8, CHUNK) information and P (2, 6, CHUNK) covariance of each line, as in `steps`; C
+    (4, CHUNK) covariance between the lines; plots (CHUNK,) so far.
     """
 
     x: np.ndarray
-    y: np.ndarray
+    Y: np.ndarray
     P: np.ndarray
-    across: np.ndarray
+    C: np.ndarray
     plots: np.ndarray
 
 
@@ -39,153 +61,179 @@ def no_tracks() -> Tracks:
 
 
 @kernel
-def forget(tracks, i):
+def clear(tracks, i):
     """Empty the place of track i."""
-    tracks.x[:, :, i], tracks.y[:, :, i], tracks.P[:, :, i] = 0.0, 0.0, 0.0
-    tracks.across[:, i], tracks.plots[i] = 0.0, 0.0
+    tracks.x[:, :, i], tracks.Y[:, :, i], tracks.P[:, :, i] = 0.0, 0.0, 0.0
+    tracks.C[:, i], tracks.plots[i] = 0.0, 0.0
 
 
-# ---- one group ----------------------------------------------------------------------------------------------------
+# ---- prediction ---------------------------------------------------------------------------------------------------
 @inline
-def four(a, i):
-    """Four rows of group i."""
-    return get(a, i), get(a, GROUPS + i), get(a, 2 * GROUPS + i), get(a, 3 * GROUPS + i)
+def joint_of(P):
+    """The joint covariance of a state of covariance P (6) without a carried error."""
+    zero = full(0.0)
+    return P[0], P[1], P[2], P[3], P[4], P[5], zero, zero, zero, zero
 
 
 @inline
-def line_foretold(p, before, tau, manoeuvre):
+def predicted_line(P, n, tau, q):
     """Covariance (6) of a line after tau periods: the plain filter's step without a plot."""
     zero = full(0.0)
-    s = (p[0], p[1], p[2], p[3], p[4], p[5], zero, zero, zero, zero)
-    g = (zero, zero, zero, zero)
-    _, _, P = believed(s, g, p, before, zero, tau, 0.0, 2, 2, manoeuvre, NOWHERE)
+    start = ((zero, zero, zero, zero), P)
+    _, _, P = kalman(joint_of(P), start, n, zero, tau, Model(2, 2, 0.0, q, KALMAN_GAIN))
     return P
 
 
 @inline
-def across_foretold(c, tau):
-    """Covariance between the lines (4) after tau periods."""
-    top, low = c[0] + tau * c[2], c[1] + tau * c[3]
-    return top + tau * low, low, c[2] + tau * c[3], c[3]
+def predicted_between(C, tau):
+    """F C Fᵀ of the covariance between the lines, after tau periods."""
+    top, low = C[0] + tau * C[2], C[1] + tau * C[3]
+    return top + tau * low, low, C[2] + tau * C[3], C[3]
+
+
+@kernel
+def predict(tracks, dt, period, sigma, manoeuvre, predicted):
+    """Places and innovation covariances after dt into predicted (5, CHUNK): r, b, S (rr, rb, bb); in m and rad.
+
+    sigma (2,) of a nominal plot; manoeuvre (2,) variances q of the lines.
+    """
+    ar, ab, pr, pb = address(tracks.x[0]), address(tracks.x[1]), address(tracks.P[0]), address(tracks.P[1])
+    ac, an, out, tau = address(tracks.C), address(tracks.plots), address(predicted), dt / period
+    rr, rb, bb = sigma[0] * sigma[0], sigma[0] * sigma[1], sigma[1] * sigma[1]
+    for i in range(GROUPS):
+        n, x_r, x_b = get(an, i), three(ar, i), three(ab, i)
+        r, _, _ = extrapolated(x_r[0], x_r[1], x_r[2], dt)
+        b, _, _ = extrapolated(x_b[0], x_b[1], x_b[2], dt)
+        P_r = predicted_line(six(pr, i), n, tau, manoeuvre[0])
+        P_b = predicted_line(six(pb, i), n, tau, manoeuvre[1])
+        C, _, _, _ = predicted_between(four(ac, i), tau)
+        put(out, i, r)
+        put(out, GROUPS + i, b)
+        put(out, 2 * GROUPS + i, rr * (P_r[0] + 1.0))
+        put(out, 3 * GROUPS + i, rb * C)
+        put(out, 4 * GROUPS + i, bb * (P_b[0] + 1.0))
+
+
+# ---- update -------------------------------------------------------------------------------------------------------
+@inline
+def updated_line(P, start, n, w):
+    """Gain K (2) and covariance P (6) of a line after a plot; start (K, P) are those of least squares."""
+    _, K, P = kalman(joint_of(P), start, n, w, 0.0, Model(2, 2, 0.0, 0.0, KALMAN_GAIN))
+    return (K[0], K[1]), P
 
 
 @inline
-def line_taken(P, y, before, w):
-    """Gain (2) and covariance (6) of a line with a plot taken where w is 1; y (8) the information with it."""
-    zero = full(0.0)
-    _, g, p = y
-    s = (P[0], P[1], P[2], P[3], P[4], P[5], zero, zero, zero, zero)
-    _, gain, taken = believed(s, g, p, before, w, 0.0, 0.0, 2, 2, 0.0, NOWHERE)
-    return gain, taken
+def reduced(P, K, h):
+    """P - K hᵀ of a line (6), symmetric since K is h scaled."""
+    return P[0] - K[0] * h[0], P[1] - K[0] * h[1], P[2], P[3] - K[1] * h[1], P[4], P[5]
 
 
 @inline
-def less(P, g, k):
-    """Covariance (6) of a line less g kᵀ, symmetric since g is k scaled."""
-    return P[0] - g[0] * k[0], P[1] - g[0] * k[1], P[2], P[3] - g[1] * k[1], P[4], P[5]
+def transposed(C):
+    """Cᵀ: the covariance between the lines in the other order."""
+    return C[0], C[2], C[1], C[3]
 
 
 @inline
-def more(P, K, L, rr, rb, bb):
-    """Covariance (6) of a line plus [K L] Σ [K L]ᵀ, K and L its gains (2) for the two innovations."""
-    u0, u1 = rr * K[0] + rb * L[0], rr * K[1] + rb * L[1]
-    w0, w1 = rb * K[0] + bb * L[0], rb * K[1] + bb * L[1]
+def updated_pair(P, P_other, C, start, n, w):
+    """Both lines after a plot of one: gains K and K_other (2), covariances P and P_other (6), and C (4) between them.
+
+    P is of the line that has the plot, start (K, P) its least squares; C is that line by the other.
+    """
+    h = (C[0], C[1])  # covariance of what is measured with the other line
+    scale = w / (P[0] + 1.0)
+    K, P = updated_line(P, start, n, w)
+    K_other = (h[0] * scale, h[1] * scale)
+    P_other = reduced(P_other, K_other, h)
+    C = (C[0] - K[0] * h[0], C[1] - K[0] * h[1], C[2] - K[1] * h[0], C[3] - K[1] * h[1])
+    return K, K_other, P, P_other, C
+
+
+@inline
+def with_scatter(P, K, L, V):
+    """P (6) of a line plus [K L] V [K L]ᵀ, K and L its gains (2) for the two innovations."""
+    u0, u1 = V[0] * K[0] + V[1] * L[0], V[0] * K[1] + V[1] * L[1]
+    v0, v1 = V[1] * K[0] + V[2] * L[0], V[1] * K[1] + V[2] * L[1]
     return (
-        P[0] + u0 * K[0] + w0 * L[0],
-        P[1] + u0 * K[1] + w0 * L[1],
+        P[0] + u0 * K[0] + v0 * L[0],
+        P[1] + u0 * K[1] + v0 * L[1],
         P[2],
-        P[3] + u1 * K[1] + w1 * L[1],
+        P[3] + u1 * K[1] + v1 * L[1],
         P[4],
         P[5],
     )
 
 
-# ---- a chunk ------------------------------------------------------------------------------------------------------
-@kernel
-def foretell(tracks, dt, period, sigma, manoeuvre, foretold):
-    """Positions and innovation covariances after dt into foretold (5, CHUNK): r, b, S (rr, rb, bb); in m and rad."""
-    ar, ab, pr, pb = address(tracks.x[0]), address(tracks.x[1]), address(tracks.P[0]), address(tracks.P[1])
-    ac, an, out, tau = address(tracks.across), address(tracks.plots), address(foretold), dt / period
-    rr, rb, bb = sigma[0] * sigma[0], sigma[0] * sigma[1], sigma[1] * sigma[1]
-    for i in range(GROUPS):
-        n = get(an, i)
-        r, _, _ = extrapolated(get(ar, i), get(ar, GROUPS + i), get(ar, 2 * GROUPS + i), dt)
-        b, _, _ = extrapolated(get(ab, i), get(ab, GROUPS + i), get(ab, 2 * GROUPS + i), dt)
-        P = line_foretold(six(pr, i), n, tau, manoeuvre[0])
-        Q = line_foretold(six(pb, i), n, tau, manoeuvre[1])
-        c, _, _, _ = across_foretold(four(ac, i), tau)
-        put(out, i, r)
-        put(out, GROUPS + i, b)
-        put(out, 2 * GROUPS + i, rr * (P[0] + 1.0))
-        put(out, 3 * GROUPS + i, rb * c)
-        put(out, 4 * GROUPS + i, bb * (Q[0] + 1.0))
+@inline
+def between_with_scatter(C, K_r, K_b, V):
+    """C (4) plus [K_rr K_rb] V [K_br K_bb]ᵀ; K_r and K_b are these pairs of gains."""
+    (K_rr, K_rb), (K_br, K_bb) = K_r, K_b
+    u0, u1 = V[0] * K_br[0] + V[1] * K_bb[0], V[0] * K_br[1] + V[1] * K_bb[1]
+    v0, v1 = V[1] * K_br[0] + V[2] * K_bb[0], V[1] * K_br[1] + V[2] * K_bb[1]
+    return (
+        C[0] + K_rr[0] * u0 + K_rb[0] * v0,
+        C[1] + K_rr[0] * u1 + K_rb[0] * v1,
+        C[2] + K_rr[1] * u0 + K_rb[1] * v0,
+        C[3] + K_rr[1] * u1 + K_rb[1] * v1,
+    )
+
+
+@inline
+def jointly_updated(P, C, starts, n, w, V):
+    """Both lines after a plot that may not be the target's: gains (K_rr, K_br, K_rb, K_bb), P (P_r, P_b), and C.
+
+    The plot's range is taken first, then its bearing: K_rb and K_bb are gains for the innovation in bearing less what
+    that in range has explained of it. starts are the least squares (K, P) of both lines.
+    """
+    K_rr, K_br, P_r, P_b, C = updated_pair(P[0], P[1], C, starts[0], n, w)
+    K_bb, K_rb, P_b, P_r, C = updated_pair(P_b, P_r, transposed(C), starts[1], n, w)
+    # Gains for the two innovations as they are, both at once.
+    K_r = ((K_rr[0] - K_rb[0] * K_br[0], K_rr[1] - K_rb[1] * K_br[0]), K_rb)
+    K_b = ((K_br[0] - K_bb[0] * K_br[0], K_br[1] - K_bb[1] * K_br[0]), K_bb)
+    P_r, P_b = with_scatter(P_r, K_r[0], K_r[1], V), with_scatter(P_b, K_b[0], K_b[1], V)
+    return (K_rr, K_br, K_rb, K_bb), (P_r, P_b), between_with_scatter(transposed(C), K_r, K_b, V)
 
 
 @kernel
-def take(tracks, dt, period, sigma, manoeuvre, joint, taken):
-    """One scan of all tracks, in place; taken (6, CHUNK) is what association gave.
+def update(tracks, dt, period, sigma, manoeuvre, joint, association):
+    """One scan of all tracks, in place; association (6, CHUNK) as `tracker.associate` leaves it.
 
-    Whether a plot is taken (1 or 0), innovation in range and bearing, and the extra scatter (rr, rb, bb) of one that is
-    not certain, in m and rad. joint: there may be such scatter.
+    Its rows: whether a plot is taken (1 or 0), innovations in range and bearing, and V (rr, rb, bb), in m and rad.
+    joint: V may be other than zero.
     """
     ar, ab, pr, pb = address(tracks.x[0]), address(tracks.x[1]), address(tracks.P[0]), address(tracks.P[1])
-    yr, yb, ac, an, at = (
-        *(address(tracks.y[0]), address(tracks.y[1]), address(tracks.across), address(tracks.plots)),
-        address(taken),
-    )
-    tau, per, ratio = dt / period, 1.0 / period, sigma[0] / sigma[1]
-    back, one_r, one_b = sigma[1] / sigma[0], 1.0 / sigma[0], 1.0 / sigma[1]
+    yr, yb, ac, an = address(tracks.Y[0]), address(tracks.Y[1]), address(tracks.C), address(tracks.plots)
+    at, tau, per = address(association), dt / period, 1.0 / period
+    r_per_b, b_per_r, per_r, per_b = sigma[0] / sigma[1], sigma[1] / sigma[0], 1.0 / sigma[0], 1.0 / sigma[1]
     for i in range(GROUPS):
-        n, w = get(an, i), get(at, i)
-        nu_r, nu_b = get(at, GROUPS + i), get(at, 2 * GROUPS + i)
-        r, vr, _ = extrapolated(get(ar, i), get(ar, GROUPS + i), get(ar, 2 * GROUPS + i), dt)
-        b, vb, _ = extrapolated(get(ab, i), get(ab, GROUPS + i), get(ab, 2 * GROUPS + i), dt)
-        information_r = informed(eight(yr, i), n, w, tau, 0.0, 2)
-        information_b = informed(eight(yb, i), n, w, tau, 0.0, 2)
-        P = line_foretold(six(pr, i), n, tau, manoeuvre[0])
-        Q = line_foretold(six(pb, i), n, tau, manoeuvre[1])
+        n, w, nu_r, nu_b = get(an, i), get(at, i), get(at, GROUPS + i), get(at, 2 * GROUPS + i)
+        x_r, x_b = three(ar, i), three(ab, i)
+        r, vr, _ = extrapolated(x_r[0], x_r[1], x_r[2], dt)
+        b, vb, _ = extrapolated(x_b[0], x_b[1], x_b[2], dt)
+        Y_r, K_start_r, P_start_r = least_squares(eight(yr, i), n, w, tau, 0.0, 2)
+        Y_b, K_start_b, P_start_b = least_squares(eight(yb, i), n, w, tau, 0.0, 2)
+        P_r = predicted_line(six(pr, i), n, tau, manoeuvre[0])
+        P_b = predicted_line(six(pb, i), n, tau, manoeuvre[1])
         if joint:
-            c = across_foretold(four(ac, i), tau)
-            # The plot in range, then that in bearing: k and h are covariances with the other line's position.
-            k = (c[0], c[1])
-            scale = w / (P[0] + 1.0)
-            g, P = line_taken(P, information_r, n, w)
-            kb = (k[0] * scale, k[1] * scale)
-            Q = less(Q, kb, k)
-            c = (c[0] - g[0] * k[0], c[1] - g[0] * k[1], c[2] - g[1] * k[0], c[3] - g[1] * k[1])
-            h = (c[0], c[2])
-            scale = w / (Q[0] + 1.0)
-            f, Q = line_taken(Q, information_b, n, w)
-            hr = (h[0] * scale, h[1] * scale)
-            P = less(P, hr, h)
-            c = (c[0] - h[0] * f[0], c[1] - h[0] * f[1], c[2] - h[1] * f[0], c[3] - h[1] * f[1])
-            nu_b = nu_b - (back * kb[0]) * nu_r
-            # Gains for the two innovations at once: (G, B) of the line in range, (A, f) of that in bearing.
-            G, A = (g[0] - hr[0] * kb[0], g[1] - hr[1] * kb[0]), (kb[0] - f[0] * kb[0], kb[1] - f[1] * kb[0])
-            rr, rb = one_r * one_r * get(at, 3 * GROUPS + i), one_r * one_b * get(at, 4 * GROUPS + i)
-            bb = one_b * one_b * get(at, 5 * GROUPS + i)
-            P, Q = more(P, G, hr, rr, rb, bb), more(Q, A, f, rr, rb, bb)
-            u0, u1 = rr * A[0] + rb * f[0], rr * A[1] + rb * f[1]
-            v0, v1 = rb * A[0] + bb * f[0], rb * A[1] + bb * f[1]
-            put(ac, i, c[0] + G[0] * u0 + hr[0] * v0)
-            put(ac, GROUPS + i, c[1] + G[0] * u1 + hr[0] * v1)
-            put(ac, 2 * GROUPS + i, c[2] + G[1] * u0 + hr[1] * v0)
-            put(ac, 3 * GROUPS + i, c[3] + G[1] * u1 + hr[1] * v1)
-            r, vr = r + (ratio * hr[0]) * nu_b, vr + (per * ratio * hr[1]) * nu_b
-            b, vb = b + (back * kb[0]) * nu_r, vb + (per * back * kb[1]) * nu_r
+            rr, rb = per_r * per_r * get(at, 3 * GROUPS + i), per_r * per_b * get(at, 4 * GROUPS + i)
+            V = (rr, rb, per_b * per_b * get(at, 5 * GROUPS + i))
+            starts = ((K_start_r, P_start_r), (K_start_b, P_start_b))
+            C = predicted_between(four(ac, i), tau)
+            K, (P_r, P_b), C = jointly_updated((P_r, P_b), C, starts, n, w, V)
+            K_rr, K_br, K_rb, K_bb = K
+            put_four(ac, i, C)
+            nu_b = nu_b - (b_per_r * K_br[0]) * nu_r
+            r, vr = r + (r_per_b * K_rb[0]) * nu_b, vr + (per * r_per_b * K_rb[1]) * nu_b
+            b, vb = b + (b_per_r * K_br[0]) * nu_r, vb + (per * b_per_r * K_br[1]) * nu_r
         else:
-            g, P = line_taken(P, information_r, n, w)
-            f, Q = line_taken(Q, information_b, n, w)
-        put(ar, i, r + g[0] * nu_r)
-        put(ar, GROUPS + i, vr + per * g[1] * nu_r)
-        put(ab, i, b + f[0] * nu_b)
-        put(ab, GROUPS + i, vb + per * f[1] * nu_b)
-        put_six(pr, i, P)
-        put_six(pb, i, Q)
-        put_six(yr, i, information_r[0])
-        put(yr, 6 * GROUPS + i, information_r[0][6])
-        put(yr, 7 * GROUPS + i, information_r[0][7])
-        put_six(yb, i, information_b[0])
-        put(yb, 6 * GROUPS + i, information_b[0][6])
-        put(yb, 7 * GROUPS + i, information_b[0][7])
+            K_rr, P_r = updated_line(P_r, (K_start_r, P_start_r), n, w)
+            K_bb, P_b = updated_line(P_b, (K_start_b, P_start_b), n, w)
+        put(ar, i, r + K_rr[0] * nu_r)
+        put(ar, GROUPS + i, vr + per * K_rr[1] * nu_r)
+        put(ab, i, b + K_bb[0] * nu_b)
+        put(ab, GROUPS + i, vb + per * K_bb[1] * nu_b)
+        put_six(pr, i, P_r)
+        put_six(pb, i, P_b)
+        put_eight(yr, i, Y_r)
+        put_eight(yb, i, Y_b)
         put(an, i, n + where_greater(w, full(0.0), full(1.0), full(0.0)))

@@ -1,8 +1,14 @@
-"""Detectors of manoeuvres (P3 eq. 3) on each realisation's last plots, and the filters that answer to them.
+"""Detectors of manoeuvres (P3 eq. 3) on each realisation's last plots, and the filters that respond to them.
 
-A detector's statistic is â²/σ_a², the acceleration of a parabola through the last n plots against its own variance; of
-all coordinates jointly it is the sum. Rows of the arrays are of one chunk, as in `sonar_steps`; times are in periods,
-weights relative to the nominal plot.
+A detector's statistic is â²/σ_a², the acceleration of a parabola through the last plots against its own variance; of
+all coordinates jointly it is the sum. Letters as in `sonar.kernels.steps`, and
+
+    Y x = b    normal equations of a parabola: Y (6), b (3)
+    T          statistic, UNTESTED where there was no test
+    mode       1 in a manoeuvre, else 0
+    quiet      tests without an alarm in a row
+
+recent (3, L, CHUNK) are the last L plots of a coordinate: plot, age, weight, the newest first.
 """
 
 from typing import NamedTuple
@@ -12,14 +18,24 @@ import numpy as np
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import address, any_greater, full, get, put, total, where_greater
 from radarsim.kernels.linear import extrapolated
-from radarsim.studies.sonar.kernels.steps import GROUPS, inverse, put_six, six, times
+from radarsim.studies.sonar.kernels.steps import (
+    GROUPS,
+    inverse,
+    predicted_information,
+    put_six,
+    put_three,
+    six,
+    six_where_greater,
+    three_where_greater,
+    times,
+)
 
 UNTESTED = -1.0  # the statistic where there was no test: it exceeds no threshold
-MODE, QUIET, PLOTS = range(3)  # rows of an adaptive filter's memory: 1 in a manoeuvre, tests without alarm, plots used
+MODE, QUIET, PLOTS = range(3)  # further rows of an adaptive filter's memory; PLOTS: number of plots that it rests on
 
 
 class Detectors(NamedTuple):
-    """D detectors on C coordinates, and groups of them G: each coordinate, then all jointly.
+    """D detectors on C coordinates, and their groups G: each coordinate, then all jointly.
 
     plots (D,) of the parabola, every (D,) scans from one test to the next; threshold (D, G, T), of which a detector has
     the first thresholds (D,); phase (K,) 0 before the manoeuvre, 1 while it lasts, 2 after it.
@@ -33,7 +49,7 @@ class Detectors(NamedTuple):
 
 
 class AdaptiveRules(NamedTuple):
-    """What F filters do about a manoeuvre, read of adaptive ones alone.
+    """How F filters respond to a manoeuvre; read of adaptive ones alone.
 
     detector (F,) and group (F, C) whose statistic is compared with threshold (F, C); raises (F,) the degree, else the
     memory is held short; quiet (F,) tests without an alarm end the manoeuvre.
@@ -44,6 +60,20 @@ class AdaptiveRules(NamedTuple):
     threshold: np.ndarray
     raises: np.ndarray
     quiet: np.ndarray
+
+
+class AdaptiveRule(NamedTuple):
+    """The rule of one adaptive filter in one coordinate: size of the state, plots of the short memory `length`.
+
+    raises: in a manoeuvre the degree is 2, else the memory is held short. threshold of the statistic, and patience: how
+    many tests without an alarm in a row end the manoeuvre.
+    """
+
+    size: int
+    length: int
+    raises: bool
+    threshold: float
+    patience: int
 
 
 class Alarms(NamedTuple):
@@ -61,71 +91,71 @@ class Alarms(NamedTuple):
 # ---- tests --------------------------------------------------------------------------------------------------------
 @inline
 def normal_equations(a, length, longest, i):
-    """Of a parabola through the last `length` plots of group i in memory, at the present: Y (6), Yx (3), the newest
-    plot.
+    """Normal equations of a parabola through the last `length` plots of group i, at the present: Y (6), b (3).
 
-    Plots are taken from the newest one, lest their figures be lost in sums.
+    a is the address of recent plots, of which there are `longest`. Plots are taken relative to the newest one, which
+    comes third, so that no digits are lost in the sums.
     """
     zero = full(0.0)
     y0, y1, y2, y3, y4, y5, b0, b1, b2 = zero, zero, zero, zero, zero, zero, zero, zero, zero
     newest = get(a, i)
-    for q in range(length):
-        here = q * GROUPS + i
+    for j in range(length):
+        here = j * GROUPS + i
         z = get(a, here) - newest
         age, w = get(a, longest * GROUPS + here), get(a, 2 * longest * GROUPS + here)
-        one, two = zero - age, 0.5 * age * age
-        w1, w2 = w * one, w * two
-        y0, y1, y2, y3, y4, y5 = y0 + w, y1 + w1, y2 + w2, y3 + w1 * one, y4 + w1 * two, y5 + w2 * two
+        h1, h2 = zero - age, 0.5 * age * age
+        w1, w2 = w * h1, w * h2
+        y0, y1, y2, y3, y4, y5 = y0 + w, y1 + w1, y2 + w2, y3 + w1 * h1, y4 + w1 * h2, y5 + w2 * h2
         b0, b1, b2 = b0 + w * z, b1 + w1 * z, b2 + w2 * z
     return (y0, y1, y2, y3, y4, y5), (b0, b1, b2), newest
 
 
 @part
-def curvature(memory, length, sigma, count, weight, q):
-    """Statistic (CHUNK,) of one coordinate's last `length` plots; UNTESTED where there are fewer, or no new one."""
-    a, ac, aw, aq = address(memory), address(count), address(weight), address(q)
+def curvature(recent, length, sigma, n, weight, T):
+    """Statistic T (CHUNK,) of one coordinate's last `length` plots; UNTESTED where there are fewer, or no new one."""
+    a, an, aw, at = address(recent), address(n), address(weight), address(T)
     zero, enough, most, none = full(0.0), full(length - 0.5), full(3.0), full(UNTESTED)
     per = 1.0 / (sigma * sigma)
     for i in range(GROUPS):
-        Y, b, _ = normal_equations(a, length, memory.shape[1], i)
-        tested = where_greater(get(aw, i), zero, get(ac, i), zero)
-        p = inverse(Y, where_greater(tested, enough, most, zero))
-        bend = p[2] * b[0] + p[4] * b[1] + p[5] * b[2]
-        value = per * (bend * bend) / where_greater(tested, enough, p[5], full(1.0))
-        put(aq, i, where_greater(tested, enough, value, none))
+        Y, b, _ = normal_equations(a, length, recent.shape[1], i)
+        tested = where_greater(get(aw, i), zero, get(an, i), zero)
+        P = inverse(Y, where_greater(tested, enough, most, zero))
+        acceleration = P[2] * b[0] + P[4] * b[1] + P[5] * b[2]
+        value = per * (acceleration * acceleration) / where_greater(tested, enough, P[5], full(1.0))
+        put(at, i, where_greater(tested, enough, value, none))
 
 
 @part
-def joined(q):
-    """The joint statistic, last row of q (C + 1, CHUNK): the sum of all, UNTESTED where any is."""
-    a, least, none = address(q), full(0.5 * UNTESTED), full(UNTESTED)
+def joint_statistic(T):
+    """The joint statistic, last row of T (C + 1, CHUNK): the sum of all, UNTESTED where any is."""
+    a, least, none = address(T), full(0.5 * UNTESTED), full(UNTESTED)
     for i in range(GROUPS):
         value = full(0.0)
-        for c in range(q.shape[0] - 1):
+        for c in range(T.shape[0] - 1):
             one = get(a, c * GROUPS + i)
             value = where_greater(one, least, where_greater(value, least, value + one, none), none)
-        put(a, (q.shape[0] - 1) * GROUPS + i, value)
+        put(a, (T.shape[0] - 1) * GROUPS + i, value)
 
 
 @kernel
-def examine(detectors, k, memory, sigma, count, weight, q):
-    """Statistics q (D, G, CHUNK) of all detectors at scan k; memory (C, 3, L, CHUNK), count and weight (C, CHUNK)."""
+def detector_statistics(detectors, k, recent, sigma, n, weight, T):
+    """Statistics T (D, G, CHUNK) of all detectors at scan k; recent (C, 3, L, CHUNK), n and weight (C, CHUNK)."""
     for d in range(detectors.plots.size):
         if (k + 1 - detectors.plots[d]) % detectors.every[d] != 0:
-            q[d] = UNTESTED
+            T[d] = UNTESTED
             continue
-        for c in range(memory.shape[0]):
-            curvature(memory[c], detectors.plots[d], sigma[c], count[c], weight[c], q[d, c])
-        joined(q[d])
+        for c in range(recent.shape[0]):
+            curvature(recent[c], detectors.plots[d], sigma[c], n[c], weight[c], T[d, c])
+        joint_statistic(T[d])
 
 
 @part
-def tell(q, threshold, ended, used, passed):
-    """How many of a chunk give an alarm, and how many their first event of a phase; passed (CHUNK,) 1 after it."""
-    aq, au, ap, zero = address(q), address(used), address(passed), full(0.0)
+def count_alarms(T, threshold, ended, used, passed):
+    """How many of a chunk give an alarm, and how many their first event of a phase; passed (CHUNK,) is 1 after it."""
+    at, au, ap, zero = address(T), address(used), address(passed), full(0.0)
     level, least, alarms, first = full(threshold), full(0.5 * UNTESTED), zero, zero
     for i in range(GROUPS):
-        value, u, before = get(aq, i), get(au, i), get(ap, i)
+        value, u, before = get(at, i), get(au, i), get(ap, i)
         alarm = where_greater(value, level, u, zero)
         event = where_greater(value, least, u - alarm, zero) if ended else alarm
         new = where_greater(event, before, event, zero)
@@ -135,105 +165,82 @@ def tell(q, threshold, ended, used, passed):
 
 
 @part
-def tally(q, used):
+def count_tested(T, used):
     """How many of a chunk were tested."""
-    aq, au, zero, least = address(q), address(used), full(0.0), full(0.5 * UNTESTED)
+    at, au, zero, least = address(T), address(used), full(0.0), full(0.5 * UNTESTED)
     tested = zero
     for i in range(GROUPS):
-        tested = tested + where_greater(get(aq, i), least, get(au, i), zero)
+        tested = tested + where_greater(get(at, i), least, get(au, i), zero)
     return total(tested)
 
 
 @part
-def add_alarms(detectors, k, q, used, passed, sums):
-    """Add the tests of scan k; passed (D, G, T, CHUNK)."""
+def add_alarms(detectors, k, T, used, passed, sums):
+    """Add the tests of scan k with statistics T (D, G, CHUNK); passed (D, G, thresholds, CHUNK)."""
     phase = detectors.phase[k]
     if k > 0 and phase != detectors.phase[k - 1]:
         passed[:] = 0.0
     for d in range(detectors.plots.size):
-        for g in range(q.shape[1]):
-            sums.tested[d, g, k] += tally(q[d, g], used)
-            for t in range(detectors.thresholds[d]):
-                alarms, first = tell(q[d, g], detectors.threshold[d, g, t], phase == 2, used, passed[d, g, t])
-                sums.alarms[d, g, t, k] += alarms
-                sums.first[d, g, t, k] += first
+        for g in range(T.shape[1]):
+            sums.tested[d, g, k] += count_tested(T[d, g], used)
+            for j in range(detectors.thresholds[d]):
+                alarms, first = count_alarms(T[d, g], detectors.threshold[d, g, j], phase == 2, used, passed[d, g, j])
+                sums.alarms[d, g, j, k] += alarms
+                sums.first[d, g, j, k] += first
 
 
 # ---- the adaptive filter ------------------------------------------------------------------------------------------
 @inline
-def grown(y, w, tau):
-    """Information y (6) of a parabola, moved on by tau and with a new plot of weight w."""
-    y00, y01, y02, y11, y12, y22 = y
-    half = 0.5 * tau * tau
-    u0, u1, u2 = half * y00 - tau * y01 + y02, half * y01 - tau * y11 + y12, half * y02 - tau * y12 + y22
-    y11, y01 = tau * (tau * y00 - 2.0 * y01) + y11, y01 - tau * y00
-    return y00 + w, y01, u0, y11, u1 - tau * u0, half * u0 - tau * u1 + u2
+def grown_information(Y, w, tau):
+    """Information Y (6) of a parabola after an interval tau and a plot of weight w."""
+    y00, y01, y02, y11, y12, y22 = predicted_information(Y, tau)
+    return y00 + w, y01, y02, y11, y12, y22
 
 
 @inline
-def decided(q, threshold, mode, quiet, patience):
-    """Mode (1 in a manoeuvre) and number of tests without an alarm in a row, by a statistic."""
+def next_mode(T, threshold, mode, quiet, patience):
+    """Mode and number of quiet tests in a row after a statistic T."""
     zero, one = full(0.0), full(1.0)
-    calm = where_greater(q, full(0.5 * UNTESTED), quiet + one, quiet)
-    calm = where_greater(q, threshold, zero, calm)
-    over = where_greater(calm, patience - 0.5, zero, mode)
-    return where_greater(q, threshold, one, over), calm
+    quiet = where_greater(T, full(0.5 * UNTESTED), quiet + one, quiet)
+    quiet = where_greater(T, threshold, zero, quiet)
+    mode = where_greater(quiet, patience - 0.5, zero, mode)
+    return where_greater(T, threshold, one, mode), quiet
 
 
 @part
-def adapt(size, raises, length, patience, threshold, q, dt, period, x, y, s, memory, z, weight, before, P):
-    """One scan, in place: growing memory of degree size - 1, begun anew with the last `length` plots at every change.
+def adapt(rule, dt, period, memory, plot, recent, T, P):
+    """One scan, in place: growing memory of degree size - 1, begun anew with the last plots at every change of mode.
 
-    An alarm sets the mode, `patience` tests without one in a row take it back. In a manoeuvre the degree is 2, or the
-    memory is held at `length` plots. x (4, CHUNK), y (8, CHUNK), s (>= 3, CHUNK); q (CHUNK,) statistics of this scan;
-    leaves P (6, CHUNK).
+    An alarm sets the mode, `patience` tests without one in a row take it back; see AdaptiveRule. memory: x, Y and the
+    further rows MODE, QUIET, PLOTS; T (CHUNK,) statistics of this scan; leaves P (6, CHUNK).
     """
-    ax, ay, at, am, az = address(x), address(y), address(s), address(memory), address(z)
-    aw, ab, aq, ap = address(weight), address(before), address(q), address(P)
-    zero, one, limit, few, short = full(0.0), full(1.0), full(threshold), full(float(size)), full(float(length))
-    tau, per, twice, half = dt / period, 1.0 / period, 1.0 / (period * period), full(0.5)
-    raised = full(3.0) if raises else few
-    calm_enough = full(float(patience))
+    ax, ay, am, ar, az = address(memory.x), address(memory.Y), address(memory.further), address(recent), address(plot.z)
+    aw, an, at, ap = address(plot.w), address(plot.n), address(T), address(P)
+    zero, one, half, threshold = full(0.0), full(1.0), full(0.5), full(rule.threshold)
+    tau, per, twice = dt / period, 1.0 / period, 1.0 / (period * period)
+    size, length, patience = full(float(rule.size)), full(float(rule.length)), full(float(rule.patience))
+    size_raised = full(3.0) if rule.raises else size
     for i in range(GROUPS):
-        w, mode = get(aw, i), get(at, i)
-        came = where_greater(w, zero, one, zero)
-        Y = grown(six(ay, i), w, tau)
-        degree, rank = where_greater(mode, half, raised, few), get(ab, i) + came
-        p = inverse(Y, where_greater(rank, degree, degree, rank))
+        w, mode = get(aw, i), get(am, i)
+        detected = where_greater(w, zero, one, zero)
+        Y = grown_information(six(ay, i), w, tau)
+        size_now, rank = where_greater(mode, half, size_raised, size), get(an, i) + detected
+        P_now = inverse(Y, where_greater(rank, size_now, size_now, rank))
         r, v, a = extrapolated(get(ax, i), get(ax, GROUPS + i), get(ax, 2 * GROUPS + i), dt)
-        residual = w * (get(az, i) - r)
-        r, v, a = r + p[0] * residual, v + per * p[1] * residual, a + twice * p[2] * residual
-        new, calm = decided(get(aq, i), limit, mode, get(at, QUIET * GROUPS + i), calm_enough)
-        plots = get(at, PLOTS * GROUPS + i) + came
-        changed = (new - mode) * (new - mode) + (zero if raises else new)
-        if any_greater(changed, half):
-            fresh, b, newest = normal_equations(am, length, memory.shape[1], i)
-            degree = where_greater(new, half, raised, few)
-            fit = inverse(fresh, degree)
-            r0, v0, a0 = times(fit, b)
-            r, v = where_greater(changed, half, newest + r0, r), where_greater(changed, half, per * v0, v)
-            a, plots = where_greater(changed, half, twice * a0, a), where_greater(changed, half, short, plots)
-            p = chosen(changed, fit, p)
-            Y = chosen(changed, fresh, Y)
+        innovation = w * (get(az, i) - r)
+        x = (r + P_now[0] * innovation, v + per * P_now[1] * innovation, a + twice * P_now[2] * innovation)
+        mode_now, quiet = next_mode(get(at, i), threshold, mode, get(am, QUIET * GROUPS + i), patience)
+        plots = get(am, PLOTS * GROUPS + i) + detected
+        begun = (mode_now - mode) * (mode_now - mode) + (zero if rule.raises else mode_now)
+        if any_greater(begun, half):
+            Y_recent, b, newest = normal_equations(ar, rule.length, recent.shape[1], i)
+            P_recent = inverse(Y_recent, where_greater(mode_now, half, size_raised, size))
+            r, v, a = times(P_recent, b)
+            x = three_where_greater(begun, half, (newest + r, per * v, twice * a), x)
+            plots = where_greater(begun, half, length, plots)
+            P_now = six_where_greater(begun, half, P_recent, P_now)
+            Y = six_where_greater(begun, half, Y_recent, Y)
         put_six(ay, i, Y)
-        put_six(ap, i, p)
-        put(ax, i, r)
-        put(ax, GROUPS + i, v)
-        put(ax, 2 * GROUPS + i, a)
-        put(at, i, new)
-        put(at, QUIET * GROUPS + i, calm)
-        put(at, PLOTS * GROUPS + i, plots)
-
-
-@inline
-def chosen(mask, yes, no):
-    """Six numbers where the mask is over a half, else six others."""
-    half = full(0.5)
-    return (
-        where_greater(mask, half, yes[0], no[0]),
-        where_greater(mask, half, yes[1], no[1]),
-        where_greater(mask, half, yes[2], no[2]),
-        where_greater(mask, half, yes[3], no[3]),
-        where_greater(mask, half, yes[4], no[4]),
-        where_greater(mask, half, yes[5], no[5]),
-    )
+        put_six(ap, i, P_now)
+        put_three(ax, i, x)
+        put_three(am, i, (mode_now, quiet, plots))

@@ -1,8 +1,14 @@
 """Two Kalman filters of one coordinate that interact (IMM: Blom & Bar-Shalom 1988), eight realisations at a time.
 
-Both have the same state and differ in their manoeuvre variance. Means, covariances and times are in nominal σ and
-periods; a state is (x, v, a) and its covariance packed (xx, xv, xa, vv, va, aa), as in `blocks`. Rows of the arrays are
-of one chunk, as in `sonar_steps`.
+Both have the same state and differ in their manoeuvre variance. Letters as in `sonar.kernels.steps`, of each model
+
+    x, P    (3), (6)   state and covariance, in units of the nominal σ and of the period
+    Q       (6)        covariance that a manoeuvre adds
+    mu                 probability of the model, after this scan's plot
+    c                  probability of the model before it (Blom and Bar-Shalom's c bar)
+    nis                normalised innovation squared, and S its variance over that of the plot
+
+and of the chain between them p_ij, the probability to go from model i to model j from scan to scan.
 """
 
 from typing import NamedTuple
@@ -13,13 +19,24 @@ from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import address, exponential, full, get, put, root, total, where_greater
 from radarsim.kernels.linear import extrapolated
 from radarsim.kernels.symmetric import predicted_axis, predicted_own
-from radarsim.studies.sonar.kernels.steps import GROUPS, eight, informed, put_six, six
+from radarsim.studies.sonar.kernels.steps import (
+    GROUPS,
+    eight,
+    least_squares,
+    put_eight,
+    put_six,
+    put_three,
+    six,
+    six_where_greater,
+    three_where_greater,
+)
 
-MEAN, COVARIANCE, PROBABILITY, ROWS = 0, 6, 18, 20  # rows of its memory: two means, two covariances, two probabilities
+# Further rows of its memory: states of both models, covariances of both, probabilities of both.
+STATE, COVARIANCE, PROBABILITY, ROWS = 0, 6, 18, 20
 
 
 class ModelPairs(NamedTuple):
-    """Models of F filters, read of interacting ones alone.
+    """Models of F filters; read of interacting ones alone.
 
     manoeuvre (F, C, 2) variances in nominal plots and periods; stay (F, 2) the probability that each model lasts from
     scan to scan.
@@ -29,123 +46,139 @@ class ModelPairs(NamedTuple):
     stay: np.ndarray
 
 
+class ModelPair(NamedTuple):
+    """The models of one filter in one coordinate: size of the state, manoeuvre variances q (2,), stay (2,) as above."""
+
+    size: int
+    q: np.ndarray
+    stay: np.ndarray
+
+
 @inline
-def merged(p, x, P, q, y, Q):
-    """Mean and covariance of two states of probabilities p and q, p + q = 1."""
-    m0, m1, m2 = p * x[0] + q * y[0], p * x[1] + q * y[1], p * x[2] + q * y[2]
-    d0, d1, d2, both = x[0] - y[0], x[1] - y[1], x[2] - y[2], p * q
+def merged(mu1, x1, P1, mu2, x2, P2):
+    """Mean and covariance of a mixture of two states with weights mu1 + mu2 = 1."""
+    m0, m1, m2 = mu1 * x1[0] + mu2 * x2[0], mu1 * x1[1] + mu2 * x2[1], mu1 * x1[2] + mu2 * x2[2]
+    d0, d1, d2, both = x1[0] - x2[0], x1[1] - x2[1], x1[2] - x2[2], mu1 * mu2
     return (m0, m1, m2), (
-        p * P[0] + q * Q[0] + both * d0 * d0,
-        p * P[1] + q * Q[1] + both * d0 * d1,
-        p * P[2] + q * Q[2] + both * d0 * d2,
-        p * P[3] + q * Q[3] + both * d1 * d1,
-        p * P[4] + q * Q[4] + both * d1 * d2,
-        p * P[5] + q * Q[5] + both * d2 * d2,
+        mu1 * P1[0] + mu2 * P2[0] + both * d0 * d0,
+        mu1 * P1[1] + mu2 * P2[1] + both * d0 * d1,
+        mu1 * P1[2] + mu2 * P2[2] + both * d0 * d2,
+        mu1 * P1[3] + mu2 * P2[3] + both * d1 * d1,
+        mu1 * P1[4] + mu2 * P2[4] + both * d1 * d2,
+        mu1 * P1[5] + mu2 * P2[5] + both * d2 * d2,
     )
 
 
 @inline
-def manoeuvred(variance, tau, size):
-    """Covariance (6) that a random derivative of order `size`, constant over tau, adds."""
+def mixed(c, from_first, first, second):
+    """State and covariance of a model before the scan, of both models' (x, P) before it.
+
+    c is the model's probability and from_first the part of it that comes from the first model. A model that has lost
+    all probability takes the second one's state.
+    """
+    zero, one = full(0.0), full(1.0)
+    mu = from_first / where_greater(c, zero, c, one)
+    return merged(mu, first[0], first[1], one - mu, second[0], second[1])
+
+
+@inline
+def manoeuvre_covariance(q, tau, size):
+    """Q (6) of a random derivative of order `size` and variance q, constant over tau."""
     half = 0.5 * tau * tau
     g0, g1, g2 = (half, tau, 0.0) if size == 2 else (tau * half / 3.0, half, tau)
-    return (
-        variance * g0 * g0,
-        variance * g0 * g1,
-        variance * g0 * g2,
-        variance * g1 * g1,
-        variance * g1 * g2,
-        variance * g2 * g2,
-    )
+    return q * g0 * g0, q * g0 * g1, q * g0 * g2, q * g1 * g1, q * g1 * g2, q * g2 * g2
 
 
 @inline
-def filtered(x, P, tau, added, z, w):
-    """Predict and update with a plot of weight w, zero where missed; also its normalised innovation squared and 1 + w
-    S."""
-    x0, x1, x2 = predicted_axis(x, (tau, 0.5 * tau * tau, 1.0, tau, 1.0))
-    P = predicted_own(P, (tau, 0.5 * tau * tau, 1.0, tau, 1.0), added)
-    spread = w * P[0] + 1.0
-    per, e = w / spread, z - x0
-    g0, g1, g2 = per * P[0], per * P[1], per * P[2]
-    updated = (P[0] / spread, P[1] / spread, P[2] / spread, P[3] - g1 * P[1], P[4] - g1 * P[2], P[5] - g2 * P[2])
-    return (x0 + g0 * e, x1 + g1 * e, x2 + g2 * e), updated, per * e * e, spread
+def filtered(x, P, tau, Q, z, w):
+    """Predict and update with a plot z of weight w, zero where missed: x, P, nis and S = 1 + w H P Hᵀ."""
+    F = (tau, 0.5 * tau * tau, 1.0, tau, 1.0)
+    r, v, a = predicted_axis(x, F)
+    P = predicted_own(P, F, Q)
+    S = w * P[0] + 1.0
+    per, e = w / S, z - r
+    k0, k1, k2 = per * P[0], per * P[1], per * P[2]
+    P = (P[0] / S, P[1] / S, P[2] / S, P[3] - k1 * P[1], P[4] - k1 * P[2], P[5] - k2 * P[2])
+    return (r + k0 * e, v + k1 * e, a + k2 * e), P, per * e * e, S
 
 
 @inline
-def either(early, x, y):
-    """Three numbers of the first where early (1 or 0), else of the second."""
-    half = full(0.5)
-    return (
-        where_greater(early, half, x[0], y[0]),
-        where_greater(early, half, x[1], y[1]),
-        where_greater(early, half, x[2], y[2]),
-    )
+def imm_step(first, second, mu, chain, tau, Q, z, w):
+    """Mix, predict and update: both models' (x, P), and the probability of the first.
+
+    first, second, mu (2) are the models' (x, P) and probabilities after the scan before; chain (p11, p12, p21, p22); Q
+    (2) of each model; z in units of the nominal σ.
+    """
+    (mu1, mu2), (p11, p12, p21, p22), one, zero = mu, chain, full(1.0), full(0.0)
+    c1, c2 = p11 * mu1 + p21 * mu2, p12 * mu1 + p22 * mu2
+    x1, P1 = mixed(c1, p11 * mu1, first, second)
+    x2, P2 = mixed(c2, p12 * mu1, first, second)
+    x1, P1, nis1, S1 = filtered(x1, P1, tau, Q[0], z, w)
+    x2, P2, nis2, S2 = filtered(x2, P2, tau, Q[1], z, w)
+    least = where_greater(nis1, nis2, nis2, nis1)
+    c1, c2 = c1 * exponential(0.5 * (least - nis1)) / root(S1), c2 * exponential(0.5 * (least - nis2)) / root(S2)
+    return (x1, P1), (x2, P2), c1 / where_greater(c1 + c2, zero, c1 + c2, one)
 
 
 @part
-def interact(size, stay, manoeuvre, dt, period, sigma, estimate, y, s, z, weight, before, P):
-    """One scan, in place, of estimate (4, CHUNK), y (8, CHUNK), s (>= ROWS, CHUNK); leaves P (6, CHUNK).
+def interact(models, dt, period, sigma, memory, plot, P):
+    """One scan, in place. memory: x, Y and further rows STATE, COVARIANCE and PROBABILITY; leaves P (6, CHUNK).
 
     The first `size` plots go into both models by least squares, at the long-run probabilities of their chain.
     """
-    ax, ay, at, az = address(estimate), address(y), address(s), address(z)
-    aw, ab, ap = address(weight), address(before), address(P)
-    tau, per, one, zero, first = dt / period, 1.0 / period, full(1.0), full(0.0), full(size - 0.5)
-    calm, moved = manoeuvred(manoeuvre[0], tau, size), manoeuvred(manoeuvre[1], tau, size)
-    leave, back = 1.0 - stay[0], 1.0 - stay[1]
-    prior = back / (leave + back)
+    ax, ay, am, ap = address(memory.x), address(memory.Y), address(memory.further), address(P)
+    az, aw, an = address(plot.z), address(plot.w), address(plot.n)
+    tau, per, unit, one, zero, size = dt / period, 1.0 / period, 1.0 / sigma, full(1.0), full(0.0), models.size
+    first_scans, half = full(size - 0.5), full(0.5)
+    Q = (manoeuvre_covariance(models.q[0], tau, size), manoeuvre_covariance(models.q[1], tau, size))
+    p11, p22 = models.stay[0], models.stay[1]
+    p12, p21 = 1.0 - p11, 1.0 - p22
+    long_run = full(p21 / (p12 + p21))
     for i in range(GROUPS):
-        w, b, plot = get(aw, i), get(ab, i), get(az, i)
-        known, g, start = informed(eight(ay, i), b, w, tau, 0.0, size)
-        put_six(ay, i, known)
-        put(ay, 6 * GROUPS + i, known[6])
-        put(ay, 7 * GROUPS + i, known[7])
-        early = where_greater(b, first, zero, one)
+        z, w, n = get(az, i), get(aw, i), get(an, i)
+        Y, K, P_start = least_squares(eight(ay, i), n, w, tau, 0.0, size)
+        put_eight(ay, i, Y)
         r, v, a = extrapolated(get(ax, i), get(ax, GROUPS + i), get(ax, 2 * GROUPS + i), dt)
-        residual = plot - r
-        unit = 1.0 / sigma
-        r, v, a = r + g[0] * residual, v + per * g[1] * residual, a + per * per * g[2] * residual
-        begun = (unit * r, unit * period * v, unit * period * period * a)
-        # Mix, predict, update; a model that has lost all probability keeps the other's state.
-        p, q = get(at, PROBABILITY * GROUPS + i), get(at, (PROBABILITY + 1) * GROUPS + i)
-        x = six(at, MEAN * GROUPS + i)
-        x1, x2 = x[:3], x[3:]
-        P1, P2 = six(at, COVARIANCE * GROUPS + i), six(at, (COVARIANCE + 6) * GROUPS + i)
-        c1, c2 = stay[0] * p + back * q, leave * p + stay[1] * q
-        to1, to2 = stay[0] * p / where_greater(c1, zero, c1, one), leave * p / where_greater(c2, zero, c2, one)
-        n1, N1 = merged(to1, x1, P1, one - to1, x2, P2)
-        n2, N2 = merged(to2, x1, P1, one - to2, x2, P2)
-        n1, N1, u1, d1 = filtered(n1, N1, tau, calm, unit * plot, w)
-        n2, N2, u2, d2 = filtered(n2, N2, tau, moved, unit * plot, w)
-        least = where_greater(u1, u2, u2, u1)
-        c1, c2 = c1 * exponential(0.5 * (least - u1)) / root(d1), c2 * exponential(0.5 * (least - u2)) / root(d2)
-        p = where_greater(early, zero, full(prior), c1 / where_greater(c1 + c2, zero, c1 + c2, one))
-        x1, x2 = either(early, begun, n1), either(early, begun, n2)
-        P1 = either(early, start[:3], N1[:3]) + either(early, start[3:], N1[3:])
-        P2 = either(early, start[:3], N2[:3]) + either(early, start[3:], N2[3:])
-        m, M = merged(p, x1, P1, one - p, x2, P2)
-        put(ax, i, where_greater(early, zero, r, sigma * m[0]))
-        put(ax, GROUPS + i, where_greater(early, zero, v, sigma * per * m[1]))
-        put(ax, 2 * GROUPS + i, where_greater(early, zero, a, sigma * per * per * m[2]))
-        put_six(ap, i, M)
-        put(at, PROBABILITY * GROUPS + i, p)
-        put(at, (PROBABILITY + 1) * GROUPS + i, one - p)
-        put_six(at, MEAN * GROUPS + i, x1 + x2)
-        put_six(at, COVARIANCE * GROUPS + i, P1)
-        put_six(at, (COVARIANCE + 6) * GROUPS + i, P2)
+        innovation = z - r
+        r, v, a = r + K[0] * innovation, v + per * K[1] * innovation, a + per * per * K[2] * innovation
+        x_start = (unit * r, unit * period * v, unit * period * period * a)
+        x, mu = (
+            six(am, STATE * GROUPS + i),
+            (get(am, PROBABILITY * GROUPS + i), get(am, (PROBABILITY + 1) * GROUPS + i)),
+        )
+        first = (x[:3], six(am, COVARIANCE * GROUPS + i))
+        second = (x[3:], six(am, (COVARIANCE + 6) * GROUPS + i))
+        first, second, mu1 = imm_step(first, second, mu, (p11, p12, p21, p22), tau, Q, unit * z, w)
+        early = where_greater(n, first_scans, zero, one)
+        mu1 = where_greater(early, zero, long_run, mu1)
+        x1, P1 = three_where_greater(early, half, x_start, first[0]), six_where_greater(early, half, P_start, first[1])
+        x2, P2 = (
+            three_where_greater(early, half, x_start, second[0]),
+            six_where_greater(early, half, P_start, second[1]),
+        )
+        x, P_now = merged(mu1, x1, P1, one - mu1, x2, P2)
+        x = (sigma * x[0], sigma * per * x[1], sigma * per * per * x[2])
+        put_three(ax, i, three_where_greater(early, zero, (r, v, a), x))
+        put_six(ap, i, P_now)
+        put(am, PROBABILITY * GROUPS + i, mu1)
+        put(am, (PROBABILITY + 1) * GROUPS + i, one - mu1)
+        put_six(am, STATE * GROUPS + i, x1 + x2)
+        put_six(am, COVARIANCE * GROUPS + i, P1)
+        put_six(am, (COVARIANCE + 6) * GROUPS + i, P2)
 
 
 @part
-def mode_sums(s, row, memory, used, out):
-    """Σp, Σp² of the probability in a row of s (CHUNK wide), and Σ of the plots in row `memory`, none if negative: out
-    (3,)."""
-    a, au, zero = address(s), address(used), full(0.0)
+def mode_sums(further, row, row_plots, used, out):
+    """Σp, Σp² of the probability in a row of a filter's further rows, and Σ of its plots in memory: out (3,).
+
+    row_plots is the row of that number, negative where there is none.
+    """
+    a, au, zero = address(further), address(used), full(0.0)
     s1, s2, s3 = zero, zero, zero
     for i in range(GROUPS):
         u = get(au, i)
         p = u * get(a, row * GROUPS + i)
         s1, s2 = s1 + p, s2 + p * p
-        if memory >= 0:
-            s3 = s3 + u * get(a, memory * GROUPS + i)
+        if row_plots >= 0:
+            s3 = s3 + u * get(a, row_plots * GROUPS + i)
     out[0], out[1], out[2] = total(s1), total(s2), total(s3)
