@@ -181,29 +181,12 @@ def begin(tracks, status, i, z, association):
 
 
 @inline
-def gate_of(predicted, i, settled, reach):
-    """The gate of track i; of one plot nothing is known of its velocity but how fast targets are: reach in m."""
-    r, S = predicted[0, i], (predicted[2, i], predicted[3, i], predicted[4, i])
+def gate_of(place, S, settled, reach):
+    """The gate of a track; of one plot nothing is known of its velocity but how fast targets are: reach in m."""
+    r, b = place
     if not settled:
         S = (S[0] + reach * reach, S[1], S[2] + (reach / max(r, CLOSEST)) ** 2)
-    return Gate(r, predicted[1, i], S, settled)
-
-
-@inline
-def note_association(status, i, taken, false_share, score):
-    """Enter what was associated into the status of track i."""
-    if status[STATE, i] == CONFIRMED:
-        status[WRONG, i] += false_share
-        status[TAKEN, i] += taken
-    status[AGE, i] += 1.0
-    status[SCORE, i] += score
-    if status[FIRST, i] > 0.0:
-        status[BEST, i] = max(status[BEST, i], status[SCORE, i])
-    if taken > 0.0:
-        status[HITS, i] += 1.0
-        status[MISSES, i], status[SINCE, i] = 0.0, 0.0
-    else:
-        status[MISSES, i] += 1.0
+    return Gate(r, b, S, settled)
 
 
 @part
@@ -213,21 +196,34 @@ def associate(field, rule, scan, tracks, status, target, work, counts):
     Its rows: whether a plot is taken, innovations (r, b) and their further covariance V (rr, rb, bb); of a track that
     begins here the plot itself for the innovations.
     """
-    grid, out, tally = grid_of(field), work.association, address(counts)
+    # Arrays are taken out of their records once: each time is a counted reference.
+    grid, out, tally, plots = grid_of(field), work.association, address(counts), tracks.plots
+    detected, z, predicted = target.detected, target.z, work.predicted
     for i in range(scan.count):
         if status[STATE, i] == NONE:
             out[:, i] = 0.0
-            if target.begins and target.detected[i] > 0.0:
-                begin(tracks, status, i, target.z, out)
+            if target.begins and detected[i] > 0.0:
+                begin(tracks, status, i, z, out)
             continue
         status[SINCE, i] += scan.dt
-        settled = tracks.plots[i] > 1.5
-        gate = gate_of(work.predicted, i, settled, rule.speed * status[SINCE, i])
-        plot = (target.detected[i], target.z[0, i], target.z[1, i])
+        place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
+        gate = gate_of(place, S, plots[i] > 1.5, rule.speed * status[SINCE, i])
+        plot = (detected[i], z[0, i], z[1, i])
         found = associate_track(grid, rule, scan.first + i, scan.k, plot, gate, tally)
         out[0, i], out[1, i], out[2, i] = found.taken, found.nu_r, found.nu_b
         out[3, i], out[4, i], out[5, i] = found.rr, found.rb, found.bb
-        note_association(status, i, found.taken, found.false_share, found.score)
+        if status[STATE, i] == CONFIRMED:
+            status[WRONG, i] += found.false_share
+            status[TAKEN, i] += found.taken
+        status[AGE, i] += 1.0
+        status[SCORE, i] += found.score
+        if status[FIRST, i] > 0.0:
+            status[BEST, i] = max(status[BEST, i], status[SCORE, i])
+        if found.taken > 0.0:
+            status[HITS, i] += 1.0
+            status[MISSES, i], status[SINCE, i] = 0.0, 0.0
+        else:
+            status[MISSES, i] += 1.0
 
 
 @part
@@ -253,35 +249,15 @@ def next_state(state, hits, misses, age, m, n, most):
     return NONE if misses >= most else CONFIRMED
 
 
-@inline
-def state_by_rules(trackers, f, status, i):
-    """State of track i of tracker f after a scan, by the rules m of n and of misses."""
-    rules = trackers.m[f], trackers.n[f], trackers.misses[f]
-    return next_state(status[STATE, i], status[HITS, i], status[MISSES, i], status[AGE, i], *rules)
-
-
-@inline
-def is_uncertain(tracks, i, limit):
-    """Whether the place of track i has a variance over the limit, in nominal plots."""
-    return max(tracks.P[0, 0, i], tracks.P[1, 0, i]) > limit
-
-
-@inline
-def is_off(tracks, i, course, limit, sigma):
-    """Whether track i is further from the target than the limit, in σ of a plot, in range or in bearing."""
-    off = abs(tracks.x[0, 0, i] - course.truth[0, 0] - course.shift[0, 0, i]) > limit * sigma[0]
-    off |= abs(tracks.x[1, 0, i] - course.truth[1, 0] - course.shift[1, 0, i]) > limit * sigma[1]
-    return off
-
-
 @part
 def judge_known(tracks, status, n, kept, counts):
     """Of an oracle's filter every track is kept from its second plot on; arguments as for `judge`."""
+    plots = tracks.plots
     for i in range(n):
         kept[i] = 0.0
         if status[STATE, i] == NONE:
             continue
-        kept[i] = 2.0 if tracks.plots[i] > 1.5 else 0.0
+        kept[i] = 2.0 if plots[i] > 1.5 else 0.0
         status[STATE, i] = CONFIRMED if kept[i] > 0.0 else TENTATIVE
         counts[KEPT] += kept[i] > 0.0
         status[HELD, i] += kept[i] > 0.0
@@ -294,16 +270,20 @@ def judge(trackers, f, n, tracks, status, course, kept, counts):
     A confirmed track ends as it is dropped, be it for misses or because its place has grown too uncertain, or as it is
     lost: too far from the target. n realisations count.
     """
-    limit = trackers.lost[f]
+    limit, m, of, misses = trackers.lost[f], trackers.m[f], trackers.n[f], trackers.misses[f]
+    x, P, truth, shift = tracks.x, tracks.P, course.truth, course.shift
+    limit_r, limit_b = limit * trackers.sigma[0], limit * trackers.sigma[1]
     for i in range(n):
         state = status[STATE, i]
         kept[i] = 0.0
         if state == NONE:
             continue
-        now = state_by_rules(trackers, f, status, i)
+        now = next_state(state, status[HITS, i], status[MISSES, i], status[AGE, i], m, of, misses)
         if now == CONFIRMED:
-            off = is_off(tracks, i, course, limit, trackers.sigma)
-            if state == CONFIRMED and (off or is_uncertain(tracks, i, limit * limit)):
+            off = abs(x[0, 0, i] - truth[0, 0] - shift[0, 0, i]) > limit_r
+            off |= abs(x[1, 0, i] - truth[1, 0] - shift[1, 0, i]) > limit_b
+            uncertain = max(P[0, 0, i], P[1, 0, i]) > limit * limit
+            if state == CONFIRMED and (off or uncertain):
                 counts[LOST if off else DROPPED] += 1.0
                 now = NONE
             elif off:  # confirmed on other plots than the target's
@@ -329,13 +309,14 @@ def judge(trackers, f, n, tracks, status, course, kept, counts):
 @part
 def judge_false(trackers, f, n, tracks, status, begun):
     """The rules over every track that a false plot began; gives whether any is left."""
-    limit, left = trackers.lost[f] * trackers.lost[f], False
+    limit, m, of, misses = trackers.lost[f] * trackers.lost[f], trackers.m[f], trackers.n[f], trackers.misses[f]
+    P, left = tracks.P, False
     for i in range(n):
         state = status[STATE, i]
         if state == NONE:
             continue
-        now = state_by_rules(trackers, f, status, i)
-        if state == CONFIRMED and is_uncertain(tracks, i, limit):
+        now = next_state(state, status[HITS, i], status[MISSES, i], status[AGE, i], m, of, misses)
+        if state == CONFIRMED and max(P[0, 0, i], P[1, 0, i]) > limit:
             now = NONE
         begun[0] += now == TENTATIVE
         begun[1] += now == CONFIRMED
