@@ -2,14 +2,26 @@
 
 import math
 import os
+from collections.abc import Iterable
 
 from radarsim.errors import ConfigError
 
 MOST_THREADS = 1024
+FORMATS = ("svg", "png", "pdf")  # of the figures' files
 NEEDED = ("workers", "depth", "shortest_s", "longest_s", "submit", "finished", "cancel", "forget")  # of an executor
 
 
-def check(*, threads=None, workers=None, precision=None, time_limit=None, executor=None, out=None) -> None:
+def check(
+    *,
+    threads=None,
+    workers=None,
+    precision=None,
+    time_limit=None,
+    executor=None,
+    out=None,
+    overrides=(),
+    figures=True,
+) -> None:
     """ConfigError with a line for each argument of `run` that is none."""
     faults = [
         *_count("threads", threads),
@@ -21,8 +33,23 @@ def check(*, threads=None, workers=None, precision=None, time_limit=None, execut
         faults.append(f"executor: must be an executor of radarsim.engine, got {executor!r}")
     if out is not None:
         faults += _directory(out)
+    if isinstance(overrides, str | bytes) or not isinstance(overrides, Iterable):
+        faults.append(f"overrides: must be a list of texts key=value, got {overrides!r}")
+    faults += _formats(figures)
     if faults:
         raise ConfigError(*faults)
+
+
+def formats(figures: bool | str | Iterable[str]) -> tuple[str, ...]:
+    """The formats of the figures' files that an argument asks for: True for svg and png; none for False or None.
+
+    Raises ConfigError for a format that there is not.
+    """
+    if faults := _formats(figures):
+        raise ConfigError(*faults)
+    if isinstance(figures, bool) or figures is None:
+        return FORMATS[:2] if figures else ()
+    return (figures,) if isinstance(figures, str) else tuple(figures)
 
 
 def directory(out: str | os.PathLike) -> None:
@@ -36,15 +63,23 @@ def _directory(out) -> list[str]:
     return [] if named and isinstance(named, str) else [f"out: must name a directory, got {out!r}"]
 
 
+def _formats(figures) -> list[str]:
+    if isinstance(figures, bool) or figures is None:
+        return []
+    given = [figures] if isinstance(figures, str) or not isinstance(figures, Iterable) else list(figures)
+    allowed = ", ".join(FORMATS)
+    return [f"figures: must be True, False or of {allowed}, got {one!r}" for one in given if one not in FORMATS]
+
+
 def _count(name: str, value) -> list[str]:
-    whole = hasattr(value, "__index__") and not isinstance(value, bool)
+    whole = hasattr(value, "__index__") and not isinstance(value, bool) and not getattr(value, "ndim", 0)
     if value is None or (whole and 1 <= value <= MOST_THREADS):
         return []
     return [f"{name}: must be a whole number from 1 to {MOST_THREADS}, got {value!r}"]
 
 
 def _number(name: str, value, most: float) -> list[str]:
-    number = hasattr(value, "__float__") and not isinstance(value, bool)
+    number = hasattr(value, "__float__") and not isinstance(value, bool) and not getattr(value, "ndim", 0)
     if value is None or (number and 0 < value <= most and math.isfinite(value)):
         return []
     bound = f" and ≤ {most:g} %" if math.isfinite(most) else ""

@@ -9,6 +9,8 @@ from radarsim.config import json_schema, lookup, own
 from radarsim.config import load as reading
 from radarsim.config.experiment import Experiment
 from radarsim.config.fields import Model
+from radarsim.errors import ConfigError
+from radarsim.report import files
 from radarsim.studies import registry
 
 lookup.further_folders = registry.folders
@@ -39,9 +41,15 @@ def shipped(stem: str) -> tuple[Model, ...] | None:
 def new(name: str, like: str | os.PathLike, folder: str | os.PathLike = ".") -> Path:
     """Write folder/NAME.yaml, the suffix given or not, after a known config; its path.
 
-    Raises ConfigError where it is there already.
+    Raises ConfigError where it is there already, StoreError where it cannot be written.
     """
-    return own.new(name, like, registry, folder)
+    name, text = own.new(name, like, registry)
+    path = Path(folder) / name
+    try:
+        files.create(path, text.encode())
+    except FileExistsError:
+        raise ConfigError(f"{path}: is there already and is never overwritten; choose another name") from None
+    return path
 
 
 def schema_json() -> str:

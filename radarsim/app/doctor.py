@@ -21,6 +21,7 @@ from radarsim.engine.executors import available_cores
 from radarsim.engine.machine import instruction_set, platform_name
 from radarsim.engine.moments import Sums
 from radarsim.errors import ConfigError, StoreError
+from radarsim.report import files
 from radarsim.studies.identity import identity
 
 LOOKS, LOOK_S = 4, 0.25
@@ -77,12 +78,13 @@ def inspected(folder: str | os.PathLike, recompute: int = 0) -> Inspection:
     is no folder of results, and where blocks cannot be computed again because the sources that compute have changed.
     """
     found = Inspection(Path(folder))
+    blocks = _blocks(found.folder)
     record = _settled(found)
     if hashlib.sha256(_json(record["resolved"])).hexdigest() != record["resolved_sha256"]:
         found.faults.append(f"{found.folder / 'run.json'}: damaged: the config in it is not the one that ran")
     elsewhere = []
     for name, stored_as in record["identities"].items():
-        store = found.folder.parent / ".blocks" / stored_as
+        store = blocks / stored_as
         if not store.is_dir():
             found.notes.append(f"{store}: no blocks of {name} are stored; the tables stand on their own")
             continue
@@ -100,6 +102,12 @@ def inspected(folder: str | os.PathLike, recompute: int = 0) -> Inspection:
     return found
 
 
+def _blocks(folder: Path) -> Path:
+    """Where the blocks of a folder of results lie, which may be `.` or a link: beside its name, or what it leads to."""
+    beside = [Path(os.path.abspath(folder)).parent, folder.resolve().parent]
+    return next((one / ".blocks" for one in beside if (one / ".blocks").is_dir()), folder.parent / ".blocks")
+
+
 def _settled(found: Inspection) -> dict:
     """The record, and its outputs looked at; a few times, where a run beside us may be writing others just now."""
     for look in range(LOOKS):
@@ -114,7 +122,7 @@ def _settled(found: Inspection) -> dict:
 def _record(folder: Path) -> dict:
     path = folder / "run.json"
     try:
-        record = json.loads(path.read_bytes())
+        record = json.loads(files.read(path))
         for key, kind in (("outputs", dict), ("identities", dict), ("cases", dict), ("resolved", dict)):
             if not isinstance(record[key], kind):
                 raise ValueError(f"{key} is no table")
@@ -144,7 +152,7 @@ def _outputs(found: Inspection, outputs: dict) -> None:
             found.faults.append(f"{found.folder / 'run.json'}: damaged: an output outside the folder: {name}")
             continue
         try:
-            data = path.read_bytes()
+            data = files.read(path)
         except FileNotFoundError:
             found.faults.append(f"{path}: missing")
         except OSError as error:

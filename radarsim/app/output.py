@@ -92,5 +92,5 @@ def write(
     )
     contents["report.html"] = page.encode()
     contents["run.json"] = provenance.to_json(provenance.with_output(record, "report.html", contents["report.html"]))
-    files.replace_all(folder, contents, stale=provenance.outputs(folder))
+    files.replace_all(folder, contents, stale=provenance.outputs)
     return Written(folder, tuple(sorted(contents)), made, answer)

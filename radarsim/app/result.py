@@ -51,16 +51,22 @@ class Result:
         >>> radarsim.run("rls2", realisations=2000).answer[0].split(":")[0]
         'Range'
         """
-        return tuple(study(self.experiment.study).answer(self.cases, self.tables))
+        return tuple(study(self.experiment.study).answer(self.cases, self._tables))
 
-    @cached_property
+    @property
     def tables(self) -> dict:
         """Every table by the stem of its file: `curves`, `gains`, `claims`, and the study's own.
+
+        Copies, like those of `curves` and `gains`: whatever is done to them, `write` writes the numbers of the run.
 
         >>> import radarsim
         >>> sorted(radarsim.run("rls2", realisations=2000).tables)
         ['believed', 'claims', 'consistency', 'curves', 'gains', 'radar', 'steady']
         """
+        return {name: table.copy() for name, table in self._tables.items()}
+
+    @cached_property
+    def _tables(self) -> dict:
         from radarsim.app import output
 
         return output.tables(self.cases, self.experiment.control_variate)
@@ -75,12 +81,12 @@ class Result:
         >>> bool(first["sigma_lo"] < first["exact_sigma"] < first["sigma_hi"])
         True
         """
-        return self.tables["curves"]
+        return self._tables["curves"].copy()
 
     @property
     def gains(self):
         """Gains against the baseline filter: a DataFrame with the columns of gains.csv."""
-        return self.tables["gains"]
+        return self._tables["gains"].copy()
 
     @property
     def last_scan(self):
@@ -93,7 +99,7 @@ class Result:
     def _described(self) -> dict:
         from radarsim.app import output
 
-        return output.figures(self.cases, self.tables, self.experiment)
+        return output.figures(self.cases, self._tables, self.experiment)
 
     @property
     def figures(self) -> tuple[str, ...]:
@@ -116,26 +122,27 @@ class Result:
             raise KeyError(f"no figure {name!r}; there are: {', '.join(self._described)}")
         return figures.render(self._described[name])
 
-    def write(self, out: str | os.PathLike, figures: bool | Sequence[str] = True):
+    def write(self, out: str | os.PathLike, figures: bool | str | Sequence[str] = True):
         """Write tables, figures, claims, run.json and report.html into out/<stem>/, and out/index.html anew.
 
         figures may name the formats of their files: svg, png, pdf. What was written comes back.
         """
-        from radarsim.app import output
-        from radarsim.report import index
+        from radarsim.app import arguments, output
+        from radarsim.report import index, provenance
 
         folder = Path(out) / self.experiment.stem
+        formats = arguments.formats(figures)
+        self.facts["warnings"] = [*self.facts["warnings"], *provenance.replaced(folder, self.experiment)]
         facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
-        formats = ("svg", "png") if isinstance(figures, bool) else tuple(figures)
         self.written = output.write(
-            self.experiment, self.cases, folder, facts, draw=bool(figures), made=self.tables, formats=formats
+            self.experiment, self.cases, folder, facts, draw=bool(formats), made=self.tables, formats=formats
         )
         index.write(Path(out))
         return self.written
 
     def verdicts(self) -> dict[str, list[str]]:
         """The claims that came out so, by verdict; empty where this experiment judges none."""
-        judged = self.tables["claims"].drop_duplicates("claim")
+        judged = self._tables["claims"].drop_duplicates("claim")
         return {verdict: list(group["claim"]) for verdict, group in judged.groupby("overall", sort=False)}
 
     @property

@@ -3,9 +3,9 @@
 import json
 import math
 import os
-import shlex
 import sys
 import time
+import unicodedata
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
@@ -14,10 +14,10 @@ from pathlib import Path
 from radarsim.app import arguments, simulation, stored_claims
 from radarsim.app.configs import load
 from radarsim.app.records import made_by_other_code
+from radarsim.app.repeat import RESULTS, command, repeated
 from radarsim.app.result import Result
 from radarsim.app.simulation import Gathered, Means, Progress
 from radarsim.app.work import CaseWork
-from radarsim.config import lookup
 from radarsim.config.experiment import Experiment
 from radarsim.engine import stopping
 from radarsim.engine.collect import stored
@@ -25,6 +25,7 @@ from radarsim.engine.executors import Executor, available_cores
 from radarsim.engine.results import CaseResult
 from radarsim.engine.stopping import Signals, Stop
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
+from radarsim.report import files
 from radarsim.report.claims import Claim
 from radarsim.studies import registry
 
@@ -37,13 +38,25 @@ def load_all(sources: Sequence, overrides: Sequence[str] = ()) -> list[Experimen
             loaded.append(load(source, overrides))
         except ConfigError as error:
             faults += error.lines
+    faults += namesakes(loaded)
     if faults:
         raise ConfigError(*faults)
     return loaded
 
 
-RESULTS = "results"  # the command's default directory
-SHORT = {"realisations": "-n", "seed": "--seed"}
+def namesakes(experiments: Sequence[Experiment]) -> list[str]:
+    """A line for each config whose results would overwrite those of another one: their folder has the config's name.
+
+    Names that differ in case or in how their letters are composed are one name to some file systems.
+    """
+    seen: dict[str, str] = {}
+    faults = []
+    for one in experiments:
+        name = unicodedata.normalize("NFC", one.stem).casefold()
+        first = seen.setdefault(name, str(one.path))
+        if first != str(one.path) and not files.same_file(first, str(one.path)):
+            faults.append(f"{one.path}: its results would overwrite those of {first}: rename one, or run them apart")
+    return faults
 
 
 def run(
@@ -59,7 +72,7 @@ def run(
     scheduler: str | None = None,
     executor: Executor | None = None,
     out: str | os.PathLike | None = None,
-    figures: bool = True,
+    figures: bool | str | Sequence[str] = True,
     progress: Progress | None = None,
     stop: Signals | None = None,
 ) -> Result:
@@ -81,7 +94,7 @@ def run(
     """
     arguments.check(
         **{"threads": threads, "workers": workers, "precision": precision, "time_limit": time_limit},
-        **{"executor": executor, "out": out},
+        **{"executor": executor, "out": out, "overrides": overrides, "figures": figures},
     )
     overrides = merged(overrides, realisations, seed)
     experiment = config if isinstance(config, Experiment) else load(config, overrides)
@@ -100,7 +113,8 @@ def run(
         raise TargetUnmet(f"{experiment.stem}: {gathered.stopped}: nothing was done by then")
     facts = facts_of(gathered, threads, time.perf_counter() - started)
     facts["warnings"] += renewed
-    result = result_of(experiment, gathered, facts, overrides)
+    ended_by = None if gathered.stopped else precision
+    result = result_of(experiment, gathered, facts, repeated(experiment, gathered.done, overrides, ended_by))
     if out is not None:
         result.write(out, figures)
     return result
@@ -141,25 +155,6 @@ def merged(overrides: Sequence[str], realisations: float | None, seed: int | Non
     return (*overrides, *(f"{key}={value}" for key, value in given.items() if value is not None))
 
 
-def repeated(experiment: Experiment, overrides: Sequence[str]) -> dict[str, str]:
-    """The command that repeats a run, as a fact of run.json; none for an experiment that is no file."""
-    if experiment.path is None:
-        return {"command": "none: the config was given in Python, and stands below"}
-    return {"command": command(experiment, overrides, RESULTS)}
-
-
-def command(experiment: Experiment, overrides: Sequence[str], out: str | os.PathLike) -> str:
-    """The command that runs an experiment; a shipped config by its stem."""
-    # In a checkout the shipped folder is a link to configs/.
-    shipped = experiment.path and Path(experiment.path).resolve().parent == (lookup.SHIPPED / "configs").resolve()
-    path = os.fsencode(experiment.path or "").decode("utf-8", "backslashreplace")
-    words = ["radarsim", "run", experiment.stem if shipped else path]
-    for override in overrides:
-        key, _, value = override.partition("=")
-        words += [SHORT[key], value] if key in SHORT else ["--set", override]
-    return shlex.join(words + (["--out", str(out)] if str(out) != RESULTS else []))
-
-
 def report(
     experiment: Experiment, *, out: str | os.PathLike, overrides: Sequence[str] = (), figures: bool = True
 ) -> Result:
@@ -191,6 +186,7 @@ def load_result(config, *, out: str | os.PathLike = RESULTS, overrides: Sequence
 def from_store(experiment: Experiment, out: str | os.PathLike, overrides: Sequence[str]) -> Result:
     """The result from stored blocks alone; as many realisations as the last run, where overrides do not say."""
     arguments.directory(out)
+    asked = experiment
     if not any(override.split("=")[0].strip() == "realisations" for override in overrides):
         experiment = as_last_run(experiment, Path(out))
     held, missing = Gathered(), []
@@ -205,12 +201,12 @@ def from_store(experiment: Experiment, out: str | os.PathLike, overrides: Sequen
             held.cases.append((case, work, collected))
     if missing:
         raise ConfigError(*missing, f"`{command(experiment, overrides, out)}` computes them")
-    return result_of(experiment, held, facts_of(held, 0, 0.0), overrides)
+    return result_of(experiment, held, facts_of(held, 0, 0.0), repeated(asked, held.done, overrides, None))
 
 
-def result_of(experiment: Experiment, gathered: Gathered, facts: dict, overrides: Sequence[str]) -> Result:
-    """The result; with a warning where a control variate is asked for and no case has one."""
-    result = Result(experiment, finished(gathered), facts | repeated(experiment, overrides))
+def result_of(experiment: Experiment, gathered: Gathered, facts: dict, again: str) -> Result:
+    """The result, `again` the command that repeats it; with a warning where a control variate is asked for in vain."""
+    result = Result(experiment, finished(gathered), facts | {"command": again})
     if experiment.control_variate and not len(result.tables.get("controlled", ())):
         facts["warnings"].append(simulation.NO_CONTROL)
     return result
@@ -219,7 +215,7 @@ def result_of(experiment: Experiment, gathered: Gathered, facts: dict, overrides
 def as_last_run(experiment: Experiment, out: Path) -> Experiment:
     """The experiment with each case's realisations as the run.json under `out` reports them, where there is one."""
     try:
-        done = json.loads((out / experiment.stem / "run.json").read_text())["cases"]
+        done = json.loads(files.read(out / experiment.stem / "run.json"))["cases"]
         numbers = {name: int(case["done"]) for name, case in done.items()}
     except FileNotFoundError:
         return experiment

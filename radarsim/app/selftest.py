@@ -14,6 +14,7 @@ from pathlib import Path
 
 from radarsim.app import run as experiment
 from radarsim.engine.machine import platform
+from radarsim.report import files
 
 KNOWN = Path(__file__).parent / "known"
 TABLES = ("curves", "gains")
@@ -129,10 +130,9 @@ def _compared(name: str, value: float, centre: float) -> float:
 
 def write() -> None:
     """Make the known tables anew, of this platform."""
-    for study in TOLERANCES:
-        for name, content in tables(study).items():
-            (KNOWN / f"{study}.{name}.csv").write_bytes(content)
-    (KNOWN / "platform.json").write_text(json.dumps(platform(), indent=2) + "\n")
+    made = {study: tables(study) for study in TOLERANCES}
+    contents = {f"{study}.{name}.csv": content for study, own in made.items() for name, content in own.items()}
+    files.replace_all(KNOWN, contents | {"platform.json": (json.dumps(platform(), indent=2) + "\n").encode()})
 
 
 if __name__ == "__main__":

@@ -31,6 +31,11 @@ class Gathered:
     stopped: str | None = None
 
     @property
+    def done(self) -> dict[str, int]:
+        """Realisations done, by the name of the case."""
+        return {case.name: collected.count for case, _, collected in self.cases}
+
+    @property
     def unmet(self) -> list[str]:
         """What of time and precision was not reached, in words, with the widest σ of all."""
         wide = [cell for cell in self.cells.values() if cell.percent >= self.precision]
@@ -192,6 +197,8 @@ def result_of(case: Case, work: CaseWork, collected: Collected) -> CaseResult:
     plan = work.plan
     # Cases that differ in display names alone share their work.
     axes = plan.axes if work.case == case else study(case.study).relabelled(plan.axes, case)
-    sums = plan.layout.unpack(collected.values)
+    values = collected.values.view()
+    values.flags.writeable = False  # tables and figures are made of them when they are asked for
+    sums = plan.layout.unpack(values)
     seconds = collected.kernel_seconds
     return CaseResult(case.name, case.study, case.spec, case.swept, collected.count, sums, axes, seconds)

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 from radarsim.errors import StoreError
+from radarsim.report import files
 
 LOOKS, PAUSE_S = 5, 0.1  # at a table that fits no record: a run beside us may be writing both just now
 
@@ -31,7 +32,7 @@ def stored(path: Path) -> list[dict] | None:
 
 def _read(path: Path) -> bytes | None:
     try:
-        return path.read_bytes()
+        return files.read(path)
     except FileNotFoundError:
         return None
     except OSError as error:

@@ -1,10 +1,12 @@
 """A case as the engine sees it."""
 
+import os
 from functools import cached_property
 
 import numpy as np
 
 from radarsim.config.experiment import Case
+from radarsim.errors import ConfigError
 from radarsim.studies.identity import identity
 from radarsim.studies.interface import Plan
 from radarsim.studies.registry import study
@@ -22,6 +24,8 @@ class CaseWork:
     @cached_property
     def plan(self) -> Plan:
         """The prepared plan, made when first needed."""
+        if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+            raise ConfigError("NUMBA_DISABLE_JIT is set: without the compiler no block is simulated; unset it")
         return study(self.case.study).prepare(self.case)
 
     @cached_property

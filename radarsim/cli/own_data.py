@@ -54,7 +54,7 @@ def simulate(config, output, realisation, overrides):
 
     (loaded,) = experiment.load_all([config], overrides)
     columns = recorded.simulated(loaded, realisation)
-    plots.write_columns(columns, output)
+    plots.write_columns(columns, output, loaded.path)
     count = len(next(iter(columns.values())))
     click.echo(f"plots    {output} ({count} rows: {', '.join(columns)})")
     console.print_warnings(experiment.cache_troubles())
@@ -93,6 +93,7 @@ def track(config, plots, output, figures, quiet, overrides):
     from radarsim.track import plots as files
 
     (loaded,) = experiment.load_all([config], overrides)
+    read = {"the plots": plots, "the config": loaded.path}
     started = False
 
     def sink(piece):
@@ -103,9 +104,9 @@ def track(config, plots, output, figures, quiet, overrides):
         write(files.rows_of(piece))
 
     with contextlib.ExitStack() as stack:
-        write = stack.enter_context(Writer(output, plots)).write if output else findings.echo
+        write = stack.enter_context(Writer(output, read)).write if output else findings.echo
         followed = recorded.follow(loaded, plots, sink)
-    drawn = recorded.draw(followed, figures) if figures else []
+    drawn = recorded.draw(followed, figures, [plots, loaded.path]) if figures else []
     if not quiet:
         findings.tell(followed, accuracy.judged(followed), stderr=output is None)
     if output:

@@ -11,7 +11,7 @@ from radarsim.config.check import check, unknown_key
 from radarsim.config.document import Document
 from radarsim.config.experiment import Case, Experiment, in_name, matches
 from radarsim.config.faults import Faults, Origin, Path, one_line
-from radarsim.config.lookup import config_file, did_you_mean, is_stem, stems
+from radarsim.config.lookup import composed, config_file, did_you_mean, is_stem, stems
 from radarsim.config.place import NoSuchKey, Read, Setting, data_files_found, key_paths, place, scenarios_inlined
 from radarsim.config.schema import COMMON_KEYS, Common, Studies
 
@@ -62,7 +62,7 @@ class Expander:
         self._check_figures(common, cases, document)
         if self.faults:
             return None
-        stem = document.file.stem if document.file else "config"
+        stem = composed(document.file.stem) if document.file else "config"
         return Experiment(
             stem=stem,
             study=cases[0].study,
@@ -110,7 +110,7 @@ class Expander:
         for setting in self.settings:
             own = self._placed(own, common.study, setting)
         own = scenarios_inlined(own, self.studies.keys(common.study), self.read, self.faults)
-        stem = document.file.stem if document.file else "config"
+        stem = composed(document.file.stem) if document.file else "config"
         return [Draft(own, stem, common.study, (), common.realisations, common.seed)]
 
     def _included(self, document: Document, common: Common, chain: tuple[FilePath, ...]) -> list[Draft]:

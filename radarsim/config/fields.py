@@ -6,6 +6,7 @@ is understood as well (and `_degps` for `_radps`); the checked object holds radi
 
 import math
 import re
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -274,7 +275,8 @@ def unique_names(members: tuple[N, ...]) -> tuple[N, ...]:
     """Check that no two members of a list have the same name; for AfterValidator."""
     seen: set[str] = set()
     for member in members:
-        if member.name in seen:
+        name = unicodedata.normalize("NFC", member.name)  # what looks the same is the same
+        if name in seen:
             raise PydanticCustomError("unique", "names must differ: {name} is there twice", {"name": member.name})
-        seen.add(member.name)
+        seen.add(name)
     return members

@@ -11,7 +11,7 @@ from radarsim.config.cases import Expander, Setting
 from radarsim.config.document import Document
 from radarsim.config.experiment import Experiment
 from radarsim.config.faults import Faults, Origin, Path
-from radarsim.config.lookup import config_file, did_you_mean, is_stem, stems
+from radarsim.config.lookup import RESERVED, config_file, did_you_mean, is_reserved, is_stem, stems
 from radarsim.config.schema import Studies
 from radarsim.config.values import DEEPEST, NotFinite, from_python, from_text
 
@@ -62,8 +62,10 @@ def _from_mapping(source: Mapping[str, Any], faults: Faults) -> Document:
 def _from_user(source: str | bytes | os.PathLike[str], faults: Faults) -> Document | None:
     """The config that the user named by path or stem."""
     name = os.fsdecode(source)
-    file = config_file(name) if is_stem(name) and not FilePath(name).is_file() else None
-    if file is None and is_stem(name) and not FilePath(name).suffix:
+    # A file without suffix that is called as a config does not hide it.
+    by_path = FilePath(name).is_file() and (FilePath(name).suffix or not (is_stem(name) and config_file(name)))
+    file = config_file(name) if is_stem(name) and not by_path else None
+    if file is None and is_stem(name) and not by_path and not FilePath(name).suffix:
         known = stems("configs")
         near = did_you_mean(name, known) or f"; there are: {', '.join(known)}"
         faults.add(Origin(name), (), f"no such config{near}")
@@ -74,6 +76,9 @@ def _from_user(source: str | bytes | os.PathLike[str], faults: Faults) -> Docume
         faults.add(
             Origin(name), (), "a config's name must be of letters, digits and _ + = - . and not begin with a dot"
         )
+        return None
+    if document and is_reserved(file.stem):
+        faults.add(Origin(name), (), RESERVED)
         return None
     return document
 

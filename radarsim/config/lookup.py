@@ -2,11 +2,16 @@
 
 import difflib
 import re
+import unicodedata
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 SHIPPED = Path(__file__).parent.parent / "shipped"
 STEM = re.compile(r"\w[\w+=-]*(?:\.[\w+=-]+)*")
+
+
+FILES_OF_RESULTS = ("index.html", "readme.md")  # stand where the folder of a config's results would
+RESERVED = "a config must have another name: there is a file of that name among the results"
 
 
 def no_folders() -> tuple[Path, ...]:
@@ -67,7 +72,17 @@ def stems(kind: str) -> tuple[str, ...]:
 
 def is_stem(name: str) -> bool:
     """Whether a name is a plain file stem: no separators, no drive, no `..`, no leading dot."""
-    return len(name) <= 100 and STEM.fullmatch(name) is not None
+    return len(name) <= 100 and STEM.fullmatch(composed(name)) is not None
+
+
+def composed(name: str) -> str:
+    """A name with each letter composed with its accents: the same for every way of writing it (Unicode's NFC)."""
+    return unicodedata.normalize("NFC", name)
+
+
+def is_reserved(stem: str) -> bool:
+    """Whether a config's results would have the name of a file that is written beside them, in letters of any case."""
+    return stem.casefold() in FILES_OF_RESULTS
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -246,4 +246,7 @@ def decoded(raw: bytes) -> tuple[dict, np.ndarray]:
         raise Damage(f"not as this program writes: {error}") from error
     if not isinstance(header, dict):
         raise Damage("not as this program writes: no header")
+    platforms = header.get("platforms")
+    if not isinstance(platforms, list) or not all(isinstance(name, str) for name in platforms):
+        raise Damage("not as this program writes: no platforms")
     return header, values

@@ -7,23 +7,49 @@ are refused.
 """
 
 import csv
+import errno
 import io
 import os
 import stat
+import threading
+import time
+import unicodedata
 import uuid
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 
 from radarsim.errors import ConfigError, StoreError
 
+try:
+    import fcntl
+except ImportError:  # not a POSIX system: nothing is locked
+    fcntl = None
 
-def replace_all(folder: Path, contents: Mapping[str, bytes], stale: Iterable[str] = ()) -> None:
+WAIT_S, LOOK_S = 60.0, 0.02
+
+
+def read(path: str | os.PathLike) -> bytes:
+    """The content of a regular file. OSError, without waiting, for a pipe, a device or a directory in its place."""
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))  # or a pipe would wait for a writer
+    with open(descriptor, "rb") as file:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, "is no regular file", str(path))
+        return file.read()
+
+
+def replace_all(
+    folder: Path, contents: Mapping[str, bytes], stale: Callable[[Path], Iterable[str]] = lambda folder: ()
+) -> None:
     """Write contents (relative path: bytes) below folder: all under temporary names first, then renamed in their order.
 
-    So a full disk leaves the outputs of an earlier run as they were. Of the paths in `stale`, those below folder and
-    not among the contents are removed. Raises StoreError.
+    So a full disk leaves the outputs of an earlier run as they were. The renaming is done under a lock, so that two
+    writers of one folder leave the files of the last of them alone. Of the paths that `stale` gives of the folder,
+    those below it and not among the contents are removed. Raises StoreError.
     """
     folder = Path(folder)
+    _refuse_twins(folder, contents)
     written: dict[Path, Path] = {}
     try:
         try:
@@ -31,16 +57,102 @@ def replace_all(folder: Path, contents: Mapping[str, bytes], stale: Iterable[str
                 written[folder / path] = beside(folder / path)
                 written[folder / path].parent.mkdir(parents=True, exist_ok=True)
                 written[folder / path].write_bytes(data)
-            for path, temporary in written.items():
-                rename(temporary, path)
+            with locked(folder):
+                gone = set(stale(folder)) - set(contents)
+                for path, temporary in written.items():
+                    _refuse_special(path)
+                    rename(temporary, path)
+                for path in gone:
+                    if not Path(path).is_absolute() and ".." not in Path(path).parts:
+                        (folder / path).unlink(missing_ok=True)
         finally:
             for temporary in written.values():
                 temporary.unlink(missing_ok=True)
-        for path in set(stale) - set(contents):
-            if not Path(path).is_absolute() and ".." not in Path(path).parts:
-                (folder / path).unlink(missing_ok=True)
     except OSError as error:
         raise StoreError(f"{error.filename or folder}: cannot be written: {error.strerror or error}") from error
+
+
+def create(path: Path, data: bytes) -> None:
+    """Write a new file, whole or not at all. Raises FileExistsError where there is anything, StoreError."""
+    temporary = beside(path)
+    try:
+        try:
+            temporary.write_bytes(data)
+            with open(path, "xb"):  # takes the name, if it is free
+                pass
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except FileExistsError:
+        raise
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder for this thread: another that asks for it, of any process of this machine, waits until it is free.
+
+    The lock leaves no file and ends with its process. Where the file system has none, nobody waits. A thread may hold
+    a folder twice. Raises StoreError where it is not free within WAIT_S.
+    """
+    key = _key(folder)
+    held = _held.__dict__.setdefault("keys", set())
+    if fcntl is None or key is None or key in held:
+        yield
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        _wait_for(descriptor, folder)
+        held.add(key)
+        yield
+    finally:
+        held.discard(key)
+        os.close(descriptor)
+
+
+_held = threading.local()
+
+
+def _key(folder: Path) -> tuple[int, int] | None:
+    try:
+        status = os.stat(folder)
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino
+
+
+def _wait_for(descriptor: int, folder: Path) -> None:
+    end = time.monotonic() + WAIT_S
+    while True:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except BlockingIOError:
+            if time.monotonic() > end:
+                raise StoreError(f"{folder}: another process has been writing there for {WAIT_S:g} s") from None
+            time.sleep(LOOK_S)
+        except OSError:  # a file system without locks
+            return
+
+
+def _refuse_twins(folder: Path, names: Iterable[str]) -> None:
+    """StoreError for names that are one file where letters of either case are the same."""
+    seen: dict[str, str] = {}
+    for name in names:
+        first = seen.setdefault(unicodedata.normalize("NFC", name).casefold(), name)
+        if first != name:
+            raise StoreError(f"{folder}: {first} and {name} are one file to some file systems; nothing is written")
+
+
+def _refuse_special(path: Path) -> None:
+    """OSError where a pipe, a device or a socket stands in an output's place; a link is replaced, never followed."""
+    try:
+        kind = os.lstat(path).st_mode
+    except OSError:
+        return
+    if not (stat.S_ISREG(kind) or stat.S_ISLNK(kind)):
+        raise OSError(errno.EINVAL, "is no regular file", str(path))
 
 
 def beside(path: Path) -> Path:
@@ -70,11 +182,11 @@ def same_file(one: str | os.PathLike, other: str | os.PathLike) -> bool:
 class Writer:
     """A CSV file at a path that the user gave: whole or not at all, or a stream that is written through.
 
-    source is a file that is read meanwhile and must not be the same: ConfigError. So is a path to no file or stream.
-    Faults of the disk become StoreError.
+    sources are files that are read, by what they are called; the path must lead to none of them: ConfigError. So is a
+    path to no file or stream. Faults of the disk become StoreError.
     """
 
-    def __init__(self, path: str | os.PathLike, source: str | os.PathLike | None = None):
+    def __init__(self, path: str | os.PathLike, sources: Mapping[str, str | os.PathLike | None] = MappingProxyType({})):
         self.path = Path(path)
         try:
             kind = os.stat(self.path).st_mode
@@ -83,8 +195,9 @@ class Writer:
         if stat.S_ISDIR(kind) or stat.S_ISBLK(kind):
             raise ConfigError(f"{self.path}: must be a file, got a {'directory' if stat.S_ISDIR(kind) else 'disk'}")
         self._stream = not stat.S_ISREG(kind)
-        if source is not None and not self._stream and same_file(path, source):
-            raise ConfigError(f"{self.path}: must be another file than the plots, which would be lost")
+        for name, source in sources.items():
+            if source is not None and not self._stream and same_file(path, source):
+                raise ConfigError(f"{self.path}: must be another file than {name}, which would be lost")
 
     def __enter__(self):
         self._target = Path(os.path.realpath(self.path))

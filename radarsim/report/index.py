@@ -1,6 +1,7 @@
 """results/index.html: all runs of a folder, newest first, each with its answer in one line."""
 
 import csv
+import io
 import json
 from collections import Counter
 from collections.abc import Mapping
@@ -14,16 +15,22 @@ NAME = "index.html"
 
 
 def write(out: Path) -> None:
-    """Write the index of the runs under out; raises StoreError. Runs whose run.json cannot be read are left out."""
-    runs = sorted(filter(None, map(_run, Path(out).glob("*/run.json"))), key=lambda run: run["finished"], reverse=True)
-    page = html.whole("index.html.j2", runs=runs, version=provenance.versions()["radarsim"])
-    files.replace_all(Path(out), {NAME: page.encode()})
+    """Write the index of the runs under out; raises StoreError. Runs whose run.json cannot be read are left out.
+
+    Under a lock from the first look to the writing: of two runs that end at once, the last one sees both.
+    """
+    out = Path(out)
+    with files.locked(out):
+        found = filter(None, map(_run, out.glob("*/run.json")))
+        runs = sorted(found, key=lambda run: run["finished"], reverse=True)
+        page = html.whole("index.html.j2", runs=runs, version=provenance.versions()["radarsim"])
+        files.replace_all(out, {NAME: page.encode()})
 
 
 def _run(path: Path) -> dict | None:
     """A row of the index, from a run.json and the claims.csv beside it."""
     try:
-        record = json.loads(path.read_bytes())
+        record = json.loads(files.read(path))
         answer = [str(line) for line in record["answer"]]
         made = {
             "name": path.parent.name,
@@ -33,7 +40,7 @@ def _run(path: Path) -> dict | None:
             "realisations": provenance.span(sorted({int(case["done"]) for case in record["cases"].values()})),
             "finished": _finished(record, path),
         }
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+    except (OSError, ArithmeticError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
     return made | {"claims": _claims(path.parent / "claims.csv")}
 
@@ -48,8 +55,8 @@ def _finished(record: Mapping, path: Path) -> str:
 def _claims(path: Path) -> str:
     """How many claims of a table came out how; nothing where there is none."""
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            overall = {row["claim"]: row["overall"] for row in csv.DictReader(file)}
+        text = files.read(path).decode("utf-8")
+        overall = {row["claim"]: row["overall"] for row in csv.DictReader(io.StringIO(text, newline=""))}
     except (OSError, ValueError, LookupError, csv.Error):
         return ""
     return ", ".join(f"{count} {verdict}" for verdict, count in Counter(overall.values()).items())

@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from radarsim.engine.results import CaseResult
+from radarsim.report import files
 from radarsim.report.statistics import FEW, FEW_HEAVY
 
 MOST_SEEDS, MOST_NAMES = 5, 3  # named in a line
@@ -31,6 +32,7 @@ def record(
     done = {result.name: result.count for result in results}
     return {
         "config": experiment.stem,
+        "config_path": path_of(experiment),
         "study": experiment.study,
         "answer": list(answer),
         "realisations_asked": sum(case.realisations for case in experiment.cases),
@@ -56,13 +58,44 @@ def with_output(made: dict, path: str, data: bytes) -> dict:
     return {**made, "outputs": {**made["outputs"], path: hashlib.sha256(data).hexdigest()}}
 
 
+def earlier(folder: Path) -> dict:
+    """The run.json of an earlier run in a folder; an empty one where there is none that can be read."""
+    try:
+        record = json.loads(files.read(folder / "run.json"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return record if isinstance(record, dict) else {}
+
+
 def outputs(folder: Path) -> list[str]:
     """The outputs that an earlier run.json of the folder names; none where there is no such record."""
-    try:
-        named = json.loads((folder / "run.json").read_bytes())["outputs"]
-    except (OSError, ValueError, LookupError, TypeError, RecursionError):
-        return []
+    named = earlier(folder).get("outputs")
     return [path for path in named if isinstance(path, str)] if isinstance(named, dict) else []
+
+
+def replaced(folder: Path, experiment) -> list[str]:
+    """A warning where a folder holds the results of another config, which has the same name."""
+    record = earlier(folder)
+    before, now = record.get("config_path"), path_of(experiment)
+    if not isinstance(before, str) or before == now or _asked(record.get("resolved")) == _asked(experiment.resolved):
+        return []
+    return [f"{folder}: held the results of another config of this name, {before}; they are replaced"]
+
+
+def path_of(experiment) -> str:
+    """The file of a config, as text that can be written."""
+    if experiment.path is None:
+        return "a mapping in Python"
+    return os.fsencode(os.path.abspath(experiment.path)).decode("utf-8", "backslashreplace")
+
+
+def _asked(resolved: object) -> object:
+    """A resolved config without how often and with which seed it is run."""
+    try:
+        cases = [{key: case[key] for key in case if key not in ("realisations", "seed")} for case in resolved["cases"]]
+    except (LookupError, TypeError):
+        return None
+    return json.loads(to_json(cases))
 
 
 def few(results: Sequence[CaseResult]) -> list[str]:

@@ -1,9 +1,10 @@
 """The filters of an experiment over recorded plots, and a realisation's plots to try them on."""
 
+import itertools
 import json
 import os
 import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from numpy.linalg import LinAlgError
 
 from radarsim.config import lookup
 from radarsim.config.experiment import Case, Experiment, in_name
+from radarsim.config.schema import LARGEST_REALISATIONS
 from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
 from radarsim.studies.interface import RecordedPlots
@@ -79,8 +81,10 @@ def listed(words: list[str]) -> str:
 def simulated(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndarray]:
     """The plots of one realisation of an experiment's one case, the very numbers of a run, and the truth as true_….
 
-    Columns of equal length, not-a-number where a plot is missed.
+    Columns of equal length, not-a-number where a plot is missed. Raises ConfigError for a realisation that no run has.
     """
+    if not 0 <= realisation < LARGEST_REALISATIONS:
+        raise ConfigError(f"realisation: must be from 0 to {LARGEST_REALISATIONS - 1}, got {realisation}")
     case = one_case(experiment, "simulate", "radarsim simulate {} -o PLOTS.csv")
     return dict(recorded_of(case).simulated(case, realisation))
 
@@ -208,9 +212,9 @@ def follow(
                 raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
             track = tracker.feed(columns)
             if twin.lost(columns, track):
-                line = plots.line_of(source, twin.gap_row)
+                place = plots.place_of(source, twin.gap_row)
                 fault = f"after a gap of {twin.gap_s:g} s a filter's numbers are lost in rounding: split the file here"
-                raise ConfigError(f"{source}:{line}: t_s: {fault}")
+                raise ConfigError(f"{place}: t_s: {fault}")
             sink(track)
             followed.take(columns, track)
     except LinAlgError as error:
@@ -230,12 +234,18 @@ def track(experiment: Experiment, source: str | os.PathLike) -> tuple[Case, Trac
     return followed.case, joined(parts)
 
 
-def draw(followed: Followed, folder: str | os.PathLike) -> list[str]:
-    """Figures of a track as SVG and PNG into a folder; their names. Raises StoreError."""
+def draw(followed: Followed, folder: str | os.PathLike, sources: Iterable[str | os.PathLike] = ()) -> list[str]:
+    """Figures of a track as SVG and PNG into a folder; their names. Raises StoreError.
+
+    ConfigError, and nothing drawn, where a figure would take the place of one of the sources.
+    """
     from radarsim.report import figures, files
     from radarsim.track import figures as described
 
     made = described.figures(followed.track())
     contents = {f"{name}.{kind}": data for name, one in made.items() for kind, data in figures.save(one).items()}
+    for name, source in itertools.product(contents, sources):
+        if files.same_file(Path(folder) / name, source):
+            raise ConfigError(f"{Path(folder) / name}: would be overwritten by a figure; choose another folder")
     files.replace_all(Path(folder), contents)
     return list(made)

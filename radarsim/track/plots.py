@@ -51,12 +51,15 @@ def chunks(
         raise ConfigError(f"{path}: is not UTF-8 text") from error
 
 
-def line_of(path: str | os.PathLike, row: int) -> int:
-    """The line in which a row of numbers, counted from 0, ends."""
-    with open(path, encoding="utf-8-sig", newline="") as file:
-        rows = csv.reader(file, strict=True)
-        numbers = (rows.line_num for cells in rows if cells)
-        return next(itertools.islice(numbers, row + 1, None))
+def place_of(path: str | os.PathLike, row: int) -> str:
+    """Where a row of numbers, counted from 0, ends: `file:line`; in a stream, which is read once, `file: row`."""
+    if os.path.isfile(path):
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            rows = csv.reader(file, strict=True)
+            numbers = (rows.line_num for cells in rows if cells)
+            if line := next(itertools.islice(numbers, row + 1, None), None):
+                return f"{path}:{line}"
+    return f"{path}: row {row + 1} after the header"
 
 
 class _Reader:
@@ -206,8 +209,10 @@ def write(track: Track, path: str | os.PathLike) -> None:
         file.write(rows_of(track))
 
 
-def write_columns(columns: Mapping[str, np.ndarray], path: str | os.PathLike) -> None:
-    """Write columns (n,) of numbers as CSV, an empty cell for not-a-number; errors of `Writer`."""
-    with Writer(path) as file:
+def write_columns(
+    columns: Mapping[str, np.ndarray], path: str | os.PathLike, config: str | os.PathLike | None = None
+) -> None:
+    """Write columns (n,) of numbers as CSV, an empty cell for not-a-number, not over the config; errors of `Writer`."""
+    with Writer(path, {"the config": config}) as file:
         file.write([tuple(columns)])
         file.write(zip(*([_cell(v) for v in column.tolist()] for column in columns.values()), strict=True))

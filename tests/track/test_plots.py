@@ -177,5 +177,5 @@ def test_the_recorded_plots_are_never_the_output(tmp_path, name):
     source.write_text("before")
     (tmp_path / "link.csv").symlink_to("plots.csv")
     with pytest.raises(ConfigError, match="must be another file than the plots"):
-        Writer(tmp_path / name, source)
+        Writer(tmp_path / name, {"the plots": source})
     assert source.read_text() == "before"

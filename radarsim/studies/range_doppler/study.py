@@ -7,6 +7,7 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.engine.moments import Layout
 from radarsim.engine.results import Axes
+from radarsim.errors import ConfigError
 from radarsim.kernels import linear as kernels
 from radarsim.physics import targets
 from radarsim.studies.noise import noise_key
@@ -63,6 +64,10 @@ def prepare(case: Case) -> Plan:
     sigma = np.array([radar.sigma_range_m, radar.sigma_velocity_mps])
     t = np.arange(scans) * dt
     x = truth(spec.target, t)
+    if not (x[:, 0] > 0).all():
+        k = int(np.flatnonzero(x[:, 0] <= 0)[0])
+        fault = f"its range must stay > 0, is {x[k, 0]:g} m at {t[k]:g} s, scan {k + 1} of {scans}"
+        raise ConfigError(f"{case.name}: target: {fault}")
     designs = [
         filters.design(len(f.observes), f.initial_scans, f.manoeuvre_variance, sigma, dt, scans) for f in spec.filters
     ]

@@ -72,6 +72,8 @@ def _gain_sentence(results: Sequence[CaseResult], rows, every, quantity: str, la
         low, high = (last.loc[last["gain_percent"].agg(pick)] for pick in ("idxmin", "idxmax"))
         ends = " to ".join(f"{_gain(row)} ({_who(row, labels, several)})" for row in (low, high))
         loss = _loss(every, low, labels)
+        if last["gain_lo"].max() <= last["gain_hi"].min():
+            ends += ", which do not differ for certain,"
         return f"{quantity.capitalize()}: {when} σ is {ends} {base}{loss}."
     row = last.iloc[0]
     best = rows.loc[rows["gain_percent"].idxmax()]

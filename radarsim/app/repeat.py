@@ -1,0 +1,51 @@
+"""The command that computes a result again, as run.json and messages give it."""
+
+import os
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from radarsim.config import lookup
+from radarsim.config.experiment import Experiment
+
+RESULTS = "results"  # the command's default directory
+SHORT = {"realisations": "-n", "seed": "--seed"}
+
+
+def repeated(asked: Experiment, done: Mapping[str, int], overrides: Sequence[str], precision: float | None) -> str:
+    """The command that makes the same tables, or a sentence that says why there is none.
+
+    asked is the experiment as config and overrides give it, done the realisations of each case that the tables hold;
+    precision, in per cent, decided where the cases ended, unless it is None.
+    """
+    if asked.path is None:
+        return "none: the config was given in Python, and stands below"
+    wanted = {case.name: case.realisations for case in asked.cases}
+    counts = {done.get(name, 0) for name in wanted}
+    if all(done.get(name) == count for name, count in wanted.items()):
+        return command(asked, overrides, RESULTS)
+    if len(counts) == 1:
+        kept = [text for text in overrides if text.partition("=")[0].strip() != "realisations"]
+        return command(asked, [*kept, f"realisations={counts.pop()}"], RESULTS)
+    if precision is not None:
+        return command(asked, overrides, RESULTS, precision)
+    return "none: the run was stopped, its cases at different numbers of realisations, which stand below"
+
+
+def command(
+    experiment: Experiment, overrides: Sequence[str], out: str | os.PathLike, precision: float | None = None
+) -> str:
+    """The command that runs an experiment; a shipped config by its stem."""
+    # In a checkout the shipped folder is a link to configs/.
+    shipped = experiment.path and Path(experiment.path).resolve().parent == (lookup.SHIPPED / "configs").resolve()
+    words = ["radarsim", "run", experiment.stem if shipped else as_text(experiment.path or "")]
+    for override in overrides:
+        key, _, value = override.partition("=")
+        words += [SHORT[key], value] if key in SHORT else ["--set", override]
+    words += [] if precision is None else ["--precision", f"{precision:.17g}"]
+    return shlex.join(words + (["--out", str(out)] if str(out) != RESULTS else []))
+
+
+def as_text(path: str) -> str:
+    """A path as text that can be written; bytes of it that are no UTF-8 escaped."""
+    return os.fsencode(path).decode("utf-8", "backslashreplace")
