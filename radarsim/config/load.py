@@ -63,8 +63,9 @@ def _from_user(source: str | bytes | os.PathLike[str], faults: Faults) -> Docume
     """The config that the user named by path or stem."""
     name = os.fsdecode(source)
     # A file without suffix that is called as a config does not hide it.
-    by_path = FilePath(name).is_file() and (FilePath(name).suffix or not (is_stem(name) and config_file(name)))
-    file = config_file(name) if is_stem(name) and not by_path else None
+    found = config_file(name) if is_stem(name) else None
+    by_path = os.path.isfile(name) and (bool(FilePath(name).suffix) or found is None)
+    file = None if by_path else found
     if file is None and is_stem(name) and not by_path and not FilePath(name).suffix:
         known = stems("configs")
         near = did_you_mean(name, known) or f"; there are: {', '.join(known)}"
