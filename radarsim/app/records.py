@@ -8,6 +8,7 @@ from radarsim.app.configs import load
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.identity import canonical
 from radarsim.errors import RadarsimError
+from radarsim.report import files
 from radarsim.studies.identity import identity
 
 LABELS = ("case", "swept")  # of a resolved case, beside its keys
@@ -32,7 +33,7 @@ def made_by_other_code(experiment: Experiment, out: Path) -> list[str]:
     Their identity differs, so they are not reused; without this line nobody would know why all is computed again.
     """
     try:
-        record = json.loads((out / experiment.stem / "run.json").read_bytes())
+        record = json.loads(files.read(out / experiment.stem / "run.json"))
         names = [case.name for case in experiment.cases if _is_other(record, case, out)]
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return []  # no record, or one of another program
