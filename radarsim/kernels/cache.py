@@ -32,7 +32,6 @@ from numba.core.serialize import dumps
 from radarsim.kernels import sources
 
 SOURCES = "sources.json"  # what is known of source files; see `sources.remember`
-APART = {f"radarsim.kernels.{name}" for name in ("cache", "sources", "trees")}  # they change no machine code
 SUFFIX = ".kernel"
 DIGEST = 32
 
@@ -129,7 +128,7 @@ def directory(module: str) -> Path | None:
     package = module.partition(".")[0]
     try:
         found = sources.closure(
-            [module], lambda name: name.split(".")[0] in (package, "radarsim") and name not in APART
+            [module], lambda name: name.split(".")[0] in (package, "radarsim") and name not in sources.APART
         )
     except LookupError:
         return None

@@ -29,6 +29,9 @@ FORMAT = 2  # of the trees' hashes, and of the file that remembers them
 MOST_KEPT = 2000  # sources in that file; beyond it only those of the process that writes are kept
 
 
+APART = {f"radarsim.kernels.{name}" for name in ("cache", "sources", "trees")}  # they change no number
+
+
 @cache
 def top_spec(package: str) -> ModuleSpec | None:
     """Where a top-level module or package lies; None where there is none."""

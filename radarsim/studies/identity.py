@@ -17,13 +17,12 @@ from importlib.metadata import PackageNotFoundError, packages_distributions, ver
 from radarsim.config.experiment import Case
 from radarsim.config.identity import canonical, digest
 from radarsim.errors import ConfigError
-from radarsim.kernels import cache as compiled
-from radarsim.kernels import random, sources
+from radarsim.kernels import sources
 from radarsim.studies.interface import Study
 from radarsim.studies.registry import study
 
 # Of radarsim: what keeps machine code, carries a case, labels its sums or declares a study changes no number.
-APART = compiled.APART | {
+APART = sources.APART | {
     "radarsim",
     "radarsim.errors",
     "radarsim.config.experiment",
@@ -42,6 +41,8 @@ SHOWS = frozenset({*vars(Study), *Study.__annotations__} - COMPUTES)
 
 def identity(case: Case) -> str:
     """What a case's numbers depend on, as SHA-256 in hexadecimal."""
+    from radarsim.kernels import random  # the compiler, which takes half a second, is not loaded for `radarsim list`
+
     return digest(
         {
             "study": case.study,
@@ -59,6 +60,8 @@ def computing_sources(name: str, roots: tuple[str, ...]) -> str:
 
     Raises ConfigError where one of these modules has no source.
     """
+    from radarsim.kernels import cache as compiled
+
     kinds = [kind for kind in type(study(name)).__mro__ if issubclass(kind, Study) and kind is not Study]
     own = {kind.__module__.partition(".")[0] for kind in kinds} | {root.partition(".")[0] for root in roots}
     try:
