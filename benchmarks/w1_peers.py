@@ -136,18 +136,18 @@ def problem_of(made) -> dict[str, np.ndarray]:
     """The case as plain arrays."""
     from radarsim.physics.motion import manoeuvre_covariance, transition
 
-    plan, axes = made.plan, made.plan.axes
-    dt, before = axes.extra["scan_period_s"], ~axes.available.all(axis=2)
-    variance = axes.extra["manoeuvre_variance"][0]
+    problem, axes = made.plan.problem, made.plan.axes
+    dt, before = axes.scan_period_s, ~axes.available.all(axis=2)
+    variance = axes.manoeuvre_variance[0]
     return {
-        "truth": plan.truth,
-        "sigma": plan.sigma,
+        "truth": problem.truth,
+        "sigma": axes.sigma,
         "F": transition(dt),
         "Q": manoeuvre_covariance(variance, dt),
-        "observes": plan.observes,
-        "start": plan.start,
-        "weights": plan.weights,
-        "believed": axes.extra["believed"][np.arange(2), plan.start - 1],
+        "observes": problem.observes,
+        "start": problem.start,
+        "weights": problem.weights,
+        "believed": axes.believed[np.arange(2), problem.start - 1],
         "exact": np.where(before[:, :, None], np.nan, axes.exact_sigma),
     }
 

@@ -5,17 +5,13 @@ chunks that stay in cache, scans outermost, one plain loop over the chunk per fo
 rate and second rate of one coordinate (range, radial velocity, acceleration); a filter of the first order is one whose
 third gains and weights are zero, and a further coordinate is a further call.
 
-A schedule is four arrays, F filters over K scans:
-
-    observes (F,)           1: the filter observes the value alone; 2: value and rate
-    start    (F,)           scan, counted from 1, at which its least-squares start ends
-    weights  (F, 3, 2, S)   that start is the sum of weights times plots over the first `start` scans; S >= all starts
-    gains    (F, K, 3, 2)   of every scan after the start; not read up to it
-
-Before the start the estimates are the plots themselves, of what the filter observes.
+Before a filter's start its estimates are the plots themselves, of what it observes.
 
 The work array x (F + 1, 3, n) holds the filters' states and, last, the plots (its third row stays zero).
 """
+
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +19,65 @@ from radarsim.kernels.compile import aligned_zeros, inline, kernel, part, summin
 from radarsim.kernels.random import fill_words, normal_pair
 
 CHUNK = 512  # realisations; a row is 4 KB, so that two filters and the plots just fill a first-level cache
+CROSSED = ((0, 1), (0, 2), (1, 2))  # the pairs of components whose products `Sums.cross` holds, in its order
+
+
+class Problem(NamedTuple):
+    """What is simulated: the truth and its plots over K scans, and the F filters that see them.
+
+    key       (2,)            of the noise's stream
+    truth     (K, 3)          value, rate and second rate
+    sigma     (2,), (K, 2)    standard deviations of the plots' value and rate
+    dt        (), (K,)        time since the scan before; the first is not read
+    observes  (F,)            1: the filter observes the value alone; 2: value and rate
+    start     (F,)            scan, counted from 1, at which its least-squares start ends
+    weights   (F, 3, 2, S)    that start is the sum of weights times plots over the first `start` scans; S >= all starts
+    gains     (F, K, 3, 2)    of every scan after the start; not read up to it
+    baseline                  the filter that others are compared with
+    """
+
+    key: np.ndarray
+    truth: np.ndarray
+    sigma: np.ndarray
+    dt: np.ndarray | float
+    observes: np.ndarray
+    start: np.ndarray
+    weights: np.ndarray
+    gains: np.ndarray
+    baseline: int = 0
+
+    def plain(self) -> "Problem":
+        """The same with arrays as the kernels take them, sigma (K, 2) and dt (K,); itself where they are so."""
+        filters, scans = np.shape(self.gains)[:2]
+        return Problem(
+            plain(self.key, 2, dtype=np.uint64),
+            plain(self.truth, scans, 3),
+            plain(self.sigma, scans, 2),
+            plain(self.dt, scans),
+            plain(self.observes, filters, dtype=np.int64),
+            plain(self.start, filters, dtype=np.int64),
+            plain(self.weights, *np.shape(self.weights)),
+            plain(self.gains, *np.shape(self.gains)),
+            int(self.baseline),
+        )
+
+
+class Sums(NamedTuple):
+    """Sums over realisations of the errors e = estimate - truth, of the components that a filter has at that scan.
+
+    error   (F, K, 3, 4)   e, e², e³, e⁴
+    paired  (F, K, 3)      e² times the baseline's e², where both have an estimate
+    cross   (F, K, 3)      the products of two components' errors, CROSSED
+    """
+
+    error: np.ndarray
+    paired: np.ndarray
+    cross: np.ndarray
+
+
+def shapes(filters: int, scans: int) -> Mapping[str, tuple[int, ...]]:
+    """The shapes of `Sums`, by name."""
+    return {"error": (filters, scans, 3, 4), "paired": (filters, scans, 3), "cross": (filters, scans, len(CROSSED))}
 
 
 @inline
@@ -133,27 +188,30 @@ def products_of_squares(x, f, g, n, truth):
 
 
 @part
-def add_sums(x, n, k, truth, observes, start, baseline, error, paired, cross):
-    """Add the sums of scan k over the first n realisations of x; truth (3,), the rest as in `simulate_block`."""
+def add_sums(x, n, k, truth, observes, start, baseline, sums):
+    """Add scan k over the first n realisations of x to the sums; truth (3,)."""
+    error, paired, cross = sums
     beside, compared = source(x, baseline, k, observes, start)
     for f in range(x.shape[0] - 1):
         row, known = source(x, f, k, observes, start)
-        sums = moments(x, row, n, truth)
-        squares = sums[3], sums[7], sums[11]
+        own = moments(x, row, n, truth)
+        squares = own[3], own[7], own[11]
         if row != beside:
             squares = products_of_squares(x, row, beside, n, truth)
         for c in range(known):
             for power in range(4):
-                error[f, k, c, power] += sums[4 * c + power]
+                error[f, k, c, power] += own[4 * c + power]
             if c < compared:
                 paired[f, k, c] += squares[c]
             for d in range(c):
-                cross[f, k, c + d - 1] += sums[12 + c + d - 1]
+                cross[f, k, c + d - 1] += own[12 + c + d - 1]
 
 
 @kernel
-def add_block(x, key, first, count, truth, sigma, dt, observes, start, weights, gains, baseline, error, paired, cross):
-    """`simulate_block` for arguments of the one type that is compiled, with a work array x (F + 1, 3, CHUNK)."""
+def add_block(x, first, count, problem, sums):
+    """`simulate_block` for a plain problem, with a work array x (F + 1, 3, CHUNK)."""
+    # Unpacked once: an array taken out of a record counts a reference, at every scan a tenth of the whole time.
+    key, truth, sigma, dt, observes, start, weights, gains, baseline = problem
     filters, scans = gains.shape[0], gains.shape[1]
     for done in range(0, count, CHUNK):
         x[:] = 0.0
@@ -162,31 +220,31 @@ def add_block(x, key, first, count, truth, sigma, dt, observes, start, weights, 
         for k in range(scans):
             fill_plots(key, first + done, k, truth[k], sigma[k], x[filters, 0], x[filters, 1])
             advance(x, k, dt[k], observes, start, weights, gains)
-            add_sums(x, n, k, truth[k], observes, start, baseline, error, paired, cross)
+            add_sums(x, n, k, truth[k], observes, start, baseline, sums)
 
 
 @kernel
-def fill_simulated(x, key, first, truth, sigma, plots):
+def fill_simulated(x, first, problem, plots):
     """`simulate_plots` into plots (n, K, 2), with a work array x (2, CHUNK)."""
     for done in range(0, plots.shape[0], CHUNK):
         n = min(CHUNK, plots.shape[0] - done)
         for k in range(plots.shape[1]):
-            fill_plots(key, first + done, k, truth[k], sigma[k], x[0], x[1])
+            fill_plots(problem.key, first + done, k, problem.truth[k], problem.sigma[k], x[0], x[1])
             plots[done : done + n, k] = x[:, :n].T
 
 
 @kernel
-def fill_estimates(x, plots, dt, observes, start, weights, gains, estimates):
+def fill_estimates(x, problem, plots, estimates):
     """`estimate` into estimates (n, F, K, 3), with a work array x (F + 1, 3, CHUNK)."""
-    filters, scans = gains.shape[0], gains.shape[1]
+    filters, scans = problem.gains.shape[0], problem.gains.shape[1]
     for done in range(0, plots.shape[0], CHUNK):
         x[:] = 0.0
         n = min(CHUNK, plots.shape[0] - done)
         for k in range(scans):
             x[filters, :2, :n] = plots[done : done + n, k].T
-            advance(x, k, dt[k], observes, start, weights, gains)
+            advance(x, k, problem.dt[k], problem.observes, problem.start, problem.weights, problem.gains)
             for f in range(filters):
-                row, known = source(x, f, k, observes, start)
+                row, known = source(x, f, k, problem.observes, problem.start)
                 estimates[done : done + n, f, k, :known] = x[row, :known, :n].T
 
 
@@ -203,55 +261,31 @@ def plain(array, *shape, dtype=np.float64):
     return made
 
 
-def schedule(dt, observes, start, weights, gains) -> tuple[np.ndarray, ...]:
-    """Interval and schedule arrays as the kernels take them; dt a number or (K,), the rest as above."""
-    filters, scans = gains.shape[:2]
-    return (
-        plain(dt, scans),
-        plain(observes, filters, dtype=np.int64),
-        plain(start, filters, dtype=np.int64),
-        plain(weights, *weights.shape),
-        plain(gains, *gains.shape),
-    )
+def simulate_block(problem: Problem, first: int, count: int, sums: Sums) -> None:
+    """Simulate realisations first … first + count - 1 (any count > 0) and add all filters' errors to the sums.
 
-
-def simulate_block(
-    key, first, count, truth, sigma, dt, observes, start, weights, gains, baseline, error, paired, cross
-) -> None:
-    """Simulate realisations first … first + count - 1 (any count > 0) and add the sums of all filters' errors.
-
-    key (2,) of the noise's stream; truth (K, 3); sigma (2,) or (K, 2), standard deviations of the plots' value and
-    rate; dt a number or (K,), the time since the scan before (the first is not read); observes, start, weights, gains
-    the schedule of F filters; baseline the filter that others are compared with. Added to, float64 and contiguous, over
-    the components that a filter estimates at that scan:
-
-        error  (F, K, 3, 4)   sums of e, e², e³, e⁴, the errors e = estimate - truth
-        paired (F, K, 3)      sums of e² times the baseline's e², where both have an estimate
-        cross  (F, K, 3)      sums of e_r e_V, e_r e_a, e_V e_a
-
-    Realisation i has the same plots and estimates in any block. Memory does not grow with count or scans.
+    The arrays of sums are float64 and contiguous. Realisation i has the same plots and estimates in any block. Memory
+    does not grow with count or scans.
     """
-    filters, scans = gains.shape[:2]
-    x = aligned_zeros(filters + 1, 3, CHUNK)
-    world = plain(key, 2, dtype=np.uint64), int(first), int(count), plain(truth, scans, 3), plain(sigma, scans, 2)
-    add_block(x, *world, *schedule(dt, observes, start, weights, gains), int(baseline), error, paired, cross)
+    problem = problem.plain()
+    add_block(aligned_zeros(len(problem.gains) + 1, 3, CHUNK), int(first), int(count), problem, sums)
 
 
-def simulate_plots(key, first, count, truth, sigma) -> np.ndarray:
+def simulate_plots(problem: Problem, first: int, count: int) -> np.ndarray:
     """The plots (count, K, 2) that `simulate_block` draws for realisations first … first + count - 1."""
-    scans = len(truth)
-    x, plots = aligned_zeros(2, CHUNK), np.empty((count, scans, 2))
-    fill_simulated(x, plain(key, 2, dtype=np.uint64), int(first), plain(truth, scans, 3), plain(sigma, scans, 2), plots)
+    problem = problem.plain()
+    plots = np.empty((count, len(problem.truth), 2))
+    fill_simulated(aligned_zeros(2, CHUNK), int(first), problem, plots)
     return plots
 
 
-def estimate(plots, dt, observes, start, weights, gains) -> np.ndarray:
-    """Estimates (n, F, K, 3) of F filters over plots (n, K, 2) of n tracks; NaN where a filter has none yet.
+def estimate(problem: Problem, plots: np.ndarray) -> np.ndarray:
+    """Estimates (n, F, K, 3) of a problem's filters over plots (n, K, 2) of n tracks; NaN where a filter has none yet.
 
-    dt and the schedule as for `simulate_block`, by the same instructions. For a missing plot give any finite number,
-    with zero gains.
+    By the same instructions as `simulate_block`. For a missing plot give any finite number, with zero gains.
     """
-    filters, scans = gains.shape[:2]
+    problem = problem.plain()
+    filters, scans = problem.gains.shape[:2]
     x, estimates = aligned_zeros(filters + 1, 3, CHUNK), np.full((len(plots), filters, scans, 3), np.nan)
-    fill_estimates(x, plain(plots, *np.shape(plots)), *schedule(dt, observes, start, weights, gains), estimates)
+    fill_estimates(x, problem, plain(plots, *np.shape(plots)), estimates)
     return estimates

@@ -159,12 +159,12 @@ random.fill_normal_strip(key, 10, 2, *strips[:2])
 random.fill_uniform_strip(key, 10, 2, *strips[2:])
 rng = np.random.default_rng(1)
 gains, weights = rng.uniform(0, 0.3, (2, 6, 3, 2)), rng.normal(size=(2, 3, 2, 3))
-schedule = np.array([1, 2]), np.array([3, 2]), weights, gains
-error, paired, cross = np.zeros((2, 6, 3, 4)), np.zeros((2, 6, 3)), np.zeros((2, 6, 3))
-linear.simulate_block(key, 7, 6, np.ones((6, 3)), np.array([2.0, 1.0]), 1.0, *schedule, 0, error, paired, cross)
-plots = linear.simulate_plots(key, 7, 6, np.ones((6, 3)), np.array([2.0, 1.0]))
-estimates = np.nan_to_num(linear.estimate(plots, 1.0, *schedule), nan=-1.0)
-numbers = [float(v) for a in (*pairs, *strips, error, paired, cross, plots, estimates) for v in a.ravel()]
+problem = linear.Problem(key, np.ones((6, 3)), np.array([2.0, 1.0]), 1.0, [1, 2], [3, 2], weights, gains)
+sums = linear.Sums(*map(np.zeros, linear.shapes(2, 6).values()))
+linear.simulate_block(problem, 7, 6, sums)
+plots = linear.simulate_plots(problem, 7, 6)
+estimates = np.nan_to_num(linear.estimate(problem, plots), nan=-1.0)
+numbers = [float(v) for a in (*pairs, *strips, *sums, plots, estimates) for v in a.ravel()]
 """
 # Words overflow by design, which NumPy's scalars report; the result does not depend on the chunk.
 PLAIN = f"""

@@ -31,49 +31,42 @@ def world(radar, scans=K):
     return truth, np.array(sigma), dt
 
 
-def schedule(radar, designs=FILTERS, scans=K):
-    """observes, start, weights, gains of several filters, as the kernels take them."""
-    _, sigma, dt = world(radar)
+def problem_of(radar, designs=FILTERS, scans=K, **changes):
+    """Several filters on a radar of the paper, parts of the problem changed."""
+    truth, sigma, dt = world(radar, scans)
     made = [filters.design(observes, start, variance, sigma, dt, scans) for observes, start, variance in designs]
     longest = max(d.start for d in made)
     weights = np.zeros((len(made), 3, 2, longest))
     for f, d in enumerate(made):
         weights[f, :, :, : d.start] = d.weights
-    return (
-        np.array([d.observes for d in made]),
-        np.array([d.start for d in made]),
-        weights,
-        np.stack([d.gains for d in made]),
-    )
+    observes, start = [d.observes for d in made], [d.start for d in made]
+    gains = np.stack([d.gains for d in made])
+    return kernels.Problem(KEY, truth, sigma, dt, observes, start, weights, gains)._replace(**changes)
 
 
-def sums(radar, first, count, baseline=0, **changes):
-    """Sums of a block: error (F, K, 3, 4), paired (F, K, 3), cross (F, K, 3)."""
-    truth, sigma, dt = world(radar)
-    observes, start, weights, gains = schedule(radar)
-    shape = gains.shape[:2]
-    error, paired, cross = np.zeros((*shape, 3, 4)), np.zeros((*shape, 3)), np.zeros((*shape, 3))
-    arguments = {"key": KEY, "truth": truth, "sigma": sigma, "dt": dt, "gains": gains} | changes
-    kernels.simulate_block(
-        first=first,
-        count=count,
-        observes=observes,
-        start=start,
-        weights=weights,
-        baseline=baseline,
-        error=error,
-        paired=paired,
-        cross=cross,
-        **arguments,
-    )
-    return error, paired, cross
+def filters_alone(dt, observes, start, weights, gains):
+    """A problem of which only the filters are of interest."""
+    return kernels.Problem(KEY, np.zeros((gains.shape[1], 3)), np.ones(2), dt, observes, start, weights, gains)
+
+
+def sums_of(problem, first, count):
+    """Sums of a block."""
+    made = kernels.Sums(*map(np.zeros, kernels.shapes(*problem.gains.shape[:2]).values()))
+    kernels.simulate_block(problem, first, count, made)
+    return made
+
+
+def sums(radar, first, count, **changes):
+    """Sums of a block of a radar of the paper."""
+    return sums_of(problem_of(radar, **changes), first, count)
 
 
 @pytest.mark.parametrize("radar", RADARS)
 def test_estimates_are_the_textbook_filter(radar):
-    truth, sigma, dt = world(radar)
-    plots = kernels.simulate_plots(KEY, 77, 20, truth, sigma)
-    got = kernels.estimate(plots, dt, *schedule(radar))
+    _, sigma, dt = world(radar)
+    problem = problem_of(radar)
+    plots = kernels.simulate_plots(problem, 77, 20)
+    got = kernels.estimate(problem, plots)
     for f, (observes, start, variance) in enumerate(FILTERS):
         for i in range(len(plots)):
             expected, _ = naive.kalman(plots[i], observes, start, variance, sigma, dt)
@@ -93,9 +86,10 @@ def test_gains_are_the_papers_closed_forms(radar, observes, start, variance):
 
 
 def test_plots_are_truth_and_noise():
-    truth, sigma, _ = world("RLS 2")
+    truth, sigma, _ = world("RLS 2", 3)
     n = 200_000
-    noise = (kernels.simulate_plots(KEY, 0, n, truth[:3], sigma) - truth[:3, :2]) / sigma
+    problem = problem_of("RLS 2", ((1, 3, 1e-3),), 3)
+    noise = (kernels.simulate_plots(problem, 0, n) - truth[:, :2]) / sigma
     flat = noise.reshape(n, -1)
     assert np.abs(flat.mean(axis=0)).max() < 5 / np.sqrt(n)
     assert np.abs(np.cov(flat.T) - np.eye(6)).max() < 5 * np.sqrt(2 / n)
@@ -103,23 +97,23 @@ def test_plots_are_truth_and_noise():
 
 def test_sums_are_those_of_the_estimates():
     count, radar = 1300, "RLS 3"  # two chunks and a part
-    truth, sigma, dt = world(radar)
-    estimates = kernels.estimate(kernels.simulate_plots(KEY, 5, count, truth, sigma), dt, *schedule(radar))
-    e = np.nan_to_num(estimates - truth, nan=0.0)
+    problem = problem_of(radar)
+    estimates = kernels.estimate(problem, kernels.simulate_plots(problem, 5, count))
+    e = np.nan_to_num(estimates - problem.truth, nan=0.0)
     for baseline in range(len(FILTERS)):
-        error, paired, cross = sums(radar, 5, count, baseline)
+        error, paired, cross = sums(radar, 5, count, baseline=baseline)
         for power in range(4):
             scale = (np.abs(e) ** (power + 1)).sum(axis=0)
             assert (np.abs(error[..., power] - (e ** (power + 1)).sum(axis=0)) <= 1e-12 * scale).all()
         np.testing.assert_allclose(paired, (e**2 * e[:, [baseline]] ** 2).sum(axis=0), rtol=1e-12)
-        a, b = e[..., [0, 0, 1]], e[..., [1, 2, 2]]
+        a, b = (e[..., list(of)] for of in zip(*kernels.CROSSED, strict=True))
         assert (np.abs(cross - (a * b).sum(axis=0)) <= 1e-12 * np.abs(a * b).sum(axis=0)).all()
 
 
 def test_before_the_start_the_plots_are_the_estimates():
-    truth, sigma, dt = world("RLS 2")
-    plots = kernels.simulate_plots(KEY, 0, 4, truth, sigma)
-    got = kernels.estimate(plots, dt, *schedule("RLS 2"))
+    problem = problem_of("RLS 2")
+    plots = kernels.simulate_plots(problem, 0, 4)
+    got = kernels.estimate(problem, plots)
     for f, (observes, start, _) in enumerate(FILTERS):
         np.testing.assert_array_equal(got[:, f, : start - 1, :observes], plots[:, : start - 1, :observes])
         assert np.isnan(got[:, f, : start - 1, observes:]).all()
@@ -134,16 +128,15 @@ def test_before_the_start_the_plots_are_the_estimates():
 
 @pytest.mark.parametrize("cuts", [(1,), (511, 512, 513), (100, 612, 1124), (3, 4, 999)])
 def test_any_split_gives_the_same(cuts):
-    total = 1200
-    truth, sigma, dt = world("RLS 4")
-    whole_plots = kernels.simulate_plots(KEY, 0, total, truth, sigma)
-    whole = kernels.estimate(whole_plots, dt, *schedule("RLS 4"))
+    total, problem = 1200, problem_of("RLS 4")
+    whole_plots = kernels.simulate_plots(problem, 0, total)
+    whole = kernels.estimate(problem, whole_plots)
     whole_sums = sums("RLS 4", 0, total)
     added = [np.zeros_like(s) for s in whole_sums]
     for first, last in zip((0, *cuts), (*cuts, total), strict=True):
-        plots = kernels.simulate_plots(KEY, first, last - first, truth, sigma)
+        plots = kernels.simulate_plots(problem, first, last - first)
         np.testing.assert_array_equal(plots, whole_plots[first:last])
-        np.testing.assert_array_equal(kernels.estimate(plots, dt, *schedule("RLS 4")), whole[first:last])
+        np.testing.assert_array_equal(kernels.estimate(problem, plots), whole[first:last])
         for total_sum, part in zip(added, sums("RLS 4", first, last - first), strict=True):
             total_sum += part
     for got, expected in zip(added, whole_sums, strict=True):
@@ -185,7 +178,7 @@ def test_every_argument_counts(what):
         "truth": truth + np.array([0, 0, 1]),
         "sigma": sigma * [1, 1.001],
         "dt": dt * 1.001,
-        "gains": schedule("RLS 2")[3] * 1.001,
+        "gains": problem_of("RLS 2").gains * 1.001,
     }[what]
     before, after = sums("RLS 2", 0, 64)[0], sums("RLS 2", 0, 64, **{what: other})[0]
     assert not np.allclose(before[:, -1], after[:, -1], rtol=1e-9)
@@ -196,7 +189,7 @@ def test_intervals_of_any_length():
     rng = np.random.default_rng(4)
     dt, plots = rng.uniform(0.1, 9.0, 12), rng.normal(size=(3, 12, 2)) * 100
     gains, weights = rng.uniform(0, 0.5, (1, 12, 3, 2)), rng.normal(size=(1, 3, 2, 2))
-    got = kernels.estimate(plots, dt, [2], [2], weights, gains)
+    got = kernels.estimate(filters_alone(dt, [2], [2], weights, gains), plots)
     for i in range(3):
         x = np.einsum("cjs,sj->c", weights[0], plots[i, :2])
         for k in range(2, 12):
@@ -213,7 +206,7 @@ def test_a_filter_of_the_first_order_has_no_third_gain():
     gains[0, :, 0, 0], gains[0, :, 1, 0] = 2 * (2 * n - 1) / (n * (n + 1)), 6 / (n * (n + 1)) / 0.5  # P3 eq. (14)
     weights = np.zeros((1, 3, 2, 2))
     weights[0, 0, 0, 1], weights[0, 1, 0] = 1.0, [-2.0, 2.0]
-    got = kernels.estimate(plots, 0.5, [1], [2], weights, gains)
+    got = kernels.estimate(filters_alone(0.5, [1], [2], weights, gains), plots)
     np.testing.assert_array_equal(got[:, 0, 1:, 2], 0.0)
     for i in range(2):
         for k in range(1, 40):
@@ -226,18 +219,19 @@ def test_memory_does_not_grow_with_scans_and_count():
     """A hundred thousand scans: beside its sums a block holds its work array alone."""
     scans = 100_000
     truth, gains = np.zeros((scans, 3)), np.tile([[0.5, 0.0], [0.15, 0.0], [0.01, 0.0]], (1, scans, 1, 1))
-    error, paired, cross = np.zeros((1, scans, 3, 4)), np.zeros((1, scans, 3)), np.zeros((1, scans, 3))
-    arguments = np.ones(1, dtype=np.int64), np.array([3]), np.zeros((1, 3, 2, 3)), gains, 0, error, paired, cross
-    kernels.simulate_block(KEY, 0, 1, truth[:5], np.ones(2), 1.0, *arguments[:3], gains[:, :5], *arguments[4:])
+    filters = [1], [3], np.zeros((1, 3, 2, 3))
+    problem = kernels.Problem(KEY, truth, np.ones(2), 1.0, *filters, gains).plain()
+    sums_of(kernels.Problem(KEY, truth[:5], np.ones(2), 1.0, *filters, gains[:, :5]), 0, 1)
+    added = kernels.Sums(*map(np.zeros, kernels.shapes(1, scans).values()))
     tracemalloc.start()
     try:
-        kernels.simulate_block(KEY, 0, 600, truth, np.ones(2), np.ones(scans), *arguments)
+        kernels.simulate_block(problem, 0, 600, added)
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    assert peak < 4 * kernels.CHUNK * 6 * 8 + scans * 8 * 3
-    assert np.isfinite(error).all()
-    assert error[0, -1, 0, 1] > 0
+    assert peak < 4 * kernels.CHUNK * 6 * 8
+    assert np.isfinite(added.error).all()
+    assert added.error[0, -1, 0, 1] > 0
 
 
 def test_one_type_is_compiled():
@@ -248,6 +242,10 @@ def test_one_type_is_compiled():
     frozen.flags.writeable = False
     sums("RLS 1", 0, 8, truth=frozen, sigma=list(sigma), dt=int(dt), key=tuple(KEY.tolist()))
     sums(
-        "RLS 1", np.int32(0), np.uint8(8), truth=np.asfortranarray(truth), gains=schedule("RLS 1")[3].astype(np.float32)
+        "RLS 1",
+        np.int32(0),
+        np.uint8(8),
+        truth=np.asfortranarray(truth),
+        gains=problem_of("RLS 1").gains.astype(np.float32),
     )
     assert len(kernels.add_block.signatures) == 1

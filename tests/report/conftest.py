@@ -48,9 +48,10 @@ def config(stem, variance=1e-3, **changes):
 def covariances(case):
     """Exact second moments (F, K, 3, 3) of the errors."""
     plan, made = range_doppler.prepare(case), []
-    for f, start in enumerate(plan.start):
-        weights, observes = plan.weights[f, :, :, :start], plan.observes[f]
-        b, S = error_recursion(weights, plan.gains[f], observes, plan.truth, plan.sigma, plan.dt)
+    of, axes = plan.problem, plan.axes
+    for f, start in enumerate(of.start):
+        weights, observes = of.weights[f, :, :, :start], of.observes[f]
+        b, S = error_recursion(weights, of.gains[f], observes, of.truth, axes.sigma, axes.scan_period_s)
         made.append(S + b[:, :, None] * b[:, None, :])
     return np.stack(made)
 

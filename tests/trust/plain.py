@@ -214,10 +214,9 @@ def tracks():
 
     made = {}
     plan = work(*RUNS["linear"][:2]).plan
-    plots = linear.simulate_plots(plan.key, 7, 3, plan.truth, plan.sigma)
+    plots = linear.simulate_plots(plan.problem, 7, 3)
     made["linear plots"] = plots
-    schedule = plan.observes, plan.start, plan.weights, plan.gains
-    made["linear estimates"] = np.nan_to_num(linear.estimate(plots, plan.dt, *schedule))
+    made["linear estimates"] = np.nan_to_num(linear.estimate(plan.problem, plots))
     one = work(*RUNS["linear"][:2])
     tracker = range_doppler_plots.Tracker(one.case)
     made["linear track"] = np.nan_to_num(tracker.feed(range_doppler_plots.simulated(one.case, 3)).estimate)

@@ -69,8 +69,9 @@ def p1(observes, start, variance, believed_variance=None):
     design = filters.design(observes, start, believed_variance or variance, sigma, dt, SCANS)
     truth = random_track(rng, 3, variance, dt, SCANS, start)
     plots = truth[:, :, :2] + sigma * rng.normal(size=(TRACKS, SCANS, 2))
-    schedule = (np.array([observes]), np.array([start]), design.weights[None], design.gains[None])
-    found = kernels.estimate(plots, dt, *schedule)[:, 0]
+    own = [observes], [start], design.weights[None], design.gains[None]
+    problem = kernels.Problem((0, 0), truth[0], sigma, dt, *own)
+    found = kernels.estimate(problem, plots)[:, 0]
     looks = [start - 1, start, start + 3, SCANS - 1]
     return np.concatenate([calibrated(truth[:, k], found[:, k], design.believed[k], k) for k in looks])
 

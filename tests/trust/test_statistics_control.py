@@ -133,12 +133,9 @@ def test_antithetic_pairs_double_the_variance():
     """Why they are not offered: a linear filter errs on mirrored noise by the same, mirrored: one square for two."""
     from radarsim.kernels import linear
 
-    plan = range_doppler.prepare(load("rls2", ["scans=8"]).cases[0])
-    plots = linear.simulate_plots(plan.key, 0, 20_000, plan.truth, plan.sigma)
-    schedule = plan.dt, plan.observes, plan.start, plan.weights, plan.gains
-    error, mirrored = (
-        linear.estimate(p, *schedule)[:, :, -1] - plan.truth[-1] for p in (plots, 2 * plan.truth[:, :2] - plots)
-    )
+    problem = range_doppler.prepare(load("rls2", ["scans=8"]).cases[0]).problem
+    truth, plots = problem.truth, linear.simulate_plots(problem, 0, 20_000)
+    error, mirrored = (linear.estimate(problem, p)[:, :, -1] - truth[-1] for p in (plots, 2 * truth[:, :2] - plots))
     scale = error.std(axis=0)
     assert np.abs((error**2 - mirrored**2) / scale**2).max() < 1e-6
     plain = np.square(error).reshape(200, 100, 2, 3).mean(axis=1).var(axis=0)

@@ -98,7 +98,7 @@ def settling_figure(results: Sequence[CaseResult], table) -> Figure | None:
 def _settling_panel(result: CaseResult, rows) -> Panel:
     """rows: of one radar and the range, one for each filter and manoeuvre variance."""
     settled = rows[np.isfinite(rows["settling_s"])]
-    limit = PERIODS * result.axes.extra["scan_period_s"]
+    limit = PERIODS * result.axes.scan_period_s
     marks: list = [Reference(limit, "x")]
     for variance, same in settled.sort_values("steady_sigma").groupby("manoeuvre_variance"):
         t, sigma = same["settling_s"].to_numpy(), same["steady_sigma"].to_numpy()

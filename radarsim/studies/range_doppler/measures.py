@@ -73,7 +73,7 @@ class Evidence(claims.Evidence):
     def settling(self, key, observes: tuple[str, ...], component: str = "r") -> Estimate:
         """Scan periods from the first plot to settling (5 % of the steady value, for good)."""
         row = self.row("steady", case=self.case(key).name, filter=self.filter(key, observes), component=component)
-        period = self.case(key).axes.extra["scan_period_s"]
+        period = self.case(key).axes.scan_period_s
         return Estimate(*(row[name] / period for name in ("settling_s", "settling_lo_s", "settling_hi_s")))
 
     def variances(self, radar: int) -> list[float]:

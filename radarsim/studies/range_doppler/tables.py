@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from radarsim.engine.results import CaseResult
+from radarsim.kernels.linear import CROSSED
 from radarsim.report import consistency, panels, statistics
 from radarsim.report import tables as common
 from radarsim.studies.range_doppler import exact
@@ -59,12 +60,12 @@ def steady(results: Sequence[CaseResult]):
 
 
 def _steady(result: CaseResult) -> list[tuple]:
-    axes, extra = result.axes, result.axes.extra
+    axes = result.axes
     of = statistics.errors(result.sums["error"], common.realisations(result)).sigma
-    t, period, rows = np.asarray(axes.t_s, dtype=float), extra["scan_period_s"], []
+    t, period, rows = np.asarray(axes.t_s, dtype=float), axes.scan_period_s, []
     for f, name in enumerate(axes.filters):
-        variance = float(extra["manoeuvre_variance"][f])
-        _, true = exact.steady_state(int(extra["observes"][f]), variance, extra["sigma"], period)
+        variance = float(axes.manoeuvre_variance[f])
+        _, true = exact.steady_state(int(axes.observes[f]), variance, axes.sigma, period)
         for c, (component, unit) in enumerate(axes.components):
             at = np.flatnonzero(axes.available[f, :, c])
             if not at.size:
@@ -106,8 +107,7 @@ def believed(results: Sequence[CaseResult]):
 
 
 def _believed(result: CaseResult) -> dict[str, np.ndarray]:
-    P = result.axes.extra["believed"]
-    return consistency.believed(result, np.sqrt(np.diagonal(P, axis1=2, axis2=3)))
+    return consistency.believed(result, np.sqrt(np.diagonal(result.axes.believed, axis1=2, axis2=3)))
 
 
 def normalised_errors(results: Sequence[CaseResult]):
@@ -131,7 +131,7 @@ def _normalised_errors(result: CaseResult) -> dict[str, np.ndarray]:
         "k": np.asarray(axes.k)[k],
         "t_s": np.asarray(axes.t_s, dtype=float)[k],
         "n": np.full(f.size, result.count),
-        **consistency.normalised("nees", mean, bounds, axes.extra["exact_nees"][at]),
+        **consistency.normalised("nees", mean, bounds, axes.exact_nees[at]),
     }
 
 
@@ -141,10 +141,10 @@ def nees(result: CaseResult) -> statistics.Estimate:
     From Σe and the Σ of products of two components. The errors of this study are Gaussian, so that these give the
     spread too: of mean m and second moment M = E eeᵀ, var eᵀP⁻¹e = 2 tr (P⁻¹M)² - 2 (mᵀP⁻¹m)².
     """
-    axes, P, n = result.axes, result.axes.extra["believed"], result.count
+    axes, P, n = result.axes, result.axes.believed, result.count
     error, first = np.asarray(result.sums["error"]), np.asarray(result.sums["error"])[..., 0] / n
     second = np.zeros(P.shape)
-    for (i, j), crossed in zip(((0, 1), (0, 2), (1, 2)), np.moveaxis(result.sums["cross"], -1, 0), strict=True):
+    for (i, j), crossed in zip(CROSSED, np.moveaxis(result.sums["cross"], -1, 0), strict=True):
         second[..., i, j] = second[..., j, i] = crossed / n
     for i in range(3):
         second[..., i, i] = error[..., i, 1] / n
@@ -160,10 +160,9 @@ def radar(results: Sequence[CaseResult]):
     """C_θ = σ_r²/(Δt²σ_V²) (eq. 11), the Doppler frequency of 300 m/s, and the unambiguous span of velocity λF/2."""
     rows = []
     for result in results:
-        extra = result.axes.extra
-        doppler = 2 * TARGET_SPEED / extra["wavelength_m"]
-        rate = extra["repetition_rate_hz"]
-        rows.append((result.name, extra["C_theta"], doppler, doppler / rate, extra["wavelength_m"] * rate / 2))
+        axes, rate = result.axes, result.axes.repetition_rate_hz
+        doppler = 2 * TARGET_SPEED / axes.wavelength_m
+        rows.append((result.name, axes.C_theta, doppler, doppler / rate, axes.wavelength_m * rate / 2))
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(RADAR)})
 
 
@@ -172,7 +171,7 @@ def inputs(results: Sequence[CaseResult]):
     radars: dict[tuple, list[CaseResult]] = {}
     for members in panels.families(results).values():
         for result in members:
-            of, theta = result.spec.radar, float(result.axes.extra["C_theta"])
+            of, theta = result.spec.radar, result.axes.C_theta
             given = (of.sigma_range_m, of.sigma_velocity_mps, of.scan_period_s, of.wavelength_m, theta)
             radars.setdefault((panels.stem(result), panels.plain(panels.device(result)), *given), []).append(result)
     rows = []

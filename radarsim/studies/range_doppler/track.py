@@ -29,9 +29,9 @@ def sigmas(spec) -> dict[str, tuple[str, ...]]:
 def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     """The plots of one realisation of the study and the truth, columns (K,)."""
     plan = prepare(case)
-    (plots,) = kernels.simulate_plots(plan.key, realisation, 1, plan.truth, plan.sigma)
+    (plots,) = kernels.simulate_plots(plan.problem, realisation, 1)
     measured = {"t_s": plan.axes.t_s, "range_m": plots[:, 0], "velocity_mps": plots[:, 1]}
-    return measured | dict(zip(("true_r_m", "true_Vr_mps", "true_ar_mps2"), plan.truth.T, strict=True))
+    return measured | dict(zip(("true_r_m", "true_Vr_mps", "true_ar_mps2"), plan.problem.truth.T, strict=True))
 
 
 class Tracker:
