@@ -33,21 +33,22 @@ class Given:
 
     def __init__(self, common):
         from radarsim.kernels.lanes import rows
-        from radarsim.studies.multimodel.kernels import hypothesis
+        from radarsim.studies.multimodel.kernels import records
 
-        self.layout = hypothesis
+        self.layout = records
         self.z, self.start, self.P0 = common.w2_meas(GROUP), common.w2_truth()[0] + common.W2_X0_OFF, common.W2_P0
-        self.plots, self.out = rows(SCANS * hypothesis.PLOT), rows(SCANS * hypothesis.OUTPUT)
-        cells = self.plots.reshape(SCANS, hypothesis.PLOT, GROUP)
+        self.plots, self.out = rows(SCANS * records.PLOT), rows(SCANS * records.OUTPUT)
+        cells = self.plots.reshape(SCANS, records.PLOT, GROUP)
         cells[:, :3], cells[:, 9] = self.z, 1
         cells[:, 3:9] = common.w2_R()[:, UPPER[0], UPPER[1], None]
 
     def run(self, models=MODELS[:3], T=T3, family="imm", rule="moment", output="moment"):
         """All scans; estimates (SCANS, 9, GROUP)."""
-        from radarsim.studies.multimodel.kernels import strip as multimodel_strip
+        from radarsim.studies.multimodel.kernels import strip
+        from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
 
         layout, size = self.layout, len(models)
-        work, numbers = layout.work_arrays()
+        work, numbers = work_arrays()
         cells = work.reshape(-1, GROUP)
         for i, (_, bends, _) in enumerate(models):
             own = cells[i * layout.HYPOTHESIS :]
@@ -63,7 +64,7 @@ class Given:
         intervals, times, everything = np.zeros(SCANS, np.int64), np.array([0.05]), np.zeros(SCANS, np.int64)
         frame = np.zeros(18)
         arrays = (models.ravel(), np.ascontiguousarray(T).ravel(), intervals, times, rules, frame, everything, self.out)
-        multimodel_strip.filter_strip(work, numbers, self.plots, 0, SCANS, *arrays)
+        strip.filter_strip(work, numbers, self.plots, 0, SCANS, *arrays)
         return self.out.reshape(SCANS, layout.OUTPUT, GROUP)[:, :9]
 
 
@@ -165,7 +166,7 @@ def measure_chain(pool, limit, every: int) -> dict:
 
 def measure_start() -> dict:
     """First block of a process and first pass over given plots: compiling where the cache is empty, loading else."""
-    from radarsim.studies.multimodel.timing import seconds_per_update
+    from radarsim.studies.multimodel.cost import seconds_per_update
 
     made = work(10, filters=6)
     started = time.process_time(), time.perf_counter()

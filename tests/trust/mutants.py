@@ -45,8 +45,8 @@ KERNELS = (
     ),
     *mutants(
         "radarsim/studies/multimodel/kernels/hypothesis.py",
-        ("p[0] + w * (q[0] + d[0] * d[0])", "p[0] + w * q[0]", TWIN),
-        ("(a[1], d[3], e[3]), lower)", "(a[1], d[1], e[3]), lower)", TWIN),
+        ("p[0] + mu * (P[0] + d[0] * d[0])", "p[0] + mu * P[0]", TWIN),
+        ("(xx[1], xy[3], xz[3]), L)", "(xx[1], xy[1], xz[3]), L)", TWIN),
     ),
     *mutants(
         "radarsim/studies/multimodel/kernels/filters.py",

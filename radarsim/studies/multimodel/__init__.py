@@ -46,19 +46,19 @@ class Multimodel(Study):
         return figures.figures(results, made, experiment)
 
     def question(self, experiment):
-        from radarsim.studies.multimodel import tables
+        from radarsim.studies.multimodel import words
 
-        return tables.question(experiment)
+        return words.question(experiment)
 
     def answer(self, results, made):
-        from radarsim.studies.multimodel import tables
+        from radarsim.studies.multimodel import words
 
-        return tables.answer(results, made)
+        return words.answer(results, made)
 
     def seconds_per_update(self, plan):
-        from radarsim.studies.multimodel import timing
+        from radarsim.studies.multimodel import cost
 
-        return timing.seconds_per_update(plan)
+        return cost.seconds_per_update(plan)
 
     def cost(self, made, run):
         from radarsim.studies.multimodel import tables

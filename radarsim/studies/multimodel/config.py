@@ -100,6 +100,11 @@ class Target(Model):
         (Stage(name="all"),), description="stages in order, the last without an end"
     )
 
+    @property
+    def stage_ends_s(self) -> tuple[float | None, ...]:
+        """Ends of all stages but the last, s from the first plot."""
+        return tuple(stage.end_s for stage in self.stages[:-1])
+
     @cross_check
     def _in_order(self):
         ends = [stage.end_s for stage in self.stages]
@@ -189,7 +194,7 @@ class Filter(Model):
     output: Literal["moment", "best"] = Field("best", description="rule by which the estimate is made")
     covariance_at: Literal["plot", "prediction"] = Field(
         "plot",
-        description="where the plot's covariance is reckoned: at the plot, as in the paper, or at its prediction",
+        description="where the plot's covariance is computed: at the plot, as in the paper, or at its prediction",
     )
 
     @cross_check
@@ -213,6 +218,8 @@ class Filter(Model):
 
 class Multimodel(Study):
     """Multiple-model filters on an aeroballistic target."""
+
+    figure_names = ("trajectory", "sigma_y", "sigma_vy", "probabilities", "families", "cost", "consistency")
 
     sensor: Sensor = Field(description="the radar")
     target: Annotated[AnyTarget, Scenario()] = Field(description="the target: a scenario's stem, or inline")

@@ -10,6 +10,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
+from radarsim.studies.multimodel.filters import labels
 
 TIME = Axis(panels.TIME, limits=(0, None))
 SIGMAS = {"y": ("height $y$", "m"), "vy": ("rate of climb $\\dot y$", "m/s")}
@@ -51,21 +52,22 @@ def _many(result: CaseResult) -> bool:
 
 def _styles(result: CaseResult) -> list[Style]:
     """A look for each filter of a case: its own where there are few, else the rule's colour and the family's marks."""
-    families, rules = result.axes.extra["families"], result.axes.extra["rules"]
+    options = result.spec.filters
     if not _many(result):
-        return [Style(n, n, n) for n in range(len(families))]
-    kinds = list(dict.fromkeys(families))
-    return [Style(RULES.index(r), kinds.index(f), kinds.index(f)) for f, r in zip(families, rules, strict=True)]
+        return [Style(n, n, n) for n in range(len(options))]
+    families = list(dict.fromkeys(of.family for of in options))
+    marks = [families.index(of.family) for of in options]
+    return [Style(RULES.index(of.merge), mark, mark) for of, mark in zip(options, marks, strict=True)]
 
 
 def _keys(result: CaseResult, **look) -> tuple[tuple[str, Style], ...]:
     """What the looks of many filters say: colours of rules, marks of families; look: how they differ from _styles."""
-    styles, extra = _styles(result), result.axes.extra
-    rules = {rule: replace(style, dash=0, marker=0) for rule, style in zip(extra["rules"], styles, strict=True)}
-    kinds = {f: replace(style, colour=0) for f, style in zip(extra["families"], styles, strict=True)}
+    styled = list(zip(result.spec.filters, _styles(result), strict=True))
+    rules = {of.merge: replace(style, dash=0, marker=0) for of, style in styled}
+    families = {of.family: replace(style, colour=0) for of, style in styled}
     named = [(rule.replace("_", " "), style) for rule, style in rules.items()]
-    named += [(FAMILIES.get(family, family), style) for family, style in kinds.items()]
-    return tuple((words, replace(style, **look)) for words, style in named)
+    named += [(FAMILIES.get(family, family), style) for family, style in families.items()]
+    return tuple((label, replace(style, **look)) for label, style in named)
 
 
 def _beside(drawn: Sequence[Panel], result: CaseResult, **look) -> list[Panel]:
@@ -89,10 +91,10 @@ def trajectory(results: Sequence[CaseResult]) -> Figure | None:
     """Ground track, height, speed and acceleration (the paper's figures 1 to 4), a line for each different flight."""
     flights: dict[bytes, CaseResult] = {}
     for result in results:
-        flights.setdefault(np.ascontiguousarray(result.axes.extra["truth"]).tobytes(), result)
+        flights.setdefault(np.ascontiguousarray(result.axes.truth).tobytes(), result)
     lines: list[list[Line]] = [[], [], [], []]
     for n, result in enumerate(flights.values()):
-        x, t = result.axes.extra["truth"], np.asarray(result.axes.t_s, dtype=float)
+        x, t = result.axes.truth, np.asarray(result.axes.t_s, dtype=float)
         words, style = _title(result, results) if len(flights) > 1 else "", Style(n, n)
         speed, acceleration = (np.linalg.norm(x[:, i::3], axis=1) for i in (1, 2))
         lines[0].append(Line(x[:, 6] / 1e3, x[:, 0] / 1e3, words, style))
@@ -117,7 +119,7 @@ def trajectory(results: Sequence[CaseResult]) -> Figure | None:
 
 def _stage_lines(results: Sequence[CaseResult]) -> tuple[Reference, ...]:
     """The ends of the stages, where all cases have the same."""
-    ends = {tuple(result.axes.extra["stage_ends_s"]) for result in results}
+    ends = {result.spec.target.stage_ends_s for result in results}
     return tuple(Reference(float(end), "x") for end in ends.pop()) if len(ends) == 1 else ()
 
 
@@ -154,11 +156,11 @@ def probabilities(results: Sequence[CaseResult], table) -> Figure | None:
     rows = common.groups(table, "case", "filter", "model")
     drawn = []
     for result in results:
-        for name, models in zip(result.axes.filters, result.axes.extra["models"], strict=True):
-            if len(models) < 2 or len(drawn) >= panels.MOST:
+        for name, options in zip(result.axes.filters, result.spec.filters, strict=True):
+            if len(options.models) < 2 or len(drawn) >= panels.MOST:
                 continue
             marks: list = list(_stage_lines([result]))
-            for m, motion in enumerate(models):
+            for m, motion in enumerate(labels(options.models)):
                 own = rows[(result.name, name, m + 1)]
                 t, value, lo, hi = (
                     own[key].to_numpy(float) for key in ("t_s", "probability", "probability_lo", "probability_hi")
@@ -182,11 +184,9 @@ def families(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     rows = common.groups(made["stages"][made["stages"]["component"] == "y"], "case", "stage")
     for result in results:
         found = {
-            (family, rule): name
-            for name, family, rule in zip(
-                result.axes.filters, result.axes.extra["families"], result.axes.extra["rules"], strict=True
-            )
-            if family in FAMILIES
+            (options.family, options.merge): name
+            for name, options in zip(result.axes.filters, result.spec.filters, strict=True)
+            if options.family in FAMILIES
         }
         names = [[found.get((family, rule)) for rule in RULES] for family in FAMILIES]
         if sum(any(row) for row in names) < 2 or sum(any(column) for column in zip(*names, strict=True)) < 2:

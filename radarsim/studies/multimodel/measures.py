@@ -14,7 +14,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import claims
 from radarsim.report.claims import Part, Range, certain
 from radarsim.report.statistics import Estimate
-from radarsim.studies.multimodel import tables as multimodel
+from radarsim.studies.multimodel import filters, tables
 
 BANK_122 = ("uniform 0.05", "accelerated 0.05", "accelerated 30")
 BANK_11 = ("uniform 5", "uniform 30")
@@ -68,15 +68,10 @@ class Evidence(claims.Evidence):
         """The number of a case's filter (family, rule, bank[, matrix]); the paper's matrix where none is named."""
         family, rule, bank, *matrix = wanted
         printed = {BANK_122: MATRIX_122, BANK_11: MATRIX_11}.get(bank)
-        extra = result.axes.extra
         for f, of in self.members(result):
-            same = (
-                extra["families"][f] == family
-                and extra["models"][f] == bank
-                and (not rule or extra["rules"][f] == rule)
-            )
+            same = of.family == family and filters.labels(of.models) == bank and (not rule or of.merge == rule)
             expected = matrix[0] if matrix else printed
-            T = extra["transitions"][f]
+            T = filters.transition_matrix(of.transition)
             fits = expected is None or (np.shape(expected) == T.shape and np.allclose(expected, T, atol=1e-9))
             if same and fits and of.covariance_at == "plot":
                 return f
@@ -91,7 +86,7 @@ class Evidence(claims.Evidence):
 
     def stage(self, key, name: str) -> int:
         """The number of a stage of a case; raises Missing."""
-        names = self.case(key).axes.extra["stages"]
+        names = tables.stage_names(self.case(key))
         if name not in names:
             raise claims.Missing(name)
         return names.index(name)
@@ -99,7 +94,7 @@ class Evidence(claims.Evidence):
     def gain(self, key, wanted: tuple, base: tuple, stage: str, component: str) -> Estimate:
         """Paired gain of a filter against another over a stage, %."""
         of, s = self.case(key), self.stage(key, stage)
-        return multimodel.stage_gain(of, self.filter(key, wanted), self.filter(key, base), s, COMPONENTS[component])
+        return tables.stage_gain(of, self.filter(key, wanted), self.filter(key, base), s, COMPONENTS[component])
 
     def probability(self, key, wanted: tuple, stage: str, model: int) -> Estimate:
         """Mean probability of a model (from 0) over the reported scans of a stage; ends of intervals are averaged."""
@@ -114,9 +109,9 @@ class Evidence(claims.Evidence):
     def _bounds(of: CaseResult, stage: str) -> tuple[float, float]:
         if stage == "whole":
             return 0.0, np.inf
-        for name, begin, end in multimodel.stage_bounds(of):
+        for name, begin, end in tables.stage_bounds(of):
             if name == stage:
-                last = name == of.axes.extra["stages"][-1]
+                last = name == tables.stage_names(of)[-1]
                 return begin, np.inf if last else end
         raise claims.Missing(stage)
 
@@ -125,6 +120,17 @@ class Evidence(claims.Evidence):
         of = self.case(key)
         name = of.axes.filters[self.filter(key, wanted)]
         return float(self.row("operations", case=of.name, filter=name, stage="whole")["operations"])
+
+
+def largest_fault_of_powers(seen: Evidence, key: tuple, tenfold: bool) -> float:
+    """The largest element, over a case's filters, of T(Δt/10⁶) − I, or of T(10 Δt) − T(Δt)¹⁰ where tenfold."""
+    faults = []
+    for options in seen.case(key).spec.filters:
+        T = filters.transition_matrix(options.transition)
+        near, ten = filters.transition_powers(T, np.array([1e-6, 10.0]))
+        product = np.linalg.multi_dot([T] * 10) if len(T) > 1 else T
+        faults.append(np.abs(ten - product if tenfold else near - np.eye(len(T))).max())
+    return float(max(faults))
 
 
 def rival_parts(key: tuple, stages: tuple[str, ...], expected: Range) -> tuple[Part, ...]:

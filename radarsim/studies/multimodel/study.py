@@ -9,9 +9,7 @@ from radarsim.engine.moments import Layout
 from radarsim.engine.results import Axes
 from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.studies.multimodel import filters
-from radarsim.studies.multimodel.kernels import filters as kernels
-from radarsim.studies.multimodel.kernels import plots, sums
-from radarsim.studies.multimodel.kernels.hypothesis import MOST, PLOT
+from radarsim.studies.multimodel.kernels import plots, records, sums
 from radarsim.studies.multimodel.world import intervals, plot_truth, sensor_frame, truth
 from radarsim.studies.noise import noise_key
 
@@ -19,164 +17,129 @@ COMPONENTS = tuple(
     (f"{prefix}{axis}", unit) for axis in "xyz" for prefix, unit in (("", "m"), ("v", "m/s"), ("a", "m/s2"))
 )
 BLOCK = 64  # eight groups of eight; 0.1 s with six filters and 3725 scans
-FAMILIES = {"kalman": kernels.KALMAN, "gpb1": kernels.GPB1, "imm": kernels.IMM, "gpb2": kernels.GPB2}
+FAMILIES = {"kalman": records.KALMAN, "gpb1": records.GPB1, "imm": records.IMM, "gpb2": records.GPB2}
 RULES = {
-    "moment": kernels.MOMENT,
-    "best": kernels.BEST,
-    "combined": kernels.COMBINED,
-    "modified_combined": kernels.MODIFIED,
+    "moment": records.MOMENT,
+    "best": records.BEST,
+    "combined": records.COMBINED,
+    "modified_combined": records.MODIFIED,
 }
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlightAxes(Axes):
+    """Labels of the sums, and what tables and figures need of the flight; stages and banks are described by the case.
+
+    truth (K', 9)       true states x, vx, ax, y, vy, ay, z, vz, az (m, m/s, m/s²) at the reported scans
+    stage_scans (S,)    scans of each stage that its means are of: from the third scan of the track on, reported or not
+    """
+
+    truth: np.ndarray
+    stage_scans: np.ndarray
 
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a block needs; see `kernels.multimodel_sums` for the arrays."""
+    """All that a block needs; see `kernels.records` for the arrays."""
 
     layout: Layout
-    axes: Axes
-    world: sums.World
-    banks: sums.Banks
+    axes: FlightAxes
+    world: records.World
+    banks: records.Banks
     block: int = BLOCK
     gaussian = False
 
 
-def banks(spec, times: np.ndarray) -> sums.Banks:
-    """The filters' arrays, padded to eights, for the different intervals times (U,)."""
+def banks(spec, times: np.ndarray) -> records.Banks:
+    """The filters' arrays, padded to eights, for the different intervals times (U,) in s."""
     count = len(spec.filters)
     numbers, models = np.zeros((count, 8), dtype=np.int64), np.zeros((count, 16))
-    transitions, probabilities = np.zeros((count, -(-len(times) * MOST**2 // 8) * 8)), np.zeros((count, 8))
+    transitions, probabilities = np.zeros((count, -(-len(times) * records.MOST**2 // 8) * 8)), np.zeros((count, 8))
     for f, options in enumerate(spec.filters):
-        size, T = len(options.models), transition(options)
-        rules = FAMILIES[options.family], RULES[options.merge], RULES[options.output]
-        numbers[f, :5] = *rules, options.covariance_at == "prediction", size
+        size, T = len(options.models), filters.transition_matrix(options.transition)
+        numbers[f, records.FAMILY] = FAMILIES[options.family]
+        numbers[f, records.MERGE], numbers[f, records.OUTPUT_RULE] = RULES[options.merge], RULES[options.output]
+        numbers[f, records.AT_PREDICTION] = options.covariance_at == "prediction"
+        numbers[f, records.SIZE] = size
         bank = filters.bank([m.motion for m in options.models], [m.sigma_acceleration_mps2 for m in options.models])
-        models[f, : 3 * size] = bank.ravel()
+        models[f, : bank.size] = bank.ravel()
         powers = filters.transition_powers(T, times / options.transition_interval_s)
         transitions[f, : powers.size] = powers.ravel()
         probabilities[f, :size] = filters.stationary(T)
-    return sums.Banks(numbers, models, transitions, probabilities)
+    return records.Banks(numbers, models, transitions, probabilities)
 
 
-def transition(options) -> np.ndarray:
-    """The transition matrix (M, M) of a filter, columns summing to one exactly."""
-    T = np.array(options.transition)
-    return T / T.sum(axis=0)
-
-
-def stages(spec, t: np.ndarray, everything: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
-    """Stage of each scan (K,), lengths (S, 2) in scans from the third on and in reported scans, and names."""
-    parts = spec.target.stages
-    ends = np.array([stage.end_s for stage in parts[:-1]])
-    stage = np.searchsorted(ends, t, side="right").astype(np.int64)
-    counted = np.arange(len(t)) >= sums.START
-    lengths = np.array(
-        [[np.sum(counted & (stage == s)), np.sum(counted & everything & (stage == s))] for s in range(len(parts))]
-    )
-    return stage, lengths.astype(float), tuple(part.name for part in parts)
+def stages(spec, t: np.ndarray, reported: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Stage of each scan (K,), and lengths (S, 2): scans of a stage from the third on, and the reported ones."""
+    stage = np.searchsorted(np.array(spec.target.stage_ends_s), t, side="right").astype(np.int64)
+    counted = np.arange(len(t)) >= records.START
+    inside = stage == np.arange(len(spec.target.stages))[:, None]
+    return stage, np.stack([(inside & counted).sum(axis=1), (inside & counted & reported).sum(axis=1)], axis=1) * 1.0
 
 
 def prepare(case: Case) -> Plan:
-    """Truth, plots' frame and banks of a case."""
+    """The plan of a case: truth, sensor, filters' banks, labels. Raises ConfigError where the flight is impossible."""
     spec = case.spec
     t, x = truth(case)
-    count = len(t)
-    reported = np.arange(count) >= sums.START
-    reported &= ((np.arange(count) + 1) % spec.report_every == 0) | (np.arange(count) == count - 1)
-    place = np.cumsum(reported) - 1
-    stage, lengths, names = stages(spec, t, reported)
+    scan = np.arange(len(t))
+    reported = scan >= records.START
+    reported &= ((scan + 1) % spec.report_every == 0) | (scan == len(t) - 1)
+    stage, lengths = stages(spec, t, reported)
     index, times = intervals(t)
-    shape = (len(spec.filters), int(reported.sum()))
-    world = sums.World(
+    world = records.World(
         keys=np.stack([noise_key(case, "plots"), noise_key(case, "detections")]),
         frame=sensor_frame(spec.sensor),
         plot_truth=plot_truth(case, t, x),
         truth=x,
         intervals=index,
         times=times,
-        everything=reported.astype(np.int64),
-        place=place.astype(np.int64),
+        reported=reported.astype(np.int64),
+        place=(np.cumsum(reported) - 1).astype(np.int64),
         stage=stage,
         lengths=lengths,
-        weights=filters.start_weights(t[:3], spec.start_acceleration_mps2),
+        weights=filters.start_weights(t[: records.START], spec.start_acceleration_mps2),
     )
-    return Plan(
-        layout=Layout(
-            error=(*shape, 9, 4),
-            paired=(*shape, 9),
-            probability=(*shape, MOST, 2),
-            believed=(*shape, 2),
-            stage=(shape[0], len(names), sums.MEANS, 2),
-            pairs=(shape[0], shape[0], len(names), 9),
-        ),
-        axes=axes(spec, t, x, reported, names, lengths),
-        world=world,
-        banks=banks(spec, times),
-    )
+    shapes = records.shapes(len(spec.filters), int(reported.sum()), len(lengths))
+    return Plan(Layout(**shapes), axes(spec, t, x, reported, lengths), world, banks(spec, times))
 
 
-def axes(spec, t: np.ndarray, x: np.ndarray, reported: np.ndarray, names: tuple[str, ...], lengths: np.ndarray) -> Axes:
+def axes(spec, t: np.ndarray, x: np.ndarray, reported: np.ndarray, lengths: np.ndarray) -> FlightAxes:
     """Labels of the sums; nothing of this study is known exactly."""
-    shape = (len(spec.filters), int(reported.sum()), 9)
-    labels = tuple(f.name for f in spec.filters)
+    shape = (len(spec.filters), int(reported.sum()), records.STATES)
+    names = tuple(f.name for f in spec.filters)
     unknown = np.full(shape, np.nan)
-    return Axes(
-        filters=labels,
+    return FlightAxes(
+        filters=names,
         components=COMPONENTS,
         k=np.flatnonzero(reported) + 1,
         t_s=t[reported],
         available=np.ones(shape, dtype=bool),
-        baseline=labels.index(spec.baseline) if spec.baseline else 0,
+        baseline=names.index(spec.baseline) if spec.baseline else 0,
         exact_sigma=unknown,
         exact_bias=unknown,
-        extra={
-            "truth": x[reported],
-            "stages": names,
-            "stage_ends_s": np.array([stage.end_s for stage in spec.target.stages[:-1]]),
-            "lengths": lengths,
-            "families": tuple(f.family for f in spec.filters),
-            "rules": tuple(f.merge for f in spec.filters),
-            "models": tuple(tuple(f"{m.motion} {m.sigma_acceleration_mps2:g}" for m in f.models) for f in spec.filters),
-            "transitions": tuple(transition(f) for f in spec.filters),
-            "intervals_s": np.array([f.transition_interval_s for f in spec.filters]),
-            "powers": powers_hold(spec),
-            "operations": np.array([operations(f) for f in spec.filters]),
-        },
+        truth=x[reported],
+        stage_scans=lengths[:, 0],
     )
-
-
-def operations(options) -> tuple[float, float, float]:
-    """See `filters.multimodel.operations`."""
-    accelerates = [filters.MOTIONS[model.motion][1] > 0 for model in options.models]
-    return filters.operations(options.family, transition(options), accelerates)
-
-
-def powers_hold(spec) -> np.ndarray:
-    """How far P(t → 0) is from the unit matrix, at a millionth of the interval, and P(10 Δt) from P(Δt)¹⁰: (F, 2)."""
-    found = []
-    for f in spec.filters:
-        T = transition(f)
-        near, tenfold = filters.transition_powers(T, np.array([1e-6, 10.0]))
-        apart = np.linalg.multi_dot([T] * 10) if len(T) > 1 else T
-        found.append((np.abs(near - np.eye(len(T))).max(), np.abs(tenfold - apart).max()))
-    return np.array(found)
 
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
-    arrays = sums.MultimodelSums(*(np.zeros(plan.layout.shapes[name]) for name in sums.MultimodelSums._fields))
+    values = np.zeros(plan.layout.size)
+    arrays = records.Sums(**plan.layout.unpack(values))
     memory = sums.memory(len(plan.banks.numbers), len(plan.world.lengths))
     sums.simulate_block(plan.world, plan.banks, memory, arrays, plan.axes.baseline, first, count)
-    return plan.layout.pack(**arrays._asdict())
+    return values
 
 
 def measured(plan: Plan, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Plots of the realisations first … first + 7: positions (K, 3, 8), covariances (K, 6, 8), detected (K, 8) as 0
-    or 1.
+    """Plots of the realisations first … first + 7: positions (K, 3, 8) in m, covariances (K, 6, 8) in m², and detected
+    (K, 8) as 0 or 1.
 
     The covariances are packed (xx, xy, xz, yy, yz, zz).
     """
     world, count = plan.world, len(plan.world.truth)
-    found = rows(count * PLOT)
-    plots.fill_plots(world.keys, world.frame, world.plot_truth, sums.START, first, rows(plots.RANDOM), found)
-    cells = found.reshape(count, PLOT, WIDTH)
-    return cells[:, :3], cells[:, 3:9], cells[:, 9]
+    found = rows(count * records.PLOT)
+    plots.fill_plots(world.keys, world.frame, world.plot_truth, records.START, first, rows(plots.RANDOM), found)
+    cells = found.reshape(count, records.PLOT, WIDTH)
+    covariance = slice(records.COVARIANCE, records.DETECTED)
+    return cells[:, : records.COVARIANCE], cells[:, covariance], cells[:, records.DETECTED]

@@ -1,20 +1,16 @@
-"""P2's own tables (probabilities, stages, consistency, operations) and the words of its report.
-
-Its figures stand in multimodel_figures.
-"""
+"""P2's own tables: probabilities of the models, stages of the flight, consistency, operations, cost."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import consistency, panels, statistics
+from radarsim.report import consistency, statistics
 from radarsim.report import tables as common
-from radarsim.studies.multimodel.figures import figures
+from radarsim.studies.multimodel import cost as costs
+from radarsim.studies.multimodel import filters
+from radarsim.studies.multimodel.kernels.records import MERGED, MERGES, NEES, NIS
 
-__all__ = ["answer", "cost", "figures", "question", "tables"]
-
-NEES, NIS, MERGED, MERGES = 9, 10, 11, 12  # places in the sums of a stage, after the nine mean squares
 FREEDOM = 3  # degrees of freedom of a position's or a plot's normalised error squared
 
 
@@ -39,7 +35,7 @@ def probabilities(results: Sequence[CaseResult]):
 
 
 def _probabilities(result: CaseResult) -> dict[str, np.ndarray]:
-    axes, models = result.axes, result.axes.extra["models"]
+    axes, models = result.axes, [filters.labels(options.models) for options in result.spec.filters]
     shown = [(f, m) for f, own in enumerate(models) for m in range(len(own)) if len(own) > 1]
     scans = len(axes.k)
     f = np.repeat([f for f, _ in shown], scans).astype(int)
@@ -73,12 +69,16 @@ def stages(results: Sequence[CaseResult]):
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(STAGES)})
 
 
+def stage_names(result: CaseResult) -> tuple[str, ...]:
+    """Names (S,) of the stages of a case, those without scans too, in the order of the sums."""
+    return tuple(stage.name for stage in result.spec.target.stages)
+
+
 def stage_bounds(result: CaseResult) -> list[tuple[str, float, float]]:
     """Name, begin and end (s) of each stage of a case that has scans."""
-    extra = result.axes.extra
-    ends = [*extra["stage_ends_s"], float(result.axes.t_s[-1])]
-    bounds = zip(extra["stages"], [0.0, *ends[:-1]], ends, strict=True)
-    return [bound for bound, length in zip(bounds, extra["lengths"], strict=True) if length[0] > 0]
+    ends = [*result.spec.target.stage_ends_s, float(result.axes.t_s[-1])]
+    bounds = zip(stage_names(result), [0.0, *ends[:-1]], ends, strict=True)
+    return [bound for bound, count in zip(bounds, result.axes.stage_scans, strict=True) if count > 0]
 
 
 def stage_sigma(result: CaseResult, f: int, s: int, c: int) -> statistics.Estimate:
@@ -95,7 +95,7 @@ def stage_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> statist
 
 def _stages(result: CaseResult) -> list[tuple]:
     rows, axes, b = [], result.axes, result.axes.baseline
-    places = {name: s for s, name in enumerate(axes.extra["stages"])}
+    places = {name: s for s, name in enumerate(stage_names(result))}
     for f, label in enumerate(axes.filters):
         for stage, begin, end in stage_bounds(result):
             for c, (component, unit) in enumerate(axes.components):
@@ -123,8 +123,8 @@ def normalised_errors(results: Sequence[CaseResult]):
 
 def _normalised_errors(result: CaseResult) -> dict[str, np.ndarray]:
     axes, n = result.axes, result.count
-    places = {name: s for s, name in enumerate(axes.extra["stages"])}
-    s = np.array([places[stage] for stage, *_ in stage_bounds(result)])
+    names = stage_names(result)
+    s = np.array([names.index(stage) for stage, *_ in stage_bounds(result)])
     filters = len(axes.filters)
     sums = np.asarray(result.sums["stage"])[:, s].reshape(filters * s.size, -1, 2)
     found = {}
@@ -136,7 +136,7 @@ def _normalised_errors(result: CaseResult) -> dict[str, np.ndarray]:
     return {
         "case": np.full(len(sums), result.name, dtype=object),
         "filter": common.names(axes.filters, np.repeat(np.arange(filters), s.size)),
-        "stage": common.names(axes.extra["stages"], np.tile(s, filters)),
+        "stage": common.names(names, np.tile(s, filters)),
         "n": np.full(len(sums), n),
         **found,
     }
@@ -152,15 +152,14 @@ def operations(results: Sequence[CaseResult]):
     """
     rows = []
     for result in results:
-        extra = result.axes.extra
-        lengths = extra["lengths"][:, 0]
-        for f, label in enumerate(result.axes.filters):
-            fixed, each, once = extra["operations"][f]
+        scans = result.axes.stage_scans
+        for f, options in enumerate(result.spec.filters):
+            fixed, each, once = costs.operations_of(options)
             own = np.asarray(result.sums["stage"])[f, :, [MERGED, MERGES], 0].T / result.count
-            whole = lengths @ own / lengths.sum()
-            named = [(name, own[s]) for s, name in enumerate(extra["stages"]) if lengths[s] > 0]
+            whole = scans @ own / scans.sum()
+            named = [(name, own[s]) for s, name in enumerate(stage_names(result)) if scans[s] > 0]
+            label, what = result.axes.filters[f], (options.family, options.merge, len(options.models))
             for stage, (merged, merges) in [*named, ("whole", whole)]:
-                what = (extra["families"][f], extra["rules"][f], len(extra["models"][f]))
                 count = fixed + each * merged + once * merges
                 rows.append((result.name, label, *what, stage, float(merged), float(merges), float(count)))
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(OPERATIONS)})
@@ -182,33 +181,3 @@ def cost(made: Mapping, run: Mapping):
     stages = list(dict.fromkeys(height["stage"]))
     wide = wide[stages].rename(columns={stage: f"σ of y, {stage}, m" for stage in stages})
     return table.merge(wide, left_on=["case", "filter"], right_index=True, how="left")
-
-
-def question(experiment) -> str:
-    """What the experiment asks, in one sentence."""
-    filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
-    told = ", ".join(filters[:-1]) + (" and " if len(filters) > 1 else "") + filters[-1]
-    flights = len(experiment.cases)
-    return f"How accurately do {told} track the target" + (f" in {flights} cases?" if flights > 1 else "?")
-
-
-def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
-    """Which filter has the least σ of the height in each stage, by case; of a single case of the rate of climb too."""
-    shown, others = panels.told(results, 4)
-    told = [f"{panels.plain_label(result)}: {_least(result, made, 'y', 'the height')}" for result in shown]
-    climb = [f"{panels.plain_label(results[0])}: {_least(results[0], made, 'vy', 'the rate of climb')}"]
-    return [*told, *(climb if len(results) == 1 else []), *others]
-
-
-def _least(result: CaseResult, made: dict, component: str, words: str) -> str:
-    """The filter of the least σ in each stage, with the interval."""
-    rows = made["stages"]
-    rows = rows[(rows["case"] == result.name) & (rows["component"] == component)]
-    parts = []
-    for stage, own in rows.groupby("stage", sort=False):
-        best = own.loc[own["sigma"].idxmin()]
-        value, low, high = (f"{float(f'{best[name]:.3g}'):,.10g}" for name in ("sigma", "sigma_lo", "sigma_hi"))
-        parts.append(
-            f"{stage} {best['filter']}, {value} {panels.UNITS.get(best['unit'], best['unit'])} [{low}, {high}]"
-        )
-    return f"least σ of {words} by stage: {'; '.join(parts)}."

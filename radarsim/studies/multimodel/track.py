@@ -1,4 +1,4 @@
-"""Plots of the multimodel study: those of one realisation, and the study's filters over recorded ones."""
+"""Recorded plots: the study's filters over them, and the plots of one simulated realisation as such a record."""
 
 from typing import NamedTuple
 
@@ -11,14 +11,31 @@ from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.studies.interface import RecordedPlots
 from radarsim.studies.multimodel import filters
 from radarsim.studies.multimodel.kernels import strip as strips
-from radarsim.studies.multimodel.kernels.hypothesis import INNOVATION, MODELS, OUTPUT, VARIANCE, work_arrays
+from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
 from radarsim.studies.multimodel.kernels.plots import NORMALS, STRIP
-from radarsim.studies.multimodel.study import COMPONENTS, banks, measured, prepare, transition
+from radarsim.studies.multimodel.kernels.records import (
+    AZIMUTH,
+    COORDINATES,
+    COVARIANCE,
+    DETECTED,
+    ELEVATION,
+    INNOVATION,
+    MODEL_NUMBERS,
+    MODELS,
+    OUTPUT,
+    PREPARED,
+    RANGE,
+    SIGMA,
+    SIZE,
+    START,
+    STATES,
+    VARIANCE,
+)
+from radarsim.studies.multimodel.study import COMPONENTS, banks, measured, prepare
 from radarsim.studies.multimodel.world import intervals, local_plots, sensor_frame
 from radarsim.studies.multimodel.world import truth as scan_times
 
 CHUNK = 4096  # recorded plots filtered at a time
-BEGIN = 3  # whole plots that a track starts from
 TESTED = (("plot", 3),)
 
 
@@ -40,11 +57,11 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     """The plots of one realisation of the study and the truth, columns (K,); not-a-number where a plot is missed."""
     plan = prepare(case)
     truth, frame, count = plan.world.plot_truth, plan.world.frame, len(plan.world.truth)
-    noise = normals(plan.world.keys[0], realisation, count) * frame[9:12]
+    noise = normals(plan.world.keys[0], realisation, count) * frame[SIGMA : SIGMA + 3]
     if case.spec.sensor.sigma_range_m is None:
-        exact = truth[:, 5:8]
+        exact = truth[:, COORDINATES:]
     else:
-        exact = np.stack([truth[:, 0], np.arcsin(truth[:, 1]), np.arcsin(truth[:, 3])], axis=1)
+        exact = np.stack([truth[:, RANGE], *np.arcsin(truth[:, [ELEVATION, AZIMUTH]]).T], axis=1)
     detected = measured(plan, realisation)[2][:, 0] > 0
     t, *names = plot_columns(case.spec)[0]
     found = np.where(detected[:, None], exact + noise, np.nan)
@@ -56,7 +73,7 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
 
 
 def normals(key: np.ndarray, realisation: int, count: int) -> np.ndarray:
-    """The three normals of each scan (count, 3) of a realisation, in the layout of `kernels.multimodel_plots`."""
+    """The three normals of each scan (count, 3) of a realisation, in the layout of `kernels.plots`."""
     half = NORMALS // 2
     drawn = np.empty((-(-count // STRIP), NORMALS))
     for strip, row in enumerate(drawn):
@@ -96,18 +113,18 @@ class Tracker:
         t = recorded["t_s"]
         z, R, whole = local_plots(self.spec.sensor, np.stack(list(recorded.values())[1:], axis=1))
         shape = (len(self.names), len(t))
-        estimate, sigma = np.full((2, *shape, 9), np.nan)
+        estimate, sigma = np.full((2, *shape, STATES), np.nan)
         probability, nis = np.full((*shape, self.most), np.nan), np.full((*shape, 1), np.nan)
         plots = np.concatenate([z, R, whole[:, None]], axis=1)
         first = self._first(t, plots)
         for f, state in enumerate(self.states) if first < len(t) else ():
             out, tested = self._tracked(state, t, plots, first)
             size = len(state.options.models)
-            estimate[f, first:] = out[:, :9]
-            sigma[f, first:] = np.sqrt(np.maximum(out[:, VARIANCE : VARIANCE + 9], 0.0))
+            estimate[f, first:] = out[:, :STATES]
+            sigma[f, first:] = np.sqrt(np.maximum(out[:, VARIANCE : VARIANCE + STATES], 0.0))
             probability[f, first:, :size] = out[:, MODELS : MODELS + size]
             nis[f, first:, 0] = np.where(tested, out[:, INNOVATION], np.nan)
-        self.begun, self.last = len(self.held) == BEGIN, t[-1]
+        self.begun, self.last = len(self.held) == START, t[-1]
         residual = np.where(whole[:, None], z, np.nan)[None] - estimate[..., 0::3]
         labels = (("x_m", "m"), ("y_m", "m"), ("z_m", "m"))
         shares = probability if self.most > 1 else None
@@ -117,9 +134,9 @@ class Tracker:
         """The first row with an estimate: that of the third whole plot, or all once the track has begun."""
         if self.begun:
             return 0
-        for k in np.flatnonzero(plots[:, 9]):
+        for k in np.flatnonzero(plots[:, DETECTED]):
             self.held.append((t[k], plots[k]))
-            if len(self.held) == BEGIN:
+            if len(self.held) == START:
                 return int(k)
         return len(t)
 
@@ -133,7 +150,7 @@ class Tracker:
             stop = min(start + CHUNK, len(t))
             before = t[start - 1] if start else self.last
             found.append(_filtered(self.spec, state, np.append(before, t[start:stop]), plots[start:stop], frame))
-        tested = plots[first:, 9] > 0
+        tested = plots[first:, DETECTED] > 0
         if not self.begun:
             tested[0] = False
         return np.concatenate(found), tested
@@ -142,10 +159,10 @@ class Tracker:
         """Start a filter from the three plots; its outputs (1, OUTPUT) at the third."""
         times, began = np.array([at for at, _ in self.held]), np.stack([plot for _, plot in self.held])
         weights = filters.start_weights(times, self.spec.start_acceleration_mps2)
-        chances = filters.stationary(transition(state.options))
+        chances = filters.stationary(filters.transition_matrix(state.options.transition))
         strips.start_strip(state.work, state.numbers, _lanes(began), weights, chances)
         out = np.zeros((1, OUTPUT))
-        out[0, :9], out[0, VARIANCE : VARIANCE + 9] = _at_start(began, weights)
+        out[0, :STATES], out[0, VARIANCE : VARIANCE + STATES] = _at_start(began, weights)
         out[0, MODELS : MODELS + len(chances)] = chances
         return out
 
@@ -159,12 +176,14 @@ def _filtered(spec, state: _State, t: np.ndarray, plots: np.ndarray, frame: np.n
     """Outputs (n, OUTPUT) over the next n plots of one filter; t (n + 1,) with the time of the row before."""
     index, times = intervals(t)
     own = banks(spec.model_copy(update={"filters": (state.options,)}), times)
-    size, count = own.numbers[0, 4], len(plots)
-    state.numbers[1] = -1  # the intervals of this chunk are numbered anew
-    out, everything = rows(count * OUTPUT), np.ones(count, dtype=np.int64)
+    size, count = own.numbers[0, SIZE], len(plots)
+    state.numbers[PREPARED] = -1  # the intervals of this chunk are numbered anew
+    out, reported = rows(count * OUTPUT), np.ones(count, dtype=np.int64)
+    scans = index[1:].copy(), times
+    design = own.models[0, : MODEL_NUMBERS * size], own.transitions[0]
     strips.filter_strip(
-        *(state.work, state.numbers, _lanes(plots), 0, count, own.models[0, : 3 * size], own.transitions[0]),
-        *(index[1:].copy(), times, own.numbers[0], frame, everything, out),
+        *(state.work, state.numbers, _lanes(plots), 0, count),
+        *(*design, *scans, own.numbers[0], frame, reported, out),
     )
     return out.reshape(count, OUTPUT, WIDTH)[:, :, 0].copy()
 
@@ -174,7 +193,7 @@ def _at_start(began: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.nd
     a, b, g = weights.reshape(3, 3)
     mean, variance = np.zeros(9), np.tile(g**2, 3)
     mean[0::3], mean[1::3] = a @ began[:, :3], b @ began[:, :3]
-    own = began[:, [3, 6, 8]]  # xx, yy, zz
+    own = began[:, [COVARIANCE, COVARIANCE + 3, COVARIANCE + 5]]  # xx, yy, zz
     variance[0::3] += a**2 @ own
     variance[1::3] += b**2 @ own
     return mean, variance

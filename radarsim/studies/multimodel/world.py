@@ -1,4 +1,4 @@
-"""What the filters of P2 see: the flight, the times of the scans, plots in the antenna's coordinates."""
+"""The world of P2: the true flight, the times of the scans, the sensor, plots in the antenna's coordinates."""
 
 import csv
 
@@ -9,7 +9,7 @@ from radarsim.errors import ConfigError
 from radarsim.kernels import random
 from radarsim.physics import frames
 from radarsim.studies.multimodel import flight
-from radarsim.studies.multimodel.kernels import plots
+from radarsim.studies.multimodel.kernels import plots, records
 from radarsim.studies.noise import noise_key
 
 
@@ -104,7 +104,7 @@ def plot_truth(case: Case, t: np.ndarray, x: np.ndarray) -> np.ndarray:
 def sensor_frame(sensor) -> np.ndarray:
     """The numbers (n,) of a sensor as the kernels take them; see `kernels.plots.frame`."""
     R = frames.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
-    form = plots.BICONICAL if sensor.sigma_range_m is not None else plots.CARTESIAN
+    form = records.BICONICAL if sensor.sigma_range_m is not None else records.CARTESIAN
     unbiased = sensor.conversion == "unbiased"
     return plots.frame(R, sensor.antenna_height_m, sensor.sigma, form, unbiased, sensor.detection_probability)
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import fractional_matrix_power
 
 from radarsim.kernels import symmetric as blocks
-from radarsim.studies.multimodel import filters
+from radarsim.studies.multimodel import cost, filters
 
 PRINTED = np.array([[0.996, 0, 0.002], [0, 0.996, 0.002], [0.004, 0.004, 0.996]])
 TWO = np.array([[0.995, 0.01], [0.005, 0.99]])
@@ -62,7 +62,7 @@ def test_start_is_least_squares_with_its_covariance():
     assert np.allclose([a @ z - 7, b @ z - 3, 0 - w], g * w / spread)
 
 
-class Nought:
+class ExactZero:
     """A zero that the compiler sees: sums with it and products by it are left out."""
 
     def _sum(self, other):
@@ -81,7 +81,7 @@ class Counted:
     count = 0
 
     def _operate(self, other):
-        if isinstance(other, Nought):
+        if isinstance(other, ExactZero):
             return NotImplemented
         Counted.count += 1
         return self
@@ -101,14 +101,14 @@ def plain(module):
 @pytest.mark.parametrize("accelerates", [True, False])
 def test_operations_are_those_of_the_formulas(accelerates):
     of, x = plain(blocks), Counted()
-    zero = x if accelerates else Nought()
+    zero = x if accelerates else ExactZero()
     F, Q = (x, zero, x, zero, zero), (x, x, zero, x, zero, zero)
     Counted.count = 0
     for _ in range(3):
         mean = of["predicted_axis"]((x,) * 3, F)
         own = of["predicted_own"]((x,) * 6, F, Q)
         cross = of["predicted_cross"]((x,) * 9, F)
-    assert Counted.count == filters.PREDICT[accelerates]
+    assert Counted.count == cost.PREDICT[accelerates]
     Counted.count = 6 + 3  # S = H P H' + R; the innovation
     of["factored"]((x,) * 6)
     v = of["whitened"]((x,) * 3, (x,) * 3)
@@ -120,14 +120,14 @@ def test_operations_are_those_of_the_formulas(accelerates):
         _ = [at + of["dot"](row, v) for at, row in zip(mean, scaled, strict=True)]
         of["shrunk_own"](own, scaled, rows)
         of["shrunk_cross"](cross, scaled, rows)
-    assert Counted.count == filters.UPDATE[accelerates]
+    assert Counted.count == cost.UPDATE[accelerates]
 
 
 def test_operations_of_families():
     for accelerates in (True, False):
-        one = filters.operations("kalman", np.ones((1, 1)), [accelerates])[0]
-        assert one == filters.PREDICT[accelerates] + filters.UPDATE[accelerates]
-    imm, gpb2 = (filters.operations(family, PRINTED, [False, True, True])[0] for family in ("imm", "gpb2"))
-    cheap, dear = (filters.PREDICT[accelerates] + filters.UPDATE[accelerates] for accelerates in (False, True))
-    assert imm == cheap + 2 * dear + 3 * filters.LIKELIHOOD + 15
-    assert gpb2 == 2 * cheap + 5 * dear + 7 * filters.LIKELIHOOD + 15
+        one = cost.operations("kalman", np.ones((1, 1)), [accelerates])[0]
+        assert one == cost.PREDICT[accelerates] + cost.UPDATE[accelerates]
+    imm, gpb2 = (cost.operations(family, PRINTED, [False, True, True])[0] for family in ("imm", "gpb2"))
+    cheap, dear = (cost.PREDICT[accelerates] + cost.UPDATE[accelerates] for accelerates in (False, True))
+    assert imm == cheap + 2 * dear + 3 * cost.LIKELIHOOD + 15
+    assert gpb2 == 2 * cheap + 5 * dear + 7 * cost.LIKELIHOOD + 15

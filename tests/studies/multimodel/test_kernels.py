@@ -4,18 +4,17 @@ import numpy as np
 import pytest
 
 from radarsim.kernels.lanes import WIDTH, rows
-from radarsim.studies.multimodel.kernels import filters as multimodel
-from radarsim.studies.multimodel.kernels import hypothesis
-from radarsim.studies.multimodel.kernels import strip as multimodel_strip
+from radarsim.studies.multimodel.kernels import hypothesis, records
+from radarsim.studies.multimodel.kernels import strip as strips
 from radarsim.studies.multimodel.kernels.plots import frame
 from tests.studies.multimodel import naive
 
-FAMILIES = {"kalman": multimodel.KALMAN, "gpb1": multimodel.GPB1, "imm": multimodel.IMM, "gpb2": multimodel.GPB2}
+FAMILIES = {"kalman": records.KALMAN, "gpb1": records.GPB1, "imm": records.IMM, "gpb2": records.GPB2}
 RULES = {
-    "moment": multimodel.MOMENT,
-    "best": multimodel.BEST,
-    "combined": multimodel.COMBINED,
-    "modified_combined": multimodel.MODIFIED,
+    "moment": records.MOMENT,
+    "best": records.BEST,
+    "combined": records.COMBINED,
+    "modified_combined": records.MODIFIED,
 }
 UPPER = np.triu_indices(3)
 DT = 0.05
@@ -57,26 +56,30 @@ def run_kernel(family, rule, output, kinds, T, p, plots, covariances, x, P, pred
     work, numbers = hypothesis.work_arrays()
     at = work.reshape(-1, WIDTH)
     for i in range(size):
-        h = at[i * hypothesis.HYPOTHESIS :]
+        h = at[i * records.HYPOTHESIS :]
         h[:9] = x[:, None]
         for axis in range(3):
             block = P[3 * axis : 3 * axis + 3, 3 * axis : 3 * axis + 3]
-            h[hypothesis.OWN + 6 * axis : hypothesis.OWN + 6 * axis + 6] = block[UPPER][:, None]
-        h[hypothesis.PROBABILITY] = p[i]
-    strip = rows(scans * hypothesis.PLOT)
-    cells = strip.reshape(scans, hypothesis.PLOT, WIDTH)
-    cells[:, 9] = ~np.isnan(plots).any(axis=1)
-    cells[:, :3], cells[:, 3:9] = np.nan_to_num(plots), covariances[:, UPPER[0], UPPER[1], None]
-    out = rows(scans * hypothesis.OUTPUT)
+            h[records.OWN + 6 * axis : records.OWN + 6 * axis + 6] = block[UPPER][:, None]
+        h[records.PROBABILITY] = p[i]
+    strip = rows(scans * records.PLOT)
+    cells = strip.reshape(scans, records.PLOT, WIDTH)
+    cells[:, records.DETECTED] = ~np.isnan(plots).any(axis=1)
+    cells[:, :3], cells[:, records.COVARIANCE : records.DETECTED] = (
+        np.nan_to_num(plots),
+        covariances[:, UPPER[0], UPPER[1], None],
+    )
+    out = rows(scans * records.OUTPUT)
     models = np.array([[k != "still", k == "accelerated", s] for k, s in kinds], dtype=float).ravel()
     rules = np.array([FAMILIES[family], RULES[rule], RULES[output], prediction])
-    intervals, times, everything = np.zeros(scans, dtype=np.int64), np.array([DT]), np.ones(scans, dtype=np.int64)
+    intervals, times, reported = np.zeros(scans, dtype=np.int64), np.array([DT]), np.ones(scans, dtype=np.int64)
     transitions = np.ascontiguousarray(T).ravel()
-    multimodel_strip.filter_strip(
-        work, numbers, strip, 0, scans, models, transitions, intervals, times, rules, FRAME, everything, out
+    strips.filter_strip(
+        work, numbers, strip, 0, scans, models, transitions, intervals, times, rules, FRAME, reported, out
     )
-    cells = out.reshape(scans, hypothesis.OUTPUT, WIDTH)
-    return cells[:, :9], cells[:, 9:18], cells[:, 21 : 21 + size], at
+    cells = out.reshape(scans, records.OUTPUT, WIDTH)
+    variances = cells[:, records.VARIANCE : records.VARIANCE + 9]
+    return cells[:, :9], variances, cells[:, records.MODELS : records.MODELS + size], at
 
 
 def compare(family, rule, output, size, scans, missing=0.0, lanes=(0,), seed=3):
@@ -129,11 +132,11 @@ def hypothesis_of(cells, lane=0):
     """Mean (9,) and covariance (9, 9) of the hypothesis that begins at a row."""
     P = np.empty((9, 9))
     for axis in range(3):
-        block = cells[hypothesis.OWN + 6 * axis :][:6, lane]
+        block = cells[records.OWN + 6 * axis :][:6, lane]
         for value, i, j in zip(block, *UPPER, strict=True):
             P[3 * axis + i, 3 * axis + j] = P[3 * axis + j, 3 * axis + i] = value
     for pair, (a, b) in enumerate(((0, 1), (0, 2), (1, 2))):
-        block = cells[hypothesis.CROSS + 9 * pair :][:9, lane].reshape(3, 3)
+        block = cells[records.CROSS + 9 * pair :][:9, lane].reshape(3, 3)
         P[3 * a : 3 * a + 3, 3 * b : 3 * b + 3], P[3 * b : 3 * b + 3, 3 * a : 3 * a + 3] = block, block.T
     return cells[:9, lane], P
 

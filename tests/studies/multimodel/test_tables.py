@@ -7,7 +7,7 @@ import pytest
 
 import radarsim
 from radarsim.report import claims, html
-from radarsim.studies.multimodel import tables as multimodel
+from radarsim.studies.multimodel import words
 from radarsim.studies.multimodel.claims import CLAIMS
 from radarsim.studies.multimodel.measures import MMA2_122, RIVALS, Evidence
 
@@ -86,7 +86,7 @@ def test_figures_are_described(result):
 
 
 def test_answer_names_the_best_filter_of_each_stage(result):
-    height, climb = multimodel.answer(result.cases, result.tables)
+    height, climb = words.answer(result.cases, result.tables)
     for stage in ("start", "ballistic", "manoeuvre", "after"):
         assert stage in height
         assert stage in climb

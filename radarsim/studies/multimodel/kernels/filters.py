@@ -1,16 +1,35 @@
 """Kalman, GPB1, IMM and GPB2 filters of nine states with any bank of up to five models, eight realisations at a time.
 
-All families are made of three steps: weights are mapped to shares (`shared`, the merging rule), a hypothesis is
-merged of others by shares (`merged`), and one is merged, predicted with a model and updated with the plot in one go
-(`advanced`). Family, rule and number of models are run-time values: one copy of machine code serves all.
+All families are made of three steps: the merging rule maps weights to shares (`shares_by_rule`), a hypothesis is
+merged of others by shares (`merge`), and one is merged, predicted with a model and updated with the plot in one go
+(`advance`). Family, rule and number of models are run-time values: one copy of machine code serves all.
+
+Letters, each of eight lanes but for the numbers i, j of models:
+
+    p[j]        probability of model j before the plot; p[i]: of model i, after it
+    T[i, j]     probability of passing from model j to model i over the interval
+    w[j]        weight of hypothesis j among those that may be merged; in the rows WEIGHT …
+    c           Σ w, the normaliser; in eq. (7) the predicted probability of model i, Σ_j T[i, j] p[j]
+    q           normalised innovation squared v' S⁻¹ v of a hypothesis
+    likelihood  density of the innovation, exp(-q / 2) / sqrt(det S), up to a common factor
+
+`work` is the address of the filter's rows, `listed` that of MOST whole numbers; `old` and `new` are the first rows of
+the banks before and after the plot.
 """
 
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import any_greater, exponential, full, get, put, root, row, where_greater
-from radarsim.studies.multimodel.kernels.hypothesis import (
+from radarsim.studies.multimodel.kernels.hypothesis import advance, merge
+from radarsim.studies.multimodel.kernels.records import (
+    BEST,
+    COMBINED,
+    COUNTED,
+    GPB1,
+    GPB2,
     HYPOTHESIS,
-    MERGED,
     MODEL,
+    MODEL_ROWS,
+    MOMENT,
     MOST,
     PROBABILITY,
     RESULT,
@@ -20,13 +39,9 @@ from radarsim.studies.multimodel.kernels.hypothesis import (
     SURPRISE,
     TRANSITION,
     WEIGHT,
-    advanced,
-    merged,
 )
 
-KALMAN, GPB1, IMM, GPB2 = range(4)
-MOMENT, BEST, COMBINED, MODIFIED = range(4)
-CREDIBLE = 1e-100
+CREDIBLE = 1e-100  # probability above which a hypothesis scales the likelihoods
 
 
 # ---- merging rules: maps of weights --------
@@ -38,48 +53,50 @@ def is_number(x, number):
 
 
 @part
-def shared(work, listed, first, size, group, main, rule):
-    """Map the rows WEIGHT … of a group to shares by a rule; list the hypotheses whose share is not zero in all lanes.
+def shares_by_rule(work, listed, first, size, c, main, rule):
+    """Map the weights of a group to shares by a rule; list the hypotheses whose share is not zero in all lanes.
 
-    Hypothesis j lies at row first + j * HYPOTHESIS; `group` is the sum of the weights and `main` (lanes) the number
-    of the main one. A group whose weights are all zero is its main hypothesis. The rows SHARE … belong to `listed`,
-    in order; returns their number.
+    Hypothesis j lies at row first + j * HYPOTHESIS; `main` (lanes) is the number of the main one. A group whose
+    weights are all zero is its main hypothesis. The rows SHARE … belong to `listed`, in order; returns their number.
     """
-    nothing, least = full(0.0), full(1e-300)
-    if any_greater(least, group):
+    zero, one, least = full(0.0), full(1.0), full(1e-300)
+    if any_greater(least, c):
         for j in range(size):
             alone = is_number(main, float(j))
-            put(work, WEIGHT + j, where_greater(least, group, alone, get(work, WEIGHT + j)))
-        group = where_greater(least, group, full(1.0), group)
+            put(work, WEIGHT + j, where_greater(least, c, alone, get(work, WEIGHT + j)))
+        c = where_greater(least, c, one, c)
     if rule != MOMENT:
-        group = kept_only(work, size, main, rule)
-    scale, count, one, inside = 1.0 / group, 0, full(1.0), nothing
+        c = keep_by_rule(work, size, main, rule)
+    scale, count, inside = 1.0 / c, 0, zero
     for j in range(size):
         w = get(work, WEIGHT + j)
-        if any_greater(w, nothing):
+        if any_greater(w, zero):
             put(work, SHARE + count, w * scale)
             listed[count] = first + j * HYPOTHESIS
             count += 1
-            inside = inside + where_greater(w, nothing, one, nothing)
+            inside = inside + where_greater(w, zero, one, zero)
     if count > 1:
-        put(work, MERGED, get(work, MERGED) + where_greater(inside, one, inside, nothing))
-        put(work, MERGED + 1, get(work, MERGED + 1) + where_greater(inside, one, one, nothing))
+        put(work, COUNTED, get(work, COUNTED) + where_greater(inside, one, inside, zero))
+        put(work, COUNTED + 1, get(work, COUNTED + 1) + where_greater(inside, one, one, zero))
     return count
 
 
 @inline
-def kept_only(work, size, main, rule):
-    """Set to zero the weights that a rule other than `moment` leaves out, and sum the rest; ties go to the lower
-    number."""
-    nothing = full(0.0)
-    top, best, of_main, others = get(work, WEIGHT), nothing, nothing, nothing
+def keep_by_rule(work, size, main, rule):
+    """Set to zero the weights that a rule other than `moment` leaves out, and return the sum of the rest.
+
+    best: the largest weight. combined: the main hypothesis where it outweighs all others together, else all.
+    modified: the main one where it does, else the main one and the best. Ties go to the lower number.
+    """
+    zero = full(0.0)
+    top, best, of_main, others = get(work, WEIGHT), zero, zero, zero
     for j in range(size):
         w, is_main = get(work, WEIGHT + j), is_number(main, float(j))
         best, top = where_greater(w, top, full(float(j)), best), where_greater(w, top, w, top)
-        of_main = where_greater(is_main, nothing, w, of_main)
-        other = where_greater(is_main, nothing, nothing, w)
+        of_main = where_greater(is_main, zero, w, of_main)
+        other = where_greater(is_main, zero, zero, w)
         others = where_greater(other, others, other, others)
-    group = nothing
+    c = zero
     for j in range(size):
         w, is_main, is_best = get(work, WEIGHT + j), is_number(main, float(j)), is_number(best, float(j))
         if rule == BEST:
@@ -87,17 +104,17 @@ def kept_only(work, size, main, rule):
         elif rule == COMBINED:
             kept = where_greater(of_main, others, is_main, full(1.0))
         else:
-            kept = where_greater(of_main, others, is_main, where_greater(is_main, nothing, is_main, is_best))
-        w = where_greater(kept, nothing, w, nothing)
+            kept = where_greater(of_main, others, is_main, where_greater(is_main, zero, is_main, is_best))
+        w = where_greater(kept, zero, w, zero)
         put(work, WEIGHT + j, w)
-        group = group + w
-    return group
+        c = c + w
+    return c
 
 
 # ---- families --------
 @inline
-def foretold(work, bank, size, i):
-    """Put P[i, j] p_j into the rows WEIGHT … and return their sum (eq. 7)."""
+def predict_weights(work, bank, size, i):
+    """Put T[i, j] p[j] into the rows WEIGHT … and return their sum c (eq. 7)."""
     c = full(0.0)
     for j in range(size):
         w = get(work, TRANSITION + i * MOST + j) * get(work, bank + j * HYPOTHESIS + PROBABILITY)
@@ -107,65 +124,67 @@ def foretold(work, bank, size, i):
 
 
 @inline
-def smaller(x, y):
+def minimum(x, y):
     """The smaller of two, lane by lane."""
     return where_greater(x, y, y, x)
 
 
 @inline
 def likelihood(work, least, result):
-    """Density of the innovation in rows result, result + 1, relative to exp(-least / 2) (eq. 9).
+    """Density of the innovation of rows result, result + 1, relative to exp(-least / 2) (eq. 9).
 
-    `least` is of what had more than a probability of CREDIBLE; what had less may be relatively likelier, up to exp 200.
-    So the sum of all weights can neither vanish nor overflow, however far a plot lies from every hypothesis.
+    `least` is the smallest q of what had more than a probability of CREDIBLE; what had less may be relatively
+    likelier, up to exp 200. So the sum of all weights can neither vanish nor overflow, however far a plot lies from
+    every hypothesis.
     """
     x, most = 0.5 * (least - get(work, result)), full(200.0)
-    return exponential(smaller(x, most)) / root(get(work, result + 1))
+    return exponential(minimum(x, most)) / root(get(work, result + 1))
 
 
 @part
-def step(work, listed, old, new, size, family, rule, plot, noise):
-    """From the old bank to the new one by one plot.
+def step(work, listed, old, new, rules, plot, noise):
+    """From the old bank to the new one by one plot; rules: `records.Rules`.
 
     IMM: for each model merge the bank, predict and update once; with one model a Kalman filter. GPB1: predict and
     update the one merged hypothesis, the first of the old bank, with each model. GPB2: predict and update every pair
     of models, then merge those that end in the same model.
     """
-    nothing, overall, top, surprise = full(0.0), full(1e300), full(-1.0), full(0.0)
+    size, family, rule = rules.size, rules.family, rules.merge
+    zero, overall, top, surprise = full(0.0), full(1e300), full(-1.0), full(0.0)
     source = SPARE if family == GPB2 else old
     for i in range(size):
-        model, main = MODEL + 11 * i, full(float(i))
-        c, least = foretold(work, old, size, i), full(1e300)
+        model, main = MODEL + MODEL_ROWS * i, full(float(i))
+        c, least = predict_weights(work, old, size, i), full(1e300)
         for j in range(size if family == GPB2 else 1):
             w, count, to, result = c, 1, new + i * HYPOTHESIS, RESULT_GROUP + 2 * i
             if family == GPB2:
                 w, to, result = get(work, WEIGHT + j), SPARE + j * HYPOTHESIS, RESULT + 2 * j
-                if not any_greater(w, nothing):
+                if not any_greater(w, zero):
                     continue
                 listed[0] = old + j * HYPOTHESIS
             elif family == GPB1:
                 listed[0] = old
             else:
-                count = shared(work, listed, source, size, c, main, rule)
-            advanced(work, listed, count, row(work, to), model, result, plot, noise)
+                count = shares_by_rule(work, listed, source, size, c, main, rule)
+            advance(work, listed, count, row(work, to), model, result, plot, noise)
             q = get(work, result)
             surprise, top = where_greater(w, top, q, surprise), where_greater(w, top, w, top)
-            least = where_greater(w, full(CREDIBLE), smaller(least, q), least)
+            least = where_greater(w, full(CREDIBLE), minimum(least, q), least)
         if family == GPB2:
-            c = group_likelihood(work, size, least)
+            c = weigh_pairs(work, size, least)
             put(work, RESULT_GROUP + 2 * i, least)
             put(work, RESULT_GROUP + 2 * i + 1, full(1.0))
-            count = shared(work, listed, source, size, c, main, rule)
-            merged(work, listed, count, row(work, new + i * HYPOTHESIS))
+            count = shares_by_rule(work, listed, source, size, c, main, rule)
+            merge(work, listed, count, row(work, new + i * HYPOTHESIS))
         put(work, new + i * HYPOTHESIS + PROBABILITY, c)
-        overall = smaller(overall, least)
+        overall = minimum(overall, least)
     put(work, SURPRISE, surprise)
-    weighed(work, new, size, overall)
+    update_probabilities(work, new, size, overall)
 
 
 @inline
-def group_likelihood(work, size, least):
-    """Multiply the rows WEIGHT … by the likelihoods of their updates, relative to exp(-least / 2); return their sum."""
+def weigh_pairs(work, size, least):
+    """Multiply the weights by the likelihoods of their updates, relative to exp(-least / 2); return their sum c."""
     c = full(0.0)
     for j in range(size):
         w = get(work, WEIGHT + j)
@@ -177,15 +196,15 @@ def group_likelihood(work, size, least):
 
 
 @inline
-def weighed(work, bank, size, least):
-    """Posterior probabilities of a bank, from the foretold ones and the likelihoods (eq. 9)."""
-    weight = full(0.0)
+def update_probabilities(work, bank, size, least):
+    """Posterior probabilities of a bank, from the predicted ones and the likelihoods (eq. 9)."""
+    c = full(0.0)
     for i in range(size):
         at = bank + i * HYPOTHESIS + PROBABILITY
         p = get(work, at) * likelihood(work, least, RESULT_GROUP + 2 * i)
         put(work, at, p)
-        weight = weight + p
-    scale = 1.0 / weight
+        c = c + p
+    scale = 1.0 / c
     for i in range(size):
         at = bank + i * HYPOTHESIS + PROBABILITY
         put(work, at, get(work, at) * scale)
@@ -200,5 +219,5 @@ def merge_gpb1(work, listed, old, new, size, rule):
         p = get(work, old + j * HYPOTHESIS + PROBABILITY)
         main, top = where_greater(p, top, full(float(j)), main), where_greater(p, top, p, top)
         put(work, WEIGHT + j, get(work, new + j * HYPOTHESIS + PROBABILITY))
-    count = shared(work, listed, new, size, full(1.0), main, rule)
-    merged(work, listed, count, row(work, new))
+    count = shares_by_rule(work, listed, new, size, full(1.0), main, rule)
+    merge(work, listed, count, row(work, new))

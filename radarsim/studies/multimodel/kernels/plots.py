@@ -3,6 +3,17 @@
 Layout of the noise: a scan takes three normals. The pair 24 s + j of a realisation (j = 0 … 23) gives the normals j and
 24 + j of the 48 of strip s, whose scan n takes 3 n, 3 n + 1, 3 n + 2 for range, elevation, azimuth. Of the stream of
 detections, the pair 8 s + j gives the uniform numbers of the scans j and 8 + j of strip s.
+
+Letters, each of eight lanes:
+
+    r                       measured range, m
+    sine_e, cosine_e        of the measured elevation; sine_a, cosine_a: of the azimuth (biconical)
+    u                       direction cosine of the plot along the antenna's normal, u² = 1 - sine_e² - sine_a²
+    x, y, z                 position (antenna's axes: x along the normal)
+    p                       covariance of a plot R J diag(sigma²) J' R' (eq. 10) as (xx, xy, xz, yy, yz, zz), m²
+    detected                1 where a plot is detected, else 0
+
+`frame` is the address of the plain numbers of a sensor, see `frame` and `records`.
 """
 
 import numpy as np
@@ -11,23 +22,37 @@ from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, root, row, where_greater
 from radarsim.kernels.random import U, normal_pair, sine_cosine_polynomial, threefry, uniform
 from radarsim.kernels.symmetric import dot
-from radarsim.studies.multimodel.kernels.hypothesis import PLOT
+from radarsim.studies.multimodel.kernels.records import (
+    AZIMUTH,
+    CARTESIAN,
+    COORDINATES,
+    COVARIANCE,
+    DETECTED,
+    DETECTION,
+    ELEVATION,
+    FORM,
+    HEIGHT,
+    PLOT,
+    PLOT_TRUTH,
+    POSITION,
+    RANGE,
+    SIGMA,
+    UNBIASED,
+)
 
 STRIP = 16  # scans
 NORMALS, UNIFORMS = 3 * STRIP, STRIP
 RANDOM = NORMALS + UNIFORMS  # rows of random numbers of a strip
-BICONICAL, CARTESIAN = 0, 1
-FRAME = 18  # numbers of an antenna, see `frame`
-NEARLY_OUTSIDE = 0.1  # cosine of the angle from the normal under which no prediction's covariance is used
-LEAST = 1e-6  # least squared cosine of the angle from the antenna's normal: nearer to its plane a plot is missed
+NEARLY_OUTSIDE = 0.1  # u under which no covariance at the prediction is used
+LEAST = 1e-6  # least u²: nearer to the antenna's plane a plot is missed
 
 
 def frame(rotation, height: float, sigma, form: int, unbiased: bool, detection: float) -> np.ndarray:
-    """The numbers (FRAME,) of a sensor: rotation (3, 3), height of the phase centre, sigma (3,), and how plots are
-    made.
+    """The numbers (FRAME,) of a sensor, in the order of `records`.
 
-    sigma is that of range (m), elevation and azimuth (rad), or of x, y, z (m) where form is CARTESIAN; unbiased:
-    with the unbiased conversion; detection: probability of detection.
+    rotation (3, 3) from the antenna's axes to the local ones; height of the phase centre, m; sigma (3,) of range (m),
+    elevation and azimuth (rad), or of x, y, z (m) where form is CARTESIAN; unbiased: with the unbiased conversion;
+    detection: probability of detection.
     """
     return np.concatenate([np.ravel(rotation), sigma, [height, form, unbiased, detection, 0.0, 0.0]]).astype(float)
 
@@ -61,12 +86,12 @@ def rotated(frame, x):
 
 @inline
 def covariance(frame, r, sine_e, cosine_e, sine_a, cosine_a, u):
-    """R J diag(sigma²) J' R' of eq. (10) as (xx, xy, xz, yy, yz, zz); u is the direction cosine along the normal."""
+    """R J diag(sigma²) J' R' of eq. (10); a, b, c: the columns of R J diag(sigma)."""
     zero, s = full(0.0), 1.0 / u
-    a = rotated(frame, (u * frame[9], sine_e * frame[9], sine_a * frame[9]))
-    t = r * cosine_e * frame[10]
+    a = rotated(frame, (u * frame[SIGMA], sine_e * frame[SIGMA], sine_a * frame[SIGMA]))
+    t = r * cosine_e * frame[SIGMA + 1]
     b = rotated(frame, ((0.0 - t) * sine_e * s, t, zero))
-    t = r * cosine_a * frame[11]
+    t = r * cosine_a * frame[SIGMA + 2]
     c = rotated(frame, ((0.0 - t) * sine_a * s, zero, t))
     x, y, z = (a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2])
     return dot(x, x), dot(x, y), dot(x, z), dot(y, y), dot(y, z), dot(z, z)
@@ -76,10 +101,10 @@ def covariance(frame, r, sine_e, cosine_e, sine_a, cosine_a, u):
 def put_plot(plots, x, p, detected):
     """Write a plot's rows: position, covariance, detection."""
     for i in range(3):
-        put(plots, i, x[i])
+        put(plots, POSITION + i, x[i])
     for i in range(6):
-        put(plots, 3 + i, p[i])
-    put(plots, 9, detected)
+        put(plots, COVARIANCE + i, p[i])
+    put(plots, DETECTED, detected)
 
 
 @inline
@@ -91,15 +116,15 @@ def biconical_plot(plots, frame, r, sine_e, cosine_e, sine_a, cosine_a, detected
     u2 = where_greater(u2, least, u2, least)
     u = root(u2)
     x = (r * u, r * sine_e, r * sine_a)
-    if frame[14] == 1.0:
-        # E[sin] shrinks by exp(-variance / 2); for u the second-order term of its Taylor series is taken off.
-        ve, va = frame[10] * frame[10], frame[11] * frame[11]
+    if frame[UNBIASED] == 1.0:
+        # E[sin] shrinks by exp(-variance / 2); the second-order term of the Taylor series of u is subtracted.
+        ve, va = frame[SIGMA + 1] * frame[SIGMA + 1], frame[SIGMA + 2] * frame[SIGMA + 2]
         ce2, ca2, s = 1.0 - e2, 1.0 - a2, 1.0 / u
         bend = ve * (e2 - ce2 - e2 * ce2 * s * s) + va * (a2 - ca2 - a2 * ca2 * s * s)
         x = (r * (u - 0.5 * s * bend), r * sine_e * (1.0 + 0.5 * ve), r * sine_a * (1.0 + 0.5 * va))
     x = rotated(frame, x)
     p = covariance(frame, r, sine_e, cosine_e, sine_a, cosine_a, u)
-    put_plot(plots, (x[0], x[1] + frame[12], x[2]), p, detected)
+    put_plot(plots, (x[0], x[1] + frame[HEIGHT], x[2]), p, detected)
 
 
 @inline
@@ -113,46 +138,47 @@ def turned(sine, cosine, delta):
 def make_plots(random, frame, truth, scan, scans, certain, plots):
     """Plots of the scans `scan` … of a strip from their random rows.
 
-    truth: rows of eight plain numbers a scan of the whole track: range, sine and cosine of elevation and azimuth,
-    and x, y, z. The first `certain` plots of a track are always detected.
+    truth: PLOT_TRUTH plain numbers a scan of the whole track. The first `certain` plots of a track are always
+    detected.
     """
     one, zero = full(1.0), full(0.0)
     for n in range(scans):
-        t, normal = 8 * (scan + n), 3 * n
+        t, at, normal = PLOT_TRUTH * (scan + n), PLOT_TRUTH * (scan + n) + COORDINATES, 3 * n
         a, b, c = get(random, normal), get(random, normal + 1), get(random, normal + 2)
-        detected = where_greater(full(frame[15]), get(random, NORMALS + n), one, zero)
+        detected = where_greater(full(frame[DETECTION]), get(random, NORMALS + n), one, zero)
         if scan + n < certain:
             detected = one
-        if frame[13] == CARTESIAN:
-            x = truth[t + 5] + frame[9] * a, truth[t + 6] + frame[10] * b, truth[t + 7] + frame[11] * c
-            p = full(frame[9] * frame[9]), zero, zero, full(frame[10] * frame[10]), zero, full(frame[11] * frame[11])
-            put_plot(row(plots, n * PLOT), x, p, detected)
+        s0, s1, s2 = frame[SIGMA], frame[SIGMA + 1], frame[SIGMA + 2]
+        if frame[FORM] == CARTESIAN:
+            x = truth[at] + s0 * a, truth[at + 1] + s1 * b, truth[at + 2] + s2 * c
+            put_plot(row(plots, n * PLOT), x, (full(s0 * s0), zero, zero, full(s1 * s1), zero, full(s2 * s2)), detected)
         else:
-            sine_e, cosine_e = turned(truth[t + 1], truth[t + 2], frame[10] * b)
-            sine_a, cosine_a = turned(truth[t + 3], truth[t + 4], frame[11] * c)
-            r = truth[t] + frame[9] * a
+            sine_e, cosine_e = turned(truth[t + ELEVATION], truth[t + ELEVATION + 1], s1 * b)
+            sine_a, cosine_a = turned(truth[t + AZIMUTH], truth[t + AZIMUTH + 1], s2 * c)
+            r = truth[t + RANGE] + s0 * a
             biconical_plot(row(plots, n * PLOT), frame, r, sine_e, cosine_e, sine_a, cosine_a, detected)
 
 
 @part
 def noise_at_prediction(frame, mean, wait, at_plot, noise):
-    """Covariance (6 rows at `noise`) of a plot where the estimate `mean` (9 rows) is extrapolated to over `wait`.
+    """Covariance (6 rows at `noise`) of a plot at the place that the estimate `mean` (9 rows) is extrapolated to over
+    `wait` s, eq. (10).
 
-    Where that lies outside the sector, or nearly so, the covariance at the plot (6 rows at `at_plot`) stands. Eq. (10).
+    Where this place is outside the sector, or nearly so, the covariance at the plot (6 rows at `at_plot`) is taken.
     """
     half = 0.5 * wait * wait
     a = get(mean, 0) + wait * get(mean, 1) + half * get(mean, 2)
-    b = get(mean, 3) + wait * get(mean, 4) + half * get(mean, 5) - frame[12]
+    b = get(mean, 3) + wait * get(mean, 4) + half * get(mean, 5) - frame[HEIGHT]
     c = get(mean, 6) + wait * get(mean, 7) + half * get(mean, 8)
     x = frame[0] * a + frame[3] * b + frame[6] * c
     y = frame[1] * a + frame[4] * b + frame[7] * c
     z = frame[2] * a + frame[5] * b + frame[8] * c
     r = root(x * x + y * y + z * z)
     scale, least, one = 1.0 / r, full(NEARLY_OUTSIDE), full(1.0)
-    sine_e, sine_a, seen = y * scale, z * scale, x * scale
-    inside = where_greater(seen, least, one, full(0.0))
+    sine_e, sine_a, u = y * scale, z * scale, x * scale
+    inside = where_greater(u, least, one, full(0.0))
     sine_e, sine_a = sine_e * inside, sine_a * inside
-    u = where_greater(seen, least, seen, one)
+    u = where_greater(u, least, u, one)
     p = covariance(frame, r, sine_e, root(one - sine_e * sine_e), sine_a, root(one - sine_a * sine_a), u)
     for i in range(6):
         put(noise, i, where_greater(inside, full(0.5), p[i], get(at_plot, i)))
@@ -160,8 +186,7 @@ def noise_at_prediction(frame, mean, wait, at_plot, noise):
 
 @kernel
 def fill_plots(keys, frame, truth, certain, first, random, plots):
-    """All plots of the realisations first … first + 7 of a track: rows PLOT to a scan; truth (K, 8), see
-    `make_plots`."""
+    """All plots of the realisations first … first + 7 of a track, PLOT rows a scan; truth (K, PLOT_TRUTH)."""
     scans = truth.shape[0]
     for k in range(0, scans, STRIP):
         draw_strip(keys, first, k // STRIP, random)

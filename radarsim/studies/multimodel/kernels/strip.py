@@ -1,75 +1,145 @@
-"""A strip of scans with one filter: the track's start, models over the real interval, missed plots, outputs."""
+"""A strip of scans with one filter: the track's start, models over the real interval, missed plots, outputs.
+
+Letters, each of eight lanes but for the numbers i, j of models:
+
+    dt            time that a prediction is over, s: since the last plot
+    F, Q          a model over it, eq. (11); F (5) and Q (6) of one axis, the same for all three
+    T[i, j]       probability of passing from model j to model i over it, eq. (8)
+    a, b, g (3)   weights of a track's start: x = Σ a z, v = Σ b z, and how an acceleration errs the states
+    R             covariance of a plot (6)
+
+`work`, `plots`, `out` and the like are addresses.
+"""
+
+from typing import NamedTuple
 
 import numpy as np
 
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import address, any_greater, full, get, put, row, where_greater
-from radarsim.studies.multimodel.kernels.filters import GPB1, merge_gpb1, shared, step
-from radarsim.studies.multimodel.kernels.hypothesis import (
+from radarsim.studies.multimodel.kernels.filters import merge_gpb1, shares_by_rule, step
+from radarsim.studies.multimodel.kernels.hypothesis import get3, merge, mixed_mean, put3
+from radarsim.studies.multimodel.kernels.plots import noise_at_prediction
+from radarsim.studies.multimodel.kernels.records import (
+    AT_PREDICTION,
     BANK,
+    COUNTED,
+    COVARIANCE,
     CROSS,
+    CURRENT,
+    DETECTED,
     ESTIMATE,
+    ESTIMATED,
+    FAMILY,
+    GPB1,
     HYPOTHESIS,
     INNOVATION,
     MEAN,
-    MERGED,
-    MERGES,
+    MERGE,
+    MERGING,
     MODEL,
+    MODEL_NUMBERS,
+    MODEL_Q,
+    MODEL_ROWS,
     MODELS,
     MOST,
     NOISE,
     OUTPUT,
+    OUTPUT_RULE,
     OWN,
     PLOT,
-    POSITION,
+    POSITION_COVARIANCE,
+    PREPARED,
     PROBABILITY,
+    SETTLED,
     SHARE,
     SPARE,
+    START,
+    STATES,
     SURPRISE,
     TRANSITION,
     VARIANCE,
     WAIT,
     WEIGHT,
-    get3,
-    merged,
-    mixed_mean,
-    put3,
+    Rules,
 )
-from radarsim.studies.multimodel.kernels.plots import noise_at_prediction
+
+
+class Filter(NamedTuple):
+    """A filter, by addresses.
+
+    rules          what it is, see `records.Rules`
+    models         (size * 3,): moves, accelerates (0 or 1), sigma of the acceleration per step in m/s²
+    transitions    (U * size * size,): T over each different interval between scans, row by row
+    """
+
+    rules: Rules
+    models: np.ndarray
+    transitions: np.ndarray
+
+
+class Memory(NamedTuple):
+    """A filter's memory, by addresses: rows (WORK), numbers CURRENT … SETTLED, and room for MOST whole numbers."""
+
+    work: np.ndarray
+    numbers: np.ndarray
+    listed: np.ndarray
+
+
+class Scans(NamedTuple):
+    """The scans first … stop - 1 of a strip.
+
+    intervals      address, (scans,): number of each scan's interval since the last one
+    times          address, (U,): the intervals, s
+    reported       address, (scans,): 1 where covariances are wanted
+    """
+
+    first: int
+    stop: int
+    intervals: np.ndarray
+    times: np.ndarray
+    reported: np.ndarray
 
 
 @inline
-def prepare_model(work, at, moves, bends, sigma, dt):
-    """F and Q of eq. (11) over dt (lanes); moves, bends (0 or 1): with velocity, acceleration; sigma of it per step."""
+def prepare_model(work, at, moves, accelerates, sigma, dt):
+    """F and Q = G sigma² G' over dt into the rows at `at` (eq. 11), G = (dt² / 2, moves dt, accelerates)'.
+
+    moves, accelerates (0 or 1): whether the model has a velocity, an acceleration; sigma of it per step, m/s².
+    """
     half, variance = 0.5 * dt * dt, sigma * sigma
     g0, g1 = half, moves * dt
-    put3(work, at, (g1, bends * half, full(moves)))
-    put3(work, at + 3, (bends * dt, full(bends), variance * (g0 * g0)))
-    put3(work, at + 6, (variance * (g0 * g1), (variance * bends) * g0, variance * (g1 * g1)))
-    put(work, at + 9, (variance * bends) * g1)
-    put(work, at + 10, full(variance * bends))
+    put3(work, at, (g1, accelerates * half, full(moves)))
+    put(work, at + 3, accelerates * dt)
+    put(work, at + 4, full(accelerates))
+    at += MODEL_Q
+    put3(work, at, (variance * (g0 * g0), variance * (g0 * g1), (variance * accelerates) * g0))
+    put3(work, at + 3, (variance * (g1 * g1), (variance * accelerates) * g1, full(variance * accelerates)))
 
 
 @part
-def prepare_step(work, size, models, transitions, transition, dt, settled):
+def prepare_step(work, design, interval, dt, settled):
     """Models and transition probabilities over the time since each lane's last plot.
 
-    The matrix at transitions[transition …] holds over the interval dt since the last scan; where plots were missed
-    since (not settled), P(a + b) = P(a) P(b), eq. (8).
+    interval is the number of the interval dt since the last scan; where plots were missed since then (not settled),
+    T(a + b) = T(a) T(b), eq. (8).
     """
+    size, models = design.rules.size, design.models
+    first = interval * size * size
     wait = full(dt)
     if not settled:
         wait = wait + get(work, WAIT)
     put(work, WAIT, wait)
     for i in range(size):
-        prepare_model(work, MODEL + 11 * i, models[3 * i], models[3 * i + 1], models[3 * i + 2], wait)
+        m = MODEL_NUMBERS * i
+        prepare_model(work, MODEL + MODEL_ROWS * i, models[m], models[m + 1], models[m + 2], wait)
     for j in range(size):
         for i in range(size):
-            c = full(transitions[transition + i * size + j])
+            c = full(design.transitions[first + i * size + j])
             if not settled:
                 c = full(0.0)
                 for n in range(size):
-                    c = c + transitions[transition + i * size + n] * get(work, TRANSITION + n * MOST + j)
+                    c = c + design.transitions[first + i * size + n] * get(work, TRANSITION + n * MOST + j)
             put(work, WEIGHT + i, c)
         for i in range(size):
             put(work, TRANSITION + i * MOST + j, get(work, WEIGHT + i))
@@ -90,59 +160,44 @@ def keep_missed(work, old, new, size, detected):
 
 
 @part
-def output(work, listed, bank, size, rule, everything, out):
-    """Merge a bank by the output rule into the rows at `out`.
+def output(work, listed, bank, rules, reported, out):
+    """Merge a bank by the output rule into the rows at `out`, see OUTPUT.
 
-    Mean (9); where `everything`: variances (9) from VARIANCE, position covariances xy, xz, yz from POSITION,
-    probabilities from MODELS; at INNOVATION the normalised innovation squared of what was thought most probable
-    before the plot. (The rows from MERGES on, hypotheses merged and merges, are written at the end of the scan.)
+    Variances, covariances and probabilities only where `reported`; the rows from MERGING on are written at the end of
+    the scan.
     """
+    size = rules.size
     for j in range(size):
         put(work, WEIGHT + j, get(work, bank + j * HYPOTHESIS + PROBABILITY))
-    count = shared(work, listed, bank, size, full(1.0), full(0.0), rule)
+    count = shares_by_rule(work, listed, bank, size, full(1.0), full(0.0), rules.output)
     put(out, INNOVATION, get(work, SURPRISE))
-    if not everything:
+    if not reported:
         for axis in range(3):
             put3(out, 3 * axis, mixed_mean(listed, count, row(work, SHARE), row(work, MEAN + 3 * axis)))
         return
-    merged(work, listed, count, row(work, SPARE))
+    merge(work, listed, count, row(work, SPARE))
     for axis in range(3):
         own = SPARE + OWN + 6 * axis
         put3(out, 3 * axis, get3(work, SPARE + MEAN + 3 * axis))
         put3(out, VARIANCE + 3 * axis, (get(work, own), get(work, own + 3), get(work, own + 5)))
-        put(out, POSITION + axis, get(work, SPARE + CROSS + 9 * axis))
+        put(out, POSITION_COVARIANCE + axis, get(work, SPARE + CROSS + 9 * axis))
     for j in range(size):
         put(out, MODELS + j, get(work, bank + j * HYPOTHESIS + PROBABILITY))
 
 
 @part
 def start(work, numbers, size, plots, weights, probabilities):
-    """The first bank, the same hypothesis for all models, from the plots of the first three scans.
+    """The first bank, the same hypothesis for all models, from the plots of the first START scans.
 
-    weights (9,): how the coordinate and the velocity at the third plot are made of the three coordinates, a (3) and
-    b (3); how an acceleration of one standard deviation would err the three states, g (3). probabilities (size,): to
-    start with.
+    weights (9,): a (3) and b (3), by which the coordinate and the velocity at the third plot are made of the three
+    coordinates; g (3), the errors that an acceleration of one standard deviation makes in the three states.
+    probabilities (size,): of the models at the start.
     """
     for e in range(6):
-        aa, ab, bb = full(0.0), full(0.0), full(0.0)
-        for k in range(3):
-            r = get(plots, k * PLOT + 3 + e)
-            aa = aa + (weights[k] * weights[k]) * r
-            ab = ab + (weights[k] * weights[3 + k]) * r
-            bb = bb + (weights[3 + k] * weights[3 + k]) * r
-        axis = 0 if e == 0 else (1 if e == 3 else 2)
-        if e == 0 or e == 3 or e == 5:
-            at, g, h, d = OWN + 6 * axis, weights[6], weights[7], weights[8]
-            put3(work, at, (aa + g * g, ab + g * h, full(g * d)))
-            put3(work, at + 3, (bb + h * h, full(h * d), full(d * d)))
-        else:
-            at, zero = CROSS + 9 * (e - 1 if e < 3 else 2), full(0.0)
-            put3(work, at, (aa, ab, zero))
-            put3(work, at + 3, (ab, bb, zero))
-            put3(work, at + 6, (zero, zero, zero))
+        start_block(work, e, plots, weights)
     for axis in range(3):
         x, v = full(0.0), full(0.0)
-        for k in range(3):
+        for k in range(START):
             z = get(plots, k * PLOT + axis)
             x, v = x + weights[k] * z, v + weights[3 + k] * z
         put3(work, MEAN + 3 * axis, (x, v, full(0.0)))
@@ -150,95 +205,83 @@ def start(work, numbers, size, plots, weights, probabilities):
         put(work, i * HYPOTHESIS + PROBABILITY, full(probabilities[i]))
         for at in range(PROBABILITY):
             put(work, i * HYPOTHESIS + at, get(work, at))
-    for at in range(9):
+    for at in range(STATES):
         put(work, ESTIMATE + at, get(work, MEAN + at))
-    numbers[0], numbers[1], numbers[2] = 0, -1, 1
+    numbers[CURRENT], numbers[PREPARED], numbers[SETTLED] = 0, -1, 1
+
+
+@inline
+def start_block(work, e, plots, weights):
+    """The block of the first covariance for element e of R (xx, xy, xz, yy, yz, zz): Σ (a, b)' (a, b) R, and g g' on
+    the diagonal."""
+    aa, ab, bb = full(0.0), full(0.0), full(0.0)
+    for k in range(START):
+        R = get(plots, k * PLOT + COVARIANCE + e)
+        aa = aa + (weights[k] * weights[k]) * R
+        ab = ab + (weights[k] * weights[3 + k]) * R
+        bb = bb + (weights[3 + k] * weights[3 + k]) * R
+    if e == 0 or e == 3 or e == 5:
+        at, g0, g1, g2 = OWN + (0 if e == 0 else (6 if e == 3 else 12)), weights[6], weights[7], weights[8]
+        put3(work, at, (aa + g0 * g0, ab + g0 * g1, full(g0 * g2)))
+        put3(work, at + 3, (bb + g1 * g1, full(g1 * g2), full(g2 * g2)))
+    else:
+        at, zero = CROSS + 9 * (e - 1 if e < 3 else 2), full(0.0)
+        put3(work, at, (aa, ab, zero))
+        put3(work, at + 3, (ab, bb, zero))
+        put3(work, at + 6, (zero, zero, zero))
 
 
 @part
-def run_strip(
-    work,
-    numbers,
-    listed,
-    plots,
-    first,
-    stop,
-    size,
-    models,
-    transitions,
-    intervals,
-    times,
-    rules,
-    frame,
-    everything,
-    out,
-):
-    """Run one filter over the scans first … stop - 1 of a strip; all arrays by their addresses.
+def run_strip(memory, design, scans, plots, frame, out):
+    """Run one filter over scans; see `Memory`, `Filter`, `Scans`.
 
-    work, numbers  its memory, see `work_arrays`: numbers are the bank in use, the interval that the rows MODEL and
-                   TRANSITION hold for (-1: none), and 1 where no lane waits for a plot that it missed
-    listed         memory for MOST whole numbers
-    plots          rows: PLOT of them a scan
-    models         (size * 3,): moves, accelerates (0 or 1), sigma of the acceleration per step in m/s²
-    transitions    (U * size * size,): over each different interval between scans, columns: from
-    intervals      (scans,) number of each scan's interval; times (U,) in s
-    rules          family, merging rule, output rule, 1 to evaluate the measurement covariance at the prediction
-    frame          antenna, for the latter: see `multimodel_plots.frame`
-    everything     (scans,): 1 where covariances are wanted
-    out            rows: OUTPUT of them a scan
+    plots: PLOT rows a scan; frame: of the sensor, for the covariance at the prediction; out: OUTPUT rows a scan.
     """
-    family, rule = rules[0], rules[1]
-    for k in range(first, stop):
-        plot, interval, to = row(plots, k * PLOT), intervals[k], row(out, k * OUTPUT)
-        noise, detected = row(plot, 3), get(plot, 9)
-        if numbers[1] != interval or numbers[2] == 0:
-            prepare_step(work, size, models, transitions, interval * size * size, times[interval], numbers[2] == 1)
-            numbers[1] = interval
-        if rules[3] == 1:
+    work, numbers, listed = memory.work, memory.numbers, memory.listed
+    rules = design.rules
+    for k in range(scans.first, scans.stop):
+        plot, interval, to = row(plots, k * PLOT), scans.intervals[k], row(out, k * OUTPUT)
+        noise, detected = row(plot, COVARIANCE), get(plot, DETECTED)
+        if numbers[PREPARED] != interval or numbers[SETTLED] == 0:
+            prepare_step(work, design, interval, scans.times[interval], numbers[SETTLED] == 1)
+            numbers[PREPARED] = interval
+        if rules.at_prediction == 1:
             noise = row(work, NOISE)
-            noise_at_prediction(frame, row(work, ESTIMATE), get(work, WAIT), row(plot, 3), noise)
-        put(work, MERGED, full(0.0))
-        put(work, MERGED + 1, full(0.0))
-        old, new = numbers[0] * BANK, (1 - numbers[0]) * BANK
-        step(work, listed, old, new, size, family, rule, plot, noise)
-        output(work, listed, new, size, rules[2], everything[k] == 1, to)
-        if family == GPB1:
-            merge_gpb1(work, listed, old, new, size, rule)
-        put(to, MERGES, get(work, MERGED))
-        put(to, MERGES + 1, get(work, MERGED + 1))
-        if rules[3] == 1:
-            for i in range(9):
-                put(work, ESTIMATE + i, where_greater(detected, full(0.5), get(to, i), get(work, ESTIMATE + i)))
+            noise_at_prediction(frame, row(work, ESTIMATE), get(work, WAIT), row(plot, COVARIANCE), noise)
+        put(work, COUNTED, full(0.0))
+        put(work, COUNTED + 1, full(0.0))
+        old, new = numbers[CURRENT] * BANK, (1 - numbers[CURRENT]) * BANK
+        step(work, listed, old, new, rules, plot, noise)
+        output(work, listed, new, rules, scans.reported[k] == 1, to)
+        if rules.family == GPB1:
+            merge_gpb1(work, listed, old, new, rules.size, rules.merge)
+        put(to, MERGING, get(work, COUNTED))
+        put(to, MERGING + 1, get(work, COUNTED + 1))
+        if rules.at_prediction == 1:
+            for i in range(STATES):
+                x = get(to, ESTIMATED + i)
+                put(work, ESTIMATE + i, where_greater(detected, full(0.5), x, get(work, ESTIMATE + i)))
         if any_greater(full(0.5), detected):
-            keep_missed(work, old, new, size, detected)
-            numbers[2] = 0
-        elif numbers[2] == 0:
-            numbers[1], numbers[2] = -1, 1
-        numbers[0] = 1 - numbers[0]
+            keep_missed(work, old, new, rules.size, detected)
+            numbers[SETTLED] = 0
+        elif numbers[SETTLED] == 0:
+            numbers[PREPARED], numbers[SETTLED] = -1, 1
+        numbers[CURRENT] = 1 - numbers[CURRENT]
+
+
+@inline
+def rules_of(numbers, size):
+    """The rules of a filter from its numbers (FAMILY, MERGE, OUTPUT_RULE, AT_PREDICTION)."""
+    return Rules(numbers[FAMILY], numbers[MERGE], numbers[OUTPUT_RULE], numbers[AT_PREDICTION], size)
 
 
 @kernel
-def filter_strip(
-    work, numbers, plots, first, stop, models, transitions, intervals, times, rules, frame, everything, out
-):
+def filter_strip(work, numbers, plots, first, stop, models, transitions, intervals, times, rules, frame, reported, out):
     """`run_strip` of arrays."""
-    run_strip(
-        address(work),
-        address(numbers),
-        address(np.zeros(MOST, dtype=np.int64)),
-        address(plots),
-        first,
-        stop,
-        models.size // 3,
-        address(models),
-        address(transitions),
-        address(intervals),
-        address(times),
-        address(rules),
-        address(frame),
-        address(everything),
-        address(out),
-    )
+    memory = Memory(address(work), address(numbers), address(np.zeros(MOST, dtype=np.int64)))
+    design = Filter(rules_of(rules, models.size // MODEL_NUMBERS), address(models), address(transitions))
+    scans = Scans(first, stop, address(intervals), address(times), address(reported))
+    run_strip(memory, design, scans, address(plots), address(frame), address(out))
 
 
 @kernel

@@ -1,4 +1,15 @@
-"""A block of realisations of the multimodel study: plots, all filters on them, and the sums of what they estimate."""
+"""A block of realisations of the multimodel study: plots, all filters on them, and the sums of what they estimate.
+
+Letters, each of eight lanes:
+
+    e          error of an estimate, by state (9), or of its position (3)
+    e0         the same of the baseline filter
+    p          probability of a model
+    q          e' P⁻¹ e of the position, with the covariance that the filter believes
+    counted    1 for the realisations that count, 0 for those beyond the block's last
+
+Arrays and their shapes: `records.World`, `Banks`, `Sums`; arguments that are not these are addresses or numbers.
+"""
 
 from typing import NamedTuple
 
@@ -7,88 +18,140 @@ import numpy as np
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, rows, total, where_greater
 from radarsim.kernels.symmetric import dot, factored, scaled, whitened
-from radarsim.studies.multimodel.kernels.hypothesis import (
+from radarsim.studies.multimodel.kernels import strip
+from radarsim.studies.multimodel.kernels.plots import RANDOM, STRIP, draw_strip, make_plots
+from radarsim.studies.multimodel.kernels.records import (
+    DETECTED,
     INNOVATION,
-    MERGES,
+    MEANS,
+    MERGED,
+    MERGING,
     MODELS,
     MOST,
+    NEES,
+    NIS,
     OUTPUT,
     PLOT,
-    POSITION,
+    PLOTS,
+    POSITION_COVARIANCE,
+    SIZE,
+    STAGE,
+    START,
+    STATES,
     VARIANCE,
     WORK,
 )
-from radarsim.studies.multimodel.kernels.plots import RANDOM, STRIP, draw_strip, make_plots
-from radarsim.studies.multimodel.kernels.strip import run_strip, start
+from radarsim.studies.multimodel.kernels.strip import Filter, Scans, rules_of, run_strip, start
 
-START = 3  # plots that a track is started from
-STAGE = 14  # rows of a stage: sums of nine squared errors, NEES, NIS, hypotheses merged, merges; number of plots
-MEANS, NEES, NIS, PLOTS = 13, 9, 10, 13
+
+class Memory(NamedTuple):
+    """Memory of one thread for eight realisations: rows, and whole numbers.
+
+    works      WORK rows of each filter; numbers (F, 8), listed (MOST,): its whole numbers, see `strip.Memory`
+    random     RANDOM rows; plots: PLOT rows a scan of a strip; out: OUTPUT rows a filter and scan of a strip
+    stages     STAGE rows a filter and stage
+    counted    one row
+    """
+
+    works: np.ndarray
+    random: np.ndarray
+    plots: np.ndarray
+    out: np.ndarray
+    stages: np.ndarray
+    counted: np.ndarray
+    numbers: np.ndarray
+    listed: np.ndarray
+
+
+class ScanSums(NamedTuple):
+    """The sums of one filter and scan, by addresses: see `records.Sums`."""
+
+    error: np.ndarray
+    paired: np.ndarray
+    probability: np.ndarray
+    believed: np.ndarray
+
+
+def memory(filters: int, stages: int) -> Memory:
+    """Memory for a number of filters and of stages."""
+    return Memory(
+        works=rows(filters * WORK),
+        random=rows(RANDOM),
+        plots=rows(STRIP * PLOT),
+        out=rows(filters * STRIP * OUTPUT),
+        stages=rows(filters * stages * STAGE),
+        counted=rows(1),
+        numbers=np.zeros((filters, 8), dtype=np.int64),
+        listed=np.zeros(MOST, dtype=np.int64),
+    )
+
+
+@inline
+def position_error(out, truth):
+    """Error of the estimated position (3)."""
+    return get(out, 0) - truth[0], get(out, 3) - truth[3], get(out, 6) - truth[6]
 
 
 @inline
 def believed_error(out, e):
-    """e' P⁻¹ e of the position (3), with the covariance that the filter believes."""
-    p = (
+    """q = e' P⁻¹ e of the position (3), with the covariance that the filter believes."""
+    P = (
         get(out, VARIANCE),
-        get(out, POSITION),
-        get(out, POSITION + 1),
+        get(out, POSITION_COVARIANCE),
+        get(out, POSITION_COVARIANCE + 1),
         get(out, VARIANCE + 3),
-        get(out, POSITION + 2),
+        get(out, POSITION_COVARIANCE + 2),
         get(out, VARIANCE + 6),
     )
-    lower, i, _ = factored(p)
-    e = whitened(e, lower)
+    L, i, _ = factored(P)  # P = L D L', i: the diagonal of D⁻¹
+    e = whitened(e, L)
     return dot(scaled(e, i), e)
 
 
 @part
-def add_scan(out, base, truth, counted, kept, error, paired, probability, believed):
-    """Add a reported scan of eight realisations to the sums, all by addresses of that filter and scan.
+def add_scan(out, base, truth, counted, size, sums):
+    """Add a reported scan of eight realisations to the sums of that filter and scan (`ScanSums`).
 
-    out, base: outputs of the filter and of the baseline; truth (9,); counted (lanes): 1 for the realisations that
-    count.
+    out, base: outputs of the filter and of the baseline; truth (9,); size: number of models.
     """
-    for c in range(9):
-        e, b = counted * (get(out, c) - truth[c]), get(base, c) - truth[c]
+    for c in range(STATES):
+        e, e0 = counted * (get(out, c) - truth[c]), get(base, c) - truth[c]
         e2 = e * e
-        error[4 * c] += total(e)
-        error[4 * c + 1] += total(e2)
-        error[4 * c + 2] += total(e2 * e)
-        error[4 * c + 3] += total(e2 * e2)
-        paired[c] += total(e2 * (b * b))
-    for i in range(kept):
+        sums.error[4 * c] += total(e)
+        sums.error[4 * c + 1] += total(e2)
+        sums.error[4 * c + 2] += total(e2 * e)
+        sums.error[4 * c + 3] += total(e2 * e2)
+        sums.paired[c] += total(e2 * (e0 * e0))
+    for i in range(size):
         p = counted * get(out, MODELS + i)
-        probability[2 * i] += total(p)
-        probability[2 * i + 1] += total(p * p)
-    e = get(out, 0) - truth[0], get(out, 3) - truth[3], get(out, 6) - truth[6]
-    q = counted * believed_error(out, e)
-    believed[0] += total(q)
-    believed[1] += total(q * q)
+        sums.probability[2 * i] += total(p)
+        sums.probability[2 * i + 1] += total(p * p)
+    q = counted * believed_error(out, position_error(out, truth))
+    sums.believed[0] += total(q)
+    sums.believed[1] += total(q * q)
 
 
 @part
-def add_to_stage(out, plot, truth, everything, stage):
-    """Add a scan to the rows of its stage: squared errors and NIS; NEES where `everything` is known."""
-    for c in range(9):
+def add_to_stage(out, plot, truth, reported, stage):
+    """Add a scan to the rows of its stage: squared errors, NIS and merges; NEES where `reported`."""
+    for c in range(STATES):
         e = get(out, c) - truth[c]
         put(stage, c, get(stage, c) + e * e)
-    detected = get(plot, 9)
+    detected = get(plot, DETECTED)
     put(stage, NIS, get(stage, NIS) + detected * get(out, INNOVATION))
     put(stage, PLOTS, get(stage, PLOTS) + detected)
     for i in range(2):
-        put(stage, NIS + 1 + i, get(stage, NIS + 1 + i) + get(out, MERGES + i))
-    if everything:
-        e = get(out, 0) - truth[0], get(out, 3) - truth[3], get(out, 6) - truth[6]
-        put(stage, NEES, get(stage, NEES) + believed_error(out, e))
+        put(stage, MERGED + i, get(stage, MERGED + i) + get(out, MERGING + i))
+    if reported:
+        put(stage, NEES, get(stage, NEES) + believed_error(out, position_error(out, truth)))
 
 
 @part
 def close_stages(stages, filters, count, lengths, counted, sums, pairs):
     """Add each realisation's means over each stage to the sums, and the products of all pairs of filters.
 
-    stages: rows of all filters, STAGE for each stage; lengths (count, 2): scans of a stage, and those with covariances;
-    sums (F, S, MEANS, 2): of nine squared errors, NEES, NIS, hypotheses merged, merges; pairs (F, F, S, 9).
+    stages: rows of all filters, STAGE for each of `count` stages; lengths (count, 2): scans of a stage, and the
+    reported ones; sums (F, S, MEANS, 2); pairs (F, F, S, 9).
     """
     for s in range(count):
         for f in range(filters):
@@ -106,103 +169,21 @@ def close_stages(stages, filters, count, lengths, counted, sums, pairs):
                 sums[(at * MEANS + c) * 2 + 1] += total(x * x)
             for g in range(filters):
                 other, at = row(stages, (g * count + s) * STAGE), (f * filters + g) * count + s
-                for c in range(9):
-                    pairs[at * 9 + c] += total(counted * get(own, c) * get(other, c))
+                for c in range(STATES):
+                    pairs[at * STATES + c] += total(counted * get(own, c) * get(other, c))
 
 
 @inline
-def clear(rows, count):
-    """Set `count` rows to zero."""
+def clear(first, count):
+    """Set `count` rows from the address `first` on to zero."""
     for n in range(count):
-        put(rows, n, full(0.0))
-
-
-class World(NamedTuple):
-    """What all filters share, K scans.
-
-    keys (2, 2)            streams of noise and of detections
-    frame                  sensor, see `multimodel_plots.frame`
-    plot_truth (K, 8)      see `multimodel_plots.make_plots`; truth (K, 9): the state
-    intervals (K,)         number of each scan's interval since the last one; times (U,): the intervals, s
-    everything, place (K,) whether a scan is reported, and its place among those
-    stage (K,)             stage of a scan; lengths (S, 2): see `close_stages`
-    weights (9,)           start of the track, see `multimodel_strip.start`
-    """
-
-    keys: np.ndarray
-    frame: np.ndarray
-    plot_truth: np.ndarray
-    truth: np.ndarray
-    intervals: np.ndarray
-    times: np.ndarray
-    everything: np.ndarray
-    place: np.ndarray
-    stage: np.ndarray
-    lengths: np.ndarray
-    weights: np.ndarray
-
-
-class Banks(NamedTuple):
-    """The filters, rows padded to eights.
-
-    numbers (F, 8)         family, merging rule, output rule, covariance at the prediction, number of models
-    models (F, 16), transitions (F, …), probabilities (F, 8): see `multimodel_strip.run_strip`
-    """
-
-    numbers: np.ndarray
-    models: np.ndarray
-    transitions: np.ndarray
-    probabilities: np.ndarray
-
-
-class Memory(NamedTuple):
-    """Memory of one thread: rows, and whole numbers."""
-
-    works: np.ndarray
-    random: np.ndarray
-    plots: np.ndarray
-    out: np.ndarray
-    stages: np.ndarray
-    counted: np.ndarray
-    numbers: np.ndarray
-    listed: np.ndarray
-
-
-class MultimodelSums(NamedTuple):
-    """Sums over realisations, K' reported scans, S stages.
-
-    error (F, K', 9, 4): e, e², e³, e⁴; paired (F, K', 9): with the baseline's e²; probability (F, K', MOST, 2);
-    believed (F, K', 2): NEES; stage (F, S, MEANS, 2): means over the stage of nine squared errors, NEES, NIS,
-    hypotheses merged, merges; pairs (F, F, S, 9): of the mean squares of two filters.
-    """
-
-    error: np.ndarray
-    paired: np.ndarray
-    probability: np.ndarray
-    believed: np.ndarray
-    stage: np.ndarray
-    pairs: np.ndarray
-
-
-def memory(filters: int, stages: int) -> Memory:
-    """Memory for a number of filters and of stages."""
-    return Memory(
-        rows(filters * WORK),
-        rows(RANDOM),
-        rows(STRIP * PLOT),
-        rows(filters * STRIP * OUTPUT),
-        rows(filters * stages * STAGE),
-        rows(1),
-        np.zeros((filters, 8), dtype=np.int64),
-        np.zeros(MOST, dtype=np.int64),
-    )
+        put(first, n, full(0.0))
 
 
 @kernel
 def simulate_block(world, banks, memory, sums, baseline, first, count):
     """Add the realisations first … first + count - 1 to the sums; gains are against the filter `baseline`."""
     filters, scans, stages = banks.numbers.shape[0], world.truth.shape[0], world.lengths.shape[0]
-    padded = banks.transitions.shape[1] // WIDTH
     for group in range(0, count, WIDTH):
         for n in range(WIDTH):
             memory.counted[n] = 1.0 if group + n < count else 0.0
@@ -210,30 +191,10 @@ def simulate_block(world, banks, memory, sums, baseline, first, count):
         for k in range(0, scans, STRIP):
             length, begin = min(STRIP, scans - k), START if k == 0 else 0
             draw_strip(world.keys, first + group, k // STRIP, memory.random)
-            plots, frame, held = address(memory.plots), address(world.frame), address(memory.numbers)
+            plots, frame = address(memory.plots), address(world.frame)
             make_plots(address(memory.random), frame, address(world.plot_truth), k, length, START, plots)
             for f in range(filters):
-                work, size = row(address(memory.works), f * WORK), banks.numbers[f, 4]
-                if k == 0:
-                    chances = row(address(banks.probabilities), f)
-                    start(work, row(held, f), size, plots, address(world.weights), chances)
-                run_strip(
-                    work,
-                    row(held, f),
-                    address(memory.listed),
-                    plots,
-                    begin,
-                    length,
-                    size,
-                    row(address(banks.models), 2 * f),
-                    row(address(banks.transitions), padded * f),
-                    address(world.intervals[k:]),
-                    address(world.times),
-                    row(address(banks.numbers), f),
-                    frame,
-                    address(world.everything[k:]),
-                    row(address(memory.out), f * STRIP * OUTPUT),
-                )
+                filter_scans(world, banks, memory, f, k, begin, length)
             add_strip(world, banks, memory, sums, baseline, k, begin, length)
         close_stages(
             address(memory.stages),
@@ -247,6 +208,21 @@ def simulate_block(world, banks, memory, sums, baseline, first, count):
 
 
 @inline
+def filter_scans(world, banks, memory, f, k, begin, length):
+    """Run filter f over a strip that starts at scan k, from its scan `begin` on; start the track in the first."""
+    padded = banks.transitions.shape[1] // WIDTH
+    work, numbers = row(address(memory.works), f * WORK), row(address(memory.numbers), f)
+    plots, size = address(memory.plots), banks.numbers[f, SIZE]
+    if k == 0:
+        start(work, numbers, size, plots, address(world.weights), row(address(banks.probabilities), f))
+    rules = rules_of(row(address(banks.numbers), f), size)
+    design = Filter(rules, row(address(banks.models), 2 * f), row(address(banks.transitions), padded * f))
+    scans = Scans(begin, length, address(world.intervals[k:]), address(world.times), address(world.reported[k:]))
+    held = strip.Memory(work, numbers, address(memory.listed))
+    run_strip(held, design, scans, plots, address(world.frame), row(address(memory.out), f * STRIP * OUTPUT))
+
+
+@inline
 def add_strip(world, banks, memory, sums, baseline, k, begin, length):
     """Add the outputs of all filters over a strip that starts at scan k."""
     stages = world.lengths.shape[0]
@@ -256,17 +232,14 @@ def add_strip(world, banks, memory, sums, baseline, k, begin, length):
         for n in range(begin, length):
             out, truth = row(address(memory.out), (f * STRIP + n) * OUTPUT), address(world.truth[k + n])
             stage = row(address(memory.stages), (f * stages + world.stage[k + n]) * STAGE)
-            add_to_stage(out, row(address(memory.plots), n * PLOT), truth, world.everything[k + n] == 1, stage)
-            if world.everything[k + n] == 1:
+            reported = world.reported[k + n] == 1
+            add_to_stage(out, row(address(memory.plots), n * PLOT), truth, reported, stage)
+            if reported:
                 place = world.place[k + n]
-                add_scan(
-                    out,
-                    row(base, n * OUTPUT),
-                    truth,
-                    counted,
-                    banks.numbers[f, 4],
+                places = ScanSums(
                     address(sums.error[f, place]),
                     address(sums.paired[f, place]),
                     address(sums.probability[f, place]),
                     address(sums.believed[f, place]),
                 )
+                add_scan(out, row(base, n * OUTPUT), truth, counted, banks.numbers[f, SIZE], places)

@@ -1,0 +1,76 @@
+"""What one update of each filter costs: arithmetic operations counted, and seconds measured by the clock."""
+
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from radarsim.studies.multimodel import filters
+from radarsim.studies.multimodel.kernels.records import MODEL_NUMBERS, OUTPUT, PLOT, SIZE, START
+
+# Additions, subtractions, multiplications, divisions, roots and exponentials of one step, all three axes, counted on
+# the formulas of `radarsim.kernels.symmetric` and `kernels.hypothesis` (a test counts them again); PREDICT, UPDATE by
+# whether the model accelerates: the zeros of one that does not are left out.
+PREDICT, UPDATE = {True: 282, False: 99}, {True: 456, False: 267}
+LIKELIHOOD, MERGE, MERGE_ONCE = 8, 208, -9
+
+MOST_SCANS, PASSES = 4096, 5  # of the measurement by the clock
+
+
+def operations(family: str, transition: np.ndarray, accelerates: Sequence[bool]) -> tuple[float, float, float]:
+    """Arithmetic operations of one scan: fixed ones, and those of each merged hypothesis and of each merge.
+
+    transition (M, M); accelerates (M,): whether each model has an acceleration. A merge of a single hypothesis is a
+    copy and costs nothing.
+    """
+    size = len(transition)
+    times = np.count_nonzero(transition, axis=1) if family == "gpb2" else np.ones(size, dtype=int)
+    advanced = sum(n * (PREDICT[bool(a)] + UPDATE[bool(a)]) for n, a in zip(times, accelerates, strict=True))
+    predicted = size * (2 * size - 1) if size > 1 else 0
+    likelihoods = times.sum() * LIKELIHOOD if size > 1 else 0
+    return float(advanced + likelihoods + predicted), MERGE, MERGE_ONCE
+
+
+def operations_of(options) -> tuple[float, float, float]:
+    """`operations` of a filter of a config."""
+    accelerates = [filters.MOTIONS[model.motion][1] > 0 for model in options.models]
+    return operations(options.family, filters.transition_matrix(options.transition), accelerates)
+
+
+def seconds_per_update(plan) -> dict[str, float]:
+    """CPU seconds of one update of one realisation by filter, outputs included, noise, plots and sums not.
+
+    The least of some passes over the first scans of the flight, in a thread of a pool as kernels run.
+    """
+    from radarsim.kernels.lanes import WIDTH, rows
+    from radarsim.studies.multimodel.kernels import plots
+
+    world = plan.world
+    count = min(len(world.truth), MOST_SCANS)
+    found = rows(count * PLOT)
+    plots.fill_plots(world.keys, world.frame, world.plot_truth[:count], START, 0, rows(plots.RANDOM), found)
+    with ThreadPoolExecutor(1) as pool:
+        seconds = [
+            min(pool.submit(_seconds, plan, f, found, count).result() for _ in range(PASSES))
+            for f in range(len(plan.axes.filters))
+        ]
+    return {name: s / (WIDTH * (count - START)) for name, s in zip(plan.axes.filters, seconds, strict=True)}
+
+
+def _seconds(plan, f: int, found: np.ndarray, count: int) -> float:
+    """CPU seconds of filter f over the scans after the start of its track."""
+    from radarsim.kernels.lanes import rows
+    from radarsim.studies.multimodel.kernels import hypothesis, strip
+
+    world, banks, (work, numbers) = plan.world, plan.banks, hypothesis.work_arrays()
+    size = banks.numbers[f, SIZE]
+    strip.start_strip(work, numbers, found, world.weights, banks.probabilities[f, :size])
+    out, scans = rows(count * OUTPUT), (found, START, count)
+    models, transitions = banks.models[f, : MODEL_NUMBERS * size], banks.transitions[f]
+    started = time.thread_time()
+    strip.filter_strip(
+        *(work, numbers, *scans, models, transitions, world.intervals, world.times, banks.numbers[f], world.frame),
+        *(world.reported, out),
+    )
+    return time.thread_time() - started

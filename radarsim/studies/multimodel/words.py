@@ -1,0 +1,37 @@
+"""What the report of P2's experiments asks and answers, in sentences."""
+
+from collections.abc import Mapping, Sequence
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import panels
+
+
+def question(experiment) -> str:
+    """What the experiment asks, in one sentence."""
+    filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
+    names = ", ".join(filters[:-1]) + (" and " if len(filters) > 1 else "") + filters[-1]
+    flights = len(experiment.cases)
+    return f"How accurately do {names} track the target" + (f" in {flights} cases?" if flights > 1 else "?")
+
+
+def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
+    """Sentences: which filter has the least σ of the height in each stage, by case; for one case also of the rate of
+    climb."""
+    shown, others = panels.told(results, 4)
+    height = [f"{panels.plain_label(result)}: {_least(result, made, 'y', 'the height')}" for result in shown]
+    climb = [f"{panels.plain_label(results[0])}: {_least(results[0], made, 'vy', 'the rate of climb')}"]
+    return [*height, *(climb if len(results) == 1 else []), *others]
+
+
+def _least(result: CaseResult, made: Mapping, component: str, quantity: str) -> str:
+    """The filter of the least σ in each stage, with the interval."""
+    rows = made["stages"]
+    rows = rows[(rows["case"] == result.name) & (rows["component"] == component)]
+    parts = []
+    for stage, own in rows.groupby("stage", sort=False):
+        best = own.loc[own["sigma"].idxmin()]
+        value, low, high = (f"{float(f'{best[name]:.3g}'):,.10g}" for name in ("sigma", "sigma_lo", "sigma_hi"))
+        parts.append(
+            f"{stage} {best['filter']}, {value} {panels.UNITS.get(best['unit'], best['unit'])} [{low}, {high}]"
+        )
+    return f"least σ of {quantity} by stage: {'; '.join(parts)}."
