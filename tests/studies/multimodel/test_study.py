@@ -8,10 +8,13 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.app.work import CaseWork
+from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.physics import frames
+from radarsim.studies.multimodel import STUDY, tables
 from radarsim.studies.multimodel import study as multimodel
 from radarsim.studies.multimodel import track as multimodel_plots
+from radarsim.studies.multimodel.kernels import records
 from tests.studies.multimodel import naive
 
 SENSOR = {
@@ -113,7 +116,7 @@ def test_sums_equal_the_twin_on_the_same_plots(sensor, conversion):
         assert len(t) == len(error)
 
 
-def test_covariance_at_the_prediction_is_reckoned_there():
+def test_covariance_at_the_prediction_is_computed_there():
     filters = [{**FILTERS[2], "covariance_at": "prediction"}]
     case = work(filters=filters)
     plan = case.plan
@@ -215,7 +218,7 @@ def test_cases_that_differ_in_filters_share_their_noise():
     assert one.identity != other.identity
 
 
-def test_recorded_flights_are_read_and_their_faults_told(tmp_path):
+def test_recorded_flights_are_read_and_their_faults_reported(tmp_path):
     file = tmp_path / "own.csv"
     t = np.arange(0, 60, 0.7)
     lines = [f"{s:.2f},{60e3},{8e3},{-30e3 + 300 * s:.1f}" for s in t]
@@ -236,6 +239,40 @@ def test_recorded_flights_are_read_and_their_faults_told(tmp_path):
         _ = CaseWork(load(str(config)).cases[0]).plan
     assert "own.csv:12: must be four numbers" in caught.value.lines[0]
     assert "own.csv:13: t_s must increase" in caught.value.lines[1]
+
+
+def test_cases_of_one_identity_have_their_own_names():
+    """A case that differs in display names alone takes over the other's sums, under its own names."""
+    one, other = work(), work(filters=[{**of, "name": f"my {of['name']}"} for of in FILTERS])
+    assert one.identity == other.identity
+    plan = one.plan
+    axes = STUDY.relabelled(plan.axes, other.case)
+    assert axes.filters == ("my imm", "my gpb2", "my kalman")
+    assert isinstance(axes, multimodel.FlightAxes)
+    assert np.array_equal(axes.truth, plan.axes.truth)
+    sums = plan.layout.unpack(one.simulate(0, 16))
+    result = CaseResult("other", "multimodel", other.case.spec, (), 16, sums, axes)
+    for name, table in tables.tables([result]).items():
+        assert set(table["filter"]) <= set(axes.filters), name
+    # Names of stages make tables of their own: a case that calls them differently is another one.
+    flight = {**inline_flight(), "stages": [{"name": "a", "end_s": 20}, {"name": "b"}]}
+    renamed = {**flight, "stages": [{"name": "a", "end_s": 20}, {"name": "c"}]}
+    assert work(target=flight).identity != work(target=renamed).identity
+
+
+def test_axes_describe_the_reported_scans():
+    case = work(report_every=7)
+    axes, spec = case.plan.axes, case.case.spec
+    assert axes.truth.shape == (len(axes.k), 9)
+    assert np.array_equal(axes.truth, case.plan.world.truth[axes.k - 1])
+    assert axes.stage_scans.sum() == spec.scans - 3
+    assert len(axes.stage_scans) == len(spec.target.stages)
+
+
+def test_sums_have_the_shapes_of_their_layout():
+    plan = work(report_every=7).plan
+    assert plan.layout.shapes == records.shapes(3, len(plan.axes.k), len(plan.axes.stage_scans))
+    assert tuple(plan.layout.shapes) == records.Sums._fields
 
 
 def test_the_plan_is_made_of_plain_data():

@@ -184,6 +184,7 @@ def clear(first, count):
 def simulate_block(world, banks, memory, sums, baseline, first, count):
     """Add the realisations first … first + count - 1 to the sums; gains are against the filter `baseline`."""
     filters, scans, stages = banks.numbers.shape[0], world.truth.shape[0], world.lengths.shape[0]
+    padded = banks.transitions.shape[1] // WIDTH
     for group in range(0, count, WIDTH):
         for n in range(WIDTH):
             memory.counted[n] = 1.0 if group + n < count else 0.0
@@ -193,33 +194,24 @@ def simulate_block(world, banks, memory, sums, baseline, first, count):
             draw_strip(world.keys, first + group, k // STRIP, memory.random)
             plots, frame = address(memory.plots), address(world.frame)
             make_plots(address(memory.random), frame, address(world.plot_truth), k, length, START, plots)
+            # This loop is written out: as a function of its own it makes LLVM fuse the products in GPB2's merges in
+            # another order, and the last bits of the results change.
             for f in range(filters):
-                filter_scans(world, banks, memory, f, k, begin, length)
+                work, numbers = row(address(memory.works), f * WORK), row(address(memory.numbers), f)
+                size = banks.numbers[f, SIZE]
+                if k == 0:
+                    start(work, numbers, size, plots, address(world.weights), row(address(banks.probabilities), f))
+                rules = rules_of(row(address(banks.numbers), f), size)
+                design = Filter(rules, row(address(banks.models), 2 * f), row(address(banks.transitions), padded * f))
+                intervals, reported = address(world.intervals[k:]), address(world.reported[k:])
+                span = Scans(begin, length, intervals, address(world.times), reported)
+                own = strip.Memory(work, numbers, address(memory.listed))
+                run_strip(own, design, span, plots, frame, row(address(memory.out), f * STRIP * OUTPUT))
             add_strip(world, banks, memory, sums, baseline, k, begin, length)
+        lengths, counted = address(world.lengths), get(address(memory.counted), 0)
         close_stages(
-            address(memory.stages),
-            filters,
-            stages,
-            address(world.lengths),
-            get(address(memory.counted), 0),
-            address(sums.stage),
-            address(sums.pairs),
+            address(memory.stages), filters, stages, lengths, counted, address(sums.stage), address(sums.pairs)
         )
-
-
-@inline
-def filter_scans(world, banks, memory, f, k, begin, length):
-    """Run filter f over a strip that starts at scan k, from its scan `begin` on; start the track in the first."""
-    padded = banks.transitions.shape[1] // WIDTH
-    work, numbers = row(address(memory.works), f * WORK), row(address(memory.numbers), f)
-    plots, size = address(memory.plots), banks.numbers[f, SIZE]
-    if k == 0:
-        start(work, numbers, size, plots, address(world.weights), row(address(banks.probabilities), f))
-    rules = rules_of(row(address(banks.numbers), f), size)
-    design = Filter(rules, row(address(banks.models), 2 * f), row(address(banks.transitions), padded * f))
-    scans = Scans(begin, length, address(world.intervals[k:]), address(world.times), address(world.reported[k:]))
-    held = strip.Memory(work, numbers, address(memory.listed))
-    run_strip(held, design, scans, plots, address(world.frame), row(address(memory.out), f * STRIP * OUTPUT))
 
 
 @inline
