@@ -149,6 +149,13 @@ def cluster(workers: int | None, scheduler: str | None) -> AbstractContextManage
     return Cluster(workers, scheduler)
 
 
+def trust(scheduler: str) -> str | None:
+    """What computing with a scheduler of another machine rests on, in one line."""
+    from radarsim.engine.cluster import trust as line
+
+    return line(scheduler)
+
+
 def merged(overrides: Sequence[str], realisations: float | None, seed: int | None) -> tuple[str, ...]:
     """Overrides with realisations and seed, where given, as two more."""
     given = {"realisations": realisations, "seed": seed}

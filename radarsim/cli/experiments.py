@@ -89,6 +89,8 @@ def run(
         if precision is not None:
             simulation.check_precision(loaded, precision)
         told, unmet = [], []
+        if scheduler and not quiet and (line := experiment.trust(scheduler)):
+            click.echo(f"note: {line}", err=True)
         with experiment.cluster(workers, scheduler) as pool:
             for one in loaded:
                 means = {"out": out, "threads": threads, "executor": pool, "time_limit": limit, "stop": stop}

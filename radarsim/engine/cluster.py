@@ -24,12 +24,13 @@ from radarsim.engine.executors import Outcome, attempted
 from radarsim.errors import ClusterError, ConfigError, Interrupted
 
 if TYPE_CHECKING:
-    from distributed import Future, LocalCluster
+    from distributed import Future, LocalCluster, Security
 
 CONNECT_S = 10
 WORKERS_S = 30  # how long a scheduler may be without a worker
 DEATHS = 20  # of workers under one task, after which it is taken for their cause
 LOOK_S = 1.0
+SCHEMES = ("tcp", "tls")
 LOOPBACK = "127.0.0.1"  # what this machine starts for itself listens to nobody else
 HINT = "--workers and --scheduler need Dask: pip install 'radarsim[cluster]'"
 QUIET = ("distributed", "distributed.nanny", "distributed.worker", "distributed.scheduler", "distributed.comm")
@@ -48,8 +49,48 @@ def _dask() -> ModuleType:
     return distributed
 
 
+def trust(address: str) -> str | None:
+    """What computing with the scheduler at an address rests on, in one line; None for one of this machine."""
+    host = address.partition("://")[2] or address
+    host = host.rpartition(":")[0].strip("[]")
+    if host in ("localhost", "::1") or host.startswith("127."):
+        return None
+    if address.startswith("tls://"):
+        return f"{address}: whoever holds a certificate of its authority may run programs on its workers"
+    return (
+        f"{address}: neither encrypted nor authenticated: whoever reaches it may run programs on its workers and give "
+        "this run false sums; on a network that you do not trust use tls:// (docs/scale.md)"
+    )
+
+
+def _security(distributed: ModuleType) -> "Security | None":
+    """Keys and certificates of one run, made for it; None without the package `cryptography`, which makes them."""
+    try:
+        return distributed.Security.temporary()
+    except ImportError:
+        return None
+
+
+def _configured(distributed: ModuleType, address: str) -> "Security | None":
+    """Dask's own settings for tls://; ConfigError where they name no authority or a file that cannot be read."""
+    if not address.startswith("tls://"):
+        return None
+    hint = "tls:// needs Dask's settings distributed.comm.tls (ca-file, client.cert, client.key), see docs/scale.md"
+    security = distributed.Security()
+    try:
+        context = security.get_connection_args("client").get("ssl_context")
+    except (OSError, ValueError, TypeError) as error:
+        raise ConfigError(f"--scheduler: {hint}: {error}") from error
+    if context is None:
+        raise ConfigError(f"--scheduler: {hint}")
+    return security
+
+
 def _check(distributed: ModuleType, address: str) -> None:
     """ConfigError for an invalid address: a Client that cannot read it takes half a minute to report it."""
+    scheme, separator, _ = address.partition("://")
+    if separator and scheme not in SCHEMES:
+        raise ConfigError(f"--scheduler: must be an address such as tcp://host:8786, got {address!r}: only tcp and tls")
     try:
         distributed.comm.resolve_address(address)
     except (OSError, ValueError, KeyError, TypeError) as error:
@@ -86,22 +127,24 @@ class Cluster:
         with dask.config.set(SETTINGS):
             if scheduler is not None:
                 _check(distributed, scheduler)
-                address = scheduler
+                address, security = scheduler, _configured(distributed, scheduler)
             else:
+                security = _security(distributed)
                 options = {
                     "host": LOOPBACK,
                     "dashboard_address": f"{LOOPBACK}:0",
-                    "protocol": "tcp",
+                    "protocol": "tls" if security else "tcp",
+                    "security": security,
                     "processes": False,
                 }
                 self._scheduler = distributed.LocalCluster(n_workers=0, silence_logs=logging.CRITICAL, **options)
                 address = self._scheduler.scheduler_address
             try:
-                self._client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
+                self._client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False, security=security)
             except OSError as error:
                 raise ConfigError(f"--scheduler: no Dask scheduler answers at {scheduler}: {error}") from error
         if workers is not None:
-            self._own = _Processes(workers, address)
+            self._own = _Processes(workers, address, security)
         self._wait_for_workers(workers or 1)
 
     def _wait_for_workers(self, wanted: int) -> None:
@@ -231,6 +274,15 @@ class Cluster:
             logging.disable(logging.NOTSET)
 
 
+def _for_workers(security: "Security") -> str:
+    """Settings that a worker takes from its environment, which other users of the machine cannot read."""
+    import dask
+
+    own = {"cert": security.tls_worker_cert, "key": security.tls_worker_key}
+    comm = {"require-encryption": True, "tls": {"ca-file": security.tls_ca_file, "worker": own}}
+    return dask.config.serialize({"distributed": {"comm": comm}})
+
+
 class _Processes:
     """Worker processes on this machine, in sessions of their own: Ctrl-C in a terminal is for the run alone.
 
@@ -238,12 +290,14 @@ class _Processes:
     themselves when the scheduler, and so this process, is gone.
     """
 
-    def __init__(self, workers: int, address: str):
+    def __init__(self, workers: int, address: str, security: "Security | None" = None):
         options = ["--no-nanny", "--nthreads", "1", "--memory-limit", "0", "--death-timeout", "10"]
         # Without the latter a worker serves HTTP to the whole network even with --no-dashboard.
         closed = ["--host", LOOPBACK, "--no-dashboard", "--dashboard-address", f"{LOOPBACK}:0"]
         self._command = [sys.executable, "-m", "distributed.cli.dask_worker", address, *options, *closed]
         self._environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        if security is not None:
+            self._environment["DASK_INTERNAL_INHERIT_CONFIG"] = _for_workers(security)
         self._running = [self._started() for _ in range(workers)]
 
     def _started(self) -> subprocess.Popen[bytes]:

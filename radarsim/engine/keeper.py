@@ -10,6 +10,7 @@ from radarsim.engine.store import Store
 
 PERIOD_S = 1.0
 SMALLEST = 64
+LOOKS = 4  # at the end of a run, at what is on disk
 
 
 class Keeper:
@@ -50,8 +51,14 @@ class Keeper:
             self._thread.join()
         self._raise()
         self._durable &= pieces.keys()
-        self._put({piece: sums for piece, sums in pieces.items() if piece not in self._durable})
-        self._raise()
+        for _ in range(LOOKS):
+            self._put({piece: sums for piece, sums in pieces.items() if piece not in self._durable})
+            self._raise()
+            # `radarsim clean` may have removed what this run wrote before.
+            stored = self.store.pieces()
+            if all(piece in stored or any(node in stored for node in piece.above(64)) for piece in pieces):
+                return
+            self._durable.clear()
 
     def _put(self, pieces: Mapping[Piece, Sums]) -> None:
         try:

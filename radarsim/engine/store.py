@@ -137,7 +137,13 @@ class Store:
         full or cannot be written."""
         if not pieces:
             return
-        self.make()
+        for look in range(LOOKS):
+            self.make()
+            with suppress(FileNotFoundError):  # `radarsim clean` removed the directory just now
+                self._write_all(pieces, last=look == LOOKS - 1)
+                return
+
+    def _write_all(self, pieces: Mapping[Piece, Sums], last: bool) -> None:
         try:
             for piece, sums in pieces.items():
                 described = self._described(piece, *piece.realisations(self._work.block))
@@ -145,6 +151,8 @@ class Store:
                 self._write_file(self.path / (piece.name + SUFFIX), encoded(header, sums.values))
             self._synchronise()
         except OSError as error:
+            if isinstance(error, FileNotFoundError) and not last:
+                raise
             where = error.filename or self.path
             raise StoreError(f"{where}: cannot be written: {error.strerror}") from error
 
@@ -182,6 +190,8 @@ class Store:
                     merged = piece is not None and any(node in durable for node in piece.above(highest))
                     if merged or (name.endswith(".tmp") and now - path.stat().st_mtime > STALE_S):
                         path.unlink()
+        except FileNotFoundError:  # removed by `radarsim clean`: nothing is left to tidy
+            return
         except OSError as error:
             raise StoreError(f"{self.path}: cannot be tidied: {error.strerror}") from error
 

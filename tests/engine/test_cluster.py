@@ -167,3 +167,45 @@ def test_a_scheduler_that_goes_away_is_told_and_what_was_done_is_stored(tmp_path
     resumed = collect(WORK, N, store=tmp_path)
     assert same(resumed)
     assert resumed.from_store > 0
+
+
+def test_a_run_has_certificates_of_its_own(two):
+    """Another user of this machine reaches the ports, but without the run's certificate no worker answers."""
+    import distributed
+
+    address = two._client.scheduler.address
+    assert address.startswith("tls://127.0.0.1:")
+    port = address.rpartition(":")[2]
+    for stranger in (f"tcp://127.0.0.1:{port}", address):
+        security = distributed.Security.temporary() if stranger.startswith("tls") else None
+        with pytest.raises(OSError, match=r"imed out|handshake|CERTIFICATE|certificate|reset"):
+            distributed.Client(stranger, timeout=2, set_as_default=False, security=security)
+
+
+def test_without_cryptography_the_run_goes_on_over_loopback(monkeypatch):
+    monkeypatch.setattr(cluster, "_security", lambda distributed: None)
+    with Cluster(1) as one:
+        assert one._client.scheduler.address.startswith("tcp://127.0.0.1:")
+        assert same(collect(WORK, 16, executor=one), 16)
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        ("tls://127.0.0.1:1", "tls:// needs Dask's settings distributed.comm.tls"),
+        ("ucx://h:1", "got .*: only tcp and tls"),
+        ("inproc://h", "got .*: only tcp and tls"),
+    ],
+)
+def test_addresses_that_cannot_be_used_are_told_at_once(address, words):
+    with pytest.raises(ConfigError, match=words):
+        Cluster(scheduler=address)
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [("tcp://h:8786", "neither encrypted nor authenticated"), ("tls://h:8786", "certificate"), ("h:8786", "neither")],
+)
+def test_what_a_scheduler_elsewhere_rests_on_is_told(address, words):
+    assert words in cluster.trust(address)
+    assert cluster.trust("tcp://127.0.0.1:8786") is None

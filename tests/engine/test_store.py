@@ -285,3 +285,33 @@ def test_the_file_is_what_the_description_says(tmp_path, blocks):
     assert json.loads(header)["count"] == 16
     assert np.frombuffer(rest[:40], "<f8").tobytes() == WORK.simulate(0, 16).tobytes()
     assert rest[40:] == hashlib.sha256(raw[:-32]).digest()
+
+
+def test_blocks_that_are_cleaned_away_while_a_run_works_are_written_again(tmp_path, monkeypatch):
+    """Whatever is written before the end goes at once, the directory too."""
+    monkeypatch.setattr(keeper, "PERIOD_S", 0.0)
+    monkeypatch.setattr("radarsim.engine.run.PROGRESS_S", 0.0)
+    removed = []
+
+    def cleaned(done, total, held):
+        if done < total and len(removed) < 3 and (tmp_path / ".blocks").exists():
+            shutil.rmtree(tmp_path / ".blocks", ignore_errors=True)
+            removed.append(done)
+
+    slow = Fake(pause_s=0.001)
+    collect(slow, N, store=tmp_path, threads=1, progress=cleaned)
+    assert removed
+    again = collect(slow, N, store=tmp_path)
+    assert again.computed == 0
+    assert same(again, N)
+
+
+def test_a_keeper_looks_again_at_what_it_wrote(tmp_path):
+    store = Store(tmp_path, WORK)
+    own = keeper.Keeper(store)
+    nodes = (Node(0, 0), Node(0, 3))
+    pieces = {node: Sums(WORK.block, WORK.simulate(node.first * WORK.block, WORK.block)) for node in nodes}
+    own._put(pieces)
+    (store.path / "L00-0.sums").unlink()
+    own.finish(pieces)
+    assert store.pieces() == set(pieces)
