@@ -40,6 +40,7 @@ def measure(n: int) -> dict:
     """Figures of one process."""
     from radarsim.app.configs import load
     from radarsim.app.work import CaseWork
+    from radarsim.studies.sonar.clutter.kernels.counts import FALSE, FALSE_KEPT, LOOKED
 
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-1:])
     out = {}
@@ -52,11 +53,11 @@ def measure(n: int) -> dict:
             sums = sum(work.simulate(first, work.block) for first in range(0, n, work.block))
             best = min(best, time.thread_time() - started)
         found = work.plan.layout.unpack(sums)
-        false = found["begun"][0, :, :2].sum()
+        false = found["begun"][0, :, : FALSE_KEPT + 1].sum()
         out[name] = {
             "million_track_scans_per_s": (n * SCANS + false) / best / 1e6,
             "of_the_target_alone": n * SCANS / best / 1e6,
-            "false_in_gate": found["counts"][0, :, 9].sum() / found["counts"][0, :, 6].sum(),
+            "false_in_gate": found["counts"][0, :, FALSE].sum() / found["counts"][0, :, LOOKED].sum(),
         }
     return out
 

@@ -13,7 +13,7 @@ DETECTOR, INITIATION = "studies/sonar/manoeuvre/test_exact.py", "studies/sonar/c
 
 MANOEUVRES = (
     *mutants(
-        "radarsim/studies/sonar/manoeuvre/kernels/detector.py",
+        "radarsim/studies/sonar/kernels/detector.py",
         ("h1, h2 = zero - age, 0.5 * age * age", "h1, h2 = zero - age, age * age", ANSWERS),
         ("first = alarms + alarm, first + new", "first = alarms + alarm, first + event", ALARMS),
         (
@@ -23,7 +23,7 @@ MANOEUVRES = (
         ),
     ),
     *mutants(
-        "radarsim/studies/sonar/manoeuvre/kernels/imm.py",
+        "radarsim/studies/sonar/kernels/imm.py",
         ("mu1 * P1[1] + mu2 * P2[1] + both * d0 * d1", "mu1 * P1[1] + mu2 * P2[1]", ANSWERS),
         ("p11 * mu1 + p21 * mu2, p12 * mu1", "p11 * mu1 + p12 * mu2, p21 * mu1", ANSWERS),
     ),
@@ -71,7 +71,7 @@ FALSE_PLOTS = (
         (
             "detected[i] = 1.0 if a < limit else 0.0",
             "detected[i] = 1.0 if a > limit else 0.0",
-            "studies/sonar/test_study.py::test_random_misses_are_exact_as_means_over_patterns",
+            "studies/sonar/smoothing/test_study.py::test_random_misses_are_exact_as_means_over_patterns",
         ),
     ),
 )

@@ -209,7 +209,6 @@ def tracks():
     from radarsim.studies.multimodel import study as multimodel
     from radarsim.studies.multimodel import track as multimodel_plots
     from radarsim.studies.range_doppler import track as range_doppler_plots
-    from radarsim.studies.sonar import track as sonar_plots
     from radarsim.studies.sonar.clutter import track as sonar_clutter_plots
 
     made = {}
@@ -230,10 +229,10 @@ def tracks():
     track = multimodel_plots.track(one.case, recorded)
     made["multimodel track"] = np.nan_to_num(track.estimate)
     one = work(*RUNS["sonar clutter"][:2])
-    recorded = sonar_plots.simulated(one.case, 3)
+    recorded = sonar_clutter_plots.simulated(one.case, 3)
     made["clutter plots"] = np.stack([np.nan_to_num(recorded[name]) for name in ("t_s", "range_m", "bearing_rad")])
     measured = {name: recorded[name] for name in ("t_s", "range_m", "bearing_rad")}
-    made["clutter track"] = np.nan_to_num(sonar_clutter_plots.track(one.case, measured).estimate)
+    made["clutter track"] = np.nan_to_num(sonar_clutter_plots.Tracker(one.case).feed(measured).estimate)
     return made
 
 

@@ -8,7 +8,7 @@ import pytest
 from radarsim.app.configs import load
 from radarsim.report import controlled, statistics
 from radarsim.studies.range_doppler import study as range_doppler
-from radarsim.studies.sonar import study as sonar
+from radarsim.studies.sonar import STUDY as sonar
 from tests.trust.test_statistics import GAUSSIAN, gaussian, pair, slack
 
 NEAR_LINEAR = [

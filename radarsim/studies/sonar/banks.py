@@ -6,9 +6,9 @@ import numpy as np
 
 from radarsim.physics.motion import transition
 from radarsim.studies.sonar import filters
+from radarsim.studies.sonar.detectors import AdaptiveRule, DetectorTests, ModelPair, adaptive_rules, model_pairs
 from radarsim.studies.sonar.kernels import patterns
 from radarsim.studies.sonar.kernels import shared_gains as kernels
-from radarsim.studies.sonar.manoeuvre.filters import AdaptiveRule, DetectorTests, ModelPair, adaptive_rules, model_pairs
 from radarsim.studies.sonar.world import step_correlations
 
 KINDS = {

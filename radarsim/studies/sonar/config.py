@@ -1,42 +1,25 @@
-"""Keys of the sonar study (P3): a sonar of range and bearing, what it observes, and filters of degree 1 and 2."""
+"""Keys of the sonar study (P3) that its parts share: the sonar, what it observes, filters of degree 1 and 2."""
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from radarsim.config.fields import (
     Correlation,
-    Design,
     Display,
     Model,
     Name,
-    NameIn,
     NonNegative,
     Number,
     Positive,
     Probability,
-    Scenario,
-    Study,
     at,
     cross_check,
-    of_each,
-    readable,
-    unique_names,
     whole,
-)
-from radarsim.studies.sonar.clutter.config import Sector, Tracking, tracker_misfits
-from radarsim.studies.sonar.manoeuvre.config import (
-    RESPONDING_KINDS,
-    Accelerating,
-    Adapting,
-    Detectors,
-    Uses,
-    answer_misfits,
-    detector_misfits,
-    uses_misfits,
 )
 
 MOST_SCANS = 100_000
+FIGURES = ("plots", "smoothing_gains", "believed", "missed", "conversion")  # beside σ of each component
 Wide = Annotated[Positive, Field(le=0.5)]  # rad: beyond some 30 degrees an angle's error is no longer Gaussian
 Derivatives = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
 
@@ -70,7 +53,7 @@ class FurtherSensor(Model):
 
 
 class Sensor(Model):
-    """A sonar: accuracies of a plot, period, and how plots fail."""
+    """A sonar: accuracies of a plot, period, and how plots are missed."""
 
     name: Annotated[Name | None, Display()] = Field(None, description="display name")
     sigma_range_m: Positive = Field(description="standard deviation of a measured range, m")
@@ -92,12 +75,6 @@ class Sensor(Model):
         (), description="scans, counted from 1, whose plots never come"
     )
     further: tuple[FurtherSensor, ...] = Field((), max_length=4, description="further sonars on the same target")
-    false_plots_per_km2: Annotated[NonNegative, Field(le=1e4), Design()] = Field(
-        0.0, description="mean number of false plots a scan, per km² of the surveyed sector"
-    )
-    sector: Annotated[Sector | None, Design()] = Field(
-        None, description="the surveyed sector, of filters with an association; outside it there are no plots"
-    )
 
     @cross_check
     def _consistent(self):
@@ -161,6 +138,28 @@ class Polynomial(Model):
         return max((self.x_m[0] ** 2 + self.y_m[0] ** 2) ** 0.5, 1.0)
 
 
+class Accelerating(Model):
+    """A vessel on a straight course whose speed changes at a constant rate between two moments."""
+
+    kind: Literal["accelerating"] = Field(description="straight course, a step of acceleration along it")
+    x_m: Number = Field(description="way north of the sonar at the first plot, m")
+    y_m: Number = Field(description="way east of the sonar at the first plot, m")
+    speed_mps: NonNegative = Field(description="speed at first, m/s")
+    course_rad: Number = Field(description="course, from north to east, rad")
+    acceleration_mps2: Number = Field(description="along the course while it lasts, m/s²; 0: no manoeuvre")
+    start_s: NonNegative = Field(description="when the acceleration begins, s from the first plot")
+    end_s: Positive | None = Field(None, description="when it ends, s; none: it lasts")
+
+    @cross_check
+    def _order(self):
+        if self.end_s is not None and self.end_s <= self.start_s:
+            yield at("end_s", "must come after start_s")
+
+    def range_0(self) -> float:
+        """Range at the first plot, m."""
+        return max((self.x_m**2 + self.y_m**2) ** 0.5, 1.0)
+
+
 class Leg(Model):
     """A turn between two moments."""
 
@@ -198,8 +197,8 @@ Target = Annotated[Polynomial | Turning | Accelerating, Field(discriminator="kin
 CORRELATED = ("kalman_augmented", "kalman_differenced")
 
 
-class Filter(Adapting, Tracking):
-    """A filter of each coordinate by itself."""
+class Filter(Model):
+    """A filter of each coordinate by itself, as far as all have the same keys."""
 
     name: Annotated[Name, Display()] = Field(description="label, unlike that of any other filter")
     kind: Literal[
@@ -242,92 +241,3 @@ class Filter(Adapting, Tracking):
     def _correlation_fits_kind(self):
         if self.error_correlation is not None and self.kind not in CORRELATED:
             yield at("error_correlation", f"only {' and '.join(CORRELATED)} know of it")
-
-
-class Sonar(Study):
-    """Sonar plots smoothed and extrapolated."""
-
-    sensor: Sensor = Field(description="the sonar")
-    target: Annotated[Target, Scenario()] = Field(description="the target: a scenario's stem, or inline")
-    frame: Annotated[Literal["polar", "cartesian", "cartesian_unbiased"], Design()] = Field(
-        "polar", description="frame that the filters work in; plots are converted to x, y plainly, or without bias"
-    )
-    filters: Annotated[
-        tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = Field(description="the filters; all see the same plots")
-    baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
-        None, description="name of the filter that gains are against; default: the first"
-    )
-    scans: Annotated[whole(2, MOST_SCANS), Design()] = Field(description="number of scans of the first sonar")
-    detectors: Annotated[Detectors, Design()] = Field((), description="detectors of manoeuvres, measured on the plots")
-    uses: Annotated[Uses | None, Design()] = Field(
-        None, description="course, speed, predicted position and closest approach, with their σ; none: left out"
-    )
-
-    @cross_check
-    def _long_enough(self):
-        most = max(readable(self.filters, lambda one: one.degree), default=0) + 1
-        if self.scans < most:
-            yield at("scans", f"must be >= {most} for a filter of degree {most - 1}")
-
-    @property
-    def tracking(self) -> bool:
-        """Whether its filters have to find their plots among false ones."""
-        return any(f.association is not None for f in self.filters)
-
-    @property
-    def manoeuvring(self) -> bool:
-        """Whether it measures detectors or uses of a track, or has filters that answer to manoeuvres."""
-        return bool(self.detectors or self.uses or any(f.kind in RESPONDING_KINDS for f in self.filters))
-
-    @cross_check
-    def _trackers_fit(self):
-        yield from tracker_misfits(self)
-
-    @cross_check
-    def _detectors_fit(self):
-        yield from detector_misfits(self)
-
-    @cross_check
-    def _uses_fit(self):
-        yield from uses_misfits(self)
-
-    @cross_check
-    def _answers_fit(self):
-        yield from answer_misfits(self)
-
-    @cross_check
-    def _misses_within_scans(self):
-        if any(scan > self.scans for scan in self.sensor.missed_scans):
-            yield at("sensor.missed_scans", f"must be <= {self.scans}, the last scan")
-
-    @cross_check
-    def _target_measured(self):
-        for key, unit in (("depth", "m"), ("elevation", "rad")):
-            measured = getattr(self.sensor, f"sigma_{key}_{unit}") is not None
-            if measured and getattr(self.target, f"{key}_{unit}", None) is None:
-                yield at("target", f"needs {key}_{unit}, which the sonar measures")
-
-    @cross_check
-    def _elevation_in_polar(self):
-        if self.frame != "polar" and self.sensor.sigma_elevation_rad is not None:
-            yield at("frame", "must be polar where the elevation is measured")
-
-    @cross_check
-    def _further_in_polar(self):
-        if self.frame != "polar" and self.sensor.further:
-            yield at("frame", "must be polar where there are further sonars")
-
-    @cross_check
-    def _fluctuating_in_polar(self):
-        if self.frame != "polar" and getattr(self.target, "fluctuation_mps2", 0.0):
-            yield at("frame", "must be polar for a fluctuating target")
-
-    @cross_check
-    def _correlated_in_polar(self):
-        def check(i: int, one: Filter):
-            if one.kind in CORRELATED:
-                yield at(f"filters.{i}.kind", f"{one.kind} works in the polar frame alone")
-
-        if self.frame != "polar":
-            yield from of_each(self.filters, check)

@@ -3,12 +3,11 @@
 import numpy as np
 
 from radarsim.studies.sonar import banks
-from radarsim.studies.sonar.kernels import patterns
+from radarsim.studies.sonar.detectors import detector_arrays, detector_tests
+from radarsim.studies.sonar.kernels import detector, patterns
+from radarsim.studies.sonar.kernels.imm import ROWS
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK
 from radarsim.studies.sonar.kernels.steps import remember
-from radarsim.studies.sonar.manoeuvre.filters import detector_arrays, detector_tests
-from radarsim.studies.sonar.manoeuvre.kernels import detector
-from radarsim.studies.sonar.manoeuvre.kernels.imm import ROWS
 
 
 def estimate_recorded(

@@ -9,7 +9,7 @@ from radarsim.studies.sonar import banks, filters
 from radarsim.studies.sonar import world as models
 from radarsim.studies.sonar.config import correlation_of
 
-MOST_OPEN = 9  # scans that may be missed up to which all patterns are told off for exact values: 512
+MOST_OPEN = 9  # scans that may be missed up to which all patterns are enumerated for exact values: 512
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.kernels.random import fill_normal_pairs, fill_uniform_pairs
-from radarsim.studies.sonar import study
+from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar import world as models
 from tests.studies.sonar import naive as naive
 
@@ -48,7 +48,7 @@ def plots(plan, realisation, rho, probability, missed=()):
         fill_normal_pairs(plan.world.plots, realisation, k, a, b)
         fresh = SIGMA * np.array([a[0], b[0]])
         e[k] = fresh if k == 0 else rho * e[k - 1] + np.sqrt(1 - rho**2) * fresh
-        if plan.observation is not None and probability < 1 and k > 0:
+        if probability < 1 and k > 0:
             fill_uniform_pairs(plan.observation.misses, realisation, k, a, b)
             detected[k] = a[0] < probability
     detected[list(missed)] = False
@@ -95,12 +95,12 @@ def settled(size, sigma, variance):
 )
 def test_estimates_are_the_twins(sensor):
     case = load(config(**sensor)).cases[0]
-    plan = study.prepare(case)
+    plan = STUDY.prepare(case)
     rho, probability = sensor.get("error_correlation", 0.0), sensor.get("detection_probability", 1.0)
     missed = [k - 1 for k in sensor.get("missed_scans", ())]
-    truth = plan.axes.extra["truth"]
+    truth = plan.world.truth
     for realisation in (0, 5, 12345):
-        sums = plan.layout.unpack(study.simulate(plan, realisation, 1))
+        sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
         e, detected = plots(plan, realisation, rho, probability, missed)
         for c in range(2):
             z = np.where(detected, truth[:, c, 0] + e[:, c], np.nan)
@@ -126,11 +126,11 @@ def test_estimates_are_the_twins(sensor):
 def test_converted_plots_and_their_weights(frame):
     """The cartesian frame: plots converted as in models, weights by the conversion's own variances, plot by plot."""
     case = load(config(frame, detection_probability=0.8)).cases[0]
-    plan = study.prepare(case)
-    truth, polar, t = plan.axes.extra["truth"], plan.axes.extra["polar"], np.arange(SCANS) * T
+    plan = STUDY.prepare(case)
+    truth, polar, t = plan.world.truth, plan.axes.polar, np.arange(SCANS) * T
     convert = models.converted if frame == "cartesian" else models.converted_unbiased
     for realisation in (0, 77):
-        sums = plan.layout.unpack(study.simulate(plan, realisation, 1))
+        sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
         e, detected = plots(plan, realisation, 0.0, 0.8)
         r, b = polar[:, 0, 0] + e[:, 0], polar[:, 1, 0] + e[:, 1]
         x, y, (xx, _, yy) = convert(r, b, *SIGMA)
@@ -154,13 +154,13 @@ def test_third_coordinate_and_walk_of_velocity_leave_the_first_two_alone():
     """Depth is a coordinate like the others, and a walk of velocity is lateral in the bearing."""
     one = config()
     one["target"] |= {"fluctuation_mps2": 0.02}
-    plan = study.prepare(load(one).cases[0])
+    plan = STUDY.prepare(load(one).cases[0])
     assert plan.world.walk[0] == 0.02
     assert plan.world.walk[1] == pytest.approx(0.02 / 9e3)
     other = config(sigma_depth_m=5.0)
     other["target"] |= {"depth_m": [100.0, 0.5]}
-    plan = study.prepare(load(other).cases[0])
-    sums = plan.layout.unpack(study.simulate(plan, 0, 4096))
+    plan = STUDY.prepare(load(other).cases[0])
+    sums = plan.layout.unpack(STUDY.simulate(plan, 0, 4096))
     sigma = np.sqrt(sums["error"][..., 1] / 4096)
     known = plan.axes.available
     assert sigma[known] == pytest.approx(plan.axes.exact_sigma[known], rel=5.5 / np.sqrt(2 * 4096))
@@ -168,8 +168,8 @@ def test_third_coordinate_and_walk_of_velocity_leave_the_first_two_alone():
 
 
 def test_blocks_add_up_whatever_their_bounds():
-    plan = study.prepare(load(config(detection_probability=0.7)).cases[0])
-    whole = plan.layout.unpack(study.simulate(plan, 0, 1500))
-    parts = [plan.layout.unpack(study.simulate(plan, *part)) for part in ((0, 700), (700, 800))]
+    plan = STUDY.prepare(load(config(detection_probability=0.7)).cases[0])
+    whole = plan.layout.unpack(STUDY.simulate(plan, 0, 1500))
+    parts = [plan.layout.unpack(STUDY.simulate(plan, *part)) for part in ((0, 700), (700, 800))]
     for name, values in whole.items():
         assert parts[0][name] + parts[1][name] == pytest.approx(values, rel=1e-9, abs=1e-9)

@@ -5,9 +5,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from radarsim.config.fields import Model, NonNegative, Number, Positive, Probability, at, cross_check, whole
+from radarsim.config.fields import Design, Model, NonNegative, Number, Positive, Probability, at, cross_check, whole
 
-ASSOCIATIONS = ("nearest", "pda", "known")
+FIGURES = ("track_map", "confirmation", "track_life", "false_tracks", "track_classes")
 MOST_FALSE = 1e7  # in a scan of the whole sector
 DEFAULTS = {
     "gate_probability": 0.99,
@@ -33,6 +33,17 @@ class Sector(Model):
     def area_m2(self) -> float:
         """Its area, m²."""
         return (self.bearing_rad[1] - self.bearing_rad[0]) * (self.range_m[1] ** 2 - self.range_m[0] ** 2) / 2
+
+
+class Surveyed(Model):
+    """What a sonar among false plots has beside: how many they are, and where."""
+
+    false_plots_per_km2: Annotated[NonNegative, Field(le=1e4), Design()] = Field(
+        0.0, description="mean number of false plots a scan, per km² of the surveyed sector"
+    )
+    sector: Annotated[Sector | None, Design()] = Field(
+        None, description="the surveyed sector, of filters with an association; outside it there are no plots"
+    )
 
 
 class Initiation(Model):
@@ -108,9 +119,6 @@ def tracker_misfits(spec):
         yield at("frame", "must be polar for filters with an association")
     if sensor.error_correlation != 0.0:
         yield at("sensor.error_correlation", "must be 0 for filters with an association")
-    for key, given in (("detectors", spec.detectors), ("uses", spec.uses)):
-        if given:
-            yield at(key, "must not be given beside filters with an association")
     if sensor.further:
         yield at("sensor.further", "must be empty for filters with an association")
     for key in ("sigma_depth_m", "sigma_elevation_rad"):

@@ -8,6 +8,8 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Style
+from radarsim.studies.sonar.clutter.axes import ClutterAxes
+from radarsim.studies.sonar.clutter.map import realisation_map
 
 KEYS = {
     "false_plots_per_km2": ("sensor.false_plots_per_km2", "false plots per km² and scan"),
@@ -17,7 +19,7 @@ KEYS = {
 WIDE = 150.0
 
 
-def figures(results: Sequence[CaseResult], made: Mapping) -> dict[str, Figure | None]:
+def figures(results: Sequence[CaseResult[ClutterAxes]], made: Mapping) -> dict[str, Figure | None]:
     """The figures of these cases, all of trackers."""
     if not results:
         return {}
@@ -30,7 +32,7 @@ def figures(results: Sequence[CaseResult], made: Mapping) -> dict[str, Figure | 
     }
 
 
-def middle(results: Sequence[CaseResult]) -> CaseResult:
+def middle(results: Sequence[CaseResult[ClutterAxes]]) -> CaseResult:
     """The case in the middle, for figures of one."""
     return results[(len(results) - 1) // 2]
 
@@ -58,7 +60,7 @@ def lined(tracking, column: str) -> dict[tuple[str, str], str]:
     return names
 
 
-def confirmation_figure(results: Sequence[CaseResult], tracks) -> Figure | None:
+def confirmation_figure(results: Sequence[CaseResult[ClutterAxes]], tracks) -> Figure | None:
     """Probability of a confirmed track by time: a panel for each case, a line for each tracker."""
     groups, drawn = common.groups(tracks, "case", "filter"), []
     for result in results[: panels.MOST]:
@@ -90,14 +92,14 @@ def confirmation_figure(results: Sequence[CaseResult], tracks) -> Figure | None:
     )
 
 
-def _words(result: CaseResult) -> str:
+def _words(result: CaseResult[ClutterAxes]) -> str:
     """A case's swept keys as words."""
     names = dict(KEYS.values())
     parts = [f"{names.get(key, panels.symbol_of(key))}: {panels.number(value)}" for key, value in result.swept]
     return ", ".join(parts)
 
 
-def life_figure(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
+def life_figure(results: Sequence[CaseResult[ClutterAxes]], made: Mapping) -> Figure | None:
     """Track life, time to confirmation, wrong plots and accuracy of the kept tracks over what is swept."""
     tracking = made["tracking"]
     over = swept_over(tracking)
@@ -127,7 +129,7 @@ def life_figure(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     return Figure("track_life", "Track life and accuracy", caption, found, 2, PAGE_MM, 58)
 
 
-def _at_end(results: Sequence[CaseResult], curves, tracking, column: str):
+def _at_end(results: Sequence[CaseResult[ClutterAxes]], curves, tracking, column: str):
     """Rows of the range's σ at the last scan, with the swept value and the line of their case."""
     rows = curves[(curves["component"] == "r") & (curves["k"] == results[0].axes.k[-1])]
     at = tracking.groupby("case")[column].first()
@@ -147,7 +149,7 @@ def _lines(table, x: str, value: str, ends: str) -> list[Line]:
     return lines
 
 
-def false_figure(results: Sequence[CaseResult], tracking) -> Figure | None:
+def false_figure(results: Sequence[CaseResult[ClutterAxes]], tracking) -> Figure | None:
     """False tracks an hour over what is swept, on a logarithmic axis."""
     over = swept_over(tracking)
     rows = tracking[tracking["false_tracks_per_hour"] > 0]
@@ -171,7 +173,7 @@ def false_figure(results: Sequence[CaseResult], tracking) -> Figure | None:
 FALSE = ("false_tracks_per_hour", "false")
 
 
-def classes_figure(results: Sequence[CaseResult], classes) -> Figure | None:
+def classes_figure(results: Sequence[CaseResult[ClutterAxes]], classes) -> Figure | None:
     """Error rates of the class by score, over its threshold, of one case."""
     case = middle(results)
     table = classes[(classes["case"] == case.name) & (classes["n_false"] > 0)]
@@ -200,22 +202,22 @@ def classes_figure(results: Sequence[CaseResult], classes) -> Figure | None:
     return Figure("track_classes", "True or false by the score", caption, tuple(drawn), 2, PAGE_MM) if drawn else None
 
 
-def map_figure(result: CaseResult) -> Figure | None:
+def map_figure(result: CaseResult[ClutterAxes]) -> Figure | None:
     """Plots, gates and tracks of realisation 0 of a case, on the map."""
-    seen = result.axes.extra["realisation"]()
+    seen = realisation_map(result)
     km = 1e-3
     marks = [
-        Line(seen["false"][1] * km, seen["false"][0] * km, "false plots", Style(7, None, 0, 1.1, 1.0)),
-        Line(seen["truth"][1] * km, seen["truth"][0] * km, "target", Style(1, 1, None)),
-        Line(seen["plots"][1] * km, seen["plots"][0] * km, "its plots", Style(1, None, 1, 1.1, 2.0)),
+        Line(seen.false[1] * km, seen.false[0] * km, "false plots", Style(7, None, 0, 1.1, 1.0)),
+        Line(seen.truth[1] * km, seen.truth[0] * km, "target", Style(1, 1, None)),
+        Line(seen.plots[1] * km, seen.plots[0] * km, "its plots", Style(1, None, 1, 1.1, 2.0)),
     ]
-    for n, (x, y) in enumerate(seen["tracks"]):
+    for n, (x, y) in enumerate(seen.tracks):
         marks.append(Line(y * km, x * km, "tracks" if n == 0 else "", Style(2, 0, None, 1.3)))
-    for n, (x, y) in enumerate(seen["gates"]):
+    for n, (x, y) in enumerate(seen.gates):
         marks.append(Line(y * km, x * km, "gates" if n == 0 else "", Style(3, 0, None, 0.6)))
-    (south, north), (west, east) = seen["window"]
+    (south, north), (west, east) = seen.window
     caption = (
-        f"Realisation 0 of {result.name}, tracker {seen['tracker']}: the target's course and plots, the false plots of "
+        f"Realisation 0 of {result.name}, tracker {seen.tracker}: the target's course and plots, the false plots of "
         f"all {len(result.axes.k)} scans, the confirmed tracks and their gates at every fourth scan, near the target."
     )
     panel = Panel(

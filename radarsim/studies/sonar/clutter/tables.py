@@ -1,20 +1,38 @@
-"""P3's tables of tracks among false plots: tracks, tracking, gates, track_classes; and the words of its report."""
+"""P3's tables of tracks among false plots: tracks, tracking, gates, track_classes."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import panels, statistics
+from radarsim.report import statistics
 from radarsim.report import tables as common
 from radarsim.report.statistics import Z95, Estimate
+from radarsim.studies.sonar.clutter.axes import ClutterAxes
+from radarsim.studies.sonar.clutter.kernels.counts import (
+    DROPPED,
+    ENDS_PER_SCAN,
+    EXPECTED,
+    FAILED,
+    FALSE,
+    FALSE_FOUND,
+    FALSE_KEPT,
+    FOUND,
+    INSIDE,
+    KEPT,
+    LOOKED,
+    LOST,
+    PLOTS,
+    TRYING,
+    WRONG_PER_PLOT,
+)
 
-# Places in sums["counts"], as kernels.sonar_clutter has them.
-TRYING, KEPT, FOUND, LOST, DROPPED, FAILED, LOOKED, PLOTS, INSIDE, FALSE, EXPECTED = range(11)
-FALSE_TRYING, FALSE_ALIVE, FALSE_FOUND = range(3)
+if TYPE_CHECKING:
+    import pandas as pd
 
 
-def tables(results: Sequence[CaseResult]) -> dict:
+def tables(results: Sequence[CaseResult[ClutterAxes]]) -> "dict[str, pd.DataFrame]":
     """The tables of these cases, all of trackers."""
     return {
         "tracks": common.joined([_tracks(result) for result in results], TRACKS),
@@ -24,19 +42,19 @@ def tables(results: Sequence[CaseResult]) -> dict:
     }
 
 
-def trackers(result: CaseResult) -> np.ndarray:
-    """Filters (n,) that have to find their plots; those told them have no track to lose."""
-    return np.flatnonzero([kind != "known" for kind in result.axes.extra["associations"]])
+def trackers(result: CaseResult[ClutterAxes]) -> np.ndarray:
+    """Filters (n,) that have to find their plots; those given them have no track to lose."""
+    return np.flatnonzero([kind != "known" for kind in result.axes.associations])
 
 
-def per_hour(result: CaseResult) -> float:
+def per_hour(result: CaseResult[ClutterAxes]) -> float:
     """Scans an hour."""
-    return 3600.0 / result.axes.extra["scan_period_s"]
+    return 3600.0 / result.axes.scan_period_s
 
 
-def false_plots(result: CaseResult) -> float:
+def false_plots(result: CaseResult[ClutterAxes]) -> float:
     """Mean number of false plots a scan in the whole sector."""
-    return result.spec.sensor.false_plots_per_km2 * result.axes.extra["area_m2"] / 1e6
+    return result.spec.sensor.false_plots_per_km2 * result.axes.area_m2 / 1e6
 
 
 # ---- statistics ------------------------------------------------------------------------------------------------------
@@ -87,7 +105,7 @@ TRACKS = (
 )
 
 
-def _tracks(result: CaseResult) -> dict:
+def _tracks(result: CaseResult[ClutterAxes]) -> dict:
     """By scan: probability that a track of the target was confirmed by then, and that one is kept.
 
     And how many of n realisations have a tentative one, lost or dropped a confirmed one, dropped a tentative one.
@@ -104,13 +122,13 @@ def _tracks(result: CaseResult) -> dict:
         "t_s": np.tile(np.asarray(result.axes.t_s, dtype=float), len(chosen)),
         "n": np.full(len(chosen) * K, n),
         **_three("confirmed", found),
-        "exact_confirmed": result.axes.extra["exact_confirmed"][chosen].ravel(),
+        "exact_confirmed": result.axes.exact_confirmed[chosen].ravel(),
         **_three("kept", kept),
         **{name: counts[:, :, place].ravel().astype(np.int64) for name, place in whole.items()},
     }
 
 
-def _named(result: CaseResult, f: np.ndarray) -> dict:
+def _named(result: CaseResult[ClutterAxes], f: np.ndarray) -> dict:
     return {"case": np.full(f.size, result.name, dtype=object), "filter": common.names(result.axes.filters, f)}
 
 
@@ -130,7 +148,7 @@ TRACKING = (
 )
 
 
-def _tracking(result: CaseResult) -> dict:
+def _tracking(result: CaseResult[ClutterAxes]) -> dict:
     """One row a tracker: how surely and soon it confirms the target's track, how long it keeps it, its false tracks.
 
     The life is a track's mean time between ends, over all confirmed tracks' time. false_confirmed is the probability
@@ -140,21 +158,21 @@ def _tracking(result: CaseResult) -> dict:
     return {name: np.array([row[name] for row in rows]) if rows else [] for name in TRACKING}
 
 
-def _summary(result: CaseResult, f: int) -> dict:
+def _summary(result: CaseResult[ClutterAxes], f: int) -> dict:
     one, sensor, n, sums = result.spec.filters[f], result.spec.sensor, result.count, result.sums
     counts, begun, t = sums["counts"][f], sums["begun"][f], np.asarray(result.axes.t_s, dtype=float)
     found = counts[:, FOUND]
-    ends = ratio(sums["ratios"][f, 0], n)
+    ends = ratio(sums["ratios"][f, ENDS_PER_SCAN], n)
     hourly = Estimate(*(part * per_hour(result) for part in ends))
     false = statistics.rate(begun[:, FALSE_FOUND].sum(), n)
     rate = false_plots(result) * per_hour(result)
     any_false = sensor.false_plots_per_km2 > 0
     with np.errstate(divide="ignore", invalid="ignore"):
-        alive = begun[:, FALSE_ALIVE].sum()
+        alive = begun[:, FALSE_KEPT].sum()
         life = Estimate(*(3600.0 / np.float64(part) for part in (hourly.value, hourly.hi, hourly.lo)))
-        false_life = alive * result.axes.extra["scan_period_s"] / begun[:, FALSE_FOUND].sum()
+        false_life = alive * result.axes.scan_period_s / begun[:, FALSE_FOUND].sum()
         in_gate = counts[:, FALSE].sum() / counts[:, LOOKED].sum()
-    exact = result.axes.extra["exact_begun"][f].sum()
+    exact = result.axes.exact_begun[f].sum()
     m, of = one.m_of_n()
     return {
         **{"case": result.name, "filter": result.axes.filters[f], "association": one.association},
@@ -168,7 +186,7 @@ def _summary(result: CaseResult, f: int) -> dict:
         **{"lost": int(counts[:, LOST].sum()), "dropped": int(counts[:, DROPPED].sum())},
         **_named_three("ends", hourly, "ends_per_hour"),
         **_named_three("life", life, "life_s"),
-        **_named_three("wrong", ratio(sums["ratios"][f, 1], n), "wrong_share"),
+        **_named_three("wrong", ratio(sums["ratios"][f, WRONG_PER_PLOT], n), "wrong_share"),
         **_named_three("false_confirmed", false if any_false else Estimate(0.0, 0.0, 0.0)),
         "exact_false_confirmed": float(exact) if any_false else 0.0,
         **_named_three("false", Estimate(*(rate * part for part in false)), "false_tracks_per_hour"),
@@ -187,10 +205,10 @@ GATES = (
 )
 
 
-def _gates(result: CaseResult) -> dict:
+def _gates(result: CaseResult[ClutterAxes]) -> dict:
     """By scan: the share of the target's plots that lay in the gate, and false plots in it, of n tracks of two plots.
 
-    A filter that is told its plots, and whose model is the target's, has the gate's probability exactly. The expected
+    A filter that is given its plots, and whose model is the target's, has the gate's probability exactly. The expected
     number of false plots is density times area, π γ √|S| times the range, over the gates as they were; a sector's edge
     is not reckoned with.
     """
@@ -217,7 +235,7 @@ def _gates(result: CaseResult) -> dict:
     }
 
 
-def straight(result: CaseResult) -> bool:
+def straight(result: CaseResult[ClutterAxes]) -> bool:
     """Whether range and bearing change at constant rates, as the trackers' model has it."""
     target = result.spec.target
     polar = target.kind == "polynomial" and target.frame == "polar"
@@ -230,14 +248,14 @@ CLASSES = (
 )
 
 
-def _classes(result: CaseResult) -> dict:
+def _classes(result: CaseResult[ClutterAxes]) -> dict:
     """Error rates of calling a track true once its score reaches a threshold, false if it ends before.
 
     Of the target's first tracks, and of tracks that false plots began. The score is the logarithm of the likelihood
     ratio of all plots in the gate; on false tracks its exponential is a martingale of mean one, so that no more than
     exp(−threshold) of them ever reach the threshold (Ville), whatever the tracker.
     """
-    chosen, thresholds = trackers(result), result.axes.extra["thresholds"]
+    chosen, thresholds = trackers(result), result.axes.thresholds
     scores = np.asarray(result.sums["scores"])[:, chosen]
     n = np.broadcast_to(scores[:, :, -1:], scores[:, :, :-1].shape)
     missed = statistics.rate(n[0] - scores[0, :, :-1], n[0])
@@ -255,37 +273,3 @@ def _classes(result: CaseResult) -> dict:
 
 def _flat(of: Estimate) -> list[np.ndarray]:
     return [np.ravel(part).astype(float) for part in of]
-
-
-# ---- words -----------------------------------------------------------------------------------------------------------
-QUESTION = (
-    "How surely and how soon is a target's track confirmed among false and missed plots, how long is it kept, and how "
-    "many false tracks does that cost?"
-)
-
-
-def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
-    """A sentence for each case told: time to a confirmed track, track life, false tracks an hour, by tracker."""
-    told = []
-    shown, others = panels.told(results, 2)
-    for result in shown:
-        rows = made["tracking"][made["tracking"]["case"] == result.name]
-        said = "; ".join(_said(row) for _, row in rows.iterrows())
-        where = panels.plain(panels.swept(result))
-        told.append(f"{where + ': ' if where else ''}{said}.")
-    return [*told, *others]
-
-
-def _said(row) -> str:
-    life = "no track lost" if not np.isfinite(row["life_s"]) else f"life {_bounded(row, 'life_s', 'life', ' s')}"
-    confirmed = f"{100 * row['confirmed']:.4g} % [{100 * row['confirmed_lo']:.4g}, {100 * row['confirmed_hi']:.4g}]"
-    return (
-        f"{row['filter']} confirms {confirmed} after {_bounded(row, 'time_to_confirm_s', 'time', ' s')} in the mean, "
-        f"{life}, {_bounded(row, 'false_tracks_per_hour', 'false')} false tracks an hour"
-    )
-
-
-def _bounded(row, name: str, stem: str, unit: str = "") -> str:
-    """A column's value with its interval, to three figures."""
-    value, low, high = (f"{float(f'{row[key]:.3g}'):,.10g}" for key in (name, f"{stem}_lo", f"{stem}_hi"))
-    return f"{value}{unit} [{low}, {high}]"

@@ -12,10 +12,7 @@ import numpy as np
 
 from radarsim.kernels.compile import kernel, part
 from radarsim.kernels.random import U, uniforms
-from radarsim.studies.sonar.kernels.shared_gains import CHUNK, Sums, move_and_measure
-from radarsim.studies.sonar.kernels.steps import Memory, Model, Plot, fit, recur, remember
-from radarsim.studies.sonar.kernels.sums import Counted, Course, Estimate, add_ahead, add_sums
-from radarsim.studies.sonar.manoeuvre.kernels.detector import (
+from radarsim.studies.sonar.kernels.detector import (
     MODE,
     PLOTS,
     AdaptiveRule,
@@ -25,7 +22,7 @@ from radarsim.studies.sonar.manoeuvre.kernels.detector import (
     add_alarms,
     detector_statistics,
 )
-from radarsim.studies.sonar.manoeuvre.kernels.imm import (
+from radarsim.studies.sonar.kernels.imm import (
     PROBABILITY,
     ROWS,
     ModelPair,
@@ -33,6 +30,9 @@ from radarsim.studies.sonar.manoeuvre.kernels.imm import (
     interact,
     mode_sums,
 )
+from radarsim.studies.sonar.kernels.shared_gains import CHUNK, Sums, move_and_measure
+from radarsim.studies.sonar.kernels.steps import Memory, Model, Plot, fit, recur, remember
+from radarsim.studies.sonar.kernels.sums import Counted, Course, Estimate, add_ahead, add_sums
 
 INFORMATION, COVARIANCE, FIXED, WINDOW, ADAPTIVE, IMM = range(6)
 PLACED = 8.0  # as world.PLACED

@@ -1,4 +1,4 @@
-"""Keys of the sonar study (P3) about manoeuvres: targets, detectors, filters that answer to them; uses of a track."""
+"""Keys of the sonar study (P3) about manoeuvres: detectors, filters that respond to them, uses of a track."""
 
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
@@ -23,33 +23,12 @@ from radarsim.config.fields import (
 )
 
 MOST_TESTED = 200_000  # scans x thresholds of all detectors: 10 MB of sums a block
+FIGURES = ("roc", "detection", "delay", "response", "modes", "uses")
 RESPONDING_KINDS = ("adaptive", "imm")  # kinds of filters whose gains are each realisation's own
 Rate = Annotated[Probability, Field(gt=0, lt=1)]
 Rates = Annotated[tuple[Rate, ...], Field(min_length=1, max_length=32)]
 Thresholds = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=32)]
 WindowPlots = whole(3, 100)
-
-
-class Accelerating(Model):
-    """A vessel on a straight course whose speed changes at a constant rate between two moments."""
-
-    kind: Literal["accelerating"] = Field(description="straight course, a step of acceleration along it")
-    x_m: Number = Field(description="way north of the sonar at the first plot, m")
-    y_m: Number = Field(description="way east of the sonar at the first plot, m")
-    speed_mps: NonNegative = Field(description="speed at first, m/s")
-    course_rad: Number = Field(description="course, from north to east, rad")
-    acceleration_mps2: Number = Field(description="along the course while it lasts, m/s²; 0: no manoeuvre")
-    start_s: NonNegative = Field(description="when the acceleration begins, s from the first plot")
-    end_s: Positive | None = Field(None, description="when it ends, s; none: it lasts")
-
-    @cross_check
-    def _order(self):
-        if self.end_s is not None and self.end_s <= self.start_s:
-            yield at("end_s", "must come after start_s")
-
-    def range_0(self) -> float:
-        """Range at the first plot, m."""
-        return max((self.x_m**2 + self.y_m**2) ** 0.5, 1.0)
 
 
 class OwnDetector(Model):
@@ -121,7 +100,7 @@ class Uses(Model):
 
 
 class Adapting(Model):
-    """What a filter needs that answers to manoeuvres: kinds `adaptive` and `imm`."""
+    """What a filter needs that responds to manoeuvres: kinds `adaptive` and `imm`."""
 
     detector: OwnDetector | None = Field(None, description="of an adaptive filter: what tells it of a manoeuvre")
     response: Literal["raise_degree", "shorten_memory"] | None = Field(
@@ -177,8 +156,6 @@ def detector_misfits(spec: Any) -> Iterator[At]:
     yield from of_each(spec.detectors, check)
     if spec.scans * sum(readable(spec.detectors, lambda one: len(one.wanted()))) > MOST_TESTED:
         yield at("detectors", f"must have at most {MOST_TESTED // spec.scans} thresholds for {spec.scans} scans")
-    if spec.detectors:
-        yield from _alone(spec, "detectors")
 
 
 def uses_misfits(spec: Any) -> Iterator[At]:
@@ -190,24 +167,29 @@ def uses_misfits(spec: Any) -> Iterator[At]:
         yield at("uses.at_s", f"must be <= {last:g}, the time of the last scan")
     if getattr(spec.target, "fluctuation_mps2", 0.0):
         yield at("uses", "needs a target that does not move at random: its future is not known")
-    yield from _alone(spec, "uses")
 
 
-def answer_misfits(spec: Any) -> Iterator[At]:
-    """Faults of the filters of a sonar study that answer to manoeuvres."""
+def response_misfits(spec: Any) -> Iterator[At]:
+    """Faults of the filters of a sonar study that respond to manoeuvres."""
 
     def check(i: int, one: Adapting):
         if one.detector is not None and one.detector.plots > spec.scans:
             yield at(f"filters.{i}.detector.plots", f"must be <= {spec.scans}, the number of scans")
-        if one.kind in RESPONDING_KINDS:
-            yield from _alone(spec, f"filters.{i}.kind")
 
     yield from of_each(spec.filters, check)
 
 
-def _alone(spec: Any, key: str) -> Iterator[At]:
-    """What answers to manoeuvres is of one sonar, and of plots whose target is known."""
+def further_misfits(spec: Any) -> Iterator[At]:
+    """What is asked about manoeuvres is of one sonar."""
     if spec.sensor.further:
-        yield at(key, "does not go with further sonars")
-    if spec.tracking:
-        yield at(key, "does not go with filters that have an association")
+        for key in asked(spec):
+            yield at(key, "does not go with further sonars")
+
+
+def asked(spec: Any) -> Iterator[str]:
+    """The keys by which a sonar study asks about manoeuvres: detectors, uses, kinds of filters that respond."""
+    if spec.detectors:
+        yield "detectors"
+    if spec.uses is not None:
+        yield "uses"
+    yield from (f"filters.{i}.kind" for i, one in enumerate(spec.filters) if one.kind in RESPONDING_KINDS)

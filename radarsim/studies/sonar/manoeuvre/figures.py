@@ -8,7 +8,9 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
+from radarsim.studies.sonar.figures import QUANTITIES
 from radarsim.studies.sonar.manoeuvre import exact
+from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
 
 USUAL = 0.01  # false alarms a test at which detectors are compared, or what comes nearest
 MOST_PANELS = 4
@@ -19,25 +21,25 @@ RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # ticks of
 STRENGTHS = {"acceleration_mps2": "acceleration, m/s²", "rate_radps": "turn rate, rad/s"}
 
 
-def figures(results: Sequence[CaseResult], made: Mapping, quantities: Mapping) -> dict[str, Figure | None]:
-    """The figures of cases with detectors, filters that answer to manoeuvres, or uses."""
+def figures(results: Sequence[CaseResult[ManoeuvreAxes]], made: Mapping) -> dict[str, Figure | None]:
+    """The figures of cases with detectors, filters that respond to manoeuvres, or uses."""
     watched = [result for result in results if result.spec.detectors and "detections" in made]
-    moving = [result for result in watched if result.axes.extra["manoeuvre_s"]]
-    answering = [result for result in results if "modes" in result.sums]
+    moving = [result for result in watched if result.axes.manoeuvre_s]
+    responding = [result for result in results if "modes" in result.sums]
     found = {
         "roc": roc_figure(spread_out(moving), made["detections"]) if moving else None,
         "detection": detection_figure(watched, made["detections"]) if moving else None,
         "delay": delay_figure(spread_out(moving), made["delays"]) if moving else None,
-        "response": response_figure(spread_out(answering, BESIDE_LEGEND), made["curves"], quantities)
-        if answering
-        else None,
-        "modes": modes_figure(spread_out(answering, BESIDE_LEGEND), made["modes"]) if answering else None,
+        "response": response_figure(spread_out(responding, BESIDE_LEGEND), made["curves"]) if responding else None,
+        "modes": modes_figure(spread_out(responding, BESIDE_LEGEND), made["modes"]) if responding else None,
         "uses": uses_figure([r for r in results if "uses" in r.sums], made["uses"]) if "uses" in made else None,
     }
     return {name: figure for name, figure in found.items() if figure}
 
 
-def spread_out(results: Sequence[CaseResult], most: int = MOST_PANELS) -> list[CaseResult]:
+def spread_out(
+    results: Sequence[CaseResult[ManoeuvreAxes]], most: int = MOST_PANELS
+) -> list[CaseResult[ManoeuvreAxes]]:
     """At most so many of the cases, from the first to the last."""
     if len(results) <= most:
         return list(results)
@@ -57,10 +59,10 @@ def usual(rows, detector: str):
     return own[away <= away.min() + 1e-9]
 
 
-def every_scan(result: CaseResult) -> list[str]:
+def every_scan(result: CaseResult[ManoeuvreAxes]) -> list[str]:
     """Detectors that test at every scan, and whose false alarms are about the usual ones."""
     found = []
-    for one, limits in zip(result.spec.detectors, result.axes.extra["thresholds"], strict=True):
+    for one, limits in zip(result.spec.detectors, result.axes.thresholds, strict=True):
         shares = exact.false_alarm(limits[0])
         if one.test_every == 1 and np.min(np.abs(np.log(shares / USUAL))) < 0.1:
             found.append(one.name)
@@ -73,7 +75,7 @@ def last_of(rows, phase: str):
     return own[own["k"] == own["k"].max()]
 
 
-def roc_figure(results: Sequence[CaseResult], detections) -> Figure | None:
+def roc_figure(results: Sequence[CaseResult[ManoeuvreAxes]], detections) -> Figure | None:
     """Probability of detection at the manoeuvre's last scan against that of a false alarm at the last before it."""
     drawn = []
     for result in results:
@@ -105,12 +107,12 @@ def roc_figure(results: Sequence[CaseResult], detections) -> Figure | None:
     return _figure("roc", "What a detector sees, and what it imagines", caption, drawn)
 
 
-def detection_figure(results: Sequence[CaseResult], detections) -> Figure | None:
+def detection_figure(results: Sequence[CaseResult[ManoeuvreAxes]], detections) -> Figure | None:
     """Probability of detection against the manoeuvre's strength, a line for each detector."""
     key = next((key for key, value in results[0].swept if key.rpartition(".")[2] in STRENGTHS), None)
     if key is None:
         return None
-    families: dict[tuple, list[CaseResult]] = {}
+    families: dict[tuple, list[CaseResult[ManoeuvreAxes]]] = {}
     for result in results:
         if key in dict(result.swept):
             families.setdefault(tuple(pair for pair in result.swept if pair[0] != key), []).append(result)
@@ -135,20 +137,18 @@ def detection_figure(results: Sequence[CaseResult], detections) -> Figure | None
     return _figure("detection", "Detection over the strength of the manoeuvre", caption, drawn)
 
 
-def _at_strongest(result: CaseResult, detections, name: str):
+def _at_strongest(result: CaseResult[ManoeuvreAxes], detections, name: str):
     own = usual(detections[detections["case"] == result.name], name)
     during = last_of(own, "manoeuvre")
     return (during if len(during) else last_of(own, "steady")).iloc[0]
 
 
-def delay_figure(results: Sequence[CaseResult], delays) -> Figure | None:
+def delay_figure(results: Sequence[CaseResult[ManoeuvreAxes]], delays) -> Figure | None:
     """Probability that an alarm has come, against the time since the manoeuvre began."""
     drawn = []
     for result in results:
         rows, marks = delays[delays["case"] == result.name], []
-        apart = [
-            one.name for one, so in zip(result.spec.detectors, result.axes.extra["independent"], strict=True) if so
-        ]
+        apart = [one.name for one, so in zip(result.spec.detectors, result.axes.independent, strict=True) if so]
         for n, name in enumerate([*every_scan(result), *apart]):
             own = usual(rows, name)
             own = own[own["event"] == "alarm"]
@@ -169,7 +169,7 @@ def delay_figure(results: Sequence[CaseResult], delays) -> Figure | None:
     return _figure("delay", "How soon a manoeuvre is seen", caption, drawn)
 
 
-def response_figure(results: Sequence[CaseResult], curves, quantities: Mapping) -> Figure | None:
+def response_figure(results: Sequence[CaseResult[ManoeuvreAxes]], curves) -> Figure | None:
     """σ of the first coordinate through the manoeuvre, a line for each filter."""
     groups = common.groups(curves, "case", "filter", "component")
     drawn = []
@@ -182,7 +182,7 @@ def response_figure(results: Sequence[CaseResult], curves, quantities: Mapping) 
             v = [rows[key].to_numpy(dtype=float) for key in ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")]
             known = v[4] if np.isfinite(v[4]).any() else None
             marks.append(Line(*v[:2], f, Style(n, n, n), *v[2:4], known))
-        y = Axis(f"$\\sigma$ of {quantities[component].symbol}, {unit}", "log")
+        y = Axis(f"$\\sigma$ of {QUANTITIES[component].symbol}, {unit}", "log")
         drawn.append(Panel(Axis(panels.TIME, limits=(0, None)), y, tuple(marks), _title(result), direct=False))
     caption = (
         f"Root-mean-square error of the first coordinate about the truth on the same plots, of "
@@ -191,7 +191,7 @@ def response_figure(results: Sequence[CaseResult], curves, quantities: Mapping) 
     return _figure("response", "Filters through a manoeuvre", caption, _one_legend(drawn))
 
 
-def modes_figure(results: Sequence[CaseResult], modes) -> Figure | None:
+def modes_figure(results: Sequence[CaseResult[ManoeuvreAxes]], modes) -> Figure | None:
     """Probability of a manoeuvre that filters live by, against time."""
     groups = common.groups(modes, "case", "filter", "component")
     drawn = []
@@ -211,7 +211,7 @@ def modes_figure(results: Sequence[CaseResult], modes) -> Figure | None:
     return _figure("modes", "What filters take the target to be doing", caption, _one_legend(drawn))
 
 
-def uses_figure(results: Sequence[CaseResult], uses) -> Figure | None:
+def uses_figure(results: Sequence[CaseResult[ManoeuvreAxes]], uses) -> Figure | None:
     """Measured over believed σ of what a track is used for, a panel for each moment."""
     result = results[0]
     rows, names = uses[uses["case"] == result.name], list(SYMBOLS)
@@ -234,17 +234,17 @@ def uses_figure(results: Sequence[CaseResult], uses) -> Figure | None:
     return _figure("uses", "What a track is used for", caption + left_out([result], results), _one_legend(drawn), 2)
 
 
-def _of(result: CaseResult) -> str:
+def _of(result: CaseResult[ManoeuvreAxes]) -> str:
     return f" ({panels.plain(_title(result))})" if result.swept else ""
 
 
-def _ends(result: CaseResult) -> list:
+def _ends(result: CaseResult[ManoeuvreAxes]) -> list:
     """Lines where the manoeuvre begins and ends."""
-    times = result.axes.extra["manoeuvre_s"] or ()
+    times = result.axes.manoeuvre_s or ()
     return [Reference(when, "x") for when in times if 0 < when < result.axes.t_s[-1]]
 
 
-def _title(result: CaseResult) -> str:
+def _title(result: CaseResult[ManoeuvreAxes]) -> str:
     """The swept values, a strength with its unit."""
     units = {key: words.rpartition(", ")[2] for key, words in STRENGTHS.items()}
     words = [f"{panels.number(v)} {units.get(key.rpartition('.')[2], '')}".rstrip() for key, v in result.swept]

@@ -1,34 +1,48 @@
 """How P3's claims on manoeuvres are measured: the cases they mean, and the numbers taken from tables."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import claims
-from radarsim.report.claims import Missing, certain, ratio
+from radarsim.report.claims import Missing, Series, certain, ratio
 from radarsim.report.statistics import Z95, Estimate
+from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
+from radarsim.studies.sonar.measures import CaseKey, Evidence, Measure
 
-WEAK, STRONG, EQUAL = "weakest manoeuvre", "strongest manoeuvre", "manoeuvre of one σ_a"
 USUAL = 0.01  # false alarms a test
-Measure = Callable[[claims.Evidence], Estimate]
 
 
-def case(results: Sequence[CaseResult], key: str) -> CaseResult:
-    """The case of an accelerating target that a key means; raises Missing."""
+# ---- the cases ----------------------------------------------------------------------------------------------------
+def _by_strength(results: Sequence[CaseResult]) -> list[CaseResult[ManoeuvreAxes]]:
+    """The cases of an accelerating target with detectors in the polar frame, from the weakest manoeuvre on."""
     found = [
         r for r in results if r.spec.frame == "polar" and r.spec.detectors and r.spec.target.kind == "accelerating"
     ]
-    found = [r for r in found if r.axes.extra["manoeuvre_s"] and (r.axes.extra["phase"] == 1).any()]
-    found.sort(key=lambda r: abs(r.spec.target.acceleration_mps2))
-    if key == EQUAL:
-        found = [r for r in found if abs(_shift_of_five(r) - 1) < 0.01]
-    if not found or (key != EQUAL and len(found) < 2):
-        raise Missing(key)
-    return found[-1] if key == STRONG else found[0]
+    found = [r for r in found if r.axes.manoeuvre_s and (r.axes.phase == 1).any()]
+    return sorted(found, key=lambda r: abs(r.spec.target.acceleration_mps2))
 
 
-def _detector(result: CaseResult, plots: int, what: str, value: float) -> tuple[int, int]:
+def _weakest(results: Sequence[CaseResult]) -> CaseResult[ManoeuvreAxes] | None:
+    found = _by_strength(results)
+    return found[0] if len(found) > 1 else None
+
+
+def _strongest(results: Sequence[CaseResult]) -> CaseResult[ManoeuvreAxes] | None:
+    found = _by_strength(results)
+    return found[-1] if len(found) > 1 else None
+
+
+def _of_one_sigma(results: Sequence[CaseResult]) -> CaseResult[ManoeuvreAxes] | None:
+    return next((r for r in _by_strength(results) if abs(_shift_of_five(r) - 1) < 0.01), None)
+
+
+WEAK, STRONG = CaseKey("weakest manoeuvre", _weakest), CaseKey("strongest manoeuvre", _strongest)
+EQUAL = CaseKey("manoeuvre of one σ_a", _of_one_sigma)
+
+
+# ---- the numbers --------------------------------------------------------------------------------------------------
+def _detector(result: CaseResult[ManoeuvreAxes], plots: int, what: str, value: float) -> tuple[int, int]:
     """Number of the detector of so many plots that tests at every scan, and of its threshold; raises Missing."""
     for d, one in enumerate(result.spec.detectors):
         given = getattr(one, what) or ()
@@ -37,24 +51,24 @@ def _detector(result: CaseResult, plots: int, what: str, value: float) -> tuple[
     raise Missing((plots, value))
 
 
-def _shift_of_five(result: CaseResult) -> float:
-    """Mean acceleration of five plots in σ_a at the last scan of the manoeuvre, in the range; nought without them."""
+def _shift_of_five(result: CaseResult[ManoeuvreAxes]) -> float:
+    """Mean acceleration of five plots in σ_a at the last scan of the manoeuvre, in the range; zero without them."""
     try:
         d, _ = _detector(result, 5, "threshold_k", 1.0)
     except Missing:
         return 0.0
-    return float(result.axes.extra["shifts"][d, 0, _last(result)])
+    return float(result.axes.shifts[d, 0, _last(result)])
 
 
-def _last(result: CaseResult) -> int:
+def _last(result: CaseResult[ManoeuvreAxes]) -> int:
     """The last scan of the manoeuvre."""
-    return int(np.flatnonzero(result.axes.extra["phase"] == 1)[-1])
+    return int(np.flatnonzero(result.axes.phase == 1)[-1])
 
 
 def thresholds_ratio(more: int, few: int) -> Measure:
     """Accelerations at the thresholds of two detectors of the same false alarms: algebra."""
 
-    def measure(seen: claims.Evidence) -> Estimate:
+    def measure(seen: Evidence) -> Estimate:
         result, found = seen.case(STRONG), []
         for plots in (more, few):
             d, _ = _detector(result, plots, "false_alarm_probability", USUAL)
@@ -68,27 +82,27 @@ def thresholds_ratio(more: int, few: int) -> Measure:
     return measure
 
 
-def mean_delay(result: CaseResult, plots: int) -> Estimate:
+def mean_delay(result: CaseResult[ManoeuvreAxes], plots: int) -> Estimate:
     """Mean time from the beginning to the first alarm in the range, s; where there is none, to the manoeuvre's end."""
     d, t = _detector(result, plots, "false_alarm_probability", USUAL)
-    scans = np.flatnonzero(result.axes.extra["phase"] == 1)
+    scans = np.flatnonzero(result.axes.phase == 1)
     share = np.asarray(result.sums["first"])[d, 0, t, scans] / result.count
     share[-1] += 1 - share.sum()
-    delay = result.axes.t_s[scans] - result.axes.extra["manoeuvre_s"][0]
+    delay = result.axes.t_s[scans] - result.axes.manoeuvre_s[0]
     mean = share @ delay
     half = Z95 * np.sqrt((share @ delay**2 - mean**2) / result.count)
     return Estimate(float(mean), float(mean - half), float(mean + half))
 
 
-def delays_ratio(key: str, more: int, few: int) -> Measure:
+def delays_ratio(key: CaseKey, more: int, few: int) -> Measure:
     """Mean delays of two detectors, taken as independent."""
     return lambda seen: ratio(mean_delay(seen.case(key), more), mean_delay(seen.case(key), few))
 
 
-def fastest(key: str) -> Measure:
-    """Plots of the detector with the least mean delay; the interval spans all that cannot be told from it."""
+def fastest(key: CaseKey) -> Measure:
+    """Plots of the detector with the least mean delay; the interval spans all that cannot be distinguished from it."""
 
-    def measure(seen: claims.Evidence) -> Estimate:
+    def measure(seen: Evidence) -> Estimate:
         result = seen.case(key)
         every = [
             one.plots
@@ -103,7 +117,7 @@ def fastest(key: str) -> Measure:
     return measure
 
 
-def detected_at_one(seen: claims.Evidence) -> Estimate:
+def detected_at_one(seen: Evidence) -> Estimate:
     """Share of alarms of five plots at k = 1 at the last scan of the manoeuvre of one σ_a."""
     result = seen.case(EQUAL)
     d, _ = _detector(result, 5, "threshold_k", 1.0)
@@ -112,10 +126,10 @@ def detected_at_one(seen: claims.Evidence) -> Estimate:
     return Estimate(*(float(row[part]) for part in ("probability", "lo", "hi")))
 
 
-def degrees_ratio(key: str, degree: int) -> Measure:
+def degrees_ratio(key: CaseKey, degree: int) -> Measure:
     """σ over the run of growing memory of a held degree, over that of the degree switched by five plots."""
 
-    def measure(seen: claims.Evidence) -> Estimate:
+    def measure(seen: Evidence) -> Estimate:
         result = seen.case(key)
         filters = [f for _, f in seen.members(result)]
         held = next((f.name for f in filters if (f.kind, f.degree) == ("growing_memory", degree)), None)
@@ -133,6 +147,6 @@ def _by_five(one) -> bool:
     return bool(simple and own.plots == 5 and own.false_alarm_probability == USUAL and own.coordinates == "each")
 
 
-def _over_run(curve: claims.Series) -> Estimate:
+def _over_run(curve: Series) -> Estimate:
     """Root of the mean square of a curve; scans of one realisation go together, so ends are taken all at once."""
     return Estimate(*(float(np.sqrt(np.mean(np.square(part)))) for part in (curve.value, curve.lo, curve.hi)))

@@ -1,8 +1,8 @@
-"""P3's manoeuvres: detectors and their exact laws, filters that respond to them, and what a track is used for.
+"""Manoeuvres (P3): detectors and their exact laws, filters that respond to them, and what a track is used for.
 
 Sums by D detectors, G groups (each coordinate, then all jointly), T thresholds and K scans: `tested`, `alarms`, `first`
-as in kernels.detector.Alarms; `modes` (F, K, C, 3) and, at A moments, `uses` (F, A, U, 5): n, Σe, Σe², Σe⁴ and Σ
-of the first-order variance.
+as in kernels.detector.Alarms; `modes` (F, K, C, 3) and, at A moments, `uses` (F, A, U, 5): n, Σe, Σe², Σe⁴ and Σ of the
+first-order variance.
 """
 
 import math
@@ -11,25 +11,27 @@ from typing import Any
 
 import numpy as np
 
-from radarsim.studies.sonar import filters
+from radarsim.config.experiment import Case
+from radarsim.engine.moments import Layout
+from radarsim.studies.sonar import banks, filters
+from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar import world as models
 from radarsim.studies.sonar.banks import FilterSpec
-from radarsim.studies.sonar.kernels import patterns
-from radarsim.studies.sonar.kernels.shared_gains import Sums
-from radarsim.studies.sonar.manoeuvre import exact
-from radarsim.studies.sonar.manoeuvre import uses as tracks
-from radarsim.studies.sonar.manoeuvre.config import RESPONDING_KINDS
-from radarsim.studies.sonar.manoeuvre.filters import (
+from radarsim.studies.sonar.detectors import (
     AdaptiveRule,
     DetectorTests,
     ModelPair,
     detector_arrays,
     detector_tests,
 )
-from radarsim.studies.sonar.manoeuvre.kernels import detector as kernels
-from radarsim.studies.sonar.scene import Scene, angular, courses, plots_of
-
-QUANTITIES = tracks.QUANTITIES
+from radarsim.studies.sonar.exact_values import exact_values
+from radarsim.studies.sonar.kernels import detector as kernels
+from radarsim.studies.sonar.kernels import patterns
+from radarsim.studies.sonar.manoeuvre import exact
+from radarsim.studies.sonar.manoeuvre import uses as tracks
+from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes, UsesAxes
+from radarsim.studies.sonar.manoeuvre.config import RESPONDING_KINDS
+from radarsim.studies.sonar.scene import Scene, angular, courses, filter_specs, plots_of, scene
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,38 @@ class DetectorPlan:
     detectors: kernels.Detectors
     measured: int
     at: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan(base.RealisationPlan):
+    """A plan with detectors, filters that respond to manoeuvres, or uses of a track."""
+
+    detector_plan: DetectorPlan
+
+    def simulate(self, first: int, count: int) -> np.ndarray:
+        """Sums of one block, in the order of the layout."""
+        sums = self.added(first, count)
+        return base.packed(self.layout, sums.errors, **added_up(self.detector_plan, sums))
+
+
+def prepare(case: Case) -> Plan:
+    """Design the filters and detectors of a case, and compute the exact values of their errors and alarms."""
+    spec, seen = case.spec, scene(case.spec)
+    specs = with_manoeuvre_response(spec, filter_specs(spec))
+    size, (K, C) = max(one.size for one in specs), seen.sigma.shape
+    detected, probability = base.detection_patterns(spec, seen)
+    plan = detector_plan(spec, seen, specs)
+    values = exact_values(seen, base.designs(specs, seen, detected), probability, size)
+    return Plan(
+        layout=Layout(**base.shapes(len(specs), K, C, size), **shapes(plan, len(specs))),
+        axes=axes(plan, base.axes(spec, seen, specs, values, None), detected, probability),
+        world=base.world(case, seen),
+        bank=banks.per_realisation_bank(specs, seen.t, seen.period, seen.nominal, plan.tests),
+        observation=base.observation(case, seen),
+        detectors=plan.detectors,
+        kept=plan.at,
+        detector_plan=plan,
+    )
 
 
 def times_of(target) -> tuple[float, float] | None:
@@ -165,25 +199,27 @@ def independent(one, seen: Scene) -> bool:
     return one.test_every >= one.plots and (seen.certain > 0).all() and not seen.rho.any() and not seen.walk.any()
 
 
-def told(plan: DetectorPlan, detected: np.ndarray, probability: np.ndarray) -> dict:
-    """What the report needs beside the sums."""
+def axes(
+    plan: DetectorPlan, common: base.GivenPlotsAxes, detected: np.ndarray, probability: np.ndarray
+) -> ManoeuvreAxes:
+    """Labels of a case, and its exact laws over patterns detected (M, K') of plots with these probabilities (M,)."""
     spec, seen = plan.spec, plan.seen
     alarms, shifts = exact_alarms(spec, seen, detected, probability)
-    found = {
-        "exact_alarms": alarms,
-        "shifts": shifts,
-        "thresholds": plan.tests.thresholds,
-        "independent": tuple(independent(one, seen) for one in spec.detectors),
-        "phase": plan.detectors.phase,
-        "manoeuvre_s": times_of(spec.target),
-    }
-    return found | (_uses_told(spec, seen, plan.at) if spec.uses else {})
+    return ManoeuvreAxes(
+        **vars(common),
+        exact_alarms=alarms,
+        shifts=shifts,
+        thresholds=plan.tests.thresholds,
+        independent=tuple(independent(one, seen) for one in spec.detectors),
+        phase=plan.detectors.phase,
+        manoeuvre_s=times_of(spec.target),
+        uses=_uses_axes(spec, seen, plan.at) if spec.uses else None,
+    )
 
 
-def _uses_told(spec, seen: Scene, at: np.ndarray) -> dict:
-    """Scans, true values and speed relative to the own ship (A,) of the uses."""
+def _uses_axes(spec, seen: Scene, at: np.ndarray) -> UsesAxes:
     apart = tracks.flat(seen.truth[at, :2, :2], spec.frame == "polar") - own_ship(spec, seen.t[at])
-    return {"uses_at": at, "uses_true": true_uses(spec, seen, at), "uses_closing": np.hypot(apart[:, 2], apart[:, 3])}
+    return UsesAxes(at=at, true=true_uses(spec, seen, at), closing_mps=np.hypot(apart[:, 2], apart[:, 3]))
 
 
 # ---- uses ---------------------------------------------------------------------------------------------------------
@@ -246,15 +282,6 @@ def shapes(plan: DetectorPlan, F: int) -> dict[str, tuple[int, ...]]:
     if plan.spec.uses:
         found["uses"] = (F, len(plan.at), len(tracks.QUANTITIES), 5)
     return found
-
-
-def empty_sums(plan: DetectorPlan, errors: Sums, count: int) -> patterns.BlockSums:
-    """Zeros that the kernels add to in a block of `count` realisations; errors are the sums of errors."""
-    F, K = errors.error.shape[:2]
-    D, G, T = plan.detectors.threshold.shape
-    alarms = kernels.Alarms(np.zeros((D, G, K)), np.zeros((D, G, T, K)), np.zeros((D, G, T, K)))
-    kept = np.zeros((len(plan.at), F, 2, 6, count))
-    return patterns.BlockSums(errors, alarms, np.zeros((F, K, G - 1, 3)), plan.at, kept)
 
 
 def added_up(plan: DetectorPlan, sums: patterns.BlockSums) -> dict[str, np.ndarray]:

@@ -1,6 +1,7 @@
 """P3's tables on manoeuvres: what detectors see, how soon, thresholds, classes, modes of filters, uses of a track."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,6 +10,11 @@ from radarsim.report import consistency, statistics
 from radarsim.report import tables as common
 from radarsim.studies.sonar.exact import sigma_acceleration
 from radarsim.studies.sonar.manoeuvre import exact
+from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
+from radarsim.studies.sonar.manoeuvre.uses import QUANTITIES
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PHASES = np.array(["steady", "manoeuvre", "after"], dtype=object)
 EVENTS = np.array(["false alarm", "alarm", "all clear"], dtype=object)  # the first of a phase
@@ -17,7 +23,7 @@ NEAR = "fails: near zero"
 NEAR_ZERO = 3.0  # σ within which speed and distances, which cannot be negative, are not of first order
 
 
-def tables(results: Sequence[CaseResult]) -> dict:
+def tables(results: Sequence[CaseResult[ManoeuvreAxes]]) -> "dict[str, pd.DataFrame]":
     """The tables of cases with detectors, filters that answer to manoeuvres, or uses."""
     measured = [result for result in results if result.spec.detectors]
     return {
@@ -30,15 +36,15 @@ def tables(results: Sequence[CaseResult]) -> dict:
     }
 
 
-def groups(result: CaseResult) -> list[str]:
+def groups(result: CaseResult[ManoeuvreAxes]) -> list[str]:
     """Names of the coordinates, and of all jointly."""
-    return [*(name for name, _ in result.axes.extra["coordinates"]), JOINT]
+    return [*(name for name, _ in result.axes.coordinates), JOINT]
 
 
-def _tested(result: CaseResult):
+def _tested(result: CaseResult[ManoeuvreAxes]):
     """Indices (detector, group, threshold, scan), each (n,), of all tests, in this order, and leading columns."""
     tested = np.asarray(result.sums["tested"])
-    count = np.array([limits.shape[1] for limits in result.axes.extra["thresholds"]])
+    count = np.array([limits.shape[1] for limits in result.axes.thresholds])
     there = np.arange(result.sums["alarms"].shape[2]) < count[:, None]
     d, g, t, k = np.nonzero((tested[:, :, None] > 0) & there[:, None, :, None])
     return (d, g, t, k), _leading(result, d, g, t) | {
@@ -47,9 +53,9 @@ def _tested(result: CaseResult):
     }
 
 
-def _leading(result: CaseResult, d: np.ndarray, g: np.ndarray, t: np.ndarray) -> dict[str, np.ndarray]:
+def _leading(result: CaseResult[ManoeuvreAxes], d: np.ndarray, g: np.ndarray, t: np.ndarray) -> dict[str, np.ndarray]:
     """Columns case, filter (the detector), component, plots, threshold_k, false_alarm_probability (the exact law's)."""
-    chosen = result.axes.extra["thresholds"]
+    chosen = result.axes.thresholds
     k = np.array([chosen[i][j, m] for i, j, m in zip(d, g, t, strict=True)])
     freedom = np.where(g == len(groups(result)) - 1, len(groups(result)) - 1, 1)
     return {
@@ -68,19 +74,19 @@ DETECTIONS = (
 )
 
 
-def _detections(result: CaseResult) -> dict:
+def _detections(result: CaseResult[ManoeuvreAxes]) -> dict:
     """Probability of an alarm at each test; `shift` is the mean of â in units of its σ_a, `n` the tests made."""
-    extra = result.axes.extra
+    axes = result.axes
     at, columns = _tested(result)
     d, g, _, k = at
     n = np.asarray(result.sums["tested"])[d, g, k]
     of = statistics.rate(np.asarray(result.sums["alarms"])[at], n)
     return columns | {
         "n": n.astype(np.int64),
-        "phase": PHASES[extra["phase"][k]],
-        "shift": extra["shifts"][d, g, k],
+        "phase": PHASES[axes.phase[k]],
+        "shift": axes.shifts[d, g, k],
         **dict(zip(("probability", "lo", "hi"), of, strict=True)),
-        "exact": extra["exact_alarms"][at],
+        "exact": axes.exact_alarms[at],
     }
 
 
@@ -90,17 +96,17 @@ DELAYS = (
 )
 
 
-def _delays(result: CaseResult) -> dict:
+def _delays(result: CaseResult[ManoeuvreAxes]) -> dict:
     """Probability that the first event of a phase has come by a scan: false alarm, alarm, end of alarms.
 
     The delay is counted from when the phase begins. `independent` is what tests independent of one another would give,
     and `exact` the same where they are: overlapping windows have no closed law.
     """
-    extra, K = result.axes.extra, len(result.axes.k)
+    axes, K = result.axes, len(result.axes.k)
     at, columns = _tested(result)
     d, k = at[0], at[3]
-    phase, since = extra["phase"], began(result)
-    p = np.where(phase == 2, 1 - extra["exact_alarms"], extra["exact_alarms"])
+    phase, since = axes.phase, began(result)
+    p = np.where(phase == 2, 1 - axes.exact_alarms, axes.exact_alarms)
     first = np.asarray(result.sums["first"])
     reached, law = np.zeros(first.shape), np.full(first.shape, np.nan)
     for part in range(3):
@@ -116,14 +122,14 @@ def _delays(result: CaseResult) -> dict:
         "event": EVENTS[phase[k]],
         "delay_s": columns["t_s"] - since[phase[k]],
         **dict(zip(("probability", "lo", "hi"), of, strict=True)),
-        "exact": np.where(np.array(extra["independent"])[d], law[at], np.nan),
+        "exact": np.where(np.array(axes.independent)[d], law[at], np.nan),
         "independent": law[at],
     }
 
 
-def began(result: CaseResult) -> np.ndarray:
+def began(result: CaseResult[ManoeuvreAxes]) -> np.ndarray:
     """When each phase begins (3,), s from the first plot; not-a-number where there is none."""
-    times = result.axes.extra["manoeuvre_s"] or (np.nan, np.nan)
+    times = result.axes.manoeuvre_s or (np.nan, np.nan)
     return np.array([0.0, *times])
 
 
@@ -133,7 +139,7 @@ CLASSES = (
 )
 
 
-def _classes(result: CaseResult) -> dict:
+def _classes(result: CaseResult[ManoeuvreAxes]) -> dict:
     """A track's class by its alarms: called manoeuvring where there was one, by legs: steady, manoeuvre.
 
     The error is a steady track called manoeuvring, or a manoeuvring one called steady; the row's scan is the last.
@@ -168,22 +174,22 @@ THRESHOLDS = (
 )
 
 
-def _thresholds(result: CaseResult) -> dict:
+def _thresholds(result: CaseResult[ManoeuvreAxes]) -> dict:
     """Thresholds of each detector with whole windows: false alarms by the χ² law, and what acceleration they stand for.
 
     `threshold_to_plot_variance` is k σ_a²/σ², in 1/s⁴: the k of the print, which compares with the plot's variance.
     """
-    extra = result.axes.extra
-    d, g, t = (np.array(one, dtype=np.int64) for one in zip(*_every_threshold(extra["thresholds"]), strict=True))
+    axes = result.axes
+    d, g, t = (np.array(one, dtype=np.int64) for one in zip(*_every_threshold(axes.thresholds), strict=True))
     columns = _leading(result, d, g, t)
     k, n, joint = columns["threshold_k"], columns["plots"], g == len(groups(result)) - 1
-    scale = np.append(extra["sigma"], np.nan)[g]
-    spread = np.where(joint, np.nan, sigma_acceleration(n.astype(float), extra["scan_period_s"]))
+    scale = np.append(axes.sigma, np.nan)[g]
+    spread = np.where(joint, np.nan, sigma_acceleration(n.astype(float), axes.scan_period_s))
     reach = {
         f"acceleration_for_{percent}_percent": scale * spread * [exact.shift_for(percent / 100, one) for one in k]
         for percent in (50, 68, 90)
     }
-    units = [f"{unit}/s2" for _, unit in extra["coordinates"]]
+    units = [f"{unit}/s2" for _, unit in axes.coordinates]
     return (
         columns
         | reach
@@ -204,7 +210,7 @@ def _every_threshold(thresholds: Sequence[np.ndarray]) -> list[tuple[int, int, i
 MODES = ("case", "filter", "component", "k", "t_s", "n", "probability", "lo", "hi", "memory_plots")
 
 
-def _modes(result: CaseResult) -> dict:
+def _modes(result: CaseResult[ManoeuvreAxes]) -> dict:
     """Mean probability of a manoeuvre that a filter lives by, and the mean number of plots that it rests on.
 
     Of an adaptive filter the share of realisations in its manoeuvring mode; of an imm that of the second model.
@@ -219,7 +225,7 @@ def _modes(result: CaseResult) -> dict:
     return {
         "case": np.full(f.size, result.name, dtype=object),
         "filter": common.names(axes.filters, f),
-        "component": common.names([name for name, _ in axes.extra["coordinates"]], c),
+        "component": common.names([name for name, _ in axes.coordinates], c),
         "k": np.asarray(axes.k)[k],
         "t_s": np.asarray(axes.t_s, dtype=float)[k],
         "n": np.full(f.size, result.count, dtype=np.int64),
@@ -228,7 +234,6 @@ def _modes(result: CaseResult) -> dict:
     }
 
 
-QUANTITIES = (("course", "rad"), ("speed", "m/s"), ("x_ahead", "m"), ("y_ahead", "m"), ("cpa", "m"), ("t_cpa", "s"))
 USES = (
     *("case", "filter", "component", "unit", "k", "t_s", "n"),
     *("true_value", "bias", "sigma", "sigma_lo", "sigma_hi", "believed_sigma", "ratio", "ratio_lo", "ratio_hi"),
@@ -236,27 +241,27 @@ USES = (
 )
 
 
-def _uses(result: CaseResult) -> dict:
+def _uses(result: CaseResult[ManoeuvreAxes]) -> dict:
     """Course, speed, predicted position, closest approach: error about the truth beside σ from the track's covariance.
 
     believed_sigma is the root of the mean first-order variance, ratio the measured σ over it. `distance_in_sigma`
     tells how many believed σ speed or closest approach lie from zero, beyond which they cannot go: within three the
     first order fails, for the course and the time of the closest approach with them.
     """
-    axes, extra = result.axes, result.axes.extra
+    axes = result.axes
     sums = np.asarray(result.sums["uses"])
     f, u, a = np.nonzero(np.moveaxis(sums[..., 0] > 0, 1, 2))
     n, first, square, fourth, spread = np.moveaxis(sums[f, a, u], -1, 0)
     of = statistics.root_mean_square(square, fourth, n)
-    believed, true = np.sqrt(spread / n), extra["uses_true"][a, u]
-    away = _distance(sums, extra["uses_true"], extra["uses_closing"])[f, u, a]
+    believed, true = np.sqrt(spread / n), axes.uses.true[a, u]
+    away = _distance(sums, axes.uses.true, axes.uses.closing_mps)[f, u, a]
     compared = consistency.ratio_columns(of, believed)
     verdict = np.select(
         [away < NEAR_ZERO, compared["ratio_lo"] > 1.05, compared["ratio_hi"] < 0.95],
         [NEAR, "error larger", "error smaller"],
         "holds within 5 %",
     )
-    k = extra["uses_at"][a]
+    k = axes.uses.at[a]
     return {
         "case": np.full(f.size, result.name, dtype=object),
         "filter": common.names(axes.filters, f),

@@ -4,27 +4,28 @@ from collections.abc import Mapping, Sequence
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels
+from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
 from radarsim.studies.sonar.manoeuvre.figures import USUAL, every_scan, last_of, usual
 from radarsim.studies.sonar.manoeuvre.tables import NEAR
 
 
 def question(specs: Sequence) -> str:
-    """What is asked of cases with detectors, filters that answer to manoeuvres, or uses."""
+    """What is asked of cases with detectors, filters that respond to manoeuvres, or uses."""
     if any(spec.detectors for spec in specs):
-        return "How surely and how soon is a manoeuvre seen, and what do filters that answer to it gain?"
+        return "How surely and how soon is a manoeuvre seen, and what do filters that respond to it gain?"
     if any(spec.uses for spec in specs):
         return "How well are course, speed, position ahead and closest approach known from a track?"
-    return "What do filters that answer to manoeuvres gain?"
+    return "What do filters that respond to manoeuvres gain?"
 
 
-def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
-    """Sentences with 95 % intervals: what detectors see of each manoeuvre, how σ from the covariance bears the test."""
-    moving = [result for result in results if result.spec.detectors and result.axes.extra["manoeuvre_s"]]
-    told = [_seen(result, made["detections"]) for result in panels.told(moving, 2)[0] if "detections" in made]
-    return [words for words in [*told, _first_order(made)] if words]
+def answer(results: Sequence[CaseResult[ManoeuvreAxes]], made: Mapping) -> list[str]:
+    """Sentences with 95 % intervals: what detectors see of each manoeuvre, and σ of uses against the covariance's."""
+    moving = [result for result in results if result.spec.detectors and result.axes.manoeuvre_s]
+    seen = [_seen(result, made["detections"]) for result in panels.told(moving, 2)[0] if "detections" in made]
+    return [words for words in [*seen, _first_order(made)] if words]
 
 
-def _seen(result: CaseResult, detections) -> str:
+def _seen(result: CaseResult[ManoeuvreAxes], detections) -> str:
     """Which detector sees most of a manoeuvre, and which least."""
     rows = detections[detections["case"] == result.name]
     found = [last_of(usual(rows, name), "manoeuvre").iloc[:1] for name in every_scan(result)]
@@ -32,30 +33,30 @@ def _seen(result: CaseResult, detections) -> str:
     if not found:
         return ""
     found.sort(key=lambda row: row["probability"])
-    said = [
+    ends = [
         f"{row['filter']} {row['probability']:.3g} [{row['lo']:.3g}, {row['hi']:.3g}]"
         for row in found[:: len(found) - 1 or 1]
     ]
     where = panels.plain(panels.swept(result))
-    ends = said[0] if len(said) == 1 else f"most with {said[-1]}, least with {said[0]}"
+    shown = ends[0] if len(ends) == 1 else f"most with {ends[-1]}, least with {ends[0]}"
     return (
         f"{where + ': ' if where else ''}alarms a test at the end of the manoeuvre, at about {USUAL:g} false alarms: "
-        f"{ends}."
+        f"{shown}."
     )
 
 
 def _first_order(made: Mapping) -> str:
-    """How σ from the covariance bears the test, of the first case's first filter at the last moment asked for."""
+    """Measured σ of uses over that from the covariance, of the first case's first filter at the last moment asked."""
     if "uses" not in made:
         return ""
     rows = made["uses"]
     first = rows.iloc[0]
     rows = rows[(rows["case"] == first["case"]) & (rows["filter"] == first["filter"])]
     rows = rows[rows["k"] == rows["k"].max()]
-    told = [
+    ratios = [
         f"{row.component} {row.ratio:.3f} [{row.ratio_lo:.3f}, {row.ratio_hi:.3f}]"
         f"{' (near zero)' if row.first_order == NEAR else ''}"
         for row in rows.itertuples()
     ]
     where = f"{first['filter']}, {rows.iloc[0]['t_s']:g} s, {first['case']}"
-    return f"Measured σ of the track's uses over that from its covariance ({where}): {', '.join(told)}."
+    return f"Measured σ of the track's uses over that from its covariance ({where}): {', '.join(ratios)}."

@@ -7,10 +7,11 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.kernels import random
-from radarsim.studies.sonar import study
+from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter import filters as design
 from radarsim.studies.sonar.clutter import track as plots
-from radarsim.studies.sonar.clutter.kernels import tracker as kernels
+from radarsim.studies.sonar.clutter.kernels import counts as places
+from radarsim.studies.sonar.clutter.study import tracker_specs
 from tests.studies.sonar.clutter import naive as naive
 
 T, SIGMA = 5.0, np.array([30.0, np.radians(1)])
@@ -39,11 +40,11 @@ def config(filters, density=0.0, detection=1.0, scans=30, **sensor):
 
 def prepared(*of, **more):
     case = load(config(*of, **more)).cases[0]
-    return case, study.prepare(case)
+    return case, STUDY.prepare(case)
 
 
 def sums_of(plan, first, count=1):
-    return plan.layout.unpack(study.simulate(plan, first, count))
+    return plan.layout.unpack(STUDY.simulate(plan, first, count))
 
 
 @pytest.mark.parametrize("density", [0.0, 1.0, 5.0])
@@ -51,7 +52,7 @@ def test_estimates_are_the_twins(density):
     """Nearest plot and PDA, with misses, drops and losses, realisation by realisation to 1e-10 of σ."""
     filters = [tracker("nearest"), tracker("pda"), tracker("pda", 0.9, 3, 4, 1e-2, drop_after_misses=2, name="other")]
     case, plan = prepared(filters, density=density, detection=0.8)
-    wanted, t, compared = plots.tracker_specs(case.spec), plan.axes.t_s, 0
+    wanted, t, compared = tracker_specs(case.spec), plan.axes.t_s, 0
     for realisation in (0, 1, 2, 3, 511, 70_000):
         sums = sums_of(plan, realisation)
         z, true = plots.target_plots(plan.world, plan.observation, realisation)
@@ -60,10 +61,10 @@ def test_estimates_are_the_twins(density):
             gate = design.gate_threshold(choice.gate_probability)
             of = (choice, SIGMA, 0.8, choice.gate_probability, gate, density / 1e6, T)
             for k, (state, x, P) in enumerate(naive.follow(t, z, false, true, *of)):
-                assert sums["counts"][f, k, kernels.KEPT] == (state == 2)
-                assert sums["counts"][f, k, kernels.TRYING] == (state == 1)
+                assert sums["counts"][f, k, places.KEPT] == (state == 2)
+                assert sums["counts"][f, k, places.TRYING] == (state == 1)
                 if state == 2:
-                    error = x - plan.axes.extra["truth"][k, :, :2].ravel()
+                    error = x - plan.world.truth[k, :, :2].ravel()
                     unit = np.sqrt(np.diag(P))
                     assert np.abs((sums["error"][f, k, :, 0] - error) / unit).max() < 1e-10
                     assert sums["believed"][f, k] == pytest.approx(unit**2, rel=1e-10)
@@ -77,7 +78,7 @@ def test_without_clutter_trackers_are_the_plain_filter_to_the_last_bit():
         filters = [tracker("known", gate), tracker("nearest", gate), tracker("pda", gate)]
         _, plan = prepared(filters)
         case = load(config([{"name": "plain", "kind": "kalman", "manoeuvre_variance": 1e-3}], detection=0.5)).cases[0]
-        plain = study.prepare(case)
+        plain = STUDY.prepare(case)
         plain = dataclasses.replace(
             plain,
             world=plain.world._replace(plots=plan.world.plots, motion=plan.world.motion),
@@ -103,7 +104,7 @@ def test_a_lone_plot_is_certain_for_nearest_whatever_the_gate_and_density():
 def test_the_field_is_poisson_and_even_in_area():
     """Numbers in a sector, over realisations, and places of their plots, against their laws."""
     _, plan = prepared([tracker("pda")], density=2.0)
-    area = plan.axes.extra["area_m2"]
+    area = plan.axes.area_m2
     found = [plots.false_plots(plan.field, i, 3) for i in range(2000)]
     number = np.array([one.shape[1] for one in found])
     mean = 2e-6 * area
@@ -123,11 +124,11 @@ def test_a_full_circle_has_no_seam():
     for first in (0.0, -180.0):
         one = config([tracker("known")], density=2.0)
         one["target"], one["sensor"]["sector"] = target, {"range_m": [7e3, 11e3], "bearing_deg": [first, first + 360]}
-        plan = study.prepare(load(one).cases[0])
+        plan = STUDY.prepare(load(one).cases[0])
         found = sums_of(plan, 0, 512)["counts"][0]
-        assert found[2:, kernels.PLOTS].sum() == 512 * 28
-        counts.append(found[:, kernels.FALSE].sum() / found[:, kernels.EXPECTED].sum())
-        expected = found[:, kernels.EXPECTED].sum()
+        assert found[2:, places.PLOTS].sum() == 512 * 28
+        counts.append(found[:, places.FALSE].sum() / found[:, places.EXPECTED].sum())
+        expected = found[:, places.EXPECTED].sum()
     assert np.abs(np.array(counts) - 1).max() < 3.9 / np.sqrt(expected)
 
 

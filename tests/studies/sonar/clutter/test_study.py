@@ -9,8 +9,8 @@ from scipy import stats
 from radarsim.app.configs import load
 from radarsim.app.work import CaseWork
 from radarsim.engine.collect import collect
-from radarsim.studies.sonar import study
-from radarsim.studies.sonar.clutter.kernels import tracker as kernels
+from radarsim.studies.sonar import STUDY
+from radarsim.studies.sonar.clutter.kernels import counts as places
 
 N = 100_000
 RATE = 5e-5  # of either tail: 99.99 % bounds
@@ -38,11 +38,11 @@ def config(filters, density=0.0, detection=1.0, scans=10, **sensor):
 
 
 def prepared(*of, **more):
-    return study.prepare(load(config(*of, **more)).cases[0])
+    return STUDY.prepare(load(config(*of, **more)).cases[0])
 
 
 def simulated(plan, count=N):
-    return plan.layout.unpack(sum(study.simulate(plan, b, min(4096, count - b)) for b in range(0, count, 4096)))
+    return plan.layout.unpack(sum(STUDY.simulate(plan, b, min(4096, count - b)) for b in range(0, count, 4096)))
 
 
 def assert_binomial(found, n, p):
@@ -54,7 +54,7 @@ def assert_binomial(found, n, p):
 
 def gates_of(plan):
     counts = simulated(plan)["counts"][:, 2:]
-    return tuple(counts[..., place] for place in (kernels.PLOTS, kernels.INSIDE, kernels.FALSE, kernels.EXPECTED))
+    return tuple(counts[..., place] for place in (places.PLOTS, places.INSIDE, places.FALSE, places.EXPECTED))
 
 
 def test_gates_hold_target_and_false_plots_as_they_should():
@@ -67,7 +67,7 @@ def test_gates_hold_target_and_false_plots_as_they_should():
     assert (false >= stats.poisson.ppf(RATE, expected)).all()
     assert (false <= stats.poisson.isf(RATE, expected)).all()
     # The area of the gate is known beforehand, and its centre's mean range is the target's.
-    n, truth = np.arange(2, 6), plan.axes.extra["truth"][2:, 0, 0]
+    n, truth = np.arange(2, 6), plan.world.truth[2:, 0, 0]
     ahead = 1 + 2 * (2 * n + 1) / (n * (n - 1))
     area = truth * np.pi * -2 * np.log(1 - wanted[:, None]) * 30.0 * np.radians(1) * ahead
     assert expected == pytest.approx(N * 1e-6 * area, rel=1e-4)
@@ -89,9 +89,9 @@ def test_initiation_follows_its_exact_law(m, n):
     plan = prepared(
         [tracker("a", "nearest", m, n, 1.0), tracker("b", "pda", m, n, 1.0)], detection=0.7, missed_scans=[6]
     )
-    sums, exact = simulated(plan), plan.axes.extra["exact_confirmed"]
+    sums, exact = simulated(plan), plan.axes.exact_confirmed
     assert np.isfinite(exact).all()
-    assert_binomial(np.cumsum(sums["counts"][:, :, kernels.FOUND], axis=1), N, exact)
+    assert_binomial(np.cumsum(sums["counts"][:, :, places.FOUND], axis=1), N, exact)
     assert (sums["begun"] == 0).all()
     assert (sums["ratios"][:, 1, 0] == 0).all()
 
@@ -105,14 +105,14 @@ def test_pairs_of_false_plots_follow_their_exact_law(density):
         tracker("c", "nearest", 2, 3, 0.9, speed_mps=5),
     ]
     plan = prepared(filters, density=density)
-    found, exact = simulated(plan)["begun"][:, :, 2], plan.axes.extra["exact_begun"]
+    found, exact = simulated(plan)["begun"][:, :, 2], plan.axes.exact_begun
     assert_binomial(np.cumsum(found, axis=1), N, np.cumsum(exact, axis=1))
 
 
 def test_scores_of_false_tracks_keep_within_their_bound():
     """exp(score) is a martingale of mean one on false tracks: at most exp(-threshold) of them reach it (Ville)."""
     plan = prepared([tracker("a"), tracker("b", "pda")], density=1.0, detection=0.8, scans=20)
-    scores, T = simulated(plan)["scores"], plan.axes.extra["thresholds"]
+    scores, T = simulated(plan)["scores"], plan.axes.thresholds
     reached = scores[1, :, :-1]
     assert (scores[1, :, -1] == N).all()
     assert (reached <= stats.binom.isf(RATE, N, np.exp(-T))).all()
@@ -125,13 +125,13 @@ def test_every_track_of_the_target_is_accounted_for():
     plan = prepared([tracker("a"), tracker("b", "pda")], density=3.0, detection=0.8, scans=20)
     sums = simulated(plan, 20_000)
     counts = sums["counts"]
-    ends = counts[:, :, [kernels.LOST, kernels.DROPPED]].sum(axis=(1, 2))
+    ends = counts[:, :, [places.LOST, places.DROPPED]].sum(axis=(1, 2))
     assert sums["ratios"][:, 0, 0] == pytest.approx(ends)
-    assert sums["ratios"][:, 0, 2] == pytest.approx(counts[:, :, kernels.KEPT].sum(axis=1))
-    assert (sums["estimates"][:, :, 0] == counts[:, :, kernels.KEPT]).all()
-    assert (counts[:, :, kernels.KEPT] + counts[:, :, kernels.TRYING] <= 20_000).all()
-    assert (counts[:, :, kernels.LOST].sum(axis=1) > 100).all()
-    assert (counts[:, :, kernels.FOUND].sum(axis=1) <= 20_000).all()
+    assert sums["ratios"][:, 0, 2] == pytest.approx(counts[:, :, places.KEPT].sum(axis=1))
+    assert (sums["estimates"][:, :, 0] == counts[:, :, places.KEPT]).all()
+    assert (counts[:, :, places.KEPT] + counts[:, :, places.TRYING] <= 20_000).all()
+    assert (counts[:, :, places.LOST].sum(axis=1) > 100).all()
+    assert (counts[:, :, places.FOUND].sum(axis=1) <= 20_000).all()
 
 
 def test_probabilistic_association_keeps_a_track_longer():
@@ -143,7 +143,7 @@ def test_probabilistic_association_keeps_a_track_longer():
 
 def test_a_target_outside_the_sector_is_not_seen():
     plan = prepared([tracker("a", "known")], sector={"range_m": [7e3, 8990.0], "bearing_deg": [5, 40]})
-    kept = simulated(plan, 512)["counts"][0, :, kernels.KEPT]
+    kept = simulated(plan, 512)["counts"][0, :, places.KEPT]
     assert plan.observation.certain.tolist() == [0] + [1] * 9  # 9000 m at first, 4 m/s less
     assert kept.tolist() == [0, 0] + [512] * 8
 
@@ -153,7 +153,7 @@ def test_whole_turns_of_the_sector_change_nothing(first):
     sector = {"range_m": [7e3, 11e3], "bearing_deg": [first + 5, first + 40]}
     plan = prepared([tracker("a"), tracker("b", "pda")], density=2.0, sector=sector)
     counts = simulated(plan, 512)["counts"]
-    false, expected = (counts[..., place].sum(axis=1) for place in (kernels.FALSE, kernels.EXPECTED))
+    false, expected = (counts[..., place].sum(axis=1) for place in (places.FALSE, places.EXPECTED))
     assert (np.abs(false / expected - 1) < 3.9 / np.sqrt(expected)).all()
 
 
@@ -166,9 +166,9 @@ def test_an_open_gate_holds_the_whole_field(bearing_deg):
     assert all(np.isfinite(values).all() for values in found.values())
     counts = found["counts"].sum(axis=1)
     area = np.ptp(np.radians(bearing_deg)) * (11e3**2 - 7e3**2) / 2
-    np.testing.assert_allclose(counts[:, kernels.EXPECTED], counts[:, kernels.LOOKED] * area * 0.3e-6, rtol=1e-12)
-    expected = counts[:, kernels.EXPECTED]
-    assert (np.abs(counts[:, kernels.FALSE] / expected - 1) < 6 / np.sqrt(expected)).all()
+    np.testing.assert_allclose(counts[:, places.EXPECTED], counts[:, places.LOOKED] * area * 0.3e-6, rtol=1e-12)
+    expected = counts[:, places.EXPECTED]
+    assert (np.abs(counts[:, places.FALSE] / expected - 1) < 6 / np.sqrt(expected)).all()
 
 
 def test_a_target_that_passes_through_the_sonar_leaves_numbers():
@@ -177,7 +177,7 @@ def test_a_target_that_passes_through_the_sonar_leaves_numbers():
     given["sensor"]["sector"] = {"range_m": [0, 15e3], "bearing_deg": [0, 360]}
     course = {"x_m": 500, "y_m": 0, "speed_mps": 10, "course_deg": 180}
     given["target"] = {"kind": "accelerating", **course, "acceleration_mps2": 0, "start_s": 0}
-    found = simulated(study.prepare(load(given).cases[0]), 2048)
+    found = simulated(STUDY.prepare(load(given).cases[0]), 2048)
     assert all(np.isfinite(values).all() for values in found.values())
 
 
@@ -193,4 +193,4 @@ def test_noise_of_the_target_is_that_of_plain_filters():
     plain = config([{"name": "plain", "kind": "kalman"}])
     plain["sensor"].pop("sector")
     other = load(plain).cases[0]
-    assert (study.prepare(one).world.plots == study.prepare(other).world.plots).all()
+    assert (STUDY.prepare(one).world.plots == STUDY.prepare(other).world.plots).all()

@@ -65,12 +65,11 @@ def test_faults_in_words(changes, words):
 def test_what_is_taken():
     made = config(target=VESSEL, filters=[ADAPTIVE, IMM], detectors=[DETECTOR], uses={"horizon_s": 60.0})
     spec = load(made).cases[0].spec
-    assert spec.manoeuvring
-    assert not spec.tracking
+    assert spec.parts == ("smoothing", "manoeuvre")
     assert spec.detectors[0].wanted() == (1.0,)
     assert spec.target.course_rad == pytest.approx(np.pi)
     assert spec.target.range_0() == 9e3
-    assert not load(config()).cases[0].spec.manoeuvring
+    assert load(config()).cases[0].spec.parts == ("smoothing",)
 
 
 def test_a_threshold_can_be_swept():

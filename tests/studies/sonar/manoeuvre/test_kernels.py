@@ -5,7 +5,7 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.kernels.random import fill_normal_pairs, fill_uniform_pairs
-from radarsim.studies.sonar import study
+from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.manoeuvre import exact
 from tests.studies.sonar.manoeuvre import naive as naive
 
@@ -53,7 +53,7 @@ def config(**changes):
 
 def plots(plan, realisation, probability):
     """Plots (K, 2) with not-a-number where missed, drawn from the same streams by the plainest code."""
-    a, b, z = np.empty(1), np.empty(1), plan.axes.extra["truth"][:, :2, 0].copy()
+    a, b, z = np.empty(1), np.empty(1), plan.world.truth[:, :2, 0].copy()
     for k in range(SCANS):
         fill_normal_pairs(plan.world.plots, realisation, k, a, b)
         z[k] += SIGMA * np.array([a[0], b[0]])
@@ -89,10 +89,10 @@ def twin(spec, z, c):
 
 @pytest.mark.parametrize("probability", [1.0, 0.7])
 def test_filters_are_their_twins(probability):
-    plan = study.prepare(load(config(sensor={"detection_probability": probability})).cases[0])
-    truth, switched = plan.axes.extra["truth"], 0
+    plan = STUDY.prepare(load(config(sensor={"detection_probability": probability})).cases[0])
+    truth, switched = plan.world.truth, 0
     for realisation in (0, 7, 4321):
-        sums = plan.layout.unpack(study.simulate(plan, realisation, 1))
+        sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
         z = plots(plan, realisation, probability)
         for (f, spec), c in ((pair, c) for pair in enumerate(FILTERS) for c in (0, 1)):
             if spec["kind"] == "growing_memory":
@@ -116,11 +116,11 @@ def test_filters_are_their_twins(probability):
 
 @pytest.mark.parametrize("probability", [1.0, 0.7])
 def test_alarms_and_first_events_are_the_twins(probability):
-    plan = study.prepare(load(config(sensor={"detection_probability": probability})).cases[0])
+    plan = STUDY.prepare(load(config(sensor={"detection_probability": probability})).cases[0])
     t = np.arange(SCANS) * T
     phase = np.digitize(t, [60, 100], right=True)
     for realisation in (3, 99):
-        sums = plan.layout.unpack(study.simulate(plan, realisation, 1))
+        sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
         z = plots(plan, realisation, probability)
         for d, spec in enumerate(DETECTORS):
             q = statistics(z, spec["plots"], spec.get("test_every", 1)).T
@@ -135,8 +135,8 @@ def test_alarms_and_first_events_are_the_twins(probability):
 
 
 def test_blocks_add_up_whatever_their_bounds():
-    plan = study.prepare(load(config() | {"uses": {"horizon_s": 60.0}}).cases[0])
-    whole = plan.layout.unpack(study.simulate(plan, 0, 1500))
-    parts = [plan.layout.unpack(study.simulate(plan, *part)) for part in ((0, 700), (700, 800))]
+    plan = STUDY.prepare(load(config() | {"uses": {"horizon_s": 60.0}}).cases[0])
+    whole = plan.layout.unpack(STUDY.simulate(plan, 0, 1500))
+    parts = [plan.layout.unpack(STUDY.simulate(plan, *part)) for part in ((0, 700), (700, 800))]
     for name, values in whole.items():
         assert parts[0][name] + parts[1][name] == pytest.approx(values, rel=1e-9, abs=1e-9), name

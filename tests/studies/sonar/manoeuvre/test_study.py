@@ -7,8 +7,8 @@ from scipy.stats import binom
 import radarsim
 from radarsim.app.configs import load
 from radarsim.report.tables import to_csv
+from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar import exact as least_squares
-from radarsim.studies.sonar import study
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre import study as manoeuvres
 from radarsim.studies.sonar.scene import scene
@@ -23,9 +23,9 @@ PLAIN = [{"name": "growing", "kind": "growing_memory"}]
 
 
 def simulated(made, count=N):
-    plan = study.prepare(load(made).cases[0])
+    plan = STUDY.prepare(load(made).cases[0])
     blocks = range(0, count, plan.block)
-    sums = sum(study.simulate(plan, first, min(plan.block, count - first)) for first in blocks)
+    sums = sum(STUDY.simulate(plan, first, min(plan.block, count - first)) for first in blocks)
     return plan, plan.layout.unpack(sums)
 
 
@@ -37,7 +37,7 @@ def within(count, n, p, level):
 
 def compared(plan, sums, level):
     """Check all tests with a known law; how many these are."""
-    tested, law = sums["tested"][:, :, None], plan.axes.extra["exact_alarms"]
+    tested, law = sums["tested"][:, :, None], plan.axes.exact_alarms
     known = np.isfinite(law) & (tested > 0)
     n = np.broadcast_to(tested, law.shape)[known]
     assert within(sums["alarms"][known], n, np.clip(law[known], 0, 1), level).all()
@@ -71,11 +71,11 @@ def test_alarms_are_as_the_exact_law_says(changes):
 def test_laws_that_are_not_known_are_left_out():
     """Correlations of several sizes: the joint statistic is no χ²; cartesian frames: weights go with the plots."""
     plan, _ = simulated(config(filters=PLAIN, sensor={"error_correlation": {"range": 0.5, "bearing": 0.2}}), 16)
-    law = plan.axes.extra["exact_alarms"]
+    law = plan.axes.exact_alarms
     assert np.isfinite(law[0, :2, :2, 10]).all()
     assert np.isnan(law[:, 2]).all()
     plan, sums = simulated(config(filters=PLAIN) | {"frame": "cartesian_unbiased"}, 16)
-    assert np.isnan(plan.axes.extra["exact_alarms"]).all()
+    assert np.isnan(plan.axes.exact_alarms).all()
     assert sums["tested"][0, 2, -1] == 16
 
 
@@ -83,7 +83,7 @@ def test_a_walking_velocity_bends_courses():
     target = {"kind": "polynomial", "frame": "polar", "range_m": [6e3, -5], "bearing_deg": [10, 0.01]}
     made = config(filters=PLAIN, detectors=[RATES]) | {"target": target | {"fluctuation_mps2": 0.2}}
     plan, sums = simulated(made)
-    assert plan.axes.extra["exact_alarms"][0, 0, 2, -1] > 0.015
+    assert plan.axes.exact_alarms[0, 0, 2, -1] > 0.015
     assert compared(plan, sums, ALL) > 50
 
 
@@ -108,9 +108,9 @@ def test_pushes_are_what_the_motion_makes_of_them():
 
 def test_first_events_of_independent_tests_are_exact_and_alarms_come_in_runs():
     plan, sums = simulated(config(filters=PLAIN, detectors=[RATES, APART]))
-    extra = plan.axes.extra
-    assert extra["independent"] == (False, True)
-    law, phase = extra["exact_alarms"], extra["phase"]
+    axes = plan.axes
+    assert axes.independent == (False, True)
+    law, phase = axes.exact_alarms, axes.phase
     for part in (0, 1, 2):
         scans = np.flatnonzero((phase == part) & (sums["tested"][1, 0] > 0))
         for g in range(3):
@@ -129,7 +129,7 @@ def test_first_events_of_independent_tests_are_exact_and_alarms_come_in_runs():
 @pytest.mark.slow
 def test_rates_within_the_binomial_bounds_at_a_hundred_thousand():
     plan, sums = simulated(config(filters=PLAIN, detectors=[RATES, APART]), 100_000)
-    law, n = plan.axes.extra["exact_alarms"], 100_000
+    law, n = plan.axes.exact_alarms, 100_000
     for k in (8, 14, 20, 29):  # steady, during, last of it, long after
         assert within(sums["alarms"][0, :, :, k], n, law[0, :, :, k], ONE).all()
     compared(plan, sums, ALL)
@@ -204,17 +204,17 @@ def test_a_future_on_another_course_is_no_matter_of_spread():
     n, first, *_ = sums["uses"][0, 0, 2]
     # Southwards the speed grows by 0.6 m/s² from 5 s on, for 40 s, and is kept for 15 s: that way goes unforeseen.
     assert first / n == pytest.approx(0.6 * (55**2 - 15**2) / 2, rel=0.02)
-    assert plan.axes.extra["uses_true"][0, 1] == pytest.approx(5.0)
+    assert plan.axes.uses.true[0, 1] == pytest.approx(5.0)
 
 
 # ---- own plots ----------------------------------------------------------------------------------------------------
 def test_recorded_plots_are_followed_as_the_twins_do():
     case = load(config() | {"uses": {"horizon_s": 60.0}}).cases[0]
     rng, t = np.random.default_rng(3), np.arange(SCANS) * T
-    truth = study.prepare(case).axes.extra["truth"]
+    truth = STUDY.prepare(case).world.truth
     z = truth[:, :2, 0] + SIGMA * rng.standard_normal((SCANS, 2))
     z[[6, 17]] = np.nan
-    track = study.track(case, {"t_s": t + 100, "range_m": z[:, 0], "bearing_rad": z[:, 1]})
+    track = STUDY.recorded().tracker(case).feed({"t_s": t + 100, "range_m": z[:, 0], "bearing_rad": z[:, 1]})
     names = [name for name, _ in track.components]
     assert names == ["r", "vr", "ar", "b", "vb", "ab", "course", "speed", "x_ahead", "y_ahead", "cpa", "t_cpa"]
     for f, spec in enumerate(FILTERS):

@@ -7,7 +7,7 @@ import radarsim
 from radarsim.app import output
 from radarsim.app.configs import load
 from radarsim.report import claims, figures, panels
-from radarsim.studies.sonar import tables as sonar
+from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.exact import sigma_acceleration
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre import figures as drawn
@@ -117,7 +117,7 @@ def test_a_case_without_detectors_has_its_own_figures_alone():
     described = output.figures(result.cases, result.tables, result.experiment)
     assert OWN & set(described) == {"response", "modes", "uses"}
     assert "detections" not in result.tables
-    assert sonar.question(made).startswith("How well are course, speed")
+    assert STUDY.question(made).startswith("How well are course, speed")
 
 
 def test_cases_in_several_frames_stand_side_by_side():
@@ -140,7 +140,7 @@ def test_a_detector_that_never_has_its_plots():
     result = radarsim.run(made)
     assert "detections" not in result.tables
     assert set(output.figures(result.cases, result.tables, made)) & OWN == {"uses"}
-    assert sonar.answer(result.cases, result.tables)
+    assert STUDY.answer(result.cases, result.tables)
 
 
 def test_claims_are_judged(result, tables):
@@ -160,8 +160,8 @@ def test_claims_are_judged(result, tables):
 
 
 def test_words(result, tables):
-    told = sonar.answer(result.cases, tables)
-    assert sonar.question(result.experiment).startswith("How surely and how soon is a manoeuvre seen")
+    told = STUDY.answer(result.cases, tables)
+    assert STUDY.question(result.experiment).startswith("How surely and how soon is a manoeuvre seen")
     assert any("10 plots" in sentence for sentence in told)
     assert any(
         sentence.startswith("Measured σ of the track's uses over that from its covariance (growing, ")

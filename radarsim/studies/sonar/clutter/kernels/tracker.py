@@ -16,6 +16,25 @@ import numpy as np
 from radarsim.kernels.compile import aligned_zeros, inline, kernel, part
 from radarsim.kernels.lanes import address
 from radarsim.kernels.random import uniforms
+from radarsim.studies.sonar.clutter.kernels.counts import (
+    COUNTS,
+    DROPPED,
+    ENDS_PER_SCAN,
+    EXPECTED,
+    FAILED,
+    FALSE,
+    FALSE_FOUND,
+    FALSE_KEPT,
+    FALSE_TRYING,
+    FOUND,
+    INSIDE,
+    KEPT,
+    LOOKED,
+    LOST,
+    PLOTS,
+    TRYING,
+    WRONG_PER_PLOT,
+)
 from radarsim.studies.sonar.clutter.kernels.field import (
     CLOSEST,
     KNOWN,
@@ -33,7 +52,7 @@ from radarsim.studies.sonar.clutter.kernels.field import (
 )
 from radarsim.studies.sonar.clutter.kernels.tracks import Tracks, clear, predict, update
 from radarsim.studies.sonar.kernels.patterns import detect
-from radarsim.studies.sonar.kernels.shared_gains import Sums, move_and_measure
+from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK
 from radarsim.studies.sonar.kernels.sums import Counted, Course, Estimate, add_sums, ahead_sums
 
@@ -43,11 +62,6 @@ NONE, TENTATIVE, CONFIRMED = range(3)
 # sums over the realisation: ends of confirmed tracks, scans with one, weight of false plots taken, plots taken.
 ROWS = 13
 STATE, AGE, HITS, MISSES, SINCE, SCORE, BEST, FIRST, BEFORE, ENDS, HELD, WRONG, TAKEN = range(ROWS)
-# What is counted at each scan: tentative tracks, kept ones, first confirmations, lost, dropped, tentative ones dropped,
-# tracks predicted, target's plots then, those in the gate, false ones in it and their expected number.
-COUNTS = 11
-TRYING, KEPT, FOUND, LOST, DROPPED, FAILED, LOOKED, PLOTS, INSIDE, FALSE, EXPECTED = range(COUNTS)
-FALSE_COUNTS = 3  # of tracks that false plots began: tentative, confirmed, first confirmations
 
 
 class Trackers(NamedTuple):
@@ -73,20 +87,6 @@ class Trackers(NamedTuple):
     period: float
     sigma: np.ndarray
     thresholds: np.ndarray
-
-
-class TrackSums(NamedTuple):
-    """Sums of a block: errors of tracks kept, counts (F, K, COUNTS), begun (F, K, FALSE_COUNTS) of false tracks, ratios
-    (F, 2, 5) and scores (2, F, T + 1) of the target's first tracks and of false ones, the last their number.
-
-    A ratio is Σa, Σa², Σb, Σb², Σab over realisations: ends of tracks to scans held, false weight to plots taken.
-    """
-
-    errors: Sums
-    counts: np.ndarray
-    begun: np.ndarray
-    ratios: np.ndarray
-    scores: np.ndarray
 
 
 class Workspace(NamedTuple):
@@ -318,9 +318,9 @@ def judge_false(trackers, f, n, tracks, status, begun):
         now = next_state(state, status[HITS, i], status[MISSES, i], status[AGE, i], m, of, misses)
         if state == CONFIRMED and max(P[0, 0, i], P[1, 0, i]) > limit:
             now = NONE
-        begun[0] += now == TENTATIVE
-        begun[1] += now == CONFIRMED
-        begun[2] += now == CONFIRMED and state == TENTATIVE
+        begun[FALSE_TRYING] += now == TENTATIVE
+        begun[FALSE_KEPT] += now == CONFIRMED
+        begun[FALSE_FOUND] += now == CONFIRMED and state == TENTATIVE
         status[STATE, i] = now
         left |= now != NONE
     return left
@@ -400,8 +400,8 @@ def simulate_block(world, observation, field, trackers, work, first, total, sums
                 sums.counts[f, k] += counts
                 add_errors(trackers, tracks, f, k, course, counted, out, sums.errors)
         for f in range(F):
-            add_ratio(status[f, ENDS], status[f, HELD], n, sums.ratios[f, 0])
-            add_ratio(status[f, WRONG], status[f, TAKEN], n, sums.ratios[f, 1])
+            add_ratio(status[f, ENDS], status[f, HELD], n, sums.ratios[f, ENDS_PER_SCAN])
+            add_ratio(status[f, WRONG], status[f, TAKEN], n, sums.ratios[f, WRONG_PER_PLOT])
             add_scores(trackers.thresholds, n, status[f], sums.scores[0, f])
 
 

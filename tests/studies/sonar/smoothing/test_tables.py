@@ -7,10 +7,7 @@ import radarsim
 from radarsim.app import output
 from radarsim.app.configs import load
 from radarsim.report import claims, figures
-from radarsim.studies.sonar import claims as claimed
-from radarsim.studies.sonar import exact
-from radarsim.studies.sonar import tables as sonar
-from radarsim.studies.sonar.smoothing import operations
+from radarsim.studies.sonar import STUDY, exact, operations
 
 FIGURES = {
     "sonar_smoothing": {"plots", "smoothing_gains", "sigma_r", "sigma_vb"},
@@ -99,13 +96,13 @@ def test_claims_are_judged_where_their_cases_are(results):
     assert found["sonar_missed"] == {"P3.5"}
     rows = results["sonar_missed"].tables["claims"]
     assert set(rows["verdict"]) == {claims.CONFIRMED}
-    assert [claim.id for claim in claimed.CLAIMS] == [f"P3.{n}" for n in range(1, 14)]
+    assert [claim.id for claim in STUDY.claims().claims] == [f"P3.{n}" for n in range(1, 14)]
 
 
 def test_words_of_the_report(results):
     for stem, result in results.items():
-        question = sonar.question(load(stem))
+        question = STUDY.question(load(stem))
         assert question.endswith("?")
-        told = sonar.answer(result.cases, result.tables)
+        told = STUDY.answer(result.cases, result.tables)
         assert told
         assert all(sentence.endswith(".") for sentence in told)

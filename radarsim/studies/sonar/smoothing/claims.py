@@ -6,11 +6,8 @@ paper's sections.
 """
 
 from radarsim.report.claims import Claim, Part, Range, above, at_most, below, within
-from radarsim.studies.sonar import measures as measured
-from radarsim.studies.sonar.manoeuvre import claims as manoeuvres
-from radarsim.studies.sonar.measures import Evidence
-
-__all__ = ["CLAIMS", "Evidence"]
+from radarsim.studies.sonar.smoothing import measures as measured
+from radarsim.studies.sonar.smoothing.measures import ASYNCHRONOUS, FLUCTUATING, GAP, TEXTBOOK, correlated
 
 IN_SIGMA = Range(0.99, 1.01, "1 within 1 %")
 IN_VARIANCE = Range(0.98, 1.02, "1 within 2 %")
@@ -23,18 +20,20 @@ def _claim(number: int, place: str, statement: str, *parts: Part, reading: str =
 
 def _formula(what: str, n: int) -> Part:
     return Part(
-        ("textbook",), f"{what} σ after {n} plots, over the formula", "", measured.over_formula(what, n), IN_SIGMA
+        (TEXTBOOK,), f"{what} σ after {n} plots, over the formula", "", measured.over_formula(what, n), IN_SIGMA
     )
 
 
 def _gain(letter: str, n: int) -> Part:
     words = f"{letter}_n from the measured errors at n = {n}, over the formula"
-    return Part(("textbook",), words, "", measured.gain_over_formula(letter, n), IN_VARIANCE)
+    return Part((TEXTBOOK,), words, "", measured.gain_over_formula(letter, n), IN_VARIANCE)
 
 
 def _optimal(rho: float) -> Part:
     words = f"σ of the range after 20 plots at ρ = {rho:g}, over generalised least squares"
-    return Part((("rho", rho),), words, "", measured.over_optimal(("rho", rho), "kalman_augmented", "r"), IN_SIGMA)
+    return Part(
+        (correlated(rho),), words, "", measured.over_optimal(correlated(rho), "kalman_augmented", "r"), IN_SIGMA
+    )
 
 
 CLAIMS = (
@@ -56,7 +55,7 @@ CLAIMS = (
         "principle of optimal construction, after (2)",
         "High accuracy of smoothing and extrapolation needs many plots: 5–6",
         Part(
-            ("textbook",),
+            (TEXTBOOK,),
             "fewest plots that extrapolate no worse than a plot measures",
             "plots",
             measured.enough,
@@ -70,7 +69,7 @@ CLAIMS = (
         "A_n = 2(2n−1)/(n(n+1)), B_n = 6/(n(n+1)); the recursion is the Kalman filter of a straight line",
         *(_gain(letter, n) for letter in "AB" for n in (2, 5, 20)),
         Part(
-            ("textbook",),
+            (TEXTBOOK,),
             "largest relative difference in σ of recursion and Kalman filter",
             "",
             measured.alike,
@@ -82,10 +81,8 @@ CLAIMS = (
         5,
         "step 4, after (14)",
         "At a missed plot the estimate is the extrapolated one",
-        Part(
-            ("gap",), "σ at the missed scan over σ extrapolated to it", "", measured.at_a_miss("growing_memory"), SAME
-        ),
-        Part(("gap",), "the same of the Kalman filter", "", measured.at_a_miss("kalman"), SAME),
+        Part((GAP,), "σ at the missed scan over σ extrapolated to it", "", measured.at_a_miss("growing_memory"), SAME),
+        Part((GAP,), "the same of the Kalman filter", "", measured.at_a_miss("kalman"), SAME),
         config="sonar_missed",
     ),
     _claim(
@@ -94,7 +91,7 @@ CLAIMS = (
         "Errors estimated beside the state, and differences of plots, both solve the case of correlated errors",
         *(
             Part(
-                (("rho", rho),),
+                (correlated(rho),),
                 f"largest relative difference in σ of the two at ρ = {rho:g}",
                 "",
                 measured.two_ways(rho),
@@ -110,17 +107,17 @@ CLAIMS = (
         7,
         "step 5, last sentences",
         "With growing n new plots count less and less; the filter stops following a real, fluctuating target",
-        Part(("textbook",), "A_40 over A_5, measured", "", measured.gain_falls("A", 5, 40), below(1)),
-        Part(("textbook",), "B_40 over B_5, measured", "", measured.gain_falls("B", 5, 40), below(1)),
+        Part((TEXTBOOK,), "A_40 over A_5, measured", "", measured.gain_falls("A", 5, 40), below(1)),
+        Part((TEXTBOOK,), "B_40 over B_5, measured", "", measured.gain_falls("B", 5, 40), below(1)),
         Part(
-            ("fluctuating",),
+            (FLUCTUATING,),
             "σ of the range at the end over its own least, growing memory",
             "",
             measured.rises,
             above(1),
         ),
         Part(
-            ("fluctuating",),
+            (FLUCTUATING,),
             "gain in σ of the range of a window of 10 plots at the end",
             "%",
             measured.bounded,
@@ -129,15 +126,14 @@ CLAIMS = (
         reading="on the shipped course, whose velocity changes by 0.25 m/s at random between plots, after 40 plots",
         config="sonar_fluctuating",
     ),
-    *manoeuvres.CLAIMS,
     _claim(
         11,
         "principle of optimal construction, sequential smoothing",
         "The recursion keeps two numbers however many the plots, and takes fewer operations than least squares anew",
-        Part(("textbook",), "numbers kept from plot to plot", "", measured.kept("recursion (12)-(14)"), within(2, 2)),
+        Part((TEXTBOOK,), "numbers kept from plot to plot", "", measured.kept("recursion (12)-(14)"), within(2, 2)),
         *(
             Part(
-                ("textbook",),
+                (TEXTBOOK,),
                 f"operations of the recursion over those of least squares on {n} plots",
                 "",
                 measured.cost("recursion (12)-(14)", f"least squares (2) on {n} plots"),
@@ -152,7 +148,7 @@ CLAIMS = (
         "correlated errors, end of the first method",
         "Estimating the errors beside the state complicates the calculation; differences do without",
         Part(
-            (("rho", 0.6),),
+            (correlated(0.6),),
             "operations of the augmented filter over those of the differenced one",
             "",
             measured.cost("augmented", "differenced"),
@@ -167,10 +163,10 @@ CLAIMS = (
         "Plots of any moments, in any combination and of different accuracy are handled by the same equations",
         *(
             Part(
-                ("asynchronous",),
+                (ASYNCHRONOUS,),
                 f"σ of the {name} at the end over weighted least squares",
                 "",
-                measured.over_optimal("asynchronous", "kalman", component),
+                measured.over_optimal(ASYNCHRONOUS, "kalman", component),
                 IN_SIGMA,
             )
             for component, name in (("r", "range"), ("b", "bearing"))

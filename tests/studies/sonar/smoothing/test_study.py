@@ -8,7 +8,9 @@ import pytest
 from radarsim.app.configs import load
 from radarsim.app.work import CaseWork
 from radarsim.engine.collect import collect
-from radarsim.studies.sonar import study
+from radarsim.studies.sonar import STUDY
+from radarsim.studies.sonar.smoothing.study import SharedPlan
+from radarsim.studies.sonar.study import RealisationPlan
 
 N = 100_000
 BOUND = 5.85 / np.sqrt(2 * N)
@@ -56,7 +58,7 @@ def misses(seed, scans=50):
 
 
 def simulated(plan, count=N):
-    return plan.layout.unpack(sum(study.simulate(plan, b, min(4096, count - b)) for b in range(0, count, 4096)))
+    return plan.layout.unpack(sum(STUDY.simulate(plan, b, min(4096, count - b)) for b in range(0, count, 4096)))
 
 
 def deviations(plan, sums):
@@ -70,21 +72,21 @@ def deviations(plan, sums):
 @pytest.mark.parametrize("rho", RHO)
 def test_every_linear_case_is_exact(rho):
     """Both degrees, 3 to 50 plots, a random pattern of misses, white and correlated errors."""
-    plan = study.prepare(load(config(error_correlation=rho, missed_scans=misses(int(rho * 100) + 60))).cases[0])
+    plan = STUDY.prepare(load(config(error_correlation=rho, missed_scans=misses(int(rho * 100) + 60))).cases[0])
     sums = simulated(plan)
     off, _ = deviations(plan, sums)
     assert np.isfinite(off[plan.axes.available]).all()
     assert np.nanmax(np.abs(off)) < BOUND
-    ahead = np.sqrt(sums["ahead"][..., 1] / N) / plan.axes.extra["exact_ahead"] - 1
+    ahead = np.sqrt(sums["ahead"][..., 1] / N) / plan.axes.exact_ahead - 1
     assert np.nanmax(np.abs(ahead)) < BOUND
 
 
 def test_what_a_filter_says_of_itself_is_as_wrong_as_calculated():
     """The naive filter's normalised error at ρ = 0.9; and 1 per component for those that know of it."""
-    plan = study.prepare(load(config(scans=20, error_correlation=0.9)).cases[0])
+    plan = STUDY.prepare(load(config(scans=20, error_correlation=0.9)).cases[0])
     sums = simulated(plan)
     q, qq = sums["joint"][..., 0] / N, sums["joint"][..., 1] / N
-    exact = plan.axes.extra["exact_nees"]
+    exact = plan.axes.exact_nees
     known = np.isfinite(exact)
     assert (np.abs(q - exact) / np.sqrt((qq - q**2) / N))[known].max() < 5.85
     names = plan.axes.filters
@@ -94,7 +96,7 @@ def test_what_a_filter_says_of_itself_is_as_wrong_as_calculated():
 
 @pytest.mark.parametrize(("rho", "probability"), [(0.0, 0.7), (0.6, 0.9)])
 def test_random_misses_are_exact_as_means_over_patterns(rho, probability):
-    plan = study.prepare(load(config(scans=10, error_correlation=rho, detection_probability=probability)).cases[0])
+    plan = STUDY.prepare(load(config(scans=10, error_correlation=rho, detection_probability=probability)).cases[0])
     assert np.isfinite(plan.axes.exact_sigma[plan.axes.available]).all()
     sums = simulated(plan)
     off, own = deviations(plan, sums)
@@ -105,7 +107,7 @@ def test_random_misses_are_exact_as_means_over_patterns(rho, probability):
 
 
 def test_walk_of_velocity_is_exact():
-    plan = study.prepare(load(config(scans=40, fluctuation=0.05, error_correlation=0.3)).cases[0])
+    plan = STUDY.prepare(load(config(scans=40, fluctuation=0.05, error_correlation=0.3)).cases[0])
     off, _ = deviations(plan, simulated(plan))
     away = np.array([name.startswith("a") for name, _ in plan.axes.components])
     assert np.nanmax(np.abs(off[:, :, ~away])) < BOUND
@@ -116,7 +118,7 @@ def test_mixed_sonars_are_exact():
         {"sigma_bearing_deg": 2.0, "scan_period_s": 3.7, "first_s": 1.3},
         {"sigma_range_m": 90.0, "sigma_bearing_deg": 0.5, "scan_period_s": 17.0, "first_s": 5.0},
     ]
-    plan = study.prepare(load(config(scans=12, further=further, missed_scans=[6, 11])).cases[0])
+    plan = STUDY.prepare(load(config(scans=12, further=further, missed_scans=[6, 11])).cases[0])
     off, _ = deviations(plan, simulated(plan))
     assert np.isfinite(off[plan.axes.available]).all()
     assert np.nanmax(np.abs(off)) < BOUND
@@ -125,13 +127,13 @@ def test_mixed_sonars_are_exact():
 def test_both_kernels_agree_where_nothing_is_missed():
     """Probability 1 - 10⁻¹² goes through the kernel of own patterns; hardly a plot is ever missed."""
     one, other = (
-        study.prepare(load(config(scans=15, error_correlation=0.6, **more)).cases[0])
+        STUDY.prepare(load(config(scans=15, error_correlation=0.6, **more)).cases[0])
         for more in ({}, {"detection_probability": 1 - 1e-12})
     )
-    assert one.observation is None
-    assert other.observation is not None
+    assert isinstance(one, SharedPlan)
+    assert isinstance(other, RealisationPlan)
     other = dataclasses.replace(other, world=one.world)  # the same noise: probability is part of the world's name
-    a, b = (plan.layout.unpack(study.simulate(plan, 0, 1000)) for plan in (one, other))
+    a, b = (plan.layout.unpack(STUDY.simulate(plan, 0, 1000)) for plan in (one, other))
     for name in a:
         unit = np.abs(a[name]).max(axis=(0, 1), keepdims=True)
         assert (np.abs(a[name] - b[name]) <= 1e-9 * unit + 1e-300).all(), name
@@ -150,7 +152,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_planted_faults_show(fault):
-    plan = study.prepare(load(config(error_correlation=0.6)).cases[0])
+    plan = STUDY.prepare(load(config(error_correlation=0.6)).cases[0])
     off, _ = deviations(plan, simulated(dataclasses.replace(plan, **FAULTS[fault](plan))))
     assert np.nanmax(np.abs(off)) > BOUND
 
@@ -164,10 +166,10 @@ def test_bytes_do_not_depend_on_threads():
 def test_cases_that_differ_in_filters_share_their_plots():
     few = load(config(filters=FILTERS[:1])).cases[0]
     many = load(config(scans=20)).cases[0]
-    a, b = study.prepare(few), study.prepare(many)
+    a, b = STUDY.prepare(few), STUDY.prepare(many)
     assert (a.world.plots == b.world.plots).all()
-    first = a.layout.unpack(study.simulate(a, 0, 512))["error"][0, :20, 0]
-    assert first == pytest.approx(b.layout.unpack(study.simulate(b, 0, 512))["error"][0, :20, 0], rel=1e-9)
+    first = a.layout.unpack(STUDY.simulate(a, 0, 512))["error"][0, :20, 0]
+    assert first == pytest.approx(b.layout.unpack(STUDY.simulate(b, 0, 512))["error"][0, :20, 0], rel=1e-9)
 
 
 def test_conversion_bias_and_its_cure():
@@ -178,8 +180,8 @@ def test_conversion_bias_and_its_cure():
             "target": {"kind": "polynomial", "frame": "cartesian", "x_m": [15e3, -4.0], "y_m": [0.0, 3.0]}
         }
         given["sensor"]["sigma_bearing_deg"] = 4.0
-        plan = study.prepare(load(given).cases[0])
-        made[frame] = simulated(plan)["error"][0, :, 0] / N, plan.axes.extra["conversion_bias"]
+        plan = STUDY.prepare(load(given).cases[0])
+        made[frame] = simulated(plan)["error"][0, :, 0] / N, plan.axes.conversion_bias
     (plain, formula), (mended, _) = made["cartesian"], made["cartesian_unbiased"]
     assert formula == pytest.approx(np.expm1(-(np.radians(4) ** 2) / 2) * 15e3)
     assert abs(plain[0, 0] - formula) < 5 * np.sqrt(plain[0, 1] / N)
@@ -197,7 +199,7 @@ def track_columns(n=6):
 def test_track_over_recorded_plots_is_least_squares():
     case = load(config(filters=FILTERS[:1] + FILTERS[8:9])).cases[0]
     columns = track_columns()
-    track = study.track(case, columns)
+    track = STUDY.recorded().tracker(case).feed(columns)
     t, r = columns["t_s"], columns["range_m"]
     seen = np.isfinite(r)
     slope, value = np.polyfit(t[seen] - t[-1], r[seen], 1)
@@ -215,7 +217,7 @@ def test_track_over_recorded_plots_is_least_squares():
 @pytest.mark.parametrize("frame", ["cartesian", "cartesian_unbiased"])
 def test_track_in_the_cartesian_frame(frame):
     case = load(config(filters=FILTERS[:1], frame=frame)).cases[0]
-    track = study.track(case, track_columns())
+    track = STUDY.recorded().tracker(case).feed(track_columns())
     assert [name for name, _ in track.components] == ["x", "vx", "y", "vy"]
     assert track.estimate[0, -1, 0] == pytest.approx(-8890, rel=0.01)
     assert np.isfinite(track.estimate[0, -1]).all()

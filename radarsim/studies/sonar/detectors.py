@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.studies.sonar.manoeuvre.kernels.detector import AdaptiveRules, Detectors
-from radarsim.studies.sonar.manoeuvre.kernels.imm import ModelPairs
+from radarsim.studies.sonar.kernels.detector import AdaptiveRules, Detectors
+from radarsim.studies.sonar.kernels.imm import ModelPairs
 
 
 class AdaptiveRule(NamedTuple):

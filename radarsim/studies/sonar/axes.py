@@ -1,0 +1,47 @@
+"""What the sums of a sonar case are of: the labels of all cases, and of those whose filters are given their plots."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from radarsim.engine.results import Axes
+
+
+@dataclass(frozen=True, kw_only=True)
+class SonarAxes(Axes):
+    """Labels of F filters over K scans in C coordinates.
+
+    Attributes:
+        coordinates: name and unit of each coordinate that the filters work in.
+        sizes: (F,) components of each filter's state in one coordinate, 2 or 3.
+        exact_ahead: (F, K, C) exact σ of the value extrapolated by one scan, in the row of the scan that it was
+            extrapolated from, in the coordinate's unit; not-a-number where it is not known.
+        exact_nees: (F, K, C) expected eᵀP⁻¹e of a coordinate's whole state, likewise.
+        scan_period_s: period of the first sonar, s.
+        sigma: (C,) nominal standard deviation of a plot in each coordinate, in its unit.
+    """
+
+    coordinates: tuple[tuple[str, str], ...]
+    sizes: np.ndarray
+    exact_ahead: np.ndarray
+    exact_nees: np.ndarray
+    scan_period_s: float
+    sigma: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class GivenPlotsAxes(SonarAxes):
+    """Of cases whose filters are given the target's plots: smoothing, and manoeuvres.
+
+    Attributes:
+        rho: (C,) correlation of the errors of neighbouring plots.
+        sigma_of_plots: (K, C) standard deviation of each plot, infinite where there is never one.
+        conversion_bias: mean error, along the line of sight, of the first plot converted to x and y, m; zero where it
+            is not converted, or without bias.
+        polar: (K, C, 3) the target's range, bearing (and depth or elevation) with first and second rates.
+    """
+
+    rho: np.ndarray
+    sigma_of_plots: np.ndarray
+    conversion_bias: float
+    polar: np.ndarray

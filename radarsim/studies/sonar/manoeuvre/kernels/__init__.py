@@ -1,1 +1,0 @@
-"""Kernels of detectors and of interacting models."""

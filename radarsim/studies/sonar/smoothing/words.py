@@ -1,0 +1,71 @@
+"""What the report of smoothed plots asks and answers."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import panels
+from radarsim.studies.sonar.axes import SonarAxes
+from radarsim.studies.sonar.figures import QUANTITIES
+
+
+def question(specs: Sequence) -> str:
+    """What is asked of cases whose filters are given their plots."""
+    if any(spec.frame != "polar" for spec in specs):
+        return "What does it cost to convert range and bearing to x and y, and when does the conversion's bias matter?"
+    if any(np.any(np.array(_rho(spec)) != 0) for spec in specs):
+        return "What does it cost to ignore that the errors of neighbouring plots are correlated?"
+    if any(spec.sensor.detection_probability < 1 or spec.sensor.missed_scans for spec in specs):
+        return "What does a missed plot cost?"
+    names = list(dict.fromkeys(f.name for spec in specs for f in spec.filters))
+    return f"How accurate are range and bearing smoothed by {', '.join(names)}?"
+
+
+def _rho(spec) -> tuple[float, ...]:
+    given = spec.sensor.error_correlation
+    return (given,) if isinstance(given, float) else (given.range, given.bearing, given.third)
+
+
+def answer(results: Sequence[CaseResult[SonarAxes]], made: Mapping) -> list[str]:
+    """Sentences with numbers and 95 % intervals: σ of the first coordinate at the end of the run, by filter.
+
+    And the most optimistic filter.
+    """
+    shown, others = panels.told(results)
+    best = [_best(result, made["curves"]) for result in shown]
+    wrong = _most_optimistic(results, made)
+    return [*best, *([wrong] if wrong else []), *others]
+
+
+def _best(result: CaseResult[SonarAxes], curves) -> str:
+    first = result.axes.components[0][0]
+    rows = curves[(curves["case"] == result.name) & (curves["component"] == first)]
+    last = rows[rows["k"] == rows["k"].max()]
+    # By the exact values where all are known: filters of one accuracy must not be ranked by their noise.
+    order = last["exact_sigma"].round(9) if last["exact_sigma"].notna().all() else last["sigma"]
+    last = last.loc[order.sort_values(kind="stable").index]
+    low, high = last.iloc[0], last.iloc[-1]
+    where = panels.plain(panels.swept(result))
+    ends = f"{low['filter']} {low['sigma']:.4g} {low['unit']} [{low['sigma_lo']:.4g}, {low['sigma_hi']:.4g}]"
+    if len(last) > 1:
+        worst = f"{high['sigma']:.4g} {high['unit']} [{high['sigma_lo']:.4g}, {high['sigma_hi']:.4g}]"
+        ends = f"least with {ends}, largest with {high['filter']} {worst}"
+    return f"{where + ': ' if where else ''}σ of the {QUANTITIES[first].name} after {low['t_s']:g} s: {ends}."
+
+
+def _most_optimistic(results: Sequence[CaseResult[SonarAxes]], made: Mapping) -> str:
+    """The worst case of a filter that believes itself more accurate than it is, its state complete."""
+    names = [result.name for result in results]
+    believed = made["believed"][made["believed"]["case"].isin(names)]
+    table = believed.merge(made["consistency"][["case", "filter", "k"]].drop_duplicates())
+    worst = table.loc[table["ratio"].idxmax()]
+    if worst["ratio_lo"] <= 1.05:
+        return ""
+    result = next(result for result in results if result.name == worst["case"])
+    where = f" at {panels.plain(panels.swept(result))}" if result.swept else ""
+    return (
+        f"Most optimistic: {worst['filter']}{where}, whose true σ is "
+        f"{worst['ratio']:.2f} [{worst['ratio_lo']:.2f}, {worst['ratio_hi']:.2f}] times the one it believes "
+        f"({QUANTITIES[worst['component']].name}, scan {worst['k']})."
+    )

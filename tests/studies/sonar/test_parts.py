@@ -1,0 +1,135 @@
+"""The sonar's three parts: each rests on the common base alone, and an edit in one leaves the blocks of the others."""
+
+import ast
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import radarsim
+from radarsim.app.configs import load
+from radarsim.engine.results import Axes
+from radarsim.errors import ConfigError
+from radarsim.kernels import sources
+from radarsim.studies import identity
+from radarsim.studies.sonar import STUDY, parts
+from radarsim.studies.sonar.axes import GivenPlotsAxes, SonarAxes
+from radarsim.studies.sonar.clutter.axes import ClutterAxes
+from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
+from tests.studies.sonar.clutter.test_study import config as clutter_config
+from tests.studies.sonar.clutter.test_study import tracker
+from tests.studies.sonar.manoeuvre.test_kernels import config as manoeuvre_config
+from tests.studies.sonar.smoothing.test_study import config as smoothing_config
+
+PACKAGE = "radarsim.studies.sonar"
+FOLDER = Path(radarsim.__file__).parent / "studies" / "sonar"
+SHIPPED = {
+    "smoothing": ("sonar_smoothing", "sonar_missed", "sonar_correlated", "sonar_asynchronous", "sonar_conversion"),
+    "manoeuvre": ("sonar_manoeuvre", "sonar_manoeuvre_turning"),
+    "clutter": ("sonar_clutter", "sonar_clutter_gate"),
+}
+CASES = [(part, stem) for part, stems in SHIPPED.items() for stem in stems]
+TOGETHER = ("__init__.py", "schema.py")  # the declared study, and the schema that puts the keys of the parts together
+
+
+def part_of(module):
+    """The part that a module lies in; None for the base and what is no sonar's."""
+    rest = module.removeprefix(f"{PACKAGE}.").partition(".")[0]
+    return rest if module.startswith(f"{PACKAGE}.") and rest in parts() else None
+
+
+def imported(path):
+    """Every name that a file imports, at any depth."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.rglob("*.py")), ids=lambda path: str(path.relative_to(FOLDER)))
+def test_the_base_knows_no_part_and_a_part_no_other(path):
+    own = path.relative_to(FOLDER).parts[0]
+    if own not in TOGETHER:
+        found = {part_of(name) for name in imported(path)} - {None}
+        assert found <= ({own} if own in parts() else set())
+
+
+@pytest.mark.parametrize(("part", "stem"), CASES)
+def test_what_a_case_is_follows_from_its_keys(part, stem):
+    for case in load(stem).cases:
+        assert case.spec.parts[-1] == part
+        assert case.spec.parts == (("smoothing", "manoeuvre") if part == "manoeuvre" else (part,))
+
+
+@pytest.mark.parametrize(("part", "stem"), CASES)
+def test_numbers_rest_on_the_base_and_their_own_part(part, stem):
+    followed = sources.closure(
+        STUDY.computes_in(load(stem).cases[0].spec), lambda module: identity.follows(module, {"radarsim"})
+    )
+    modules = [module.rstrip(":") for module in followed.hashes if module.startswith(PACKAGE)]
+    assert {part_of(module) for module in modules} <= {None, part}
+    assert f"{PACKAGE}.{part}.study" in modules
+    assert {f"{PACKAGE}.study", f"{PACKAGE}.config", f"{PACKAGE}.kernels.patterns"} <= set(modules)
+    roles = {module.rpartition(".")[2] for module in modules}
+    assert not roles & {"tables", "figures", "words", "claims", "measures", "track", "map", "part", "schema"}
+
+
+def test_labels_are_typed_and_described():
+    for kind in (SonarAxes, GivenPlotsAxes, ManoeuvreAxes, ClutterAxes):
+        for name in set(kind.__annotations__) - set(Axes.__annotations__):
+            assert f"        {name}: " in kind.__doc__, f"{kind.__name__}.{name}"
+    kinds = {"sonar_smoothing": GivenPlotsAxes, "sonar_manoeuvre": ManoeuvreAxes, "sonar_clutter": ClutterAxes}
+    for stem, kind in kinds.items():
+        case = load(stem).cases[0]
+        axes = STUDY.prepare(case).axes
+        assert type(axes) is kind
+        relabelled = STUDY.relabelled(axes, case)
+        assert type(relabelled) is kind
+        assert relabelled.filters == tuple(one.name for one in case.spec.filters)
+
+
+@pytest.mark.parametrize("stem", ["sonar_smoothing", "sonar_manoeuvre", "sonar_clutter"])
+def test_an_unknown_figure_is_refused(stem):
+    with pytest.raises(ConfigError, match=r"figures\.sigma_q: no such figure; did you mean sigma_"):
+        load(stem, ["figures={sigma_q: ['*']}"])
+
+
+def written(folder, name, config):
+    """A config in a file, in JSON, which is YAML."""
+    (folder / f"{name}.yaml").write_text(json.dumps(config | {"realisations": 64}), encoding="utf-8")
+
+
+def test_cases_of_all_parts_in_one_run(tmp_path):
+    """Tables have the rows of each case that asks for them, figures are drawn, answers told of each part."""
+    written(tmp_path, "plain", smoothing_config(scans=30, filters=[{"name": "growing", "kind": "growing_memory"}]))
+    written(tmp_path, "moving", manoeuvre_config())
+    written(tmp_path, "among", clutter_config([tracker("nearest")], density=1.0, detection=0.9, scans=12))
+    (tmp_path / "all.yaml").write_text("include: [plain, moving, among]\n", encoding="utf-8")
+    result = radarsim.run(tmp_path / "all.yaml")
+    rows = {name: set(table["case"]) for name, table in result.tables.items() if "case" in table}
+    assert rows["extrapolation"] == rows["believed"] == {"plain", "moving", "among"}
+    assert rows["plots"] == {"plain"}
+    assert rows["detections"] == {"moving"}
+    assert rows["tracks"] == {"among"}
+    assert {"sigma_r", "plots", "response", "confirmation"} <= set(result.figures)
+    assert result.question.startswith("How surely and how soon is a target's track confirmed")
+    assert result.answer[0].startswith("nearest confirms")
+    assert any("σ of the range after 145 s" in sentence for sentence in result.answer)
+
+
+def test_every_figure_of_the_study_has_its_name(tmp_path):
+    drawn = set()
+    for stem in ("sonar_smoothing", "sonar_conversion", "sonar_manoeuvre_turning", "sonar_clutter"):
+        result = radarsim.run(load(stem, ["realisations=64"]))
+        drawn |= {name for name in result.figures if not name.startswith("sweep_")}
+    known = STUDY.keys().figure_names
+    assert drawn <= set(known)
+    assert len(known) == len(set(known))
+
+
+def test_a_plan_makes_its_own_sums():
+    for made in (smoothing_config(scans=5), manoeuvre_config(), clutter_config([tracker("nearest")], scans=5)):
+        plan = STUDY.prepare(load(made).cases[0])
+        assert np.array_equal(STUDY.simulate(plan, 3, 4), plan.simulate(3, 4))
