@@ -7,6 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from radarsim.cli import main
+from radarsim.studies import registry
 
 MANOEUVRE = ("scans=12", "uses.at_s=[35]")
 SMALL = {
@@ -33,8 +34,8 @@ def run(tmp_path, config, overrides, *more):
 
 def spoil(monkeypatch, name, number):
     """From now on the study's filter 1 gives `number` in realisation 37 at its second scan."""
-    module = import_module(f"radarsim.studies.{name}.study")
-    simulate = module.simulate
+    declared = registry.study(name)
+    simulate = declared.simulate
 
     def spoiled(plan, first, count):
         values = np.array(simulate(plan, first, count))
@@ -42,7 +43,7 @@ def spoil(monkeypatch, name, number):
             plan.layout.unpack(values)["error"][FILTER, 1, 0, 1] = number
         return values
 
-    monkeypatch.setattr(module, "simulate", spoiled)
+    monkeypatch.setattr(declared, "simulate", spoiled)
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf])
