@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-STANDARD_GRAVITY_MPS2 = 9.80665  # ISO 80000-3
+from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
 
 
 def polynomial(coefficients: Sequence[float], t: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@ consistency."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
 from radarsim.studies.multimodel.filters import labels
+
+if TYPE_CHECKING:
+    from radarsim.studies.multimodel.study import FlightAxes
 
 TIME = Axis(panels.TIME, limits=(0, None))
 SIGMAS = {"y": ("height $y$", "m"), "vy": ("rate of climb $\\dot y$", "m/s")}
@@ -87,7 +91,7 @@ def _title(result: CaseResult, results: Sequence[CaseResult]) -> str:
     return words.replace("_", " ")
 
 
-def trajectory(results: Sequence[CaseResult]) -> Figure | None:
+def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
     """Ground track, height, speed and acceleration (the paper's figures 1 to 4), a line for each different flight."""
     flights: dict[bytes, CaseResult] = {}
     for result in results:

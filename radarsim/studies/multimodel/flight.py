@@ -1,7 +1,7 @@
 """Flight of a point mass in the local frame (x north, y up, z east): gravity, drag, and accelerations commanded by
 phase.
 
-The paper's trajectory (P2 figs. 1-4) is lost but for its axes, so trajectories are integrated from a description
+The paper's trajectory (P2 figs. 1-4) is lost except for its axes, so trajectories are integrated from a description
 that is physical: exponential atmosphere, ballistic coefficient m/(C_D S), commands that are followed with a lag.
 """
 
@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-GRAVITY_MPS2 = 9.80665  # ISO 80000-3
+from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
+
 DENSITY_KGPM3, SCALE_HEIGHT_M = 1.225, 7200.0  # of an exponential atmosphere, fitted below 50 km
 ORBIT_MPS = 7900.0  # first cosmic velocity: a flat earth is no model of anything faster
 TOLERANCE = 1e-10
@@ -52,7 +53,9 @@ def derivative(t: float, state: np.ndarray, phase: Phase, coefficient: float, la
     acceleration = followed[0] * right + followed[1] * up + followed[2] * along
     if not phase.trimmed:
         density = DENSITY_KGPM3 * math.exp(-state[1] / SCALE_HEIGHT_M)
-        acceleration = acceleration - density * speed**2 / (2 * coefficient) * along + np.array([0, -GRAVITY_MPS2, 0])
+        acceleration = (
+            acceleration - density * speed**2 / (2 * coefficient) * along + np.array([0, -STANDARD_GRAVITY_MPS2, 0])
+        )
     return np.concatenate([velocity, acceleration, (command - followed) / lag])
 
 

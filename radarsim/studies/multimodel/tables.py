@@ -1,6 +1,7 @@
 """P2's own tables: probabilities of the models, stages of the flight, consistency, operations, cost."""
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from radarsim.report import tables as common
 from radarsim.studies.multimodel import cost as costs
 from radarsim.studies.multimodel import filters
 from radarsim.studies.multimodel.kernels.records import MERGED, MERGES, NEES, NIS
+
+if TYPE_CHECKING:
+    from radarsim.studies.multimodel.study import FlightAxes
 
 FREEDOM = 3  # degrees of freedom of a position's or a plot's normalised error squared
 
@@ -74,7 +78,7 @@ def stage_names(result: CaseResult) -> tuple[str, ...]:
     return tuple(stage.name for stage in result.spec.target.stages)
 
 
-def stage_bounds(result: CaseResult) -> list[tuple[str, float, float]]:
+def stage_bounds(result: "CaseResult[FlightAxes]") -> list[tuple[str, float, float]]:
     """Name, begin and end (s) of each stage of a case that has scans."""
     ends = [*result.spec.target.stage_ends_s, float(result.axes.t_s[-1])]
     bounds = zip(stage_names(result), [0.0, *ends[:-1]], ends, strict=True)
@@ -145,7 +149,7 @@ def _normalised_errors(result: CaseResult) -> dict[str, np.ndarray]:
 OPERATIONS = ("case", "filter", "family", "merge", "models", "stage", "merged", "merges", "operations")
 
 
-def operations(results: Sequence[CaseResult]):
+def operations(results: Sequence["CaseResult[FlightAxes]"]):
     """Arithmetic operations of one update of one realisation, counted: mean over the scans of each stage, and over all.
 
     merged: hypotheses that went into merges of more than one; merges: their number; both a scan.

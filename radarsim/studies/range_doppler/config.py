@@ -24,6 +24,7 @@ from radarsim.config.fields import (
     unique_names,
     whole,
 )
+from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
 
 MOST_SCANS = 100_000
 FARTHEST_M = 1e15  # a range that still resolves a metre in double precision
@@ -31,7 +32,6 @@ RESOLVED = 1e-4 * 2.0**52  # range over accuracy at which rounding reaches a ten
 NEAREST_M = 100.0  # a target that flies over the radar has no radial motion that a filter could follow
 FASTEST_MPS = 12_000.0  # escape from the Earth
 HARDEST_MPS2 = 1000.0  # about 100 g, more than any missile's
-STANDARD_GRAVITY_MPS2 = 9.80665  # ISO 80000-3
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
 
 

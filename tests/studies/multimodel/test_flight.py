@@ -12,7 +12,7 @@ VACUUM = 1e30  # ballistic coefficient without drag
 
 def test_without_air_it_is_a_parabola():
     x = fly((1e5, 2e4, 0), (-800, 300, 50), VACUUM, 1.0, [Phase(0)], T)
-    g = flight.GRAVITY_MPS2
+    g = flight.STANDARD_GRAVITY_MPS2
     assert np.allclose(x[:, 0], 1e5 - 800 * T, atol=1e-3)
     assert np.allclose(x[:, 3], 2e4 + 300 * T - g * T**2 / 2, atol=1e-3)
     assert np.allclose(x[:, 4], 300 - g * T, atol=1e-6)
