@@ -14,12 +14,14 @@ _DECIDING = ("avx512f", "avx2", "fma", "avx", "sse4_2", "asimd")
 def instruction_set() -> str:
     """The instruction set, like `x86_64 avx512f avx2 fma`; sums from equal ones are equal to the last bit.
 
-    If the compiler targets another processor (NUMBA_CPU_NAME), that is named, since it decides instead.
+    If the compiler targets another processor (NUMBA_CPU_NAME), that is named, since it decides instead; so are features
+    that NumPy is told to leave alone (NPY_DISABLE_CPU_FEATURES).
     """
-    aimed_at = os.environ.get("NUMBA_CPU_NAME")
+    aimed_at, disabled = os.environ.get("NUMBA_CPU_NAME"), os.environ.get("NPY_DISABLE_CPU_FEATURES")
     found = set(_flags())
     parts = [system.machine(), *(flag for flag in _DECIDING if flag in found)]
-    return " ".join([*parts, f"aiming at {aimed_at}"] if aimed_at else parts)
+    parts += [f"aiming at {aimed_at}"] if aimed_at else []
+    return " ".join([*parts, f"NumPy without {disabled}"] if disabled else parts)
 
 
 def _flags() -> list[str]:

@@ -178,8 +178,8 @@ def altered(tables, column, change):
 def test_the_self_test_says_so_where_numbers_differ(monkeypatch):
     made = {name: (selftest.KNOWN / f"discriminator.{name}.csv").read_bytes() for name in selftest.TABLES}
     assert selftest.verdict("discriminator", made, True).words == "the known bytes"
-    # Rounding is forgiven where platforms differ, as far as its conditioning allows, and nowhere else.
-    for column, factor, elsewhere in (
+    # Rounding is forgiven as far as its conditioning allows.
+    for column, factor, sound in (
         ("sigma", 1 + 1e-10, True),
         ("sigma", 1 + 1e-7, False),
         ("exact_sigma", 1 + 2e-11, True),
@@ -189,8 +189,10 @@ def test_the_self_test_says_so_where_numbers_differ(monkeypatch):
         ("spread", 1 + 1e-7, False),
     ):
         changed = altered(made, column, lambda value, factor=factor: value * factor)
-        assert not selftest.verdict("discriminator", changed, True).good, column
-        assert selftest.verdict("discriminator", changed, False).good is elsewhere, (column, factor)
+        for same_platform in (True, False):
+            assert selftest.verdict("discriminator", changed, same_platform).good is sound, (column, factor)
+        if sound:
+            assert "not the known bytes" in selftest.verdict("discriminator", changed, True).words
     for spoiled in (made["curves"].replace(b"cured", b"cursed"), made["curves"][: len(made["curves"]) // 2]):
         assert not selftest.verdict("discriminator", made | {"curves": spoiled}, False).good
     monkeypatch.setattr(selftest, "verdicts", lambda: [selftest.Verdict("sonar", False, "differs")])
