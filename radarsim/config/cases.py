@@ -245,7 +245,7 @@ class Expander:
         if len(known) != 1 or known[0] is None:
             return
         for figure in common.figures:
-            if figure not in known[0]:
+            if not any(matches(figure, name) for name in known[0]):
                 path = ("figures", figure)
                 near = did_you_mean(figure, known[0]) or f"; there are: {', '.join(known[0])}"
                 self.faults.add(document.key_origin(path), path, f"no such figure{near}")

@@ -244,7 +244,8 @@ class Study(Model):
     """A study's own top-level keys, beside the common ones.
 
     bare_keys names the list whose members a bare key of `sweep` and `--set` speaks to. figure_names are all figures
-    that the study's report may draw; None: not known here, and names under `figures` go unchecked.
+    that the study's report may draw, with * for what depends on the config; None: not known here, and names under
+    `figures` go unchecked.
     """
 
     bare_keys: ClassVar[str] = "filters"

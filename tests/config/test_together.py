@@ -169,3 +169,13 @@ def test_figures_in_a_file_and_of_included_configs(house, said):
 def test_figure_names_are_those_that_the_report_draws():
     drawn = {f"{kind}_{component}" for component in QUANTITIES for kind in ("sigma", "gain", "dynamic")}
     assert set(RangeDoppler.figure_names) == drawn | {"settling", "consistency"}
+
+
+def test_unknown_figures_of_bursts_are_refused():
+    from radarsim.app.configs import load
+    from radarsim.errors import ConfigError
+
+    for name in ("residuals", "locks", "accuracy", "lock_density", "lock_scale_noise_variance"):
+        assert load("discriminator", [f"figures.{name}=[discriminator]"])
+    with pytest.raises(ConfigError, match=r"figures\.lokcs: no such figure; did you mean locks"):
+        load("discriminator", ["figures.lokcs=[discriminator]"])

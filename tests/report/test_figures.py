@@ -8,6 +8,7 @@ import pytest
 
 from radarsim.report import chart_look, figures, panels, tables
 from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
+from radarsim.studies.range_doppler import figures as range_doppler_figures
 from radarsim.studies.range_doppler import tables as range_doppler
 
 
@@ -118,7 +119,7 @@ def test_any_name_can_be_drawn(name, expected_radar):
     results = [expected_radar("rls2", filters=filters, radar={"name": name})]
     made = {"curves": tables.curves(results), "gains": tables.gains(results), **range_doppler.tables(results)}
     shown = SimpleNamespace(shown_in=lambda figure: [SimpleNamespace(name=results[0].name)])
-    drawn = range_doppler.figures(results, made, shown)
+    drawn = range_doppler_figures.figures(results, made, shown)
     for figure in (drawn["sigma_r"], drawn["gain_r"]):
         saved = figures.save(figure, ("svg",))["svg"].decode()
         assert "<script" not in saved

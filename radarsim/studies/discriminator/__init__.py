@@ -47,14 +47,14 @@ class Discriminator(Study):
         return figures.figures(results, made, experiment)
 
     def question(self, experiment):
-        from radarsim.studies.discriminator import tables
+        from radarsim.studies.discriminator import words
 
-        return tables.question(experiment)
+        return words.question(experiment)
 
     def answer(self, results, made):
-        from radarsim.studies.discriminator import tables
+        from radarsim.studies.discriminator import words
 
-        return tables.answer(results, made)
+        return words.answer(results, made)
 
     def curves(self, results):
         from radarsim.studies.discriminator import tables

@@ -171,6 +171,7 @@ class Discriminator(Study):
     """Doppler frequency and its derivatives from one burst."""
 
     bare_keys = "estimators"
+    figure_names = ("residuals", "locks", "accuracy", "lock_*")  # the last: of what a sweep varies
 
     burst: Burst = Field(description="the burst")
     truth: Annotated[Truth, Scenario()] = Field(description="the echo's phase: a scenario's stem, or inline")

@@ -36,12 +36,22 @@ SURE = 0.99
 def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
     """residuals, locks and accuracy of each case without a sweep; a figure for each family of swept cases."""
     drawn: dict[str, Figure] = {}
-    for n, result in enumerate(result for result in results if not result.swept):
-        for figure in (residuals(result, made), locks(result, made), accuracy(result, made)):
+
+    def chosen(name: str, among: Sequence[CaseResult]) -> list[CaseResult]:
+        wanted = {case.name for case in experiment.shown_in(name)}
+        return [result for result in among if result.name in wanted]
+
+    plain = [result for result in results if not result.swept]
+    for name, draw in (("residuals", residuals), ("locks", locks), ("accuracy", accuracy)):
+        for n, result in enumerate(chosen(name, plain)):
+            figure = draw(result, made)
             named = figure if n == 0 else of_case(figure, result.name)
             drawn[named.name] = named
-    for keys, members in swept_families(results).items():
+    for keys, family in swept_families(results).items():
         name = "_".join(["lock", *(key.split(".")[-1] for key in keys)])
+        members = chosen(name, family)
+        if not members:
+            continue
         if len(keys) == 1:
             drawn[name] = lock_against(name, keys[0], members, made)
         elif len(keys) == 2:

@@ -11,6 +11,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import claims
 from radarsim.report.claims import Missing, certain
 from radarsim.report.statistics import Estimate, difference, root_mean_square
+from radarsim.studies.discriminator.kernels.sums import LOCKS
 
 COMPUTED, PRINTED = "computed", "printed"
 READINGS = {COMPUTED: (2.25, 1.0), PRINTED: (9.0, 0.5)}  # noise variance, threshold c
@@ -61,7 +62,7 @@ class Evidence(claims.Evidence):
 
     def windows(self, key, kind: str = "sequence") -> np.ndarray:
         """Window lengths in s of an estimator."""
-        durations = self.case(key).axes.extra["duration_s"][self.estimator(key, kind)]
+        durations = self.case(key).axes.duration_s[self.estimator(key, kind)]
         return durations[np.isfinite(durations)]
 
     def lock(
@@ -82,23 +83,23 @@ class Evidence(claims.Evidence):
         result, i = self.case(key), self.estimator(key, kind)
         k, c = len(self.windows(key, kind)) - 1, COMPONENTS.index(component)
         moments = result.sums["error"][i, k, c]
-        return root_mean_square(moments[1], moments[3], result.sums["locks"][i, k, 0])
+        return root_mean_square(moments[1], moments[3], result.sums["locks"][i, k, LOCKS.index("lock")])
 
     def over_whole(self, key, kind: str, component: str) -> Estimate:
         """σ of all bursts at an estimator's last window over the potential one of the whole burst."""
         result, i = self.case(key), self.estimator(key, kind)
         k, c = len(self.windows(key, kind)) - 1, COMPONENTS.index(component)
         moments = result.sums["error_all"][i, k, c]
-        scale = result.axes.exact_sigma[i, k, c] / result.axes.extra["potential_closed_form"][c]
+        scale = result.axes.exact_sigma[i, k, c] / result.axes.potential_closed_form[c]
         return Estimate(*(scale * part for part in root_mean_square(moments[1], moments[3], result.count)))
 
     def potential(self, key, component: str) -> Estimate:
         """Potential spread of the whole burst, computed."""
-        return certain(self.case(key).axes.extra["potential_closed_form"][COMPONENTS.index(component)])
+        return certain(self.case(key).axes.potential_closed_form[COMPONENTS.index(component)])
 
     def shortest_window(self, key, amplitude: float) -> Estimate:
         """T_min (17) in ms at an amplitude."""
-        return certain(1e3 * self.case(key).axes.extra["shortest_window_s"] / amplitude**2)
+        return certain(1e3 * self.case(key).axes.shortest_window_s / amplitude**2)
 
     def lock_loss(self, key, other, kind: str) -> Estimate:
         """Lock of one case less that of another."""

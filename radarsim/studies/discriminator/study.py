@@ -29,7 +29,31 @@ MODES = {"block_sums": BLOCK_SUMS, "samples": SAMPLES, "demodulated": DEMODULATE
 # change sides, with 24 of them 0.5 %.
 BLOCKS_PER_WINDOW = {BLOCK_SUMS: 20, SAMPLES: 20, DEMODULATED: 32}
 IMAGE_BLOCKS_PER_WINDOW = {BLOCK_SUMS: 24, SAMPLES: 24, DEMODULATED: 32}
-LOCKS = 6  # see kernels.discriminator_sums.accumulate
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscriminatorAxes(Axes):
+    """Labels of P4's sums, and what its tables need beside them: F estimators, K windows, C components of θ.
+
+    Of each window, not-a-number where an estimator has none: duration_s (F, K) its length in s, energy_ratio (F, K) its
+    μ, no unit, posterior_sigma (F, K, C) the bounds with the prior, in the components' units; pulses holds the lengths
+    in pulses, a tuple for each estimator. Of the whole burst, burst_s long: prior_sigma (C,) and the potential
+    standard deviations in closed form, potential_closed_form (C,), in the components' units, and their covariance
+    potential_covariance (C, C). shortest_window_s is T_min (17) in s; model_error_turns (turns) and model_error_hz (Hz)
+    are the rms differences between the true phase and frequency and those of the fitted parameters.
+    """
+
+    duration_s: np.ndarray
+    pulses: tuple[tuple[int, ...], ...]
+    posterior_sigma: np.ndarray
+    prior_sigma: np.ndarray
+    potential_closed_form: np.ndarray
+    potential_covariance: np.ndarray
+    energy_ratio: np.ndarray
+    burst_s: float
+    shortest_window_s: float
+    model_error_turns: float
+    model_error_hz: float
 
 
 @dataclass(frozen=True)
@@ -37,7 +61,7 @@ class Plan:
     """All that a block needs; arrays as in `kernels.discriminator.estimate_block` and `accumulate`."""
 
     layout: Layout
-    axes: Axes
+    axes: DiscriminatorAxes
     world: plans.World
     tables: tuple[np.ndarray, np.ndarray]
     windows: np.ndarray
@@ -163,7 +187,7 @@ def prepared(case: Case) -> Plan:
         layout=Layout(
             error=(count, most, size, 4),
             error_all=(count, most, size, 4),
-            locks=(count, most, LOCKS),
+            locks=(count, most, len(sums_of.LOCKS)),
             residuals=(count, most, size, sums_of.BINS),
             passes=(count, 2),
         ),
@@ -221,8 +245,8 @@ def bounds(burst, windows, theta, sigma) -> tuple[np.ndarray, np.ndarray]:
     return potential, posterior
 
 
-def axes(spec, burst, windows, phase: Phase, sigma, potential, posterior) -> Axes:
-    """Labels: filters are the estimators, scans their windows; each has window lengths of its own, in extra."""
+def axes(spec, burst, windows, phase: Phase, sigma, potential, posterior) -> DiscriminatorAxes:
+    """Labels: filters are the estimators, scans their windows; each has window lengths of its own."""
     names, size = tuple(e.name for e in spec.estimators), len(sigma)
     most = max(map(len, windows))
     durations = np.full((len(names), most), np.nan)
@@ -230,7 +254,7 @@ def axes(spec, burst, windows, phase: Phase, sigma, potential, posterior) -> Axe
         durations[f, : len(own)] = np.array(own) * burst.pulse_period_s
     available = np.repeat(np.isfinite(durations)[..., None], size, axis=2)
     whole = exact.fisher(burst, size, burst.duration_s)
-    return Axes(
+    return DiscriminatorAxes(
         filters=names,
         components=COMPONENTS[:size],
         k=np.arange(1, most + 1),
@@ -239,20 +263,17 @@ def axes(spec, burst, windows, phase: Phase, sigma, potential, posterior) -> Axe
         baseline=0,
         exact_sigma=np.where(available, potential, np.nan),
         exact_bias=np.where(available, 0.0, np.nan),
-        extra={
-            "duration_s": durations,
-            "pulses": tuple(tuple(own) for own in windows),
-            "posterior_sigma": np.where(available, posterior, np.nan),
-            "prior_sigma": sigma,
-            "potential_closed_form": exact.spreads(whole),
-            "potential_covariance": model.balanced_inverse(whole),
-            "energy_ratio": exact.energy_ratio(burst, 1.0) * durations,
-            "bin_edges": sums_of.bin_edges(),
-            "burst_s": burst.duration_s,
-            "shortest_window_s": exact.shortest_window(burst),
-            "model_error_turns": float(np.sqrt(np.mean((phase.turns - phase.reference) ** 2))),
-            "model_error_hz": doppler_error(burst, phase),
-        },
+        duration_s=durations,
+        pulses=tuple(tuple(own) for own in windows),
+        posterior_sigma=np.where(available, posterior, np.nan),
+        prior_sigma=sigma,
+        potential_closed_form=exact.spreads(whole),
+        potential_covariance=model.balanced_inverse(whole),
+        energy_ratio=exact.energy_ratio(burst, 1.0) * durations,
+        burst_s=burst.duration_s,
+        shortest_window_s=exact.shortest_window(burst),
+        model_error_turns=float(np.sqrt(np.mean((phase.turns - phase.reference) ** 2))),
+        model_error_hz=doppler_error(burst, phase),
     )
 
 

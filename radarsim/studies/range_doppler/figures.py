@@ -9,8 +9,8 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
+from radarsim.studies.range_doppler.tables import PERIODS
 
-PERIODS = 10  # the paper: a manoeuvre variance is good when the error settles in under ten scan periods
 QUANTITIES = {
     "r": panels.Quantity("$r$", "range"),
     "Vr": panels.Quantity("$V_r$", "radial velocity"),

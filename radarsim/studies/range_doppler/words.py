@@ -5,13 +5,8 @@ from collections.abc import Sequence
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 from radarsim.report import tables as common
-from radarsim.studies.range_doppler.figures import PERIODS, QUANTITIES
-
-
-def follows_the_model(result: CaseResult) -> bool:
-    """Whether the target moves as the filters take it to, by no more than a square of the time."""
-    target = result.spec.target
-    return target.kind == "polynomial" and not any(target.coefficients[3:])
+from radarsim.studies.range_doppler.figures import QUANTITIES
+from radarsim.studies.range_doppler.tables import PERIODS, follows_the_model
 
 
 def question(experiment) -> str:

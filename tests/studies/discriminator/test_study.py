@@ -304,10 +304,10 @@ def test_auto_takes_samples_where_block_sums_cannot_serve():
 def test_a_profile_breaks_the_model_and_says_so():
     truth = {"phase_rad": 0.7, "times_s": [0.0, 0.1, 0.2, 0.3], "velocities_mps": [0.0, 350.0, 450.0, 475.0]}
     plan = plan_of(SEQUENCE, engine="auto", truth=truth)
-    assert plan.axes.extra["model_error_turns"] > 1
-    assert plan.axes.extra["model_error_hz"] > 100
+    assert plan.axes.model_error_turns > 1
+    assert plan.axes.model_error_hz > 100
     straight = plan_of(SEQUENCE, truth=BASE["truth"])
-    assert straight.axes.extra["model_error_turns"] == 0
+    assert straight.axes.model_error_turns == 0
 
 
 def test_cases_that_differ_in_estimators_share_forecasts():

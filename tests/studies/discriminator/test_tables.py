@@ -8,7 +8,7 @@ import pytest
 
 from radarsim.app import run as experiment
 from radarsim.report.drawing import Line
-from radarsim.studies.discriminator import claims, measures
+from radarsim.studies.discriminator import claims, measures, words
 from radarsim.studies.discriminator import tables as report
 from radarsim.studies.discriminator.kernels.sums import bin_edges
 
@@ -105,7 +105,7 @@ def test_gains_are_left_to_studies_with_common_scans(made):
 
 
 def test_answer_names_every_estimator(made):
-    first, others = report.answer(made.cases, made.tables)
+    first, others = words.answer(made.cases, made.tables)
     names = made.cases[0].axes.filters
     assert first.startswith(f"{names[0]}: ")
     assert all(re.search(rf"(: |, ){re.escape(name)} \d+(\.\d\d)? % \[", others) for name in names[1:])

@@ -7,6 +7,7 @@ import pytest
 
 from radarsim.report import statistics, tables
 from radarsim.report.drawing import Line, Style
+from radarsim.studies.range_doppler import figures as range_doppler_figures
 from radarsim.studies.range_doppler import tables as range_doppler
 from radarsim.studies.range_doppler import words as range_doppler_words
 
@@ -18,7 +19,7 @@ def made_of(results):
 def drawn_of(results, made=None):
     """Its figures, each showing every case."""
     everything = SimpleNamespace(shown_in=lambda name: [SimpleNamespace(name=r.name) for r in results])
-    return range_doppler.figures(results, made or made_of(results), everything)
+    return range_doppler_figures.figures(results, made or made_of(results), everything)
 
 
 def steady_row(table, case, name, component="r"):
@@ -172,13 +173,13 @@ def test_dynamic_error_is_drawn_where_there_is_one(expected_radar):
 
 def test_answer_tells_the_last_gain_of_each_component(paper):
     made = made_of(paper[1:2])
-    told = range_doppler.answer(paper[1:2], made)
+    told = range_doppler_words.answer(paper[1:2], made)
     assert len(told) == 3
     assert "at 140 s, the last scan, σ is 18.3 % [" in told[0]
     assert "than with range alone" in told[0]
     assert "at best 34.6 % [" in told[0]
-    assert "RLS 1" in range_doppler.answer(paper, made_of(paper))[2]
-    assert "higher (RLS 1)" in range_doppler.answer(paper, made_of(paper))[2]
+    assert "RLS 1" in range_doppler_words.answer(paper, made_of(paper))[2]
+    assert "higher (RLS 1)" in range_doppler_words.answer(paper, made_of(paper))[2]
 
 
 def test_answer_names_a_baseline_that_observes_more(expected_radar):
@@ -187,7 +188,7 @@ def test_answer_names_a_baseline_that_observes_more(expected_radar):
         for v in (1e-3, 1e-2)
     ]
     results = [expected_radar("rls2", filters=velocity)]
-    assert "than with filter 'D 0.001'" in range_doppler.answer(results, made_of(results))[0]
+    assert "than with filter 'D 0.001'" in range_doppler_words.answer(results, made_of(results))[0]
 
 
 def test_inputs_have_a_row_for_each_radar_that_differs(expected_radar, swept):
@@ -220,11 +221,11 @@ def test_answer_tells_the_greatest_loss(expected_radar):
     results = [expected_radar("rls2", 1e-4, target=BRAKING, radar=sharp)]
     made = made_of(results)
     words = greatest_loss(made)
-    assert range_doppler.answer(results, made)[0].endswith(f"{words}.")
+    assert range_doppler_words.answer(results, made)[0].endswith(f"{words}.")
     others = [expected_radar("rls2", name="calm"), expected_radar("rls5", name="fine"), *results]
     made = made_of(others)
     words = greatest_loss(made)
-    assert range_doppler.answer(others, made)[0].endswith(f"{words}, with RLS 2.")
+    assert range_doppler_words.answer(others, made)[0].endswith(f"{words}, with RLS 2.")
 
 
 def test_answer_is_silent_of_a_loss_that_is_none(paper):
@@ -232,7 +233,7 @@ def test_answer_is_silent_of_a_loss_that_is_none(paper):
     made = made_of(one)
     first = made["gains"][made["gains"]["component"] == "r"]
     assert (first["gain_hi"] > -1).all()
-    assert "at worst" not in range_doppler.answer(one, made)[0]
+    assert "at worst" not in range_doppler_words.answer(one, made)[0]
 
 
 @pytest.mark.parametrize(
@@ -251,7 +252,7 @@ def test_a_gain_in_words(gain, words):
 
 
 def test_answer_tells_the_best_variance(swept):
-    told = range_doppler.answer(swept, made_of(swept))[0]  # before the gains: it is what is asked
+    told = range_doppler_words.answer(swept, made_of(swept))[0]  # before the gains: it is what is asked
     assert told.startswith("Best manoeuvre variance D_M")
     assert "RLS 2: r 10⁻³ (σ 189.1 m, settled after 90 s); r+Vr 10⁻³ (σ 154." in told
 
@@ -263,7 +264,7 @@ def test_a_target_that_breaks_the_model(expected_radar):
     assert made["steady"].empty
     rows = made["curves"][(made["curves"]["component"] == "r") & (made["curves"]["filter"] == "r")]
     worst = rows.loc[rows["sigma"].idxmax()]
-    told = range_doppler.answer(results, made)[-1]
+    told = range_doppler_words.answer(results, made)[-1]
     assert f"r worst σ of the range {worst['sigma']:.4g} m [" in told
     assert f"at {worst['t_s']:g} s, largest bias " in told
 
@@ -271,5 +272,5 @@ def test_a_target_that_breaks_the_model(expected_radar):
 def test_answer_of_a_single_filter(expected_radar):
     one = {"name": "only", "observes": ["range"], "manoeuvre_variance": 1e-3}
     results = [expected_radar("rls2", filters=[one])]
-    (sentence,) = range_doppler.answer(results, made_of(results))
+    (sentence,) = range_doppler_words.answer(results, made_of(results))
     assert "only: σ of the range at 140 s is 189.3 m" in sentence

@@ -129,7 +129,7 @@ def best_of_phases(physics, work, sums, table, window, options):
 def run_strip(physics, drawn, tables, windows, options, work, sums, errors):
     """All windows (K,) of an estimator on eight bursts; writes errors (up to 8, K, 6), in turns over the burst.
 
-    drawn are rows of the blocks' sums, tables those of `filters.discriminator_plan.Tables`. Passes are left in work.
+    drawn are rows of the blocks' sums, tables those of `blocks.Tables`. Passes are left in work.
     """
     table, weights = address(tables[0]), address(tables[1])
     work, sums, drawn = address(work), address(sums), address(drawn)
@@ -201,7 +201,7 @@ def estimate_strips(physics, mean, factor, tables, windows, options, keys, first
     """As `discriminator.estimate_block`, with block sums: errors (n, F, K, 6) and passes (n, F) are written.
 
     mean (blocks, 4) and factor (blocks, 10) are the law of the sums drawn, sigma (6,) that of the forecast's errors,
-    tables those of `filters.discriminator_plan.Tables`. All is relative to the truth.
+    tables those of `blocks.Tables`. All is relative to the truth.
     """
     room = room_for(len(mean))
     run_strips(physics, mean, factor, tables, windows, options, keys, first, sigma, room, errors, passes)

@@ -6,6 +6,9 @@ from radarsim.kernels.compile import inline, kernel
 
 BINS_PER_OCTAVE, FEWEST_OCTAVES, OCTAVES = 4, -6, 18  # of |e|/σ: from 1/64 to 4096, outer bins open
 BINS = BINS_PER_OCTAVE * OCTAVES
+# What `locks` counts, in its order: bursts within 5 and 3 potential bounds, within 5 and 3 posterior ones, and within 3
+# of either at this and all earlier windows.
+LOCKS = ("lock", "three", "posterior", "posterior_three", "always_three", "always_posterior_three")
 
 
 @inline
@@ -41,8 +44,7 @@ def accumulate(errors, size, options, potential, posterior, error, error_all, lo
 
     potential and posterior (F, K, 6) are the bounds without and with the prior, in the same unit. error and error_all
     (F, K, size, 4) become Σe … Σe⁴, in units of the potential bound; to residuals (F, K, size, BINS) the histogram of
-    |e| over the posterior bound is added. locks (F, K, 6) counts bursts within 5 and 3 potential bounds, within 5 and
-    3 posterior ones, and within 3 potential, 3 posterior ones at this and all earlier windows.
+    |e| over the posterior bound is added. locks (F, K, 6) counts bursts, see LOCKS.
     """
     n = errors.shape[0]
     e, within = np.empty((size, n)), np.empty(n)

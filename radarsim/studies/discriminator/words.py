@@ -1,0 +1,65 @@
+"""What P4's report says: the question of an experiment, and its answer in sentences."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import panels
+from radarsim.report import tables as common
+
+
+def question(experiment) -> str:
+    """What the experiment asks, in one sentence."""
+    names = list(dict.fromkeys(e.name for case in experiment.cases for e in case.spec.estimators))
+    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    return f"How often do {listed} lock onto the Doppler frequency and its derivatives, and how accurate are they then?"
+
+
+def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
+    """Sentences with numbers: by case where nothing is swept, else the range of lock of each estimator."""
+    plain = [result for result in results if not result.swept]
+    if not plain and len(results) > 1:
+        return [_over(results, made, name) for name in results[0].axes.filters]
+    told = plain or list(results)
+    return [words for result in told for words in _of_one(result, made, f"{result.name}, " if len(told) > 1 else "")]
+
+
+def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
+    """Lock and accuracy of the first estimator at its last window, and the locks of the others."""
+    first, *others = result.axes.filters
+    row = _last(made, result, first)
+    k, n, accuracy = int(row["k"]), max(row["lock_rate"] * row["n"], 1), ""
+    if row["lock_rate"]:
+        bound = result.axes.posterior_sigma[0, k - 1] / result.axes.exact_sigma[0, k - 1]
+        ratio = np.sqrt(result.sums["error"][0, k - 1, :, 1] / n) / bound
+        accuracy = f"; σ of the locked over the bound (forecast included) {ratio.min():.3f} to {ratio.max():.3f}"
+    windows = f"{k} window{'s' if k > 1 else ''}"
+    words = [f"{before}{first}: {windows}, locked in {_lock(row)} of {result.count:,} bursts{accuracy}."]
+    if others:
+        locks = ", ".join(f"{name} {_lock(_last(made, result, name))}" for name in others)
+        words.append(f"{before}the others lock in: {locks}.")
+    return words
+
+
+def _over(results: Sequence[CaseResult], made: Mapping, name: str) -> str:
+    """The least and the largest lock of an estimator among swept cases."""
+    found = [result for result in results if name in result.axes.filters]
+    rows = {result.name: _last(made, result, name) for result in found}
+    found.sort(key=lambda result: rows[result.name]["lock_rate"])
+    ends = (found[0], found[-1])
+    least, most = (f"{_lock(rows[result.name])} ({panels.plain(panels.swept(result))})" for result in ends)
+    return f"{name}: locked in {least} to {most}; {len(found)} cases of {panels.realisations(found)}."
+
+
+def _last(made: Mapping, result: CaseResult, name: str):
+    """An estimator's row of locks at its last window."""
+    return common.groups(made["locks"], "case", "filter")[(result.name, name)].iloc[-1]
+
+
+def _lock(row) -> str:
+    """A share of bursts with its interval; of all or none the bound to as many digits as it has."""
+    value, low, high = (100 * row[name] for name in ("lock_rate", "lock_lo", "lock_hi"))
+    if 0 < value < 100:
+        return f"{value:.2f} % [{low:.2f}, {high:.2f}]"
+    return f"{value:.0f} % [{low:.3f}, {high:.3f}]"
