@@ -124,7 +124,7 @@ def replace_estimator(estimator, **change):
 
 
 def test_another_burst_is_not_the_papers(made):
-    evidence = measures.Evidence(made.cases, made.tables)
+    evidence = measures.Evidence(made.cases, made.tables, {})
     assert evidence.case(measures.COMPUTED) is made.cases[0]
     with pytest.raises(measures.Missing):
         evidence.case(measures.PRINTED)
@@ -133,4 +133,4 @@ def test_another_burst_is_not_the_papers(made):
         made.cases[0], spec=spec.model_copy(update={"burst": spec.burst.model_copy(update={"pulses": 20000})})
     )
     with pytest.raises(measures.Missing):
-        measures.Evidence([other], made.tables).case(measures.COMPUTED)
+        measures.Evidence([other], made.tables, {}).case(measures.COMPUTED)
