@@ -1,7 +1,7 @@
 """What a finished case hands to the report: its sums, and the axes that say what each of them is."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -13,7 +13,7 @@ class Axes:
 
     k (K,) counts scans from 1, t_s (K,) is the time from the first plot. available (F, K, C) says where a filter has an
     estimate. baseline is the filter that gains are against. exact_sigma and exact_bias (F, K, C) are not-a-number where
-    no exact value is known. extra holds what the study's own tables need.
+    no exact value is known. What the tables of a study need beside them stands in a subclass of its own.
     """
 
     filters: tuple[str, ...]
@@ -24,7 +24,6 @@ class Axes:
     baseline: int
     exact_sigma: np.ndarray
     exact_bias: np.ndarray
-    extra: Mapping[str, Any] = field(default_factory=dict)
 
 
 A_co = TypeVar("A_co", bound=Axes, covariant=True)
