@@ -1,8 +1,10 @@
 """Arguments that Python gives, refused as the command refuses its options."""
 
 import math
+import operator
 import os
 from collections.abc import Iterable
+from typing import SupportsFloat, SupportsIndex
 
 from radarsim.errors import ConfigError
 
@@ -13,16 +15,16 @@ NEEDED = ("workers", "depth", "shortest_s", "longest_s", "submit", "finished", "
 
 def check(
     *,
-    threads=None,
-    workers=None,
-    precision=None,
-    time_limit=None,
-    executor=None,
-    out=None,
-    overrides=(),
-    figures=True,
+    threads: object = None,
+    workers: object = None,
+    precision: object = None,
+    time_limit: object = None,
+    executor: object = None,
+    out: object = None,
+    overrides: object = (),
+    figures: object = True,
 ) -> None:
-    """ConfigError with a line for each argument of `run` that is none."""
+    """ConfigError with a line for each invalid argument of `run`."""
     faults = [
         *_count("threads", threads),
         *_count("workers", workers),
@@ -52,18 +54,18 @@ def formats(figures: bool | str | Iterable[str]) -> tuple[str, ...]:
     return (figures,) if isinstance(figures, str) else tuple(figures)
 
 
-def directory(out: str | os.PathLike) -> None:
+def directory(out: object) -> None:
     """ConfigError for what names no directory."""
     if faults := _directory(out):
         raise ConfigError(*faults)
 
 
-def _directory(out) -> list[str]:
+def _directory(out: object) -> list[str]:
     named = isinstance(out, str | os.PathLike) and os.fspath(out)
     return [] if named and isinstance(named, str) else [f"out: must name a directory, got {out!r}"]
 
 
-def _formats(figures) -> list[str]:
+def _formats(figures: object) -> list[str]:
     if isinstance(figures, bool) or figures is None:
         return []
     given = [figures] if isinstance(figures, str) or not isinstance(figures, Iterable) else list(figures)
@@ -71,16 +73,18 @@ def _formats(figures) -> list[str]:
     return [f"figures: must be True, False or of {allowed}, got {one!r}" for one in given if one not in FORMATS]
 
 
-def _count(name: str, value) -> list[str]:
-    whole = hasattr(value, "__index__") and not isinstance(value, bool) and not getattr(value, "ndim", 0)
-    if value is None or (whole and 1 <= value <= MOST_THREADS):
+def _count(name: str, value: object) -> list[str]:
+    scalar = not isinstance(value, bool) and not getattr(value, "ndim", 0)
+    number = operator.index(value) if isinstance(value, SupportsIndex) and scalar else 0
+    if value is None or 1 <= number <= MOST_THREADS:
         return []
     return [f"{name}: must be a whole number from 1 to {MOST_THREADS}, got {value!r}"]
 
 
-def _number(name: str, value, most: float) -> list[str]:
-    number = hasattr(value, "__float__") and not isinstance(value, bool) and not getattr(value, "ndim", 0)
-    if value is None or (number and 0 < value <= most and math.isfinite(value)):
+def _number(name: str, value: object, most: float) -> list[str]:
+    scalar = not isinstance(value, bool) and not getattr(value, "ndim", 0)
+    number = float(value) if isinstance(value, SupportsFloat) and scalar else math.nan
+    if value is None or (0 < number <= most and math.isfinite(number)):
         return []
     bound = f" and ≤ {most:g} %" if math.isfinite(most) else ""
     return [f"{name}: must be > 0{bound}, got {value!r}"]

@@ -23,7 +23,9 @@ class Cleaned:
     size: int
 
 
-def clean(out: str | os.PathLike, experiments: Iterable[Experiment] | None = None, dry_run: bool = False) -> Cleaned:
+def clean(
+    out: str | os.PathLike[str], experiments: Iterable[Experiment] | None = None, dry_run: bool = False
+) -> Cleaned:
     """Drop the stored blocks of all experiments, or of some, below out/.blocks; with dry_run only say how much.
 
     Links are not followed and files that no store makes are left, and with them their folder. Raises ConfigError if

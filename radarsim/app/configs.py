@@ -1,9 +1,10 @@
-"""Configs, read with all studies at hand."""
+"""Configs, read with all available studies."""
 
 import os
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from radarsim.config import json_schema, lookup, own
 from radarsim.config import load as reading
@@ -16,7 +17,7 @@ from radarsim.studies import registry
 lookup.further_folders = registry.folders
 
 
-def load(source: str | os.PathLike | Mapping, overrides: Iterable[str] = ()) -> Experiment:
+def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Iterable[str] = ()) -> Experiment:
     """The experiment that a config describes, all of it checked.
 
     source is a path, the stem of a config (here, in ./configs, or shipped), or a mapping as YAML would give it;
@@ -38,7 +39,7 @@ def shipped(stem: str) -> tuple[Model, ...] | None:
     return None
 
 
-def new(name: str, like: str | os.PathLike, folder: str | os.PathLike = ".") -> Path:
+def new(name: str, like: str | os.PathLike[str], folder: str | os.PathLike[str] = ".") -> Path:
     """Write folder/NAME.yaml, the suffix given or not, after a known config; its path.
 
     Raises ConfigError where it is there already, StoreError where it cannot be written.

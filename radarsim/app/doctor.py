@@ -8,6 +8,7 @@ import shutil
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ ROUNDINGS = 10  # a power p ≤ 4 of an error, and heavy tails in it
 
 
 def machine() -> dict[str, str]:
-    """The machine, what runs on it, and where compiled kernels are kept, each in words."""
+    """The machine, what runs on it, and where compiled kernels are kept, a text each."""
     from radarsim.kernels import cache as compiled
     from radarsim.report import provenance
 
@@ -49,7 +50,7 @@ def machine() -> dict[str, str]:
 
 
 def cluster() -> str:
-    """Whether Dask is at hand, in words."""
+    """Whether Dask is installed."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:
@@ -71,7 +72,7 @@ class Inspection:
     notes: list[str] = field(default_factory=list)
 
 
-def inspected(folder: str | os.PathLike, recompute: int = 0) -> Inspection:
+def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
     """Check a folder of results against its run.json, and all stored blocks of its cases; compute some of them again.
 
     recompute is how many stored pieces of each case to compute again, the smallest first. Raises ConfigError for what
@@ -108,8 +109,8 @@ def _blocks(folder: Path) -> Path:
     return next((one / ".blocks" for one in beside if (one / ".blocks").is_dir()), folder.parent / ".blocks")
 
 
-def _settled(found: Inspection) -> dict:
-    """The record, and its outputs looked at; a few times, where a run beside us may be writing others just now."""
+def _settled(found: Inspection) -> dict[str, Any]:
+    """The record, and its outputs checked; a few times, since another run may be writing others at the same time."""
     for look in range(LOOKS):
         time.sleep(LOOK_S if look else 0)
         record, found.outputs, found.faults = _record(found.folder), 0, []
@@ -119,17 +120,17 @@ def _settled(found: Inspection) -> dict:
     return record
 
 
-def _record(folder: Path) -> dict:
+def _record(folder: Path) -> dict[str, Any]:
     path = folder / "run.json"
     try:
-        record = json.loads(files.read(path))
+        record: dict[str, Any] = json.loads(files.read(path))
         for key, kind in (("outputs", dict), ("identities", dict), ("cases", dict), ("resolved", dict)):
             if not isinstance(record[key], kind):
                 raise ValueError(f"{key} is no table")
         record["resolved_sha256"], record["study"]
-        for name, identity in record["identities"].items():
-            if not isinstance(record["cases"][name]["done"], int) or not re.fullmatch("[0-9a-f]{2,128}", identity):
-                raise ValueError(f"identity or realisations of {name} are none")
+        for name, recorded in record["identities"].items():
+            if not isinstance(record["cases"][name]["done"], int) or not re.fullmatch("[0-9a-f]{2,128}", recorded):
+                raise ValueError(f"identity or realisations of {name} are invalid")
     except (FileNotFoundError, NotADirectoryError) as error:
         raise ConfigError(f"{folder}: no run.json in it, so it is no folder of results") from error
     except OSError as error:
@@ -145,7 +146,7 @@ def _json(value: object) -> bytes:
     return to_json(value)
 
 
-def _outputs(found: Inspection, outputs: dict) -> None:
+def _outputs(found: Inspection, outputs: dict[str, str]) -> None:
     for name, digest in outputs.items():
         path = found.folder / name
         if Path(name).is_absolute() or ".." in Path(name).parts:

@@ -1,10 +1,19 @@
-"""What the commands give with --json: plain data, one document a command, of the same content as their words."""
+"""What the commands print with --json: plain data, one document a command, with the content of their text output."""
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    from radarsim.app.outlook import Inventory, Outlook
+    from radarsim.app.result import Result
+    from radarsim.app.simulation import Shares
+    from radarsim.config.experiment import Experiment
 
 
 def text(document: object) -> str:
@@ -22,13 +31,15 @@ def _plain(value: object) -> object:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def fields(one) -> dict:
+def fields(one: "DataclassInstance") -> dict[str, Any]:
     """A dataclass as it is, paths as text."""
     return {key: str(value) if isinstance(value, Path) else value for key, value in asdict(one).items()}
 
 
-def result(one) -> dict:
+def result(one: "Result") -> dict[str, Any]:
     """A finished run or report: what was asked and done, the answer, σ at the last scan, verdicts, files."""
+    written = one.written
+    assert written is not None  # the commands write what they print
     names = {case.name: case.count for case in one.cases}
     return {
         "config": one.experiment.stem,
@@ -39,26 +50,26 @@ def result(one) -> dict:
             for case in one.experiment.cases
         },
         "precision": one.facts.get("precision"),
-        "answer": list(one.written.answer),
+        "answer": list(written.answer),
         "last_scan": one.last_scan.to_dict("records"),
         "claims": one.verdicts(),
-        "folder": str(one.written.folder),
-        "files": list(one.written.files),
+        "folder": str(written.folder),
+        "files": list(written.files),
         "warnings": one.warnings,
     }
 
 
-def share(done) -> dict:
+def share(done: "Shares") -> dict[str, Any]:
     """What a share came to, in realisations, by case."""
     return {**asdict(done), "unmet": done.unmet, "warnings": done.warnings}
 
 
-def outlook(experiment, one) -> dict:
+def outlook(experiment: "Experiment", one: "Outlook") -> dict[str, Any]:
     """What a run would take."""
     return {"config": experiment.stem, "path": experiment.path, **asdict(one)}
 
 
-def inventory(tables: Sequence) -> dict:
+def inventory(tables: "Inventory") -> dict[str, list[dict[str, str]]]:
     """Configs, scenarios, studies and filters: lists of rows by the first word of their title."""
     return {
         title.split()[0].lower(): [dict(zip(columns, row, strict=True)) for row in rows]

@@ -1,7 +1,7 @@
 """What running an experiment would take, and what there is to run."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,8 +13,10 @@ from radarsim.config import lookup
 from radarsim.config.experiment import Experiment
 from radarsim.engine.collect import collect
 from radarsim.engine.executors import available_cores
+from radarsim.engine.results import Axes
 from radarsim.studies import registry
 
+Inventory = Sequence[tuple[str, Sequence[str], Sequence[tuple[str, ...]]]]  # title, columns, rows
 PILOT_S = 0.3  # of all cases together, unless single realisations take longer
 LADDER, FOR_NOTHING = 8, 1.2  # so many times more realisations at a look; times as good as equal
 SHORT_S = 0.01
@@ -24,7 +26,7 @@ PILOT_OF_PRECISION_S, LEAST, MOST = 1.0, 256, 16_384  # realisations that a prec
 @dataclass(frozen=True)
 class Need:
     """What a precision takes: realisations (None beyond all bounds), from `exact` values or a `pilot` of how many, and
-    the σ that is last to get there, in words."""
+    the name of the σ that reaches it last."""
 
     realisations: int | None
     known_by: str
@@ -69,7 +71,8 @@ def outlook(
     threads = threads or available_cores()
     if precision is not None:
         check_precision([experiment], precision)
-    cases, largest, preparing, control = [], 0, 0.0, False
+    cases: list[CaseOutlook] = []
+    largest, preparing, control = 0, 0.0, False
     registry.study(experiment.study).prepare(experiment.cases[0])  # what it loads is not to be timed
     for done, case in enumerate(experiment.cases, 1):
         work, started = CaseWork(case), time.perf_counter()
@@ -92,7 +95,7 @@ def outlook(
     return Outlook(tuple(cases), threads, seconds, memory, precision, warnings)
 
 
-def controls(axes) -> bool:
+def controls(axes: Axes) -> bool:
     """Whether the baseline's σ is known exactly somewhere where another filter has one too."""
     known = axes.available[axes.baseline] & np.isfinite(np.asarray(axes.exact_sigma, dtype=float)[axes.baseline])
     return bool((np.delete(axes.available, axes.baseline, axis=0) & known).any())
@@ -139,33 +142,35 @@ def seconds_each(work: CaseWork, realisations: int, pilot_s: float) -> float:
 
 def timed(work: CaseWork, count: int) -> float:
     """Seconds of the processor that `count` realisations take; of short ones the lesser of two."""
-    taken = []
-    while not taken or (len(taken) < 2 and taken[0] < SHORT_S):
+    seconds: list[float] = []
+    while not seconds or (len(seconds) < 2 and seconds[0] < SHORT_S):
         started = time.thread_time()
         work.simulate(0, count)
-        taken.append(time.thread_time() - started)
-    return min(taken)
+        seconds.append(time.thread_time() - started)
+    return min(seconds)
 
 
-def described(file: Path) -> str:
-    """The first words of a YAML file's leading comment, without its own name."""
+def described(file: Path | None) -> str:
+    """The first line of a YAML file's leading comment, without its own name; empty where there is no such file."""
+    if file is None:
+        return ""
     with file.open(encoding="utf-8") as lines:
         for line in lines:
-            words = line.lstrip("#").strip()
+            comment = line.lstrip("#").strip()
             if not line.startswith("#"):
                 break
-            if not words.startswith("yaml-language-server"):
-                return words.partition(" — ")[2] or words
+            if not comment.startswith("yaml-language-server"):
+                return comment.partition(" — ")[2] or comment
     return ""
 
 
-def inventory() -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
-    """What `radarsim list` shows: title, columns and rows of each kind of thing at hand."""
+def inventory() -> Inventory:
+    """What `radarsim list` shows: title, columns and rows of configs, scenarios, studies and filters."""
     configs = [(stem, described(lookup.config_file(stem))) for stem in lookup.stems("configs")]
     scenarios = [(stem, described(lookup.scenario_file(stem, None))) for stem in lookup.stems("scenarios")]
     studies = [registry.study(name) for name in registry.names()]
     about = [(study.name, study.about) for study in studies]
-    filters = [(study.name, key, words) for study in studies for key, words in study.filters.items()]
+    filters = [(study.name, key, text) for study in studies for key, text in study.filters.items()]
     return [
         ("Configs (radarsim run NAME)", ("name", "what it is"), configs),
         ("Scenarios (target: NAME)", ("name", "what it is"), scenarios),

@@ -3,13 +3,18 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from radarsim.app import configs
+from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.report import agreement, claims, controlled, files, notes, provenance, sweeps
 from radarsim.report import tables as common
 from radarsim.report.drawing import Figure
 from radarsim.studies.registry import study
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def tables(results: Sequence[CaseResult], control_variate: bool = False) -> dict:
@@ -28,7 +33,9 @@ def tables(results: Sequence[CaseResult], control_variate: bool = False) -> dict
     return notes.noted(made, results)
 
 
-def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
+def figures(
+    results: Sequence[CaseResult], made: Mapping[str, "pd.DataFrame"], experiment: Experiment
+) -> dict[str, Figure]:
     """The figures of an experiment, described, by the stem of their file: the study's own, and of sweeps."""
     own = study(results[0].study)
     drawn = own.figures(results, made, experiment)
@@ -39,11 +46,11 @@ def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[st
 
 @dataclass(frozen=True)
 class Written:
-    """What was written: the folder, its files by their path in it, the tables, and the answer in words."""
+    """What was written: the folder, its files by their path in it, the tables, and the sentences of the answer."""
 
     folder: Path
     files: tuple[str, ...]
-    tables: Mapping = field(repr=False)
+    tables: Mapping[str, "pd.DataFrame"] = field(repr=False)
     answer: tuple[str, ...]
 
 
@@ -51,13 +58,13 @@ ALWAYS = ("curves", "gains")  # tables written without a row too; others only wh
 
 
 def write(
-    experiment,
+    experiment: Experiment,
     results: Sequence[CaseResult],
     folder: Path,
-    run: Mapping,
+    run: Mapping[str, Any],
     *,
     draw: bool = True,
-    made: Mapping | None = None,
+    made: "Mapping[str, pd.DataFrame] | None" = None,
     formats: Sequence[str] = ("svg", "png"),
 ) -> Written:
     """Write all of an experiment's outputs into folder; every file at once, none half.

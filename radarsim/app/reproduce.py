@@ -31,11 +31,11 @@ LOOK_S = 0.1  # how often a signal is looked for
 
 @dataclass(frozen=True)
 class Done:
-    """One config: its seconds, what it made in words; its faults and the exit code they deserve, if it has any."""
+    """One config: its seconds, a summary of what it made; its faults and their exit code, if it has any."""
 
     stem: str
     seconds: float
-    words: str
+    summary: str
     faults: tuple[str, ...] = ()
     code: int = 0
 
@@ -58,7 +58,7 @@ def reproduce(
     overrides: Sequence[str] = (),
     figures: bool = True,
 ) -> list[Done]:
-    """Run every config, telling a line as each is done; a fault of one does not keep the others from running.
+    """Run every config, reporting a line as each is done; a fault of one does not keep the others from running.
 
     Raises Interrupted, with all that was done stored, if `stop` saw a signal.
     """
@@ -66,7 +66,7 @@ def reproduce(
     tasks = [Task(stem, str(out), tuple(overrides), figures) for stem in stems]
     for one in _finished(tasks, stop):
         done.append(one)
-        say(f"[{len(done):>2}/{len(stems)}] {one.stem:<26} {one.seconds:6.1f} s  {one.words}")
+        say(f"[{len(done):>2}/{len(stems)}] {one.stem:<26} {one.seconds:6.1f} s  {one.summary}")
     return done
 
 
@@ -86,7 +86,7 @@ def _finished(tasks: Sequence[Task], stop: Signals | None) -> Iterator[Done]:
             idle.put(process)
 
     with ThreadPoolExecutor(max(1, count)) as pool:
-        pending: set[Future] = {pool.submit(run, task) for task in tasks}
+        pending: set[Future[Done]] = {pool.submit(run, task) for task in tasks}
         try:
             while pending:
                 ready, pending = wait(pending, LOOK_S, FIRST_COMPLETED)
@@ -111,31 +111,35 @@ class _Process:
         self._start()
 
     def _start(self) -> None:
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         command = [sys.executable, "-c", "from radarsim.app.reproduce import answer; answer()"]
-        self._popen = subprocess.Popen(command, env=environment, start_new_session=True, **pipes)
+        self._popen = subprocess.Popen(
+            command, env=environment, start_new_session=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        assert self._popen.stdin is not None
+        assert self._popen.stdout is not None
+        self._requests, self._answers = self._popen.stdin, self._popen.stdout
 
     def done(self, task: Task) -> Done:
-        """Have it run a config. One that dies under it is told as that config's fault, and another is started."""
+        """Have it run a config. If the process dies, that is reported as the config's fault, and another is started."""
         began = time.perf_counter()
         with suppress(OSError):
-            self._popen.stdin.write(json.dumps(asdict(task)) + "\n")
-            self._popen.stdin.flush()
-        if line := self._popen.stdout.readline():
-            told = json.loads(line)
-            return Done(**told | {"faults": tuple(told["faults"])})
+            self._requests.write(json.dumps(asdict(task)) + "\n")
+            self._requests.flush()
+        if line := self._answers.readline():
+            answered = json.loads(line)
+            return Done(**answered | {"faults": tuple(answered["faults"])})
         code = self._popen.wait()
         with self._lock:
             if not self._ended:
-                self._popen.stdout.close()
+                self._answers.close()
                 self._close_stdin()
                 self._start()
         fault = f"{task.stem}: its process ended with {code}; run again, what it had done is stored"
         return Done(task.stem, time.perf_counter() - began, f"FAILED: {fault}", (fault,), 1)
 
     def stop(self, at_once: bool) -> None:
-        """Ask it to end: in the midst of a config, which it stores as far as it is, or else after it."""
+        """Ask it to end: at once, storing what is done of a config, or else after the config."""
         with self._lock:
             self._ended = True
             if at_once:
@@ -145,11 +149,11 @@ class _Process:
     def wait(self) -> None:
         """Until it has ended."""
         self._popen.wait()
-        self._popen.stdout.close()
+        self._answers.close()
 
     def _close_stdin(self) -> None:
         with suppress(OSError):  # a config that it never read
-            self._popen.stdin.close()
+            self._requests.close()
 
 
 def answer() -> None:
@@ -159,8 +163,8 @@ def answer() -> None:
         try:
             for line in sys.stdin:
                 asked = json.loads(line)
-                told = _run(Task(**asked | {"overrides": tuple(asked["overrides"])}), stop)
-                sys.stdout.write(json.dumps(asdict(told)) + "\n")
+                done = _run(Task(**asked | {"overrides": tuple(asked["overrides"])}), stop)
+                sys.stdout.write(json.dumps(asdict(done)) + "\n")
                 sys.stdout.flush()
         except Interrupted as ended:
             os._exit(ended.exit_code)  # as the command does: whoever sent the signal need not wait for an orderly end
@@ -177,21 +181,23 @@ def _follow(parent: int) -> None:
 
 def _run(task: Task, stop: Signals) -> Done:
     started = time.perf_counter()
+    faults: tuple[str, ...] = ()
+    code = 0
     try:
         result = experiment.run(task.stem, overrides=task.overrides, out=task.out, stop=stop, figures=task.figures)
         verdicts = ", ".join(f"{len(names)} {verdict}" for verdict, names in result.verdicts().items())
-        drawn = sum(name.endswith(".svg") for name in result.written.files)
-        words = [plural(drawn, "figure")] if task.figures else []
-        words, faults, code = [*words, *([f"claims: {verdicts}"] if verdicts else [])], (), 0
+        drawn = sum(name.endswith(".svg") for name in result.written.files) if result.written else 0
+        made = [plural(drawn, "figure")] if task.figures else []
+        made += [f"claims: {verdicts}"] if verdicts else []
     except Interrupted:
         raise
     except RadarsimError as error:
-        words, faults, code = [f"FAILED: {error.lines[0]}"], error.lines, error.exit_code
-    return Done(task.stem, time.perf_counter() - started, "; ".join(words), tuple(faults), code)
+        made, faults, code = [f"FAILED: {error.lines[0]}"], error.lines, error.exit_code
+    return Done(task.stem, time.perf_counter() - started, "; ".join(made), faults, code)
 
 
 def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
-    """The closing words: claims by verdict, time, where all lies."""
+    """The closing lines: claims by verdict, time, where the results are."""
     from radarsim.report import index
 
     index.write(Path(out))  # two processes may have written it at once, one without the other's run
@@ -200,12 +206,12 @@ def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
     longest = max(done, key=lambda one: one.seconds)
     failed = [one.stem for one in done if one.faults]
     guide = Path(out) / "README.md"
-    told = f"; {guide} says what lies where" if guide.is_file() else ""
+    hint = f"; {guide} says what lies where" if guide.is_file() else ""
     return [
         "",
         f"claims   {sum(overall.values())}: " + ", ".join(f"{count} {verdict}" for verdict, count in overall.items()),
         f"time     {clock(seconds)} for {plural(len(done), 'config')}, "
         f"the longest {longest.stem}, {longest.seconds:.0f} s",
-        f"where    {Path(out) / 'index.html'} leads to every report{told}",
+        f"where    {Path(out) / 'index.html'} leads to every report{hint}",
         *([f"failed   {', '.join(failed)}"] if failed else []),
     ]

@@ -5,26 +5,38 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.studies.registry import study
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from radarsim.app.output import Written
+    from radarsim.report.drawing import Figure
+    from radarsim.report.figures import Canvas
+
 MOST_ROWS = 40  # that a notebook shows
 
 
 class Result:
-    """A finished experiment: its cases, tables (pandas), figures (Matplotlib). Nothing is written unless asked for."""
+    """A finished experiment: its cases, tables (pandas), figures (Matplotlib). Nothing is written unless asked for.
 
-    def __init__(self, experiment: Experiment, cases: Sequence[CaseResult], facts: Mapping):
+    written: what the last call of `write` wrote; None before the first.
+    """
+
+    def __init__(self, experiment: Experiment, cases: Sequence[CaseResult], facts: Mapping[str, Any]):
         self.experiment, self.cases, self.facts = experiment, tuple(cases), dict(facts)
+        self.written: Written | None = None
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         counts = sorted({case.count for case in self.cases})
         each = f"{counts[0]:,}" if len(counts) == 1 else f"{counts[0]:,} to {counts[-1]:,}"
         return f"<radarsim result {self.experiment.stem}: {len(self.cases)} cases of {each} realisations>"
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """What a notebook shows: question, answer, realisations, σ and gain at the last scan; text escaped."""
         from html import escape
 
@@ -34,9 +46,9 @@ class Result:
         columns = [*shown, *(name for name in ("gain_percent", "gain_lo", "gain_hi") if len(self.gains))]
         rows = self.last_scan[columns].dropna(axis=1, how="all")
         table = rows.to_html(index=False, border=0, float_format=lambda v: f"{v:.4g}", na_rep="", max_rows=MOST_ROWS)
-        said = "".join(f"<p>{escape(line)}</p>" for line in self.answer)
+        answer = "".join(f"<p>{escape(line)}</p>" for line in self.answer)
         count = escape(provenance.span(sorted({case.count for case in self.cases})))
-        return f"<h4>{escape(self.question)}</h4>{said}<p>{count} realisations; 95 % intervals.</p>{table}"
+        return f"<h4>{escape(self.question)}</h4>{answer}<p>{count} realisations; 95 % intervals.</p>{table}"
 
     @property
     def question(self) -> str:
@@ -72,7 +84,7 @@ class Result:
         return output.tables(self.cases, self.experiment.control_variate)
 
     @property
-    def curves(self):
+    def curves(self) -> "pd.DataFrame":
         """sigma(k), bias and spread of every case, filter and component: a DataFrame with the columns of curves.csv.
 
         >>> import radarsim
@@ -84,19 +96,19 @@ class Result:
         return self._tables["curves"].copy()
 
     @property
-    def gains(self):
+    def gains(self) -> "pd.DataFrame":
         """Gains against the baseline filter: a DataFrame with the columns of gains.csv."""
         return self._tables["gains"].copy()
 
     @property
-    def last_scan(self):
+    def last_scan(self) -> "pd.DataFrame":
         """The rows of curves at the last scan of each case, filter and component, with those of gains beside them."""
         keys = ["case", "filter", "component"]
         last = self.curves.groupby(keys, sort=False).tail(1)
         return last.merge(self.gains.groupby(keys, sort=False).tail(1), on=[*keys, "k", "t_s"], how="left")
 
     @cached_property
-    def _described(self) -> dict:
+    def _described(self) -> "dict[str, Figure]":
         from radarsim.app import output
 
         return output.figures(self.cases, self._tables, self.experiment)
@@ -106,7 +118,7 @@ class Result:
         """The names that `figure` takes."""
         return tuple(self._described)
 
-    def figure(self, name: str):
+    def figure(self, name: str) -> "Canvas":
         """A Matplotlib figure by its name; KeyError names those there are.
 
         >>> import radarsim
@@ -122,7 +134,7 @@ class Result:
             raise KeyError(f"no figure {name!r}; there are: {', '.join(self._described)}")
         return figures.render(self._described[name])
 
-    def write(self, out: str | os.PathLike, figures: bool | str | Sequence[str] = True):
+    def write(self, out: str | os.PathLike[str], figures: bool | str | Sequence[str] = True) -> "Written":
         """Write tables, figures, claims, run.json and report.html into out/<stem>/, and out/index.html anew.
 
         figures may name the formats of their files: svg, png, pdf. What was written comes back.
@@ -147,7 +159,7 @@ class Result:
 
     @property
     def unmet(self) -> list[str]:
-        """The targets of precision or time that the run did not reach, in words; empty if it is all that was asked."""
+        """The targets of precision or time that the run did not reach, a text each; empty if all was done."""
         return list(self.facts.get("unmet", ()))
 
     @property

@@ -6,17 +6,18 @@ import os
 import sys
 import time
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 from radarsim.app import arguments, simulation, stored_claims
 from radarsim.app.configs import load
 from radarsim.app.records import made_by_other_code
 from radarsim.app.repeat import RESULTS, command, repeated
 from radarsim.app.result import Result
-from radarsim.app.simulation import Gathered, Means, Progress
+from radarsim.app.simulation import Progress, RunOptions, SimulatedCases
 from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Experiment
 from radarsim.engine import stopping
@@ -30,9 +31,10 @@ from radarsim.report.claims import Claim
 from radarsim.studies import registry
 
 
-def load_all(sources: Sequence, overrides: Sequence[str] = ()) -> list[Experiment]:
+def load_all(sources: Sequence[str | os.PathLike[str]], overrides: Sequence[str] = ()) -> list[Experiment]:
     """Every config checked before any runs; raises one ConfigError with the faults of all."""
-    loaded, faults = [], []
+    loaded: list[Experiment] = []
+    faults: list[str] = []
     for source in sources:
         try:
             loaded.append(load(source, overrides))
@@ -42,6 +44,9 @@ def load_all(sources: Sequence, overrides: Sequence[str] = ()) -> list[Experimen
     if faults:
         raise ConfigError(*faults)
     return loaded
+
+
+Config = str | os.PathLike[str] | Mapping[str, Any] | Experiment
 
 
 def namesakes(experiments: Sequence[Experiment]) -> list[str]:
@@ -60,7 +65,7 @@ def namesakes(experiments: Sequence[Experiment]) -> list[str]:
 
 
 def run(
-    config,
+    config: Config,
     *,
     realisations: float | None = None,
     seed: int | None = None,
@@ -71,7 +76,7 @@ def run(
     workers: int | None = None,
     scheduler: str | None = None,
     executor: Executor | None = None,
-    out: str | os.PathLike | None = None,
+    out: str | os.PathLike[str] | None = None,
     figures: bool | str | Sequence[str] = True,
     progress: Progress | None = None,
     stop: Signals | None = None,
@@ -105,16 +110,16 @@ def run(
     renewed = made_by_other_code(experiment, Path(out)) if out is not None else []
     with cluster(workers, scheduler) if executor is None else nullcontext(executor) as pool:
         threads = pool.workers if pool else int(threads or available_cores())
-        means = Means(out, threads, stopping.Either(stop, limit), pool)
-        gathered = simulation.simulated(experiment, means, progress=progress, precision=precision)
+        options = RunOptions(out, threads, stopping.Either(stop, limit), pool)
+        simulated = simulation.simulated(experiment, options, progress=progress, precision=precision)
         if stop is not None:
             stop.raise_if_received()
-    if not gathered.cases:
-        raise TargetUnmet(f"{experiment.stem}: {gathered.stopped}: nothing was done by then")
-    facts = facts_of(gathered, threads, time.perf_counter() - started)
+    if not simulated.cases:
+        raise TargetUnmet(f"{experiment.stem}: {simulated.stopped}: nothing was done by then")
+    facts = facts_of(simulated, threads, time.perf_counter() - started)
     facts["warnings"] += renewed
-    ended_by = None if gathered.stopped else precision
-    result = result_of(experiment, gathered, facts, repeated(experiment, gathered.done, overrides, ended_by))
+    ended_by = None if simulated.stopped else precision
+    result = result_of(experiment, simulated, facts, repeated(experiment, simulated.done, overrides, ended_by))
     if out is not None:
         result.write(out, figures)
     return result
@@ -125,7 +130,7 @@ def share(
     number: int,
     of: int,
     *,
-    out: str | os.PathLike,
+    out: str | os.PathLike[str],
     threads: int | None = None,
     executor: Executor | None = None,
     time_limit: Stop | None = None,
@@ -133,8 +138,8 @@ def share(
     stop: Signals | None = None,
 ) -> simulation.Shares:
     """Compute share `number` of `of` of every case into the store under out; no tables. Arguments as those of `run`."""
-    means = Means(out, threads, stopping.Either(stop, time_limit), executor)
-    done = simulation.shared(experiment, number, of, means, progress=progress)
+    options = RunOptions(out, threads, stopping.Either(stop, time_limit), executor)
+    done = simulation.shared(experiment, number, of, options, progress=progress)
     if stop is not None:
         stop.raise_if_received()
     return done
@@ -163,7 +168,11 @@ def merged(overrides: Sequence[str], realisations: float | None, seed: int | Non
 
 
 def report(
-    experiment: Experiment, *, out: str | os.PathLike, overrides: Sequence[str] = (), figures: bool = True
+    experiment: Experiment,
+    *,
+    out: str | os.PathLike[str],
+    overrides: Sequence[str] = (),
+    figures: bool | str | Sequence[str] = True,
 ) -> Result:
     """Tables, figures and report of a config from what is stored; raises ConfigError where something is missing.
 
@@ -174,7 +183,7 @@ def report(
     return result
 
 
-def load_result(config, *, out: str | os.PathLike = RESULTS, overrides: Sequence[str] = ()) -> Result:
+def load_result(config: Config, *, out: str | os.PathLike[str] = RESULTS, overrides: Sequence[str] = ()) -> Result:
     """The result of an experiment that was run into `out`, from what is stored there: computes and writes nothing.
 
     config and overrides as for `run`. Raises ConfigError where something is missing, with the command that computes it.
@@ -190,13 +199,13 @@ def load_result(config, *, out: str | os.PathLike = RESULTS, overrides: Sequence
     return from_store(experiment, out, overrides)
 
 
-def from_store(experiment: Experiment, out: str | os.PathLike, overrides: Sequence[str]) -> Result:
+def from_store(experiment: Experiment, out: str | os.PathLike[str], overrides: Sequence[str]) -> Result:
     """The result from stored blocks alone; as many realisations as the last run, where overrides do not say."""
     arguments.directory(out)
     asked = experiment
     if not any(override.split("=")[0].strip() == "realisations" for override in overrides):
         experiment = as_last_run(experiment, Path(out))
-    held, missing = Gathered(), []
+    held, missing = SimulatedCases(), []
     for case in experiment.cases:
         work = CaseWork(case)
         if not case.realisations:  # the last run was stopped before it came to this case
@@ -211,9 +220,9 @@ def from_store(experiment: Experiment, out: str | os.PathLike, overrides: Sequen
     return result_of(experiment, held, facts_of(held, 0, 0.0), repeated(asked, held.done, overrides, None))
 
 
-def result_of(experiment: Experiment, gathered: Gathered, facts: dict, again: str) -> Result:
+def result_of(experiment: Experiment, simulated: SimulatedCases, facts: dict[str, Any], again: str) -> Result:
     """The result, `again` the command that repeats it; with a warning where a control variate is asked for in vain."""
-    result = Result(experiment, finished(gathered), facts | {"command": again})
+    result = Result(experiment, finished(simulated), facts | {"command": again})
     if experiment.control_variate and not len(result.tables.get("controlled", ())):
         facts["warnings"].append(simulation.NO_CONTROL)
     return result
@@ -227,40 +236,40 @@ def as_last_run(experiment: Experiment, out: Path) -> Experiment:
     except FileNotFoundError:
         return experiment
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        said = getattr(error, "strerror", None) or "damaged"
+        reason = getattr(error, "strerror", None) or "damaged"
         raise StoreError(
-            f"{out / experiment.stem / 'run.json'}: cannot be read: {said}; `radarsim run` makes it anew, "
+            f"{out / experiment.stem / 'run.json'}: cannot be read: {reason}; `radarsim run` makes it anew, "
             "and so does `radarsim report` with -n"
         ) from error
     cases = tuple(replace(case, realisations=numbers.get(case.name, case.realisations)) for case in experiment.cases)
     return replace(experiment, cases=cases, realisations=max(case.realisations for case in cases))
 
 
-def finished(gathered: Gathered) -> list[CaseResult]:
+def finished(simulated: SimulatedCases) -> list[CaseResult]:
     """Cases with their sums and the labels that say what these are."""
-    return [simulation.result_of(*one) for one in gathered.cases]
+    return [simulation.result_of(*one) for one in simulated.cases]
 
 
-def facts_of(gathered: Gathered, threads: int, seconds: float) -> dict:
+def facts_of(simulated: SimulatedCases, threads: int, seconds: float) -> dict[str, Any]:
     """The facts of a run for run.json: stop reason, threads, times, warnings, identities, the precision reached."""
-    collected = [c for _, _, c in gathered.cases]
-    facts = {
-        "stop": "; ".join(gathered.unmet) or "done",
-        "unmet": gathered.unmet,
+    collected = [c for _, _, c in simulated.cases]
+    facts: dict[str, Any] = {
+        "stop": "; ".join(simulated.unmet) or "done",
+        "unmet": simulated.unmet,
         "threads": threads,
         "seconds": seconds,
         "kernel_seconds": sum(c.kernel_seconds for c in collected),
         "realisations_computed": sum(c.computed for c in collected),
         "realisations_from_store": sum(c.from_store for c in collected),
         "warnings": [*dict.fromkeys(warning for c in collected for warning in c.warnings), *cache_troubles()],
-        "identities": {case.name: work.identity for case, work, _ in gathered.cases},
+        "identities": {case.name: work.identity for case, work, _ in simulated.cases},
     }
-    if measured := seconds_per_update(work for _, work, _ in gathered.cases):
+    if measured := seconds_per_update(work for _, work, _ in simulated.cases):
         facts["seconds_per_update"] = measured
-    if gathered.precision is None:
+    if simulated.precision is None:
         return facts
-    widest = {name: asdict(cell) | {"percent": finite(cell.percent)} for name, cell in gathered.cells.items()}
-    return facts | {"precision": {"asked_percent": gathered.precision, "widest": widest}}
+    widest = {name: asdict(cell) | {"percent": finite(cell.percent)} for name, cell in simulated.cells.items()}
+    return facts | {"precision": {"asked_percent": simulated.precision, "widest": widest}}
 
 
 def cache_troubles() -> list[str]:
@@ -279,7 +288,7 @@ def seconds_per_update(works: Iterable[CaseWork]) -> dict[str, dict[str, float]]
 
 
 def finite(value: float) -> float | None:
-    """The number, or None where it is none that JSON knows."""
+    """The number, or None where JSON cannot hold it."""
     return value if math.isfinite(value) else None
 
 
@@ -289,7 +298,7 @@ def all_claims() -> list[Claim]:
     return [claim for of in every if of is not None for claim in of.claims]
 
 
-def claims(configs: Sequence[str], out: str | os.PathLike) -> list[dict]:
+def claims(configs: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, Any]]:
     """Rows of the claims, as stored under `out` or as not run; of some configs only if any are given.
 
     Each row has the columns of claims.csv and `config`. Raises ConfigError for a config that does not exist.

@@ -61,7 +61,7 @@ FIRST_NUMBER = {"curves": "sigma", "gains": "gain_percent"}  # columns before it
 
 @dataclass(frozen=True)
 class Verdict:
-    """How a study's case came out: in words, and whether that is as it should be."""
+    """The outcome of a study's case, and whether it is as it should be."""
 
     study: str
     good: bool
@@ -117,9 +117,9 @@ def distances(table: str, one: bytes, other: bytes) -> tuple[float, float]:
             if not (a.get(name) and b[name]):
                 return LABELS_DIFFER
             of = max(scale, abs(float(b[name])))
-            one, other = (_compared(name, float(row[name]) / of, float(row[centre] or 0) / of) for row in (a, b))
+            here, there = (_compared(name, float(row[name]) / of, float(row[centre] or 0) / of) for row in (a, b))
             exact = name in EXACT
-            farthest[exact] = max(farthest[exact], abs(one - other))
+            farthest[exact] = max(farthest[exact], abs(here - there))
     return farthest[False], farthest[True]
 
 

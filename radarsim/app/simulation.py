@@ -5,29 +5,36 @@ import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.collect import collect, share
+from radarsim.engine.executors import Executor
 from radarsim.engine.results import CaseResult
 from radarsim.engine.run import Collected, Shared
+from radarsim.engine.stopping import Stop
 from radarsim.errors import ConfigError
 from radarsim.studies.registry import study
+
+if TYPE_CHECKING:
+    from radarsim.report.precision import Cell
 
 Progress = Callable[[int, int, int], None]
 NO_CONTROL = "control_variate: no filter beside a baseline whose sigma is known exactly: no controlled.csv"
 
 
 @dataclass
-class Gathered:
-    """What simulating gave: of each case that has a realisation done, in the experiment's order, its work and sums.
+class SimulatedCases:
+    """Of each case that has a realisation done, in the experiment's order, its work and sums.
 
     stopped is why not all is done; precision is what was asked for, cells are the widest σ of each case looked at.
     """
 
     cases: list[tuple[Case, CaseWork, Collected]] = field(default_factory=list)
     precision: float | None = None
-    cells: dict = field(default_factory=dict)
+    cells: "dict[str, Cell]" = field(default_factory=dict)
     stopped: str | None = None
 
     @property
@@ -37,14 +44,16 @@ class Gathered:
 
     @property
     def unmet(self) -> list[str]:
-        """What of time and precision was not reached, in words, with the widest σ of all."""
+        """The targets of time and precision that were not reached, a text each, with the widest σ of all."""
+        reasons = [] if self.stopped is None else [self.stopped]
+        if self.precision is None:
+            return reasons
         wide = [cell for cell in self.cells.values() if cell.percent >= self.precision]
         cases = f" in {len(wide)} of {len(self.cells)} cases" if len(self.cells) > 1 else ""
-        told = [] if self.stopped is None else [self.stopped]
         if wide:
             worst = max(wide, key=lambda cell: cell.percent)
-            told.append(f"precision of {self.precision:g} % not reached{cases}; worst: {worst}")
-        return told
+            reasons.append(f"precision of {self.precision:g} % not reached{cases}; worst: {worst}")
+        return reasons
 
 
 @dataclass(frozen=True)
@@ -58,7 +67,7 @@ class Shares:
 
     @property
     def unmet(self) -> list[str]:
-        """Why not all of it is done, in words."""
+        """Why not all of it is done."""
         return list(dict.fromkeys(one.stopped for one in self.cases.values() if one.stopped))
 
     @property
@@ -68,90 +77,104 @@ class Shares:
 
 
 @dataclass(frozen=True)
-class Means:
-    """How an experiment is computed: nothing of it changes a number.
+class RunOptions:
+    """How an experiment is computed: no option changes a number.
 
-    out is the results directory, None for none; executor, where given, stands in for threads; stop is asked between
+    out is the results directory, None for none; executor, where given, replaces the threads; stop is called between
     tasks.
     """
 
-    out: str | os.PathLike | None = None
+    out: str | os.PathLike[str] | None = None
     threads: int | None = None
-    stop: Callable[[], str | None] | None = None
-    executor: object = None
-
-    def options(self) -> dict:
-        """As the engine takes them."""
-        return {"store": self.out, "threads": self.threads, "stop": self.stop, "executor": self.executor}
+    stop: Stop | None = None
+    executor: Executor | None = None
 
 
 def simulated(
-    experiment: Experiment, means: Means, *, progress: Progress | None = None, precision: float | None = None
-) -> Gathered:
+    experiment: Experiment, options: RunOptions, *, progress: Progress | None = None, precision: float | None = None
+) -> SimulatedCases:
     """Collect every case in turn, cases of one identity once; progress(done, total, from_store) is over all of them.
 
     precision is in per cent: a case ends at the first look (report.precision) at which every σ is known so well.
     """
     total = sum(case.realisations for case in experiment.cases)
-    made: dict[tuple[str, int], tuple] = {}
-    gathered, done, held = Gathered(precision=precision), 0, 0
+    made: dict[tuple[str, int], tuple[CaseWork, Collected, Cell | None]] = {}
+    simulation, done, held = SimulatedCases(precision=precision), 0, 0
 
     def over_all(case_done: int, _: int, case_held: int) -> None:
         if progress is not None:
             progress(done + case_done, total, held + case_held)
 
     with ExitStack() as stack:
-        if precision is not None and means.out is None:
-            means = replace(means, out=stack.enter_context(tempfile.TemporaryDirectory(prefix="radarsim-")))
+        if precision is not None and options.out is None:
+            options = replace(options, out=stack.enter_context(tempfile.TemporaryDirectory(prefix="radarsim-")))
         for case in experiment.cases:
             work = CaseWork(case)
             key = (work.identity, case.realisations)
             if key not in made:
-                options = means.options() | {"progress": over_all}
-                made[key] = work, *_collected(case, work, precision, options)
+                collector = _collector(work, options, over_all)
+                made[key] = work, *_collected(case, work, precision, collector)
             work, collected, cell = made[key]
             if collected.count:
-                gathered.cases.append((case, work, collected))
+                simulation.cases.append((case, work, collected))
             if cell is not None:
-                gathered.cells[case.name] = replace(cell, case=case.name)
+                simulation.cells[case.name] = replace(cell, case=case.name)
             done += collected.count
             held += collected.from_store
             if collected.stopped:
-                gathered.stopped = collected.stopped
+                simulation.stopped = collected.stopped
                 break
-    return gathered
+    return simulation
 
 
-def _collected(case: Case, work: CaseWork, precision: float | None, options: dict):
+def _collector(work: CaseWork, options: RunOptions, progress: Progress) -> Callable[[int], Collected]:
+    """The engine's `collect` for a work, as a function of the number of realisations."""
+    return partial(
+        collect,
+        work,
+        store=options.out,
+        threads=options.threads,
+        progress=progress,
+        stop=options.stop,
+        executor=options.executor,
+    )
+
+
+def _collected(
+    case: Case, work: CaseWork, precision: float | None, collector: Callable[[int], Collected]
+) -> "tuple[Collected, Cell | None]":
     """The sums of a case, and the cell of its widest σ where a precision is asked for."""
     if precision is None:
-        return collect(work, case.realisations, **options), None
+        return collector(case.realisations), None
     from radarsim.report.precision import looks, worst
 
-    looked, best, cell = [], None, None
+    looked: list[Collected] = []
+    best, cell = None, None
     for n in looks(case.realisations):
-        looked.append(collect(work, n, **options))
+        looked.append(collector(n))
         # Stopped on the way to a look, a run may hold less without a gap than at the look before.
         if best is None or looked[-1].count > best.count:
             best = looked[-1]
             cell = worst(result_of(case, work, best), study(case.study).curves) if best.count else None
         if looked[-1].stopped or cell is None or cell.percent < precision:
             break
+    assert best is not None  # there is a look at every number of realisations that check_precision lets pass
     computed = sum(one.computed for one in looked)
-    facts = {
-        "asked": case.realisations,
-        "computed": computed,
-        "from_store": max(0, best.count - computed),
-        "kernel_seconds": sum(one.kernel_seconds for one in looked),
-        "seconds": sum(one.seconds for one in looked),
-        "stopped": looked[-1].stopped,
-        "warnings": tuple(dict.fromkeys(warning for one in looked for warning in one.warnings)),
-    }
-    return replace(best, **facts), cell
+    whole = replace(
+        best,
+        asked=case.realisations,
+        computed=computed,
+        from_store=max(0, best.count - computed),
+        kernel_seconds=sum(one.kernel_seconds for one in looked),
+        seconds=sum(one.seconds for one in looked),
+        stopped=looked[-1].stopped,
+        warnings=tuple(dict.fromkeys(warning for one in looked for warning in one.warnings)),
+    )
+    return whole, cell
 
 
 def check_precision(experiments: Sequence[Experiment], percent: float) -> None:
-    """ConfigError for a precision that is none, and for every case of too few realisations ever to be looked at."""
+    """ConfigError for an invalid precision, and for every case of too few realisations ever to be looked at."""
     from radarsim.report.precision import FIRST
 
     if not 0 < percent <= 100:
@@ -167,8 +190,11 @@ def check_precision(experiments: Sequence[Experiment], percent: float) -> None:
         raise ConfigError(*faults)
 
 
-def shared(experiment: Experiment, number: int, of: int, means: Means, *, progress: Progress | None = None) -> Shares:
-    """Put share `number` of `of` of every case into the store under means.out; ends early where it is stopped."""
+def shared(
+    experiment: Experiment, number: int, of: int, options: RunOptions, *, progress: Progress | None = None
+) -> Shares:
+    """Put share `number` of `of` of every case into the store under options.out; ends early where it is stopped."""
+    assert options.out is not None  # a share is nothing but what it stores
     total = sum(case.realisations for case in experiment.cases) // of
     made: set[tuple[str, int]] = set()
     shares: dict[str, Shared] = {}
@@ -182,7 +208,17 @@ def shared(experiment: Experiment, number: int, of: int, means: Means, *, progre
         work = CaseWork(case)
         if (key := (work.identity, case.realisations)) in made:
             continue
-        one = share(work, case.realisations, number, of, **means.options() | {"progress": over_all})
+        one = share(
+            work,
+            case.realisations,
+            number,
+            of,
+            store=options.out,
+            threads=options.threads,
+            progress=over_all,
+            stop=options.stop,
+            executor=options.executor,
+        )
         made.add(key)
         shares[case.name] = one
         done += one.done

@@ -1,4 +1,4 @@
-"""Claims as a run has stored them: its table is believed only as run.json says that it was written."""
+"""Claims as a run has stored them: the table is read only if it is the one that run.json records."""
 
 import csv  # and not pandas, which takes half a second to load
 import hashlib
@@ -6,6 +6,7 @@ import io
 import json
 import time
 from pathlib import Path
+from typing import Any
 
 from radarsim.errors import StoreError
 from radarsim.report import files
@@ -13,7 +14,7 @@ from radarsim.report import files
 LOOKS, PAUSE_S = 5, 0.1  # at a table that fits no record: a run beside us may be writing both just now
 
 
-def stored(path: Path) -> list[dict] | None:
+def stored(path: Path) -> list[dict[str, Any]] | None:
     """The rows of a stored claims.csv, numbers as such; None if there is none.
 
     Raises StoreError where it cannot be read, is no such table, or is another one than run.json beside it records.
@@ -50,7 +51,7 @@ def _recorded(path: Path) -> str | None:
     return digest
 
 
-def _rows(path: Path, content: bytes) -> list[dict]:
+def _rows(path: Path, content: bytes) -> list[dict[str, Any]]:
     from radarsim.report.claims import NUMBERS
 
     try:
@@ -62,5 +63,5 @@ def _rows(path: Path, content: bytes) -> list[dict]:
         if {"claim", "verdict", "overall", *NUMBERS} <= names:
             return [row | {name: float(row[name]) if row[name] else "" for name in NUMBERS} for row in rows]
     except (LookupError, TypeError, ValueError):
-        pass  # it is told like any other spoiled table
+        pass  # reported like any other damaged table
     raise StoreError(f"{path}: is no table of claims; `radarsim report` makes it anew")

@@ -18,7 +18,7 @@ class CaseWork:
     def __init__(self, case: Case):
         self.case = case
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[type["CaseWork"], tuple[Case]]:
         return CaseWork, (self.case,)
 
     @cached_property

@@ -4,13 +4,13 @@ import gc
 import os
 import sys
 
-from radarsim.cli import experiments, house, own_data
+from radarsim.cli import experiments, maintenance, own_data
 from radarsim.cli.group import main
 
-__all__ = ["entry", "experiments", "house", "main", "own_data"]
+__all__ = ["entry", "experiments", "main", "maintenance", "own_data"]
 
 
-def entry():
+def entry() -> None:
     """The console script: `main` with streams that are there and can hold every character."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
@@ -18,5 +18,5 @@ def entry():
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115
         elif hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
-    gc.set_threshold(100_000)  # a tenth of a start went into looking at objects of Numba and pandas that stay
+    gc.set_threshold(100_000)  # a tenth of a start went into collecting objects of Numba and pandas that stay
     main()

@@ -1,20 +1,36 @@
-"""What the terminal shows: progress with rate and time left, tables of the answer, where things were written."""
+"""What the terminal shows: progress with rate and time left, tables of the answer, where files were written."""
 
 import math
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
 
 from radarsim.report.text import clock, known, plural, printable, significant_digits
 
+if TYPE_CHECKING:
+    import pandas as pd
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+    from rich.progress import TaskID
+
+    from radarsim.app.clean import Cleaned
+    from radarsim.app.doctor import Inspection
+    from radarsim.app.outlook import Inventory, Outlook
+    from radarsim.app.result import Result
+    from radarsim.app.simulation import Shares
+    from radarsim.config.experiment import Experiment
+
 SILENT_S = 2.0  # a run shorter than this shows no progress
 PIPED_WIDTH = 10_000  # whatever reads it wraps it, or not
-ROOMY = 110  # columns of a terminal from which claims are told with place and config
-MOST_ROWS = 36  # of the last scan's table; a larger experiment speaks by its answer and files
+ROOMY = 110  # columns of a terminal from which claims are shown with place and config
+MOST_ROWS = 36  # of the last scan's table; of a larger experiment the answer and the files are enough
 
 
-def console(stderr: bool = False):
+def console(stderr: bool = False) -> "Console":
     """A rich console; plain text of a fixed width where the stream is no terminal."""
     from rich.console import Console
 
@@ -28,12 +44,14 @@ class Progress:
 
     def __init__(self, title: str, quiet: bool, what: str = "realisations"):
         self.title, self.quiet, self.what = title, quiet, what
-        self.started, self.bar = time.monotonic(), None
+        self.started = time.monotonic()
+        self.bar: Bar | None = None
+        self.task: TaskID
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
         if self.bar is not None:
             self.bar.stop()
 
@@ -43,12 +61,12 @@ class Progress:
         if self.quiet or elapsed < SILENT_S or not sys.stderr.isatty():
             return
         if self.bar is None:
-            self._begin(total)
+            self.bar = self._begun(total)
         rate = (done - from_store) / elapsed
         left = clock((total - done) / rate) if rate > 0 else "–"
         self.bar.update(self.task, completed=done, rate=rate, left=left)
 
-    def _begin(self, total: int) -> None:
+    def _begun(self, total: int) -> "Bar":
         from rich.progress import BarColumn, TextColumn
         from rich.progress import Progress as Bar
 
@@ -59,9 +77,10 @@ class Progress:
                 "{task.percentage:5.1f} %  {task.fields[rate]:,.0f} " + f"{self.what}/s  {{task.fields[left]}} left"
             ),
         )
-        self.bar = Bar(*columns, console=console(stderr=True), transient=True)
-        self.task = self.bar.add_task(self.title, total=total, rate=0.0, left="–")
-        self.bar.start()
+        bar = Bar(*columns, console=console(stderr=True), transient=True)
+        self.task = bar.add_task(self.title, total=total, rate=0.0, left="–")
+        bar.start()
+        return bar
 
 
 def show(
@@ -108,9 +127,10 @@ def say(line: str) -> None:
     sys.stdout.write(printable(line) + "\n")
 
 
-def print_result(result) -> None:
-    """The answer of a run, σ at the last scan, the verdicts, and where everything lies."""
+def print_result(result: "Result") -> None:
+    """The answer of a run, σ at the last scan, the verdicts, and where the files are."""
     written = result.written
+    assert written is not None  # the commands write what they print
     for line in written.answer:
         say(line)
     show_last_scan(result.last_scan)
@@ -134,10 +154,11 @@ def print_warnings(warnings: Iterable[str]) -> None:
         sys.stderr.write(f"warning: {printable(warning)}\n")
 
 
-def show_last_scan(last) -> None:
+def show_last_scan(last: "pd.DataFrame") -> None:
     """σ with interval, exact σ and gain of each case, filter and component at the last scan, unless too many."""
     if not 0 < len(last) <= MOST_ROWS:
         return
+    found: Iterable[Any] = last.itertuples()  # named by column, which pandas' stubs do not know
     rows = [
         (
             *(row.case, row.filter, row.component, f"{row.t_s:g} s"),
@@ -147,13 +168,13 @@ def show_last_scan(last) -> None:
             known(row.gain_percent, ".2f", " %"),
             known(row.gain_lo, ".2f", " … ") + known(row.gain_hi, ".2f"),
         )
-        for row in last.itertuples()
+        for row in found
     ]
     columns = ("case", "filter", "component", "at", "sigma", "95 %", "exact", "gain", "95 % of gain")
     show("", columns, rows, right=columns[3:], spare=("95 % of gain", "exact", "95 %", "gain"))
 
 
-def print_outlook(experiment, outlook) -> None:
+def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
     """What a run would do."""
     say(f"{experiment.path or experiment.stem}: valid")
     rows = [
@@ -174,10 +195,10 @@ def print_outlook(experiment, outlook) -> None:
     print_warnings(outlook.warnings)
 
 
-def print_needs(experiment, outlook) -> None:
+def print_needs(experiment: "Experiment", outlook: "Outlook") -> None:
     """How many realisations a precision takes, and whether the run may do so many."""
     asked = {case.name: case.realisations for case in experiment.cases}
-    needs = {case.name: case.need for case in outlook.cases}
+    needs = {case.name: case.need for case in outlook.cases if case.need is not None}
     rows = [
         (name, "out of reach" if need.realisations is None else f"{need.realisations:,}", need.known_by, need.last)
         for name, need in needs.items()
@@ -191,8 +212,8 @@ def print_needs(experiment, outlook) -> None:
         say(f"precision not within reach of {plural(len(short), 'case')}: {', '.join(short[:3])}{cure}")
 
 
-def print_share(share, out) -> None:
-    """What a share of an experiment came to, and what to do with it."""
+def print_share(share: "Shares", out: str | os.PathLike[str]) -> None:
+    """What was done of a share of an experiment, and what to do with it."""
     done = sum(one.done for one in share.cases.values())
     held = sum(one.from_store for one in share.cases.values())
     say(f"share    {share.number} of {share.of} of {share.config}: {done:,} realisations, {held:,} were stored before")
@@ -201,14 +222,14 @@ def print_share(share, out) -> None:
 
 
 def print_facts(facts: Mapping[str, str]) -> None:
-    """Labels and what there is to say of them, a line each."""
+    """Labels and their facts, a line each."""
     width = max(map(len, facts))
-    for label, words in facts.items():
-        say(f"{label:<{width}}  {words}")
+    for label, fact in facts.items():
+        say(f"{label:<{width}}  {fact}")
 
 
-def print_inspection(found) -> None:
-    """What a look over a result found; its faults are told as errors."""
+def print_inspection(found: "Inspection") -> None:
+    """What an inspection of a result found; its faults are reported as errors."""
     say(f"{found.folder}: {plural(found.outputs, 'output')} and {plural(found.pieces, 'stored piece')} checked")
     if found.recomputed:
         pieces = plural(len(found.recomputed), "piece")
@@ -218,13 +239,13 @@ def print_inspection(found) -> None:
     say("all whole" if not found.faults else f"{plural(len(found.faults), 'fault')} found")
 
 
-def print_cleaned(cleaned, dry_run: bool) -> None:
+def print_cleaned(cleaned: "Cleaned", dry_run: bool) -> None:
     """How much was dropped, or would be."""
     what = f"{plural(cleaned.files, 'file')} of {plural(cleaned.identities, 'case')}, {cleaned.size / 1e6:.1f} MB"
     say(f"{'would drop' if dry_run else 'dropped'} {what} in {cleaned.path}")
 
 
-def print_claims(rows: Sequence[dict]) -> None:
+def print_claims(rows: Sequence[dict[str, Any]]) -> None:
     """Each claim with its verdict, and below it what was measured, or the command that would judge it.
 
     On a terminal a table; where it is piped, lines that can be searched.
@@ -236,18 +257,18 @@ def print_claims(rows: Sequence[dict]) -> None:
         for claim in dict.fromkeys(row["claim"] for row in rows):
             own = [row for row in rows if row["claim"] == claim]
             first, done = own[0], own[0]["overall"] != "not run"
-            told = "\n".join(page.measured(row) for row in own) if done else f"radarsim run {first['config']}"
-            cells.append((claim, first["statement"], first["place"], told, first["overall"], first["config"]))
+            measured = "\n".join(page.measured(row) for row in own) if done else f"radarsim run {first['config']}"
+            cells.append((claim, first["statement"], first["place"], measured, first["overall"], first["config"]))
         columns = ("claim", "statement", "place", "measured", "verdict", "config")
         show("", columns, cells, spare=() if console().width >= ROOMY else ("place", "config"))
     else:
         _print_claim_lines(rows, page.measured)
     say(page.counted(rows) or "no claims are judged by this")
     if rows and all(row["overall"] == "not run" for row in rows):
-        say("nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has what came out at full size")
+        say("nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has the results at full size")
 
 
-def _print_claim_lines(rows: Sequence[dict], measured: Callable[[Mapping], str]) -> None:
+def _print_claim_lines(rows: Sequence[dict[str, Any]], measured: Callable[[Mapping[str, Any]], str]) -> None:
     last = None
     for row in rows:
         if row["claim"] != last:
@@ -256,12 +277,12 @@ def _print_claim_lines(rows: Sequence[dict], measured: Callable[[Mapping], str])
             if row["overall"] == "not run":
                 say(f"       radarsim run {row['config']}")
         if row["overall"] != "not run":
-            words = f"{row['case']}: {row['what']} {measured(row)}; expected {row['expected']}"
-            say(f"       {row['verdict']:<20} {words}")
+            part = f"{row['case']}: {row['what']} {measured(row)}; expected {row['expected']}"
+            say(f"       {row['verdict']:<20} {part}")
 
 
-def print_inventory(inventory) -> None:
-    """Configs, scenarios, studies and filters, with a line of what each is."""
+def print_inventory(inventory: "Inventory") -> None:
+    """Configs, scenarios, studies and filters, with a line on each."""
     for title, columns, rows in inventory:
         show(title, columns, rows)
         say("")

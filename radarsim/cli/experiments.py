@@ -1,5 +1,7 @@
 """Commands that run experiments and read their results. Heavy imports wait inside the commands."""
 
+from typing import TYPE_CHECKING, Any
+
 import click
 
 from radarsim.cli.group import (
@@ -19,6 +21,10 @@ from radarsim.cli.group import (
 )
 from radarsim.errors import ClusterError, TargetUnmet
 
+if TYPE_CHECKING:
+    from radarsim.app.result import Result
+    from radarsim.app.simulation import Shares
+
 
 @main.command()
 @configs_argument
@@ -37,22 +43,22 @@ from radarsim.errors import ClusterError, TargetUnmet
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @json_option
 def run(
-    configs,
-    realisations,
-    seed,
-    overrides,
-    precision,
-    time_limit,
-    shard,
-    threads,
-    workers,
-    scheduler,
-    out,
-    no_figures,
-    formats,
-    quiet,
-    as_json,
-):
+    configs: tuple[str, ...],
+    realisations: int | None,
+    seed: int | None,
+    overrides: tuple[str, ...],
+    precision: float | None,
+    time_limit: float | None,
+    shard: tuple[int, int] | None,
+    threads: int | None,
+    workers: int | None,
+    scheduler: str | None,
+    out: str,
+    no_figures: bool,
+    formats: tuple[str, ...],
+    quiet: bool,
+    as_json: bool,
+) -> None:
     """Run experiments; resumes by itself.
 
     CONFIG is a YAML file, or the name of a shipped experiment (`radarsim list`). Finished blocks are kept under
@@ -88,24 +94,23 @@ def run(
         loaded = experiment.load_all(configs, overrides)
         if precision is not None:
             simulation.check_precision(loaded, precision)
-        told, unmet = [], []
+        made: list[dict[str, Any]] = []
+        unmet: list[str] = []
         if scheduler and not quiet and (line := experiment.trust(scheduler)):
             click.echo(f"note: {line}", err=True)
         with experiment.cluster(workers, scheduler) as pool:
             for one in loaded:
-                means = {"out": out, "threads": threads, "executor": pool, "time_limit": limit, "stop": stop}
+                options: dict[str, Any] = {"out": out, "threads": threads, "executor": pool, "time_limit": limit}
+                done: Result | Shares
                 with console.Progress(one.stem, quiet=quiet) as progress:
-                    means["progress"] = progress.update
+                    options |= {"stop": stop, "progress": progress.update}
                     try:
                         if shard:
-                            done = experiment.share(one, *shard, **means)
+                            done = experiment.share(one, *shard, **options)
                         else:
+                            figures = False if no_figures else formats or True
                             done = experiment.run(
-                                one,
-                                overrides=overrides,
-                                precision=precision,
-                                figures=not no_figures and (formats or True),
-                                **means,
+                                one, overrides=overrides, precision=precision, figures=figures, **options
                             )
                     except ClusterError:
                         raise  # for the other experiments too
@@ -113,11 +118,16 @@ def run(
                         unmet += error.lines
                         continue
                 unmet += [f"{one.stem}: {reason}" for reason in done.unmet]
-                told.append(documents.share(done) if shard else documents.result(done))
-                if not (quiet or as_json):
-                    console.print_share(done, out) if shard else console.print_result(done)
+                if isinstance(done, simulation.Shares):
+                    made.append(documents.share(done))
+                    if not (quiet or as_json):
+                        console.print_share(done, out)
+                else:
+                    made.append(documents.result(done))
+                    if not (quiet or as_json):
+                        console.print_result(done)
         if as_json:
-            click.echo(documents.text(told))
+            click.echo(documents.text(made))
         if unmet:
             raise TargetUnmet(*unmet)
 
@@ -129,7 +139,14 @@ def run(
 @set_option
 @precision_option
 @json_option
-def check(configs, realisations, seed, overrides, precision, as_json):
+def check(
+    configs: tuple[str, ...],
+    realisations: int | None,
+    seed: int | None,
+    overrides: tuple[str, ...],
+    precision: float | None,
+    as_json: bool,
+) -> None:
     """Validate configs; say what would run: cases, filters, realisations, time, memory.
 
     With a precision, also how many realisations it takes: from exact values where the filters are linear, else from a
@@ -145,15 +162,15 @@ def check(configs, realisations, seed, overrides, precision, as_json):
     from radarsim.app import run as experiment
     from radarsim.cli import console
 
-    told = []
+    made = []
     for one in experiment.load_all(configs, experiment.merged(overrides, realisations, seed)):
         with console.Progress(one.stem, quiet=as_json, what="cases") as bar:
             outlook = overview.outlook(one, precision=precision, progress=bar.update)
-        told.append(documents.outlook(one, outlook))
+        made.append(documents.outlook(one, outlook))
         if not as_json:
             console.print_outlook(one, outlook)
     if as_json:
-        click.echo(documents.text(told))
+        click.echo(documents.text(made))
 
 
 @main.command()
@@ -165,7 +182,16 @@ def check(configs, realisations, seed, overrides, precision, as_json):
 @figures_option
 @format_option
 @json_option
-def report(configs, realisations, seed, overrides, out, no_figures, formats, as_json):
+def report(
+    configs: tuple[str, ...],
+    realisations: int | None,
+    seed: int | None,
+    overrides: tuple[str, ...],
+    out: str,
+    no_figures: bool,
+    formats: tuple[str, ...],
+    as_json: bool,
+) -> None:
     """Tables, figures and report from what is stored; computes nothing.
 
     \b
@@ -178,22 +204,23 @@ def report(configs, realisations, seed, overrides, out, no_figures, formats, as_
     from radarsim.cli import console
 
     overrides = experiment.merged(overrides, realisations, seed)
-    told = []
+    made = []
     for one in experiment.load_all(configs, overrides):
-        result = experiment.report(one, out=out, overrides=overrides, figures=not no_figures and (formats or True))
-        told.append(documents.result(result))
+        figures = False if no_figures else formats or True
+        result = experiment.report(one, out=out, overrides=overrides, figures=figures)
+        made.append(documents.result(result))
         if not as_json:
             console.print_result(result)
     if as_json:
-        click.echo(documents.text(told))
+        click.echo(documents.text(made))
 
 
 @main.command()
 @click.argument("configs", nargs=-1, metavar="[CONFIG…]", shell_complete=completed)
 @out_option
 @json_option
-@click.option("--markdown", is_flag=True, help="The page docs/claims.md on stdout in place of words.")
-def claims(configs, out, as_json, markdown):
+@click.option("--markdown", is_flag=True, help="The page docs/claims.md on stdout in place of text.")
+def claims(configs: tuple[str, ...], out: str, as_json: bool, markdown: bool) -> None:
     """The papers' claims: stated, measured with interval, verdict; computes nothing.
 
     Without CONFIG all claims of all papers; those without stored results are listed as not run, with the command that

@@ -1,10 +1,11 @@
-"""What the terminal says of a track over recorded plots: rows, gaps, and how well the stated accuracies fit."""
+"""What the terminal reports of a track over recorded plots: rows, gaps, and how well the stated accuracies fit."""
 
 import sys
 from collections.abc import Iterable, Sequence
 
 from radarsim.report.text import plural, printable
 from radarsim.track import accuracy
+from radarsim.track.follow import Followed
 
 
 def echo(rows: Iterable[Sequence[str]]) -> None:
@@ -14,14 +15,14 @@ def echo(rows: Iterable[Sequence[str]]) -> None:
     csv.writer(sys.stdout, lineterminator="\n").writerows(rows)
 
 
-def tell(followed, judged: Sequence[accuracy.Judged], stderr: bool = False) -> None:
+def report(followed: Followed, judged: Sequence[accuracy.Judged], stderr: bool = False) -> None:
     """Print what was found; to stderr where the track itself goes to stdout."""
     stream = sys.stderr if stderr else sys.stdout
     for line in [*_rows(followed), *(_line(one) for one in judged if one.tests), *_advice(judged)]:
         stream.write(printable(line) + "\n")
 
 
-def _rows(followed) -> list[str]:
+def _rows(followed: Followed) -> list[str]:
     span = followed.last_s - followed.first_s
     lines = [f"plots    {plural(followed.rows, 'row')} over {span:g} s, from {followed.first_s:g} s"]
     missing = ", ".join(f"{count} of {name}" for name, count in followed.missing.items() if count)
@@ -38,15 +39,15 @@ def _rows(followed) -> list[str]:
 
 
 def _line(one: accuracy.Judged) -> str:
-    words = {
+    finding = {
         accuracy.FITS: "the stated σ fits",
         accuracy.SMALL: "the stated σ is too small, or the target manoeuvres harder than the filter allows",
         accuracy.LARGE: "the stated σ is too large, or the filter allows for harder manoeuvres than there are",
-        accuracy.UNKNOWN: "too few plots to say",
+        accuracy.UNKNOWN: "too few plots to decide",
     }[one.verdict]
     bounds = f"NIS {one.nis:.3g} of {plural(one.tests, 'plot')}, 95 % of right filters [{one.lo:.3g}, {one.hi:.3g}]"
     better = ", ".join(f"{key} {value:.4g}" for key, value in one.better.items())
-    return f"{one.filter}, {one.name}: {bounds}: {words}" + (f"; {better} would" if better else "")
+    return f"{one.filter}, {one.name}: {bounds}: {finding}" + (f"; {better} would" if better else "")
 
 
 def _advice(judged: Sequence[accuracy.Judged]) -> list[str]:
@@ -56,5 +57,5 @@ def _advice(judged: Sequence[accuracy.Judged]) -> list[str]:
         return []
     best = min((one for one in wrong), key=lambda one: abs(one.nis - 1))
     own = {key: value for one in wrong if one.filter == best.filter for key, value in one.better.items()}
-    words = " ".join(f"--set {key}={value:.4g}" for key, value in own.items())
-    return [f"         nearest is {best.filter}; with its better values: {words}"]
+    settings = " ".join(f"--set {key}={value:.4g}" for key, value in own.items())
+    return [f"         nearest is {best.filter}; with its better values: {settings}"]

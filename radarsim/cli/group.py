@@ -1,4 +1,4 @@
-"""The group of commands: what all share of options, faults and exit codes."""
+"""The group of commands: the options, faults and exit codes that all share."""
 
 import contextlib
 import math
@@ -6,17 +6,21 @@ import os
 import re
 import signal
 import sys
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 import radarsim
 from radarsim.errors import Interrupted, RadarsimError, StoreError
 
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
 SECTIONS = {
     "Run": ("run", "check"),
     "Read": ("report", "claims"),
     "Own data": ("new", "simulate", "track"),
-    "House": ("list", "schema", "doctor", "clean"),
+    "Maintenance": ("list", "schema", "doctor", "clean"),
 }
 ORDER = tuple(name for names in SECTIONS.values() for name in names)
 SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
@@ -25,17 +29,17 @@ SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 class Commands(click.Group):
     """Commands in the order of their use; faults become lines on stderr and an exit code, never a traceback."""
 
-    def list_commands(self, ctx):
+    def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted(self.commands, key=ORDER.index)
 
-    def format_commands(self, ctx, formatter):
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         width = max(map(len, ORDER))
         for title, names in SECTIONS.items():
             rows = [(name.ljust(width), self.commands[name].get_short_help_str(100)) for name in names]
             with formatter.section(title):
                 formatter.write_dl(rows)
 
-    def invoke(self, ctx):
+    def invoke(self, ctx: click.Context) -> Any:
         try:
             result = super().invoke(ctx)
             sys.stdout.flush()
@@ -45,7 +49,7 @@ class Commands(click.Group):
         except KeyboardInterrupt:
             fail(Interrupted(signal.SIGINT))
         except BrokenPipeError:
-            # The reader of our output has seen enough (`| head`): no fault of anybody's.
+            # The reader of our output has closed it (`| head`), which is no fault.
             sys.stdout = open(os.devnull, "w")  # noqa: SIM115
             sys.exit(0)
         except OSError as error:
@@ -53,8 +57,8 @@ class Commands(click.Group):
             fail(StoreError(f"{error.filename or 'output'}: cannot be written: {error.strerror or error}"))
 
 
-def fail(error: RadarsimError) -> None:
-    """Tell a fault, a line each, and leave with its exit code."""
+def fail(error: RadarsimError) -> NoReturn:
+    """Report a fault, a line each, and leave with its exit code."""
     for line in dict.fromkeys(error.lines):
         click.echo(line, err=True)
     if isinstance(error, Interrupted):
@@ -68,7 +72,7 @@ class Count(click.ParamType):
 
     name = "N"
 
-    def convert(self, value, param, ctx):
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
         text = str(value)
         try:
             number = float(text) if text.isascii() and "_" not in text else float("nan")
@@ -85,7 +89,7 @@ class Positive(click.ParamType):
     def __init__(self, name: str, most: float = math.inf):
         self.name, self.most = name, most
 
-    def convert(self, value, param, ctx):
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         try:
             number = float(value)
         except ValueError:
@@ -97,14 +101,14 @@ class Positive(click.ParamType):
 
 
 class Directory(click.ParamType):
-    """The name of a directory, there or not: an empty one would be the working directory."""
+    """The name of a directory, which need not exist; an empty name would mean the working directory."""
 
     name = "DIR"
 
-    def convert(self, value, param, ctx):
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         if not value:
             self.fail("must name a directory, got ''", param, ctx)
-        return value
+        return str(value)
 
 
 class Share(click.ParamType):
@@ -112,15 +116,15 @@ class Share(click.ParamType):
 
     name = "i/n"
 
-    def convert(self, value, param, ctx):
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
         match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", value, re.ASCII)
         if not match or not 1 <= int(match[1]) <= int(match[2]):
             self.fail(f"must be i/n with i from 1 to n, such as 2/3, got {value!r}", param, ctx)
         return int(match[1]), int(match[2])
 
 
-def _plain(ctx, param, value):
-    """Take colours from the terminal's tables for this run."""
+def _plain(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    """Switch off colours in the terminal's tables for this run."""
     if value:
         os.environ["NO_COLOR"] = "1"
 
@@ -130,7 +134,7 @@ def _plain(ctx, param, value):
 @click.option(
     "--no-color", is_flag=True, expose_value=False, is_eager=True, callback=_plain, help="No colours; as NO_COLOR=1."
 )
-def main():
+def main() -> None:
     """Monte-Carlo experiments on radar and sonar track processing.
 
     An experiment is a YAML file: a sensor, a target, the filters compared. radarsim runs 10⁵ and more realisations
@@ -148,8 +152,8 @@ def main():
     """
 
 
-def completed(ctx, param, incomplete):
-    """What may stand for a config on the command line: the stems that are found, YAML files, and folders to look in."""
+def completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> "list[CompletionItem]":
+    """What may stand for a config on the command line: the stems that are found, YAML files, and folders."""
     from click.shell_completion import CompletionItem
 
     from radarsim.config import lookup
@@ -185,7 +189,7 @@ precision_option = click.option(
     metavar="PCT",
     help="Run until the 95 % half-width of every σ is under PCT %, at most N; looks at 2000, 4000, 8000, …",
 )
-json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout in place of words.")
+json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout in place of text.")
 format_option = click.option(
     "--format",
     "formats",

@@ -1,8 +1,13 @@
 """Commands for one's own data and one's own radar. Heavy imports wait inside the commands."""
 
+from typing import TYPE_CHECKING
+
 import click
 
 from radarsim.cli.group import Count, completed, config_argument, main, set_option
+
+if TYPE_CHECKING:
+    from radarsim.engine.results import Track
 
 
 @main.command()
@@ -14,11 +19,11 @@ from radarsim.cli.group import Count, completed, config_argument, main, set_opti
     shell_complete=completed,
     help="The config to begin from: `radarsim list` names them.",
 )
-def new(name, like):
+def new(name: str, like: str) -> None:
     """A commented config of one's own: ./NAME.yaml.
 
-    It is CONFIG written anew, with the unit and the meaning of every key beside it, and the keys that might be there
-    too. A file of that name is never overwritten.
+    It repeats CONFIG, with the unit and the meaning of every key beside it, and adds the optional keys as comments.
+    An existing file is never overwritten.
 
     \b
     Example
@@ -36,11 +41,11 @@ def new(name, like):
 @click.option("-o", "--output", required=True, metavar="PLOTS.csv", help="Where the plots are written.")
 @click.option("-i", "--realisation", type=Count(), default=0, show_default=True, help="Which realisation, from 0.")
 @set_option
-def simulate(config, output, realisation, overrides):
+def simulate(config: str, output: str, realisation: int, overrides: tuple[str, ...]) -> None:
     """One realisation's measurements, with the truth in columns true_….
 
     The plots are those that a run of CONFIG draws in this realisation, number for number: `radarsim track` over them
-    makes the errors that the run adds up. A missed plot is an empty cell.
+    gives the errors that the run adds up. A missed plot is an empty cell.
 
     \b
     Example
@@ -65,9 +70,11 @@ def simulate(config, output, realisation, overrides):
 @click.argument("plots", metavar="PLOTS.csv")
 @click.option("-o", "--output", metavar="TRACK.csv", help="Where the track is written; default: to the terminal.")
 @click.option("--figures", metavar="DIR", help="Draw track, residuals and probabilities of the models into DIR.")
-@click.option("-q", "--quiet", is_flag=True, help="Say nothing of gaps and of how well the accuracies fit.")
+@click.option("-q", "--quiet", is_flag=True, help="Report neither gaps nor how well the accuracies fit.")
 @set_option
-def track(config, plots, output, figures, quiet, overrides):
+def track(
+    config: str, plots: str, output: str | None, figures: str | None, quiet: bool, overrides: tuple[str, ...]
+) -> None:
     """The config's filters over recorded measurements.
 
     PLOTS.csv has a header and one row a plot, its times rising at any spacing; an empty cell is a missing value, other
@@ -75,9 +82,9 @@ def track(config, plots, output, figures, quiet, overrides):
     (range_doppler), `range_m, bearing_rad` (sonar), `range_m, elevation_rad, azimuth_rad` or `x_m, y_m, z_m`
     (multimodel).
 
-    Told beside: gaps and missing values, and whether the accuracies that the config states fit the plots: the filters'
-    own innovations are tested (NIS, 1 for a filter that is right about its errors). A gap so long that
-    a filter's numbers after it would be rounding alone ends in a fault with its line: split the file there.
+    Also reported: gaps and missing values, and whether the accuracies that the config states fit the plots: the
+    filters' own innovations are tested (NIS, 1 for a filter that is right about its errors). A gap so long that
+    a filter's numbers after it would be only rounding errors is a fault, reported with its line: split the file there.
 
     \b
     Example
@@ -96,7 +103,7 @@ def track(config, plots, output, figures, quiet, overrides):
     read = {"the plots": plots, "the config": loaded.path}
     started = False
 
-    def sink(piece):
+    def sink(piece: "Track") -> None:
         nonlocal started
         if not started:
             write([files.header_of(piece)])
@@ -108,7 +115,7 @@ def track(config, plots, output, figures, quiet, overrides):
         followed = recorded.follow(loaded, plots, sink)
     drawn = recorded.draw(followed, figures, [plots, loaded.path]) if figures else []
     if not quiet:
-        findings.tell(followed, accuracy.judged(followed), stderr=output is None)
+        findings.report(followed, accuracy.judged(followed), stderr=output is None)
     if output:
         click.echo(f"track    {output}")
     if drawn:

@@ -1,4 +1,4 @@
-"""Commands about the house itself. Heavy imports wait inside the commands."""
+"""Commands that describe, check and clean the installation and its results. Heavy imports wait inside the commands."""
 
 import click
 
@@ -8,8 +8,8 @@ from radarsim.errors import StoreError
 
 @main.command(name="list")
 @json_option
-def list_(as_json):
-    """Configs, scenarios, studies and filters at hand.
+def list_(as_json: bool) -> None:
+    """Available configs, scenarios, studies and filters.
 
     \b
     Examples
@@ -27,7 +27,7 @@ def list_(as_json):
 
 
 @main.command()
-def schema():
+def schema() -> None:
     """JSON Schema of the YAML, for editors and other programs.
 
     \b
@@ -43,7 +43,7 @@ def schema():
 @click.argument("result", required=False, metavar="[RESULT]")
 @click.option("--recompute", type=Count(), default=0, metavar="N", help="Compute N stored pieces of each case again.")
 @json_option
-def doctor(result, recompute, as_json):
+def doctor(result: str | None, recompute: int, as_json: bool) -> None:
     """The machine, and a self-test with known answers; of RESULT: is all that is stored of it whole?
 
     RESULT is a folder such as results/rls2. Every output is checked against run.json, every stored block of its cases
@@ -91,7 +91,9 @@ def doctor(result, recompute, as_json):
 @out_option
 @click.option("--dry-run", is_flag=True, help="Remove nothing; say how much it would be.")
 @json_option
-def clean(configs, seed, overrides, out, dry_run, as_json):
+def clean(
+    configs: tuple[str, ...], seed: int | None, overrides: tuple[str, ...], out: str, dry_run: bool, as_json: bool
+) -> None:
     """Drop stored blocks, all or of some configs; tables, figures and reports stay.
 
     Without CONFIG all blocks below DIR/.blocks, those of older configs and older versions too. Nothing else is touched.
