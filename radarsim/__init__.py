@@ -11,6 +11,13 @@ In a notebook a result shows its answer and the last scan; `radarsim.load("rls2"
 """
 
 from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from radarsim.app.result import Result
+    from radarsim.app.run import load_result as load
+    from radarsim.app.run import run
+    from radarsim.errors import ConfigError, RadarsimError
 
 __version__ = "0.1.0"
 __all__ = ["ConfigError", "RadarsimError", "Result", "__version__", "load", "run"]
@@ -21,9 +28,13 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str):
+def __getattr__(name: str) -> object:
     # Imported on first use, so that `radarsim --help` loads neither NumPy nor Numba.
     if name in _HOMES:
         module, _, attribute = _HOMES[name].partition(":")
         return getattr(import_module(f"radarsim.{module}"), attribute)
     raise AttributeError(f"module 'radarsim' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__} - {"TYPE_CHECKING", "_HOMES", "import_module"})

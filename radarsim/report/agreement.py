@@ -1,14 +1,19 @@
 """Exact values against Monte-Carlo: how often the intervals hold them, and how far apart the two come."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from radarsim.report import tables as common
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 COLUMNS = ("case", "filter", "component", "unit", "scans", "inside_percent", "largest_difference_percent", "at_k")
 MOST_ROWS = 300
 
 
-def agreement(curves):
+def agreement(curves: "pd.DataFrame") -> "pd.DataFrame | None":
     """A row for each case, filter and component of curves.csv whose exact σ is known; None where none is."""
     known = curves[np.isfinite(curves["exact_sigma"]) & (curves["exact_sigma"] > 0) & np.isfinite(curves["sigma_lo"])]
     if not len(known):

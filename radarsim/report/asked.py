@@ -1,24 +1,29 @@
-"""What was asked, in words: every key of the cases with its value and what the schema says of it."""
+"""What was asked: every key of the cases with its value and the schema's description."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, TypeGuard
 
+from radarsim.config.experiment import Case
 from radarsim.config.fields import Model
 from radarsim.report import tables as common
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 COLUMNS = ("key", "value", "meaning")
-MOST_ENTRIES = 12  # of a list told one by one
-MOST_CASES = 40  # told row by row
+MOST_ENTRIES = 12  # of a list shown one by one
+MOST_CASES = 40  # shown row by row
 
 
-def asked(cases: Sequence) -> dict:
-    """Tables of words by their title: what all cases share, and where there are several, in what they differ."""
-    told = {case.name: {key: (value, about) for key, value, about in described(case.spec)} for case in cases}
-    first = told[cases[0].name]
+def asked(cases: Sequence[Case]) -> "dict[str, pd.DataFrame]":
+    """Tables of text by their title: what all cases share, and where there are several, in what they differ."""
+    keys_of = {case.name: {key: (value, about) for key, value, about in described(case.spec)} for case in cases}
+    first = keys_of[cases[0].name]
     shared = [
         (key, value, about)
         for key, (value, about) in first.items()
-        if all(key in other and other[key][0] == value for other in told.values())
+        if all(key in other and other[key][0] == value for other in keys_of.values())
     ]
     counted = [("realisations", f"{n:,}", "independent runs") for n in sorted({case.realisations for case in cases})]
     counted += [("seed", str(s), "of the noise") for s in sorted({case.seed for case in cases})]
@@ -26,18 +31,18 @@ def asked(cases: Sequence) -> dict:
     made = {title: _frame(COLUMNS, [*shared, *(counted if len(counted) == 2 else [])])}
     if len(cases) > 1:
         same = {key for key, _, _ in shared}
-        keys = list(dict.fromkeys(key for of in told.values() for key in of if key not in same))
-        rows = [
-            (case.name, *(told[case.name].get(key, ("–", ""))[0] for key in keys), f"{case.realisations:,}", case.seed)
-            for case in cases[:MOST_CASES]
-        ]
+        keys = list(dict.fromkeys(key for of in keys_of.values() for key in of if key not in same))
+        rows: list[tuple[object, ...]] = []
+        for case in cases[:MOST_CASES]:
+            values = (keys_of[case.name].get(key, ("–", ""))[0] for key in keys)
+            rows.append((case.name, *values, f"{case.realisations:,}", case.seed))
         left = len(cases) - len(rows)
         title = "In what the cases differ" + (f" (first {MOST_CASES}; {left} more in run.json)" if left else "")
         made[title] = _frame(("case", *keys, "realisations", "seed"), rows)
     return made
 
 
-def _frame(columns: Sequence[str], rows: Sequence[tuple]):
+def _frame(columns: Sequence[str], rows: Sequence[tuple[object, ...]]) -> "pd.DataFrame":
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(columns)})
 
 
@@ -54,10 +59,10 @@ def described(model: Model, before: str = "") -> Iterator[tuple[str, str, str]]:
             if len(value) > MOST_ENTRIES:
                 yield f"{before}{name}", f"{len(value) - MOST_ENTRIES} more", ""
         elif value is not None and value != ():
-            yield f"{before}{name}", said(name, value), about
+            yield f"{before}{name}", as_text(name, value), about
 
 
-def _models(value) -> bool:
+def _models(value: object) -> TypeGuard[Sequence[Model]]:
     return isinstance(value, tuple | list) and bool(value) and all(isinstance(one, Model) for one in value)
 
 
@@ -70,11 +75,11 @@ def _pairs(model: Model) -> Iterator[str]:
         elif _models(value):
             yield f"{name}: {' | '.join(', '.join(_pairs(one)) for one in value)}"
         elif value is not None and value != ():
-            yield f"{name} {said(name, value)}"
+            yield f"{name} {as_text(name, value)}"
 
 
-def said(name: str, value) -> str:
-    """A value in words: angles in degrees too, lists with commas."""
+def as_text(name: str, value: object) -> str:
+    """A value as text: angles in degrees too, lists with commas."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
@@ -83,8 +88,8 @@ def said(name: str, value) -> str:
         return f"{text} ({math.degrees(value):.6g}{degrees})".replace("-", "−") if degrees and value else text
     if isinstance(value, tuple | list):
         return ", ".join(
-            said(name, one) if not isinstance(one, tuple | list) else f"[{said(name, one)}]" for one in value
+            as_text(name, one) if not isinstance(one, tuple | list) else f"[{as_text(name, one)}]" for one in value
         )
     if isinstance(value, Mapping):
-        return ", ".join(f"{key}: {said(str(key), one)}" for key, one in value.items())
+        return ", ".join(f"{key}: {as_text(str(key), one)}" for key, one in value.items())
     return str(value)

@@ -5,6 +5,7 @@ in a light and a dark form. Text is escaped here; nothing else from outside gets
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -12,9 +13,9 @@ from markupsafe import Markup
 from radarsim.report import chart_look as look
 from radarsim.report import chart_pieces as pieces
 from radarsim.report.chart_pieces import SIZE
-from radarsim.report.chart_scale import Scale, scale, words
+from radarsim.report.chart_scale import Scale, scale, tick_text
 from radarsim.report.chart_text import html, spoken
-from radarsim.report.drawing import Bars, Figure, Heat, Line, Note, Panel, Reference, Style
+from radarsim.report.drawing import Bars, Figure, Heat, Line, Mark, Note, Panel, Reference, Style
 
 WIDTH, HEIGHT = 440.0, 280.0  # of a panel, in units of the SVG
 LETTER = 0.62 * SIZE  # mean width of one
@@ -100,8 +101,8 @@ class _Frame:
         self.x: Scale = scale(panel.x, [x for x, _ in extent], "x", self.left, WIDTH - RIGHT)
         self.x_ticks = list(panel.x.ticks) or self.x.ticks(6)
         ends = [[s.log, *(float(f"{v:.9g}") for v in (s.low, s.high, s.start, s.end))] for s in (self.x, self.y)]
-        said = {"xl": spoken(panel.x.label), "yl": spoken(panel.y.label)}
-        self.data: dict = {"x": ends[0], "y": ends[1], **said, "xs": [], "lines": []}
+        labels = {"xl": spoken(panel.x.label), "yl": spoken(panel.y.label)}
+        self.data: dict[str, Any] = {"x": ends[0], "y": ends[1], **labels, "xs": [], "lines": []}
 
     def inside(self) -> tuple[float, float, float, float]:
         """Left, top, width and height of the plot, a little wider than the axes for markers at their ends."""
@@ -128,7 +129,7 @@ class _Frame:
         )
         return made + pieces.text(2, SIZE + 1, self.panel.y.label, "start", "lab")
 
-    def draw(self, mark, numbers: dict[str, int], points: int) -> Markup:
+    def draw(self, mark: Mark, numbers: dict[str, int], points: int) -> Markup:
         """The markup of a mark; the numbers of curves, bars and maps are kept for the pointer."""
         match mark:
             case Line():
@@ -233,7 +234,7 @@ class _Frame:
             if few:
                 on = "#ffffff" if look.contrast(colour, "#ffffff") > look.contrast(colour, "#000000") else "#000000"
                 made += Markup('<text x="{:.1f}" y="{:.1f}" text-anchor="middle" style="fill:{}">{}</text>').format(
-                    x, y + 0.35 * SIZE, on, words(float(f"{value:.3g}"))
+                    x, y + 0.35 * SIZE, on, tick_text(float(f"{value:.3g}"))
                 )
         values = [pieces.short(row) for row in heat.values]
         ticks = ([text for _, text in self.x_ticks], [text for _, text in self.y_ticks])

@@ -1,4 +1,4 @@
-"""Pieces of a page's charts: paths, samples of lines, words; how far a mark reaches, and what of it is drawn."""
+"""Pieces of a page's charts: paths, samples of lines, text; how far a mark reaches, and what of it is drawn."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,9 +7,9 @@ import numpy as np
 from markupsafe import Markup
 
 from radarsim.report import chart_look as look
-from radarsim.report.chart_scale import words
+from radarsim.report.chart_scale import tick_text
 from radarsim.report.chart_text import tspans
-from radarsim.report.drawing import Bars, Heat, Line, Panel, Reference, Style
+from radarsim.report.drawing import Bars, Heat, Line, Mark, Panel, Reference, Style
 
 SIZE = 12.0  # of the letters, in units of the SVG
 DIGITS = ".5g"  # of the numbers that a pointer reads off
@@ -29,20 +29,24 @@ def ink(style: Style) -> Markup:
 
 
 def dashed(style: Style) -> Markup:
-    """The dash, as an attribute; nothing for a whole line."""
+    """The dash, as an attribute; nothing for a whole line and for none."""
+    if style.dash is None:
+        return Markup("")
     dash = look.DASHES[style.dash % len(look.DASHES)]
     return Markup(' stroke-dasharray="{}"').format(dash) if dash else Markup("")
 
 
 def markers(places: Sequence[tuple[float, float]], style: Style) -> Markup:
-    """A style's marker at each place, all as one path."""
+    """A style's marker at each place, all as one path; nothing where it has none."""
+    if style.marker is None:
+        return Markup("")
     shape = look.MARKERS[style.marker % len(look.MARKERS)]
     full = "f" if style.dash is None else "m"
     path = "".join(f"M{x:.1f} {y:.1f}{shape}" for x, y in places)
     return Markup('<path class="{}" d="{}"/>').format(full, path)
 
 
-def extent(mark) -> tuple[np.ndarray, np.ndarray]:
+def extent(mark: Mark) -> tuple[np.ndarray, np.ndarray]:
     """What a mark adds to the limits of x and of y."""
     none = np.zeros(0)
     match mark:
@@ -67,7 +71,7 @@ def by_number(panel: Panel) -> Panel:
     axes = {}
     for which, values in (("x", mark.x), ("y", mark.y)):
         axis = getattr(panel, which)
-        named = axis.ticks or tuple((i, words(float(v))) for i, v in enumerate(values))
+        named = axis.ticks or tuple((i, tick_text(float(v))) for i, v in enumerate(values))
         axes[which] = replace(axis, scale="linear", limits=(-0.5, len(values) - 0.5), ticks=named)
     return replace(panel, **axes)
 
@@ -104,13 +108,13 @@ def path(x: np.ndarray, y: np.ndarray) -> str:
     return "".join(parts)
 
 
-def short(values) -> list[float | None]:
+def short(values: np.ndarray) -> list[float | None]:
     """Numbers for the pointer: five digits, nothing where not finite."""
     return [float(format(v, DIGITS)) if np.isfinite(v) else None for v in np.asarray(values, dtype=float).tolist()]
 
 
 def text(x: float, y: float, text: str, anchor: str, css: str = "") -> Markup:
-    """Words at a place, a line below the other."""
+    """Text at a place, a line below the other."""
     named = Markup(' class="{}"').format(css) if css else Markup("")
     return Markup("").join(
         Markup('<text x="{:.1f}" y="{:.1f}" text-anchor="{}"{}>{}</text>').format(

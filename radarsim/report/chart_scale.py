@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from radarsim.report.drawing import Axis
 
@@ -23,7 +24,7 @@ class Scale:
     start: float
     end: float
 
-    def place(self, values) -> np.ndarray:
+    def place(self, values: ArrayLike) -> np.ndarray:
         """Places of values; not-a-number where a value has none."""
         v = np.asarray(values, dtype=float)
         low, high = self.low, self.high
@@ -34,10 +35,10 @@ class Scale:
         return self.start + (self.end - self.start) * (v - low) / (high - low)
 
     def ticks(self, wanted: int) -> list[tuple[float, str]]:
-        """About `wanted` round values inside the axis, with their words."""
+        """About `wanted` round values inside the axis, with their text."""
         if self.log and self.high / self.low >= 10:
             return decades(self.low, self.high)
-        return [(v, words(v)) for v in steps(self.low, self.high, wanted)]
+        return [(v, tick_text(v)) for v in steps(self.low, self.high, wanted)]
 
 
 def scale(axis: Axis, values: Sequence[np.ndarray], which: str, start: float, end: float) -> Scale:
@@ -77,17 +78,17 @@ def decades(low: float, high: float) -> list[tuple[float, str]]:
     if len(ticks) > 3:
         return ticks
     fine = [m * 10.0**n for n in range(first - 1, last + 1) for m in (2, 5) if low <= m * 10.0**n <= high]
-    return sorted([*ticks, *((v, words(v)) for v in fine)])
+    return sorted([*ticks, *((v, tick_text(v)) for v in fine)])
 
 
 def power(n: int) -> str:
     """10ⁿ in figures where short."""
     if -3 <= n <= 4:
-        return words(10.0**n)
+        return tick_text(10.0**n)
     return "10" + str(n).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
-def words(value: float) -> str:
+def tick_text(value: float) -> str:
     """A tick's number: at most six digits, a true minus, powers of ten raised."""
     text = f"{value:.6g}"
     text = "0" if float(text) == 0 else text

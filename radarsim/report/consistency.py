@@ -13,7 +13,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import statistics, tables
-from radarsim.report.statistics import Estimate
+from radarsim.report.statistics import Estimate, Values
 
 OPTIMISTIC, CONSISTENT, PESSIMISTIC = "optimistic", "consistent", "pessimistic"
 BELIEVED = (
@@ -75,7 +75,7 @@ def verdict(mean: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:
     return np.select([mean < lo, mean > hi], [PESSIMISTIC, OPTIMISTIC], CONSISTENT).astype(object)
 
 
-def bounds_from_spread(total, square, n, looks: int) -> tuple[np.ndarray, np.ndarray]:
+def bounds_from_spread(total: Values, square: Values, n: Values, looks: int) -> tuple[np.ndarray, np.ndarray]:
     """Bounds of a mean NEES or NIS of unknown law, from Σq and Σq² over n realisations.
 
     They stand about 1 as the interval of the mean, widened so that `looks` of them hold at once in 95 % of runs, stands

@@ -1,6 +1,7 @@
-"""σ with the baseline as control variate: where that is known exactly, its error tells the luck of the same noise."""
+"""σ with the baseline as control variate: where its σ is known exactly, its error shows that of the same noise."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,13 +9,16 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import statistics
 from radarsim.report import tables as common
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 CONTROLLED = (
     *("case", "filter", "control", "component", "unit", "k", "t_s", "n", "sigma", "sigma_lo", "sigma_hi"),
     *("variance_factor", "exact_sigma"),
 )
 
 
-def controlled(results: Sequence[CaseResult]):
+def controlled(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """Rows where the baseline's σ is known exactly and both have an estimate in the same realisations.
 
     `variance_factor` is how many times more realisations the plain σ would take for the same interval.

@@ -6,14 +6,19 @@ data and on the versions of Matplotlib and its fonts alone.
 
 import io
 import warnings
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
+from matplotlib.text import Annotation
 from matplotlib.ticker import NullFormatter
 
 from radarsim.report.drawing import Bars, Figure, Heat, Line, Note, Panel, Reference, Style
@@ -28,8 +33,14 @@ LONGEST_AT_END = 28  # letters of a name that may stand at a line's end
 TITLE_LETTERS_PER_MM = 0.49  # of a panel's cell with its axis, in the bold of titles
 MOST_IN_COLUMN = 10  # names in one column of a legend
 MARKED = 16  # at most about so many markers or crosses a line
-EXACT = {"linestyle": "none", "marker": "+", "color": "black", "markersize": 4.2, "markeredgewidth": 0.6}
-STYLE = {
+EXACT: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "+",
+    "color": "black",
+    "markersize": 4.2,
+    "markeredgewidth": 0.6,
+}
+STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 7.5,
     "axes.titlesize": 8,
@@ -64,7 +75,7 @@ def render(figure: Figure) -> Canvas:
 
 
 @contextmanager
-def _unknown_letters_pass():
+def _unknown_letters_pass() -> Iterator[None]:
     """Letters that the font lacks are drawn as boxes, without a warning for each."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing")
@@ -74,20 +85,24 @@ def _unknown_letters_pass():
 def _laid_out(figure: Figure) -> Canvas:
     rows = -(-len(figure.panels) // figure.columns)
     size = (figure.width_mm * MM, rows * figure.panel_height_mm * MM)
-    canvas = Canvas(figsize=size, dpi=PNG_DPI, layout="constrained")
+    layout = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.05)
+    canvas = Canvas(figsize=size, dpi=PNG_DPI, layout=layout)
     FigureCanvasAgg(canvas)
-    canvas.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.05)
     grid = canvas.subplots(rows, figure.columns, squeeze=False, sharey=figure.share_y)
-    ended, told = [], False  # crosses are told once a figure
+    ended: list[list[Annotation]] = []
+    explained = False  # crosses are explained once a figure
     letters = TITLE_LETTERS_PER_MM * figure.width_mm / figure.columns
     for axes, panel in zip(grid.flat, figure.panels, strict=False):
         panel = replace(panel, title=wrapped(panel.title, letters))
-        crosses = not told and any(isinstance(m, Line) and m.exact is not None for m in panel.marks)
-        told |= crosses
-        ended.append(_draw(axes, panel, crosses) if panel.marks else _legend(axes, panel, list(panel.keys), False))
+        crosses = not explained and any(isinstance(m, Line) and m.exact is not None for m in panel.marks)
+        explained |= crosses
+        if panel.marks:
+            ended.append(_draw(axes, panel, crosses))
+        else:
+            _legend(axes, panel, list(panel.keys), False)
     for axes in grid.flat[len(figure.panels) :]:
         axes.set_visible(False)
-    canvas.get_layout_engine().execute(canvas)
+    layout.execute(canvas)
     canvas.set_layout_engine(None)  # not "none": an engine that does nothing still has savefig draw everything twice
     for texts in ended:
         _spread(texts)
@@ -97,29 +112,30 @@ def _laid_out(figure: Figure) -> Canvas:
 def wrapped(title: str, letters: float) -> str:
     """A title in lines of at most so many letters, broken after commas alone."""
     lines: list[str] = []
-    for words in title.split(", "):
-        if lines and len(lines[-1]) + 2 + len(words) <= letters:
-            lines[-1] += f", {words}"
+    for part in title.split(", "):
+        if lines and len(lines[-1]) + 2 + len(part) <= letters:
+            lines[-1] += f", {part}"
         else:
-            lines.append(words)
+            lines.append(part)
     return ",\n".join(lines)
 
 
-def save(figure: Figure, formats=("svg", "png")) -> dict[str, bytes]:
+def save(figure: Figure, formats: Iterable[str] = ("svg", "png")) -> dict[str, bytes]:
     """The bytes of the figure in each format ("svg", "png" at 200 dpi, "pdf"), the same for the same data."""
     canvas = render(figure)
     return {kind: _bytes(canvas, kind, figure.name) for kind in formats}
 
 
 def _bytes(canvas: Canvas, kind: str, name: str) -> bytes:
+    undated: dict[str, Any]
     undated = {"svg": {"Date": None, "Creator": None}, "pdf": {"CreationDate": None}, "png": {"Software": None}}
     out = io.BytesIO()
-    with matplotlib.rc_context({**STYLE, "svg.hashsalt": name}), _unknown_letters_pass():
+    with matplotlib.rc_context(STYLE | {"svg.hashsalt": name}), _unknown_letters_pass():
         canvas.savefig(out, format=kind, dpi=PNG_DPI, metadata=undated[kind])
     return out.getvalue()
 
 
-def _draw(axes, panel: Panel, crosses: bool) -> list:
+def _draw(axes: Axes, panel: Panel, crosses: bool) -> list[Annotation]:
     """Draw a panel, with a key to exact crosses or not.
 
     The texts written at line ends come back, to be moved apart once the layout stands.
@@ -128,7 +144,17 @@ def _draw(axes, panel: Panel, crosses: bool) -> list:
     axes.set_yscale(panel.y.scale)
     axes.margins(x=0.02)
     for mark in panel.marks:
-        DRAWN[type(mark)](axes, mark)
+        match mark:
+            case Line():
+                _line(axes, mark)
+            case Reference():
+                _reference(axes, mark)
+            case Bars():
+                _bars(axes, mark)
+            case Heat():
+                _heat(axes, mark)
+            case Note():
+                _note(axes, mark)
     axes.set_xlabel(panel.x.label)
     axes.set_ylabel(panel.y.label)
     axes.set_title(panel.title, loc="left", fontweight="bold")
@@ -136,22 +162,23 @@ def _draw(axes, panel: Panel, crosses: bool) -> list:
         if limits != (None, None):
             put(*limits)
         if axis.ticks:
-            where, words = zip(*axis.ticks, strict=True)
-            (axes.set_xticks if axis is panel.x else axes.set_yticks)(where, words)
+            where, labels = zip(*axis.ticks, strict=True)
+            (axes.set_xticks if axis is panel.x else axes.set_yticks)(where, labels)
             (axes.xaxis if axis is panel.x else axes.yaxis).set_minor_formatter(NullFormatter())
     if panel.remark:
         axes.set_title(panel.remark, loc="right", fontsize=7)
     return _name(axes, panel, crosses)
 
 
-def _colour(style: Style):
+def _colour(style: Style) -> str | tuple[float, float, float, float]:
     if isinstance(style.colour, float):
-        return matplotlib.colormaps["viridis"](0.72 * style.colour)
+        red, green, blue, alpha = matplotlib.colormaps["viridis"](0.72 * style.colour)
+        return red, green, blue, alpha
     return COLOURS[style.colour % len(COLOURS)]
 
 
-def _look(style: Style) -> dict:
-    """Matplotlib's words for a style."""
+def _look(style: Style) -> dict[str, Any]:
+    """Matplotlib's keywords for a style."""
     marker = None if style.marker is None else MARKERS[style.marker % len(MARKERS)]
     dash = "none" if style.dash is None else DASHES[style.dash % len(DASHES)]
     colour = _colour(style)
@@ -161,7 +188,7 @@ def _look(style: Style) -> dict:
     }
 
 
-def _line(axes, line: Line) -> None:
+def _line(axes: Axes, line: Line) -> None:
     line = _thinned(line)
     step = 1 if line.style.dash is None else max(1, -(-len(line.x) // MARKED))
     scattered = line.style.dash is None
@@ -185,18 +212,18 @@ def _thinned(line: Line) -> Line:
     return replace(line, **{name: part[::stride] for name, part in parts.items() if part is not None})
 
 
-def _reference(axes, mark: Reference) -> None:
-    look = {"color": "#555555", "linewidth": 0.7, "linestyle": (0, (2, 2)), "zorder": 1.5}
-    words = {"s": f" {mark.label} ", "ha": "right", "va": "bottom", "color": "#555555"}
+def _reference(axes: Axes, mark: Reference) -> None:
+    look: dict[str, Any] = {"color": "#555555", "linewidth": 0.7, "linestyle": (0, (2, 2)), "zorder": 1.5}
+    text: dict[str, Any] = {"s": f" {mark.label} ", "ha": "right", "va": "bottom", "color": "#555555"}
     if mark.across == "y":
         axes.axhline(mark.value, **look)
-        axes.text(0.99, mark.value, transform=axes.get_yaxis_transform(), **words)
+        axes.text(0.99, mark.value, transform=axes.get_yaxis_transform(), **text)
     else:
         axes.axvline(mark.value, **look)
-        axes.text(mark.value, 0.02, transform=axes.get_xaxis_transform(), **words)
+        axes.text(mark.value, 0.02, transform=axes.get_xaxis_transform(), **text)
 
 
-def _bars(axes, bars: Bars) -> None:
+def _bars(axes: Axes, bars: Bars) -> None:
     where = np.arange(len(bars.names))
     axes.bar(where, bars.values, color=_colour(bars.style), alpha=0.75, width=0.65, zorder=2)
     if bars.lo is not None and bars.hi is not None:
@@ -205,7 +232,7 @@ def _bars(axes, bars: Bars) -> None:
     axes.grid(False, axis="x")
 
 
-def _heat(axes, heat: Heat) -> None:
+def _heat(axes: Axes, heat: Heat) -> None:
     drawn = axes.pcolormesh(
         np.arange(len(heat.x)), np.arange(len(heat.y)), heat.values, cmap="viridis", shading="nearest"
     )
@@ -219,23 +246,20 @@ def _heat(axes, heat: Heat) -> None:
             axes.text(j, i, f"{value:.3g}", ha="center", va="center", color="white" if value < middle else "black")
 
 
-def _note(axes, note: Note) -> None:
+def _note(axes: Axes, note: Note) -> None:
     up, right = "n" in note.place, "e" in note.place
-    look = {"ha": "left" if right else "right", "va": "bottom" if up else "top", "fontsize": 7}
+    look: dict[str, Any] = {"ha": "left" if right else "right", "va": "bottom" if up else "top", "fontsize": 7}
     shift = (3 if right else -3, 3 if up else -3)
     axes.annotate(note.text, (note.x, note.y), xytext=shift, textcoords="offset points", **look)
 
 
-DRAWN = {Line: _line, Reference: _reference, Bars: _bars, Heat: _heat, Note: _note}
+def _name(axes: Axes, panel: Panel, crosses: bool) -> list[Annotation]:
+    """Name the lines, at their ends where there are few enough, else in a legend, and explain the styles in a legend.
 
-
-def _name(axes, panel: Panel, crosses: bool) -> list:
-    """Name the lines: at their ends where there are few enough, else in a legend.
-
-    And the keys of styles in a legend.
+    Gives the names at line ends.
     """
     lines = [m for m in panel.marks if isinstance(m, Line) and m.label and np.isfinite(m.y).any()]
-    handles = [(words, style) for words, style in panel.keys]
+    handles = list(panel.keys)
     short = all(len(m.label) <= LONGEST_AT_END for m in lines)
     direct = panel.direct and short and all(m.style.dash is not None for m in lines) and len(lines) <= _fitting(axes)
     if not direct:
@@ -260,36 +284,39 @@ def _name(axes, panel: Panel, crosses: bool) -> list:
     return texts
 
 
-def _legend(axes, panel: Panel, handles: list, crosses: bool) -> list:
-    """A legend of words and styles, with the exact crosses where asked; of a panel without marks in its middle."""
+def _legend(axes: Axes, panel: Panel, handles: list[tuple[str, Style]], crosses: bool) -> None:
+    """A legend of names and styles, with the exact crosses where asked; of a panel without marks in its middle."""
     look = [Line2D([], [], **_look(style)) for _, style in handles] + [Line2D([], [], **EXACT)] * crosses
-    words = [words for words, _ in handles] + [panel.crosses] * crosses
-    if not words:
-        return []
-    place = {"loc": "best" if panel.legend == "none" else panel.legend}
+    names = [name for name, _ in handles] + [panel.crosses] * crosses
+    if not names:
+        return
+    place: dict[str, Any] = {"loc": "best" if panel.legend == "none" else panel.legend}
     if not panel.marks:
         axes.set_axis_off()
         place = {"loc": "center"}
     elif panel.legend == "right":
         place = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
-    room = {"ncols": -(-len(words) // MOST_IN_COLUMN), "borderaxespad": 0.3, "labelspacing": 0.3}
-    legend = axes.legend(look, words, title=panel.key_title or None, alignment="left", **place, **room)
+    room: dict[str, Any] = {"ncols": -(-len(names) // MOST_IN_COLUMN), "borderaxespad": 0.3, "labelspacing": 0.3}
+    legend = axes.legend(look, names, title=panel.key_title or None, alignment="left", **place, **room)
     # Inside the panel it may not push it to nothing; beside it, it takes its room.
     legend.set_in_layout(panel.legend == "right")
-    return []
 
 
-def _fitting(axes) -> int:
+def _fitting(axes: Axes) -> int:
     """How many labels of one line fit one below the other beside a panel."""
-    height = axes.figure.get_size_inches()[1] / axes.get_subplotspec().get_gridspec().nrows
+    canvas, place = axes.get_figure(root=True), axes.get_subplotspec()
+    assert canvas is not None
+    assert place is not None  # every panel is a cell of its figure
+    height = canvas.get_size_inches()[1] / place.get_gridspec().nrows
     return int(0.75 * height * 72 / (1.25 * STYLE["font.size"]))
 
 
-def _spread(texts: list) -> None:
+def _spread(texts: list[Annotation]) -> None:
     """Move labels at line ends apart, up and down, keeping their order; within the panel where they fit."""
     if not texts:
         return
     axes = texts[0].axes
+    assert axes is not None  # every name is written into a panel
     box = axes.get_window_extent()
     step = 1.2 * STYLE["font.size"] * axes.figure.dpi / 72
     wanted = [axes.transData.transform(text.xy)[1] for text in texts]

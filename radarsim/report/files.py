@@ -199,7 +199,7 @@ class Writer:
             if source is not None and not self._stream and same_file(path, source):
                 raise ConfigError(f"{self.path}: must be another file than {name}, which would be lost")
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         self._target = Path(os.path.realpath(self.path))
         self._temporary = None if self._stream else beside(self._target)
         try:
@@ -210,14 +210,14 @@ class Writer:
         self._rows = csv.writer(self._file, lineterminator="\n")
         return self
 
-    def write(self, rows: Iterable[Sequence]) -> None:
+    def write(self, rows: Iterable[Sequence[str]]) -> None:
         """Write rows of text."""
         try:
             self._rows.writerows(rows)
         except OSError as error:
             raise self._fault(error) from error
 
-    def __exit__(self, kind: type | None, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         try:
             self._file.close()
             if kind is None and self._temporary is not None:

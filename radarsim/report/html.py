@@ -5,14 +5,20 @@ import hashlib
 import json
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib import resources
+from typing import TYPE_CHECKING, Any
 
+from radarsim.config.experiment import Experiment
 from radarsim.config.load import as_yaml
 from radarsim.report import asked, chart, provenance
 from radarsim.report.chart_text import spoken
 from radarsim.report.drawing import Figure, Line
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from jinja2 import Template
 
 NOT_SETTLED = "not settled in the run"
 ROWS = 200  # of a table shown in the page
@@ -24,16 +30,16 @@ SHOWN_FACTS = ("threads", "seconds", "kernel_seconds", "realisations_computed", 
 
 
 def page(
-    experiment,
-    made: Mapping,
+    experiment: Experiment,
+    made: "Mapping[str, pd.DataFrame]",
     figures: Sequence[Figure],
-    record: Mapping,
+    record: Mapping[str, Any],
     answer: Sequence[str],
     question: str,
     *,
-    inputs=None,
-    agreement=None,
-    cost=None,
+    inputs: "pd.DataFrame | None" = None,
+    agreement: "pd.DataFrame | None" = None,
+    cost: "pd.DataFrame | None" = None,
 ) -> str:
     """The page of an experiment: question, answer, what was asked, figures, claims, exact values, tables, provenance.
 
@@ -65,7 +71,7 @@ def page(
     )
 
 
-def yaml_of(resolved: Mapping) -> str:
+def yaml_of(resolved: Mapping[str, Any]) -> str:
     """The resolved experiment as YAML; of very many cases the first."""
     cases = resolved["cases"]
     text = as_yaml({**resolved, "cases": cases[:MOST_CASES]})
@@ -73,15 +79,15 @@ def yaml_of(resolved: Mapping) -> str:
     return text + (f"# {left} further cases stand in run.json\n" if left > 0 else "")
 
 
-def command(experiment, record: Mapping) -> str:
+def command(experiment: Experiment, record: Mapping[str, Any]) -> str:
     """The command that repeats the run: as the run's facts give it, else by the config."""
     if "command" in record:
         return str(record["command"])
-    words = ["radarsim", "run", shlex.quote(str(experiment.path or experiment.stem))]
+    parts = ["radarsim", "run", shlex.quote(str(experiment.path or experiment.stem))]
     for flag, key in (("-n", "asked"), ("--seed", "seed")):
         asked = {case[key] for case in record["cases"].values()}
-        words += [flag, str(*asked)] if len(asked) == 1 else []  # cases that differ have it from the config
-    return " ".join(words)
+        parts += [flag, str(*asked)] if len(asked) == 1 else []  # cases that differ have it from the config
+    return " ".join(parts)
 
 
 def number(value: object) -> str:
@@ -96,13 +102,19 @@ def number(value: object) -> str:
 
 
 @cache
-def _template(name: str):
+def _template(name: str) -> "Template":
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     loader = PackageLoader("radarsim.report")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    own = {"number": number, "thousands": lambda n: f"{n:,}", "css": _css, "kept": kept, "measured": _measured}
-    environment.filters |= own
+    own: dict[str, Callable[..., str]] = {
+        "number": number,
+        "thousands": lambda n: f"{n:,}",
+        "css": _css,
+        "kept": kept,
+        "measured": _measured,
+    }
+    environment.filters.update(own)
     return environment.get_template(name)
 
 
@@ -111,8 +123,8 @@ def kept(text: object) -> str:
     return str(text).replace(" %", "\u00a0%")
 
 
-def _measured(part: Mapping) -> str:
-    """What a part of a claim measured; a settling time without end in words."""
+def _measured(part: Mapping[str, Any]) -> str:
+    """What a part of a claim measured; an infinite settling time as text."""
     if math.isinf(part["measured"]) and "settling" in part["what"]:
         return NOT_SETTLED
     return number(part["measured"])
@@ -122,9 +134,9 @@ def _css(verdict: str) -> str:
     return verdict if verdict in ("confirmed", "refuted") else "unclear"
 
 
-def _claims(table) -> list[dict]:
+def _claims(table: "pd.DataFrame") -> list[dict[str, Any]]:
     """Claims with their parts, from claims.csv's rows."""
-    found: dict[str, dict] = {}
+    found: dict[str, dict[str, Any]] = {}
     for row in table.to_dict("records"):
         same = {key: row[key] for key in ("statement", "paper", "place", "reading", "overall")}
         found.setdefault(row["claim"], {"id": row["claim"], **same, "parts": []})["parts"].append(row)
@@ -136,7 +148,7 @@ def _cell(column: str, value: object) -> str:
     return NOT_SETTLED if endless else number(value)
 
 
-def _tables(made: Mapping) -> list[dict]:
+def _tables(made: "Mapping[str, pd.DataFrame]") -> list[dict[str, Any]]:
     """The tables as far as they are shown: the long ones share what room the short ones leave."""
     rows, most = [len(table) for table in made.values()], ROWS
     while most > 10 and sum(min(count, most) for count in rows) > ALL_ROWS:
@@ -144,7 +156,7 @@ def _tables(made: Mapping) -> list[dict]:
     return [_table(name, table, most) for name, table in made.items()]
 
 
-def _table(name: str, table, most: int = ROWS) -> dict:
+def _table(name: str, table: "pd.DataFrame", most: int = ROWS) -> dict[str, Any]:
     order = list(table.columns)
     if {"sigma", "exact_sigma"} <= set(order):  # side by side, to be compared
         order.remove("exact_sigma")
@@ -155,7 +167,7 @@ def _table(name: str, table, most: int = ROWS) -> dict:
     return {"name": name, "columns": columns, "rows": cells, "count": len(table), "cut": len(table) > most}
 
 
-def _figures(figures: Sequence[Figure]) -> list[dict]:
+def _figures(figures: Sequence[Figure]) -> list[dict[str, Any]]:
     """The figures as charts; where there are many curves, each is drawn of fewer points."""
     from markupsafe import Markup
 
@@ -183,11 +195,11 @@ def _file(name: str) -> str:
     return resources.files("radarsim.report").joinpath("templates", name).read_text(encoding="utf-8")
 
 
-def whole(template: str, **words) -> str:
+def whole(template: str, **content: object) -> str:
     """A page from a template, with the style and the script that all pages share."""
     from markupsafe import Markup
 
     text, digest = script()
     return _template(template).render(
-        style=Markup(_file("style.css")), script=Markup(text), script_hash=digest, **words
+        style=Markup(_file("style.css")), script=Markup(text), script_hash=digest, **content
     )

@@ -1,9 +1,9 @@
 """Figures that every study needs, made from the tables alone: σ against time, gain against time."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -12,9 +12,12 @@ from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark
 from radarsim.report.provenance import span
 from radarsim.report.statistics import Z95
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 WIDE_MM = 120.0  # one panel of many lines
 MOST_AT_ENDS = 6  # lines of one panel named at their ends; more by colour and dash
-MOST = 8  # cases a figure shows; more are told in its caption
+MOST = 8  # cases a figure shows; more are named in its caption
 LONGEST_INSIDE = 28  # letters of a name that may stand in a legend inside a panel of many lines
 TIME = "time from the first plot, s"
 SYMBOLS = {"manoeuvre_variance": "$D_M$"}
@@ -31,7 +34,7 @@ class Quantity(NamedTuple):
     name: str
 
 
-def number(value, powers: bool = False) -> str:
+def number(value: object, powers: bool = False) -> str:
     """A number for people: 0.001 as 10⁻³ (with powers, 0.1 as 10⁻¹), others at four digits; text as it is."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         return literal(str(value))
@@ -105,7 +108,7 @@ def in_legend(drawn: Sequence[Panel]) -> list[Panel]:
 
 
 def counts(label: str, highest: float) -> Axis:
-    """An axis of whole numbers from nought, ticks at whole numbers alone."""
+    """An axis of whole numbers from zero, with ticks at whole numbers only."""
     step = next(s * 10**p for p in range(9) for s in (1, 2, 5) if highest / (s * 10**p) <= 8)
     return Axis(label, limits=(0, None), ticks=tuple((float(n), str(n)) for n in range(0, int(highest) + 1, step)))
 
@@ -125,7 +128,7 @@ def told(results: Sequence[CaseResult], most: int = 3) -> tuple[list[CaseResult]
 
 
 def plain(text: str) -> str:
-    """A figure's words without the marks of mathematical text."""
+    """A figure's text without the marks of mathematical text."""
     return text.replace(r"\$", "\0").replace("$", "").replace("\0", "$")
 
 
@@ -184,12 +187,10 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
     if not single:
         panels = [replace(panel, legend="none" if panel.legend == "none" else "best") for panel in panels]
     wordy = panels and not panels[-1].marks and any(len(words) > LONGEST_INSIDE for words, _ in panels[-1].keys)
-    shape = (
-        {"width_mm": WIDE_MM if beside else COLUMN_MM}
-        if single
-        else {"columns": 2 if wordy else min(3, len(panels)), "width_mm": PAGE_MM}
-    )
-    return Figure(name, title, caption, tuple(panels), **shape, panel_height_mm=64 if single else 56)
+    columns, width, height = 2 if wordy else min(3, len(panels)), PAGE_MM, 56
+    if single:
+        columns, width, height = 1, WIDE_MM if beside else COLUMN_MM, 64
+    return Figure(name, title, caption, tuple(panels), columns, width, height)
 
 
 def _sigma_panel(members: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity) -> Panel:
@@ -220,18 +221,19 @@ def _sigma_panel(members: Sequence[CaseResult], curves: Mapping, component: str,
 
 def _by_colour(panel: Panel, dashes: tuple, key: str) -> Panel:
     """A panel of many lines: names not at the lines but in a legend beside it, one of each colour and each dash."""
-    shades = {mark.label: Style(mark.style.colour, 0) for mark in panel.marks}
-    marks = tuple(replace(mark, label="") for mark in panel.marks)
+    lines = [mark for mark in panel.marks if isinstance(mark, Line)]
+    shades = {line.label: Style(line.style.colour, 0) for line in lines}
+    marks = tuple(replace(line, label="") for line in lines)
     title = ", ".join(filter(None, (symbol_of(key), KEY_UNITS.get(key, "")))) if key else ""
     return replace(panel, marks=marks, keys=(*shades.items(), *dashes), key_title=title, legend="right")
 
 
-def _sigma_line(rows, words: str, style: Style, name: str) -> Line:
+def _sigma_line(rows: "pd.DataFrame", label: str, style: Style, name: str) -> Line:
     values = {
         name: rows[name].to_numpy(dtype=float) for name in ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")
     }
     exact = values["exact_sigma"] if np.isfinite(values["exact_sigma"]).any() else None
-    return Line(values["t_s"], values["sigma"], words, style, values["sigma_lo"], values["sigma_hi"], exact, name)
+    return Line(values["t_s"], values["sigma"], label, style, values["sigma_lo"], values["sigma_hi"], exact, name)
 
 
 def look(nth_filter: int, nth_case: int, cases: int) -> Style:
@@ -277,11 +279,15 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
 
 
 def per_component(
-    results: Sequence[CaseResult], curves: Mapping, gains: Mapping, quantities: Mapping[str, Quantity], chosen
+    results: Sequence[CaseResult],
+    curves: Mapping[Any, "pd.DataFrame"],
+    gains: Mapping[Any, "pd.DataFrame"],
+    quantities: Mapping[str, Quantity],
+    chosen: Callable[[str], Sequence[str]],
 ) -> dict[str, Figure]:
     """sigma_<component> and gain_<component> of every component.
 
-    Chosen(name) gives the case names that a figure shows.
+    chosen(name) gives the case names that a figure shows.
     """
     made = {}
     for component, of in quantities.items():
@@ -305,7 +311,7 @@ def dynamic_figure(
 
     None where no case's bias exceeds its spread anywhere: then σ says it all.
     """
-    drawn = []
+    drawn: list[Panel] = []
     for result in results:
         found = [
             (f, curves[(result.name, f, component)])

@@ -33,7 +33,7 @@ class Cell:
     k: int
     count: int
 
-    def __str__(self):
+    def __str__(self) -> str:
         width = f"± {self.percent:.3g} %" if math.isfinite(self.percent) else "not known"
         where = f"filter {self.filter!r}, component {self.component}, k = {self.k}"
         return f"{self.case}: {where}: sigma {width} at {self.count:,} realisations"
@@ -62,8 +62,8 @@ def worst(result: CaseResult, table: Curves) -> Cell | None:
     percent = np.where(np.isnan(percent) | np.isnan(sigma), np.inf, percent)
     # Of equal ones the first: Gaussian errors without bias are all known equally well, up to rounding.
     row = int(np.flatnonzero(percent >= percent.max() * (1 - EQUAL))[0])
-    names = (str(curves[name].iloc[row]) for name in ("case", "filter", "component"))
-    return Cell(float(percent.max()), *names, int(curves["k"].iloc[row]), result.count)
+    case, name, component = (str(curves[column].iloc[row]) for column in ("case", "filter", "component"))
+    return Cell(float(percent.max()), case, name, component, int(curves["k"].iloc[row]), result.count)
 
 
 def needed(result: CaseResult, percent: float, table: Curves) -> int | None:

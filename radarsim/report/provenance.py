@@ -1,4 +1,4 @@
-"""run.json: what was run, with what, and what came out. Times stand here and in the report, never in a CSV."""
+"""run.json: what was run, with what, and the outcome. Times stand here and in the report, never in a CSV."""
 
 import hashlib
 import json
@@ -9,7 +9,9 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
+from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.report import files
 from radarsim.report.statistics import FEW, FEW_HEAVY
@@ -19,8 +21,12 @@ PACKAGES = ("radarsim", "numpy", "numba", "llvmlite", "scipy", "pandas", "matplo
 
 
 def record(
-    experiment, results: Sequence[CaseResult], run: Mapping, contents: Mapping[str, bytes], answer: Sequence[str]
-) -> dict:
+    experiment: Experiment,
+    results: Sequence[CaseResult],
+    run: Mapping[str, Any],
+    contents: Mapping[str, bytes],
+    answer: Sequence[str],
+) -> dict[str, Any]:
     """All of run.json but the report's own hash.
 
     run gives the facts of the run (stop reason, threads, times, warnings, identities …), kept as they are; contents

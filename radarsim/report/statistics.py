@@ -5,10 +5,11 @@ e² comes from the fourth moment. tests/report and tests/trust simulate the cove
 """
 
 from statistics import NormalDist
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+Values = Any  # a number or an array of numbers: NumPy computes with both alike, which its types cannot express
 Z95 = 1.959963984540054
 # Where less than this stands behind a 95 % interval, its coverage was measured to leave 93.6 … 96.4 %, and 92.5 % for
 # Student's t with five degrees of freedom (docs/trust.md): tables then say so.
@@ -18,11 +19,11 @@ FEW_EVENTS = 20  # of either outcome of a rate: Wilson's interval covers 91.7 to
 
 
 class Estimate(NamedTuple):
-    """A value and the ends of its 95 % interval; arrays of one shape."""
+    """A value and the ends of its 95 % interval; numbers, or arrays of one shape."""
 
-    value: np.ndarray
-    lo: np.ndarray
-    hi: np.ndarray
+    value: Values
+    lo: Values
+    hi: Values
 
 
 class ErrorStatistics(NamedTuple):
@@ -34,7 +35,7 @@ class ErrorStatistics(NamedTuple):
     spread: np.ndarray
 
 
-def student(freedom):
+def student(freedom: Values) -> Values:
     """The 0.975 quantile of Student's t (Abramowitz & Stegun 26.7.5), to 4·10⁻⁴ from 4 degrees of freedom on.
 
     Used to widen intervals whose spread is itself estimated; infinite where there is no degree of freedom.
@@ -51,14 +52,14 @@ def student(freedom):
         return np.where(nu > 0, z + sum(c / np.abs(nu) ** (i + 1) for i, c in enumerate(terms)), np.inf)
 
 
-def _per_one(sums, n):
+def _per_one(sums: Values, n: Values) -> Values:
     """sums / n, not-a-number where n is 0."""
     n = np.asarray(n, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(n > 0, sums / n, np.nan)
 
 
-def root_mean_square(square, fourth, n, looks=1) -> Estimate:
+def root_mean_square(square: Values, fourth: Values, n: Values, looks: Values = 1) -> Estimate:
     """rms of e with its interval, from Σe² and Σe⁴ over n realisations; of `looks` at once all hold in 95 % of runs.
 
     The mean of e² is taken as a chi-square variable of 2/CV² degrees of freedom, CV² = (m₄/m₂² − 1)/n: exact for
@@ -74,7 +75,7 @@ def root_mean_square(square, fourth, n, looks=1) -> Estimate:
         return _root(m2, excess / n, n, looks)
 
 
-def _root(m2, relative, n, looks=1) -> Estimate:
+def _root(m2: Values, relative: Values, n: Values, looks: Values = 1) -> Estimate:
     """Root of a mean square m2 of relative variance `relative`, with the interval that `root_mean_square` describes."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ninth = np.maximum(relative, 0) / 9  # Wilson and Hilferty's 2/(9ν)
@@ -87,7 +88,15 @@ def _root(m2, relative, n, looks=1) -> Estimate:
     return Estimate(root, np.where(known, lo, np.nan), np.where(known & (m2 > 0), hi, np.where(known, root, np.nan)))
 
 
-def controlled(square, fourth, control_square, control_fourth, cross, exact_square, n) -> tuple[Estimate, np.ndarray]:
+def controlled(
+    square: Values,
+    fourth: Values,
+    control_square: Values,
+    control_fourth: Values,
+    cross: Values,
+    exact_square: Values,
+    n: Values,
+) -> tuple[Estimate, np.ndarray]:
     """rms of e with another error c as control variate, and the factor by which that lowers the variance of the mean.
 
     From Σe², Σe⁴, Σc², Σc⁴, Σe²c² over n realisations and E c² = exact_square: mean e² − β (mean c² − E c²), β the
@@ -105,7 +114,7 @@ def controlled(square, fourth, control_square, control_fourth, cross, exact_squa
         return _root(mean, relative, n), 1 / left
 
 
-def errors(moments, n) -> ErrorStatistics:
+def errors(moments: Values, n: Values) -> ErrorStatistics:
     """Statistics of errors from moments (…, 4) = Σe, Σe², Σe³, Σe⁴ over n (…) realisations.
 
     The spread divides by n, so that sigma² = bias² + spread²; the standard error of the bias by n − 1. Where |bias|
@@ -120,7 +129,7 @@ def errors(moments, n) -> ErrorStatistics:
     return ErrorStatistics(root_mean_square(moments[..., 1], moments[..., 3], n), bias, bias_se, np.sqrt(variance))
 
 
-def mean(total, square, n) -> Estimate:
+def mean(total: Values, square: Values, n: Values) -> Estimate:
     """Mean of any numbers x with its interval (Student's), from Σx and Σx² over n realisations."""
     n = np.asarray(n, dtype=float)
     value = _per_one(total, n)
@@ -130,7 +139,7 @@ def mean(total, square, n) -> Estimate:
     return Estimate(value, value - half, value + half)
 
 
-def mean_square(total, square, n, looks=1) -> Estimate:
+def mean_square(total: Values, square: Values, n: Values, looks: Values = 1) -> Estimate:
     """Mean of numbers q ≥ 0 that are sums of squares (NEES, NIS), from Σq and Σq² over n realisations.
 
     The interval of `root_mean_square`, squared: near a chi-square variable it covers better than Student's does.
@@ -138,7 +147,7 @@ def mean_square(total, square, n, looks=1) -> Estimate:
     return Estimate(*(np.square(end) for end in root_mean_square(total, square, n, looks)))
 
 
-def quantile(looks):
+def quantile(looks: Values) -> Values:
     """The normal quantile with which all of so many intervals or bounds hold in 95 % of runs, however dependent.
 
     Bonferroni: the 5 % are shared among them.
@@ -146,7 +155,7 @@ def quantile(looks):
     return np.vectorize(lambda n: NormalDist().inv_cdf(1 - 0.025 / n), otypes=[float])(np.maximum(looks, 1))
 
 
-def normalised_bounds(freedom, looks=1) -> tuple[np.ndarray, np.ndarray]:
+def normalised_bounds(freedom: Values, looks: Values = 1) -> tuple[np.ndarray, np.ndarray]:
     """Bounds of the mean normalised error squared (NEES, NIS per component) of a filter that is right about itself.
 
     freedom is realisations × components, of which the sum is chi-square; its quantiles are Wilson and Hilferty's. In
@@ -158,7 +167,9 @@ def normalised_bounds(freedom, looks=1) -> tuple[np.ndarray, np.ndarray]:
     return np.maximum(1 - ninth - step, 0) ** 3, (1 - ninth + step) ** 3
 
 
-def gain(square, fourth, base_square, base_fourth, cross, n) -> Estimate:
+def gain(
+    square: Values, fourth: Values, base_square: Values, base_fourth: Values, cross: Values, n: Values
+) -> Estimate:
     """Relative gain K = 100 (1 − σ/σ_base) in per cent (P1 eq. 17), paired: both errors are of the same realisations.
 
     From Σe², Σe⁴ of both and cross = Σ e²·e_base². The interval is that of the logarithm of the ratio of mean
@@ -172,7 +183,9 @@ def gain(square, fourth, base_square, base_fourth, cross, n) -> Estimate:
         return _gain(a, b, np.maximum(variance, 0) * _freed(n), n - 1)
 
 
-def gain_unpaired(square, fourth, n, base_square, base_fourth, base_n) -> Estimate:
+def gain_unpaired(
+    square: Values, fourth: Values, n: Values, base_square: Values, base_fourth: Values, base_n: Values
+) -> Estimate:
     """As `gain`, of two samples with noise of their own, n and base_n realisations."""
     with np.errstate(divide="ignore", invalid="ignore"):
         a, b = _per_one(square, n), _per_one(base_square, base_n)
@@ -181,13 +194,13 @@ def gain_unpaired(square, fourth, n, base_square, base_fourth, base_n) -> Estima
         return _gain(a, b, np.maximum(one, 0) + np.maximum(other, 0), np.minimum(n, base_n) - 1)
 
 
-def _freed(n):
+def _freed(n: Values) -> Values:
     """(n + 2) / (n − 1) / n: what makes m₄/m₂² − 1 of a Gaussian sample the variance of its mean square over m₂²."""
     n = np.asarray(n, dtype=float)
     return (n + 2) / np.maximum(n - 1, 0) / n
 
 
-def _gain(mean_square, base, log_variance, freedom) -> Estimate:
+def _gain(mean_square: Values, base: Values, log_variance: Values, freedom: Values) -> Estimate:
     ratio = np.sqrt(mean_square / base)
     # One realisation tells nothing of its spread: the interval is all there can be.
     step = np.where(np.asarray(freedom) > 0, 0.5 * student(freedom) * np.sqrt(log_variance), np.inf)
@@ -195,7 +208,7 @@ def _gain(mean_square, base, log_variance, freedom) -> Estimate:
     return Estimate(100 * (1 - ratio), 100 * (1 - ratio * factor), 100 * (1 - ratio / factor))
 
 
-def probability(total, square, n) -> Estimate:
+def probability(total: Values, square: Values, n: Values) -> Estimate:
     """Mean of values between 0 and 1 with its interval, from Σp and Σp² over n realisations.
 
     Wilson's score interval at the number of yes-or-no trials of the same variance, n·p(1−p)/var ≥ n: for zeros and
@@ -212,7 +225,7 @@ def probability(total, square, n) -> Estimate:
     return Estimate(p, np.clip(middle - half, 0, 1), np.clip(middle + half, 0, 1))
 
 
-def rate(count, n) -> Estimate:
+def rate(count: Values, n: Values) -> Estimate:
     """Share of n realisations in which something happened, with Wilson's interval."""
     return probability(count, count, n)
 

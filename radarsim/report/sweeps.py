@@ -107,17 +107,17 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
         if np.isfinite(grid).any():
             heat = Heat(x, y, grid, panels.with_unit(f"$\\sigma$ of {panels.letter(component)}", unit))
             ticks = [tuple((float(i), panels.number(v)) for i, v in enumerate(values)) for values in ranked]
-            axes = (Axis(axis.label, ticks=t) for axis, t in zip((x_axis, y_axis), ticks, strict=True))
-            made.append(Panel(*axes, (heat,), panels.literal(f)))
+            columns_axis, rows_axis = (Axis(one.label, ticks=t) for one, t in zip((x_axis, y_axis), ticks, strict=True))
+            made.append(Panel(columns_axis, rows_axis, (heat,), panels.literal(f)))
     if not made:
         return None
-    told = " and ".join(panels.plain(panels.symbol_of(key)) for key in keys)
-    caption = f"σ of {component} at the last scan over {told}, of {panels.realisations(members)} in each cell."
+    over = " and ".join(panels.plain(panels.symbol_of(key)) for key in keys)
+    caption = f"σ of {component} at the last scan over {over}, of {panels.realisations(members)} in each cell."
     columns = min(2, len(made))
     return Figure(
-        name, f"σ over {told}", caption, tuple(made), columns, panels.WIDE_MM if columns == 1 else PAGE_MM, 62
+        name, f"σ over {over}", caption, tuple(made), columns, panels.WIDE_MM if columns == 1 else PAGE_MM, 62
     )
 
 
-def _hashable(value):
+def _hashable(value: object) -> int | float | str:
     return value if isinstance(value, int | float | str) else str(value)

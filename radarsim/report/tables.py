@@ -5,21 +5,25 @@ when the first table is made.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import statistics
 
+if TYPE_CHECKING:
+    import pandas as pd
 
-def frame(columns: Mapping[str, Sequence]):
+
+def frame(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> "pd.DataFrame":
     """A DataFrame of the named columns, in their order."""
     import pandas as pd
 
     return pd.DataFrame(dict(columns))
 
 
-def joined(parts: Sequence[Mapping[str, np.ndarray]], columns: Sequence[str]):
+def joined(parts: Sequence[Mapping[str, np.ndarray]], columns: Sequence[str]) -> "pd.DataFrame":
     """One DataFrame of cases' columns set one below the other; the named columns alone where there is no case."""
     if not parts:
         return frame({name: [] for name in columns})
@@ -31,7 +35,7 @@ def names(values: Sequence[str], index: np.ndarray) -> np.ndarray:
     return np.array(list(values), dtype=object)[index]
 
 
-def shown(result: CaseResult, mask: np.ndarray | None = None):
+def shown(result: CaseResult, mask: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which rows of a case are written: indices (filter, scan, component), each (n,), ordered filter, component, scan.
 
     mask (F, K, C) narrows what is available.
@@ -53,7 +57,7 @@ CURVES = (
 )
 
 
-def curves(results: Sequence[CaseResult]):
+def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """σ with its interval, bias, spread and exact σ, by case, filter, component and scan (contract: curves.csv)."""
     return joined([_curves(result) for result in results], CURVES)
 
@@ -84,7 +88,7 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
 GAINS = ("case", "filter", "baseline", "component", "k", "t_s", "gain_percent", "gain_lo", "gain_hi", "exact_percent")
 
 
-def gains(results: Sequence[CaseResult]):
+def gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """Paired gains against the baseline filter, where both have an estimate (contract: gains.csv; P1 eq. 17)."""
     return joined([_gains(result) for result in results], GAINS)
 
@@ -115,7 +119,7 @@ def _gains(result: CaseResult) -> dict[str, np.ndarray]:
     }
 
 
-def to_csv(table) -> bytes:
+def to_csv(table: "pd.DataFrame") -> bytes:
     """A table as UTF-8 CSV: shortest numbers that read back the same, '\\n' ends, an empty cell for not-a-number.
 
     Several times faster than DataFrame.to_csv at the same text, and independent of pandas' version.
@@ -125,7 +129,7 @@ def to_csv(table) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def _cells(column) -> list[str]:
+def _cells(column: "pd.Series") -> list[str]:
     values = column.to_numpy()
     if values.dtype.kind == "b":
         return ["true" if value else "false" for value in values.tolist()]
@@ -137,11 +141,11 @@ def _cells(column) -> list[str]:
             texts[i] = ""
         return texts
     codes, distinct = column.factorize(use_na_sentinel=False)
-    texts = np.array([_text(value) for value in distinct], dtype=object)
-    return texts[codes].tolist() if codes.size else []
+    of_code = [_text(value) for value in distinct]
+    return [of_code[code] for code in codes.tolist()]
 
 
-def _text(value) -> str:
+def _text(value: object) -> str:
     return "" if value is None or value != value else _quoted(str(value))
 
 
@@ -151,6 +155,6 @@ def _quoted(text: str) -> str:
     return text
 
 
-def groups(table, *columns: str) -> dict:
+def groups(table: "pd.DataFrame", *columns: str) -> "dict[Any, pd.DataFrame]":
     """The rows of a table by the values of some columns, in the order of the table: {(case, filter, …): rows}."""
     return dict(iter(table.groupby(list(columns), sort=False)))

@@ -73,7 +73,7 @@ def folders() -> tuple[Path, ...]:
     for name in offered():
         try:
             folder = study(name).shipped()
-        except ConfigError:  # told when the study is asked for
+        except ConfigError:  # reported when the study itself is requested
             continue
         if folder is not None:
             found.append(folder)

@@ -1,4 +1,4 @@
-"""Whether the accuracies that a config states fit recorded plots: the filters' own innovations say so.
+"""Whether the accuracies that a config states fit recorded plots, judged by the filters' own innovations.
 
 A filter that is right about its errors has innovations whose squares, over the variance that it believes, are 1 on
 average per degree of freedom (NIS). More: the plots are worse than stated, or the target manoeuvres harder than the
@@ -12,9 +12,10 @@ from statistics import NormalDist
 import numpy as np
 
 from radarsim.config.experiment import Case
+from radarsim.config.fields import Model
 from radarsim.track.follow import Followed, Tally, recorded_of
 
-LEAST_TESTS = 10  # below which nothing is said
+LEAST_TESTS = 10  # below which there is no verdict
 CLOSE = 0.005  # of one, to which the mean is brought
 ROUNDS = 60
 FITS, SMALL, LARGE, UNKNOWN = "fits", "too small", "too large", "too few plots"
@@ -83,8 +84,10 @@ def better(case: Case, filter_name: str, columns: Mapping[str, np.ndarray]) -> d
         for key, factor in factors.items():
             trial = _set(trial, key, stated[key] * factor)
         track = of.tracker(replace(case, spec=trial)).feed(dict(columns))
-        off, change = [], {key: [] for key in factors}
+        off: list[float] = []
+        change: dict[str, list[float]] = {key: [] for key in factors}
         for q, (name, freedom) in enumerate(track.tested):
+            assert track.nis is not None  # what is tested has its NIS
             values = track.nis[0, :, q]
             values = values[np.isfinite(values)]
             if values.size >= LEAST_TESTS:
@@ -104,12 +107,12 @@ def better(case: Case, filter_name: str, columns: Mapping[str, np.ndarray]) -> d
     return {}
 
 
-def _get(spec, key: str) -> float:
+def _get(spec: Model, key: str) -> float:
     part, name = key.split(".")
-    return getattr(getattr(spec, part), name)
+    return float(getattr(getattr(spec, part), name))
 
 
-def _set(spec, key: str, value: float):
+def _set(spec: Model, key: str, value: float) -> Model:
     part, name = key.split(".")
     inner = getattr(spec, part)
     return spec.model_copy(update={part: inner.model_copy(update={name: value})})

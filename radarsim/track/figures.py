@@ -1,5 +1,7 @@
 """Figures of a track over recorded plots: estimates and plots, residuals, probabilities of the models."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from radarsim.engine.results import Track
@@ -19,7 +21,7 @@ def figures(track: Track) -> dict[str, Figure]:
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
-def _several(name: str, title: str, caption: str, made: list[Panel], keys=()) -> Figure:
+def _several(name: str, title: str, caption: str, made: list[Panel], keys: Sequence[tuple[str, Style]] = ()) -> Figure:
     """A figure of panels and, where there are keys, their legend in a cell of its own."""
     made = [*made, *([Panel(TIME, TIME, (), keys=tuple(keys))] if keys else [])]
     columns = min(3 if len(made) > 4 else 2, len(made))
@@ -50,8 +52,8 @@ def estimates(track: Track) -> Figure:
         for f, name in enumerate(track.filters[:MOST_FILTERS]):
             x, half = track.estimate[f, :, c], Z95 * track.sigma[f, :, c]
             if np.isfinite(x).any():
-                words = panels.literal(name)
-                marks.append(Line(track.t_s, x, "", Style(f, f), x - half, x + half, name=words))
+                label = panels.literal(name)
+                marks.append(Line(track.t_s, x, "", Style(f, f), x - half, x + half, name=label))
         if marks:
             y = Axis(panels.with_unit(panels.letter(component), unit), limits=_usual(track.estimate[..., c]))
             made.append(Panel(TIME, y, tuple(marks), direct=False))
@@ -70,17 +72,17 @@ def residuals(track: Track) -> Figure | None:
     made = []
     for d, (name, unit) in enumerate(track.measured):
         marks: list = [Reference(0.0)]
-        for f, words in enumerate(track.filters[:MOST_FILTERS]):
+        for f, filter_name in enumerate(track.filters[:MOST_FILTERS]):
             known = np.flatnonzero(np.isfinite(track.residual[f, :, d]))
             known = known[:: -(-max(known.size, 1) // MOST_DOTS)]
-            label = panels.literal(words)
+            label = panels.literal(filter_name)
             style = Style(f, None, f, size_pt=1.8)
             marks.append(Line(track.t_s[known], track.residual[f, known, d], "", style, name=label))
         if len(marks) > 1:
             axis = Axis(panels.with_unit(f"residual of {name.rpartition('_')[0]}", unit))
             made.append(Panel(TIME, axis, tuple(marks), direct=False))
     caption = "What each plot differs from the estimate after it. Around zero without a trend where the filter follows."
-    keys = [(panels.literal(words), Style(f, None, f)) for f, words in enumerate(track.filters[:MOST_FILTERS])]
+    keys = [(panels.literal(one), Style(f, None, f)) for f, one in enumerate(track.filters[:MOST_FILTERS])]
     return _several("residuals", "Residuals", caption, made, keys) if made else None
 
 
@@ -94,7 +96,7 @@ def probabilities(track: Track) -> Figure | None:
         if known.sum() > 1:
             marks = tuple(
                 Line(track.t_s, track.probability[f, :, m], f"model {m + 1}", Style(m, m))
-                for m in np.flatnonzero(known)
+                for m in np.flatnonzero(known).tolist()
             )
             y = Axis("probability", limits=(0, 1.02))
             made.append(Panel(TIME, y, marks, panels.literal(name), direct=False))

@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -23,7 +24,7 @@ from radarsim.track.rounding import Twin
 
 MOST_DRAWN = 2000  # rows kept for figures; of more, every second is dropped again and again
 GAP = 3.0  # intervals' median lengths that make a gap
-MOST_NAMED = 12  # configs or values told where one must be chosen
+MOST_NAMED = 12  # configs or values listed where one must be chosen
 HEAD = 5000  # rows that a better σ is looked for on
 
 
@@ -62,8 +63,8 @@ def choice(experiment: Experiment, command: str) -> str:
     each = {key: list({in_name(value): value for value in found}.values()) for key, found in values.items()}
     there = "; ".join(f"{key} = {listed([in_name(value) for value in found])}" for key, found in each.items())
     first = [shlex.quote(f"sweep.{key}={json.dumps(found[:1], ensure_ascii=False)}") for key, found in each.items()]
-    words = " ".join([command.format(named(experiment.path or experiment.stem)), *(f"--set {s}" for s in first)])
-    return f"choose of {there}: {words}"
+    chosen = " ".join([command.format(named(experiment.path or experiment.stem)), *(f"--set {s}" for s in first)])
+    return f"choose of {there}: {chosen}"
 
 
 def named(path: str) -> str:
@@ -73,9 +74,9 @@ def named(path: str) -> str:
     return shlex.quote(path if file.is_file() and not (found and found.samefile(file)) else file.stem)
 
 
-def listed(words: list[str]) -> str:
-    """Words one after the other; of very many the first."""
-    return ", ".join([*words[:MOST_NAMED], *(["…"] if len(words) > MOST_NAMED else [])])
+def listed(names: list[str]) -> str:
+    """Names one after the other; of very many the first."""
+    return ", ".join([*names[:MOST_NAMED], *(["…"] if len(names) > MOST_NAMED else [])])
 
 
 def simulated(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndarray]:
@@ -107,7 +108,7 @@ class Tally:
 
 @dataclass
 class Followed:
-    """What came of a file of plots: rows, time, gaps, missing values, tests; and what figures and checks need of it."""
+    """The filters over a file of plots: rows, time, gaps, missing values, tests; and what figures and checks need."""
 
     case: Case
     rows: int = 0
@@ -132,9 +133,10 @@ class Followed:
         self.estimating |= {name for name, some in zip(track.filters, estimates, strict=True) if some}
         for name, column in list(columns.items())[1:]:
             self.missing[name] = self.missing.get(name, 0) + int(np.isnan(column).sum())
+        nis = np.empty((len(track.filters), len(t), 0)) if track.nis is None else track.nis
         for q, (name, freedom) in enumerate(track.tested):
             for f, filter_name in enumerate(track.filters):
-                known = track.nis[f, :, q]
+                known = nis[f, :, q]
                 known = known[np.isfinite(known)]
                 tally = self.tallies.setdefault((filter_name, name), Tally(filter_name, name, freedom))
                 tally.count, tally.total = tally.count + known.size, tally.total + float(known.sum())
@@ -176,7 +178,7 @@ class Followed:
 def rows_of(track: Track, kept: np.ndarray) -> Track:
     """Some rows of a track, copied."""
     arrays = ("estimate", "sigma", "probability", "residual", "nis", "score")
-    some = {name: getattr(track, name)[:, kept] for name in arrays if getattr(track, name) is not None}
+    some: dict[str, Any] = {name: getattr(track, name)[:, kept] for name in arrays if getattr(track, name) is not None}
     return replace(track, t_s=track.t_s[kept], **some)
 
 
@@ -184,7 +186,7 @@ def joined(parts: list[Track]) -> Track:
     """Tracks one after the other."""
     arrays = ("estimate", "sigma", "probability", "residual", "nis", "score")
     first = parts[0]
-    whole = {
+    whole: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts], axis=1)
         for name in arrays
         if getattr(first, name) is not None

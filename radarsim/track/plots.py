@@ -10,6 +10,7 @@ import math
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,7 +18,10 @@ from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
 from radarsim.report.files import Writer
 
-MOST_FAULTS = 20  # told at once; a file of the wrong kind would have one in each row
+if TYPE_CHECKING:
+    import _csv
+
+MOST_FAULTS = 20  # reported at once; a file of the wrong kind would have one in each row
 LARGEST = 1e18  # of any number, as in configs
 SEPARATORS = {";": "semicolons", "\t": "tabulators"}  # of other programs
 DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
@@ -63,11 +67,12 @@ def place_of(path: str | os.PathLike, row: int) -> str:
 
 
 class _Reader:
-    """Header, then numbers, then the order of the times; faults are gathered."""
+    """Header, then numbers, then the order of the times; faults are collected."""
 
-    def __init__(self, path: str, rows, choices: Sequence[Sequence[str]], several: bool):
+    def __init__(self, path: str, rows: "_csv.Reader", choices: Sequence[Sequence[str]], several: bool):
         self.several = several
-        self.path, self.rows, self.faults, self.measured = path, rows, [], False
+        self.path, self.rows, self.measured = path, rows, False
+        self.faults: list[str] = []
         try:
             header = [name.strip() for name in next(rows, [])]
         except csv.Error as error:
@@ -172,7 +177,7 @@ def _chosen(path: str, header: list[str], choices: Sequence[Sequence[str]]) -> l
             return list(choice)
     allowed = " or ".join(", ".join(choice) for choice in choices)
     given = "".join(c if c.isprintable() else "�" for c in ", ".join(header)[:200])
-    between = next((words for sign, words in SEPARATORS.items() if len(header) == 1 and sign in header[0]), None)
+    between = next((name for sign, name in SEPARATORS.items() if len(header) == 1 and sign in header[0]), None)
     hint = f" (commas must stand between cells, not {between}, and a point in numbers)" if between else ""
     raise ConfigError(f"{path}:1: must have the columns {allowed}; got {given or 'nothing'}{hint}")
 
@@ -185,12 +190,14 @@ def header_of(track: Track) -> tuple[str, ...]:
     return (*names, *(f"probability_{m + 1}" for m in range(models)), *more)
 
 
-def rows_of(track: Track) -> Iterator[tuple]:
+def rows_of(track: Track) -> Iterator[tuple[str, ...]]:
     """Rows of a track: t_s, filter, component, unit, estimate, sigma, the models' probabilities, number and score."""
     for i, t in enumerate(track.t_s.tolist()):
         for f, name in enumerate(track.filters):
-            shares = () if track.probability is None else tuple(map(_cell, track.probability[f, i].tolist()))
-            if track.numbers is not None:
+            shares: tuple[str, ...] = ()
+            if track.probability is not None:
+                shares = tuple(map(_cell, track.probability[f, i].tolist()))
+            if track.numbers is not None and track.score is not None:
                 shares = (*shares, str(track.numbers[f]), _cell(float(track.score[f, i])))
             numbers = zip(track.estimate[f, i].tolist(), track.sigma[f, i].tolist(), track.components, strict=True)
             for estimate, sigma, (component, unit) in numbers:

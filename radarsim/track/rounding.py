@@ -9,6 +9,7 @@ its target magnifies any difference by itself.
 import numpy as np
 
 from radarsim.engine.results import Track
+from radarsim.studies.interface import Tracker
 
 STRETCH = 1 + 2.0**-33
 SIGMA, ESTIMATE, CHANCE = 1e-5, 1e-3, 1e-3  # that stretched times may change: of σ, in σ, in probability
@@ -20,9 +21,11 @@ LENGTHS = ("m", "rad")  # units of what is measured, and so never known exactly
 class Twin:
     """A second tracker beside the first, and where the longest interval before the first loss was."""
 
-    def __init__(self, tracker, period_s: float):
+    def __init__(self, tracker: Tracker, period_s: float):
         self.tracker, self.period_s, self.whole = tracker, period_s, tracker.most_rows is not None
-        self.origin = self.seen = self.usual = None  # first time; last time of each measured number; an interval
+        self.origin: float | None = None  # the first time
+        self.seen: list[float] = []  # the last time of each measured number
+        self.usual = np.inf  # the longest interval that is no gap
         self.rows, self.compared, self.gap_s, self.gap_row = 0, 0, 0.0, 0
 
     def lost(self, columns: dict[str, np.ndarray], track: Track) -> bool:
@@ -32,7 +35,7 @@ class Twin:
         """
         t, *measured = columns.values()
         if self.origin is None:
-            self.origin, self.seen = t[0], [t[0]] * len(measured)
+            self.origin, self.seen = float(t[0]), [float(t[0])] * len(measured)
             rises = np.diff(t)[np.diff(t) > 0]
             self.usual = min(WIDE * np.median(rises) if rises.size else np.inf, PERIODS * self.period_s)
         steps = self._steps(t, measured)
@@ -54,10 +57,10 @@ class Twin:
         """The time (n,) since the row that last had what a row has: the longest of its numbers, zero where none."""
         longest = np.zeros(len(t))
         for j, column in enumerate(measured):
-            came = np.isfinite(column)
-            until = np.maximum.accumulate(np.where(came, t, self.seen[j]))
+            present = np.isfinite(column)
+            until = np.maximum.accumulate(np.where(present, t, self.seen[j]))
             before = np.concatenate([[self.seen[j]], until[:-1]])
-            longest, self.seen[j] = np.maximum(longest, np.where(came, t - before, 0.0)), until[-1]
+            longest, self.seen[j] = np.maximum(longest, np.where(present, t - before, 0.0)), float(until[-1])
         return longest
 
     def _after(self, wide: np.ndarray) -> np.ndarray:
@@ -80,6 +83,6 @@ def unlike(track: Track, other: Track) -> np.ndarray:
         bad |= known & (np.abs(sigma - other.sigma) > SIGMA * sigma)
         bad |= known & (sigma > 0) & (np.abs(track.estimate - other.estimate) > ESTIMATE * sigma)
         rows = bad.any(axis=(0, 2))
-        if track.probability is not None:
+        if track.probability is not None and other.probability is not None:
             rows |= (np.abs(track.probability - other.probability) > CHANCE).any(axis=(0, 2))
     return rows

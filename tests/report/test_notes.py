@@ -10,11 +10,11 @@ from radarsim.report.statistics import FEW, FEW_EVENTS, FEW_HEAVY
 
 def test_words():
     n = np.array([1.0, FEW - 1, FEW, FEW_HEAVY - 1, FEW_HEAVY])
-    assert list(map(bool, notes.words_on(n))) == [True, True, True, True, False]
-    assert notes.words_on(n)[1] == f"under {FEW} realisations"
-    assert "heavy tails" in notes.words_on(n)[2]
+    assert list(map(bool, notes.notes_on(n))) == [True, True, True, True, False]
+    assert notes.notes_on(n)[1] == f"under {FEW} realisations"
+    assert "heavy tails" in notes.notes_on(n)[2]
     events = np.array([0.0, FEW_EVENTS - 1, FEW_EVENTS])
-    assert list(map(bool, notes.words_on(np.full(3, 1e6), events))) == [True, True, False]
+    assert list(map(bool, notes.notes_on(np.full(3, 1e6), events))) == [True, True, False]
 
 
 @pytest.mark.parametrize(("count", "noted"), [(50, "under 200"), (500, "heavy tails?"), (1000, None)])

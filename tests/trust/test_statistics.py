@@ -119,7 +119,7 @@ def test_rates_cover_exactly(n):
     """No simulation: Wilson's coverage is a sum of binomial chances, at every rate whose expected count is no few."""
     count = np.arange(n + 1)
     of = statistics.rate(count, n)
-    assert not any(notes.words_on(np.array([1000.0]), np.array([20.0])))
+    assert not any(notes.notes_on(np.array([1000.0]), np.array([20.0])))
     for p in np.linspace(statistics.FEW_EVENTS / n, min(0.5, 200 / n), 300):
         near = slice(max(0, int(n * p) - 400), int(n * p) + 400)
         chance = binom.pmf(count[near], n, p)

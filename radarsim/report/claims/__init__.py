@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import tables as common
 from radarsim.report.claims.paper import Described, Shipped, described, own_members
 from radarsim.report.statistics import Estimate, difference
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PAPERS = {
     "P1": "Gorshkov & Zavizhenets 2017",
@@ -213,35 +216,36 @@ class Evidence:
         """The members of a list of a case that are the paper's, each with its number; not those that were added."""
         return [(i, one) for i, one in enumerate(getattr(result.spec, key)) if i in self._places[result.name][key]]
 
-    def case(self, key) -> CaseResult:
+    def case(self, key: Any) -> CaseResult:
         """The case that a key means; raises Missing where the experiment does not hold it. Here: by name."""
         for result in self.results:
             if result.name == key:
                 return result
         raise Missing(key)
 
-    def curve(self, key, filter_name: str, component: str) -> Series:
+    def curve(self, key: Any, filter_name: str, component: str) -> Series:
         """σ(k) of a filter of a case."""
         return self._series(self._curves, key, filter_name, component, ("sigma", "sigma_lo", "sigma_hi"))
 
-    def gain(self, key, filter_name: str, component: str) -> Series:
+    def gain(self, key: Any, filter_name: str, component: str) -> Series:
         """Relative gain of a filter of a case against its baseline, %."""
         return self._series(self._gains, key, filter_name, component, ("gain_percent", "gain_lo", "gain_hi"))
 
-    def _series(self, groups: Mapping, key, filter_name: str, component: str, values: tuple[str, ...]) -> Series:
+    def _series(self, groups: Mapping, key: Any, filter_name: str, component: str, values: tuple[str, ...]) -> Series:
         rows = groups.get((self.case(key).name, filter_name, component))
         if rows is None:
             raise Missing(key)
         return Series(*(rows[name].to_numpy() for name in ("k", "t_s", *values)))
 
-    def row(self, table: str, **equal) -> Mapping:
+    def row(self, table: str, **equal: object) -> Mapping[str, Any]:
         """The one row of a table with these values; raises Missing."""
         rows = self.tables[table]
         for name, value in equal.items():
             rows = rows[rows[name] == value]
         if not len(rows):
             raise Missing(equal)
-        return rows.iloc[0]
+        first: Any = rows.iloc[0]  # a Series, read as a mapping
+        return first
 
 
 @dataclass(frozen=True)
@@ -282,7 +286,9 @@ CLAIMED = (
 NUMBERS = ("measured", "lo", "hi", "expected_lo", "expected_hi")  # of these columns; empty where there is none
 
 
-def judged(of: PaperClaims | None, results: Sequence[CaseResult], made: Mapping, shipped: Shipped):
+def judged(
+    of: PaperClaims | None, results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", shipped: Shipped
+) -> "pd.DataFrame":
     """claims.csv: a row for each part of each claim that these results can judge, those of whole claims only.
 
     A claim sees only the cases that are the paper's: those of its config, which `shipped` gives by its stem.
@@ -321,7 +327,7 @@ class _Papers:
         return self._of.evidence([result for result in self._results if result.name in places], made, places)
 
 
-def _of_cases(table, names: set[str]):
+def _of_cases(table: "pd.DataFrame", names: set[str]) -> "pd.DataFrame":
     """The rows of a table that belong to cases of these names, or to none."""
     return table[table["case"].isin(names)] if "case" in table else table
 

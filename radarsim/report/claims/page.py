@@ -90,13 +90,13 @@ def measured(row: Mapping) -> str:
     value, lo, hi = (float(row[name]) for name in ("measured", "lo", "hi"))
     half = (hi - lo) / 2
     if not 0 < half < math.inf:
-        said = f"{value:.4g}".replace("inf", "∞")
+        text = f"{value:.4g}".replace("inf", "∞")
     else:
         whole = all(one == round(one) for one in (value, lo, hi))
         place = 0 if whole else max(0, 1 - math.floor(math.log10(half)))
-        value, lo, hi = (f"{round(one, place) + 0.0:.{place}f}" for one in (value, lo, hi))
-        said = f"{value} [{lo}, {hi}]"
-    return f"{said} {row['unit']}".rstrip().replace("-", "\N{MINUS SIGN}")
+        middle, low, high = (f"{round(one, place) + 0.0:.{place}f}" for one in (value, lo, hi))
+        text = f"{middle} [{low}, {high}]"
+    return f"{text} {row['unit']}".rstrip().replace("-", "\N{MINUS SIGN}")
 
 
 def _cell(text: str) -> str:
