@@ -29,6 +29,7 @@ mutants: $(VENV)/tested
 lint: $(VENV)/tested
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python -m mypy
 
 smoke: $(VENV)/installed
 	$(BIN)/python -m radarsim.cli.reproduce $(SMOKE) --set realisations=200 $(SMOKE_FLAGS)

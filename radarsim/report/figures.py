@@ -40,7 +40,7 @@ EXACT: dict[str, Any] = {
     "markersize": 4.2,
     "markeredgewidth": 0.6,
 }
-STYLE: dict[str, Any] = {
+STYLE: dict[Any, Any] = {  # Matplotlib names every key that it knows as a type of its own
     "font.family": "DejaVu Sans",
     "font.size": 7.5,
     "axes.titlesize": 8,

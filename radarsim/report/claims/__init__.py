@@ -96,7 +96,7 @@ class Part:
     cases: tuple
     what: str
     unit: str
-    measure: Callable[["Evidence"], Estimate]
+    measure: Callable[[Any], Estimate]  # of the evidence of the study, a subclass of Evidence
     expected: Range
 
 
@@ -131,7 +131,7 @@ class Series:
         """The i-th point."""
         return Estimate(float(self.value[i]), float(self.lo[i]), float(self.hi[i]))
 
-    def where(self, mask: np.ndarray) -> "Series":
+    def where(self, mask: np.ndarray | slice) -> "Series":
         """The points that a mask or indices pick; raises Missing where there is none."""
         if not np.asarray(self.k)[mask].size:
             raise Missing("no such scans")
