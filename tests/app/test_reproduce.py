@@ -45,7 +45,7 @@ def test_a_process_that_dies_is_told_and_replaced(tmp_path):
         process.wait()
     assert "ended with -9" in lost.faults[0]
     assert not again.faults
-    assert "claims: " in again.words
+    assert "claims: " in again.summary
 
 
 def test_a_signal_ends_it_and_its_processes_in_time(tmp_path):

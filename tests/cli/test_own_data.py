@@ -353,7 +353,7 @@ def test_help_of_ones_own_data_teaches_with_an_example(command):
 
 def test_help_is_grouped():
     text = radarsim("--help").stdout
-    order = [text.index(f"\n{title}:\n") for title in ("Run", "Read", "Own data", "House")]
+    order = [text.index(f"\n{title}:\n") for title in ("Run", "Read", "Own data", "Maintenance")]
     assert order == sorted(order)
     assert set(main.commands) == {name for names in group.SECTIONS.values() for name in names}
 
