@@ -113,7 +113,7 @@ def track(
     with contextlib.ExitStack() as stack:
         write = stack.enter_context(Writer(output, read)).write if output else findings.echo
         followed = recorded.follow(loaded, plots, sink)
-    drawn = recorded.draw(followed, figures, [plots, loaded.path]) if figures else []
+    drawn = recorded.draw(followed, figures, [plots, *([loaded.path] if loaded.path else [])]) if figures else []
     if not quiet:
         findings.report(followed, accuracy.judged(followed), stderr=output is None)
     if output:

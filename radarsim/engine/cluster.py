@@ -17,7 +17,7 @@ from functools import lru_cache
 from itertools import count
 from queue import Empty, SimpleQueue
 from types import ModuleType, TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from radarsim.engine.blocks import Node, Partial, Work
 from radarsim.engine.executors import Outcome, attempted
@@ -278,9 +278,10 @@ def _for_workers(security: "Security") -> str:
     """Settings that a worker takes from its environment, which other users of the machine cannot read."""
     import dask
 
-    own = {"cert": security.tls_worker_cert, "key": security.tls_worker_key}
-    comm = {"require-encryption": True, "tls": {"ca-file": security.tls_ca_file, "worker": own}}
-    return dask.config.serialize({"distributed": {"comm": comm}})
+    given: Any = security  # its attributes are made from a list of names, which its types do not show
+    own = {"cert": given.tls_worker_cert, "key": given.tls_worker_key}
+    comm = {"require-encryption": True, "tls": {"ca-file": given.tls_ca_file, "worker": own}}
+    return str(dask.config.serialize({"distributed": {"comm": comm}}))
 
 
 class _Processes:

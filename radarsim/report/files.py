@@ -18,10 +18,12 @@ import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
+from typing import Self
 
 from radarsim.errors import ConfigError, StoreError
 
+fcntl: ModuleType | None
 try:
     import fcntl
 except ImportError:  # not a POSIX system: nothing is locked
@@ -53,18 +55,18 @@ def replace_all(
     written: dict[Path, Path] = {}
     try:
         try:
-            for path, data in contents.items():
-                written[folder / path] = beside(folder / path)
-                written[folder / path].parent.mkdir(parents=True, exist_ok=True)
-                written[folder / path].write_bytes(data)
+            for name, data in contents.items():
+                temporary = written[folder / name] = beside(folder / name)
+                temporary.parent.mkdir(parents=True, exist_ok=True)
+                temporary.write_bytes(data)
             with locked(folder):
                 gone = set(stale(folder)) - set(contents)
                 for path, temporary in written.items():
                     _refuse_special(path)
                     rename(temporary, path)
-                for path in gone:
-                    if not Path(path).is_absolute() and ".." not in Path(path).parts:
-                        (folder / path).unlink(missing_ok=True)
+                for name in gone:
+                    if not Path(name).is_absolute() and ".." not in Path(name).parts:
+                        (folder / name).unlink(missing_ok=True)
         finally:
             for temporary in written.values():
                 temporary.unlink(missing_ok=True)

@@ -79,7 +79,7 @@ def outputs(folder: Path) -> list[str]:
     return [path for path in named if isinstance(path, str)] if isinstance(named, dict) else []
 
 
-def replaced(folder: Path, experiment) -> list[str]:
+def replaced(folder: Path, experiment: Experiment) -> list[str]:
     """A warning where a folder holds the results of another config, which has the same name."""
     record = earlier(folder)
     before, now = record.get("config_path"), path_of(experiment)
@@ -88,14 +88,14 @@ def replaced(folder: Path, experiment) -> list[str]:
     return [f"{folder}: held the results of another config of this name, {before}; they are replaced"]
 
 
-def path_of(experiment) -> str:
+def path_of(experiment: Experiment) -> str:
     """The file of a config, as text that can be written."""
     if experiment.path is None:
         return "a mapping in Python"
     return os.fsencode(os.path.abspath(experiment.path)).decode("utf-8", "backslashreplace")
 
 
-def _asked(resolved: object) -> object:
+def _asked(resolved: Any) -> object:
     """A resolved config without how often and with which seed it is run."""
     try:
         cases = [{key: case[key] for key in case if key not in ("realisations", "seed")} for case in resolved["cases"]]
