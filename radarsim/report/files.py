@@ -125,6 +125,7 @@ def _key(folder: Path) -> tuple[int, int] | None:
 
 
 def _wait_for(descriptor: int, folder: Path) -> None:
+    assert fcntl is not None  # or nobody waits, see `locked`
     end = time.monotonic() + WAIT_S
     while True:
         try:
