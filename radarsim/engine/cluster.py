@@ -274,7 +274,7 @@ class Cluster:
             logging.disable(logging.NOTSET)
 
 
-def _for_workers(security: "Security") -> str:
+def _for_workers(security: Any) -> str:  # whose fields Dask makes at run time
     """Settings that a worker takes from its environment, which other users of the machine cannot read."""
     import dask
 
