@@ -50,11 +50,12 @@ from radarsim.studies.sonar.clutter.kernels.field import (
     with_false_plots,
     with_plot,
 )
+from radarsim.studies.sonar.clutter.kernels.sums import add_ahead, add_errors, add_ratio, add_scores
 from radarsim.studies.sonar.clutter.kernels.tracks import Tracks, clear, predict, update
 from radarsim.studies.sonar.kernels.patterns import detect
 from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK
-from radarsim.studies.sonar.kernels.sums import Counted, Course, Estimate, add_sums, ahead_sums
+from radarsim.studies.sonar.kernels.sums import Counted, Course
 
 NONE, TENTATIVE, CONFIRMED = range(3)
 # Rows of a track's status: state, scans since its first plot, plots taken, misses in a row, time since the last plot,
@@ -326,49 +327,6 @@ def judge_false(trackers, f, n, tracks, status, begun):
     return left
 
 
-# ---- sums ---------------------------------------------------------------------------------------------------------
-@part
-def add_scores(thresholds, n, status, scores):
-    """How many first tracks' scores reached each threshold, and how many first tracks there were."""
-    for i in range(n):
-        if status[FIRST, i] >= 0.0:
-            scores[thresholds.size] += 1.0
-            for t in range(thresholds.size):
-                scores[t] += status[BEST, i] >= thresholds[t]
-
-
-@part
-def add_ratio(a, b, n, ratio):
-    """Σa, Σa², Σb, Σb², Σab over n realisations."""
-    for i in range(n):
-        one, other = a[i], b[i]
-        ratio[0] += one
-        ratio[1] += one * one
-        ratio[2] += other
-        ratio[3] += other * other
-        ratio[4] += one * other
-
-
-@part
-def add_errors(trackers, tracks, f, k, course, counted, out, sums):
-    """Add the errors of the tracks kept of tracker f at scan k, in range and in bearing; out (7,) is scratch."""
-    size = tracks.x.shape[0]  # two, but as a number known to the compiler all that is inlined would be compiled twice
-    for c in range(size):
-        estimate = Estimate(tracks.x[c], tracks.P[c], size, tracks.x[c], 0)
-        units = (trackers.sigma[c], trackers.period)
-        add_sums(estimate, Course(course.truth[c], course.shift[c]), counted, units, (f, k, c), out, sums)
-
-
-@part
-def add_ahead(tracks, f, k, dt, course, counted, out, sums):
-    """Add the errors of tracker f at scan k of what was extrapolated from scan k - 1."""
-    size = tracks.x.shape[0]
-    for c in range(size):
-        ahead_sums(tracks.x[c], size, Course(course.truth[c], course.shift[c]), counted, dt, out)
-        for power in range(4):
-            sums.ahead[f, k - 1, c, power] += out[power]
-
-
 # ---- a block ------------------------------------------------------------------------------------------------------
 @kernel
 def simulate_block(world, observation, field, trackers, work, first, total, sums):
@@ -402,7 +360,7 @@ def simulate_block(world, observation, field, trackers, work, first, total, sums
         for f in range(F):
             add_ratio(status[f, ENDS], status[f, HELD], n, sums.ratios[f, ENDS_PER_SCAN])
             add_ratio(status[f, WRONG], status[f, TAKEN], n, sums.ratios[f, WRONG_PER_PLOT])
-            add_scores(trackers.thresholds, n, status[f], sums.scores[0, f])
+            add_scores(trackers.thresholds, n, status[f, FIRST], status[f, BEST], sums.scores[0, f])
 
 
 @kernel
@@ -428,4 +386,4 @@ def simulate_false(key, field, trackers, work, dt, first, total, sums):
                 step(trackers, f, field, Scan(first + done, n, k, dt[k]), tracks, target, work, counts)
                 if not judge_false(trackers, f, n, tracks, status, sums.begun[f, k]):
                     break
-            add_scores(trackers.thresholds, n, status, sums.scores[1, f])
+            add_scores(trackers.thresholds, n, status[FIRST], status[BEST], sums.scores[1, f])
