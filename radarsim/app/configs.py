@@ -6,8 +6,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from radarsim.config import json_schema, lookup, own
 from radarsim.config import load as reading
+from radarsim.config import lookup, own
 from radarsim.config.experiment import Experiment
 from radarsim.config.fields import Model
 from radarsim.errors import ConfigError
@@ -55,4 +55,6 @@ def new(name: str, like: str | os.PathLike[str], folder: str | os.PathLike[str] 
 
 def schema_json() -> str:
     """JSON Schema of the YAML, of all studies, as text."""
+    from radarsim.config import json_schema  # pydantic's part takes a tenth of a second to load
+
     return json_schema.schema_json(registry)

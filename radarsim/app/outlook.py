@@ -1,15 +1,13 @@
-"""What running an experiment would take, and what there is to run."""
+"""What running an experiment would take."""
 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from radarsim.app.simulation import NO_CONTROL, check_precision, result_of
 from radarsim.app.work import CaseWork
-from radarsim.config import lookup
 from radarsim.config.experiment import Experiment
 from radarsim.engine.collect import collect
 from radarsim.engine.executors import available_cores
@@ -148,32 +146,3 @@ def timed(work: CaseWork, count: int) -> float:
         work.simulate(0, count)
         seconds.append(time.thread_time() - started)
     return min(seconds)
-
-
-def described(file: Path | None) -> str:
-    """The first line of a YAML file's leading comment, without its own name; empty where there is no such file."""
-    if file is None:
-        return ""
-    with file.open(encoding="utf-8") as lines:
-        for line in lines:
-            comment = line.lstrip("#").strip()
-            if not line.startswith("#"):
-                break
-            if not comment.startswith("yaml-language-server"):
-                return comment.partition(" — ")[2] or comment
-    return ""
-
-
-def inventory() -> Inventory:
-    """What `radarsim list` shows: title, columns and rows of configs, scenarios, studies and filters."""
-    configs = [(stem, described(lookup.config_file(stem))) for stem in lookup.stems("configs")]
-    scenarios = [(stem, described(lookup.scenario_file(stem, None))) for stem in lookup.stems("scenarios")]
-    studies = [registry.study(name) for name in registry.names()]
-    about = [(study.name, study.about) for study in studies]
-    filters = [(study.name, key, text) for study in studies for key, text in study.filters.items()]
-    return [
-        ("Configs (radarsim run NAME)", ("name", "what it is"), configs),
-        ("Scenarios (target: NAME)", ("name", "what it is"), scenarios),
-        ("Studies (study: NAME)", ("name", "paper and question"), about),
-        ("Filters", ("study", "keys", "what it is"), filters),
-    ]

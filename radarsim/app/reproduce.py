@@ -202,7 +202,7 @@ def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
 
     index.write(Path(out))  # two processes may have written it at once, one without the other's run
     rows = experiment.claims((), out)
-    overall = Counter({row["claim"]: row["overall"] for row in rows}.values())
+    overall = Counter({(row["paper"], row["claim"]): row["overall"] for row in rows}.values())
     longest = max(done, key=lambda one: one.seconds)
     failed = [one.stem for one in done if one.faults]
     guide = Path(out) / "README.md"

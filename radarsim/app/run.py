@@ -27,7 +27,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.engine.stopping import Signals, Stop
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.report import files
-from radarsim.report.claims import Claim
+from radarsim.report.claims import PaperClaims
 from radarsim.studies import registry
 
 
@@ -292,10 +292,9 @@ def finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def all_claims() -> list[Claim]:
-    """Every claim of every paper, in the order of the studies."""
-    every = (registry.study(name).claims() for name in registry.names())
-    return [claim for of in every if of is not None for claim in of.claims]
+def papers() -> list[PaperClaims]:
+    """The claims of every paper, in the order of the studies."""
+    return [of for of in registry.parts(lambda study: study.claims()).values() if of is not None]
 
 
 def claims(configs: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, Any]]:
@@ -303,16 +302,17 @@ def claims(configs: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str
 
     Each row has the columns of claims.csv and `config`. Raises ConfigError for a config that does not exist.
     """
-    from radarsim.report import claims as papers
+    from radarsim.report.claims import listed
 
-    stems = [one.stem for one in load_all(configs)] or sorted({claim.config for claim in all_claims()})
+    every = papers()
+    stems = [one.stem for one in load_all(configs)] or sorted({claim.config for of in every for claim in of.claims})
     held = {stem: rows for stem in stems if (rows := stored_claims.stored(Path(out) / stem / "claims.csv")) is not None}
     if not configs:
-        return papers.listed(all_claims(), held)
+        return listed(every, held)
     rows = []
     for stem in stems:
         if stem in held:
             rows += [row | {"config": stem} for row in held[stem]]
         else:
-            rows += [row for row in papers.listed(all_claims(), {}) if row["config"] == stem]
+            rows += [row for row in listed(every, {}) if row["config"] == stem]
     return rows

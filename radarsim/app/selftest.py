@@ -4,6 +4,7 @@ radarsim/app/known holds for each study (the sonar is three) a config, and the t
 platform.json. Elsewhere (instruction set, compiler, BLAS, mathematical library) the last bits differ: an ulp here and
 there, which the arithmetic after it magnifies by its condition number κ. So a number may differ by what κ allows, see
 `Tolerance`. `make known` makes the tables anew, after a change that is meant to change numbers.
+A study of an installed package has its known answers in tests of its own; here it is only loaded.
 """
 
 import csv
@@ -77,9 +78,14 @@ def tables(study: str) -> dict[str, bytes]:
 
 
 def verdicts() -> list[Verdict]:
-    """One for each study."""
+    """One for each study. A package that cannot be used is reported; it is no damage."""
     same_platform = platform() == json.loads((KNOWN / "platform.json").read_text())
-    return [verdict(study, tables(study), same_platform) for study in TOLERANCES]
+    broken = registry.unusable()
+    return [
+        *(verdict(study, tables(study), same_platform) for study in TOLERANCES),
+        *(Verdict(name, True, f"{registry.package(name)}: loads") for name in registry.offered() if name not in broken),
+        *(Verdict(name, True, f"cannot be used: {words}") for name, words in broken.items()),
+    ]
 
 
 def verdict(study: str, made: dict[str, bytes], same_platform: bool) -> Verdict:

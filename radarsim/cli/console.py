@@ -254,8 +254,8 @@ def print_claims(rows: Sequence[dict[str, Any]]) -> None:
 
     if sys.stdout.isatty():
         cells = []
-        for claim in dict.fromkeys(row["claim"] for row in rows):
-            own = [row for row in rows if row["claim"] == claim]
+        for paper, claim in dict.fromkeys((row["paper"], row["claim"]) for row in rows):
+            own = [row for row in rows if (row["paper"], row["claim"]) == (paper, claim)]
             first, done = own[0], own[0]["overall"] != "not run"
             measured = "\n".join(page.measured(row) for row in own) if done else f"radarsim run {first['config']}"
             cells.append((claim, first["statement"], first["place"], measured, first["overall"], first["config"]))
@@ -271,9 +271,9 @@ def print_claims(rows: Sequence[dict[str, Any]]) -> None:
 def _print_claim_lines(rows: Sequence[dict[str, Any]], measured: Callable[[Mapping[str, Any]], str]) -> None:
     last = None
     for row in rows:
-        if row["claim"] != last:
-            last = row["claim"]
-            say(f"{last:<6} {row['overall']:<20} {row['statement']}  [{row['paper']}, {row['place']}]")
+        if (row["paper"], row["claim"]) != last:
+            last = row["paper"], row["claim"]
+            say(f"{row['claim']:<6} {row['overall']:<20} {row['statement']}  [{row['paper']}, {row['place']}]")
             if row["overall"] == "not run":
                 say(f"       radarsim run {row['config']}")
         if row["overall"] != "not run":

@@ -241,6 +241,6 @@ def claims(configs: tuple[str, ...], out: str, as_json: bool, markdown: bool) ->
     elif markdown:
         from radarsim.report.claims import page
 
-        click.echo(page.page(rows), nl=False)
+        click.echo(page.page(rows, {of.paper: of.page for of in experiment.papers()}), nl=False)
     else:
         console.print_claims(rows)

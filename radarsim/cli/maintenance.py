@@ -17,13 +17,13 @@ def list_(as_json: bool) -> None:
       radarsim list --json | jq -r '.configs[].name'
     """
     from radarsim.app import documents
-    from radarsim.app import outlook as overview
+    from radarsim.app.inventory import inventory
     from radarsim.cli import console
 
     if as_json:
-        click.echo(documents.text(documents.inventory(overview.inventory())))
+        click.echo(documents.text(documents.inventory(inventory())))
     else:
-        console.print_inventory(overview.inventory())
+        console.print_inventory(inventory())
 
 
 @main.command()

@@ -251,6 +251,18 @@ class Study(Model):
     bare_keys: ClassVar[str] = "filters"
     figure_names: ClassVar[tuple[str, ...] | None] = None
 
+    @property
+    def device(self) -> str | None:
+        """The display name of what measures: of the first part of the config that has a name."""
+        parts = (getattr(self, key) for key in type(self).model_fields)
+        named = (part.name for part in parts if isinstance(part, Model) and "name" in type(part).model_fields)
+        return next(filter(None, named), None)
+
+    @property
+    def members(self) -> tuple[Any, ...]:
+        """The list that `bare_keys` names: the filters of a case."""
+        return getattr(self, self.bare_keys)
+
     @cross_check
     def _names_exist(self) -> Iterator[At]:
         for field, info in type(self).model_fields.items():

@@ -15,7 +15,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 def schema(studies: Studies) -> dict[str, Any]:
     """JSON Schema of a config, of one of the studies or an `include` of others, and of a scenario."""
-    models = {name: studies.keys(name) for name in studies.names()}
+    models = {name: studies.keys(name) for name in studies.usable()}
     described: tuple[type[BaseModel], ...] = (Common, *models.values())
     wanted: list[tuple[type[BaseModel], Literal["validation"]]] = [(model, "validation") for model in described]
     references, whole = models_json_schema(wanted, ref_template="#/$defs/{model}")

@@ -42,6 +42,9 @@ class Studies(Protocol):
     def names(self) -> tuple[str, ...]:
         """The values that `study:` may have."""
 
+    def usable(self) -> tuple[str, ...]:
+        """Those of them whose keys can be read; a package from outside may be broken."""
+
     def has(self, name: str) -> bool:
         """Whether there is a study of that name."""
 

@@ -16,7 +16,6 @@ PLAIN = re.compile(r"[A-Za-z_][\w+ .*-]*")  # text that YAML reads as text witho
 RESERVED = {"true", "false", "null", "yes", "no", "on", "off", "none"}
 COLUMN = 44  # at which comments begin
 WIDTH = 110
-DEVICES = ("radar", "sensor")  # whose display name is the config's
 DEGREES = {"rad": "degrees", "rad/s": "degrees per second"}
 
 
@@ -31,7 +30,9 @@ def starter(data: Mapping[str, Any], study_keys: type[Model], name: str, like: s
     ]
     common = {key: value for key, value in data.items() if key in COMMON_KEYS}
     own = {key: value for key, value in data.items() if key not in COMMON_KEYS}
-    own = {key: {**value, "name": name} if key in DEVICES and "name" in value else value for key, value in own.items()}
+    # What has a display name (a radar, a sensor) is called as the config is.
+    named = {key: value for key, value in own.items() if isinstance(value, Mapping) and "name" in value}
+    own |= {key: {**value, "name": name} for key, value in named.items()}
     for key in ("study", "include"):
         if key in common:
             lines += _entry(key, common.pop(key), Common, "")

@@ -56,11 +56,7 @@ def stem(result: CaseResult) -> str:
 
 def device(result: CaseResult) -> str:
     """What a case's sensor is called: the display name, else the config's stem."""
-    for part in ("radar", "sensor", "sonar"):
-        name = getattr(getattr(result.spec, part, None), "name", None)
-        if name:
-            return literal(name)
-    return stem(result)
+    return literal(result.spec.device) if result.spec.device else stem(result)
 
 
 def swept(result: CaseResult) -> str:

@@ -119,8 +119,7 @@ class Study(ABC):
 
     def relabelled(self, axes: "Axes", case: "Case") -> "Axes":
         """The axes of a plan with the display names of a case that has the same identity. Default: names of filters."""
-        members = getattr(case.spec, case.spec.bare_keys)
-        return replace(axes, filters=tuple(member.name for member in members))
+        return replace(axes, filters=tuple(member.name for member in case.spec.members))
 
     def seconds_per_update(self, plan: Any) -> Mapping[str, float]:
         """CPU seconds of one update of one realisation, by filter. Default: not measured."""

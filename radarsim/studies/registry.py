@@ -1,18 +1,23 @@
 """The studies there are: those shipped here, and those that installed packages offer.
 
 A package offers a study by an entry point of the group `radarsim.studies`: its name is the value of `study:` in YAML,
-its target the declared object, see `radarsim.studies.interface.Study`.
+its target the declared object, see `radarsim.studies.interface.Study`. A package that cannot be used is an error only
+where its study is asked for: lists of all studies leave it out, and `unusable` says why.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from typing import TypeVar
 
 from radarsim.config.fields import Study as Keys
-from radarsim.errors import ConfigError
+from radarsim.config.schema import COMMON_KEYS
+from radarsim.errors import ConfigError, RadarsimError
 from radarsim.studies.interface import Study
+
+Part = TypeVar("Part")
 
 GROUP = "radarsim.studies"
 SHIPPED = {  # in the order of the papers
@@ -24,14 +29,22 @@ SHIPPED = {  # in the order of the papers
 
 
 @cache
-def offered() -> Mapping[str, EntryPoint]:
-    """The studies of installed packages by name; a name that is shipped here is not taken over."""
-    return {entry.name: entry for entry in entry_points(group=GROUP) if entry.name not in SHIPPED}
+def entries() -> Mapping[str, Mapping[str, EntryPoint]]:
+    """What installed packages offer: by the study's name, and of each name by the package's."""
+    found: dict[str, dict[str, EntryPoint]] = {}
+    for entry in sorted(entry_points(group=GROUP)):
+        found.setdefault(entry.name, {}).setdefault(entry.dist.name if entry.dist else entry.value, entry)
+    return found
+
+
+def offered() -> tuple[str, ...]:
+    """The names of the studies of installed packages; a name that is shipped here is not taken over."""
+    return tuple(name for name in entries() if name not in SHIPPED)
 
 
 def names() -> tuple[str, ...]:
     """The values that `study:` may have."""
-    return (*SHIPPED, *sorted(offered()))
+    return (*SHIPPED, *offered())
 
 
 def has(name: str) -> bool:
@@ -39,42 +52,110 @@ def has(name: str) -> bool:
     return name in SHIPPED or name in offered()
 
 
-@cache
 def study(name: str) -> Study:
     """The study of a name. Raises KeyError where there is none, ConfigError where a package's cannot be loaded."""
-    if name in SHIPPED:
-        return import_module(SHIPPED[name]).STUDY
-    entry = offered()[name]
-    try:
-        found = entry.load()
-    except Exception as error:  # a package may fail in any way of its own
-        fault = f"cannot be loaded: {type(error).__name__}: {error}"
-        raise ConfigError(f"study {name}: {_package(entry)} {fault}") from error
-    if not isinstance(found, Study):
-        kind = type(found).__name__
-        raise ConfigError(f"study {name}: {_package(entry)} must offer a radarsim.studies.interface.Study, got {kind}")
-    if found.name != name:
-        raise ConfigError(f"study {name}: {_package(entry)} offers it under this name, but it is called {found.name}")
+    found = _loaded(name)
+    if isinstance(found, ConfigError):
+        raise found
     return found
 
 
-def _package(entry: EntryPoint) -> str:
-    return f"the package {entry.dist.name if entry.dist else entry.value}"
+@cache
+def _loaded(name: str) -> Study | ConfigError:
+    """The study, or why it cannot be loaded: a package that fails is imported once."""
+    if name in SHIPPED:
+        return import_module(SHIPPED[name]).STUDY
+    packages = entries()[name]
+    if len(packages) > 1:
+        return ConfigError(f"study {name}: offered by the packages {' and '.join(packages)}: uninstall all but one")
+    (entry,) = packages.values()
+    try:
+        found = entry.load()
+    except Exception as error:  # a package may fail in any way of its own
+        return _fault(name, f"cannot be loaded: {described(error)}")
+    if not isinstance(found, Study):
+        return _fault(name, f"must offer a radarsim.studies.interface.Study, got {type(found).__name__}")
+    if found.name != name:
+        return _fault(name, f"offers it under this name, but it is called {found.name}")
+    return found
+
+
+def part(name: str, take: Callable[[Study], Part]) -> Part:
+    """What `take` gets from the study of a name.
+
+    Raises ConfigError with the package's name where the study comes from a package that cannot give it.
+    """
+    one = study(name)
+    if name in SHIPPED:
+        return take(one)
+    try:
+        return take(one)
+    except RadarsimError:
+        raise
+    except Exception as error:
+        raise _fault(name, f"fails: {described(error)}") from error
+
+
+def parts(take: Callable[[Study], Part]) -> dict[str, Part]:
+    """What `take` gets from every study that can give it, by the study's name."""
+    found = {}
+    for name in names():
+        try:
+            found[name] = part(name, take)
+        except ConfigError:
+            continue  # reported by `unusable`, and where this study is asked for
+    return found
+
+
+def unusable() -> dict[str, str]:
+    """The studies of installed packages that cannot be used, by name, and why."""
+    found = {
+        name: f"study {name}: shipped with radarsim; that of the package {' and '.join(packages)} is not used"
+        for name, packages in entries().items()
+        if name in SHIPPED
+    }
+    for name in offered():
+        try:
+            keys(name)
+        except ConfigError as error:
+            found[name] = error.lines[0]
+    return found
 
 
 def keys(name: str) -> type[Keys]:
-    """The schema of a study's YAML keys."""
-    return study(name).keys()
+    """The schema of a study's YAML keys. Raises as `study`."""
+    found = part(name, lambda one: one.keys())
+    if not (isinstance(found, type) and issubclass(found, Keys)):
+        raise _fault(name, "must give keys that are a subclass of radarsim.config.fields.Study")
+    if taken := [key for key in found.model_fields if key in COMMON_KEYS]:
+        raise _fault(name, f"has keys that every config has already: {', '.join(taken)}")
+    return found
+
+
+def usable() -> tuple[str, ...]:
+    """The names of the studies whose keys can be read."""
+    return tuple(parts(lambda one: keys(one.name)))
 
 
 def folders() -> tuple[Path, ...]:
     """Folders with `configs/` and `scenarios/` that packages ship, whose configs are found by stem."""
-    found = []
-    for name in offered():
-        try:
-            folder = study(name).shipped()
-        except ConfigError:  # reported when the study itself is requested
-            continue
-        if folder is not None:
-            found.append(folder)
-    return tuple(found)
+    found = parts(lambda one: one.shipped()) if offered() else {}
+    return tuple(Path(folder) for folder in found.values() if folder is not None)
+
+
+def package(name: str) -> str | None:
+    """The installed package that offers a study, with its version; None for one that is shipped here."""
+    if name in SHIPPED:
+        return None
+    entry = next(iter(entries()[name].values()))
+    return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
+
+
+def described(error: Exception) -> str:
+    """An exception in one line: its kind and the first line of its message."""
+    lines = str(error).strip().splitlines()
+    return f"{type(error).__name__}: {lines[0]}" if lines else type(error).__name__
+
+
+def _fault(name: str, words: str) -> ConfigError:
+    return ConfigError(f"study {name}: the package {package(name) or 'radarsim'} {words}")

@@ -148,7 +148,7 @@ class Followed:
     @property
     def silent(self) -> list[str]:
         """The filters of the config that never had an estimate."""
-        return [one.name for one in self.case.spec.filters if one.name not in self.estimating]
+        return [one.name for one in self.case.spec.members if one.name not in self.estimating]
 
     def _gaps(self, t: np.ndarray) -> None:
         if self.rows == 0:

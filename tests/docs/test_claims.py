@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from radarsim.app.run import all_claims
+from radarsim.app.run import papers
 from radarsim.report import claims
 from radarsim.report.claims import page
 
@@ -12,8 +12,8 @@ LINE = re.compile(r"^\| (P\d\.\w+) \| (.*?) \| [^|]* \| .* \| ([^|]*) \| `(\w+)`
 
 
 def test_the_page_has_all_claims_in_their_words():
-    rows = claims.listed(all_claims(), {})
-    wanted = [(row["claim"], page.page([row])) for row in rows]
+    rows = claims.listed(papers(), {})
+    wanted = [(row["claim"], page.page([row], {})) for row in rows]
     stands = {found[1]: found for found in LINE.finditer(TEXT)}
     assert list(stands) == [claim for claim, _ in wanted]
     for claim, alone in wanted:

@@ -7,7 +7,7 @@ import pytest
 
 import radarsim
 from radarsim.app import configs
-from radarsim.app.run import all_claims
+from radarsim.app.run import papers
 from radarsim.report import claims, tables
 from radarsim.report.claims import CONFIRMED, REFUTED, UNCLEAR, Range, Series
 from radarsim.report.statistics import Estimate
@@ -190,13 +190,13 @@ def test_few_realisations_leave_it_open(expected_radar):
 
 
 def test_all_claims_are_listed_run_or_not(table):
-    ids = [claim.id for claim in all_claims()]
+    ids = [claim.id for of in papers() for claim in of.claims]
     assert len(ids) == len(set(ids))
-    rows = claims.listed(all_claims(), {})
+    rows = claims.listed(papers(), {})
     assert [row["claim"] for row in rows] == ids
     assert {row["verdict"] for row in rows} == {"not run"}
     assert {row["config"] for row in rows if row["paper"].startswith("Gorshkov")} == {"range_doppler"}
-    rows = claims.listed(all_claims(), {"range_doppler": table.to_dict("records")})
+    rows = claims.listed(papers(), {"range_doppler": table.to_dict("records")})
     assert sum(row["claim"].startswith("P1.") for row in rows) == len(table)
     assert all(row["config"] for row in rows)
 

@@ -5,7 +5,7 @@ import pytest
 
 from radarsim.app import output
 from radarsim.app import run as experiment
-from radarsim.report import chart_text, claims, panels, sweeps
+from radarsim.report import chart_text, panels, sweeps
 from radarsim.report import tables as common
 from radarsim.report.claims import page
 
@@ -69,7 +69,8 @@ def test_no_sweep_no_figure(expected_radar):
 
 
 ROW = {
-    **{"claim": "P1.1", "paper": claims.PAPERS["P1"], "statement": "a | b < c", "place": "table", "reading": ""},
+    **{"claim": "P1.1", "paper": "Gorshkov & Zavizhenets 2017", "statement": "a | b < c", "place": "table"},
+    **{"reading": ""},
     **{"overall": "confirmed", "verdict": "confirmed", "what": "gain", "measured": -1.23456, "lo": -1.3, "hi": -1.2},
     **{"unit": "%", "config": "rls2", "case": "rls2", "expected": "< 0"},
 }
@@ -82,7 +83,7 @@ def test_the_page_of_claims():
     parts = [
         {**ROW, "claim": "P1.4", "overall": "refuted", "verdict": v, "case": f"rls{i}"} for i, v in enumerate(verdicts)
     ]
-    text = page.page([ROW, counted, never, *parts])
+    text = page.page([ROW, counted, never, *parts], {ROW["paper"]: "range_doppler"})
     lines = [line for line in text.split("\n") if line.startswith("| P1")]
     assert lines == [
         "| P1.1 | a \\| b &lt; c | table | gain: −1.235 [−1.300, −1.200] % | **confirmed** | `rls2` |",

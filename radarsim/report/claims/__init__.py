@@ -26,13 +26,6 @@ from radarsim.report.statistics import Estimate, difference
 if TYPE_CHECKING:
     import pandas as pd
 
-PAPERS = {
-    "P1": "Gorshkov & Zavizhenets 2017",
-    "P2": "Sychev & Osipov 2023",
-    "P3": "Butyrskiy",
-    "P4": "Uss, Baryshev & Djavad 2010",
-}
-
 CONFIRMED, REFUTED, UNCLEAR, NOT_RUN = "confirmed", "refuted", "not distinguishable", "not run"
 
 
@@ -113,7 +106,7 @@ class Claim:
 
     @property
     def paper(self) -> str:
-        """The key of the paper: P1 … P4."""
+        """The key of the paper, the part of the id before its first point."""
         return self.id.partition(".")[0]
 
 
@@ -252,12 +245,15 @@ class Evidence:
 class PaperClaims:
     """The claims of a paper that a study judges, and how its results are read for them.
 
+    paper is how tables cite it: authors and year. page is the stem of the study's page in docs/, where there is one.
     may_grow names the study's lists to which members may be added without its being another experiment than the
     paper's; every other key must be as in the claim's config, see `radarsim.report.claims.paper`.
     """
 
     claims: Sequence[Claim]
     evidence: type[Evidence]
+    paper: str
+    page: str = ""
     may_grow: tuple[str, ...] = ()
 
 
@@ -298,7 +294,7 @@ def judged(
         papers = _Papers(of, results, made, shipped)
         for claim in of.claims:
             if (evidence := papers.evidence(claim.config)) is not None:
-                rows += _rows(claim, evidence)
+                rows += _rows(claim, of.paper, evidence)
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(CLAIMED)})
 
 
@@ -332,7 +328,7 @@ def _of_cases(table: "pd.DataFrame", names: set[str]) -> "pd.DataFrame":
     return table[table["case"].isin(names)] if "case" in table else table
 
 
-def _rows(claim: Claim, evidence: Evidence) -> list[tuple]:
+def _rows(claim: Claim, paper: str, evidence: Evidence) -> list[tuple]:
     try:
         measured = [part.measure(evidence) for part in claim.parts]
         cases = [", ".join(evidence.case(key).name for key in part.cases) for part in claim.parts]
@@ -341,7 +337,7 @@ def _rows(claim: Claim, evidence: Evidence) -> list[tuple]:
     verdicts = [verdict(of, part.expected) for of, part in zip(measured, claim.parts, strict=True)]
     return [
         (
-            *(claim.id, PAPERS[claim.paper], claim.statement, case, float(of.value), float(of.lo), float(of.hi)),
+            *(claim.id, paper, claim.statement, case, float(of.value), float(of.lo), float(of.hi)),
             *(part.expected.words, said, _end(part.expected.lo), _end(part.expected.hi)),
             *(part.what, part.unit, claim.place, claim.reading, overall(verdicts)),
         )
@@ -354,15 +350,15 @@ def _end(value: float) -> float:
     return float(f"{value:.12g}") if math.isfinite(value) else math.nan
 
 
-def listed(claims: Sequence[Claim], stored: Mapping[str, Sequence[Mapping]]) -> list[dict]:
+def listed(papers: Sequence[PaperClaims], stored: Mapping[str, Sequence[Mapping]]) -> list[dict]:
     """Rows of claims with the columns of claims.csv and `config`: as stored, or once as not run.
 
     stored: config stem → the rows of its claims.csv.
     """
     rows = []
-    for claim in claims:
+    for paper, claim in ((of.paper, claim) for of in papers for claim in of.claims):
         own = [dict(row) for row in stored.get(claim.config, ()) if row["claim"] == claim.id]
-        blank = dict.fromkeys(CLAIMED, "") | {"claim": claim.id, "paper": PAPERS[claim.paper]}
+        blank = dict.fromkeys(CLAIMED, "") | {"claim": claim.id, "paper": paper}
         blank |= {"place": claim.place, "reading": claim.reading}
         rows += own or [blank | {"statement": claim.statement, "verdict": NOT_RUN, "overall": NOT_RUN}]
         for row in rows[-max(1, len(own)) :]:

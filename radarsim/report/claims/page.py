@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from radarsim.report.claims import CONFIRMED, NOT_RUN, PAPERS, REFUTED
+from radarsim.report.claims import CONFIRMED, NOT_RUN, REFUTED
 
 HEAD = """# The papers' claims
 
@@ -18,19 +18,18 @@ parts is confirmed when all of them are, refuted when one is. How the words were
 from the words alone and were written down before anything was measured ([rules](methods.md#verdicts)).
 """
 MARKS = {CONFIRMED: "**confirmed**", REFUTED: "**refuted**"}
-PAGES = {"P1": "range_doppler", "P2": "multimodel", "P3": "sonar", "P4": "discriminator"}
 SHOWN = 3  # parts of a claim in its paper's first table
 
 
-def page(rows: Sequence[Mapping]) -> str:
-    """The page, from the rows of `claims.listed`."""
+def page(rows: Sequence[Mapping], pages: Mapping[str, str]) -> str:
+    """The page, from the rows of `claims.listed`; pages holds the stem of a paper's page, by the paper."""
     text = [HEAD, f"In all: {counted(rows)}.", ""]
-    for key, paper in PAPERS.items():
+    for paper in dict.fromkeys(row["paper"] for row in rows):
         own = [row for row in rows if row["paper"] == paper]
-        if not own:
-            continue
+        key = own[0]["claim"].partition(".")[0]
+        link = f" Equations and decisions: [{key}]({pages[paper]}.md)." if pages.get(paper) else ""
         claims = [[row for row in own if row["claim"] == claim] for claim in dict.fromkeys(row["claim"] for row in own)]
-        text += [f"## {key} {paper}", "", f"{counted(own)}. Equations and decisions: [{key}]({PAGES[key]}.md).", ""]
+        text += [f"## {key} {paper}", "", f"{counted(own)}.{link}", ""]
         text += ["| claim | statement | place | measured | verdict | config |", "|---|---|---|---|---|---|"]
         text += [*map(_line, claims), "", f"### {key}, part by part", ""]
         text += ["| claim | part | measured | range that the words leave | verdict |", "|---|---|---|---|---|"]
@@ -41,7 +40,7 @@ def page(rows: Sequence[Mapping]) -> str:
 
 def counted(rows: Sequence[Mapping]) -> str:
     """How many claims came out how, in words."""
-    overall = {row["claim"]: row["overall"] for row in rows}
+    overall = {(row["paper"], row["claim"]): row["overall"] for row in rows}
     return ", ".join(f"{count} {verdict}" for verdict, count in Counter(overall.values()).items())
 
 

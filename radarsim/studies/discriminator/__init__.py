@@ -65,7 +65,13 @@ class Discriminator(Study):
         from radarsim.report.claims import PaperClaims
         from radarsim.studies.discriminator import claims, measures
 
-        return PaperClaims(claims.CLAIMS, measures.Evidence, may_grow=("estimators",))
+        return PaperClaims(
+            claims.CLAIMS,
+            measures.Evidence,
+            paper="Uss, Baryshev & Djavad 2010",
+            page="discriminator",
+            may_grow=("estimators",),
+        )
 
 
 STUDY = Discriminator()

@@ -69,7 +69,9 @@ class Multimodel(Study):
         from radarsim.report.claims import PaperClaims
         from radarsim.studies.multimodel import claims, measures
 
-        return PaperClaims(claims.CLAIMS, measures.Evidence, may_grow=("filters",))
+        return PaperClaims(
+            claims.CLAIMS, measures.Evidence, paper="Sychev & Osipov 2023", page="multimodel", may_grow=("filters",)
+        )
 
     def recorded(self):
         from radarsim.studies.multimodel import track

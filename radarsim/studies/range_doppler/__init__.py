@@ -62,7 +62,7 @@ class RangeDoppler(Study):
         from radarsim.report.claims import PaperClaims
         from radarsim.studies.range_doppler import claims, measures
 
-        return PaperClaims(claims.CLAIMS, measures.Evidence)
+        return PaperClaims(claims.CLAIMS, measures.Evidence, paper="Gorshkov & Zavizhenets 2017", page="range_doppler")
 
     def recorded(self):
         from radarsim.studies.range_doppler import track

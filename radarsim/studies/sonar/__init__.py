@@ -81,7 +81,7 @@ class Sonar(Study):
 
         claims = [claim for part in parts().values() for claim in part.claims()]
         claims.sort(key=lambda claim: int(claim.id.partition(".")[2]))
-        return PaperClaims(claims, Evidence, may_grow=("filters",))
+        return PaperClaims(claims, Evidence, paper="Butyrskiy", page="sonar", may_grow=("filters",))
 
     def recorded(self):
         return Recorded()

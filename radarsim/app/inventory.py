@@ -1,0 +1,34 @@
+"""What there is to run: configs, scenarios, studies and filters. Loads no kernels."""
+
+from pathlib import Path
+
+from radarsim.app.configs import lookup
+from radarsim.studies import registry
+
+
+def described(file: Path) -> str:
+    """The first words of a YAML file's leading comment, without its own name."""
+    with file.open(encoding="utf-8") as lines:
+        for line in lines:
+            words = line.lstrip("#").strip()
+            if not line.startswith("#"):
+                break
+            if not words.startswith("yaml-language-server"):
+                return words.partition(" — ")[2] or words
+    return ""
+
+
+def inventory() -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
+    """What `radarsim list` shows: title, columns and rows of each kind of thing at hand."""
+    configs = [(stem, described(lookup.config_file(stem))) for stem in lookup.stems("configs")]
+    scenarios = [(stem, described(lookup.scenario_file(stem, None))) for stem in lookup.stems("scenarios")]
+    studies = registry.parts(lambda study: (study.about, dict(study.filters)))
+    about = [(name, words) for name, (words, _) in studies.items()]
+    about += [(name, f"cannot be used: {words}") for name, words in registry.unusable().items()]
+    filters = [(name, key, words) for name, (_, of) in studies.items() for key, words in of.items()]
+    return [
+        ("Configs (radarsim run NAME)", ("name", "what it is"), configs),
+        ("Scenarios (target: NAME)", ("name", "what it is"), scenarios),
+        ("Studies (study: NAME)", ("name", "paper and question"), about),
+        ("Filters", ("study", "keys", "what it is"), filters),
+    ]
