@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 SECTIONS = {
     "Run": ("run", "check"),
     "Read": ("report", "claims"),
-    "Own data": ("new", "simulate", "track"),
+    "Own data": ("new", "simulate", "track", "new-study"),
     "Maintenance": ("list", "schema", "doctor", "clean"),
 }
 ORDER = tuple(name for names in SECTIONS.values() for name in names)

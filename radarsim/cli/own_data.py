@@ -36,6 +36,28 @@ def new(name: str, like: str) -> None:
     click.echo(f"         change its numbers, then `radarsim check {path}` and `radarsim run {path}`")
 
 
+@main.command(name="new-study")
+@click.argument("name", metavar="NAME")
+def new_study(name):
+    """A package with a small whole study, to be made one's own: ./NAME.
+
+    It compares two filters on a random walk: keys, kernel, exact values, tables, figures, a claim, recorded plots,
+    configs and a test, and in each file a comment `Yours: …` where one's own goes. Installed beside radarsim it is a
+    study like those shipped here. Nothing is ever overwritten.
+
+    \b
+    Example
+      radarsim new-study my_paper
+      pip install -e my_paper
+      radarsim run my_paper
+    """
+    from radarsim.app.new_study import new_study as write
+
+    path = write(name)
+    click.echo(f"package  {path}")
+    click.echo(f"         `pip install -e {path}`, then `radarsim run {name}`; {path / 'README.md'} says what is where")
+
+
 @main.command()
 @config_argument
 @click.option("-o", "--output", required=True, metavar="PLOTS.csv", help="Where the plots are written.")
@@ -78,9 +100,9 @@ def track(
     """The config's filters over recorded measurements.
 
     PLOTS.csv has a header and one row a plot, its times rising at any spacing; an empty cell is a missing value, other
-    columns are ignored. Its columns are t_s and what the study's sensor measures: `range_m, velocity_mps`
-    (range_doppler), `range_m, bearing_rad` (sonar), `range_m, elevation_rad, azimuth_rad` or `x_m, y_m, z_m`
-    (multimodel).
+    columns are ignored. Its columns are t_s and what the study's sensor measures, as `radarsim simulate` writes them:
+    `range_m, velocity_mps` (range_doppler), `range_m, bearing_rad` (sonar), `range_m, elevation_rad, azimuth_rad` or
+    `x_m, y_m, z_m` (multimodel).
 
     Also reported: gaps and missing values, and whether the accuracies that the config states fit the plots: the
     filters' own innovations are tested (NIS, 1 for a filter that is right about its errors). A gap so long that

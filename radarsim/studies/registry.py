@@ -67,7 +67,9 @@ def _loaded(name: str) -> Study | ConfigError:
         return import_module(SHIPPED[name]).STUDY
     packages = entries()[name]
     if len(packages) > 1:
-        return ConfigError(f"study {name}: offered by the packages {' and '.join(packages)}: uninstall all but one")
+        return ConfigError(
+            f"study {name}: offered by the packages {' and '.join(sorted(packages))}: uninstall all but one"
+        )
     (entry,) = packages.values()
     try:
         found = entry.load()
@@ -110,7 +112,7 @@ def parts(take: Callable[[Study], Part]) -> dict[str, Part]:
 def unusable() -> dict[str, str]:
     """The studies of installed packages that cannot be used, by name, and why."""
     found = {
-        name: f"study {name}: shipped with radarsim; that of the package {' and '.join(packages)} is not used"
+        name: f"study {name}: shipped with radarsim; that of the package {' and '.join(sorted(packages))} is not used"
         for name, packages in entries().items()
         if name in SHIPPED
     }

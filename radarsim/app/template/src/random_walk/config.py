@@ -1,0 +1,74 @@
+"""The YAML keys of the study. Whatever can be wrong in a config is found here, with line and column."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+from radarsim.config.fields import (
+    Design,
+    Display,
+    Model,
+    Name,
+    NameIn,
+    NonNegative,
+    Positive,
+    Study,
+    at,
+    cross_check,
+    unique_names,
+    whole,
+)
+
+MOST_SCANS = 100_000
+
+
+# Yours: what measures. A key ends in its unit (_m, _s, _mps, _rad, …) and its description names it.
+class Sensor(Model):
+    """A sensor that measures the position."""
+
+    name: Annotated[Name | None, Display()] = Field(None, description="display name")
+    sigma_x_m: Positive = Field(description="standard deviation of a measured position, m")
+    scan_period_s: Positive = Field(description="time between two plots, s")
+
+
+# Yours: what is observed. `Scenario()` beside the field below would let it be named by a file in scenarios/.
+class Target(Model):
+    """A target whose position is a random walk."""
+
+    sigma_step_m: NonNegative = Field(description="standard deviation of its step from one scan to the next, m")
+
+
+# Yours: the filters that are compared, each key with a default or without.
+class Filter(Model):
+    """A filter of the position."""
+
+    name: Annotated[Name, Display()] = Field(description="label, unlike that of any other filter")
+    kind: Literal["kalman", "fixed_gain"] = Field(description="how its gain is made")
+    gain: Annotated[Positive, Field(le=1)] | None = Field(
+        None, description="fixed_gain: share of the innovation that is taken over, no unit"
+    )
+
+    @cross_check
+    def _gain_where_fixed(self):
+        """Yours: keys that must go together are checked so; a fault is yielded at the key that it is about."""
+        if self.kind == "fixed_gain" and self.gain is None:
+            yield at("gain", "is needed by kind fixed_gain")
+        elif self.kind != "fixed_gain" and self.gain is not None:
+            yield at("gain", f"has no effect on kind {self.kind}: leave it out")
+
+
+class Keys(Study):
+    """A random walk and the filters that follow it."""
+
+    # Yours: all figures that the study may draw, so that a misspelt name under `figures:` is refused.
+    figure_names = ("sigma_x", "gain_x")
+
+    sensor: Sensor = Field(description="the sensor")
+    target: Target = Field(description="the target")
+    # Design(): cases that differ in nothing else have the same noise, so that their comparison is paired.
+    filters: Annotated[
+        tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
+    ] = Field(description="the filters; all see the same plots")
+    baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
+        None, description="name of the filter that gains are against; default: the first"
+    )
+    scans: Annotated[whole(1, MOST_SCANS), Design()] = Field(description="number of plots")

@@ -1,0 +1,27 @@
+"""From the keys of a filter to the gains that the kernel reads: NumPy, once for each case.
+
+The state is the position x; x⁺ = x + w with w of variance q = step², a plot is z = x + v with v of variance R = sigma².
+"""
+
+import numpy as np
+
+
+def design(options, sigma: float, step: float, scans: int) -> np.ndarray:
+    """The gains K (scans,) of a filter, the first of which takes over the first plot. sigma and step in m."""
+    # Yours: a line for each kind of filter. Gains that depend on the data belong into the kernel.
+    match options.kind:
+        case "kalman":
+            return kalman_gains(sigma, step, scans)
+        case "fixed_gain":
+            return np.concatenate([[1.0], np.full(scans - 1, options.gain)])
+    raise ValueError(f"no such filter: {options.kind}")
+
+
+def kalman_gains(sigma: float, step: float, scans: int) -> np.ndarray:
+    """K = P / (P + R) with the predicted variance P = (1 - K) P + q (Bar-Shalom et al. 2001, section 5.2); (scans,)."""
+    gains, P = np.ones(scans), sigma**2
+    for k in range(1, scans):
+        P += step**2
+        gains[k] = P / (P + sigma**2)
+        P *= 1 - gains[k]
+    return gains

@@ -1,0 +1,26 @@
+"""What the report asks and answers. Yours: sentences with numbers and 95 % intervals, made from the tables."""
+
+from collections.abc import Mapping, Sequence
+
+from radarsim.config.experiment import Experiment
+from radarsim.engine.results import CaseResult
+
+
+def question(experiment: Experiment) -> str:
+    """What an experiment asks, in one sentence."""
+    names = list(dict.fromkeys(one.name for case in experiment.cases for one in case.spec.filters))
+    return f"How well do the filters {', '.join(names)} follow a random walk?"
+
+
+def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
+    """A sentence for each case and filter: σ at the last scan, and the gain against the baseline."""
+    last = made["gains"].groupby(["case", "filter"], sort=False).tail(1).set_index(["case", "filter"])
+    told = []
+    for row in made["steady"].to_dict("records"):
+        words = f"{row['last_sigma']:.4g} m [{row['last_lo']:.4g}, {row['last_hi']:.4g}]"
+        if (row["case"], row["filter"]) in last.index:
+            gain = last.loc[(row["case"], row["filter"])]
+            interval = f"[{gain['gain_lo']:.3g}, {gain['gain_hi']:.3g}]"
+            words += f", a gain of {gain['gain_percent']:.3g} % {interval} against {gain['baseline']}"
+        told.append(f"{row['case']}, {row['filter']}: σ of the position at the last scan is {words}.")
+    return told

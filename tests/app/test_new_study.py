@@ -1,0 +1,60 @@
+"""`radarsim new-study` writes a package under a name that nothing has, and never over anything.
+
+That the package works is tested by tests/studies/test_outside.py.
+"""
+
+import pytest
+from click.testing import CliRunner
+
+from radarsim.app import new_study
+from radarsim.cli import main
+from radarsim.errors import ConfigError, StoreError
+
+
+def test_the_command_writes_a_package_under_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, ["new-study", "my_paper"])
+    assert done.exit_code == 0, done.output
+    assert "pip install -e my_paper" in done.output
+    written = [file for file in sorted((tmp_path / "my_paper").rglob("*")) if file.is_file()]
+    assert len(written) == len(new_study.files())
+    assert (tmp_path / "my_paper/src/my_paper/shipped/configs/my_paper.yaml").is_file()
+    text = "".join(file.read_text(encoding="utf-8") for file in written)
+    assert "random_walk" not in text
+    assert "RandomWalk" not in text
+    assert "class MyPaperStudy(Study)" in text
+
+
+def test_every_file_says_what_goes_there():
+    silent = [file.name for file in new_study.files() if "Yours:" not in file.read_text(encoding="utf-8")]
+    assert silent == ["__init__.py", "random_walk_step.yaml"]
+
+
+@pytest.mark.parametrize(
+    "name", ["", "1st", "my-paper", "My", "class", "match", "a.b", "../a", "ё", "a" * 41, "a\nb", "_a"]
+)
+def test_a_name_that_is_no_modules_is_refused(name, tmp_path):
+    with pytest.raises(ConfigError, match="must be a module's name"):
+        new_study.new_study(name, tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "taken"),
+    [("sonar", "study"), ("rls2", "config"), ("json", "module"), ("numpy", "module"), ("radarsim", "module")],
+)
+def test_a_name_that_is_taken_is_refused(name, taken, tmp_path):
+    with pytest.raises(ConfigError, match=f"{name}: there is a .*{taken}"):
+        new_study.new_study(name, tmp_path)
+
+
+def test_nothing_is_overwritten(tmp_path):
+    (tmp_path / "mine").write_text("mine")
+    with pytest.raises(ConfigError, match="never overwritten"):
+        new_study.new_study("mine", tmp_path)
+    assert (tmp_path / "mine").read_text() == "mine"
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+    with pytest.raises(StoreError, match="cannot be written"):
+        new_study.new_study("mine", tmp_path / "nowhere")

@@ -1,0 +1,197 @@
+"""A study from an installed package is a full study: every command, any means of computing, an identity of its own.
+
+The package is the one that `radarsim new-study` writes, so this proves the template too.
+"""
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.studies import outside
+
+N = 10_000  # two whole blocks and a partial one
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with the package `fifth`, installed in its folder `site`."""
+    folder = tmp_path_factory.mktemp("outside")
+    (folder / "site").mkdir()
+    outside.command("new-study", "fifth", site=folder / "site", cwd=folder)
+    outside.installed(folder / "fifth", folder / "site")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def radarsim(place):
+    """The real command, beside the installed package."""
+    return lambda *arguments, **options: outside.command(*arguments, **{"site": place / "site", "cwd": place} | options)
+
+
+@pytest.fixture(scope="module")
+def ran(place, radarsim):
+    """The folder of results of a finished run."""
+    radarsim("run", "fifth", "-n", N, "--threads", 1, "--out", "results")
+    return place / "results/fifth"
+
+
+def csv_bytes(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in sorted(folder.glob("*.csv"))}
+
+
+def test_it_is_listed_with_its_configs_and_filters(radarsim):
+    listed = json.loads(radarsim("list", "--json").stdout)
+    assert {"fifth", "fifth_step"} <= {one["name"] for one in listed["configs"]}
+    assert "fifth" in {one["name"] for one in listed["studies"]}
+    assert {"kind: kalman", "kind: fixed_gain"} <= {one["keys"] for one in listed["filters"]}
+
+
+def test_its_keys_are_in_schema_and_check(place, radarsim):
+    schema = json.loads(radarsim("schema").stdout)
+    assert {"$ref": "#/$defs/fifth"} in schema["oneOf"]
+    assert {"sensor", "target", "filters"} <= schema["$defs"]["fifth"]["properties"].keys()
+    assert "valid" in radarsim("check", "fifth", "fifth_step").stdout
+    shutil.copy(place / "fifth/src/fifth/shipped/configs/fifth.yaml", place / "mine.yaml")
+    assert "mine.yaml: valid" in radarsim("check", "mine.yaml", "--precision", 1).stdout
+    fault = radarsim("check", "mine.yaml", "--set", "sensor.sigma_m=1", code=2).stderr
+    assert "sensor.sigma_m: unknown key; did you mean sigma_x_m?" in fault
+    fault = radarsim("check", "mine.yaml", "--set", "figures.sigma_y=[mine]", code=2).stderr
+    assert "sigma_y" in fault
+    assert "sigma_x" in fault
+
+
+def test_a_run_leaves_tables_figures_claims_and_report(ran):
+    assert {"curves.csv", "gains.csv", "steady.csv", "claims.csv"} <= csv_bytes(ran).keys()
+    assert {"sigma_x.svg", "gain_x.svg"} <= {file.name for file in (ran / "figures").iterdir()}
+    assert "How well do the filters fixed, kalman" in (ran / "report.html").read_text(encoding="utf-8")
+    claim = (ran / "claims.csv").read_text(encoding="utf-8").splitlines()[1]
+    assert claim.startswith("fifth.1,Kalman 1960,")
+    assert "confirmed" in claim
+
+
+@pytest.mark.parametrize("means", [("--threads", 3), ("--workers", 2)], ids=lambda means: means[0])
+def test_the_same_bytes_by_any_means(ran, radarsim, tmp_path, means):
+    radarsim("run", "fifth", "-n", N, *means, "--no-figures", "--out", tmp_path)
+    assert csv_bytes(tmp_path / "fifth") == csv_bytes(ran)
+
+
+def test_the_same_bytes_in_shares_and_continued(ran, radarsim, tmp_path):
+    radarsim("run", "fifth", "-n", 5000, "--no-figures", "--out", tmp_path)
+    for share in ("1/2", "2/2"):
+        radarsim("run", "fifth", "-n", N, "--shard", share, "--out", tmp_path)
+    radarsim("report", "fifth", "-n", N, "--no-figures", "--out", tmp_path)
+    assert csv_bytes(tmp_path / "fifth") == csv_bytes(ran)
+
+
+def test_a_precision_ends_it(radarsim, tmp_path):
+    arguments = ("--precision", 2, "--no-figures", "--out", tmp_path, "--json")
+    (done,) = json.loads(radarsim("run", "fifth", *arguments).stdout)
+    assert done["cases"]["fifth"]["done"] == 8000
+    radarsim("run", "fifth", "-n", 4000, *arguments, code=3)
+
+
+def test_its_claims_are_listed_among_all(ran, radarsim, tmp_path):
+    rows = json.loads(radarsim("claims", "--json").stdout)
+    (own,) = [row for row in rows if row["claim"] == "fifth.1"]
+    assert (own["paper"], own["overall"], own["config"]) == ("Kalman 1960", "confirmed", "fifth")
+    assert {row["claim"].partition(".")[0] for row in rows} == {"P1", "P2", "P3", "P4", "fifth"}
+    assert "fifth.1 confirmed" in radarsim("claims", "fifth").stdout
+    assert "## fifth Kalman 1960" in radarsim("claims", "--markdown").stdout
+
+
+def test_recorded_plots_and_a_config_of_ones_own(radarsim, tmp_path):
+    for arguments in (
+        ("new", "own", "--like", "fifth"),
+        ("simulate", "own.yaml", "-o", "plots.csv"),
+        ("track", "own.yaml", "plots.csv", "-o", "track.csv", "--figures", "drawn"),
+    ):
+        radarsim(*arguments, cwd=tmp_path)
+    assert "standard deviation of a measured position, m" in (tmp_path / "own.yaml").read_text(encoding="utf-8")
+    assert (tmp_path / "plots.csv").read_text().startswith("t_s,x_m,true_x_m\n")
+    assert len((tmp_path / "track.csv").read_text().splitlines()) == 1 + 2 * 30
+
+
+def test_the_tab_key_completes_its_configs(radarsim, tmp_path):
+    program = (
+        "from radarsim.cli.group import completed\nprint(*(one.value for one in completed(None, None, 'fifth_')))\n"
+    )
+    (tmp_path / "tab.py").write_text(program)
+    assert radarsim(module="tab", cwd=tmp_path).stdout == "fifth_step\n"
+
+
+def test_doctor_and_clean(radarsim, tmp_path):
+    radarsim("run", "fifth", "-n", N, "--no-figures", "--out", tmp_path)
+    assert "all whole" in radarsim("doctor", tmp_path / "fifth", "--recompute", 2).stdout
+    assert "dropped" in radarsim("clean", "fifth", "--out", tmp_path).stdout
+    assert not list((tmp_path / ".blocks").rglob("*.sums"))
+
+
+@pytest.mark.slow
+def test_doctor_names_the_package(radarsim):
+    (own,) = [one for one in json.loads(radarsim("doctor", "--json").stdout)["self-test"] if one["study"] == "fifth"]
+    assert own["words"] == "fifth 0.1.0: loads"
+
+
+def test_its_kernels_are_compiled_once(ran, radarsim, tmp_path):
+    cache = Path(os.environ.get("RADARSIM_CACHE_DIR") or tmp_path)
+    first = radarsim("run", "fifth", "-n", 100, "--no-figures", "--out", tmp_path, RADARSIM_CACHE_DIR=str(cache))
+    kept = {file: file.stat().st_mtime_ns for file in cache.rglob("walk.simulate_block*.nbc")}
+    assert kept, first.stdout
+    radarsim("run", "fifth", "-n", 200, "--no-figures", "--out", tmp_path, RADARSIM_CACHE_DIR=str(cache))
+    assert {file: file.stat().st_mtime_ns for file in cache.rglob("walk.simulate_block*.nbc")} == kept
+
+
+EDITS = [  # file, text in it, its replacement, whether numbers may change
+    ("exact.py", "S = (1 - K) ** 2", "S = (1.0 - K) ** 2", True),
+    ("filters.py", "gains[k] = P / (P", "gains[k] = P / (0 + P", True),
+    ("kernels/walk.py", "e[f] = estimate[f] - x", "e[f] = 1 * estimate[f] - x", True),
+    ("config.py", "Field(le=1)]", "Field(le=2)]", True),
+    ("study.py", "BLOCK = 4096", "BLOCK = 2048", True),
+    ("study.py", '"""Sums of realisations', '"""The sums of realisations', False),
+    ("config.py", 'description="the sensor"', 'description="a sensor"', False),
+    ("words.py", "How well", "How badly", False),
+    ("tables.py", '"x", "m", gain', '"y", "m", gain', False),
+    ("claims.py", "above(10)", "above(11)", False),
+    ("track.py", "self.R = ", "self.R = 2 * ", False),
+    ("__init__.py", "Kalman 1960", "Kalman 1961", False),
+]
+
+
+@pytest.fixture(scope="module")
+def identities(place, tmp_path_factory):
+    """The identity of the study's case as the package stands, and after each edit, all by one process."""
+    folder = tmp_path_factory.mktemp("edited")
+    program = (
+        "import json, pathlib, sys\n"
+        "from radarsim.app.configs import load\n"
+        "from radarsim.kernels import sources\n"
+        "from radarsim.studies import identity\n"
+        "case, base, found = load('fifth').cases[0], pathlib.Path('package/src/fifth'), []\n"
+        "for file, old, new in [('study.py', '', ''), *json.loads(sys.argv[1])]:\n"
+        "    text = (base / file).read_text()\n"
+        "    assert old in text, (file, old)\n"
+        "    (base / file).write_text(text.replace(old, new, 1))\n"
+        "    identity.computing_sources.cache_clear()\n"
+        "    found.append(identity.identity(case))\n"
+        "    (base / file).write_text(text)\n"
+        "print(json.dumps(found))\n"
+    )
+    (folder / "edits.py").write_text(program)
+    shutil.copytree(place / "fifth", folder / "package")
+    (folder / "site").mkdir()
+    outside.installed(folder / "package", folder / "site")
+    edits = json.dumps([edit[:3] for edit in EDITS])
+    return json.loads(outside.command(edits, site=folder / "site", cwd=folder, module="edits").stdout)
+
+
+@pytest.mark.parametrize("i", range(len(EDITS)), ids=lambda i: f"{EDITS[i][0]}: {EDITS[i][2]}")
+def test_its_identity_is_that_of_its_own_sources(identities, i):
+    assert (identities[i + 1] != identities[0]) is EDITS[i][3]
+
+
+def test_its_own_tests_pass(place):
+    done = outside.command("-q", "-p", "no:cacheprovider", site=place / "site", cwd=place / "fifth", module="pytest")
+    assert "6 passed" in done.stdout
