@@ -6,14 +6,14 @@ import pytest
 
 import radarsim
 from radarsim.app import configs, output
-from radarsim.app.run import all_claims
+from radarsim.app.run import papers
 from radarsim.config.check import models_in
 from radarsim.config.fields import Display, Model
 from radarsim.report import claims
 from radarsim.report.claims.paper import described, own_members
 from radarsim.studies import registry
 
-CONFIGS = sorted({claim.config for claim in all_claims()})
+CONFIGS = sorted({claim.config for of in papers() for claim in of.claims})
 MAY_GROW = {"range_doppler": (), "multimodel": ("filters",), "sonar": ("filters",), "discriminator": ("estimators",)}
 # The only keys that may have another value than in the paper's experiment: names that are displayed.
 MAY_DIFFER = {

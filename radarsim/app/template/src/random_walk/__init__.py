@@ -26,11 +26,6 @@ class RandomWalkStudy(Study):
 
         return config.Keys
 
-    def computes_in(self, spec):
-        # Yours: where the numbers begin. What these modules import counts too, within this package and radarsim; name
-        # modules of other packages here if an edit of theirs changes your numbers.
-        return "random_walk.study", "random_walk.config"
-
     def prepare(self, case):
         from random_walk import study
 
@@ -67,8 +62,8 @@ class RandomWalkStudy(Study):
 
         from random_walk import claims
 
-        # Yours: how tables cite the paper.
-        return PaperClaims(claims.CLAIMS, claims.Evidence, paper="Kalman 1960")
+        # Yours: how tables cite the paper, and to which lists a user may add without its being another experiment.
+        return PaperClaims(claims.CLAIMS, claims.Evidence, paper="Kalman 1960", may_grow=("filters",))
 
     def recorded(self):
         from random_walk import track
