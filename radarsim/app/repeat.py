@@ -37,7 +37,8 @@ def command(
 ) -> str:
     """The command that runs an experiment; a shipped config by its stem."""
     # In a checkout the shipped folder is a link to configs/.
-    shipped = experiment.path and Path(experiment.path).resolve().parent == (lookup.SHIPPED / "configs").resolve()
+    folders = {(folder / "configs").resolve() for folder in (lookup.SHIPPED, *lookup.further_folders())}
+    shipped = experiment.path and Path(experiment.path).resolve().parent in folders
     words = ["radarsim", "run", experiment.stem if shipped else as_text(experiment.path or "")]
     for override in overrides:
         key, _, value = override.partition("=")

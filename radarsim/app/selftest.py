@@ -16,6 +16,7 @@ from pathlib import Path
 from radarsim.app import run as experiment
 from radarsim.engine.machine import platform
 from radarsim.report import files
+from radarsim.studies import registry
 
 KNOWN = Path(__file__).parent / "known"
 TABLES = ("curves", "gains")

@@ -255,8 +255,8 @@ class Study(Model):
     def device(self) -> str | None:
         """The display name of what measures: of the first part of the config that has a name."""
         parts = (getattr(self, key) for key in type(self).model_fields)
-        named = (part.name for part in parts if isinstance(part, Model) and "name" in type(part).model_fields)
-        return next(filter(None, named), None)
+        names = (dict(part).get("name") for part in parts if isinstance(part, Model))
+        return next(filter(None, names), None)
 
     @property
     def members(self) -> tuple[Any, ...]:

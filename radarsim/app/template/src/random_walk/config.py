@@ -1,9 +1,11 @@
 """The YAML keys of the study. Whatever can be wrong in a config is found here, with line and column."""
 
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 from radarsim.config.fields import (
+    At,
     Design,
     Display,
     Model,
@@ -12,10 +14,10 @@ from radarsim.config.fields import (
     NonNegative,
     Positive,
     Study,
+    Whole,
     at,
     cross_check,
     unique_names,
-    whole,
 )
 
 MOST_SCANS = 100_000
@@ -48,7 +50,7 @@ class Filter(Model):
     )
 
     @cross_check
-    def _gain_where_fixed(self):
+    def _gain_where_fixed(self) -> Iterator[At]:
         """Yours: keys that must go together are checked so; a fault is yielded at the key that it is about."""
         if self.kind == "fixed_gain" and self.gain is None:
             yield at("gain", "is needed by kind fixed_gain")
@@ -71,4 +73,4 @@ class Keys(Study):
     baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
         None, description="name of the filter that gains are against; default: the first"
     )
-    scans: Annotated[whole(1, MOST_SCANS), Design()] = Field(description="number of plots")
+    scans: Annotated[int, Whole(1, MOST_SCANS), Design()] = Field(description="number of plots")

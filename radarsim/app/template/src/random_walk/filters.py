@@ -5,8 +5,10 @@ The state is the position x; x⁺ = x + w with w of variance q = step², a plot 
 
 import numpy as np
 
+from random_walk import config
 
-def design(options, sigma: float, step: float, scans: int) -> np.ndarray:
+
+def design(options: config.Filter, sigma: float, step: float, scans: int) -> np.ndarray:
     """The gains K (scans,) of a filter, the first of which takes over the first plot. sigma and step in m."""
     # Yours: a line for each kind of filter. Gains that depend on the data belong into the kernel.
     match options.kind:
