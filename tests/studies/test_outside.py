@@ -136,10 +136,10 @@ def test_doctor_names_the_package(radarsim):
 def test_its_kernels_are_compiled_once(ran, radarsim, tmp_path):
     cache = Path(os.environ.get("RADARSIM_CACHE_DIR") or tmp_path)
     first = radarsim("run", "fifth", "-n", 100, "--no-figures", "--out", tmp_path, RADARSIM_CACHE_DIR=str(cache))
-    kept = {file: file.stat().st_mtime_ns for file in cache.rglob("walk.simulate_block*.nbc")}
+    kept = {file: file.stat().st_mtime_ns for file in cache.rglob("fifth.kernels.walk.simulate_block*")}
     assert kept, first.stdout
     radarsim("run", "fifth", "-n", 200, "--no-figures", "--out", tmp_path, RADARSIM_CACHE_DIR=str(cache))
-    assert {file: file.stat().st_mtime_ns for file in cache.rglob("walk.simulate_block*.nbc")} == kept
+    assert {file: file.stat().st_mtime_ns for file in cache.rglob("fifth.kernels.walk.simulate_block*")} == kept
 
 
 EDITS = [  # file, text in it, its replacement, whether numbers may change
