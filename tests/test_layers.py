@@ -40,14 +40,14 @@ ROOMS = {
 # Inside a study: what of the shared rooms a role stands on, and on which roles of its own study.
 GROUND = ("errors", "kernels", "physics", *CASE)
 KEYS = ("errors", "config.faults", "config.fields", "physics")
-DESIGN = ("kernels", "config", "part")
+DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
-SHOWN = (*SUMS, "tables", "figures")
+SHOWN = (*SUMS, "tables", "figures", "map")
 READ = (*SHOWN, "words", "claims", "measures")
 ROLES = {
     "kernels": (("kernels",), ("kernels",)),
     "config": (KEYS, ("config",)),
-    "part": ((*GROUND, *DATA, "studies.noise"), DESIGN),  # world, filters, exact, and whatever else prepares numbers
+    "design": ((*GROUND, *DATA, "studies.noise"), DESIGN),  # world, filters, exact, and whatever else prepares numbers
     "study": ((*GROUND, *DATA, "studies.noise"), SUMS),
     "tables": ((*GROUND, *DATA, "report"), SHOWN),
     "figures": ((*GROUND, *DATA, "report"), SHOWN),
@@ -55,8 +55,14 @@ ROLES = {
     "claims": ((*GROUND, *DATA, "report"), READ),
     "measures": ((*GROUND, *DATA, "report"), READ),
     "track": ((*GROUND, *DATA, "studies.noise", "studies.interface"), (*SUMS, "track")),
-    "__init__": (("studies.interface", "report.claims"), (*READ, "track", "__init__")),
+    "map": ((*GROUND, *DATA), (*SUMS, "track")),  # one realisation followed as recorded plots are, for a figure
+    "part": (
+        (*GROUND, *DATA, "report", "studies.interface"),
+        (*READ, "track"),
+    ),  # of several: their type
+    "__init__": (("studies.interface", "report.claims"), (*READ, "track", "part", "__init__")),
 }
+ALSO = {"schema": "config"}  # the keys of a study of several parts
 
 LIBRARIES = {  # library: the files and rooms that may import it
     "yaml": {"config/load.py"},
@@ -68,9 +74,12 @@ LIBRARIES = {  # library: the files and rooms that may import it
     "jinja2": {"report/html.py"},
     "numba": {"kernels/cache.py", "kernels/compile.py", "kernels/lanes.py"},
     "llvmlite": {"kernels/cache.py", "kernels/compile.py", "kernels/lanes.py"},
-    "pydantic": {"config", "studies/*/config.py", "studies/*/*/config.py"},
+    "pydantic": {"config", "studies/*/config.py", "studies/*/*/config.py", "studies/*/schema.py"},
     "pydantic_core": {"config/check.py", "config/fields.py", "config/starter.py"},
-    "pandas": {"report/tables.py", "report/precision.py", "studies/interface.py"},
+    "pandas": {
+        *("report/tables.py", "report/precision.py", "studies/interface.py", "studies/*/part.py"),
+        *("studies/*/tables.py", "studies/*/*/tables.py"),
+    },
 }
 
 
@@ -100,7 +109,7 @@ def place(module: str) -> Place:
 def role(inner: list[str]) -> str:
     """The role of a module by its path inside a study or a variant of one."""
     name = inner[0] if inner else "__init__"
-    return name if name in ROLES else "part"
+    return ALSO.get(name, name if name in ROLES else "design")
 
 
 def under(module: str, homes) -> bool:
@@ -124,19 +133,13 @@ def fault(importing: str, imported: str) -> str:
         return "" if under(imported, ground) else f"a study's {here.role} stands on {', '.join(ground)}"
     if here.study != there.study:
         return "no study knows another"
-    if there.variant and here.variant != there.variant and not (here.variant == "" and here.study in CHOOSE):
+    if there.variant and here.variant != there.variant and importing not in CHOOSE:
         return "a variant is known to itself and where it is chosen"
     return "" if there.role in own else f"a study's {here.role} stands on its {', '.join(own)}"
 
 
-CHOOSE = {"sonar"}  # studies whose common base chooses among its variants
-# Not yet as it should be.
-KNOWN = {
-    ("studies.multimodel.measures", "app.configs"),
-    ("studies.range_doppler.tables", "studies.range_doppler.words"),
-    ("studies.sonar.clutter.study", "studies.sonar.clutter.track"),
-    ("studies.sonar.tables", "studies.sonar.manoeuvre.words"),
-}
+CHOOSE = {"studies.sonar", "studies.sonar.schema"}  # where the variants of a study are chosen
+KNOWN = {("studies.multimodel.measures", "app.configs")}  # not yet as it should be
 
 
 def modules() -> dict[str, Path]:
@@ -230,7 +233,8 @@ PLANTED = [
     ("studies.range_doppler.study", "radarsim.studies.range_doppler.tables"),
     ("studies.range_doppler.study", "radarsim.engine.run"),
     ("studies.range_doppler.study", "radarsim.studies.registry"),
-    ("studies.range_doppler.tables", "radarsim.studies.range_doppler.claims"),
+    ("studies.range_doppler.tables", "radarsim.studies.range_doppler.words"),
+    ("studies.sonar.filters", "radarsim.studies.sonar.clutter.filters"),
     ("studies.range_doppler.figures", "radarsim.studies.range_doppler.claims"),
     ("studies.range_doppler.words", "radarsim.studies.range_doppler.track"),
     ("studies.range_doppler.measures", "radarsim.app.configs"),
@@ -282,7 +286,7 @@ def at_home(file: str, homes: set[str]) -> bool:
         ("config/load.py", "yaml", True),
         ("config/check.py", "yaml", False),
         ("studies/sonar/clutter/config.py", "pydantic", True),
-        ("studies/sonar/config.py", "pydantic", True),
+        ("studies/sonar/schema.py", "pydantic", True),
         ("studies/sonar/study.py", "pydantic", False),
         ("cli/group.py", "click", True),
         ("app/run.py", "click", False),
