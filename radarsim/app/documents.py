@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-    from radarsim.app.outlook import Inventory, Outlook
+    from radarsim.app.inventory import Inventory
+    from radarsim.app.outlook import Outlook
     from radarsim.app.result import Result
     from radarsim.app.simulation import Shares
     from radarsim.config.experiment import Experiment

@@ -1,13 +1,18 @@
 """What there is to run: configs, scenarios, studies and filters. Loads no kernels."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from radarsim.app.configs import lookup
 from radarsim.studies import registry
 
+Inventory = Sequence[tuple[str, Sequence[str], Sequence[tuple[str, ...]]]]  # title, columns, rows
 
-def described(file: Path) -> str:
-    """The first words of a YAML file's leading comment, without its own name."""
+
+def described(file: Path | None) -> str:
+    """The first line of a YAML file's leading comment, without its own name; empty where there is no such file."""
+    if file is None:
+        return ""
     with file.open(encoding="utf-8") as lines:
         for line in lines:
             words = line.lstrip("#").strip()
@@ -18,7 +23,7 @@ def described(file: Path) -> str:
     return ""
 
 
-def inventory() -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
+def inventory() -> Inventory:
     """What `radarsim list` shows: title, columns and rows of each kind of thing at hand."""
     configs = [(stem, described(lookup.config_file(stem))) for stem in lookup.stems("configs")]
     scenarios = [(stem, described(lookup.scenario_file(stem, None))) for stem in lookup.stems("scenarios")]

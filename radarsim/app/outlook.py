@@ -1,7 +1,7 @@
 """What running an experiment would take."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,6 @@ from radarsim.engine.executors import available_cores
 from radarsim.engine.results import Axes
 from radarsim.studies import registry
 
-Inventory = Sequence[tuple[str, Sequence[str], Sequence[tuple[str, ...]]]]  # title, columns, rows
 PILOT_S = 0.3  # of all cases together, unless single realisations take longer
 LADDER, FOR_NOTHING = 8, 1.2  # so many times more realisations at a look; times as good as equal
 SHORT_S = 0.01

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
     from radarsim.app.clean import Cleaned
     from radarsim.app.doctor import Inspection
-    from radarsim.app.outlook import Inventory, Outlook
+    from radarsim.app.inventory import Inventory
+    from radarsim.app.outlook import Outlook
     from radarsim.app.result import Result
     from radarsim.app.simulation import Shares
     from radarsim.config.experiment import Experiment
