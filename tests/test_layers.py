@@ -260,7 +260,8 @@ def users(library: str) -> set[str]:
     return {
         path.relative_to(PACKAGE).as_posix()
         for module, path in MODULES.items()
-        if any(name.split(".")[0] == library for name in imports(text_of(module))) and not path.is_relative_to(TEMPLATE)
+        if any(name.split(".")[0] == library for name in imports(running(text_of(module))))
+        and not path.is_relative_to(TEMPLATE)
     }
 
 
