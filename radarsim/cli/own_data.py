@@ -38,7 +38,7 @@ def new(name: str, like: str) -> None:
 
 @main.command(name="new-study")
 @click.argument("name", metavar="NAME")
-def new_study(name):
+def new_study(name: str) -> None:
     """A package with a small whole study, to be made one's own: ./NAME.
 
     It compares two filters on a random walk: keys, kernel, exact values, tables, figures, a claim, recorded plots,
