@@ -32,12 +32,16 @@ autodoc_typehints_format = "short"
 nitpick_ignore_regex = [
     (
         "py:.*",
-        r"(np|numpy|pd|pandas|matplotlib|collections|contextlib|importlib|os|pathlib|types|numba|click|pydantic|markupsafe)\..*",
+        r"(np|numpy|pd|pandas|matplotlib|collections|contextlib|importlib|_frozen_importlib|ast|os|pathlib|types|numba"
+        r"|click|pydantic|markupsafe)\..*",
     ),
+    ("py:class", r"Canvas|DataclassInstance"),
     ("py:class", r"radarsim\.config\.(fields|schema)\..*|Keys"),  # their keys have a page of their own
-    ("py:class", r"radarsim\.engine\.results\.A_co"),  # a type variable
+    ("py:class", r"radarsim\..*\.(A_co|M|Part|Asked)|Inventory"),  # type variables and names of types
     ("py:class", r"(dict|list)\[.*"),  # a subscript that autodoc takes for a name
 ]
+# Several studies have a class of one name, each documented in its own module; a type of that name may be any of them.
+suppress_warnings = ["ref.python"]
 
 html_theme = "furo"
 html_title = f"radarsim {version}"
