@@ -182,12 +182,24 @@ def words():
     return made
 
 
-def work(config, overrides):
-    """The last case of a config, as it is run."""
-    from radarsim.app.configs import load
-    from radarsim.app.work import CaseWork
+class Work:
+    """A case as its study computes it: the engine itself refuses to run without a compiler."""
 
-    return CaseWork(load(config, overrides).cases[-1])
+    def __init__(self, case):
+        from radarsim.studies.registry import study
+
+        self.case, self.study = case, study(case.study)
+        self.plan = self.study.prepare(case)
+
+    def simulate(self, first, count):
+        return self.study.simulate(self.plan, first, count)
+
+
+def work(config, overrides):
+    """The last case of a config."""
+    from radarsim.app.configs import load
+
+    return Work(load(config, overrides).cases[-1])
 
 
 def sums(config, overrides, count):

@@ -79,7 +79,7 @@ class Filter(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """A filter's memory, by addresses: rows (WORK), numbers CURRENT … SETTLED, and room for MOST whole numbers."""
+    """A filter's memory, by addresses: rows (WORK,), numbers CURRENT … SETTLED, and room for MOST whole numbers."""
 
     work: np.ndarray
     numbers: np.ndarray
