@@ -85,7 +85,7 @@ def recorded(decorate):
     """The decorator, of functions that note that they ran."""
 
     def noted(function):
-        name, made = f"{function.__module__.rpartition('.')[2]}.{function.__name__}", decorate(function)
+        name, made = f"{function.__module__}.{function.__name__}", decorate(function)
         there.add(name)
 
         @functools.wraps(function)
@@ -107,14 +107,16 @@ def uncompiled():
 
     for name, plain in LANES.items():
         setattr(lanes, name, plain)
-    for file in sorted(Path(compiling.__file__).parent.glob("[a-z]*.py")):
-        module = importlib.import_module(f"radarsim.kernels.{file.stem}")
+    package = Path(compiling.__file__).parents[1]
+    for file in sorted(file for file in package.rglob("kernels/[a-z]*.py") if "template" not in file.parts):
+        name = ".".join(file.relative_to(package.parent).with_suffix("").parts)
+        module = importlib.import_module(name)
         if hasattr(module, "np"):
             module.np = Records()
-        if "discriminator" not in file.stem:
-            for name, size in SIZES.items():
-                if hasattr(module, name):
-                    setattr(module, name, size)
+        if "discriminator" not in file.parts:
+            for constant, size in SIZES.items():
+                if hasattr(module, constant):
+                    setattr(module, constant, size)
 
 
 BURST = {"carrier_hz": 10e9, "pulse_period_s": 1e-5, "pulse_length_s": 2e-6, "sampling_period_s": 1e-6, "pulses": 64}
