@@ -24,24 +24,24 @@ def instruction_set() -> str:
     return " ".join([*parts, f"NumPy without {disabled}"] if disabled else parts)
 
 
-def _flags() -> list[str]:
-    """Features of the first processor, as Linux lists them; none elsewhere."""
+def _cpuinfo() -> list[str]:
+    """The lines in which Linux describes the first processor; none elsewhere."""
     try:
         with open("/proc/cpuinfo", encoding="ascii", errors="replace") as file:
-            lines = file.read(8192).splitlines()
+            return file.read(8192).splitlines()
     except OSError:
         return []
-    return next((line.split() for line in lines if line.startswith(("flags", "Features"))), [])
+
+
+def _flags() -> list[str]:
+    """Features of the first processor, as Linux lists them; none elsewhere."""
+    return next((line.split() for line in _cpuinfo() if line.startswith(("flags", "Features"))), [])
 
 
 @functools.cache
 def processor() -> str:
     """The processor's name; empty where the system does not say."""
-    try:
-        with open("/proc/cpuinfo", encoding="ascii", errors="replace") as file:
-            names = [line.partition(":")[2].strip() for line in file.read(8192).splitlines() if "model name" in line]
-    except OSError:
-        names = []
+    names = [line.partition(":")[2].strip() for line in _cpuinfo() if "model name" in line]
     return names[0] if names else system.processor()
 
 
