@@ -9,7 +9,7 @@ import radarsim
 from radarsim.app import configs
 from radarsim.app.run import papers
 from radarsim.report import claims, tables
-from radarsim.report.claims import CONFIRMED, REFUTED, UNCLEAR, Range, Series
+from radarsim.report.claims import CONFIRMED, REFUTED, UNCLEAR, Series
 from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
 from radarsim.studies.range_doppler import tables as range_doppler
@@ -28,20 +28,34 @@ def table(paper, swept_all):
 
 
 def test_ranges_from_words():
-    assert claims.printed("18")[:2] == (17.5, 18.5)
-    assert claims.printed("0.33")[:2] == pytest.approx((0.325, 0.335))
-    assert claims.between("7", "15")[:2] == (6.5, 15.5)
-    assert claims.about("10")[:2] == pytest.approx((9, 11))
-    assert claims.about("20", "30")[:2] == pytest.approx((18, 33))
+    """Values, margin, and the range of the old rule."""
+    assert claims.printed("18")[:2] == (18, 18)
+    assert claims.printed("18").margin == 0.5
+    assert claims.printed("25", step=5).margin == 2.5
+    assert claims.printed("0.33").strict == pytest.approx((0.325, 0.335))
+    assert claims.between("7", "15")[:2] == (7, 15)
+    assert claims.between("7", "15").strict == (6.5, 15.5)
+    assert claims.about("10").margin == pytest.approx(1)
+    assert claims.about("10", margin=5).margin == 5
+    assert claims.about("20", "30").strict == pytest.approx((18, 33))
     assert claims.above(50).lo > 50
+    assert claims.above(50).margin == 0.5
+    assert claims.above(0.99).margin == pytest.approx(0.005)
     assert claims.below(10).hi < 10
     assert claims.within(3, 4)[:2] == (3, 4)
 
 
-def test_words_tell_the_range_tested():
-    assert claims.between("10", "50").words == "10 to 50 (9.5 … 50.5)"
-    assert claims.printed("18").words == "18 (17.5 … 18.5)"
-    assert claims.about("10").words == "about 10 (9 … 11)"
+def test_kinds_of_margins():
+    assert claims.above(0).kind == claims.greater().kind == "material"
+    assert claims.above(50).kind == claims.at_most(10).kind == "limit"
+    assert (claims.printed("18").kind, claims.about("10").kind, claims.same().kind) == ("print", "about", "same")
+
+
+def test_words_give_the_margin():
+    assert claims.between("10", "50").words == "10 to 50 ± 0.5"
+    assert claims.printed("25", step=5).words == "25 ± 2.5"
+    assert claims.about("10").words == "about 10 ± 1"
+    assert claims.about("20", "30", margin=10).words == "about 20 to 30 ± 10"
 
 
 @pytest.mark.parametrize(
@@ -59,7 +73,7 @@ def test_words_tell_the_range_tested():
     ],
 )
 def test_verdict_is_of_the_interval(lo, hi, said):
-    assert claims.verdict(Estimate((lo + hi) / 2, lo, hi), Range(1.0, 2.0, "")) == said
+    assert claims.verdict(Estimate((lo + hi) / 2, lo, hi), (1.0, 2.0)) == said
 
 
 def test_verdict_of_several_parts():

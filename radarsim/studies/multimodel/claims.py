@@ -6,9 +6,7 @@ in general it is judged once more, with the letter t, on the other four. "The sa
 the words name no stage and no component, all stages count, in height and rate of climb.
 """
 
-import math
-
-from radarsim.report.claims import Claim, Part, Range, above, at_most, below, certain, within
+from radarsim.report.claims import Claim, Part, above, at_least, at_most, below, certain, same, within
 from radarsim.studies.multimodel.measures import (
     AEROBALLISTIC,
     BANK_122,
@@ -29,8 +27,8 @@ __all__ = ["CLAIMS", "Evidence"]
 
 SIX = (MMA2_122, *RIVALS)
 PAPER = ("aeroballistic", 0.05, SIX)
-SAME = within(-0.5, 0.5)
-FEW_PERCENT = Range(-5.0, math.inf, "≥ -5")  # a loss of at most 5 %
+SAME = same(0, 1, strict=0.5)  # %, of σ
+FEW_PERCENT = at_least(-5)  # a loss of at most 5 %
 RULES = {rule: ("imm", rule, BANK_122) for rule in ("moment", "best", "combined", "modified_combined")}
 MMA3 = ("gpb2", "combined", BANK_122)
 MMA1 = ("gpb1", "combined", BANK_122)

@@ -5,13 +5,13 @@ measured is within 1 % of it in σ, within 2 % in a variance or covariance; an i
 paper's sections.
 """
 
-from radarsim.report.claims import Claim, Part, Range, above, at_most, below, within
+from radarsim.report.claims import Claim, Part, above, at_most, below, same, within
 from radarsim.studies.sonar.smoothing import measures as measured
 from radarsim.studies.sonar.smoothing.measures import ASYNCHRONOUS, FLUCTUATING, GAP, TEXTBOOK, correlated
 
-IN_SIGMA = Range(0.99, 1.01, "1 within 1 %")
-IN_VARIANCE = Range(0.98, 1.02, "1 within 2 %")
-SAME = Range(1 - 1e-9, 1 + 1e-9, "1 to 10⁻⁹")
+IN_SIGMA = same(1, 0.01)
+IN_VARIANCE = same(1, 0.02)
+SAME = same(1, 1e-9)
 
 
 def _claim(number: int, place: str, statement: str, *parts: Part, reading: str = "", config: str = "sonar_smoothing"):

@@ -1,0 +1,147 @@
+"""What an experiment measured, as claims ask for it: curves as series, points of them with their intervals."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import tables as common
+from radarsim.report.statistics import Estimate, difference
+
+
+class Missing(KeyError):
+    """The experiment does not hold a case that a claim needs; the claim is then not judged by it."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """A measured curve: scans k, times t, values and the ends of their intervals, arrays of one length."""
+
+    k: np.ndarray
+    t: np.ndarray
+    value: np.ndarray
+    lo: np.ndarray
+    hi: np.ndarray
+
+    def point(self, i: int) -> Estimate:
+        """The i-th point."""
+        return Estimate(float(self.value[i]), float(self.lo[i]), float(self.hi[i]))
+
+    def where(self, mask: np.ndarray | slice) -> "Series":
+        """The points that a mask or indices pick; raises Missing where there is none."""
+        if not np.asarray(self.k)[mask].size:
+            raise Missing("no such scans")
+        return Series(*(np.asarray(part)[mask] for part in (self.k, self.t, self.value, self.lo, self.hi)))
+
+    def since(self, k: int) -> "Series":
+        """From scan k on."""
+        return self.where(self.k >= k)
+
+    def at(self, k: int) -> Estimate:
+        """The point at scan k."""
+        return self.where(self.k == k).point(0)
+
+    def first(self) -> Estimate:
+        """The first point."""
+        return self.point(0)
+
+    def last(self) -> Estimate:
+        """The last point."""
+        return self.point(-1)
+
+    def largest(self) -> Estimate:
+        """The largest value, with the interval of its own scan."""
+        return self.point(int(np.nanargmax(self.value)))
+
+    def least(self) -> Estimate:
+        """The least value, with the interval of its own scan."""
+        return self.point(int(np.nanargmin(self.value)))
+
+    def when_largest(self, of: str = "t") -> Estimate:
+        """Time (or scan, of="k") of the largest value; the interval spans all that cannot be told from it."""
+        axis = getattr(self, of)
+        top = int(np.nanargmax(self.value))
+        near = axis[self.hi >= self.lo[top]]
+        return Estimate(float(axis[top]), float(near.min()), float(near.max()))
+
+
+def common_times(a: Series, b: Series) -> tuple[Series, Series]:
+    """The points of both at the times that both have."""
+    _, i, j = np.intersect1d(np.round(a.t, 6), np.round(b.t, 6), return_indices=True)
+    return a.where(i), b.where(j)
+
+
+def minus(a: Series, b: Series) -> Series:
+    """a − b, point by point, of independent noise: half-widths add in squares."""
+    of = difference(Estimate(a.value, a.lo, a.hi), Estimate(b.value, b.lo, b.hi))
+    return Series(a.k, a.t, *of)
+
+
+def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
+    """scale · a / b of independent positive estimates: relative half-widths add in squares."""
+    value = scale * a.value / b.value
+    down = np.hypot(1 - a.lo / a.value, b.hi / b.value - 1)
+    up = np.hypot(a.hi / a.value - 1, 1 - b.lo / b.value)
+    return Estimate(value, value * (1 - down), value * (1 + up))
+
+
+def certain(value: float) -> Estimate:
+    """A number without noise: algebra, a count."""
+    return Estimate(float(value), float(value), float(value))
+
+
+class Evidence:
+    """What an experiment measured, as the claims of its study ask for it. Studies say in `case` what a key means.
+
+    results are the cases that are the paper's, no others; of their lists that may grow, `members` gives the paper's.
+    """
+
+    def __init__(self, results: Sequence[CaseResult], made: Mapping, places: Mapping[str, Mapping[str, set[int]]]):
+        """places: by the name of a case and the key of a list, which of its members are the paper's."""
+        self.results, self.tables, self._places = list(results), made, places
+
+    @cached_property
+    def _curves(self) -> Mapping:
+        return common.groups(self.tables["curves"], "case", "filter", "component")
+
+    @cached_property
+    def _gains(self) -> Mapping:
+        return common.groups(self.tables["gains"], "case", "filter", "component")
+
+    def members(self, result: CaseResult, key: str = "filters") -> list[tuple[int, Any]]:
+        """The members of a list of a case that are the paper's, each with its number; not those that were added."""
+        return [(i, one) for i, one in enumerate(getattr(result.spec, key)) if i in self._places[result.name][key]]
+
+    def case(self, key: Any) -> CaseResult:
+        """The case that a key means; raises Missing where the experiment does not hold it. Here: by name."""
+        for result in self.results:
+            if result.name == key:
+                return result
+        raise Missing(key)
+
+    def curve(self, key: Any, filter_name: str, component: str) -> Series:
+        """σ(k) of a filter of a case."""
+        return self._series(self._curves, key, filter_name, component, ("sigma", "sigma_lo", "sigma_hi"))
+
+    def gain(self, key: Any, filter_name: str, component: str) -> Series:
+        """Relative gain of a filter of a case against its baseline, %."""
+        return self._series(self._gains, key, filter_name, component, ("gain_percent", "gain_lo", "gain_hi"))
+
+    def _series(self, groups: Mapping, key: Any, filter_name: str, component: str, values: tuple[str, ...]) -> Series:
+        rows = groups.get((self.case(key).name, filter_name, component))
+        if rows is None:
+            raise Missing(key)
+        return Series(*(rows[name].to_numpy() for name in ("k", "t_s", *values)))
+
+    def row(self, table: str, **equal: object) -> Mapping[str, Any]:
+        """The one row of a table with these values; raises Missing."""
+        rows = self.tables[table]
+        for name, value in equal.items():
+            rows = rows[rows[name] == value]
+        if not len(rows):
+            raise Missing(equal)
+        first: Any = rows.iloc[0]  # a Series, read as a mapping
+        return first

@@ -1,0 +1,380 @@
+"""The rule by which a claim is judged: numbers in, verdicts out. Written down before anything was measured.
+
+docs/verdicts.md gives it in words. A judged part holds what was measured, the exact value where one is known, the range
+that the paper's words leave and the margin that these words have. `verdict` judges one part, `claim` all parts of a
+claim, `over_readings` a claim under all readings that its paper allows.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from statistics import NormalDist
+
+CONFIRMED, REFUTED, IMMATERIAL = "confirmed", "refuted", "no material difference"
+CONTRADICTORY, UNJUDGEABLE = "the print contradicts itself", "not judgeable as stated"
+UNDECIDED, DEPENDS = "not yet decided", "depends on"
+VOID = "void"  # of a part: the truth itself would not pass it
+CLASSES = (CONFIRMED, REFUTED, DEPENDS, IMMATERIAL, CONTRADICTORY, UNJUDGEABLE, UNDECIDED)
+
+# Kinds of margin. Of the first four the margin belongs to the words: a value within it is what the paper says.
+PRINT, ABOUT, GRID, SAME = "print", "about", "grid", "same"
+LIMIT = "limit"  # "more than 50 %": just outside, within the margin, is no material difference
+MATERIAL = "material"  # "better": within the margin of equality, on either side, is no material difference
+INCLUSIVE = (PRINT, ABOUT, GRID, SAME)
+
+EQUIVALENT, UNSTATED, AGAINST = "E", "U", "N"  # kinds of readings; the last contradicts the print
+Z95 = NormalDist().inv_cdf(0.975)
+ERROR_OF_PROGRAM = 5.85  # standard errors between exact value and Monte-Carlo: by chance once in 2·10⁸
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One measured part of a claim; all numbers in the part's own unit.
+
+    lo and hi bound 95 %. exact is not-a-number where it is not known. expected_lo and expected_hi are what the words
+    say, an end that they leave open infinite; margin > 0 is how finely they say it, kind whence it comes. ceiling is
+    what a perfect estimator would score, not-a-number where that is no question.
+
+    statement names the part's sentence where a claim makes several, each of which has to be true. Parts of one
+    `number` are variants of it: one suffices. variant is the name of this one, against_print whether it takes a value
+    that the paper contradicts. A part that is not asserted by the paper is an extension: shown, not counted.
+    """
+
+    measured: float
+    lo: float
+    hi: float
+    expected_lo: float
+    expected_hi: float
+    margin: float
+    kind: str = PRINT
+    exact: float = math.nan
+    ceiling: float = math.nan
+    n: int = 0
+    statement: str = ""
+    number: str = ""
+    variant: str = ""
+    against_print: bool = False
+    asserted: bool = True
+
+    @property
+    def known(self) -> bool:
+        """Whether the exact value is known; it then decides."""
+        return not math.isnan(self.exact)
+
+    @property
+    def value(self) -> float:
+        """What is judged: the exact value, or the measured one."""
+        return self.exact if self.known else self.measured
+
+    @property
+    def void(self) -> bool:
+        """Whether a perfect estimator would fail: then the part tests nothing."""
+        return not math.isnan(self.ceiling) and _miss(self.ceiling, self) > 1
+
+    @property
+    def sampled(self) -> bool:
+        """Whether chance has a part in it."""
+        return not self.known and self.lo != self.hi
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a claim: its class, the words, how many numbers held and failed, and the worst miss in margins.
+
+    needed is how many realisations would decide what is not yet decided, where that is so; None: no number would.
+    """
+
+    kind: str
+    held: int
+    failed: int
+    of: int
+    miss: float
+    needed: int | None = None
+    depends_on: tuple[str, ...] = ()
+    holds_in: int | None = None
+    readings: int | None = None
+
+    @property
+    def words(self) -> str:
+        """The class, and what it depends on."""
+        return f"{self.kind} {', '.join(self.depends_on)}".rstrip() if self.kind == DEPENDS else self.kind
+
+
+# ---- one part -----------------------------------------------------------------------------------------------------
+def widened(lo: float, value: float, hi: float, factor: float) -> tuple[float, float]:
+    """An interval with its two half-widths times a factor."""
+    return value - factor * (value - lo), value + factor * (hi - value)
+
+
+def level(parts: int) -> float:
+    """Half-widths at which that many intervals hold at once in 95 % of runs, over those of one (Bonferroni)."""
+    return NormalDist().inv_cdf(1 - 0.025 / max(parts, 1)) / Z95
+
+
+def ends(part: Judged, parts: int = 1) -> tuple[float, float]:
+    """The interval that is judged: the exact value twice, or the 95 % interval widened for so many parts."""
+    if part.known:
+        return part.exact, part.exact
+    if part.lo == part.hi:
+        return part.lo, part.hi
+    if not (math.isfinite(part.measured) and math.isfinite(part.lo) and math.isfinite(part.hi)):
+        return part.lo, part.hi
+    return widened(part.lo, part.measured, part.hi, level(parts))
+
+
+def miss(part: Judged) -> float:
+    """How far the value lies outside the words, in margins; 0 inside."""
+    return _miss(part.value, part)
+
+
+def _miss(value: float, part: Judged) -> float:
+    outside = max(part.expected_lo - value, value - part.expected_hi, 0.0)
+    return outside / part.margin if outside else 0.0
+
+
+def verdict(part: Judged, parts: int = 1) -> str:
+    """The verdict on one part of a claim that has so many parts with a sampling error."""
+    lo, hi = ends(part, parts)
+    if part.void:
+        return VOID
+    if not lo <= hi:
+        return UNDECIDED
+    low, high = part.expected_lo - part.margin, part.expected_hi + part.margin
+    if hi < low or lo > high:
+        return REFUTED
+    if part.kind == MATERIAL and _near_equality(lo, hi, part):
+        return IMMATERIAL
+    if part.expected_lo <= lo and hi <= part.expected_hi:
+        return CONFIRMED
+    if low <= lo and hi <= high:
+        if part.kind in INCLUSIVE:
+            return CONFIRMED
+        if part.kind == LIMIT:
+            return IMMATERIAL
+    return UNDECIDED
+
+
+def _near_equality(lo: float, hi: float, part: Judged) -> bool:
+    """Whether an interval lies within the margin of an end of the range, on whichever side."""
+    equal = (end for end in (part.expected_lo, part.expected_hi) if math.isfinite(end))
+    return any(end - part.margin <= lo and hi <= end + part.margin for end in equal)
+
+
+def harmless(part: Judged, parts: int = 1) -> bool:
+    """Whether an undecided part can at worst turn out to be no material difference."""
+    lo, hi = ends(part, parts)
+    return part.expected_lo - part.margin <= lo and hi <= part.expected_hi + part.margin
+
+
+def needed(part: Judged, parts: int = 1) -> int | None:
+    """How many realisations would likely decide a part: the interval shrinks with 1/√n about the value measured.
+
+    0 where it is decided; None where the value lies on a border, or nothing is known of its interval.
+    """
+    if verdict(part, parts) != UNDECIDED:
+        return 0
+    lo, hi = ends(part, parts)
+    if part.known or not part.n or not (math.isfinite(lo) and math.isfinite(hi) and lo < hi):
+        return None
+    found = [one for one in (_shrunk(part, parts, border) for border in _borders(part)) if one is not None]
+    return min(found, default=None)
+
+
+def _borders(part: Judged) -> list[float]:
+    """The values on which verdicts change."""
+    ways = (-part.margin, part.margin) if part.kind == MATERIAL else (0.0,)
+    out = (part.expected_lo - part.margin, part.expected_hi + part.margin)
+    inner = [end + way for end in (part.expected_lo, part.expected_hi) for way in ways]
+    return sorted({one for one in (*out, *(() if part.kind in INCLUSIVE else inner)) if math.isfinite(one)})
+
+
+def _shrunk(part: Judged, parts: int, border: float) -> int | None:
+    """Realisations at which the interval no longer reaches a border, if no other one is reached then either."""
+    lo, hi = ends(part, parts)
+    gap = abs(part.measured - border)
+    half = part.measured - lo if border < part.measured else hi - part.measured
+    if not 0 < gap < half:
+        return None
+    share = gap / half * (1 - 1e-9)
+    low, high = widened(part.lo, part.measured, part.hi, share)
+    decided = verdict(replace(part, lo=low, hi=high), parts) != UNDECIDED
+    return math.ceil(part.n / share**2) if decided else None
+
+
+def disagrees(part: Judged) -> bool:
+    """Whether exact value and Monte-Carlo lie further apart than chance ever puts them: an error of the program.
+
+    lo and hi are those of the measured value. Of values without a width, as times on a grid, nothing is said.
+    """
+    if not part.known or part.lo == part.hi or not (math.isfinite(part.exact) and math.isfinite(part.measured)):
+        return False
+    lo, hi = widened(part.lo, part.measured, part.hi, ERROR_OF_PROGRAM / Z95)
+    return part.exact < lo or part.exact > hi
+
+
+# ---- a claim ------------------------------------------------------------------------------------------------------
+# Of variants of a number the first of these that one of them has; CONTRADICTORY where only one against the print holds.
+BEST = (CONFIRMED, IMMATERIAL, UNDECIDED, CONTRADICTORY, REFUTED)
+# Of the sentences of a claim the first of these that one of them has.
+WORST = (REFUTED, CONTRADICTORY, UNDECIDED, UNJUDGEABLE, IMMATERIAL, CONFIRMED)
+
+
+def claim(parts: Sequence[Judged], *, unstated: bool = False, joint: bool = False) -> Outcome:
+    """The outcome of a claim of these parts; of an extension none of which is asserted, as if all were.
+
+    unstated: the paper leaves out what the statement is about, so that it cannot be judged. joint: one variant has to
+    give every number; where each comes out in some variant and no variant gives all, the print contradicts itself.
+    """
+    asserted = [part for part in parts if part.asserted] or list(parts)
+    many = sum(part.sampled and not part.void for part in asserted)
+    if joint:
+        return _joint(asserted, many)
+    numbers = _numbers(asserted)
+    said = {name: _best(own, many) for name, own in numbers.items()}
+    kind = UNJUDGEABLE if unstated else _kind(numbers, said, many)
+    misses = [min(miss(part) for part in own) for name, own in numbers.items() if said[name] != VOID]
+    open_ = [part for name, own in numbers.items() if said[name] == UNDECIDED for part in own]
+    return Outcome(
+        kind,
+        held=sum(one in (CONFIRMED, IMMATERIAL) for one in said.values()),
+        failed=sum(one in (REFUTED, CONTRADICTORY) for one in said.values()),
+        of=sum(one != VOID for one in said.values()),
+        miss=max(misses, default=math.nan),
+        needed=_most_needed(open_, many) if kind == UNDECIDED else None,
+    )
+
+
+def _numbers(parts: Sequence[Judged]) -> dict[tuple[str, str], list[Judged]]:
+    """Parts by statement and number; one of no number stands for itself."""
+    numbers: dict[tuple[str, str], list[Judged]] = {}
+    for i, part in enumerate(parts):
+        numbers.setdefault((part.statement, part.number or f"#{i}"), []).append(part)
+    return numbers
+
+
+def _best(variants: Sequence[Judged], many: int) -> str:
+    """The verdict on a number from those on its variants."""
+    said = []
+    for part in variants:
+        one = verdict(part, many)
+        if part.against_print and one in (CONFIRMED, IMMATERIAL):
+            one = CONTRADICTORY
+        if one != VOID:
+            said.append(REFUTED if part.against_print and one == UNDECIDED else one)
+    return min(said, key=BEST.index) if said else VOID
+
+
+def _kind(numbers: Mapping[tuple[str, str], Sequence[Judged]], said: Mapping[tuple[str, str], str], many: int) -> str:
+    sentences = []
+    for sentence in dict.fromkeys(name for name, _ in numbers):
+        own = {key: said[key] for key in numbers if key[0] == sentence and said[key] != VOID}
+        safe = all(harmless(part, many) for key, one in own.items() if one == UNDECIDED for part in numbers[key])
+        sentences.append(_sentence(list(own.values()), safe))
+    return min(sentences, key=WORST.index) if sentences else UNJUDGEABLE
+
+
+def _sentence(said: Sequence[str], safe: bool) -> str:
+    """The verdict on a sentence: one material miss refutes it, immaterial ones neither refute nor confirm."""
+    for bad in (REFUTED, CONTRADICTORY):
+        if bad in said:
+            return bad
+    if UNDECIDED in said and not (safe and CONFIRMED in said):
+        return UNDECIDED
+    if CONFIRMED in said:
+        return CONFIRMED
+    return IMMATERIAL if said else UNJUDGEABLE
+
+
+def _most_needed(parts: Sequence[Judged], many: int) -> int | None:
+    every = [needed(part, many) for part in parts]
+    return None if not every or None in every else max(one for one in every if one is not None)
+
+
+def _joint(parts: Sequence[Judged], many: int) -> Outcome:
+    by_variant: dict[str, list[str]] = {}
+    by_number: dict[str, list[str]] = {}
+    for part in parts:
+        said = verdict(part, many)
+        by_variant.setdefault(part.variant, []).append(said)
+        by_number.setdefault(part.number, []).append(said)
+    held = {name: sum(one in (CONFIRMED, IMMATERIAL) for one in said) for name, said in by_variant.items()}
+    best = max(held, key=lambda name: held[name])
+    if held[best] == len(by_number):
+        kind = CONFIRMED
+    elif any(UNDECIDED in said and REFUTED not in said for said in by_variant.values()):
+        kind = UNDECIDED
+    else:
+        kind = CONTRADICTORY if all(CONFIRMED in said for said in by_number.values()) else REFUTED
+    worst = max(miss(part) for part in parts if part.variant == best)
+    return Outcome(kind, held[best], len(by_number) - held[best], len(by_number), worst)
+
+
+# ---- over readings ------------------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class Reading:
+    """A claim under one reading: its kind (E, U or N), what it chooses, and the class that the claim has under it.
+
+    outcome is empty where the reading could not be flown or designed.
+    """
+
+    name: str
+    kind: str
+    choices: Mapping[str, str] = field(default_factory=dict)
+    outcome: str = ""
+
+
+def over_readings(own: Outcome, readings: Sequence[Reading]) -> Outcome:
+    """The outcome of a claim from that of the default reading and those of all: only E and U count.
+
+    Confirmed only if true in all of them, refuted only if false in all, else it depends on what these choose. What no
+    reading can mend stays: a print that contradicts itself, a statement that cannot be judged.
+    """
+    counted = [one for one in readings if one.kind in (EQUIVALENT, UNSTATED) and one.outcome]
+    if not counted:
+        return own
+    said = Counter(one.outcome for one in counted)
+    holds = said[CONFIRMED]
+    kind: str = own.kind
+    on: tuple[str, ...] = ()
+    if own.kind not in (CONTRADICTORY, UNJUDGEABLE):
+        if len(said) == 1:
+            (kind,) = said
+        elif set(said) == {CONFIRMED, IMMATERIAL}:
+            kind = own.kind
+        elif set(said) <= {CONFIRMED, IMMATERIAL, UNDECIDED}:
+            kind = UNDECIDED
+        else:
+            kind, on = DEPENDS, flips(counted)
+    return replace(own, kind=kind, depends_on=on, holds_in=holds, readings=len(counted))
+
+
+def flips(readings: Sequence[Reading]) -> tuple[str, ...]:
+    """The choices on which the outcome hangs, the strongest first.
+
+    A choice is one of them if two readings that differ in it alone come out differently. Where no two readings differ
+    in one choice alone, those by whose values the readings differ most in the share that holds.
+    """
+    found: Counter[str] = Counter()
+    alone = False
+    for i, one in enumerate(readings):
+        for other in readings[:i]:
+            keys = dict.fromkeys((*one.choices, *other.choices))
+            differ = [key for key in keys if one.choices.get(key) != other.choices.get(key)]
+            alone = alone or len(differ) == 1
+            if len(differ) == 1 and (one.outcome == CONFIRMED) != (other.outcome == CONFIRMED):
+                found[differ[0]] += 1
+    if alone and found:
+        return tuple(name for name, _ in found.most_common())
+    spread = {name: _spread(name, readings) for name in dict.fromkeys(key for one in readings for key in one.choices)}
+    most = max(spread.values(), default=0.0)
+    return tuple(name for name, one in spread.items() if one and math.isclose(one, most))
+
+
+def _spread(choice: str, readings: Sequence[Reading]) -> float:
+    """Largest less least share of readings that hold, over the values of a choice."""
+    shares: dict[str, list[bool]] = {}
+    for one in readings:
+        shares.setdefault(one.choices.get(choice, ""), []).append(one.outcome == CONFIRMED)
+    held = [sum(own) / len(own) for own in shares.values()]
+    return max(held) - min(held)

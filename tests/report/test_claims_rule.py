@@ -1,0 +1,193 @@
+"""The rule, case by case, by hand."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from radarsim.report.claims import rule
+from radarsim.report.claims.rule import (
+    CONFIRMED,
+    CONTRADICTORY,
+    DEPENDS,
+    IMMATERIAL,
+    LIMIT,
+    MATERIAL,
+    REFUTED,
+    UNDECIDED,
+    UNJUDGEABLE,
+    VOID,
+    Judged,
+    Reading,
+)
+
+INF = math.inf
+NUMBER = Judged(25, 24.9, 25.1, 25, 25, 2.5)  # a 25 among multiples of five
+OVER = Judged(51, 50.9, 51.1, 50, INF, 0.5, LIMIT)
+BETTER = Judged(5, 4.9, 5.1, 0, INF, 1.0, MATERIAL)  # gain in σ, %
+
+
+def at(part, value, half=0.1, **more):
+    return replace(part, measured=value, lo=value - half, hi=value + half, **more)
+
+
+@pytest.mark.parametrize(
+    ("part", "value", "said"),
+    [
+        (NUMBER, 22.9, CONFIRMED),
+        (NUMBER, 22.3, REFUTED),
+        (NUMBER, 22.45, UNDECIDED),
+        (NUMBER, 27.45, UNDECIDED),
+        (NUMBER, 27.7, REFUTED),
+        (OVER, 50.2, CONFIRMED),
+        (OVER, 49.8, IMMATERIAL),
+        (OVER, 50.05, IMMATERIAL),
+        (OVER, 49.45, UNDECIDED),
+        (OVER, 49.3, REFUTED),
+        (BETTER, 1.5, CONFIRMED),
+        (BETTER, 1.05, CONFIRMED),
+        (BETTER, 0.5, IMMATERIAL),
+        (BETTER, -0.5, IMMATERIAL),
+        (BETTER, -1.05, UNDECIDED),
+        (BETTER, -1.2, REFUTED),
+    ],
+)
+def test_parts(part, value, said):
+    assert rule.verdict(at(part, value)) == said
+
+
+def test_a_comparison_the_other_way_round():
+    less = Judged(-0.5, -0.6, -0.4, -INF, 0, 1.0, MATERIAL)
+    assert rule.verdict(less) == IMMATERIAL
+    assert rule.verdict(at(less, -3)) == CONFIRMED
+    assert rule.verdict(at(less, 3)) == REFUTED
+    assert rule.miss(at(less, 3)) == 3
+
+
+def test_exact_first():
+    wide = at(NUMBER, 22.0, half=3.0)
+    assert rule.verdict(wide) == UNDECIDED
+    assert rule.verdict(replace(wide, exact=22.6)) == CONFIRMED
+    assert rule.verdict(replace(wide, exact=22.4)) == REFUTED
+    assert rule.miss(replace(wide, exact=22.0)) == pytest.approx(1.2)
+    assert rule.miss(at(NUMBER, 25)) == 0
+    never = Judged(INF, 13, INF, 0, INF, 1, MATERIAL, exact=INF)
+    assert rule.verdict(never) == CONFIRMED
+
+
+def test_exact_against_monte_carlo():
+    se = 1 / rule.Z95
+    inside, outside = (replace(at(NUMBER, 25, 1.0), exact=25 + z * se) for z in (5.8, 5.9))
+    assert not rule.disagrees(inside)
+    assert rule.disagrees(outside)
+    assert not rule.disagrees(replace(NUMBER, lo=25, hi=25, exact=30))  # on a grid: no width, no statement
+
+
+def test_level_is_of_all_parts():
+    assert rule.level(1) == pytest.approx(1)
+    assert rule.level(50) == pytest.approx(3.2905 / 1.95996, abs=1e-4)
+    one = at(BETTER, -2.0, half=0.8)
+    assert rule.verdict(one, 1) == REFUTED
+    assert rule.verdict(one, 50) == UNDECIDED
+    certain = Judged(7, 7, 7, 5, 5, 0.5)
+    assert rule.verdict(certain, 1000) == REFUTED
+
+
+def test_what_the_truth_cannot_pass_is_void():
+    share = Judged(0.90, 0.89, 0.91, 0.99, 1, 0.005, ceiling=0.939)
+    assert rule.verdict(share) == VOID
+    assert rule.verdict(replace(share, ceiling=0.995)) == REFUTED
+    assert rule.claim([share]).kind == UNJUDGEABLE
+    assert rule.claim([share, NUMBER]).kind == CONFIRMED
+    assert rule.claim([share, NUMBER]).of == 1
+
+
+def test_one_immaterial_part_in_fifty_refutes_nothing():
+    fifty = [at(BETTER, 5)] * 49 + [at(BETTER, -0.2)]
+    assert rule.claim(fifty).kind == CONFIRMED
+    assert rule.claim(fifty).miss == pytest.approx(0.2)
+    assert rule.claim([*fifty[1:], at(BETTER, -3)]).kind == REFUTED
+    assert rule.claim([at(BETTER, -0.2)] * 3).kind == IMMATERIAL
+
+
+def test_sentences_of_a_claim_are_judged_each():
+    first, second = at(BETTER, 5, statement="a"), at(BETTER, 0.1, statement="b")
+    assert rule.claim([first, second]).kind == IMMATERIAL
+    assert rule.claim([first, replace(second, statement="a")]).kind == CONFIRMED
+
+
+def test_undecided_only_where_it_may_yet_be_refuted():
+    open_ = at(BETTER, 0.5, half=1.2)  # −0.7 … 1.7: at worst immaterial
+    assert rule.verdict(open_) == UNDECIDED
+    assert rule.claim([at(BETTER, 5), replace(open_, exact=math.nan)]).kind == CONFIRMED
+    assert rule.claim([open_]).kind == UNDECIDED
+    assert rule.claim([at(BETTER, 5), at(BETTER, 0, half=1.2)]).kind == UNDECIDED
+
+
+def test_realisations_that_would_decide():
+    assert rule.needed(NUMBER) == 0
+    edge = at(NUMBER, 22.4, half=0.2, n=1000)  # border 22.5
+    assert rule.needed(edge) == pytest.approx(4000, abs=1)
+    assert rule.verdict(at(NUMBER, 22.4, half=0.0999)) == REFUTED
+    assert rule.needed(at(NUMBER, 22.5, half=0.2, n=1000)) is None
+    two = at(BETTER, 0.5, half=1.2, n=1000)  # to 1 it has 0.5, to −1 more than it needs
+    assert rule.needed(two) == pytest.approx(1000 * (1.2 / 0.5) ** 2, abs=1)
+    assert rule.claim([edge]).needed == pytest.approx(4000, abs=1)
+    assert rule.claim([NUMBER]).needed is None
+
+
+def test_variants_of_a_number_one_suffices():
+    right, wrong = at(NUMBER, 25, number="T", variant="a"), at(NUMBER, 50, number="T", variant="b")
+    assert rule.claim([right, wrong]).kind == CONFIRMED
+    assert rule.claim([right, wrong]).of == 1
+    assert rule.claim([wrong]).kind == REFUTED
+    assert rule.claim([replace(right, against_print=True), wrong]).kind == CONTRADICTORY
+    assert rule.claim([replace(wrong, against_print=True), right]).kind == CONFIRMED
+
+
+def test_a_joint_reading():
+    def of(first, second):
+        return [
+            at(NUMBER, 25 if ok else 50, number=number, variant=variant)
+            for variant, both in (("a", first), ("b", second))
+            for number, ok in zip("TS", both, strict=True)
+        ]
+
+    assert rule.claim(of((True, True), (False, False)), joint=True).kind == CONFIRMED
+    assert rule.claim(of((True, False), (False, True)), joint=True).kind == CONTRADICTORY
+    assert rule.claim(of((True, False), (True, False)), joint=True).kind == REFUTED
+
+
+def test_extensions_and_what_is_not_stated():
+    ours = at(NUMBER, 50, asserted=False)
+    assert rule.claim([NUMBER, ours]).kind == CONFIRMED
+    assert rule.claim([ours]).kind == REFUTED
+    assert rule.claim([NUMBER], unstated=True).kind == UNJUDGEABLE
+
+
+def reading(outcome, kind="U", **choices):
+    return Reading(str(choices), kind, choices, outcome)
+
+
+def test_over_readings():
+    own = rule.claim([at(NUMBER, 50)])
+    assert rule.over_readings(own, []) == own
+    false = [reading(REFUTED, a="1"), reading(REFUTED, a="2")]
+    assert rule.over_readings(own, false).kind == REFUTED
+    mixed = rule.over_readings(own, [*false, reading(CONFIRMED, a="3"), reading(CONFIRMED, "N", a="4")])
+    assert (mixed.kind, mixed.words) == (DEPENDS, "depends on a")
+    assert (mixed.holds_in, mixed.readings) == (1, 3)
+    assert rule.over_readings(own, [reading(CONFIRMED, a="1"), reading("", a="2")]).kind == CONFIRMED
+    assert rule.over_readings(own, [reading(CONFIRMED, a="1"), reading(UNDECIDED, a="2")]).kind == UNDECIDED
+    assert rule.over_readings(own, [*false, reading(CONFIRMED, "N", a="4")]).kind == REFUTED
+
+
+def test_the_choice_that_flips():
+    grid = [
+        reading(CONFIRMED if flight == "weave" else REFUTED, flight=flight, start=start)
+        for flight in ("weave", "pull", "turn")
+        for start in ("plots", "truth")
+    ]
+    assert rule.flips(grid) == ("flight",)
+    apart = [reading(CONFIRMED, a="1", b="1"), reading(REFUTED, a="2", b="2"), reading(CONFIRMED, a="1", b="2")]
+    assert rule.flips(apart) == ("a",)
