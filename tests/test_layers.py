@@ -16,7 +16,6 @@ TEMPLATE = PACKAGE / "app/template/src"  # a study of a package of its own, to w
 
 STUDIES = sorted(path.name for path in (PACKAGE / "studies").iterdir() if (path / "__init__.py").is_file())
 TEMPLATES = sorted(path.name for path in TEMPLATE.iterdir())
-SHARED = ("interface", "registry", "identity", "noise")  # modules of studies/ that are no study's
 DATA = ("engine.moments", "engine.results")  # the engine's plain data, which studies fill
 CASE = ("config.experiment", "config.fields", "config.identity")
 ROOMS = {
@@ -28,6 +27,7 @@ ROOMS = {
     "report": ("errors", "config", *DATA),
     "studies.noise": (*CASE, "kernels.random"),
     "studies.interface": (*CASE, *DATA, "report"),
+    "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "studies.interface"),
     "studies.registry": ("errors", "config", "studies.interface"),
     "studies.identity": ("errors", "config", "kernels", "studies.interface", "studies.registry"),
     "track": ("errors", "config", "engine", "kernels", "physics", "report", "studies", "app"),
@@ -60,7 +60,7 @@ ROLES = {
         (*GROUND, *DATA, "report", "studies.interface"),
         (*READ, "track"),
     ),  # of several: their type
-    "__init__": (("studies.interface", "report.claims"), (*READ, "track", "part", "__init__")),
+    "__init__": (("studies.interface", "studies.folder", "report.claims"), (*READ, "track", "part", "__init__")),
 }
 ALSO = {"schema": "config"}  # the keys of a study of several parts
 
@@ -315,7 +315,7 @@ PARTS = {
     if isinstance(node, ast.FunctionDef | ast.AnnAssign)
 } - {"name"}
 READ_SOURCES = {"kernels.sources", "kernels.trees"}  # identity and cache: which sources there are, not what they can do
-LOAD_BY_NAME = {"__init__", "studies.registry"}
+LOAD_BY_NAME = {"__init__", "studies.registry", "studies.folder", "studies.sonar.part"}
 
 
 def probes(module: str, text: str) -> list[str]:

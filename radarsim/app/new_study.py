@@ -17,7 +17,7 @@ from radarsim.errors import ConfigError, StoreError
 from radarsim.studies import registry
 
 TEMPLATE = Path(__file__).parent / "template"
-MODULE, CLASS = "random_walk", "RandomWalk"  # as the template has them
+MODULE = "random_walk"  # the name that the template has
 SUFFIXES = (".md", ".py", ".toml", ".yaml")
 PLAIN = re.compile(r"[a-z][a-z0-9_]{0,39}")
 
@@ -62,8 +62,7 @@ def files() -> list[Path]:
 
 def renamed(text: str, name: str) -> str:
     """A text of the template for a study of another name."""
-    in_class = "".join(part.capitalize() for part in name.split("_"))
-    return text.replace(MODULE, name).replace(CLASS, in_class)
+    return text.replace(MODULE, name)
 
 
 def _write(path: Path, text: str) -> None:

@@ -6,13 +6,15 @@ that `radarsim list` loads no kernels.
 
 The numbers come from two of them: `prepare` makes a plan of a case, once; `simulate` makes the sums of one block of
 realisations. Everything else is made of these sums.
+
+A study whose files have the usual names need not write the class: see `radarsim.studies.folder`.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 if TYPE_CHECKING:
     import numpy as np
@@ -82,14 +84,25 @@ class RecordedPlots(ABC):
         """The filters of a case, before their first plot."""
 
 
+class Paper(NamedTuple):
+    """The paper whose claims a study judges; its fields are those of `radarsim.report.claims.PaperClaims`."""
+
+    paper: str
+    page: str = ""
+    may_grow: tuple[str, ...] = ()
+
+
+OptionalPart = Literal["curves", "inputs", "cost", "seconds_per_update", "recorded", "shipped"]
+
+
 class Study(ABC):
     """A study. `name` is the value of `study:` in YAML, `about` one line for `radarsim list`."""
 
-    name: ClassVar[str]
-    about: ClassVar[str]
-    filters: ClassVar[Mapping[str, str]]  # what `radarsim list` says of its filters: keys, and what they make
-    exact_errors: ClassVar[bool] = True  # False: exact_sigma is a bound, which a filter may reach or not
-    draws_sweeps: ClassVar[bool] = False  # True: `figures` draws sweeps too, in place of the common figures
+    name: str
+    about: str
+    filters: Mapping[str, str]  # what `radarsim list` says of its filters: keys, and what they make
+    exact_errors: bool = True  # False: exact_sigma is a bound, which a filter may reach or not
+    draws_sweeps: bool = False  # True: `figures` draws sweeps too, in place of the common figures
 
     # ---- what is asked -------------------------------------------------------------------------------------------
     @abstractmethod

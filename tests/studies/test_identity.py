@@ -13,6 +13,7 @@ import pytest
 from radarsim.app.configs import load
 from radarsim.kernels import sources
 from radarsim.studies import identity, registry
+from radarsim.studies.folder import StudyFolder
 
 ROOT = Path(__file__).parents[2]
 STEMS = ("rls2", "multimodel", "sonar_smoothing", "sonar_manoeuvre", "sonar_clutter", "discriminator")
@@ -186,6 +187,7 @@ def test_sentences_move_nothing(folder, moved):
         ("track/follow.py", NONE),
         ("studies/registry.py", NONE),
         ("studies/interface.py", NONE),
+        ("studies/folder.py", NONE),
         ("studies/identity.py", NONE),
     ],
 )
@@ -207,11 +209,12 @@ def test_the_shared_rooms(path, expected, moved):
         ("studies/range_doppler/config.py", 'description="', 'description="that is ', NONE),
         ("studies/registry.py", '"multimodel": ', '"another": "elsewhere.study",\n    "multimodel": ', NONE),
         # The declared study: what it is called and shows, and how it computes.
-        ("studies/range_doppler/__init__.py", 'about = "', 'about = "Indeed: ', NONE),
-        ("studies/range_doppler/__init__.py", "tables.tables(results)", "tables.tables(results[:1])", NONE),
-        ("studies/range_doppler/__init__.py", "study.prepare(case)", "study.prepare(case, 1)", {"rls2"}),
-        ("studies/multimodel/__init__.py", "study.simulate(plan, first, count)",
-         "study.simulate(plan, first + 1, count)", {"multimodel"}),
+        ("studies/range_doppler/__init__.py", 'about="', 'about="Indeed: ', NONE),
+        ("studies/range_doppler/__init__.py", '"inputs", ', "", NONE),
+        ("studies/folder.py", ".tables(results)", ".tables(results[:1])", NONE),
+        ("studies/folder.py", ".prepare(case)", ".prepare(case, 1)", ALL - SONAR),
+        ("studies/folder.py", ".simulate(plan, first, count)", ".simulate(plan, first + 1, count)", ALL - SONAR),
+        ("studies/sonar/__init__.py", ".simulate(first, count)", ".simulate(first + 1, count)", SONAR),
     ],
 )  # fmt: skip
 def test_single_places(path, old, new, expected, moved):
@@ -241,15 +244,20 @@ def test_a_statement_that_a_package_runs_counts(moved):
     assert moved("kernels/__init__.py", text_of("kernels/__init__.py") + "print()\n") == ALL
 
 
-def test_every_study_begins_where_prepare_and_simulate_do():
+@pytest.mark.parametrize("name", registry.SHIPPED)
+def test_every_study_begins_where_prepare_and_simulate_do(name):
     """What these import is among what is followed from `computes_in`, over all shipped cases of a study."""
-    named: dict[str, set[str]] = {}
-    for file in sorted((ROOT / "configs").glob("*.yaml")):
+    study = registry.study(name)
+    if isinstance(study, StudyFolder):
+        (spec,) = (case.spec for case in load(next(stem for stem in STEMS if stem in FOLDERS[name])).cases)
+        assert study.computes_in(spec) == (study.keys().__module__.replace("config", "study"), study.keys().__module__)
+        assert study.file("study").__name__ == study.computes_in(spec)[0]
+        return
+    found: set[str] = set()
+    for file in sorted((ROOT / "configs").glob(f"{name}*.yaml")):
         for case in load(str(file)).cases[:1]:
-            study = registry.study(case.study)
-            named.setdefault(case.study, set()).update(closed(study, study.computes_in(case.spec)))
-    for name, found in named.items():
-        assert closed(registry.study(name), ()) - ASSEMBLED <= found, name
+            found |= closed(study, study.computes_in(case.spec))
+    assert closed(study, ()) - ASSEMBLED <= found
 
 
 def closed(study, roots):

@@ -167,7 +167,7 @@ class Estimator(Model):
             yield at("schedule", "window lengths must rise")
 
 
-class Discriminator(Study):
+class Keys(Study):
     """Doppler frequency and its derivatives from one burst."""
 
     bare_keys = "estimators"

@@ -216,7 +216,7 @@ class Filter(Model):
             yield at("transition", f"its columns must sum to one (column j: from model j){hint}")
 
 
-class Multimodel(Study):
+class Keys(Study):
     """Multiple-model filters on an aeroballistic target."""
 
     figure_names = ("trajectory", "sigma_y", "sigma_vy", "probabilities", "families", "cost", "consistency")

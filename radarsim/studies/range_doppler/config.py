@@ -195,7 +195,7 @@ class Filter(Model):
         return self.initial_scans or PLOTS_NEEDED[len(self.observes)]
 
 
-class RangeDoppler(Study):
+class Keys(Study):
     """Range alone against range and radial velocity."""
 
     figure_names = (

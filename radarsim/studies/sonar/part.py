@@ -1,13 +1,14 @@
 """What each of the sonar's parts is: one of the paper's three questions, as the study sees it.
 
 A part has cases of its own, which its module `study` computes: `prepare(case)` makes a plan whose `simulate(first,
-count)` makes the sums of a block. What is declared here is what it shows of them, beside what all parts have in common,
-and what it does with recorded plots. Methods import what they need when they are called, as those of
-`radarsim.studies.interface.Study`.
+count)` makes the sums of a block. What stands here is what it shows of them, beside what all parts have in common, and
+what it does with recorded plots: functions of the same names in the part's files, as in `radarsim.studies.folder`.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -20,38 +21,52 @@ if TYPE_CHECKING:
     from radarsim.report.drawing import Figure
     from radarsim.studies.interface import Tracker
 
+COMMON = __name__.rpartition(".")[0]
 
-class SonarPart(ABC):
-    """A part."""
 
-    @abstractmethod
+@dataclass(frozen=True)
+class SonarPart:
+    """A part.
+
+    package is its folder as Python imports it. claimed: whether the paper makes claims on it. tracker_in and
+    simulated_in are the packages whose file `track` has its `Tracker` and its `simulated`.
+    """
+
+    package: str
+    claimed: bool = True
+    tracker_in: str = COMMON
+    simulated_in: str = COMMON
+
+    def file(self, name: str) -> ModuleType:
+        """A module of the part's folder."""
+        return import_module(f"{self.package}.{name}")
+
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
         """The tables of cases of which this part is asked, beside those of all parts; some may have no rows."""
+        return self.file("tables").tables(results)
 
-    @abstractmethod
     def figures(
         self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]"
     ) -> "dict[str, Figure | None]":
         """The figures of such cases, beside those of all parts; None where there is nothing to draw."""
+        return self.file("figures").figures(results, made)
 
-    @abstractmethod
     def question(self, specs: Sequence[Any]) -> str:
         """What is asked of such cases, in one sentence."""
+        return self.file("words").question(specs)
 
-    @abstractmethod
     def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> list[str]:
         """The answer: sentences with numbers and 95 % intervals."""
+        return self.file("words").answer(results, made)
 
     def claims(self) -> "tuple[Claim, ...]":
-        """The paper's claims on it. Default: none."""
-        return ()
+        """The paper's claims on it."""
+        return self.file("claims").CLAIMS if self.claimed else ()
 
     def simulated(self, case: "Case", realisation: int) -> "Mapping[str, np.ndarray]":
-        """The plots of one realisation, and the truth. Default: those of a target whose plots are known."""
-        from radarsim.studies.sonar import track
+        """The plots of one realisation, and the truth."""
+        return import_module(f"{self.simulated_in}.track").simulated(case, realisation)
 
-        return track.simulated(case, realisation)
-
-    @abstractmethod
     def tracker(self, case: "Case") -> "Tracker":
         """The filters of a case over recorded plots, before their first plot."""
+        return import_module(f"{self.tracker_in}.track").Tracker(case)

@@ -4,28 +4,9 @@ A claim says where the paper says what, how it was read, and in parts what is me
 Write the ranges down from the words alone, before anything is measured.
 """
 
-from radarsim.engine.results import CaseResult
-from radarsim.report import claims
 from radarsim.report.claims import Claim, Part, above
-from radarsim.report.statistics import Estimate
 
-
-class Evidence(claims.Evidence):
-    """What the paper's experiment measured: only cases whose keys are those of the claim's config are seen here."""
-
-    def case(self, key: object) -> CaseResult:
-        """Yours: the case that a key means, as `Part.cases` has them. Here the paper has but one."""
-        for result in self.results:
-            return result
-        raise claims.Missing(key)
-
-
-def last_gain(seen: Evidence) -> Estimate:
-    """The Kalman filter's gain in σ at the last scan, %."""
-    kalman = next(one.name for one in seen.case("walk").spec.filters if one.kind == "kalman")
-    series = seen.gain("walk", kalman, "x")
-    return series.point(len(series.k) - 1)
-
+from random_walk.measures import last_gain
 
 CLAIMS = (
     Claim(
