@@ -13,8 +13,13 @@ SMOKE_FLAGS ?= --no-figures
 run: $(VENV)/installed
 	$(RADARSIM) run configs/rls2.yaml
 
+# A process for each processor, at most eight; what measures time or memory runs after them, alone. JOBS=0: one after another.
+JOBS ?= logical
+ORDINARY := not slow and not machines
+
 test: $(VENV)/tested
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 8 --dist loadgroup --no-loadscope-reorder -m '$(ORDINARY) and not alone'
+	$(BIN)/python -m pytest -m '$(ORDINARY) and alone'
 
 slow: $(VENV)/tested
 	$(BIN)/python -m pytest -m slow

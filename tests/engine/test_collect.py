@@ -157,6 +157,7 @@ def test_a_stop_that_comes_when_all_is_done_is_none():
     assert collect(WORK, 10, threads=0, stop=lambda: next(asked, "late")).stopped is None
 
 
+@pytest.mark.alone
 def test_a_time_limit():
     started = time.perf_counter()
     result = collect(Fake(pause_s=1e-3), 10**9, stop=time_limit(0.3))
@@ -164,6 +165,7 @@ def test_a_time_limit():
     assert result.stopped == "time limit of 0.3 s"
 
 
+@pytest.mark.alone
 def test_a_stop_with_grace_does_not_wait_for_a_stuck_task():
     class Impatient:
         grace_s = 0.2
@@ -229,6 +231,7 @@ def test_the_default_is_all_cores():
     assert pool.workers == available_cores()
 
 
+@pytest.mark.alone
 def test_memory_is_flat_up_to_a_thousand_million_realisations():
     program = """if True:
         import resource

@@ -175,6 +175,7 @@ def test_a_full_disk_names_the_file_and_leaves_the_old_ones(tmp_path, blocks, mo
     assert resumed.from_store >= 4_992
 
 
+@pytest.mark.alone
 def test_a_disk_that_fills_up_while_running_ends_the_run_at_once(tmp_path, blocks, monkeypatch):
     monkeypatch.setattr(keeper, "PERIOD_S", 0.05)
     full_disk(monkeypatch, 3)

@@ -19,6 +19,7 @@ from radarsim.errors import Interrupted
 from tests.engine.fake import Fake, textbook
 
 ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.alone
 WORK = Fake()
 
 

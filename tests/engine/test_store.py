@@ -218,6 +218,7 @@ class Slow(Store):
         self.writing = False
 
 
+@pytest.mark.alone
 def test_workers_do_not_wait_for_the_disk_and_one_thing_is_written_at_a_time(tmp_path, monkeypatch):
     monkeypatch.setattr(keeper, "PERIOD_S", 0.01)
     writer = keeper.Keeper(Slow(tmp_path, WORK))

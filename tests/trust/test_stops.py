@@ -15,6 +15,7 @@ from radarsim.engine.blocks import Node
 from radarsim.engine.store import Store
 
 ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.alone
 PLENTY = "1e9"  # realisations, some minutes of them
 MODES = {
     "threads": [],

@@ -1,0 +1,35 @@
+"""How the suite is divided among processes: `make test` gives each a group of tests, `pytest` alone runs them in turn.
+
+A group is a file, so that what its tests share is made once; the tests of a study are one group, so that its kernels
+are compiled once. Groups that take long begin first, those of the studies before others: what they compile, the
+others read from the cache of kernels.
+"""
+
+from pathlib import Path
+
+import pytest
+
+TESTS = Path(__file__).parent
+LONG = ("studies", "trust", "cli", "app", "engine")  # folders, in the order in which their groups begin
+
+
+def group_of(path: Path) -> tuple[str, ...]:
+    """The folder of a study's tests, or the file."""
+    parts = path.relative_to(TESTS).parts
+    return parts[:2] if parts[0] == "studies" else parts
+
+
+def begins(item: pytest.Item) -> tuple[int, int]:
+    """Where a group stands in the order: by its folder, in `studies` those of several files first."""
+    folder, *rest = group_of(item.path)
+    return LONG.index(folder) if folder in LONG else len(LONG), bool(rest) and rest[0].endswith(".py")
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the names
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Name the groups, and put them in their order."""
+    if not getattr(config.option, "loadgroup", False):  # set in the processes that `--dist loadgroup` starts
+        return
+    items.sort(key=begins)
+    for item in items:
+        item.add_marker(pytest.mark.xdist_group("/".join(group_of(item.path))))
