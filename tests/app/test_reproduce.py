@@ -6,6 +6,8 @@ import subprocess
 import sys
 import time
 
+import pytest
+
 from radarsim.app import reproduce
 
 SMALL = ["realisations=100"]
@@ -48,6 +50,7 @@ def test_a_process_that_dies_is_told_and_replaced(tmp_path):
     assert "claims: " in again.summary
 
 
+@pytest.mark.alone
 def test_a_signal_ends_it_and_its_processes_in_time(tmp_path):
     command = [sys.executable, "-m", "radarsim.cli.reproduce", str(tmp_path), "rls2", "range_doppler"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as run:
@@ -71,18 +74,15 @@ def test_output_that_nobody_can_take(tmp_path):
     assert piped.stderr == ""
 
 
+@pytest.mark.alone
 def test_its_processes_end_with_it(tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "radarsim.app.reproduce",
-        str(tmp_path),
-        "manoeuvre_variance",
-        "--set",
-        "realisations=1e9",
-    ]
+    """Killed, it cannot tell them; they see that it is gone."""
+    options = [str(tmp_path), "rls2", "rls4", "--set", "realisations=1e9", "--no-figures"]
+    command = [sys.executable, "-m", "radarsim.cli.reproduce", *options]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as run:
-        time.sleep(3)
+        while len(list(tmp_path.glob(".blocks/*/*.sums"))) < 2:
+            assert run.poll() is None
+            time.sleep(0.05)
         run.kill()
         run.wait()
         killed = time.monotonic()

@@ -1,5 +1,8 @@
 """Dask workers: the same bytes, also when workers die; what goes wrong is told in words."""
 
+import contextlib
+import datetime
+import json
 import os
 import pickle
 import random
@@ -209,3 +212,75 @@ def test_addresses_that_cannot_be_used_are_told_at_once(address, words):
 def test_what_a_scheduler_elsewhere_rests_on_is_told(address, words):
     assert words in cluster.trust(address)
     assert cluster.trust("tcp://127.0.0.1:8786") is None
+
+
+def certificates(folder):
+    """An authority, and a certificate of it for everybody at 127.0.0.1: the paths of both and of the key."""
+    x509 = pytest.importorskip("cryptography.x509")
+    from cryptography.hazmat.primitives import hashes, serialization
+    from cryptography.hazmat.primitives.asymmetric import ec
+
+    def named(name):
+        return x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
+
+    def certificate(subject, key, root):
+        now, day = datetime.datetime.now(datetime.UTC), datetime.timedelta(days=1)
+        made = x509.CertificateBuilder(named("authority"), named(subject), key.public_key())
+        made = made.serial_number(x509.random_serial_number()).not_valid_before(now - day).not_valid_after(now + day)
+        made = made.add_extension(x509.BasicConstraints(ca=key is root, path_length=None), critical=True)
+        return made.sign(root, hashes.SHA256()).public_bytes(serialization.Encoding.PEM)
+
+    root, key = (ec.generate_private_key(ec.SECP256R1()) for _ in range(2))
+    private = serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+    contents = {
+        "authority.pem": certificate("authority", root, root),
+        "own.pem": certificate("127.0.0.1", key, root),
+        "own-key.pem": key.private_bytes(*private),
+    }
+    folder.mkdir()
+    for name, content in contents.items():
+        (folder / name).write_bytes(content)
+    return [str(folder / name) for name in contents]
+
+
+@contextlib.contextmanager
+def encrypted(authority, own, key, place):
+    """The address of a scheduler with one worker that talk TLS alone, started as docs/scale.md has it."""
+    tls = ["--tls-ca-file", authority, "--tls-cert", own, "--tls-key", key, "--host", "127.0.0.1"]
+    closed = ["--dashboard-address", "127.0.0.1:0"]
+    port = ["--port", "0", "--protocol", "tls", "--scheduler-file", str(place)]
+    cli, null = [sys.executable, "-m"], {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": ROOT}
+    with subprocess.Popen([*cli, "distributed.cli.dask_scheduler", *port, *tls, *closed], **null) as there:
+        while not (place.is_file() and (text := place.read_text())):
+            assert there.poll() is None
+            time.sleep(0.05)
+        address = json.loads(text)["address"]
+        one = ["--no-nanny", "--nthreads", "1", "--death-timeout", "10"]
+        with subprocess.Popen([*cli, "distributed.cli.dask_worker", address, *one, *tls, *closed], **null) as worker:
+            try:
+                yield address
+            finally:
+                worker.kill()
+                there.kill()
+
+
+def settings(authority, own, key):
+    """Dask's own, as in ~/.config/dask/distributed.yaml."""
+    comm, client = "distributed.comm", "distributed.comm.tls.client"
+    given = {f"{comm}.tls.ca-file": authority, f"{client}.cert": own, f"{client}.key": key}
+    return {f"{comm}.require-encryption": True, **given}
+
+
+def test_a_scheduler_with_certificates_of_ones_own(tmp_path, monkeypatch):
+    """The same sums over tls://; a certificate of another authority opens nothing."""
+    import dask
+
+    ours, theirs = certificates(tmp_path / "ours"), certificates(tmp_path / "theirs")
+    with encrypted(*ours, tmp_path / "scheduler.json") as address:
+        assert address.startswith("tls://127.0.0.1:")
+        with dask.config.set(settings(*ours)), Cluster(scheduler=address) as workers:
+            assert same(collect(WORK, N, executor=workers))
+        monkeypatch.setattr(cluster, "CONNECT_S", 2)
+        monkeypatch.setitem(cluster.SETTINGS, "distributed.comm.timeouts.connect", "2s")
+        with dask.config.set(settings(*theirs)), pytest.raises(ConfigError, match="no Dask scheduler answers"):
+            Cluster(scheduler=address)
