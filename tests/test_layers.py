@@ -124,8 +124,6 @@ def fault(importing: str, imported: str) -> str:
             return ""
         return f"{here.room} stands on {', '.join(ROOMS[here.room]) or 'nothing of ours'}"
     ground, own = ROLES[here.role]
-    if (importing, imported) in KNOWN:
-        return ""
     if there.room != "study":
         return "" if under(imported, ground) else f"a study's {here.role} stands on {', '.join(ground)}"
     if here.study != there.study:
@@ -136,7 +134,6 @@ def fault(importing: str, imported: str) -> str:
 
 
 CHOOSE = {"studies.sonar", "studies.sonar.schema"}  # where the variants of a study are chosen
-KNOWN = {("studies.multimodel.measures", "app.configs")}  # not yet as it should be
 
 
 def modules() -> dict[str, Path]:

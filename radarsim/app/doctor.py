@@ -18,8 +18,7 @@ from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Case
 from radarsim.engine.audit import Audit, audited
 from radarsim.engine.blocks import Node, Partial, simulated
-from radarsim.engine.executors import available_cores
-from radarsim.engine.machine import instruction_set, platform_name
+from radarsim.engine.machine import available_cores, described, instruction_set, platform_name
 from radarsim.engine.moments import Sums
 from radarsim.errors import ConfigError, StoreError
 from radarsim.report import files
@@ -34,7 +33,7 @@ def machine() -> dict[str, str]:
     from radarsim.kernels import cache as compiled
     from radarsim.report import provenance
 
-    facts, cache = provenance.machine(), compiled.ROOT
+    facts, cache = described(), compiled.ROOT
     kept = [path.stat().st_size for path in cache.rglob("*") if path.is_file()] if cache.is_dir() else []
     writable = "writable" if os.access(cache, os.W_OK) else "not writable"
     free = shutil.disk_usage(Path.cwd()).free

@@ -10,7 +10,7 @@ from radarsim.app.simulation import NO_CONTROL, check_precision, result_of
 from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Experiment
 from radarsim.engine.collect import collect
-from radarsim.engine.executors import available_cores
+from radarsim.engine.machine import available_cores
 from radarsim.engine.results import Axes
 from radarsim.studies import registry
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.app import configs
 from radarsim.config.experiment import Experiment
+from radarsim.engine import machine
 from radarsim.engine.results import CaseResult
 from radarsim.report import agreement, claims, controlled, files, notes, provenance, sweeps
 from radarsim.report import tables as common
@@ -85,7 +86,7 @@ def write(
             contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.save(figure, formats).items()}
     own = study(experiment.study)
     answer = tuple(own.answer(results, made))
-    record = provenance.record(experiment, results, run, contents, answer)
+    record = provenance.record(experiment, results, run, contents, answer, machine.described())
     page = html.page(
         experiment,
         made,

@@ -22,7 +22,8 @@ from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Experiment
 from radarsim.engine import stopping
 from radarsim.engine.collect import stored
-from radarsim.engine.executors import Executor, available_cores
+from radarsim.engine.executors import Executor
+from radarsim.engine.machine import available_cores
 from radarsim.engine.results import CaseResult
 from radarsim.engine.stopping import Signals, Stop
 from radarsim.errors import ConfigError, StoreError, TargetUnmet

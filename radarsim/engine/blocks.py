@@ -114,19 +114,6 @@ class Total:
 Piece = Node | Partial | Total
 
 
-def decomposition(blocks: int) -> list[Node]:
-    """The largest nodes that fill blocks 0 … blocks-1, from left to right.
-
-    >>> decomposition(6)
-    [Node(level=2, index=0), Node(level=1, index=2)]
-    """
-    nodes, first = [], 0
-    while first < blocks:
-        nodes.append(widest(first, blocks, blocks.bit_length()))
-        first = nodes[-1].stop
-    return nodes
-
-
 def widest(first: int, stop: int, highest: int) -> Node:
     """The largest node of at most level `highest` that starts at block `first` and ends by block `stop`."""
     level = min(highest, (stop - first).bit_length() - 1)
@@ -208,7 +195,7 @@ class Forest:
         self.nodes[node] = sums
 
     def prefix(self) -> list[Node]:
-        """The nodes that follow one another from block 0 without a gap; they are decomposition(their blocks)."""
+        """The nodes that follow one another from block 0 without a gap; they are the largest that fill them."""
         nodes, stop = [], 0
         for node in sorted(self.nodes, key=lambda node: node.first):
             if node.first != stop:

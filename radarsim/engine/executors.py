@@ -1,6 +1,5 @@
 """Where tasks run. An executor takes (work, piece) and gives back outcomes in any order."""
 
-import os
 import threading
 import time
 from collections import deque
@@ -9,7 +8,7 @@ from queue import Empty, SimpleQueue
 from typing import Protocol
 
 from radarsim.engine.blocks import Node, Partial, Work, simulated
-from radarsim.engine.machine import platform_name
+from radarsim.engine.machine import available_cores, platform_name
 from radarsim.engine.moments import Sums
 
 
@@ -60,11 +59,6 @@ def attempted(work: Work, piece: Node | Partial) -> Outcome:
     except Exception as error:
         result = error
     return Outcome(piece, result, time.perf_counter() - started, platform_name())
-
-
-def available_cores() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class Threads:

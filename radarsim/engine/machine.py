@@ -45,6 +45,23 @@ def processor() -> str:
     return names[0] if names else system.processor()
 
 
+def available_cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@functools.cache
+def described() -> dict[str, object]:
+    """The machine for a reader: system, processor, cores."""
+    return {
+        "system": system.platform(),
+        "processor": processor(),
+        "architecture": system.machine(),
+        "cores": available_cores(),
+        "byteorder": sys.byteorder,
+    }
+
+
 @functools.cache
 def linear_algebra() -> str:
     """The BLAS library NumPy has loaded, and the processor that its kernels are made for, like `openblas SkylakeX`.

@@ -171,11 +171,3 @@ def fill_normal_strip(key, first, pair, a, b):
     k0, k1, start, origin = key[0], key[1], U(first), U(pair)
     for i in range(a.size):
         a[i], b[i] = normals(k0, k1, start + (U(i) & U(LANES - 1)), origin + (U(i) >> U(LANE_BITS)))
-
-
-@kernel
-def fill_uniform_strip(key, first, pair, a, b):
-    """Uniform numbers in (0, 1), as `fill_normal_strip`."""
-    k0, k1, start, origin = key[0], key[1], U(first), U(pair)
-    for i in range(a.size):
-        a[i], b[i] = uniforms(k0, k1, start + (U(i) & U(LANES - 1)), origin + (U(i) >> U(LANE_BITS)))

@@ -51,15 +51,6 @@ def from_biconical(biconical: np.ndarray) -> np.ndarray:
     return np.stack([r * u, r * np.sin(biconical[..., 1]), r * np.sin(biconical[..., 2])], axis=-1)
 
 
-def to_biconical(antenna: np.ndarray) -> np.ndarray:
-    """Biconical points (…, 3) of antenna coordinates; raises OutsideSector behind the antenna, in its plane, and at
-    its centre."""
-    if not np.all(antenna[..., 0] > 0):
-        raise OutsideSector("the point is not in front of the antenna")
-    r = np.linalg.norm(antenna, axis=-1)
-    return np.stack([r, np.arcsin(antenna[..., 1] / r), np.arcsin(antenna[..., 2] / r)], axis=-1)
-
-
 def jacobian(biconical: np.ndarray) -> np.ndarray:
     """Derivatives (…, 3, 3) of the antenna coordinates by (r, e, a): J of eq. (10); raises OutsideSector."""
     r, e, a = np.moveaxis(biconical, -1, 0)

@@ -4,9 +4,7 @@ import hashlib
 import json
 import os
 import platform
-import sys
 from collections.abc import Mapping, Sequence
-from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -26,11 +24,13 @@ def record(
     run: Mapping[str, Any],
     contents: Mapping[str, bytes],
     answer: Sequence[str],
+    machine: Mapping[str, object],
 ) -> dict[str, Any]:
     """All of run.json but the report's own hash.
 
     run gives the facts of the run (stop reason, threads, times, warnings, identities …), kept as they are; contents
-    are the outputs, by path. Realisations asked and done are sums over the cases, which may differ in both.
+    are the outputs, by path; machine describes the one they were made on. Realisations asked and done are sums over
+    the cases, which may differ in both.
     """
     facts = dict(run)
     stop = facts.pop("stop", "done")
@@ -54,7 +54,7 @@ def record(
         **facts,
         "warnings": warnings,
         "versions": versions(),
-        "machine": machine(),
+        "machine": dict(machine),
         "outputs": {path: hashlib.sha256(data).hexdigest() for path, data in sorted(contents.items())},
     }
 
@@ -157,26 +157,3 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             found[name] = "not installed"
     return found
-
-
-@cache
-def machine() -> dict[str, object]:
-    """The machine in words: system, processor, cores."""
-    return {
-        "system": platform.platform(),
-        "processor": _processor(),
-        "architecture": platform.machine(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
-        "byteorder": sys.byteorder,
-    }
-
-
-def _processor() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as lines:
-            for line in lines:
-                if line.startswith("model name"):
-                    return line.partition(":")[2].strip()
-    except OSError:
-        return platform.processor()
-    return platform.processor()

@@ -183,17 +183,6 @@ def gain(
         return _gain(a, b, np.maximum(variance, 0) * _freed(n), n - 1)
 
 
-def gain_unpaired(
-    square: Values, fourth: Values, n: Values, base_square: Values, base_fourth: Values, base_n: Values
-) -> Estimate:
-    """As `gain`, of two samples with noise of their own, n and base_n realisations."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        a, b = _per_one(square, n), _per_one(base_square, base_n)
-        one = (_per_one(fourth, n) / a**2 - 1) * _freed(n)
-        other = (_per_one(base_fourth, base_n) / b**2 - 1) * _freed(base_n)
-        return _gain(a, b, np.maximum(one, 0) + np.maximum(other, 0), np.minimum(n, base_n) - 1)
-
-
 def _freed(n: Values) -> Values:
     """(n + 2) / (n − 1) / n: what makes m₄/m₂² − 1 of a Gaussian sample the variance of its mean square over m₂²."""
     n = np.asarray(n, dtype=float)

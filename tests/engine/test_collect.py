@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from radarsim.engine.collect import collect
-from radarsim.engine.executors import Serial, Threads, attempted, available_cores
+from radarsim.engine.executors import Serial, Threads, attempted
+from radarsim.engine.machine import available_cores
 from radarsim.engine.stopping import time_limit
 from radarsim.errors import NonFiniteError
 from tests.engine.fake import Fake, textbook

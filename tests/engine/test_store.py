@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from radarsim.engine import executors, keeper
-from radarsim.engine.blocks import Node, Partial, Total, decomposition
+from radarsim.engine.blocks import Node, Partial, Total
 from radarsim.engine.collect import collect, stored
 from radarsim.engine.moments import Sums
 from radarsim.engine.store import Store, decoded, piece_named
 from radarsim.errors import NonFiniteError
 from tests.engine.fake import NAMES, WORK, Fake, N, contents, names, same
+from tests.engine.tree import decomposition
 
 
 def test_what_is_stored_is_not_computed_again(tmp_path, blocks):

@@ -152,11 +152,10 @@ NUMBERS = """
 import numpy as np
 from radarsim.kernels import linear, random
 key = random.stream(3, "plain")
-pairs, strips = [np.empty(3) for _ in range(4)], [np.empty(16) for _ in range(4)]
+pairs, strips = [np.empty(3) for _ in range(4)], [np.empty(16) for _ in range(2)]
 random.fill_normal_pairs(key, 10, 2, *pairs[:2])
 random.fill_uniform_pairs(key, 10, 2, *pairs[2:])
-random.fill_normal_strip(key, 10, 2, *strips[:2])
-random.fill_uniform_strip(key, 10, 2, *strips[2:])
+random.fill_normal_strip(key, 10, 2, *strips)
 rng = np.random.default_rng(1)
 gains, weights = rng.uniform(0, 0.3, (2, 6, 3, 2)), rng.normal(size=(2, 3, 2, 3))
 problem = linear.Problem(key, np.ones((6, 3)), np.array([2.0, 1.0]), 1.0, [1, 2], [3, 2], weights, gains)

@@ -176,7 +176,6 @@ def words():
         (random.fill_normal_pairs, 5),
         (random.fill_uniform_pairs, 5),
         (random.fill_normal_strip, 16),
-        (random.fill_uniform_strip, 16),
     ):
         a, b = np.empty(size), np.empty(size)
         fill(key, 10, 2, a, b)

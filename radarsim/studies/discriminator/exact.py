@@ -35,25 +35,11 @@ def fisher(burst: Burst, size: int, duration_s: float) -> np.ndarray:
     return 2.0 * energy_ratio(burst, duration_s) * np.outer(c, c) / (order[:, None] + order + 1.0)
 
 
-def fisher_sum(burst: Burst, size: int, pulses: int, theta: np.ndarray | None = None) -> np.ndarray:
-    """Fisher matrix (size, size) of the samples of the first `pulses` pulses as a sum; theta (size,).
-
-    With the true θ the sum is exact; without, sin² of the phase is replaced by its mean ½, as in the closed form.
-    """
-    t = sample_times(burst, pulses)
-    duration = pulses * burst.pulse_period_s
-    k = sensitivities(size, duration) * (t.ravel()[:, None] / duration) ** np.arange(size)
-    if burst.complex_samples:
-        weight = 1.0
-    elif theta is None:
-        weight = 0.5
-    else:
-        weight = np.sin(2.0 * math.pi * phase_turns(theta, t).ravel())[:, None] ** 2
-    return burst.amplitude**2 / burst.noise_variance * (weight * k).T @ k
-
-
 def fisher_sums(burst: Burst, size: int, windows: list[int], theta: np.ndarray | None = None) -> list[np.ndarray]:
-    """`fisher_sum` of many windows at once, from running sums of the powers of time."""
+    """Fisher matrices (size, size) of the samples up to each window (in pulses), from running sums of powers of time.
+
+    With the true θ the sums are exact; without, sin² of the phase is replaced by its mean ½, as in the closed form.
+    """
     t = sample_times(burst, max(windows))
     x = t / burst.duration_s
     weight = np.full(t.shape, 1.0 if burst.complex_samples else 0.5)
@@ -78,16 +64,6 @@ def spreads(information: np.ndarray) -> np.ndarray:
     except np.linalg.LinAlgError:
         return np.full(len(information), np.inf)
     return np.sqrt(np.where(variance > 0.0, variance, np.inf))
-
-
-def prior_information(sigma: np.ndarray) -> np.ndarray:
-    """R_pr⁻¹ of independent prior errors with standard deviations sigma (size,)."""
-    return np.diag(np.asarray(sigma, dtype=float) ** -2.0)
-
-
-def radial_motion(sigma: np.ndarray, wavelength_m: float) -> np.ndarray:
-    """Spreads (n - 1,) of radial velocity (m/s), acceleration (m/s²), … from those of θ, (n,): v = λ f / 2."""
-    return 0.5 * wavelength_m * np.asarray(sigma)[1:]
 
 
 def derivative_spread(covariance: np.ndarray, order: int, t_s: float) -> float:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 LIGHT_MPS = 299_792_458.0
-MOST_PARAMETERS = 6  # phase, Doppler frequency and up to four derivatives
 
 
 @dataclass(frozen=True)
@@ -71,26 +70,12 @@ def signal(burst: Burst, turns: np.ndarray) -> np.ndarray:
     return burst.amplitude * (np.exp(1j * angle) if burst.complex_samples else np.cos(angle))
 
 
-def amplitude_estimate(burst: Burst, samples: np.ndarray, as_printed: bool = False) -> np.ndarray:
-    """Amplitude from the mean energy (7) of bursts (…, samples); the print gives its square, kept by `as_printed`.
-
-    A negative energy, possible at a low signal-to-noise ratio, gives zero.
-    """
-    numbers = samples.shape[-1] * (2 if burst.complex_samples else 1)
-    energy = np.sum(np.abs(samples) ** 2, axis=-1) - numbers * burst.noise_variance
-    square = np.maximum(2.0 * energy / numbers, 0.0)
-    return square if as_printed else np.sqrt(square)
-
-
 @dataclass(frozen=True)
 class VelocityProfile:
     """Radial velocity in m/s, positive towards the radar, straight between the given instants (s)."""
 
     times_s: tuple[float, ...]
     velocities_mps: tuple[float, ...]
-
-    def doppler_hz(self, t: np.ndarray, wavelength_m: float) -> np.ndarray:
-        return 2.0 / wavelength_m * np.interp(t, self.times_s, self.velocities_mps)
 
     def phase_turns(self, t: np.ndarray, wavelength_m: float, phase_rad: float) -> np.ndarray:
         """Phase in turns at times t: the exact integral of the Doppler frequency from the first instant."""

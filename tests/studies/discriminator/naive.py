@@ -69,3 +69,25 @@ def block_sums(u, turns, edges, t):
         e, s = np.exp(-2j * np.pi * turns[:, a:b]), t[:, a:b] - t[:, a:b].mean()
         out.append([np.sum(u[:, a:b] * e * s**i) for i in range(3)])
     return np.array(out).T
+
+
+def fisher_sum(burst, size, pulses, theta=None):
+    """Fisher matrix (size, size) of the samples of the first pulses, a row of sensitivities each.
+
+    With the true θ the sum is exact; without, sin² of the phase is replaced by its mean ½, as in the closed form.
+    """
+    offsets = np.arange(burst.samples_per_pulse) * burst.sampling_period_s
+    t = (offsets[:, None] + np.arange(pulses) * burst.pulse_period_s).ravel()
+    k = np.stack([2 * np.pi * t**i / math.factorial(i) for i in range(size)], axis=1)
+    k[:, 0] = 1.0
+    weight = np.full((len(t), 1), 1.0 if burst.complex_samples else 0.5)
+    if theta is not None and not burst.complex_samples:
+        weight = np.sin(phase(theta, t))[:, None] ** 2
+    return burst.amplitude**2 / burst.noise_variance * (weight * k).T @ k
+
+
+def amplitude(burst, samples, as_printed=False):
+    """Amplitude from the mean energy (7) of the samples of a burst; the print gives its square."""
+    numbers = samples.size * (2 if burst.complex_samples else 1)
+    square = 2 * (np.sum(np.abs(samples) ** 2) - numbers * burst.noise_variance) / numbers
+    return square if as_printed else math.sqrt(square)

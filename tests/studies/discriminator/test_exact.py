@@ -7,7 +7,7 @@ import pytest
 
 from radarsim.studies.discriminator import exact
 from radarsim.studies.discriminator import world as model
-from tests.studies.discriminator import naive as naive
+from tests.studies.discriminator import naive
 
 PAPER = model.Burst(10e9, 1e-5, 1e-6, 1e-6, 30000, 1.0, 2.25)
 THETA = np.array([0.7, 1e4, 18e4, -75e4, 1e6])
@@ -34,7 +34,7 @@ def test_closed_form_is_the_printed_matrix():
 def test_sum_tends_to_the_closed_form(pulses):
     duration = pulses * PAPER.pulse_period_s
     scale = np.sqrt(np.diag(exact.fisher(PAPER, 5, duration)))
-    difference = exact.fisher_sum(PAPER, 5, pulses) - exact.fisher(PAPER, 5, duration)
+    difference = naive.fisher_sum(PAPER, 5, pulses) - exact.fisher(PAPER, 5, duration)
     assert np.abs(difference / np.outer(scale, scale)).max() < 6 / pulses
 
 
@@ -46,7 +46,7 @@ def test_exact_sum_is_the_curvature_of_the_likelihood(size, complex_samples):
     theta = np.array([0.7, 1e4, 18e4, -75e4, 1e6, 1e7])[:size]
     t = model.sample_times(burst, 200)
     u = model.signal(burst, model.phase_turns(theta, t))
-    information = exact.fisher_sum(burst, size, 200, theta)
+    information = naive.fisher_sum(burst, size, 200, theta)
     step = 1e-3 / np.sqrt(np.diag(information))
 
     def value(moves):
@@ -62,8 +62,8 @@ def test_exact_sum_is_the_curvature_of_the_likelihood(size, complex_samples):
 
 def test_the_image_matters_where_doppler_is_near_zero():
     slow = np.array([0.7, 100.0, -2000.0, 0, 0])
-    without = exact.spreads(exact.fisher_sum(PAPER, 5, 199))
-    difference = [np.abs(exact.spreads(exact.fisher_sum(PAPER, 5, 199, at)) / without - 1) for at in (THETA, slow)]
+    without = exact.spreads(naive.fisher_sum(PAPER, 5, 199))
+    difference = [np.abs(exact.spreads(naive.fisher_sum(PAPER, 5, 199, at)) / without - 1) for at in (THETA, slow)]
     assert difference[0].max() < 0.05
     assert difference[1].max() > 0.15
 
@@ -78,16 +78,12 @@ def test_shortest_window_is_the_printed_one_with_the_printed_estimates():
 def test_a_prior_adds_information():
     sigma = np.array([0.1, 1.0, 10.0, 100.0, 1000.0])
     information = exact.fisher(PAPER, 5, 0.3)
-    both = exact.spreads(information + exact.prior_information(sigma))
+    both = exact.spreads(information + np.diag(sigma**-2))
     assert np.all(both < np.minimum(exact.spreads(information), sigma))
 
 
 def test_complex_samples_hold_twice_the_information():
     assert exact.fisher(replace(PAPER, complex_samples=True), 5, 0.3) == pytest.approx(2 * exact.fisher(PAPER, 5, 0.3))
-
-
-def test_motion_is_half_a_wavelength_of_doppler():
-    assert exact.radial_motion(np.array([0.06, 0.45, 12.2]), 0.03) == pytest.approx([0.00675, 0.183])
 
 
 def test_frequency_is_known_best_in_the_middle():
@@ -102,7 +98,7 @@ def test_many_windows_at_once_are_as_one_by_one(theta):
     windows = [100, 199, 5000, 30000]
     for window, information in zip(windows, exact.fisher_sums(PAPER, 5, windows, theta), strict=True):
         scale = np.sqrt(np.diag(information))
-        alone = exact.fisher_sum(PAPER, 5, window, theta)
+        alone = naive.fisher_sum(PAPER, 5, window, theta)
         assert information / np.outer(scale, scale) == pytest.approx(alone / np.outer(scale, scale), abs=1e-9)
 
 

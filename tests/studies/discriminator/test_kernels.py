@@ -327,10 +327,13 @@ def test_sums_of_errors_against_numpy():
     assert not residuals[1, 2:].any()
 
 
-def test_amplitude_estimate_is_the_models():
-    burst = burst_of(pulses=5000)
+@pytest.mark.parametrize("complex_samples", [False, True])
+def test_amplitude_estimate_and_its_misprint(complex_samples):
+    """The mean energy of 50 000 samples: its root is the amplitude to 2 %, five times the spread at σ²/A² = 0.3."""
+    burst = burst_of(50_000, complex_samples)
     _, u = noisy(burst, THETA)
-    physics = physics_of(burst)
-    assert kernels.estimated_amplitude(physics, rows(u), 1) == pytest.approx(model.amplitude_estimate(burst, u.ravel()))
-    printed = model.amplitude_estimate(burst, u.ravel(), as_printed=True)
-    assert kernels.estimated_amplitude(physics, rows(u), 2) == pytest.approx(printed)
+    measured, printed = (kernels.estimated_amplitude(physics_of(burst), rows(u), kind) for kind in (1, 2))
+    assert measured == pytest.approx(naive.amplitude(burst, u))
+    assert printed == pytest.approx(naive.amplitude(burst, u, as_printed=True)) == pytest.approx(measured**2)
+    assert measured == pytest.approx(burst.amplitude, rel=0.02)
+    assert kernels.estimated_amplitude(physics_of(burst), rows(0 * u), 1) == pytest.approx(1e-3)  # a floor, not a root

@@ -15,6 +15,7 @@ from radarsim.studies.multimodel import STUDY, tables
 from radarsim.studies.multimodel import study as multimodel
 from radarsim.studies.multimodel import track as multimodel_plots
 from radarsim.studies.multimodel.kernels import records
+from tests.physics.antenna import to_biconical
 from tests.studies.multimodel import naive
 
 SENSOR = {
@@ -67,7 +68,7 @@ def test_plots_have_the_stated_errors_and_covariances():
     assert abs(nis.mean() - 3) < 5 * np.sqrt(6 / nis.size)
     antenna = frames.to_antenna(truth, frames.rotation(0, np.radians(30)), 12)
     sigma = np.array([2.5, np.radians(0.1), np.radians(0.1)])
-    exact = frames.plot_covariance(frames.to_biconical(antenna), sigma, frames.rotation(0, np.radians(30)))
+    exact = frames.plot_covariance(to_biconical(antenna), sigma, frames.rotation(0, np.radians(30)))
     assert np.allclose(mean.mean(axis=0), exact, rtol=1e-3, atol=1e-3 * np.abs(exact).max())
 
 
@@ -131,7 +132,7 @@ def test_covariance_at_the_prediction_is_computed_there():
     F, Q = naive.motion("accelerated", 20.0, 0.5)
     turn, sigma = frames.rotation(0, np.radians(30)), np.array([2.5, np.radians(0.1), np.radians(0.1)])
     for k in range(3, len(z)):
-        at = frames.to_biconical(frames.to_antenna((F @ x)[0::3], turn, 12))
+        at = to_biconical(frames.to_antenna((F @ x)[0::3], turn, 12))
         x, P, *_ = naive.advance(x, P, F, Q, z[k], frames.plot_covariance(at, sigma, turn))
         assert np.allclose(sums["error"][0, k - 3, :, 0], x - plan.world.truth[k], rtol=1e-7, atol=1e-5)
 
@@ -286,7 +287,7 @@ def test_track_over_recorded_plots_equals_the_experiment():
     plan, sensor = case.plan, case.case.spec.sensor
     z, *_ = multimodel.measured(plan, 0)
     R = frames.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
-    biconical = frames.to_biconical(frames.to_antenna(z[:, :, 0], R, sensor.antenna_height_m))
+    biconical = to_biconical(frames.to_antenna(z[:, :, 0], R, sensor.antenna_height_m))
     t = np.concatenate([plan.axes.t_s[:1] - 1.5, plan.axes.t_s[:1] - 1.0, plan.axes.t_s[:1] - 0.5, plan.axes.t_s])
     columns = multimodel_plots.plot_columns(case.case.spec)[0]
     track = multimodel_plots.track(case.case, dict(zip(columns, [t + 100, *biconical.T], strict=True)))
