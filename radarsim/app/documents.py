@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from radarsim.app.outlook import Outlook
     from radarsim.app.result import Result
     from radarsim.app.simulation import Shares
+    from radarsim.app.solve import Answer
     from radarsim.config.experiment import Experiment
 
 
@@ -68,6 +69,11 @@ def share(done: "Shares") -> dict[str, Any]:
 def outlook(experiment: "Experiment", one: "Outlook") -> dict[str, Any]:
     """What a run would take."""
     return {"config": experiment.stem, "path": experiment.path, **asdict(one)}
+
+
+def answer(one: "Answer") -> dict[str, Any]:
+    """What was solved for: the value with its interval, or the limit where it is not attainable."""
+    return {**asdict(one), "quantity": one.quantity.words}
 
 
 def inventory(tables: "Inventory") -> dict[str, list[dict[str, str]]]:

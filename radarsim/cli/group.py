@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 SECTIONS = {
     "Run": ("run", "check"),
     "Read": ("report", "claims"),
+    "Design": ("solve",),
     "Own data": ("new", "simulate", "track", "new-study"),
     "Maintenance": ("list", "schema", "doctor", "clean"),
 }
@@ -146,6 +147,7 @@ def main() -> None:
       radarsim run rls2 --set radar.sigma_velocity_mps=5 -n 1e6
       radarsim claims                            what the papers claim, and what came out
       radarsim new mine --like rls2              a radar of one's own
+      radarsim solve rls2 radar.sigma_velocity_mps --gain r --at 60 --equals 30
 
     Commands, options and configs complete with the tab key after
     `eval "$(_RADARSIM_COMPLETE=bash_source radarsim)"` (bash; zsh_source, fish_source likewise).

@@ -15,7 +15,8 @@ class Case:
     """One configuration to be run: a study's checked keys, how often, and with which seed.
 
     name is the stem of its config with ` key=value` for each swept key. spec holds the study's own keys, an object of
-    its subclass of `radarsim.config.fields.Study`.
+    its subclass of `radarsim.config.fields.Study`. noise_of, where given, are the keys of another case, whose noise
+    this one shares although its world is another: common random numbers.
     """
 
     name: str
@@ -25,6 +26,7 @@ class Case:
     swept: tuple[tuple[str, object], ...]
     realisations: int
     seed: int
+    noise_of: Any = None
 
     def resolved(self) -> dict[str, Any]:
         """The case as plain JSON-able data, names included."""

@@ -15,7 +15,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, packages_distributions, version
 
 from radarsim.config.experiment import Case
-from radarsim.config.identity import canonical, digest
+from radarsim.config.identity import canonical, digest, world
 from radarsim.errors import ConfigError
 from radarsim.kernels import sources
 from radarsim.studies.interface import Study
@@ -43,8 +43,10 @@ def identity(case: Case) -> str:
     """What a case's numbers depend on, as SHA-256 in hexadecimal."""
     from radarsim.kernels import random  # the compiler, which takes half a second, is not loaded for `radarsim list`
 
+    shared = {} if case.noise_of is None else {"noise_of": world(case.noise_of)}
     return digest(
-        {
+        shared
+        | {
             "study": case.study,
             "spec": canonical(case.spec),
             "seed": case.seed,

@@ -9,4 +9,5 @@ from radarsim.kernels.random import stream
 
 def noise_key(case: Case, what: str) -> np.ndarray:
     """Key (2,) of the noise stream `what` of a case: the same for cases that differ only in their filters."""
-    return stream(case.seed, f"{case.study}:{what}:{digest(world(case.spec))}")
+    keyed_by = case.spec if case.noise_of is None else case.noise_of
+    return stream(case.seed, f"{case.study}:{what}:{digest(world(keyed_by))}")

@@ -1,0 +1,185 @@
+"""Where a function of one number reaches a target: every root on a range, or the nearest that it comes.
+
+The function may be undefined in places (not-a-number), as a config's keys are where they do not go together. Positive
+ranges of more than a factor of 20 are searched on a logarithmic scale.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+WIDE = 20  # high over low from which a range is searched logarithmically
+PER_DECADE, LEAST_POINTS, MOST_POINTS = 5, 25, 61
+EXACTLY = 1e-13  # of a root's size, to which brackets are closed: far below the 1e-9 that is promised
+GOLDEN = (math.sqrt(5) - 1) / 2
+
+Function = Callable[[float], float]
+
+
+@dataclass(frozen=True)
+class Range:
+    """What is searched: low to high, on a scale that is logarithmic or not, of whole numbers or not."""
+
+    low: float
+    high: float
+    logarithmic: bool
+    whole: bool = False
+
+    def inner(self, x: float) -> float:
+        """A value on the scale of the search."""
+        return math.log(x) if self.logarithmic else x
+
+    def outer(self, u: float) -> float:
+        """The value at a place of the scale, within the range; the nearest whole one where only these are."""
+        x = math.exp(u) if self.logarithmic else u
+        return min(max(float(round(x)) if self.whole else x, self.low), self.high)
+
+    def grid(self, points: int | None = None) -> list[float]:
+        """Places from end to end, even on the scale; whole numbers, all of them where they are few."""
+        if self.whole and self.high - self.low < MOST_POINTS:
+            return [float(n) for n in range(math.ceil(self.low), math.floor(self.high) + 1)]
+        if points is None:
+            decades = (self.inner(self.high) - self.inner(self.low)) / math.log(10) if self.logarithmic else 0
+            points = min(max(LEAST_POINTS, math.ceil(PER_DECADE * decades) + 1), MOST_POINTS)
+        first, step = self.inner(self.low), (self.inner(self.high) - self.inner(self.low)) / (points - 1)
+        found = [self.outer(first + i * step) for i in range(points)]
+        found[0], found[-1] = self.low, self.high
+        return sorted(set(found)) if self.whole else found
+
+
+def searched(low: float, high: float, whole: bool = False) -> Range:
+    """The range from low to high, on the scale that fits it."""
+    return Range(low, high, low > 0 and high / low > WIDE, whole)
+
+
+@dataclass(frozen=True)
+class Found:
+    """The roots on a range, rising; without any, the place where the function comes nearest to zero and its value."""
+
+    roots: tuple[float, ...]
+    nearest: float
+    at_nearest: float
+
+
+def roots(function: Function, over: Range) -> Found:
+    """All roots that a scan of the range shows: changes of sign, and touching ones where it turns near zero.
+
+    Raises ValueError where the function is defined nowhere on the scan.
+    """
+    places = [(x, function(x)) for x in over.grid()]
+    places = _with_edges(function, over, places)
+    places = _with_turns(function, over, places)
+    known = [(x, y) for x, y in places if not math.isnan(y)]
+    if not known:
+        raise ValueError("not defined on the range")
+    found = [x for x, y in known if y == 0]
+    for (a, ya), (b, yb) in pairwise(places):
+        if ya * yb < 0:
+            found.append(closed(function, over, (a, ya), (b, yb)))
+    nearest, at_nearest = min(known, key=lambda one: abs(one[1]))
+    return Found(tuple(sorted(found)), nearest, at_nearest)
+
+
+def closed(
+    function: Function,
+    over: Range,
+    one: tuple[float, float],
+    other: tuple[float, float],
+    near_enough: Callable[[float, float], bool] = lambda x, y: False,
+) -> float:
+    """The root between two places (x, y) of opposite signs (Chandrupatla, Adv. Eng. Software 28, 1997, 145-149).
+
+    Ends where near_enough(x, y), at a root, or where the bracket is closed to rounding; where the function jumps over
+    zero, at the jump. Of whole numbers the one beside the change of sign with the smaller value.
+    """
+    (a, fa), (b, fb) = (over.inner(one[0]), one[1]), (over.inner(other[0]), other[1])
+    c, fc, t = a, fa, 0.5
+    for _ in range(200):
+        x = over.outer(a + t * (b - a))
+        u = over.inner(x)
+        width = abs(over.outer(b) - over.outer(a))
+        if x in (over.outer(a), over.outer(b)) or width <= EXACTLY * abs(x) or (over.whole and width <= 1):
+            break
+        f = function(x)
+        if f == 0 or near_enough(x, f) or math.isnan(f):
+            return x
+        if (f > 0) == (fa > 0):
+            c, fc = a, fa
+        else:
+            c, b, fc, fb = b, a, fb, fa
+        a, fa = u, f
+        t = _next(a, b, c, fa, fb, fc)
+    u, _ = min(((a, fa), (b, fb)), key=lambda end: abs(end[1]))
+    return over.outer(u)
+
+
+def _next(a: float, b: float, c: float, fa: float, fb: float, fc: float) -> float:
+    """Where to look next between a and b, as a share: inverse quadratic interpolation where it is safe, else half."""
+    if c in (a, b) or fc in (fa, fb):
+        return 0.5
+    xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
+    if not (phi**2 < xi and (1 - phi) ** 2 < 1 - xi):
+        return 0.5
+    share = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+    margin = 2e-15 * max(abs(a), 1e-300) / abs(b - a)
+    return min(max(share, margin), 1 - margin)
+
+
+def _with_edges(function: Function, over: Range, places: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The places with those at which the function begins or ceases to be defined, to a thousandth of a step."""
+    made = list(places)
+    if over.whole:
+        return made
+    for one, other in pairwise(places):
+        if math.isnan(one[1]) == math.isnan(other[1]):
+            continue
+        bad, good = (one, other) if math.isnan(one[1]) else (other, one)
+        for _ in range(10):
+            x = over.outer((over.inner(bad[0]) + over.inner(good[0])) / 2)
+            tried = (x, function(x))
+            bad, good = (tried, good) if math.isnan(tried[1]) else (bad, tried)
+        made.append(good)
+    return sorted(made)
+
+
+def _with_turns(function: Function, over: Range, places: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The places with the extremes, found by golden sections, at which the function turns back before it reaches zero.
+
+    Only where it may reach it: beyond a turn the parabola through the three places comes at most so much nearer.
+    """
+    made = list(places)
+    if over.whole:
+        return made
+    for (a, ya), (b, yb), (c, yc) in zip(places, places[1:], places[2:], strict=False):
+        if math.isnan(ya + yb + yc) or not (ya * yb > 0 and yb * yc > 0 and abs(ya) > abs(yb) <= abs(yc)):
+            continue
+        if abs(yb) > 2 * max(abs(ya - yb), abs(yc - yb)) + 1e-12 and not _least(places, b):
+            continue
+        made.append(_turn(function, over, a, c, math.copysign(1.0, yb)))
+    return sorted(made)
+
+
+def _least(places: Sequence[tuple[float, float]], x: float) -> bool:
+    """Whether of all places this is where the function is nearest to zero: the limit, if it is never reached."""
+    return x == min((abs(y), x) for x, y in places if not math.isnan(y))[1]
+
+
+def _turn(function: Function, over: Range, low: float, high: float, sign: float) -> tuple[float, float]:
+    """The least of sign · function between two places; ends early where it crosses zero."""
+    a, b = over.inner(low), over.inner(high)
+    u, v = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
+    fu, fv = sign * function(over.outer(u)), sign * function(over.outer(v))
+    for _ in range(40):
+        if min(fu, fv) <= 0 or b - a < 1e-8 * max(abs(a), abs(b), 1.0):
+            break
+        if fu < fv:
+            b, v, fv = v, u, fu
+            u = b - GOLDEN * (b - a)
+            fu = sign * function(over.outer(u))
+        else:
+            a, u, fu = u, v, fv
+            v = a + GOLDEN * (b - a)
+            fv = sign * function(over.outer(v))
+    place, least = (u, fu) if fu < fv else (v, fv)
+    return over.outer(place), sign * least

@@ -1,0 +1,78 @@
+"""What the terminal says of an answer: the value that was solved for, what it attains, its slope, the check."""
+
+import math
+from typing import TYPE_CHECKING
+
+from radarsim.cli.console import say
+from radarsim.report.text import significant_digits
+
+if TYPE_CHECKING:
+    from radarsim.app.solve import Answer
+
+PLAIN = ".6g"
+
+
+def print_answer(answer: "Answer") -> None:
+    """A value with what it attains, then a line each: the slope, other values, the confirming run."""
+    value, lo, hi = answer.value, answer.lo, answer.hi
+    assert value is not None  # what is not attained is no answer
+    assert lo is not None
+    assert hi is not None
+    interval = "exact" if answer.exact else f"95 % {_number(lo)} … {_number(hi)}"
+    say(f"{answer.key} = {_with_unit(value, answer.unit)}   {interval}")
+    attained = math.nan if answer.attained is None else answer.attained
+    say(f"attains  {answer.quantity.words}: {_quantity(answer, attained)}{_now(answer)}")
+    if answer.slope is not None:
+        say(f"slope    {slope(answer)}")
+    if answer.others:
+        say(f"also at  {', '.join(_with_unit(other, answer.unit) for other in answer.others)}")
+    for note in answer.notes:
+        say(f"note     {note}")
+    say(f"check    {answer.command}")
+
+
+def unattained(answer: "Answer") -> list[str]:
+    """Why there is no answer: the nearest that was found, and where."""
+    limit, at = answer.limit, answer.limit_at
+    assert limit is not None
+    assert at is not None
+    bound = "at most" if limit < answer.equals else "at least"
+    lines = [
+        f"{answer.quantity.words}: {_quantity(answer, answer.equals)} is not attainable by {answer.key} from "
+        f"{_number(answer.low)} to {_with_unit(answer.high, answer.unit)}: {bound} {_quantity(answer, limit)}, at "
+        f"{_with_unit(at, answer.unit)}"
+    ]
+    return [*lines, *(f"note: {note}" for note in answer.notes)]
+
+
+def slope(answer: "Answer") -> str:
+    """What a little more of the key changes: `1 m/s more costs 1.7 points`."""
+    value, per_unit = answer.value, answer.slope
+    assert value is not None
+    assert per_unit is not None
+    step = 10.0 ** math.floor(math.log10(abs(value) / 2)) if value else 1.0
+    step = max(step, 1.0) if float(value).is_integer() and step >= 0.5 else step
+    change = per_unit * step
+    better = (change > 0) == answer.quantity.of.more_is_better
+    verb = ("brings" if better else "costs") if answer.quantity.of.more_is_better else ("adds", "takes off")[better]
+    unit = "points" if answer.quantity_unit == "%" else answer.quantity_unit
+    return f"{_with_unit(step, answer.unit, PLAIN)} more {verb} {_number(abs(change), '#.3g')} {unit}"
+
+
+def _now(answer: "Answer") -> str:
+    if math.isnan(answer.attained_now):
+        return ""
+    own = "as the config is" if answer.now is None else f"at {_with_unit(answer.now, answer.unit, PLAIN)}"
+    return f" ({own}: {_quantity(answer, answer.attained_now)})"
+
+
+def _quantity(answer: "Answer", value: float) -> str:
+    return f"{_number(value, '.4g')} {answer.quantity_unit}"
+
+
+def _with_unit(value: float, unit: str, form: str = PLAIN) -> str:
+    return f"{_number(value, form)} {unit}".rstrip()
+
+
+def _number(value: float, form: str = PLAIN) -> str:
+    return significant_digits(value, form).replace("e−0", "·10^−").replace("e+", "·10^")

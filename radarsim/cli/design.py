@@ -1,0 +1,122 @@
+"""Commands that put the question the other way round. Heavy imports wait inside the commands."""
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from radarsim.cli.group import config_argument, json_option, main, realisations_option, seed_option, set_option
+
+if TYPE_CHECKING:
+    from radarsim.app.quantities import Quantity
+
+OPTIONS = {
+    "gain": ("COMPONENT", "Gain in a component (r, Vr, …) against the baseline, per cent."),
+    "sigma": ("COMPONENT", "σ of a component, in its unit."),
+    "lock": ("NAME", "Rate of locks of this estimator, per cent (discriminator)."),
+    "right": ("NAME", "Rate of rightly unfolded velocities of this filter, per cent."),
+    "loss": ("NAME", "Ends of the target's track an hour with this tracker (sonar)."),
+    "false_tracks": ("NAME", "False tracks an hour of this tracker (sonar)."),
+}
+
+
+def quantity_options(command: Any) -> Any:
+    """The options that name a quantity."""
+    for kind, (metavar, text) in reversed(OPTIONS.items()):
+        command = click.option(f"--{kind.replace('_', '-')}", kind, metavar=metavar, help=text)(command)
+    return command
+
+
+at_options = (
+    click.option("--at", "at_s", type=float, metavar="S", help="At this time, s; default: the last scan."),
+    click.option("--at-k", type=click.IntRange(1), metavar="K", help="At this scan, from 1, in place of --at."),
+)
+
+
+@main.command()
+@config_argument
+@click.argument("key", metavar="KEY")
+@quantity_options
+@click.option("--filter", "filter_name", metavar="NAME", help="The filter, where there are several.")
+@at_options[0]
+@at_options[1]
+@click.option("--equals", type=float, required=True, metavar="X", help="What it shall be: per cent of gains and rates.")
+@click.option("--between", type=(float, float), metavar="LO HI", help="Values of KEY that are searched.")
+@click.option("--case", metavar="CASE", help="The case, of a config that has several.")
+@set_option
+@realisations_option
+@seed_option
+@click.option("--threads", type=click.IntRange(1, 1024), metavar="T", help="Threads; default: all cores.")
+@json_option
+def solve(
+    config: str,
+    key: str,
+    filter_name: str | None,
+    at_s: float | None,
+    at_k: int | None,
+    equals: float,
+    between: tuple[float, float] | None,
+    case: str | None,
+    overrides: tuple[str, ...],
+    realisations: int | None,
+    seed: int | None,
+    threads: int | None,
+    as_json: bool,
+    **kinds: str | None,
+) -> None:
+    """The value of KEY at which a quantity reaches a target.
+
+    KEY is any key that holds a number, by its dotted path as for --set; a bare filter key means that of all filters.
+    Where the quantity is known exactly (linear filters), so is the answer. Else each value is simulated with the same
+    noise, and the answer has a 95 % interval. What is not attainable ends in exit code 3, with the nearest there is.
+    A positive key is searched from a thousandth to a thousand times its value, unless --between says otherwise.
+
+    \b
+    Examples
+      radarsim solve rls2 radar.sigma_velocity_mps --gain r --filter r+Vr --at 60 --equals 30
+      radarsim solve rls2 radar.scan_period_s --sigma Vr --filter r --at 60 --equals 5
+      radarsim solve discriminator burst.noise_variance --lock sequence --equals 95 -n 1000
+      radarsim solve sonar_clutter filters.0.manoeuvre_variance --loss nearest --equals 8 \\
+          --case "sonar_clutter sensor.false_plots_per_km2=1" -n 2000
+    """
+    from radarsim.app import documents
+    from radarsim.app import run as experiment
+    from radarsim.app import solve as solving
+    from radarsim.cli import answers, console
+    from radarsim.errors import TargetUnmet
+
+    quantity = asked(kinds, filter_name, at_s, at_k)
+    overrides = experiment.merged(overrides, None, seed)
+    with console.Progress(key, quiet=as_json, what="values") as progress:
+        answer = solving.solve(
+            *(config, key, quantity, equals),
+            overrides=overrides,
+            between=between,
+            case=case,
+            realisations=realisations,
+            threads=threads,
+            progress=progress.update,
+        )
+    if as_json:
+        click.echo(documents.text(documents.answer(answer)))
+    elif answer.value is not None:
+        answers.print_answer(answer)
+    if answer.value is None:
+        raise TargetUnmet(*answers.unattained(answer))
+
+
+def asked(kinds: "dict[str, str | None]", filter_name: str | None, at_s: float | None, at_k: int | None) -> "Quantity":
+    """The quantity that the options name. Raises UsageError unless it is one."""
+    from radarsim.app.quantities import Quantity
+
+    given = {kind: value for kind, value in kinds.items() if value is not None}
+    if len(given) != 1:
+        options = ", ".join(f"--{kind.replace('_', '-')}" for kind in OPTIONS)
+        raise click.UsageError(f"name one quantity: {options}")
+    if at_s is not None and at_k is not None:
+        raise click.UsageError("--at and --at-k do not go together: a time or a scan")
+    ((kind, name),) = given.items()
+    of_component = kind in ("gain", "sigma")
+    if not of_component and filter_name is not None:
+        raise click.UsageError(f"--{kind.replace('_', '-')} names the filter itself: leave --filter out")
+    component, chosen = (name, filter_name) if of_component else (None, name)
+    return Quantity(kind, chosen, component, at_s, at_k)
