@@ -1,0 +1,106 @@
+"""Roots on a range: several, touching, jumping, undefined in places; whole numbers; against known roots."""
+
+import math
+
+import numpy as np
+import pytest
+
+from radarsim.app import search
+
+RANGE = search.searched(0.01, 100.0)
+
+
+@pytest.mark.parametrize(
+    ("function", "expected"),
+    [
+        (lambda x: x - 3, [3]),
+        (lambda x: 1 / x - 3, [1 / 3]),
+        (lambda x: math.log(x) ** 2 - 4, [math.exp(-2), math.exp(2)]),
+        (lambda x: (x - 2) ** 2 - 1e-4, [1.99, 2.01]),  # between two places of the scan
+        (lambda x: 1e-4 - (x - 2) ** 2, [1.99, 2.01]),
+        (lambda x: math.tanh(50 * (x - 7)), [7]),
+        (lambda x: x**9 - 5**9, [5]),
+    ],
+)
+def test_all_roots_are_found_to_rounding(function, expected):
+    assert search.roots(function, RANGE).roots == pytest.approx(expected, rel=1e-12)
+
+
+def test_many_roots_on_a_linear_scale():
+    found = search.roots(math.sin, search.searched(1.0, 19.5)).roots
+    assert found == pytest.approx([math.pi * n for n in range(1, 7)], rel=1e-12)
+
+
+def test_random_cubics_against_their_roots():
+    """All three where they stand apart by more than a step of the scan; else one or three, each a root."""
+    rng = np.random.default_rng(5)
+    step = math.log(100 / 0.01) / 24
+    for _ in range(200):
+        logs, sign = np.sort(rng.uniform(math.log(0.02), math.log(50), 3)), rng.choice([-1, 1])
+
+        def function(x, logs=logs, sign=sign):
+            return sign * float(np.prod(math.log(x) - logs))
+
+        found = np.log(search.roots(function, RANGE).roots)
+        if np.diff(logs).min() > step:
+            assert found == pytest.approx(logs, rel=1e-9)
+        assert len(found) in (1, 3)
+        assert np.abs(found[:, None] - logs).min(axis=1).max() < 1e-6
+
+
+@pytest.mark.parametrize(("turn", "sign"), [(0.37, 1), (2.0, -1), (61.0, 1)])
+def test_where_there_is_no_root_the_limit_is_the_turn(turn, sign):
+    found = search.roots(lambda x: sign * (math.log(x / turn) ** 2 + 0.25), RANGE)
+    assert found.roots == ()
+    assert found.nearest == pytest.approx(turn, rel=1e-6)
+    assert found.at_nearest == pytest.approx(sign * 0.25, rel=1e-9)
+
+
+def test_where_there_is_no_root_the_limit_may_be_an_end():
+    found = search.roots(lambda x: x + 1, RANGE)
+    assert (found.roots, found.nearest) == ((), 0.01)
+
+
+def test_a_root_in_the_last_defined_step_is_found():
+    found = search.roots(lambda x: math.nan if x > 3.2 else x - 3.15, RANGE)
+    assert found.roots == pytest.approx([3.15], rel=1e-12)
+    beyond = search.roots(lambda x: math.nan if x > 3.2 else x - 3.3, RANGE)
+    assert beyond.roots == ()
+    assert beyond.nearest == pytest.approx(3.2, rel=1e-3)
+
+
+def test_a_function_that_is_defined_nowhere_is_refused():
+    with pytest.raises(ValueError, match="not defined"):
+        search.roots(lambda x: math.nan, RANGE)
+
+
+def test_a_jump_over_zero_is_closed_to_the_jump():
+    (root,) = search.roots(lambda x: -1.0 if x < 7.3 else 1.0, RANGE).roots
+    assert root == pytest.approx(7.3, rel=1e-12)
+
+
+@pytest.mark.parametrize(("low", "high"), [(2, 30), (2, 100_000)])
+@pytest.mark.parametrize("edge", [5, 17, 29])
+def test_of_whole_numbers_one_beside_the_change(low, high, edge):
+    over = search.searched(low, high, whole=True)
+    seen = []
+
+    def function(n):
+        seen.append(n)
+        return n - edge + 0.5
+
+    (root,) = search.roots(function, over).roots
+    assert root in (edge - 1, edge)
+    assert all(float(n).is_integer() for n in seen)
+
+
+def test_the_search_takes_few_values():
+    count = 0
+
+    def function(x):
+        nonlocal count
+        count += 1
+        return math.log(x) - 1
+
+    search.roots(function, search.searched(1e-3, 1e3))
+    assert count <= 45

@@ -1,0 +1,244 @@
+"""Solving for a key: against a filter of textbooks, the run that confirms, limits, several roots, what is refused."""
+
+import json
+import math
+import shlex
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import radarsim
+from radarsim.app.quantities import Quantity
+from radarsim.app.solve import solve
+from radarsim.cli import main
+from radarsim.errors import ConfigError
+from tests.studies.range_doppler import impulse
+
+GAIN = Quantity("gain", "r+Vr", "r", 60.0)
+RLS2 = {"variance": 1e-3, "sigma": (250.0, 15.0), "dt": 10.0}
+
+
+def command(*words):
+    return CliRunner().invoke(main, ["solve", *map(str, words)])
+
+
+# ---- exact -----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(("equals", "printed"), [(30, 13.7), (40, 8.8)])
+def test_the_velocity_accuracy_for_a_gain(equals, printed):
+    found = solve("rls2", "radar.sigma_velocity_mps", GAIN, equals)
+    assert found.exact
+    assert found.value == pytest.approx(printed, abs=0.05)
+    assert (found.lo, found.hi, found.others) == (found.value, found.value, ())
+    twin = impulse.gains(7, 1e-3, (250.0, found.value), 10.0)[0]
+    assert twin == pytest.approx(equals, abs=1e-8)
+    assert found.attained == pytest.approx(equals, abs=1e-9)
+
+
+def test_what_is_not_attainable_has_its_limit():
+    found = solve("rls2", "radar.sigma_velocity_mps", GAIN, 60)
+    assert found.value is None
+    assert found.limit == pytest.approx(56.7, abs=0.05)
+    assert found.limit_at == found.low == 0.015
+    assert found.limit == pytest.approx(impulse.gains(7, 1e-3, (250.0, 0.015), 10.0)[0], abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("key", "quantity", "equals", "setting"),
+    [
+        ("radar.sigma_range_m", Quantity("sigma", "r", "Vr", 100.0), 5.0, {"sigma": lambda x: (x, 15.0)}),
+        ("manoeuvre_variance", Quantity("sigma", "r+Vr", "ar", at_k=12), 0.5, {"variance": lambda x: x}),
+        ("manoeuvre_variance", Quantity("gain", None, "Vr"), 25.0, {"variance": lambda x: x}),
+    ],
+)
+def test_other_keys_and_quantities_against_the_textbook(key, quantity, equals, setting):
+    found = solve("rls2", key, quantity, equals)
+    scans = 11 if quantity.at_s else quantity.at_k or 15
+    component = ("r", "Vr", "ar").index(quantity.component)
+    for value in (found.value, *found.others):
+        given = RLS2 | {name: of(value) for name, of in setting.items()}
+        if quantity.kind == "gain":
+            attained = impulse.gains(scans, **given)[component]
+        else:
+            attained = impulse.sigmas({"r": 1, "r+Vr": 2}[quantity.filter], scans, **given)[component]
+        assert attained == pytest.approx(equals, rel=1e-8)
+
+
+def test_all_roots_are_those_of_a_dense_grid():
+    quantity = Quantity("gain", "r+Vr", "ar", 100.0)
+    found = solve("rls2", "manoeuvre_variance", quantity, 0.0, between=(1e-6, 1e-1))
+    grid = np.geomspace(1e-6, 1e-1, 120)
+    gains = np.array([impulse.gains(11, x, (250.0, 15.0), 10.0)[2] for x in grid])
+    turns = np.flatnonzero(np.diff(np.sign(gains)))
+    values = sorted([found.value, *found.others])
+    assert len(values) == len(turns) >= 2
+    for value, i in zip(values, turns, strict=True):
+        assert grid[i] <= value <= grid[i + 1]
+
+
+def test_the_slope_is_the_derivative():
+    found = solve("rls2", "radar.sigma_velocity_mps", GAIN, 30)
+    step = 1e-3
+    ends = [impulse.gains(7, 1e-3, (250.0, found.value + h), 10.0)[0] for h in (-step, step)]
+    assert found.slope == pytest.approx((ends[1] - ends[0]) / (2 * step), rel=1e-6)
+
+
+def test_the_confirming_run_confirms():
+    found = solve("rls2", "radar.sigma_velocity_mps", GAIN, 30, overrides=["radar.sigma_range_m=200"])
+    program, run, config, *words = shlex.split(found.command)
+    assert (program, run) == ("radarsim", "run")
+    result = radarsim.run(config, overrides=[word for word in words if word != "--set"], realisations=2000)
+    row = result.gains.query("component == 'r' and t_s == 60").iloc[0]
+    assert row["exact_percent"] == pytest.approx(30, abs=1e-8)
+    assert row["gain_lo"] < 30 < row["gain_hi"]
+
+
+def test_a_time_between_two_scans_is_interpolated():
+    period = solve("rls2", "radar.scan_period_s", Quantity("sigma", "r+Vr", "r", 60.0), 150.0)
+    k, share = divmod(60 / period.value, 1)
+    ends = [impulse.sigmas(2, int(k) + i, 1e-3, (250.0, 15.0), period.value)[0] for i in (1, 2)]
+    assert ends[0] + share * (ends[1] - ends[0]) == pytest.approx(150, rel=1e-8)
+
+
+def test_of_whole_numbers_one_that_does_as_well():
+    quantity = Quantity("sigma", "r", "r", 140.0)
+    found = solve("rls2", "filters.0.initial_scans", quantity, 180.0)
+    sigma = {n: impulse.sigmas(1, 15, 1e-3, (250.0, 15.0), 10.0, start=n)[0] for n in range(3, 16)}
+    assert sigma[found.value] <= 180 < sigma[found.value - 1]
+    assert found.attained == pytest.approx(sigma[found.value], rel=1e-9)
+    assert found.slope == pytest.approx(sigma[found.value + 1] - sigma[found.value], rel=1e-6)
+
+
+def test_linear_sonar_filters_are_exact_too():
+    """Least squares over growing memory: σ is proportional to that of a plot."""
+    quantity = Quantity("sigma", "growing", "r")
+    case = "sonar_missed sensor.detection_probability=1"
+    found = solve("sonar_missed", "sensor.sigma_range_m", quantity, 10.0, case=case)
+    assert found.exact
+    assert found.value == pytest.approx(found.now * 10 / found.attained_now, rel=1e-9)
+
+
+# ---- by sampling -----------------------------------------------------------------------------------------------------
+def test_sampled_it_is_near_the_exact_and_the_same_again():
+    exact = solve("rls2", "radar.sigma_velocity_mps", GAIN, 30).value
+    found = [
+        solve("rls2", "radar.sigma_velocity_mps", GAIN, 30, sampled=True, realisations=4000, threads=t) for t in (1, 2)
+    ]
+    assert found[0] == found[1]
+    one = found[0]
+    assert not one.exact
+    assert one.lo < one.value < one.hi
+    # The gain's own interval over its slope, as the delta method has it.
+    result = radarsim.run("rls2", overrides=[f"radar.sigma_velocity_mps={exact}"], realisations=4000)
+    row = result.gains.query("component == 'r' and t_s == 60").iloc[0]
+    width = (row["gain_hi"] - row["gain_lo"]) / abs(solve("rls2", "radar.sigma_velocity_mps", GAIN, 30).slope)
+    assert one.hi - one.lo == pytest.approx(width, rel=0.2)
+    assert abs(one.value - exact) < 2 * width  # four standard errors
+    assert one.slope == pytest.approx(-1.70, rel=0.15)
+
+
+def test_sampled_it_has_limits_and_keys_without_effect():
+    beyond = solve("rls2", "radar.sigma_velocity_mps", GAIN, 65, sampled=True, realisations=2000)
+    assert beyond.value is None
+    assert beyond.limit == pytest.approx(56.7, abs=6)
+    with pytest.raises(ConfigError, match="has no effect"):
+        solve("rls2", "radar.wavelength_m", GAIN, 30, sampled=True, realisations=500)
+
+
+@pytest.mark.slow
+def test_the_interval_covers_a_known_root():
+    """Of 200 seeds the 95 % interval holds the exact root in as many as a binomial number of 0.95 allows (4 σ)."""
+    exact = solve("rls2", "radar.sigma_velocity_mps", GAIN, 30).value
+    seeds, covered, low, high = 200, 0, 0, 0
+    for seed in range(seeds):
+        found = solve(
+            *("rls2", "radar.sigma_velocity_mps", GAIN, 30),
+            overrides=[f"seed={seed}"],
+            between=(4, 40),
+            sampled=True,
+            realisations=1000,
+        )
+        covered += found.lo <= exact <= found.hi
+        low += found.hi < exact
+        high += found.lo > exact
+    assert abs(covered - 0.95 * seeds) <= 4 * math.sqrt(seeds * 0.95 * 0.05), (low, high)
+
+
+# ---- what is refused -------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("rls2", "radar.wavelength_m", GAIN, 30), "has no effect on the gain of r+Vr in r at 60 s"),
+        (("rls2", "radar.sigma_rnge_m", GAIN, 30), "did you mean radar.sigma_range_m?"),
+        (("rls2", "radar.sigma_range_m", Quantity("gain", "r+V", "r"), 30), "did you mean r+Vr?"),
+        (("rls2", "radar.sigma_range_m", Quantity("gain", "r", "r"), 30), "is the baseline"),
+        (("rls2", "radar.sigma_range_m", Quantity("sigma", None, "r"), 30), "--filter: name one of r, r+Vr"),
+        (("rls2", "radar.sigma_range_m", Quantity("sigma", "r", "vr"), 30), "no component 'vr'"),
+        (("rls2", "radar.sigma_range_m", Quantity("sigma", "r", "r", 1e4), 30), "must be from 0 to 140 s"),
+        (("rls2", "radar.sigma_range_m", Quantity("sigma", "r", "r", at_k=16), 30), "must be from 1 to 15"),
+        (("rls2", "radar.sigma_range_m", Quantity("sigma", "r", "Vr", at_k=1), 30), "there is no estimate there"),
+        (("rls2", "radar.sigma_range_m", Quantity("lock", "r"), 30), "makes no locks.csv"),
+        (("range_doppler", "radar.sigma_range_m", GAIN, 30), "choose one with --case: 'rls1', "),
+        (("nosuch", "radar.sigma_range_m", GAIN, 30), "no such config"),
+    ],
+)
+def test_faults(arguments, words):
+    with pytest.raises(ConfigError) as refused:
+        solve(*arguments)
+    assert words in str(refused.value)
+
+
+@pytest.mark.parametrize("between", [(5, 3), (math.nan, 3), (1, math.inf), (-4, -2)])
+def test_a_range_that_is_none(between):
+    with pytest.raises(ConfigError):
+        solve("rls2", "radar.sigma_range_m", GAIN, 30, between=between)
+
+
+# ---- the command -----------------------------------------------------------------------------------------------------
+def test_the_command_says_value_slope_and_check():
+    ended = command(
+        *("rls2", "radar.sigma_velocity_mps", "--gain", "r", "--filter", "r+Vr", "--at", 60, "--equals", 30)
+    )
+    assert ended.exit_code == 0
+    assert ended.stdout.splitlines() == [
+        "radar.sigma_velocity_mps = 13.7212 m/s   exact",
+        "attains  gain of r+Vr in r at 60 s: 30 % (at 15 m/s: 27.92 %)",
+        "slope    1 m/s more costs 1.70 points",
+        "check    radarsim run rls2 --set radar.sigma_velocity_mps=13.7212493675",
+    ]
+
+
+def test_the_command_ends_with_3_where_it_is_not_attainable():
+    words = ("rls2", "radar.sigma_velocity_mps", "--gain", "r", "--at", 60, "--equals", 60)
+    ended = command(*words)
+    assert ended.exit_code == 3
+    assert ended.stdout == ""
+    assert "60 % is not attainable" in ended.stderr
+    assert "at most 56.7 %, at 0.015 m/s" in ended.stderr
+    document = json.loads(command(*words, "--json").stdout)
+    assert document["value"] is None
+    assert document["limit"] == pytest.approx(56.7, abs=0.05)
+
+
+def test_the_command_gives_one_json_document():
+    ended = command("rls2", "manoeuvre_variance", "--sigma", "Vr", "--filter", "r", "--equals", 6, "--json")
+    document = json.loads(ended.stdout)
+    assert set(document) >= {"key", "value", "lo", "hi", "exact", "attained", "slope", "others", "limit"}
+    assert document["exact"] is True
+    assert document["lo"] == document["value"] == document["hi"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--equals", 30),
+        ("--gain", "r", "--sigma", "r", "--equals", 30),
+        ("--gain", "r", "--at", 60, "--at-k", 3, "--equals", 30),
+        ("--lock", "sequence", "--filter", "sequence", "--equals", 30),
+        ("--gain", "r"),
+    ],
+)
+def test_options_that_do_not_go_together(words):
+    ended = command("rls2", "radar.sigma_range_m", *words)
+    assert ended.exit_code == 2
+    assert "Error" in ended.stderr

@@ -1,0 +1,88 @@
+"""The numeric keys of a config: each is found, keeps its value when it is put back, and has the schema's bounds."""
+
+import math
+
+import pytest
+
+from radarsim.app.configs import load
+from radarsim.config import numeric
+from radarsim.errors import ConfigError
+
+STEMS = ("rls2", "multimodel", "sonar_clutter", "sonar_manoeuvre", "discriminator")
+
+
+@pytest.mark.parametrize("stem", STEMS)
+def test_keys_can_be_set_to_their_own_values(stem):
+    """What is found is what `--set` understands; only an item of a list that the config gives in degrees, or not at
+    all, has no place there."""
+    case = load(stem).cases[0]
+    swept = {key for key, _ in case.swept}
+    given = [key for key in numeric.keys(case.spec) if key.value is not None and key.path not in swept]
+    places, refused = [], []
+    for key in given:
+        try:
+            assert load(stem, [f"{key.path}={key.value!r}"]).cases[0].spec == case.spec
+            places.append(key)
+        except ConfigError:
+            refused.append(key.path)
+    assert len(places) > 8
+    assert all(path.rpartition(".")[2].isdecimal() for path in refused)
+    assert stem != "rls2" or not refused
+
+
+def test_the_keys_of_a_radar():
+    keys = {key.path: key for key in numeric.keys(load("rls2").cases[0].spec)}
+    assert keys["radar.sigma_range_m"] == numeric.NumericKey("radar.sigma_range_m", 250.0, 0, math.inf, False)
+    assert keys["target.coefficients.2"].value == 4.0
+    assert (keys["filters.1.initial_scans"].low, keys["filters.1.initial_scans"].whole) == (2, True)
+    assert not any(path.startswith("radar.band") for path in keys)
+
+
+def test_bounds_of_both_ends_and_optional_keys():
+    keys = {key.path: key for key in numeric.keys(load("sonar_clutter").cases[0].spec)}
+    probability = keys["sensor.detection_probability"]
+    assert (probability.low, probability.high) == (0, 1)
+    assert keys["filters.0.gate_probability"].value is None
+    assert "filters.0.degree" not in keys  # a choice of two
+
+
+def test_a_bare_filter_key_means_every_filter_and_degrees_are_understood():
+    spec = load("rls2").cases[0].spec
+    both = numeric.find(spec, "manoeuvre_variance")
+    assert [key.path for key in both] == ["filters.0.manoeuvre_variance", "filters.1.manoeuvre_variance"]
+    (one,) = numeric.find(load("sonar_clutter").cases[0].spec, "sensor.sigma_bearing_deg")
+    assert one.path == "sensor.sigma_bearing_deg"
+    assert one.value == pytest.approx(1)
+    assert one.high == pytest.approx(math.degrees(0.5))
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("radar.sigma_velocty_mps", "did you mean radar.sigma_velocity_mps?"),
+        ("sigma_range_m", "did you mean radar.sigma_range_m?"),
+        ("radar.name", "holds no number"),
+        ("filters", "holds no number"),
+        ("zzz", "allowed: radar.wavelength_m"),
+        ("filters.7.manoeuvre_variance", "unknown key"),
+        ("", "unknown key"),
+    ],
+)
+def test_what_is_no_numeric_key(name, words):
+    with pytest.raises(ConfigError) as refused:
+        numeric.find(load("rls2").cases[0].spec, name)
+    assert words in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("path", "unit"),
+    [
+        ("radar.sigma_velocity_mps", "m/s"),
+        ("target.range_m.0", "m"),
+        ("filters.0.manoeuvre_variance", ""),
+        ("scans", ""),
+        ("a.b_deg", "°"),
+    ],
+)
+def test_units(path, unit):
+    assert numeric.unit(path) == unit
