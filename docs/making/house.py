@@ -16,7 +16,7 @@ ROWS = (
     ("cli",),
     ("app", "track"),
     ("registry",),
-    ("range_doppler", "multimodel", "sonar", "discriminator"),
+    ("range_doppler", "multimodel", "sonar", "discriminator", "ambiguous_doppler"),
     ("interface", "report"),
     ("config", "engine", "kernels", "physics"),
 )
@@ -32,6 +32,7 @@ ABOUT = {
     "multimodel": "P2",
     "sonar": "P3, three studies",
     "discriminator": "P4",
+    "ambiguous_doppler": "folded velocity",
     "config": "YAML to checked cases",
     "engine": "blocks, sums, store",
     "kernels": "compiled, shared",

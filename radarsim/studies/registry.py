@@ -20,11 +20,12 @@ from radarsim.studies.interface import Study
 Part = TypeVar("Part")
 
 GROUP = "radarsim.studies"
-SHIPPED = {  # in the order of the papers
+SHIPPED = {  # in the order of the papers, then what goes beyond them
     "range_doppler": "radarsim.studies.range_doppler",
     "multimodel": "radarsim.studies.multimodel",
     "sonar": "radarsim.studies.sonar",
     "discriminator": "radarsim.studies.discriminator",
+    "ambiguous_doppler": "radarsim.studies.ambiguous_doppler",
 }
 
 

@@ -16,10 +16,16 @@ from radarsim.studies import identity, registry
 from radarsim.studies.folder import StudyFolder
 
 ROOT = Path(__file__).parents[2]
-STEMS = ("rls2", "multimodel", "sonar_smoothing", "sonar_manoeuvre", "sonar_clutter", "discriminator")
+STEMS = ("rls2", "multimodel", "sonar_smoothing", "sonar_manoeuvre", "sonar_clutter", "discriminator", "ambiguous_rls4")
 SONAR = {stem for stem in STEMS if stem.startswith("sonar_")}
 ALL, NONE = set(STEMS), set()
-FOLDERS = {"range_doppler": {"rls2"}, "multimodel": {"multimodel"}, "discriminator": {"discriminator"}, "sonar": SONAR}
+FOLDERS = {
+    "range_doppler": {"rls2"},
+    "multimodel": {"multimodel"},
+    "discriminator": {"discriminator"},
+    "ambiguous_doppler": {"ambiguous_rls4"},
+    "sonar": SONAR,
+}
 COMPUTING = ("study", "config", "world", "filters", "exact")
 SHOWING = ("tables", "figures", "words", "claims", "measures")
 STUDIES = ROOT / "radarsim" / "studies"

@@ -1,0 +1,225 @@
+"""Keys of the ambiguous_doppler study: a radar whose velocity folds, a target in range, filters that unfold."""
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from radarsim.config.fields import (
+    At,
+    Design,
+    Display,
+    Model,
+    Name,
+    NameIn,
+    NonNegative,
+    Number,
+    Positive,
+    Scenario,
+    Study,
+    Whole,
+    at,
+    cross_check,
+    of_each,
+    unique_names,
+)
+
+MOST_SCANS = 10_000  # plots and estimates of eight realisations are held for the whole run
+MOST_HYPOTHESES = 100_000
+MOST_RATES = 16
+PROPORTION = 1e6  # largest ratio of what the prior leaves open to what a plot tells: beyond, rounding shows
+DISTINCT = 1e-9  # relative difference from which two spans are two
+UNFOLDING = {"hypotheses": 300, "prune_below": 1e-6, "merge": "never", "estimate": "mean"}  # and its defaults
+
+Coefficients = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
+
+
+class Radar(Model):
+    """A coherent surveillance radar: accuracies of one plot, period of its scans, pulse repetition rates."""
+
+    name: Annotated[Name | None, Display()] = Field(None, description="display name")
+    band: Annotated[Literal["metre", "decimetre", "centimetre"] | None, Display()] = Field(
+        None, description="wave band, for display"
+    )
+    wavelength_m: Positive = Field(description="wavelength, m: the span of velocity is half of it times the rate")
+    sigma_range_m: Positive = Field(description="standard deviation of a measured range, m")
+    sigma_velocity_mps: Positive = Field(description="standard deviation of a measured radial velocity, m/s")
+    scan_period_s: Positive = Field(description="time between two plots, s")
+    repetition_rate_hz: Positive | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_RATES)] = Field(
+        description="pulse repetition rate, Hz; a list is used in turn, scan by scan (stagger)"
+    )
+    detection_probability: Annotated[float, Field(gt=0, le=1)] = Field(
+        1.0, description="probability that a scan gives a plot"
+    )
+
+    @property
+    def rates_hz(self) -> tuple[float, ...]:
+        """The repetition rates, used in turn."""
+        rates = self.repetition_rate_hz
+        return rates if isinstance(rates, tuple) else (rates,)
+
+    @property
+    def spans_mps(self) -> tuple[float, ...]:
+        """The spans of velocity D = λF/2 of the repetition rates, m/s."""
+        return tuple(self.wavelength_m * rate / 2 for rate in self.rates_hz)
+
+    @cross_check
+    def _spans_differ(self) -> Iterator[At]:
+        spans = self.spans_mps
+        for i, one in enumerate(spans):
+            if any(math.isclose(one, other, rel_tol=DISTINCT) for other in spans[:i]):
+                yield at("repetition_rate_hz", f"must differ from rate to rate: two spans are {one:g} m/s")
+                return
+
+
+class Prior(Model):
+    """What the filters know before the first plot: mean zero, and these standard deviations. The range is not known."""
+
+    sigma_velocity_mps: Positive = Field(300.0, description="of the radial velocity, m/s")
+    sigma_acceleration_mps2: Positive = Field(10.0, description="of the radial acceleration, m/s²")
+
+
+class Polynomial(Model):
+    """A range that is a polynomial of time; up to the second degree it fits the filters' model exactly."""
+
+    kind: Literal["polynomial"] = Field(description="a polynomial of any degree up to 11")
+    coefficients: Coefficients = Field(
+        description="derivatives of range at the first plot: m, m/s, m/s², … (the sum of c_i t^i / i!)"
+    )
+
+
+class RandomPolynomial(Model):
+    """A polynomial of the second degree that each realisation draws: velocity and acceleration at the first scan.
+
+    Both are normal with mean zero. Range counts from any origin, so that it may become negative.
+    """
+
+    kind: Literal["random_polynomial"] = Field(description="a polynomial of the second degree, drawn each realisation")
+    range_m: Positive = Field(100e3, description="range at the first scan, m")
+    sigma_velocity_mps: NonNegative | None = Field(
+        None, description="standard deviation of the radial velocity, m/s; default: that of `prior`"
+    )
+    sigma_acceleration_mps2: NonNegative | None = Field(
+        None, description="standard deviation of the radial acceleration, m/s²; default: that of `prior`"
+    )
+
+
+Target = Annotated[Polynomial | RandomPolynomial, Field(discriminator="kind")]
+
+
+class Filter(Model):
+    """A Kalman filter of range, with the Doppler velocity or without, and what it does about its folds."""
+
+    name: Annotated[Name, Display()] = Field(description="label, unlike that of any other filter")
+    doppler: Literal["none", "unfolded", "folded"] = Field(
+        description="none: range alone; unfolded: the velocity with its true fold, a bound; folded: as measured"
+    )
+    manoeuvre_variance: NonNegative = Field(
+        description="variance of the random derivative it allows for: jerk (m/s³)² of order 2, acceleration (m/s²)² of "
+        "order 1, velocity (m/s)² of order 0"
+    )
+    order: Annotated[int, Whole(0, 2)] = Field(2, description="order of its model: 2 has an acceleration, 1 a velocity")
+    hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = Field(
+        None, description="folded: most sequences of folds that it keeps; 1: the nearest fold; default: 300"
+    )
+    prune_below: Annotated[float, Field(ge=0, lt=1)] | None = Field(
+        None,
+        description="folded: ratio to the probability of the best, under which a hypothesis is dropped; 0: none is; "
+        "default: 1e-6",
+    )
+    merge: Literal["never", "each_scan"] | None = Field(
+        None, description="folded: keep hypotheses over scans, or merge them into one at each scan; default: never"
+    )
+    estimate: Literal["best", "mean"] | None = Field(
+        None, description="folded: the best hypothesis, or the mean of all by their probabilities; default: mean"
+    )
+
+    @cross_check
+    def _has_effect(self) -> Iterator[At]:
+        for key in UNFOLDING:
+            if getattr(self, key) is None:
+                continue
+            if self.doppler != "folded":
+                yield at(key, f"has no effect with doppler: {self.doppler}; leave it out")
+            elif self.merge == "each_scan" and key != "merge":
+                yield at(key, "has no effect with merge: each_scan, which leaves one hypothesis; leave it out")
+
+    @model_validator(mode="after")
+    def _completed(self) -> Self:
+        """The same with the defaults of what has an effect written out."""
+        if self.doppler != "folded":
+            return self
+        defaults = {"merge": "never"} if self.merge == "each_scan" else UNFOLDING
+        missing = {key: value for key, value in defaults.items() if getattr(self, key) is None}
+        return self.model_copy(update=missing) if missing else self
+
+
+class Keys(Study):
+    """Folded Doppler: what it is worth, and how many scans it takes."""
+
+    figure_names = (
+        *(f"{kind}_{component}" for component in ("r", "Vr", "ar") for kind in ("sigma", "gain", "dynamic")),
+        "right",
+        "calibration",
+        "hypotheses",
+    )
+
+    radar: Radar = Field(description="the radar")
+    target: Annotated[Target, Scenario()] = Field(description="the target: a scenario's stem, or inline")
+    prior: Annotated[Prior, Design()] = Field(
+        Prior.model_validate({}), description="what the filters know before the first plot"
+    )
+    filters: Annotated[
+        tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
+    ] = Field(description="the filters; all see the same plots")
+    baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
+        None, description="name of the filter that gains are against; default: the first"
+    )
+    scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = Field(description="number of scans")
+
+    @model_validator(mode="after")
+    def _completed(self) -> Self:
+        """The target with its spreads written out."""
+        if not isinstance(self.target, RandomPolynomial):
+            return self
+        own = {
+            key: getattr(self.prior, key)
+            for key in ("sigma_velocity_mps", "sigma_acceleration_mps2")
+            if getattr(self.target, key) is None
+        }
+        return self.model_copy(update={"target": self.target.model_copy(update=own)}) if own else self
+
+    @cross_check
+    def _prior_in_proportion(self) -> Iterator[At]:
+        """Refuse a prior beside which a plot's accuracy drowns in rounding, or a start that has too many folds."""
+        radar, prior = self.radar, self.prior
+        if prior.sigma_velocity_mps > PROPORTION * min(radar.sigma_velocity_mps, min(radar.spans_mps)):
+            few = f"{PROPORTION:g} times the velocity's accuracy and the span"
+            yield at("prior.sigma_velocity_mps", f"must be at most {few}")
+
+    @cross_check
+    def _range_resolved(self) -> Iterator[At]:
+        radar, prior, last = self.radar, self.prior, (self.scans - 1) * self.radar.scan_period_s
+        if prior.sigma_acceleration_mps2 * radar.scan_period_s > PROPORTION * radar.sigma_velocity_mps:
+            few = f"{PROPORTION:g} times the velocity's accuracy a scan period"
+            yield at("prior.sigma_acceleration_mps2", f"must be at most {few}")
+        if isinstance(self.target, Polynomial):
+            reach = sum(abs(c) * last**i / math.factorial(i) for i, c in enumerate(self.target.coefficients))
+            if reach > radar.sigma_range_m * 1e11:
+                yield at(
+                    "target", f"must stay within {radar.sigma_range_m * 1e11:g} m of the radar up to the last plot"
+                )
+
+    @cross_check
+    def _variances_in_proportion(self) -> Iterator[At]:
+        yield from of_each(self.filters, self._variance_in_proportion)
+
+    def _variance_in_proportion(self, i: int, one: Filter) -> Iterator[At]:
+        radar = self.radar
+        grown = math.sqrt(one.manoeuvre_variance) * radar.scan_period_s**one.order
+        if grown > PROPORTION * radar.sigma_velocity_mps:
+            few = f"{PROPORTION:g} times the velocity's accuracy a scan"
+            yield at(
+                f"filters.{i}.manoeuvre_variance", f"out of proportion: its root must change velocity by at most {few}"
+            )

@@ -1,0 +1,1 @@
+"""One block of realisations, compiled: folded plots, filters that share their gains, hypotheses on folds."""

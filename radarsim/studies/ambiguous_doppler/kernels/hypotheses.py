@@ -1,0 +1,261 @@
+"""Hypotheses on the folds of one realisation, kept from scan to scan: the Bayes filter where none is dropped.
+
+Given its folds a filter is linear, so that all hypotheses share gains and covariance; each is three numbers and the
+logarithm of a weight. A scan moves all, weighs them by the range, branches each over the folds that the velocity
+leaves possible, and drops what is too far below the best or beyond the number that is kept. Letters:
+
+    r, v, a, w   columns of the list: state and logarithm of the weight, the best one's 0 (lists are rows of eight)
+    e            innovation of the velocity, folded to -D/2 … D/2; e + n D are those of the other folds
+    c            1/(2S) of it
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from radarsim.kernels.compile import inline, part
+from radarsim.kernels.lanes import WIDTH, exponential, full, get, nearest, put, row, total, where_greater
+from radarsim.kernels.symmetric import predicted_axis
+from radarsim.studies.ambiguous_doppler.kernels.records import (
+    BEST,
+    CAME,
+    COUNT,
+    FIRST,
+    GAINS,
+    LISTED,
+    MEAN,
+    OUTPUT,
+    PLOT,
+    PROBABILITY,
+    RANGE,
+    RANGE_GAIN,
+    RIGHT,
+    UNFOLDED,
+    VARIANCE,
+    VELOCITY,
+    VELOCITY_GAIN,
+    WEIGHT,
+)
+from radarsim.studies.ambiguous_doppler.kernels.steps import FARTHEST, motion
+
+NOTHING = -1e300  # logarithm of the weight of a place that holds no hypothesis
+
+
+class Lists(NamedTuple):
+    """Room for hypotheses, by addresses (`room`, `most`: numbers per column).
+
+    columns    two lists of r, v, a, w, `room` numbers each; then the innovations e and the weights with the nearest
+               fold, of the list that is branched
+    children   logarithms of weights and innovations of what branches, then a copy of the weights; `most` numbers each
+    parents    of which hypothesis each is a branch
+    """
+
+    columns: np.ndarray
+    children: np.ndarray
+    parents: np.ndarray
+    room: int
+    most: int
+
+
+@inline
+def column(lists, which, number):
+    """Address of column `number` of list `which`."""
+    return row(lists.columns, (4 * which + number) * (lists.room // WIDTH))
+
+
+@inline
+def greatest(x):
+    """The greatest of eight lanes, as all of them; by a row of memory."""
+    most = x[0]
+    for i in range(1, WIDTH):
+        most = max(most, x[i])
+    return most
+
+
+@part
+def moved_and_weighed(lists, which, count, F, z, scan):
+    """Move `count` hypotheses over a scan and take the range z: columns in place; scan: this lane of the gains."""
+    r, v, a, w = column(lists, which, 0), column(lists, which, 1), column(lists, which, 2), column(lists, which, 3)
+    weight = scan[WEIGHT * WIDTH]
+    g0, g1, g2 = scan[RANGE_GAIN * WIDTH], scan[(RANGE_GAIN + 1) * WIDTH], scan[(RANGE_GAIN + 2) * WIDTH]
+    for i in range((count + WIDTH - 1) // WIDTH):
+        x = predicted_axis((get(r, i), get(v, i), get(a, i)), F)
+        e = z - x[0]
+        put(r, i, x[0] + g0 * e)
+        put(v, i, x[1] + g1 * e)
+        put(a, i, x[2] + g2 * e)
+        put(w, i, get(w, i) - weight * (e * e))
+
+
+@part
+def nearest_folds(lists, which, count, z, D, c):
+    """Innovations with the nearest folds and the weights with them, columns 8 and 9; the greatest of these weights."""
+    v, w = column(lists, which, 1), column(lists, which, 3)
+    to_e, to_w = column(lists, 2, 0), column(lists, 2, 1)
+    best = full(NOTHING)
+    for i in range((count + WIDTH - 1) // WIDTH):
+        e = z - get(v, i)
+        e = e - D * nearest(e / D)
+        near = get(w, i) - c * (e * e)
+        put(to_e, i, e)
+        put(to_w, i, near)
+        best = where_greater(near, best, near, best)
+    put(to_w, lists.room // WIDTH - 1, best)  # the last row of a column is free
+    return greatest(row(to_w, lists.room // WIDTH - 1))
+
+
+@part
+def least_kept(weights, count, copy, most):
+    """The `most`-th greatest of `count` weights (Hoare's selection on a copy); most < count."""
+    for i in range(count):
+        copy[i] = weights[i]
+    low, high, wanted = 0, count - 1, most - 1
+    while low < high:
+        pivot = copy[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while copy[i] > pivot:
+                i += 1
+            while copy[j] < pivot:
+                j -= 1
+            if i <= j:
+                copy[i], copy[j] = copy[j], copy[i]
+                i += 1
+                j -= 1
+        if wanted <= j:
+            high = j
+        elif wanted >= i:
+            low = i
+        else:
+            break
+    return copy[wanted]
+
+
+@part
+def keep_greatest(lists, count, most):
+    """Of `count` children keep the `most` with the greatest weights, of equal ones the first; their least weight."""
+    weights, found = lists.children, row(lists.children, lists.most // WIDTH)
+    least = least_kept(weights, count, row(lists.children, 2 * lists.most // WIDTH), most)
+    above = 0
+    for i in range(count):
+        above += 1 if weights[i] > least else 0
+    equal, kept = most - above, 0
+    for i in range(count):
+        take = weights[i] > least
+        if weights[i] == least and equal > 0:
+            take, equal = True, equal - 1
+        if take:
+            weights[kept], found[kept], lists.parents[kept] = weights[i], found[i], lists.parents[i]
+            kept += 1
+    return least
+
+
+@part
+def branched(lists, which, count, D, c, best, deepest, most):
+    """Branch `count` hypotheses over their folds, down to best - deepest and FARTHEST, the `most` best: how many."""
+    e, near, w = column(lists, 2, 0), column(lists, 2, 1), column(lists, which, 3)
+    weights, found = lists.children, row(lists.children, lists.most // WIDTH)
+    least, made = best - deepest, 0
+    for i in range(count):
+        if near[i] < least:
+            continue
+        floor = max(least, near[i] - 0.5 * FARTHEST)
+        for n in range(2 * lists.most):
+            side = 1.0 if (n & 1) == 1 else -1.0  # folds 0, 1, -1, 2, -2, …
+            f = e[i] + side * ((n + 1) // 2) * D
+            weight = w[i] - c * f * f
+            if weight < floor:
+                if side * e[i] <= 0.0:  # the nearer side of the pair: all that follow are farther
+                    break
+                continue
+            if made == lists.most:
+                least = max(least, keep_greatest(lists, made, most))
+                floor, made = max(least, floor), most
+                if weight < floor:
+                    continue
+            weights[made], found[made], lists.parents[made] = weight, f, i
+            made += 1
+    if made > most:
+        keep_greatest(lists, made, most)
+        made = most
+    return made
+
+
+@part
+def inherited(lists, which, count, best, scan):
+    """Write `count` children into the other list; weights become those above `best`. Gives the number of the best."""
+    r, v, a = column(lists, which, 0), column(lists, which, 1), column(lists, which, 2)
+    to_r, to_v, to_a = column(lists, 1 - which, 0), column(lists, 1 - which, 1), column(lists, 1 - which, 2)
+    to_w = column(lists, 1 - which, 3)
+    weights, found, parents = lists.children, row(lists.children, lists.most // WIDTH), lists.parents
+    g0, g1, g2 = scan[VELOCITY_GAIN * WIDTH], scan[(VELOCITY_GAIN + 1) * WIDTH], scan[(VELOCITY_GAIN + 2) * WIDTH]
+    first, top = 0, NOTHING
+    for i in range(count):
+        j, f = parents[i], found[i]
+        to_r[i], to_v[i], to_a[i] = r[j] + g0 * f, v[j] + g1 * f, a[j] + g2 * f
+        to_w[i] = weights[i] - best
+        if weights[i] > top:
+            first, top = i, weights[i]
+    for i in range(count, (count + WIDTH - 1) // WIDTH * WIDTH):
+        to_r[i] = to_v[i] = to_a[i] = 0.0
+        to_w[i] = NOTHING
+    return first
+
+
+@part
+def put_estimates(lists, which, count, best, right, to):
+    """Write this lane of the output: the mean of all by their weights, the best, what is known of the right one."""
+    r, v, a, w = column(lists, which, 0), column(lists, which, 1), column(lists, which, 2), column(lists, which, 3)
+    zero = full(0.0)
+    all_, mean_r, mean_v, mean_a = zero, zero, zero, zero
+    for i in range((count + WIDTH - 1) // WIDTH):
+        weight = exponential(get(w, i) - w[best])
+        all_, mean_r = all_ + weight, mean_r + weight * get(r, i)
+        mean_v, mean_a = mean_v + weight * get(v, i), mean_a + weight * get(a, i)
+    sum_ = total(all_)
+    to[MEAN * WIDTH] = total(mean_r) / sum_
+    to[(MEAN + 1) * WIDTH] = total(mean_v) / sum_
+    to[(MEAN + 2) * WIDTH] = total(mean_a) / sum_
+    to[BEST * WIDTH], to[(BEST + 1) * WIDTH], to[(BEST + 2) * WIDTH] = r[best], v[best], a[best]
+    to[RIGHT * WIDTH] = 1.0 if best == right else 0.0
+    to[LISTED * WIDTH] = 1.0 if right >= 0 else 0.0
+    to[COUNT * WIDTH] = count
+    to[PROBABILITY * WIDTH] = 1.0 / sum_
+
+
+@inline
+def child_that_is_right(lists, which, count, right, u, D):
+    """Which of the children is the right hypothesis `right` with the fold of the true velocity u; -1: none."""
+    v, found = column(lists, which, 1), row(lists.children, lists.most // WIDTH)
+    if right >= 0:
+        for i in range(count):
+            if lists.parents[i] == right and abs(v[right] + found[i] - u) < 0.5 * D:
+                return i
+    return -1
+
+
+@part
+def run_remembering(design, most, deepest, spans, plots, gains, out, lists):
+    """A bank that remembers, over all scans of one realisation: plots, gains, out are addresses of its lane."""
+    F, _ = motion(design)
+    which, count, best, right = 0, 0, 0, -1
+    for k in range(spans.size):
+        plot, scan, D = row(plots, k * PLOT), row(gains, k * GAINS), spans[k]
+        if count > 0:
+            moved_and_weighed(lists, which, count, F, plot[RANGE * WIDTH], scan)
+        elif plot[FIRST * WIDTH] > 0.0:
+            for c in range(4):
+                start = column(lists, which, c)
+                for i in range(WIDTH):
+                    start[i] = 0.0 if c < 3 or i == 0 else NOTHING
+            column(lists, which, 0)[0] = plot[RANGE * WIDTH]
+            count, right = 1, 0
+        if count > 0 and plot[CAME * WIDTH] > 0.0:
+            c = 0.5 / scan[VARIANCE * WIDTH]
+            top = nearest_folds(lists, which, count, plot[VELOCITY * WIDTH], D, c)
+            made = branched(lists, which, count, D, c, top, deepest, most)
+            right = child_that_is_right(lists, which, made, right, plot[UNFOLDED * WIDTH], D)
+            best = inherited(lists, which, made, top, scan)
+            which, count = 1 - which, made
+        if count > 0:
+            put_estimates(lists, which, count, best, right, row(out, k * OUTPUT))

@@ -1,0 +1,146 @@
+"""The arrays that the kernels read and fill, and what their rows hold: eight realisations a row (`kernels.lanes`).
+
+Letters: K scans, D designs (what gains depend on), B banks (a design and what is done about folds), F filters.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from radarsim.kernels.lanes import WIDTH, rows
+
+# A scan's plot and truth: range and folded velocity; the velocity before it was folded; 1 where there is a plot, where
+# it is the first, where there has been one; the truth (3).
+RANGE, VELOCITY, UNFOLDED, CAME, FIRST, STARTED, TRUTH, PLOT = 0, 1, 2, 3, 4, 5, 6, 9
+
+# A scan's gains, shared by all hypotheses of a realisation: 1/(2S) of the range's innovation and its gains (3); of the
+# velocity's the variance S, which stands also where there is no plot, and its gains (3). Zero where nothing is taken.
+WEIGHT, RANGE_GAIN, VARIANCE, VELOCITY_GAIN, GAINS = 0, 1, 4, 5, 8
+
+# A scan's output of a bank: the mean of its hypotheses (3) and the best one (3); whether that has all folds right,
+# whether any listed has, how many there are, and the probability of the best.
+MEAN, BEST, RIGHT, LISTED, COUNT, PROBABILITY, OUTPUT = 0, 3, 6, 7, 8, 9, 10
+
+# Numbers of a design: F above its diagonal of ones and zeros (5) and Q (6) as `kernels.symmetric` has them, the prior
+# variances of velocity and acceleration, 1 where it takes the velocity.
+MOTION, NOISE, PRIOR, TAKES_VELOCITY, DESIGN = 0, 5, 11, 13, 16
+
+NONE, UNFOLDS, NEAREST, MERGES, REMEMBERS = 0, 1, 2, 3, 4  # what a bank does about the folds
+
+RIGHT_SUM, LISTED_SUM, COUNT_SUM, BEYOND_SUM, FOLD_SUMS = 0, 1, 2, 3, 4  # last axis of `Sums.folds`
+BINS = 10  # of the best hypothesis's probability
+
+
+class World(NamedTuple):
+    """What is observed.
+
+    keys    (3, 2)   of the streams of plots, detections, and of what a target draws
+    truth   (K, 3)   mean range, velocity, acceleration
+    t       (K,)     times of the scans, s
+    spread  (2,)     standard deviations of the velocity and of the acceleration that each realisation adds
+    sigma   (2,)     of the plots: m, m/s
+    spans   (K,)     of velocity at each scan, m/s
+    detection        probability of a plot
+    """
+
+    keys: np.ndarray
+    truth: np.ndarray
+    t: np.ndarray
+    spread: np.ndarray
+    sigma: np.ndarray
+    spans: np.ndarray
+    detection: float
+
+
+class Banks(NamedTuple):
+    """The filters.
+
+    designs  (D, DESIGN)  see above
+    design   (B,)         of each bank
+    kind     (B,)         NONE … REMEMBERS
+    most     (B,)         hypotheses kept
+    deepest  (B,)         logarithm of the largest ratio of the best hypothesis's probability to a kept one's
+    bank     (F,)         of each filter
+    place    (F,)         MEAN or BEST
+    baseline, oracle      numbers of filters; oracle -1: there is none
+    """
+
+    designs: np.ndarray
+    design: np.ndarray
+    kind: np.ndarray
+    most: np.ndarray
+    deepest: np.ndarray
+    bank: np.ndarray
+    place: np.ndarray
+    baseline: int
+    oracle: int
+
+
+class Memory(NamedTuple):
+    """Work arrays for a group of eight realisations.
+
+    plots (K × PLOT rows), gains (D × K × GAINS), out (B × K × OUTPUT), and room for hypotheses, see `hypotheses.Lists`.
+    """
+
+    random: np.ndarray
+    plots: np.ndarray
+    gains: np.ndarray
+    out: np.ndarray
+    counted: np.ndarray
+    listed: np.ndarray
+    children: np.ndarray
+    parents: np.ndarray
+    room: int
+
+
+class Sums(NamedTuple):
+    """Sums over realisations; e = estimate - truth of the components.
+
+    error       (F, K, 3, 4)        e, e², e³, e⁴
+    paired      (F, K, 3)           e² times the baseline's
+    oracle      (F, K, 3)           e² times the oracle's; zero where there is none
+    estimates   (F, K, 3)           realisations that have an estimate
+    folds       (F, K, FOLD_SUMS)   the best hypothesis has all folds right; the list holds the right one; hypotheses;
+                                    the velocity's error is over half the span
+    calibration (F, K, BINS, 3)     by the probability of the best hypothesis: realisations, those where it is right,
+                                    and the sum of these probabilities
+    """
+
+    error: np.ndarray
+    paired: np.ndarray
+    oracle: np.ndarray
+    estimates: np.ndarray
+    folds: np.ndarray
+    calibration: np.ndarray
+
+
+def shapes(filters: int, scans: int) -> Mapping[str, tuple[int, ...]]:
+    """The shapes of `Sums`, by name."""
+    each = (filters, scans, 3)
+    return {
+        "error": (*each, 4),
+        "paired": each,
+        "oracle": each,
+        "estimates": each,
+        "folds": (filters, scans, FOLD_SUMS),
+        "calibration": (filters, scans, BINS, 3),
+    }
+
+
+def memory(scans: int, banks: Banks) -> Memory:
+    """Work arrays for so many scans."""
+    most = max((int(n) for n, kind in zip(banks.most, banks.kind, strict=True) if kind == REMEMBERS), default=1)
+    room = -(-most // WIDTH) * WIDTH + WIDTH
+    children = 4 * room + 64
+    return Memory(
+        random=rows(2 * max(scans, 1)),
+        plots=rows(scans * PLOT),
+        gains=rows(len(banks.designs) * scans * GAINS),
+        out=rows(len(banks.kind) * scans * OUTPUT),
+        counted=rows(1),
+        listed=rows(10 * room // WIDTH),
+        children=rows(3 * children // WIDTH),
+        parents=np.zeros(children, dtype=np.int64),
+        room=room,
+    )

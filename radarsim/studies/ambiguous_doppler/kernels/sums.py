@@ -1,0 +1,175 @@
+"""One block: plots, gains, filters and sums of eight realisations after the other."""
+
+import numpy as np
+
+from radarsim.kernels.compile import inline, kernel, part
+from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, total, where_greater
+from radarsim.studies.ambiguous_doppler.kernels.hypotheses import Lists, run_remembering
+from radarsim.studies.ambiguous_doppler.kernels.plots import fill_plots
+from radarsim.studies.ambiguous_doppler.kernels.records import (
+    BEYOND_SUM,
+    BINS,
+    CAME,
+    COUNT,
+    COUNT_SUM,
+    GAINS,
+    LISTED,
+    LISTED_SUM,
+    MERGES,
+    OUTPUT,
+    PLOT,
+    PROBABILITY,
+    REMEMBERS,
+    RIGHT,
+    RIGHT_SUM,
+    STARTED,
+    TRUTH,
+    Banks,
+    Sums,
+    World,
+    memory,
+)
+from radarsim.studies.ambiguous_doppler.kernels.steps import fill_gains, run_merged, run_single
+
+
+@part
+def run_filters(world, banks, memory, fresh):
+    """Gains and outputs of all banks over the plots in memory; gains are made anew where `fresh`."""
+    scans, plots = world.truth.shape[0], address(memory.plots)
+    sigma = address(world.sigma)
+    if fresh:
+        for d in range(banks.designs.shape[0]):
+            fill_gains(address(banks.designs[d]), sigma, scans, plots, row(address(memory.gains), d * scans * GAINS))
+    for b in range(banks.kind.size):
+        kind, design = banks.kind[b], address(banks.designs[banks.design[b]])
+        gains = row(address(memory.gains), banks.design[b] * scans * GAINS)
+        out = row(address(memory.out), b * scans * OUTPUT)
+        if kind == REMEMBERS:
+            lists = Lists(
+                address(memory.listed),
+                address(memory.children),
+                address(memory.parents),
+                memory.room,
+                memory.parents.size,
+            )
+            for lane in range(WIDTH):
+                run_remembering(
+                    design,
+                    banks.most[b],
+                    banks.deepest[b],
+                    world.spans,
+                    address(memory.plots[lane:]),
+                    address(memory.gains[banks.design[b] * scans * GAINS * WIDTH + lane :]),
+                    address(memory.out[b * scans * OUTPUT * WIDTH + lane :]),
+                    lists,
+                )
+        elif kind == MERGES:
+            run_merged(design, sigma, world.spans, plots, out)
+        else:
+            run_single(kind, design, world.spans, plots, gains, out)
+
+
+@inline
+def errors(estimate, plot, counted, c):
+    """Error of component c, zero where it does not count."""
+    return counted * (get(estimate, c) - get(plot, TRUTH + c))
+
+
+@part
+def add_scan(plot, own, base, oracle, counted, half_span, error, paired, against, estimates):
+    """Add a scan of a filter: own, base, oracle are the rows of estimates; counted (lanes); the rest addresses.
+
+    Gives the number of lanes whose velocity is off by over half a span.
+    """
+    beyond = full(0.0)
+    for c in range(3):
+        e = errors(own, plot, counted, c)
+        e2, b, o = e * e, errors(base, plot, counted, c), errors(oracle, plot, counted, c)
+        error[4 * c] += total(e)
+        error[4 * c + 1] += total(e2)
+        error[4 * c + 2] += total(e2 * e)
+        error[4 * c + 3] += total(e2 * e2)
+        paired[c] += total(e2 * (b * b))
+        against[c] += total(e2 * (o * o))
+        estimates[c] += total(counted)
+        if c == 1:
+            beyond = where_greater(e2, full(half_span * half_span), full(1.0), full(0.0))
+    return total(beyond)
+
+
+@part
+def add_calibration(out, plot, calibration):
+    """Count the lanes by the probability of the best hypothesis, and those where it is right; of plots that count."""
+    for i in range(WIDTH):
+        if plot[CAME * WIDTH + i] > 0.0:
+            p = out[PROBABILITY * WIDTH + i]
+            number = 3 * min(int(p * BINS), BINS - 1)
+            calibration[number] += 1.0
+            calibration[number + 1] += out[RIGHT * WIDTH + i]
+            calibration[number + 2] += p
+
+
+@part
+def add_group(world, banks, memory, sums):
+    """Add the outputs of a group of eight realisations to the sums."""
+    scans = world.truth.shape[0]
+    whole, out = get(address(memory.counted), 0), address(memory.out)
+    for k in range(scans):
+        plot = row(address(memory.plots), k * PLOT)
+        counted = whole * get(plot, STARTED)
+        put(plot, CAME, whole * get(plot, CAME))  # read by add_calibration, and no more after it
+        base = row(out, (banks.bank[banks.baseline] * scans + k) * OUTPUT + banks.place[banks.baseline])
+        for f in range(banks.bank.size):
+            bank = row(out, (banks.bank[f] * scans + k) * OUTPUT)
+            oracle = base
+            if banks.oracle >= 0:
+                oracle = row(out, (banks.bank[banks.oracle] * scans + k) * OUTPUT + banks.place[banks.oracle])
+            folds = address(sums.folds[f, k])
+            folds[BEYOND_SUM] += add_scan(
+                plot,
+                row(bank, banks.place[f]),
+                base,
+                oracle,
+                counted,
+                0.5 * world.spans[k],
+                address(sums.error[f, k]),
+                address(sums.paired[f, k]),
+                address(sums.oracle[f, k]),
+                address(sums.estimates[f, k]),
+            )
+            folds[RIGHT_SUM] += total(counted * get(bank, RIGHT))
+            folds[LISTED_SUM] += total(counted * get(bank, LISTED))
+            folds[COUNT_SUM] += total(counted * get(bank, COUNT))
+            if banks.kind[banks.bank[f]] == REMEMBERS:
+                add_calibration(bank, plot, address(sums.calibration[f, k]))
+
+
+@kernel
+def add_block(world, banks, memory, sums, first, count):
+    """Add the realisations first … first + count - 1 to the sums."""
+    for group in range(0, count, WIDTH):
+        for n in range(WIDTH):
+            memory.counted[n] = 1.0 if group + n < count else 0.0
+        fill_plots(world, first + group, memory.random, memory.plots)
+        run_filters(world, banks, memory, group == 0 or world.detection < 1.0)
+        add_group(world, banks, memory, sums)
+
+
+@kernel
+def fill_outputs(world, banks, memory, first):
+    """Plots and outputs of the realisations first … first + 7, left in memory."""
+    fill_plots(world, first, memory.random, memory.plots)
+    run_filters(world, banks, memory, True)
+
+
+def simulate_block(world: World, banks: Banks, sums: Sums, first: int, count: int) -> None:
+    """Add the errors and folds of realisations first … first + count - 1 to the sums."""
+    add_block(world, banks, memory(len(world.t), banks), sums, first, count)
+
+
+def simulated(world: World, banks: Banks, first: int) -> tuple[np.ndarray, np.ndarray]:
+    """Plots (K, PLOT, 8) and outputs (B, K, OUTPUT, 8) of the realisations first … first + 7, see `records`."""
+    scans, work = len(world.t), memory(len(world.t), banks)
+    fill_outputs(world, banks, work, first)
+    shape = (len(banks.kind), scans, OUTPUT, WIDTH)
+    return work.plots.reshape(scans, PLOT, WIDTH), work.out.reshape(shape)

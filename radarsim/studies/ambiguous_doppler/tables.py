@@ -1,0 +1,129 @@
+"""The study's own tables: folds, calibration, and gains with a further column on the oracle."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import panels, statistics
+from radarsim.report import tables as common
+from radarsim.studies.ambiguous_doppler.axes import FoldedAxes
+from radarsim.studies.ambiguous_doppler.kernels.records import (
+    BEYOND_SUM,
+    BINS,
+    COUNT_SUM,
+    LISTED_SUM,
+    RIGHT_SUM,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Result = CaseResult[FoldedAxes]
+FOLDS = (
+    *("case", "filter", "k", "t_s", "n", "right", "right_lo", "right_hi", "exact_right"),
+    *("listed", "hypotheses", "beyond", "beyond_lo", "beyond_hi"),
+)
+CALIBRATION = ("case", "filter", "k", "bin_lo", "bin_hi", "n", "right", "right_lo", "right_hi", "expected")
+ABOVE = ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")
+
+
+def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
+    """The tables beyond curves: gains (with what is lost against the oracle), folds, calibration."""
+    return {"gains": gains(results), "folds": folds(results), "calibration": calibration(results)}
+
+
+def gains(results: Sequence[Result]) -> "pd.DataFrame":
+    """The common table, with 100 (σ/σ_oracle − 1), paired, where a filter has the true folds."""
+    table = common.gains(results)
+    parts = [_above_oracle(result) for result in results]
+    return table.assign(**{name: np.concatenate([part[i] for part in parts]) for i, name in enumerate(ABOVE)})
+
+
+def _above_oracle(result: Result) -> tuple[np.ndarray, ...]:
+    """Value and interval (rows,) in the order of the rows of gains."""
+    axes, b = result.axes, result.axes.baseline
+    both = np.array(axes.available[b : b + 1] & axes.available)
+    both[b] = False
+    at = f, k, c = common.shown(result, both)
+    oracles = [i for i, one in enumerate(result.spec.filters) if one.doppler == "unfolded"]
+    if not oracles:
+        return (np.full(f.size, np.nan),) * 3
+    o, error = oracles[0], np.asarray(result.sums["error"])
+    own, base, cross = error[at], error[o, k, c], np.asarray(result.sums["oracle"])[at]
+    of = statistics.gain(own[:, 1], own[:, 3], base[:, 1], base[:, 3], cross, common.realisations(result)[at])
+    known = axes.available[o, k, c] & (f != o)
+    return tuple(np.where(known, -part, np.nan) for part in (of.value, of.hi, of.lo))
+
+
+def folds(results: Sequence[Result]) -> "pd.DataFrame":
+    """How often all folds are right, by scan, of every filter that unfolds.
+
+    right is the share of realisations whose best hypothesis has all folds right, listed that whose list holds the right
+    one, hypotheses the mean number kept, beyond the share whose velocity is off by more than half the span.
+    """
+    return common.joined([_folds(result) for result in results], FOLDS)
+
+
+def _folds(result: Result) -> dict[str, np.ndarray]:
+    axes = result.axes
+    shown = np.broadcast_to(axes.folded[:, None], axes.exact_right.shape)
+    at = f, k = np.nonzero(shown & (np.asarray(result.sums["estimates"])[..., 0] > 0))
+    n = np.asarray(result.sums["estimates"])[..., 0][at]
+    of = np.asarray(result.sums["folds"])[at]
+    right, beyond = statistics.rate(of[:, RIGHT_SUM], n), statistics.rate(of[:, BEYOND_SUM], n)
+    return {
+        "case": np.full(f.size, result.name, dtype=object),
+        "filter": common.names(axes.filters, f),
+        "k": np.asarray(axes.k)[k],
+        "t_s": np.asarray(axes.t_s, dtype=float)[k],
+        "n": n.astype(np.int64),
+        **dict(zip(("right", "right_lo", "right_hi"), right, strict=True)),
+        "exact_right": axes.exact_right[at],
+        "listed": of[:, LISTED_SUM] / n,
+        "hypotheses": of[:, COUNT_SUM] / n,
+        **dict(zip(("beyond", "beyond_lo", "beyond_hi"), beyond, strict=True)),
+    }
+
+
+def calibration(results: Sequence[Result]) -> "pd.DataFrame":
+    """By the probability that a filter gives its best hypothesis, in ten bins: how often that is right.
+
+    Of filters that keep several hypotheses, at each scan, over realisations with a plot there; empty bins have no row.
+    expected is the mean of these probabilities, which `right` equals where truth and filter agree.
+    """
+    return common.joined([_calibration(result) for result in results], CALIBRATION)
+
+
+def _calibration(result: Result) -> dict[str, np.ndarray]:
+    axes, counted = result.axes, np.asarray(result.sums["calibration"])
+    at = f, k, bins = np.nonzero(axes.remembers[:, None, None] & (counted[..., 0] > 0))
+    n = counted[at][:, 0]
+    right = statistics.rate(counted[at][:, 1], n)
+    return {
+        "case": np.full(f.size, result.name, dtype=object),
+        "filter": common.names(axes.filters, f),
+        "k": np.asarray(axes.k)[k],
+        "bin_lo": bins / BINS,
+        "bin_hi": (bins + 1) / BINS,
+        "n": n.astype(np.int64),
+        **dict(zip(("right", "right_lo", "right_hi"), right, strict=True)),
+        "expected": counted[at][:, 2] / n,
+    }
+
+
+INPUTS = ("radar", "σ_r, m", "σ_V, m/s", "Δt, s", "λ, m", "F, Hz", "D, m/s", "D/σ_V", "P_D", "scans")
+
+
+def inputs(results: Sequence[Result]) -> "pd.DataFrame":
+    """What was put in, for the page: a row for each radar that differs from the others."""
+    rows: dict[tuple, None] = {}
+    for result in results:
+        of = result.spec.radar
+        spans = of.spans_mps
+        said = [", ".join(map(panels.number, each)) for each in (of.rates_hz, spans)]
+        accuracy = (of.sigma_range_m, of.sigma_velocity_mps, of.scan_period_s, of.wavelength_m)
+        last = (min(spans) / of.sigma_velocity_mps, of.detection_probability, result.spec.scans)
+        rows[(panels.plain(panels.device(result)), *accuracy, *said, *last)] = None
+    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(INPUTS)})

@@ -1,0 +1,27 @@
+"""What is observed, without the plots' noise: a mean motion, and the motions that a realisation adds to it."""
+
+import numpy as np
+
+from radarsim.physics import targets
+
+
+def truth(target: object, t: np.ndarray) -> np.ndarray:
+    """Mean range, radial velocity and acceleration (K, 3) of a configured target at times t (K,), in m, m/s, m/s²."""
+    match target.kind:  # type: ignore[attr-defined]
+        case "polynomial":
+            return targets.polynomial(target.coefficients, t)  # type: ignore[attr-defined]
+        case "random_polynomial":
+            return targets.polynomial((target.range_m,), t)  # type: ignore[attr-defined]
+    raise ValueError(f"no such target: {target}")
+
+
+def spread(target: object) -> np.ndarray:
+    """Standard deviations (2,) of the velocity (m/s) and acceleration (m/s²) that each realisation draws, or zeros."""
+    own = (getattr(target, name, 0.0) for name in ("sigma_velocity_mps", "sigma_acceleration_mps2"))
+    return np.array([value or 0.0 for value in own])
+
+
+def drawn_motions(t: np.ndarray) -> np.ndarray:
+    """What a drawn velocity of 1 m/s, and an acceleration of 1 m/s², add to the motion: (2, K, 3) at times t (K,)."""
+    one, zero = np.ones_like(t), np.zeros_like(t)
+    return np.stack([np.stack([t, one, zero], axis=1), np.stack([t**2 / 2, t, one], axis=1)])

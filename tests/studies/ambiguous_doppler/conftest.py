@@ -1,0 +1,64 @@
+"""A case of the study from a few numbers, and the sums of one."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from radarsim.config.experiment import Case
+from radarsim.studies.ambiguous_doppler import config, study
+
+RADARS = {  # σ_r, σ_V, Δt, λ of P1's
+    "RLS 2": (250.0, 15.0, 10.0, 0.15),
+    "RLS 3": (250.0, 15.0, 5.0, 0.15),
+    "RLS 4": (50.0, 1.0, 10.0, 0.03),
+    "RLS 5": (50.0, 1.0, 5.0, 0.03),
+}
+RANGE_ONLY = {"name": "range only", "doppler": "none"}
+ORACLE = {"name": "oracle", "doppler": "unfolded"}
+NEAREST = {"name": "nearest fold", "doppler": "folded", "hypotheses": 1}
+NO_MEMORY = {"name": "no memory", "doppler": "folded", "merge": "each_scan"}
+BEST = {"name": "best hypothesis", "doppler": "folded", "estimate": "best"}
+MEMORY = {"name": "memory", "doppler": "folded"}
+RANDOM = {"kind": "random_polynomial"}
+FIXED = {"kind": "polynomial", "coefficients": [100e3, -250.0, 4.0]}
+
+
+def made(radar, filters, scans, target=RANDOM, variance=1e-3, seed=1, prior=None, **keys):
+    """A checked case; keys are further ones of the radar."""
+    sigma_r, sigma_v, dt, wavelength = RADARS[radar]
+    given = {"sigma_range_m": sigma_r, "sigma_velocity_mps": sigma_v, "scan_period_s": dt, "wavelength_m": wavelength}
+    document = {
+        "radar": given | {"repetition_rate_hz": 1000.0} | keys,
+        "target": target,
+        "filters": [{"manoeuvre_variance": variance} | one for one in filters],
+        "scans": scans,
+    }
+    if prior:
+        document["prior"] = prior
+    spec = config.Keys.model_validate(document)
+    return Case("case", "case", "ambiguous_doppler", spec, (), 1, seed)
+
+
+def summed(case, n):
+    """The plan and the sums of n realisations."""
+    plan = study.prepare(case)
+    values = np.zeros(plan.layout.size)
+    for first in range(0, n, plan.block):
+        values += study.simulate(plan, first, min(plan.block, n - first))
+    return plan, SimpleNamespace(**plan.layout.unpack(values))
+
+
+@pytest.fixture(scope="session")
+def matched():
+    """Sums of 100 000 realisations where truth and filters agree, by radar."""
+    kept = {}
+    wide = {"hypotheses": 3000, "prune_below": 1e-7}
+
+    def of(radar):
+        if radar not in kept:
+            filters = [RANGE_ONLY, ORACLE, NEAREST, MEMORY | wide]
+            kept[radar] = summed(made(radar, filters, 10, variance=0.0), 100_000)
+        return kept[radar]
+
+    return of

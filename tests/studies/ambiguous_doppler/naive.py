@@ -1,0 +1,157 @@
+"""Textbook twins of the kernels: one realisation, joint updates with full matrices, lists of hypotheses in Python.
+
+A plot is (range, velocity as folded, velocity before it was folded, whether it came); sigma and P0 as in the study.
+"""
+
+import itertools
+
+import numpy as np
+
+from radarsim.studies.ambiguous_doppler.filters import model, prior_variances
+
+
+def wrapped(x, D):
+    """x folded into -D/2 … D/2."""
+    return x - D * np.rint(x / D)
+
+
+class Kalman:
+    """A Kalman filter of one set of options: predictions and joint updates of a state and a covariance."""
+
+    def __init__(self, one, prior, sigma, dt):
+        self.F, self.Q = model(one.order, one.manoeuvre_variance, dt)
+        self.P0 = np.diag([0.0, *prior_variances(one.order, prior)])
+        self.sigma = np.asarray(sigma, dtype=float)
+        self.observes = 1 if one.doppler == "none" else 2
+
+    def predicted(self, x, P):
+        return self.F @ x, self.F @ P @ self.F.T + self.Q
+
+    def started(self, z, P):
+        """A first plot: its range is taken as it is, whatever else is known."""
+        P = P.copy()
+        P[0] = P[:, 0] = 0.0
+        P[0, 0] = self.sigma[0] ** 2
+        return np.array([z, 0.0, 0.0]), P
+
+    def updated(self, x, P, z, rows):
+        """The update by several components at once, and the logarithm of its likelihood."""
+        H, R = np.eye(3)[rows], np.diag(self.sigma[rows] ** 2)
+        S = H @ P @ H.T + R
+        K = P @ H.T @ np.linalg.inv(S)
+        e = np.asarray(z) - H @ x
+        log_likelihood = -0.5 * (e @ np.linalg.solve(S, e) + np.log(np.linalg.det(S)))
+        kept = np.eye(3) - K @ H
+        return x + K @ e, kept @ P @ kept.T + K @ R @ K.T, log_likelihood
+
+
+def single(kalman, plots, spans, how):
+    """States (K, 3) of a filter with one hypothesis, and whether all folds are right (K,).
+
+    how: none, unfolded, nearest.
+    """
+    x, P, started, right, made = np.zeros(3), kalman.P0, False, True, []
+    for k, (r, v, u, came) in enumerate(plots):
+        if k > 0:
+            x, P = kalman.predicted(x, P)
+        if came:
+            if started:
+                predicted = kalman.updated(x, P, [r], [0])[:2]
+            else:
+                predicted = kalman.started(r, P)
+            taken = u if how == "unfolded" else predicted[0][1] + wrapped(v - predicted[0][1], spans[k])
+            right = right and (how != "nearest" or bool(abs(taken - u) < spans[k] / 2))
+            if how == "none":
+                x, P = predicted
+            elif started:
+                x, P, _ = kalman.updated(x, P, [r, taken], [0, 1])
+            else:
+                x, P, _ = kalman.updated(*predicted, [taken], [1])
+            started = True
+        made.append((*x, right))
+    made = np.array(made, dtype=float)
+    return made[:, :3], made[:, 3]
+
+
+def merged(kalman, plots, spans, folds=60):
+    """States (K, 3) of the filter that merges all folds of a scan into one state and covariance."""
+    x, P, started, made = np.zeros(3), kalman.P0, False, []
+    for k, (r, v, _, came) in enumerate(plots):
+        if k > 0:
+            x, P = kalman.predicted(x, P)
+        if came:
+            x, P = kalman.updated(x, P, [r], [0])[:2] if started else kalman.started(r, P)
+            near = x[1] + wrapped(v - x[1], spans[k])
+            branches = [kalman.updated(x, P, [near + n * spans[k]], [1]) for n in range(-folds, folds + 1)]
+            w = np.exp([b[2] - max(b[2] for b in branches) for b in branches])
+            w /= w.sum()
+            mean = sum(p * b[0] for p, b in zip(w, branches, strict=True))
+            P = sum(p * (b[1] + np.outer(b[0] - mean, b[0] - mean)) for p, b in zip(w, branches, strict=True))
+            x, started = mean, True
+        made.append(x)
+    return np.array(made)
+
+
+def remembering(kalman, plots, spans, most, prune_below, folds=60):
+    """Outputs (K, 10) of the filter that keeps hypotheses: mean (3), best (3), right, listed, count, probability.
+
+    A hypothesis is (state, logarithm of weight, whether all folds are right); the covariance is common to all.
+    """
+    listed, P, started, made = [(np.zeros(3), 0.0, True)], kalman.P0, False, []
+    for k, (r, v, u, came) in enumerate(plots):
+        if k > 0:
+            moved = [(kalman.predicted(x, P)[0], w, right) for x, w, right in listed]
+            listed, P = moved, kalman.predicted(listed[0][0], P)[1]
+        if came:
+            children, D = [], spans[k]
+            for x, w, right in listed:
+                x, after, like = kalman.updated(x, P, [r], [0]) if started else (*kalman.started(r, P), 0.0)
+                near = x[1] + wrapped(v - x[1], D)
+                order = sorted(range(-folds, folds + 1), key=lambda n: (abs(n), -n))
+                for n in order:
+                    y, final, more = kalman.updated(x, after, [near + n * D], [1])
+                    children.append((y, w + like + more, right and bool(abs(near + n * D - u) < D / 2)))
+            top = max(w for _, w, _ in children)
+            children = [(x, w - top, right) for x, w, right in children]
+            if prune_below > 0:
+                children = [one for one in children if one[1] >= np.log(prune_below)]
+            listed = sorted(children, key=lambda one: -one[1])[:most]
+            P, started = final, True
+        w = np.exp([w for _, w, _ in listed])
+        x = np.array([x for x, _, _ in listed])
+        best = int(np.argmax(w))
+        known = (listed[best][2], any(one[2] for one in listed), len(listed), w[best] / w.sum())
+        made.append((*(w @ x / w.sum()), *x[best], *known))
+    return np.array(made, dtype=float)
+
+
+def enumerated(one, prior, sigma, dt, plots, spans, folds):
+    """The Bayes mean and the probability of the best sequence at the last scan, over all sequences of folds.
+
+    No recursion: all plots are linear in (first range, V, a, random derivatives); of each sequence the least squares.
+    """
+    F, Q = model(one.order, one.manoeuvre_variance, dt)
+    K = len(plots)
+    jumps = Q[:, [2]] / np.sqrt(Q[2, 2]) if Q.any() else np.zeros((3, 0))  # order 2: one random number a scan
+    size = 3 + jumps.shape[1] * (K - 1)
+    states, state = [], np.eye(3, size)
+    for k in range(K):
+        if k > 0:
+            state = F @ state
+            at = 3 + jumps.shape[1] * (k - 1)
+            state[:, at : at + jumps.shape[1]] += jumps
+        states.append(state)
+    A = np.concatenate([state[:2] for state in states])
+    scale = np.tile(1 / np.asarray(sigma, dtype=float), K)
+    information = np.diag(np.concatenate([[0.0], 1 / prior_variances(one.order, prior), np.ones(size - 3)]))
+    B = scale[:, None] * A
+    solve = np.linalg.solve(information + B.T @ B, B.T)  # of whitened plots, the estimate
+    whole = np.eye(2 * K) - B @ solve
+    numbers = np.array(list(itertools.product(range(-folds, folds + 1), repeat=K)))
+    y = np.empty((len(numbers), 2 * K))
+    y[:, 0::2] = [r for r, *_ in plots]
+    y[:, 1::2] = [v for _, v, *_ in plots] + numbers * np.asarray(spans)
+    y *= scale
+    cost = 0.5 * np.einsum("ni,ij,nj->n", y, whole, y)
+    w = np.exp(cost.min() - cost)
+    return states[-1] @ solve @ (w @ y / w.sum()), w.max() / w.sum()

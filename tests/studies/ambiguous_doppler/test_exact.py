@@ -1,0 +1,90 @@
+"""Exact σ, exact probabilities, calibration: against simulation, within statistical error at every scan."""
+
+import numpy as np
+import pytest
+
+from radarsim.studies.ambiguous_doppler import exact, study
+from tests.studies.ambiguous_doppler.conftest import FIXED, MEMORY, NEAREST, ORACLE, RANDOM, RANGE_ONLY, made, summed
+
+LIMIT = 5.85  # unit normals: of 1000, one exceeds it by chance in 200 000 runs
+N = 100_000
+
+
+def sigma(sums):
+    return np.sqrt(sums.error[..., 1] / sums.estimates)
+
+
+@pytest.mark.parametrize("target", [RANDOM, FIXED], ids=["random", "fixed"])
+@pytest.mark.parametrize("radar", ["RLS 2", "RLS 4", "RLS 5"])
+def test_range_only_and_oracle_are_exact(radar, target):
+    plan, sums = summed(made(radar, [RANGE_ONLY, ORACLE], 15, target), N)
+    z = (sigma(sums) / plan.axes.exact_sigma - 1) * np.sqrt(2 * N)
+    assert np.abs(z).max() < LIMIT
+    assert 0.2 < np.sqrt(np.mean(z**2)) < 2.5
+    mean = sums.error[..., 0] / N
+    spread = np.sqrt(np.maximum(plan.axes.exact_sigma**2 - plan.axes.exact_bias**2, 0))
+    random = spread > 1e-6 * plan.axes.exact_sigma  # at the first scan a fixed velocity is missed by itself
+    assert np.abs((mean - plan.axes.exact_bias) / np.where(random, spread, 1) * np.sqrt(N))[random].max() < LIMIT
+    assert np.allclose(mean[~random], plan.axes.exact_bias[~random], rtol=1e-6)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_lower_orders_are_exact_of_what_they_estimate(order):
+    filters = [RANGE_ONLY | {"order": order}, ORACLE | {"order": order}]
+    plan, sums = summed(made("RLS 2", filters, 15, FIXED, 25.0), N)
+    known = np.isfinite(plan.axes.exact_sigma)
+    assert np.array_equal(known, plan.axes.available)
+    assert known[:, 0].sum(axis=1).tolist() == ([1, 2] if order == 0 else [2, 2])
+    z = (sigma(sums) / plan.axes.exact_sigma - 1)[known] * np.sqrt(2 * N)
+    # e² of a biased error varies less than 2σ⁴: the deviations are smaller than unit normals, never larger.
+    assert np.abs(z).max() < LIMIT
+
+
+@pytest.mark.parametrize("radar", ["RLS 2", "RLS 3", "RLS 4", "RLS 5"])
+def test_nearest_fold_is_right_as_often_as_the_product_says(radar, matched):
+    plan, sums = matched(radar)
+    p, found = plan.axes.exact_right[2], sums.folds[2, :, 0] / N
+    assert np.isfinite(p).all()
+    assert np.abs((found - p) / np.sqrt(p * (1 - p) / N)).max() < LIMIT
+
+
+@pytest.mark.parametrize("radar", ["RLS 2", "RLS 3", "RLS 4", "RLS 5"])
+def test_probabilities_of_the_best_hypothesis_are_calibrated(radar, matched):
+    """Where truth and filter agree the best is right as often as its probability says, in every bin, at every scan."""
+    _, sums = matched(radar)
+    n, right, expected = np.moveaxis(sums.calibration[3], -1, 0)
+    some = n > 0
+    mean = np.where(some, expected / np.where(some, n, 1), 0.5)
+    # Within a bin probabilities differ by at most a tenth; the variance of a sum of events is at most n p (1 - p).
+    deviation = (right - expected)[some] / np.sqrt(np.maximum(n * mean * (1 - mean), 1.0))[some]
+    assert np.abs(deviation).max() < LIMIT
+    assert some.sum() >= 20  # two bins a scan, at the least
+    assert n.sum() == 10 * N
+
+
+@pytest.mark.parametrize("radar", ["RLS 2", "RLS 4"])
+def test_memory_lies_between_its_brackets(radar, matched):
+    """The optimum is no worse than the filter of range alone, nor better than the one that knows the folds."""
+    _, sums = matched(radar)
+    range_only, oracle, _, memory = sigma(sums)
+    allowed = 1 + LIMIT * 1.5 / np.sqrt(2 * N)
+    assert (memory < range_only * allowed).all()
+    assert (memory > oracle / allowed).all()
+
+
+def test_no_exact_probability_where_truth_and_filter_differ():
+    def known(**changes):
+        plan = study.prepare(made("RLS 4", [NEAREST, MEMORY], 4, **({"variance": 0.0} | changes)))
+        return np.isfinite(plan.axes.exact_right).any(axis=1).tolist()
+
+    assert known() == [True, False]
+    assert known(variance=1e-3) == [False, False]
+    assert known(target=FIXED) == [False, False]
+    assert known(target=RANDOM | {"sigma_velocity_mps": 100.0}) == [False, False]
+    assert known(detection_probability=0.9) == [False, False]
+
+
+def test_product_of_teunissen():
+    """Two scans of a span of two standard deviations: erf(1/√2)² = 0.4660649…"""
+    of = exact.Gains(np.eye(3), np.zeros((2, 3)), np.zeros((2, 3)), np.array([4.0, 9.0]), np.zeros((2, 3, 3)))
+    assert np.allclose(exact.all_right(of, np.array([4.0, 6.0])), [0.6826894921370859, 0.6826894921370859**2])

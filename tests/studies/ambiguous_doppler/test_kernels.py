@@ -1,0 +1,121 @@
+"""Each kernel against its textbook twin, realisation by realisation; the optimum against all sequences of folds."""
+
+import numpy as np
+import pytest
+
+from radarsim.studies.ambiguous_doppler import study
+from radarsim.studies.ambiguous_doppler.kernels import records, sums
+from tests.studies.ambiguous_doppler import naive
+from tests.studies.ambiguous_doppler.conftest import (
+    BEST,
+    FIXED,
+    MEMORY,
+    NEAREST,
+    NO_MEMORY,
+    ORACLE,
+    RANGE_ONLY,
+    made,
+)
+
+SINGLE = (RANGE_ONLY, ORACLE, NEAREST)
+HOW = {"range only": "none", "oracle": "unfolded", "nearest fold": "nearest"}
+
+
+def compared(case, lanes=8):
+    """Of some realisations: plots as the twins take them, and outputs (B, K, OUTPUT) of the kernels."""
+    plan = study.prepare(case)
+    plots, out = sums.simulated(plan.world, plan.banks, 16)
+    columns = plots[:, [records.RANGE, records.VELOCITY, records.UNFOLDED, records.CAME]]
+    for lane in range(lanes):
+        yield plan, columns[:, :, lane], out[..., lane]
+
+
+def twin(case, one):
+    radar = case.spec.radar
+    sigma = (radar.sigma_range_m, radar.sigma_velocity_mps)
+    return naive.Kalman(one, case.spec.prior, sigma, radar.scan_period_s)
+
+
+def started(plots):
+    return np.cumsum(plots[:, 3]) > 0
+
+
+@pytest.mark.parametrize("detection", [1.0, 0.6])
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("radar", ["RLS 2", "RLS 5"])
+def test_filters_of_one_hypothesis(radar, order, detection):
+    variance = {0: 1e4, 1: 4.0, 2: 1e-3}[order]
+    filters = [one | {"order": order} for one in SINGLE]
+    case = made(radar, filters, 12, FIXED, variance, detection_probability=detection)
+    for plan, plots, out in compared(case):
+        for one, own in zip(case.spec.filters, out, strict=True):
+            x, right = naive.single(twin(case, one), plots, plan.world.spans, HOW[one.name])
+            there = started(plots)
+            scale = np.array([1e5, 1e3, 10.0])  # sizes of the numbers that are added up
+            assert np.abs((own[:, records.MEAN : records.MEAN + 3] - x) / scale)[there].max() < 1e-10
+            assert np.array_equal(own[there, records.RIGHT], right[there])
+
+
+@pytest.mark.parametrize("detection", [1.0, 0.6])
+@pytest.mark.parametrize("radar", ["RLS 2", "RLS 4"])
+def test_merging_filter(radar, detection):
+    case = made(radar, [NO_MEMORY], 8, detection_probability=detection)
+    for plan, plots, out in compared(case, 4):
+        x = naive.merged(twin(case, case.spec.filters[0]), plots, plan.world.spans, 160)
+        assert np.abs((out[0, :, :3] - x) / [1e5, 1e3, 10.0])[started(plots)].max() < 1e-9
+
+
+@pytest.mark.parametrize("detection", [1.0, 0.6])
+@pytest.mark.parametrize(("most", "prune_below"), [(40, 1e-6), (7, 1e-3), (1000, 1e-4)], ids=["forty", "seven", "many"])
+def test_remembering_filter(most, prune_below, detection):
+    options = {"hypotheses": most, "prune_below": prune_below}
+    stagger = [1000.0, 1200.0, 1400.0]
+    keys = {"detection_probability": detection, "repetition_rate_hz": stagger}
+    case = made("RLS 2", [MEMORY | options, BEST | options], 5, **keys)
+    for plan, plots, out in compared(case, 4):
+        found = naive.remembering(twin(case, case.spec.filters[0]), plots, plan.world.spans, most, prune_below, 24)
+        there = started(plots)
+        assert len(out) == 1  # the two filters share a list
+        exactly = [records.RIGHT, records.LISTED, records.COUNT]
+        assert np.array_equal(out[0][there][:, exactly], found[there][:, exactly])
+        apart = (out[0] - found)[there]
+        assert np.abs(apart[:, :6] / np.tile([1e5, 1e3, 10.0], 2)).max() < 1e-9
+        assert np.abs(apart[:, records.PROBABILITY]).max() < 1e-9
+
+
+def test_one_hypothesis_is_the_nearest_fold():
+    """A list of one, by the kernel of lists, is the filter of the nearest fold."""
+    case = made("RLS 4", [NEAREST, MEMORY | {"hypotheses": 2}], 8, FIXED)
+    plan = study.prepare(case)
+    _, out = sums.simulated(plan.world, plan.banks._replace(most=np.array([1, 1])), 0)
+    assert np.abs(out[0] - out[1])[:, : records.RIGHT].max() < 1e-8
+    assert np.array_equal(out[0][:, records.RIGHT :], out[1][:, records.RIGHT :])
+
+
+@pytest.mark.parametrize("variance", [0.0, 1e-2])
+@pytest.mark.parametrize("scans", [2, 3, 4])
+def test_without_bounds_it_is_the_sum_over_all_sequences_of_folds(scans, variance):
+    unbounded = {"hypotheses": 20_000, "prune_below": 0.0}
+    prior = {"sigma_velocity_mps": 30.0, "sigma_acceleration_mps2": 2.0}
+    target = {"kind": "random_polynomial", "range_m": 1000.0}
+    # Spans of 60 and 72 m/s: with six folds to either side, sequences left out weigh under exp(-50).
+    keys = {"repetition_rate_hz": [800.0, 960.0], "sigma_range_m": 40.0}
+    case = made("RLS 3", [MEMORY | unbounded], scans, target, variance, prior=prior, **keys)
+    sigma = (40.0, 15.0)
+    for plan, plots, out in compared(case):
+        one, spans = case.spec.filters[0], plan.world.spans
+        mean, probability = naive.enumerated(one, case.spec.prior, sigma, 5.0, plots, spans, 6)
+        assert np.abs((out[0, -1, :3] - mean) / [1000.0, 30.0, 2.0]).max() < 1e-12
+        assert abs(out[0, -1, records.PROBABILITY] - probability) < 1e-12
+
+
+def test_partial_groups_and_blocks_add_up():
+    """Realisation i is itself whatever the block: sums over 21 realisations in one and in two parts."""
+    case = made("RLS 2", [RANGE_ONLY, ORACLE, NO_MEMORY, MEMORY], 4, detection_probability=0.8)
+    plan = study.prepare(case)
+    whole = study.simulate(plan, 0, 21)
+    parts = study.simulate(plan, 0, 8) + study.simulate(plan, 8, 13)
+    assert np.abs(whole - parts).max() <= 1e-9 * np.abs(whole).max()
+    counted = plan.layout.unpack(whole)["estimates"]
+    assert counted.max() <= 21
+    assert counted.min() > 0
