@@ -171,7 +171,7 @@ def test_sentences_move_nothing(folder, moved):
     [
         ("kernels/random.py", ALL),
         ("kernels/compile.py", ALL),
-        ("physics/motion.py", {"rls2"} | SONAR),
+        ("physics/motion.py", {"rls2", "ambiguous_rls4"} | SONAR),
         ("physics/frames.py", {"multimodel"}),
         ("studies/noise.py", ALL),
         ("config/fields.py", ALL),

@@ -2,7 +2,7 @@
 
 from radarsim.kernels.compile import part
 from radarsim.kernels.lanes import address, full, get, nearest, put, row, where_greater
-from radarsim.kernels.random import fill_normal_strip, fill_uniform_strip
+from radarsim.kernels.random import fill_normal_strip, fill_uniform_pairs
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     CAME,
     FIRST,
@@ -43,11 +43,10 @@ def fill_plots(world, first, random, plots):
         put(scan, UNFOLDED, u)
         put(scan, VELOCITY, u - span * nearest(u / span))
     started = zero
-    if world.detection < 1.0:
-        fill_uniform_strip(world.keys[1], first, 0, a[:size], b[:size])
     for k in range(scans):
         scan, came = row(to, k * PLOT), one
         if world.detection < 1.0:
+            fill_uniform_pairs(world.keys[1], first, k, a[8 * k : 8 * k + 8], b[8 * k : 8 * k + 8])
             came = where_greater(full(world.detection), get(noise_r, k), one, zero)
         put(scan, CAME, came)
         put(scan, FIRST, came * (one - started))
