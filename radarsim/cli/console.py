@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress as Bar
     from rich.progress import TaskID
+    from rich.status import Status
 
     from radarsim.app.clean import Cleaned
     from radarsim.app.doctor import Inspection
@@ -82,6 +83,31 @@ class Progress:
         self.task = bar.add_task(self.title, total=total, rate=0.0, left="–")
         bar.start()
         return bar
+
+
+class Counter:
+    """How much is done of what has no known end, on stderr if that is a terminal, once it has lasted two seconds."""
+
+    def __init__(self, title: str, what: str):
+        self.title, self.what, self.started = title, what, time.monotonic()
+        self.status: Status | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        if self.status is not None:
+            self.status.stop()
+
+    def update(self, done: int) -> None:
+        """How many are done."""
+        elapsed = time.monotonic() - self.started
+        if elapsed < SILENT_S or not sys.stderr.isatty():
+            return
+        if self.status is None:
+            self.status = console(stderr=True).status("")
+            self.status.start()
+        self.status.update(f"{self.title}: {done:,} {self.what}, {done / elapsed:,.0f}/s")
 
 
 def show(

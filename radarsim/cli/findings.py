@@ -25,6 +25,11 @@ def report(followed: Followed, judged: Sequence[accuracy.Judged], stderr: bool =
 def _rows(followed: Followed) -> list[str]:
     span = followed.last_s - followed.first_s
     lines = [f"plots    {plural(followed.rows, 'row')} over {span:g} s, from {followed.first_s:g} s"]
+    if followed.tracks:
+        longest_rows = max(one.rows for one in followed.tracks.values())
+        lines.append(f"tracks   {len(followed.tracks)}, the longest of {plural(longest_rows, 'row')}")
+    if followed.passed_over:
+        lines.append(f"passed   {plural(followed.passed_over, 'row')} of no track")
     missing = ", ".join(f"{count} of {name}" for name, count in followed.missing.items() if count)
     if missing:
         lines.append(f"missing  {missing}")

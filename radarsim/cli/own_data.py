@@ -7,7 +7,10 @@ import click
 from radarsim.cli.group import Count, completed, config_argument, main, set_option
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from radarsim.engine.results import Track
+    from radarsim.track.formats.importing import Format
 
 
 @main.command()
@@ -87,6 +90,79 @@ def simulate(config: str, output: str, realisation: int, overrides: tuple[str, .
     console.print_warnings(experiment.cache_troubles())
 
 
+@main.command(name="import")
+@click.argument("recording", metavar="FILE")
+@click.option("-o", "--output", required=True, metavar="PLOTS.csv", help="Where the plots are written.")
+@click.option(
+    "--from",
+    "kind",
+    type=click.Choice(["asterix", "opensky", "ais", "csv"]),
+    help="The format; default: what the content shows.",
+)
+@click.option("--at", "place", metavar="LAT,LON,HEIGHT", help="Where the radar stands: degrees, degrees, m (WGS 84).")
+@click.option("--antenna", metavar="AZ,EL", help="Its normal, degrees: adds the angles that multimodel takes.")
+@click.option("--track", "tracks", multiple=True, metavar="ID", help="Only this track; may be given again.")
+@click.option("--truth", metavar="FILE", help="A recording of positions: columns true_… by aircraft and time.")
+@click.option(
+    "--time-from",
+    default="first",
+    show_default=True,
+    metavar="ZERO",
+    help="What t_s counts from: first (record), midnight, or a date and time (UTC).",
+)
+@click.option("--doppler-towards", is_flag=True, help="The recording counts Doppler as positive for approach.")
+@click.option("--column", "columns", multiple=True, metavar="OURS=THEIRS", help="A column of a CSV, named by hand.")
+def import_(
+    recording: str,
+    output: str,
+    kind: "Format | None",
+    place: str | None,
+    antenna: str | None,
+    tracks: tuple[str, ...],
+    **further: "Any",
+) -> None:
+    """A recording into plots: ASTERIX, transponder data (ADS-B) in CSV, AIS, or a spreadsheet.
+
+    PLOTS.csv has a row a plot and all tracks of the recording, each named in the column `track`; `radarsim track` and
+    `radarsim fit` read it. Its first lines say what the columns are. Nothing is written of a damaged file.
+
+    \b
+    asterix  categories 048 and 001 (plots of a radar: range, bearing, height, Doppler speed
+             and the span by which it is ambiguous) and 062 (positions: the truth of the plots
+             of the same aircraft); needs radarsim[asterix]
+    opensky  latitude, longitude, altitude and time of aircraft, in CSV; needs --at
+    ais      sentences !AIVDM of ships; needs --at and radarsim[ais]
+    csv      any table with a header: time, and range or latitude and longitude; units as in
+             `range_km` or `Altitude [ft]`
+
+    \b
+    Example
+      radarsim import radar.ast --at 52.30,4.76,12 -o plots.csv
+      radarsim track range_doppler_own plots.csv -o track.csv
+    """
+    from radarsim.cli import console
+    from radarsim.report.text import plural
+    from radarsim.track.formats import importing, site
+
+    options = importing.Options(
+        kind,
+        site.site_of(place) if place else None,
+        site.antenna_of(antenna) if antenna else None,
+        tracks,
+        importing.zero_of(further["time_from"]),
+        further["truth"],
+        further["doppler_towards"],
+        importing.columns_of(further["columns"]),
+    )
+    with console.Counter("reading", "records") as counter:
+        done = importing.import_recording(recording, output, options, counter.update)
+    count = len([name for name in done.tracks if name])
+    click.echo(f"plots    {output} ({plural(done.rows, 'row')} of {plural(count, 'track')}: {', '.join(done.columns)})")
+    click.echo(f"         {done.format}, {plural(done.records, 'record')} read")
+    for line in (*(f"{what} left out" for what in done.skipped), *done.notes):
+        click.echo(f"         {line}", err=True)
+
+
 @main.command()
 @config_argument
 @click.argument("plots", metavar="PLOTS.csv")
@@ -108,6 +184,9 @@ def track(
     filters' own innovations are tested (NIS, 1 for a filter that is right about its errors). A gap so long that
     a filter's numbers after it would be only rounding errors is a fault, reported with its line: split the file there.
 
+    A file with a column `track`, as `radarsim import` writes it, holds several tracks, each followed by itself; then
+    TRACK.csv begins with the column recorded_track, and figures are drawn of the longest.
+
     \b
     Example
       radarsim track sonar_smoothing plots.csv -o track.csv --figures figures
@@ -125,12 +204,12 @@ def track(
     read = {"the plots": plots, "the config": loaded.path}
     started = False
 
-    def sink(piece: "Track") -> None:
+    def sink(piece: "Track", name: str | None) -> None:
         nonlocal started
         if not started:
-            write([files.header_of(piece)])
+            write([files.header_of(piece, name is not None)])
             started = True
-        write(files.rows_of(piece))
+        write(files.rows_of(piece, name))
 
     with contextlib.ExitStack() as stack:
         write = stack.enter_context(Writer(output, read)).write if output else findings.echo

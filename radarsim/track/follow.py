@@ -4,7 +4,7 @@ import itertools
 import json
 import os
 import shlex
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -124,6 +124,8 @@ class Followed:
     stride: int = 1
     head: dict[str, np.ndarray] = field(default_factory=dict)
     median_s: float = np.nan
+    tracks: dict[str, "Followed"] = field(default_factory=dict)  # of a file that tells several apart, by name
+    passed_over: int = 0  # rows that belong to no track
 
     def take(self, columns: Mapping[str, np.ndarray], track: Track) -> None:
         """Count one more piece of the file."""
@@ -194,36 +196,99 @@ def joined(parts: list[Track]) -> Track:
     return replace(first, t_s=np.concatenate([part.t_s for part in parts]), **whole)
 
 
+class Follower:
+    """The filters of a case over one track of a file of plots."""
+
+    def __init__(self, case: Case, source: str | os.PathLike, name: str | None):
+        of = recorded_of(case)
+        self.source, self.name = source, name
+        self.tracker, self.followed = of.tracker(case), Followed(case)
+        self.twin = Twin(of.tracker(case), of.scan_period_s(case.spec))
+
+    def feed(self, columns: dict[str, np.ndarray]) -> Track:
+        """The estimates over the next rows of the track; raises ConfigError where they are only rounding errors."""
+        try:
+            track = self.tracker.feed(columns)
+            lost = self.twin.lost(columns, track)
+        except LinAlgError as error:
+            fault = "intervals so different leave a filter's equations without solution"
+            raise ConfigError(f"{self.source}: {self._named()}t_s: {fault}") from error
+        if lost:
+            fault = f"after a gap of {self.twin.gap_s:g} s a filter's numbers are lost in rounding: split the file here"
+            if self.name is None:
+                raise ConfigError(f"{plots.place_of(self.source, self.twin.gap_row)}: t_s: {fault}")
+            raise ConfigError(f"{self.source}: {self._named()}row {self.twin.gap_row + 1} of it: t_s: {fault}")
+        self.followed.take(columns, track)
+        return track
+
+    def _named(self) -> str:
+        return "" if self.name is None else f"track {self.name}: "
+
+
 def follow(
-    experiment: Experiment, source: str | os.PathLike, sink: Callable[[Track], None] = lambda track: None
+    experiment: Experiment,
+    source: str | os.PathLike,
+    sink: Callable[[Track, str | None], None] = lambda track, name: None,
 ) -> Followed:
     """The filters of an experiment's one case over the recorded plots in a CSV file, piece by piece to `sink`.
 
-    Memory does not grow with the file where the study's filters go from row to row; others take so many rows at most.
-    Raises ConfigError for an experiment of several cases, a study without recorded plots, and faults in the file.
+    A file with a column `track` holds several tracks: the filters follow each by itself, and the sink is given its
+    name; rows without a name belong to none and are passed over. Memory does not grow with a track's rows where the
+    study's filters go from row to row; others take so many rows at most. Raises ConfigError for an experiment of
+    several cases, a study without recorded plots, and faults in the file.
     """
     plots_named = shlex.quote(os.fspath(source)).replace("{", "{{").replace("}", "}}")
     case = one_case(experiment, "track with", f"radarsim track {{}} {plots_named}")
     of = recorded_of(case)
-    tracker, followed = of.tracker(case), Followed(case)
-    twin = Twin(of.tracker(case), of.scan_period_s(case.spec))
+    tracker = of.tracker(case)
     size = tracker.most_rows or plots.CHUNK
-    try:
-        for columns in plots.chunks(source, of.columns(case.spec), size, tracker.several):
-            if followed.rows and tracker.most_rows:
-                raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
-            track = tracker.feed(columns)
-            if twin.lost(columns, track):
-                place = plots.place_of(source, twin.gap_row)
-                fault = f"after a gap of {twin.gap_s:g} s a filter's numbers are lost in rounding: split the file here"
-                raise ConfigError(f"{place}: t_s: {fault}")
-            sink(track)
-            followed.take(columns, track)
-    except LinAlgError as error:
-        raise ConfigError(
-            f"{source}: t_s: intervals so different leave a filter's equations without solution"
-        ) from error
-    return followed
+    followers: dict[str | None, Follower] = {}
+    passed_over = 0
+    for columns, tracks in plots.pieces(source, of.columns(case.spec), size, tracker.several):
+        if followers and tracker.most_rows:
+            raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
+        for name, rows in _by_track(columns, tracks):
+            if name == "":
+                passed_over += len(rows["t_s"])
+                continue
+            if name not in followers:
+                followers[name] = Follower(case, source, name)
+            sink(followers[name].feed(rows), name)
+    if not followers:
+        raise ConfigError(f"{source}: track: must name the track of some rows, all {passed_over} are empty")
+    found = {name: one.followed for name, one in followers.items()}
+    return found[None] if None in found else together(case, found, passed_over)
+
+
+def _by_track(
+    columns: dict[str, np.ndarray], tracks: list[str] | None
+) -> Iterator[tuple[str | None, dict[str, np.ndarray]]]:
+    """The rows of each track by its name, or all of them where tracks are not told apart."""
+    if tracks is None:
+        yield None, columns
+        return
+    for name, rows in plots.grouped(tracks).items():
+        yield name, {key: column[rows] for key, column in columns.items()}
+
+
+def together(case: Case, found: Mapping[str | None, Followed], passed_over: int) -> Followed:
+    """What was found over several tracks: sums, and what is drawn and tried again of the longest of them."""
+    longest = max(found.values(), key=lambda one: one.rows)
+    whole = replace(longest, tallies={}, missing={}, estimating=set(), rows=0, gaps=0, passed_over=passed_over)
+    whole.tracks = {str(name): one for name, one in found.items()}
+    for one in found.values():
+        whole.rows += one.rows
+        whole.gaps += one.gaps
+        whole.first_s, whole.last_s = min(whole.first_s, one.first_s), max(whole.last_s, one.last_s)
+        if one.longest_gap_s > whole.longest_gap_s:
+            whole.longest_gap_s, whole.longest_gap_at_s = one.longest_gap_s, one.longest_gap_at_s
+        whole.estimating |= one.estimating
+        for name, count in one.missing.items():
+            whole.missing[name] = whole.missing.get(name, 0) + count
+        for key, tally in one.tallies.items():
+            sums = whole.tallies.setdefault(key, Tally(tally.filter, tally.name, tally.freedom))
+            sums.count, sums.total = sums.count + tally.count, sums.total + tally.total
+    return whole
 
 
 def track(experiment: Experiment, source: str | os.PathLike) -> tuple[Case, Track]:
@@ -232,7 +297,9 @@ def track(experiment: Experiment, source: str | os.PathLike) -> tuple[Case, Trac
     Raises ConfigError as `follow`.
     """
     parts: list[Track] = []
-    followed = follow(experiment, source, parts.append)
+    followed = follow(experiment, source, lambda track, name: parts.append(track))
+    if len(followed.tracks) > 1:
+        raise ConfigError(f"{source}: track: must be one track, got {len(followed.tracks)}")
     return followed.case, joined(parts)
 
 

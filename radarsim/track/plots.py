@@ -1,7 +1,7 @@
 """Recorded plots: one track from a CSV file, and the estimates over it back to one.
 
-A plots file has a header; `t_s` must rise from row to row (or, for studies that take several plots at a time, not
-fall), an empty cell means missing, other columns are ignored.
+A plots file has a header, before which lines may stand that begin with `#`; `t_s` must rise from row to row (or, for
+studies that take several plots at a time, not fall), an empty cell means missing, other columns are ignored.
 """
 
 import csv
@@ -25,6 +25,7 @@ MOST_FAULTS = 20  # reported at once; a file of the wrong kind would have one in
 LARGEST = 1e18  # of any number, as in configs
 SEPARATORS = {";": "semicolons", "\t": "tabulators"}  # of other programs
 DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
+TRACK = "track"  # the column that tells several tracks of a file apart
 CHUNK = 20_000  # rows read, filtered and written at a time
 
 
@@ -46,6 +47,14 @@ def chunks(
 
     After the first fault no more rows come: the rest is read for its faults, and ConfigError raised at the end.
     """
+    for columns, _ in pieces(path, choices, size, several):
+        yield columns
+
+
+def pieces(
+    path: str | os.PathLike, choices: Sequence[Sequence[str]], size: int = CHUNK, several: bool = False
+) -> Iterator[tuple[dict[str, np.ndarray], list[str] | None]]:
+    """As `chunks`, with the track of each row, where the file has a column of that name: times rise within a track."""
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
             yield from _Reader(str(path), csv.reader(file, strict=True), choices, several).chunks(size)
@@ -60,7 +69,7 @@ def place_of(path: str | os.PathLike, row: int) -> str:
     if os.path.isfile(path):
         with open(path, encoding="utf-8-sig", newline="") as file:
             rows = csv.reader(file, strict=True)
-            numbers = (rows.line_num for cells in rows if cells)
+            numbers = (rows.line_num for cells in itertools.dropwhile(_comment, rows) if cells)
             if line := next(itertools.islice(numbers, row + 1, None), None):
                 return f"{path}:{line}"
     return f"{path}: row {row + 1} after the header"
@@ -74,26 +83,27 @@ class _Reader:
         self.path, self.rows, self.measured = path, rows, False
         self.faults: list[str] = []
         try:
-            header = [name.strip() for name in next(rows, [])]
+            header = [name.strip() for name in next((row for row in rows if not _comment(row)), [])]
         except csv.Error as error:
             raise ConfigError(f"{path}:{rows.line_num}: not a CSV row: {error}") from error
         self.wanted = _chosen(path, header, choices)
         self.width, self.places = len(header), [header.index(name) for name in self.wanted]
-        self.last = math.nan
+        self.track = header.index(TRACK) if TRACK in header else None
+        self.last: dict[str, float] = {}
 
-    def chunks(self, size: int) -> Iterator[dict[str, np.ndarray]]:
-        """The wanted columns, `size` rows at a time."""
+    def chunks(self, size: int) -> Iterator[tuple[dict[str, np.ndarray], list[str] | None]]:
+        """The wanted columns and the rows' tracks, `size` rows at a time."""
         any_row = False
         while True:
-            lines, values = self._some(size)
+            lines, values, tracks = self._some(size)
             if not lines:
                 break
             any_row = True
             array = np.array(values, dtype=float).reshape(-1, len(self.wanted))
             self._judge(array, lines)
-            self.last = array[-1, 0]
+            self._in_order(array[:, 0], lines, tracks)
             if not self.faults:
-                yield dict(zip(self.wanted, array.T.copy(), strict=True))
+                yield dict(zip(self.wanted, array.T.copy(), strict=True)), None if self.track is None else tracks
         if not any_row and not self.faults:
             self.faults.append(f"{self.path}: has no rows")
         if not self.faults and not self.measured:
@@ -101,38 +111,47 @@ class _Reader:
         if self.faults:
             raise ConfigError(*self.faults)
 
-    def _some(self, size: int) -> tuple[list[int], list[list[float]]]:
-        """Line numbers and numbers of the next rows."""
+    def _some(self, size: int) -> tuple[list[int], list[list[float]], list[str]]:
+        """Line numbers, numbers and tracks of the next rows."""
         lines: list[int] = []
         values: list[list[float]] = []
+        tracks: list[str] = []
         try:
             for row in self.rows:
                 if row:
                     line = self.rows.line_num
                     lines.append(line)
                     values.append(self._numbers(row, line))
+                    whole = self.track is not None and len(row) == self.width
+                    tracks.append(row[self.track].strip() if whole and self.track is not None else "")
                 if len(self.faults) >= MOST_FAULTS:
                     raise ConfigError(*self.faults, f"{self.path}: more faults may follow")
                 if len(lines) == size:
                     break
         except csv.Error as error:
             raise ConfigError(*self.faults, f"{self.path}:{self.rows.line_num}: not a CSV row: {error}") from error
-        return lines, values
+        return lines, values, tracks
 
     def _judge(self, array: np.ndarray, lines: list[int]) -> None:
-        """Note values that no sensor can have given, and times that do not rise."""
+        """Note values that no sensor can have given."""
         path, wanted, places = self.path, self.wanted, self.places
         self.measured |= bool(np.isfinite(array[:, 1:]).any())
         for i, j in np.argwhere(impossible(array, wanted))[:MOST_FAULTS]:
             allowed = "must be > 0" if wanted[j] == "range_m" else "must be in radians, from -2 pi to 2 pi"
             self.faults.append(f"{path}:{lines[i]}:{places[j] + 1}: {wanted[j]}: {allowed}, got {array[i, j]:g}")
-        t = np.append(self.last, array[:, 0])
-        rises = np.diff(t) >= 0 if self.several else np.diff(t) > 0
-        for i in np.flatnonzero(~rises)[:MOST_FAULTS]:
-            if np.isfinite(t[i : i + 2]).all():
-                place = f"{path}:{lines[i]}:{places[0] + 1}: t_s"
-                must = "not be earlier" if self.several else "be later"
-                self.faults.append(f"{place}: must {must} than the row before, got {t[i + 1]:g} after {t[i]:g}")
+
+    def _in_order(self, t: np.ndarray, lines: list[int], tracks: list[str]) -> None:
+        """Note times that do not rise from row to row of a track."""
+        for name, rows in grouped(tracks).items():
+            own = np.append(self.last.get(name, math.nan), t[rows])
+            rises = np.diff(own) >= 0 if self.several else np.diff(own) > 0
+            for i in np.flatnonzero(~rises)[:MOST_FAULTS]:
+                if np.isfinite(own[i : i + 2]).all():
+                    place = f"{self.path}:{lines[rows[i]]}:{self.places[0] + 1}: t_s"
+                    must = "not be earlier" if self.several else "be later"
+                    before = f"the row before of track {name}" if name else "the row before"
+                    self.faults.append(f"{place}: must {must} than {before}, got {own[i + 1]:g} after {own[i]:g}")
+            self.last[name] = own[-1]
 
     def _numbers(self, row: list[str], line: int) -> list[float]:
         """The wanted numbers of a row; faults are noted and stand as not-a-number."""
@@ -154,6 +173,21 @@ class _Reader:
             self.faults.append(f"{where}: must be a finite number, got {text[:60]!r}{hint}")
             return math.nan
         return value
+
+
+def grouped(names: Sequence[str]) -> dict[str, np.ndarray]:
+    """The rows of each name, in the order in which the names come first."""
+    if len(set(names)) == 1:
+        return {names[0]: np.arange(len(names))}
+    rows: dict[str, list[int]] = {}
+    for i, name in enumerate(names):
+        rows.setdefault(name, []).append(i)
+    return {name: np.array(own) for name, own in rows.items()}
+
+
+def _comment(row: list[str]) -> bool:
+    """Whether a row before the header says something of the file."""
+    return bool(row) and row[0].startswith("#")
 
 
 def impossible(array: np.ndarray, names: list[str]) -> np.ndarray:
@@ -182,18 +216,23 @@ def _chosen(path: str, header: list[str], choices: Sequence[Sequence[str]]) -> l
     raise ConfigError(f"{path}:1: must have the columns {allowed}; got {given or 'nothing'}{hint}")
 
 
-def header_of(track: Track) -> tuple[str, ...]:
-    """The columns of a track."""
+def header_of(track: Track, named: bool = False) -> tuple[str, ...]:
+    """The columns of a track; named: with the name of the recorded track before them."""
     models = 0 if track.probability is None else track.probability.shape[2]
     names = ("t_s", "filter", "component", "unit", "estimate", "sigma")
     more = () if track.numbers is None else ("track", "score")
-    return (*names, *(f"probability_{m + 1}" for m in range(models)), *more)
+    recorded = ("recorded_track",) if named else ()
+    return (*recorded, *names, *(f"probability_{m + 1}" for m in range(models)), *more)
 
 
-def rows_of(track: Track) -> Iterator[tuple[str, ...]]:
-    """Rows of a track: t_s, filter, component, unit, estimate, sigma, the models' probabilities, number and score."""
+def rows_of(track: Track, name: str | None = None) -> Iterator[tuple[str, ...]]:
+    """Rows of a track: t_s, filter, component, unit, estimate, sigma, the models' probabilities, number and score.
+
+    name: of the recorded track, put before them.
+    """
+    recorded = () if name is None else (name,)
     for i, t in enumerate(track.t_s.tolist()):
-        for f, name in enumerate(track.filters):
+        for f, filter_name in enumerate(track.filters):
             shares: tuple[str, ...] = ()
             if track.probability is not None:
                 shares = tuple(map(_cell, track.probability[f, i].tolist()))
@@ -202,7 +241,7 @@ def rows_of(track: Track) -> Iterator[tuple[str, ...]]:
             numbers = zip(track.estimate[f, i].tolist(), track.sigma[f, i].tolist(), track.components, strict=True)
             for estimate, sigma, (component, unit) in numbers:
                 if not math.isnan(estimate):
-                    yield (repr(t), name, component, unit, repr(estimate), _cell(sigma), *shares)
+                    yield (*recorded, repr(t), filter_name, component, unit, repr(estimate), _cell(sigma), *shares)
 
 
 def _cell(value: float) -> str:

@@ -1,0 +1,1 @@
+"""Recordings of radars, transponders and ships, read into our columns: `radarsim import`."""

@@ -1,0 +1,129 @@
+"""Ships by AIS: NMEA sentences `!AIVDM…`, by pyais.
+
+A message gives only the second of its minute. The time is that of the tag block (`\\c:1577836800*..\\!AIVDM…`) or of
+a number or ISO time before the sentence; where there is neither, the seconds are made to run on from minute to minute.
+"""
+
+import datetime
+import math
+import re
+from collections.abc import Iterator
+from types import ModuleType
+from typing import Any, BinaryIO
+
+from radarsim.errors import ConfigError
+from radarsim.track.formats.records import BATCH, POSITION_COLUMNS, POSITIONS, Batch, Gathered, Unrolled, needs
+
+pyais: ModuleType | None
+try:
+    import pyais
+    from pyais.exceptions import AISBaseException
+except ImportError:
+    pyais = None
+
+KNOT_MPS = 1852 / 3600
+SENTENCE = re.compile(rb"![A-Z]{2}VD[MO],[^\r\n]*")
+TAG_TIME = re.compile(rb"[\\,]c:(\d{9,13})")
+PARTS = re.compile(rb"![A-Z]{2}VD[MO],(\d),(\d),(\d?),")
+NO_SPEED, NO_COURSE, NO_SECOND = 102.2, 360.0, 60
+MOST_OPEN = 100  # messages of several sentences that wait for their end
+LEAST_GOOD = 0.5  # of the sentences; a file with fewer is no AIS
+
+
+class Ais:
+    """A file of AIS sentences; class A and B reports of position are read, all others passed over."""
+
+    of_day = False
+
+    def __init__(self, path: str, file: BinaryIO):
+        if pyais is None:
+            raise needs("pyais", "ais")
+        self.path, self.file = path, file
+        self.records = 0
+        self.skipped: dict[str, int] = {}
+        self.open: dict[bytes, list[bytes]] = {}
+        self.minute = Unrolled(60.0)
+
+    def batches(self) -> Iterator[Batch]:
+        """The reports of position, some at a time; raises ConfigError where most sentences are damaged."""
+        gathered, damaged, first = Gathered(POSITIONS, POSITION_COLUMNS), 0, ""
+        for number, line in enumerate(self.file, start=1):
+            sentence = SENTENCE.search(line)
+            if not sentence:
+                if line.strip() and not line.lstrip().startswith((b"#", b"$")):
+                    damaged, first = damaged + 1, first or f"{self.path}:{number}"
+                continue
+            try:
+                message = self._decoded(sentence[0])
+            except AISBaseException:
+                damaged, first = damaged + 1, first or f"{self.path}:{number}"
+                continue
+            if message is not None:
+                self._take(message, self._stated(line, sentence.start(), number), gathered)
+            if len(gathered) >= BATCH:
+                yield gathered.taken()
+        if damaged and damaged >= LEAST_GOOD * (self.records + damaged):
+            raise ConfigError(f"{first}: must be AIS sentences (!AIVDM,…); {damaged} lines are none or damaged, "
+                              f"{self.records} messages were read")  # fmt: skip
+        if damaged:
+            self.skipped["damaged lines"] = damaged
+        if len(gathered):
+            yield gathered.taken()
+
+    def _decoded(self, sentence: bytes) -> Any:
+        """The message that a sentence ends; none while further sentences of it are to come."""
+        assert pyais is not None  # `__init__` has made sure
+        parts = PARTS.match(sentence)
+        if parts and parts[1] != b"1":
+            held = self.open.setdefault(parts[3], [])
+            if parts[2] == b"1":
+                held.clear()
+            held.append(sentence)
+            if len(self.open) > MOST_OPEN:
+                self.open.pop(next(iter(self.open)))
+            if parts[2] != parts[1]:
+                return None
+            whole = self.open.pop(parts[3])
+            self.records += 1
+            return pyais.decode(*whole)
+        self.records += 1
+        return pyais.decode(sentence)
+
+    def _stated(self, line: bytes, before: int, number: int) -> float:
+        """The time before a sentence, s from 1970; not-a-number where none is stated."""
+        head = line[:before]
+        if found := TAG_TIME.search(head):
+            stamp = float(found[1])
+            return stamp / 1000 if stamp > 1e11 else stamp
+        text = head.decode("ascii", "replace").strip(" \t,;\\")
+        if not text or "*" in text:
+            return math.nan
+        try:
+            return float(text)
+        except ValueError:
+            pass
+        try:
+            moment = datetime.datetime.fromisoformat(text)
+        except ValueError:
+            must = "before the sentence must stand a time in s from 1970 or ISO 8601, or a tag block"
+            read = f"{self.records} messages were read"
+            raise ConfigError(f"{self.path}:{number}: {must}; got {text[:60]!r}; {read}") from None
+        return (moment if moment.tzinfo else moment.replace(tzinfo=datetime.UTC)).timestamp()
+
+    def _take(self, message: Any, stated: float, gathered: Gathered) -> None:
+        latitude, longitude = getattr(message, "lat", None), getattr(message, "lon", None)
+        if latitude is None or longitude is None or message.msg_type not in (1, 2, 3, 18, 19):
+            self._skip("messages that are no ship's position")
+            return
+        second = int(message.second)
+        if abs(latitude) > 90 or abs(longitude) > 180 or (math.isnan(stated) and second >= NO_SECOND):
+            self._skip("reports without position or time")
+            return
+        t = self.minute(second) if math.isnan(stated) else stated
+        speed, course = float(message.speed), math.radians(float(message.course))
+        known = speed <= NO_SPEED and float(message.course) < NO_COURSE
+        east, north = (speed * KNOT_MPS * part(course) if known else math.nan for part in (math.sin, math.cos))
+        gathered.add(str(message.mmsi), str(message.mmsi), (t, latitude, longitude, 0.0, east, north, 0.0))
+
+    def _skip(self, what: str) -> None:
+        self.skipped[what] = self.skipped.get(what, 0) + 1

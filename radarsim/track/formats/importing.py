@@ -1,0 +1,453 @@
+"""`radarsim import`: a recording into a CSV of plots in our columns, with several tracks in one file.
+
+Records are read, placed and written some at a time, so that memory does not grow with the file; only what is truth is
+held, as it must be looked up by time. The file is there whole or not at all.
+"""
+
+import datetime
+import io
+import math
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from radarsim.errors import ConfigError
+from radarsim.report.files import Writer
+from radarsim.track.formats import ais, asterix
+from radarsim.track.formats.ais import Ais
+from radarsim.track.formats.asterix import Asterix
+from radarsim.track.formats.records import DAY_S, PLOTS, POSITIONS, Batch, Reader, counted
+from radarsim.track.formats.site import Antenna, Site, biconical, described
+from radarsim.track.formats.text import Table
+
+Format = Literal["asterix", "opensky", "ais", "csv"]
+FORMATS: tuple[Format, ...] = ("asterix", "opensky", "ais", "csv")
+HEAD = 4096  # bytes that the format is found from
+LONGEST_GAP_S = 60.0  # over which truth is not interpolated
+MOST_LISTED = 12
+SIGN_TESTS = 2000  # pairs of plots over which the sign of the Doppler speed is looked at
+LEAST_TESTS = 20
+PLACED = ("range_m", "bearing_rad", "velocity_mps")
+LOCAL = ("x_m", "y_m", "z_m")
+SPEEDS = ("vx_mps", "vy_mps", "vz_mps")
+ANGLES = ("elevation_rad", "azimuth_rad")
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to read a recording.
+
+    format: found from the content where None. site: where the radar stands. antenna: its normal, for the angles that
+    `multimodel` takes. tracks: those to be written, all where empty. zero: what t_s counts from, "first" (record),
+    "midnight" (of the first record's day, UTC) or s from 1970. truth: a second recording, of positions. towards:
+    Doppler speeds count as positive where the range falls. columns: of a CSV, theirs by ours.
+    """
+
+    format: Format | None = None
+    site: Site | None = None
+    antenna: Antenna | None = None
+    tracks: tuple[str, ...] = ()
+    zero: str | float = "first"
+    truth: str | None = None
+    towards: bool = False
+    columns: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass
+class Imported:
+    """What was read and written: format, records read, rows written, rows by track, what was passed over."""
+
+    format: Format
+    records: int = 0
+    rows: int = 0
+    tracks: dict[str, int] = field(default_factory=dict)
+    skipped: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    columns: tuple[str, ...] = ()
+
+
+@contextmanager
+def opened(path: str, options: Options) -> Iterator[tuple[Format, Reader]]:
+    """The reader of a recording, by the format that is asked for or that its first bytes show; raises ConfigError."""
+    try:
+        with open(path, "rb") as file:
+            head = file.peek(HEAD)[:HEAD]
+            kind = options.format or found(path, head)
+            if kind == "asterix":
+                yield kind, Asterix(path, file)
+            elif kind == "ais":
+                yield kind, Ais(path, file)
+            else:
+                text = io.TextIOWrapper(file, encoding="utf-8-sig", newline="")
+                yield kind, Table(path, text, options.columns)
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is not UTF-8 text") from error
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def found(path: str, head: bytes) -> Format:
+    """The format that the first bytes of a file show; raises ConfigError."""
+    if not head:
+        raise ConfigError(f"{path}: is empty")
+    if ais.SENTENCE.search(head):
+        return "ais"
+    text = b"\0" not in head and sum(byte < 9 or 13 < byte < 32 for byte in head) == 0
+    if text and b"," in head.split(b"\n", 1)[0]:
+        names = head.lower()
+        return "opensky" if b"icao24" in names and b"lat" in names else "csv"
+    if not text and asterix.looks_like(head):
+        return "asterix"
+    raise ConfigError(f"{path}: must be a recording in one of {', '.join(FORMATS)}; its first bytes are of none: "
+                      f"{head[:16].hex(' ')}")  # fmt: skip
+
+
+def import_recording(
+    source: str | os.PathLike,
+    output: str | os.PathLike,
+    options: Options,
+    progress: Callable[[int], None] = lambda records: None,
+) -> Imported:
+    """Read a recording and write it as plots; raises ConfigError, StoreError, and then leaves nothing written.
+
+    progress is called now and then with the number of records read.
+    """
+    path = os.fspath(source)
+    truth = _Truth(path, options) if options.site else None
+    with opened(path, options) as (kind, reader):
+        work = _Import(kind, reader, options, truth)
+        with Writer(output, {"the recording": path, "the truth": options.truth}) as file:
+            first = True
+            for rows in work.rows():
+                if first:
+                    file.write([(line,) for line in work.comment()])
+                    file.write([work.done.columns])
+                    first = False
+                file.write(rows)
+                progress(reader.records)
+            if first:
+                raise ConfigError(work.nothing())
+    return work.finished()
+
+
+class _Import:
+    """The recording on its way: batches in, rows out."""
+
+    def __init__(self, kind: Format, reader: Reader, options: Options, truth: "_Truth | None"):
+        self.reader, self.options, self.truth = reader, options, truth
+        self.done = Imported(kind)
+        self.zero: float | None = None
+        self.last: dict[str, float] = {}
+        self.left = {"rows not later than the one before of their track": 0, "rows of other tracks": 0}
+        self.behind = self.unplaced = 0
+        self.sign = _Sign()
+        self.seen: set[str] = set()
+
+    def rows(self) -> Iterator[Iterable[tuple[str, ...]]]:
+        """The rows of the output, some at a time."""
+        for batch in self.reader.batches():
+            if batch.kind == POSITIONS and self.truth is not None and self.truth.own:
+                continue  # it is the truth of the plots in the same file
+            kept = self._kept(batch)
+            if kept is not None:
+                yield self._written(kept)
+
+    def _kept(self, batch: Batch) -> Batch | None:
+        """Those records of a batch that are asked for and later than their track's last."""
+        wanted, keep = set(self.options.tracks), []
+        times = batch.columns["t_s"].tolist()
+        for i, (track, t) in enumerate(zip(batch.track, times, strict=True)):
+            if len(self.seen) < MOST_LISTED:
+                self.seen.add(track)
+            if wanted and track not in wanted:
+                self.left["rows of other tracks"] += 1
+            elif track and t <= self.last.get(track, -math.inf):
+                self.left["rows not later than the one before of their track"] += 1
+            else:
+                keep.append(i)
+                self.last[track] = t
+                self.done.tracks[track] = self.done.tracks.get(track, 0) + 1
+        if not keep:
+            return None
+        columns = {name: column[keep] for name, column in batch.columns.items()}
+        if self.options.towards and "velocity_mps" in columns:
+            columns["velocity_mps"] = -columns["velocity_mps"]
+        return Batch(batch.kind, [batch.track[i] for i in keep], [batch.address[i] for i in keep], columns)
+
+    def _written(self, batch: Batch) -> Iterable[tuple[str, ...]]:
+        """The rows of a batch, as text."""
+        t = batch.columns["t_s"]
+        if self.zero is None:
+            self.zero = self._zero(float(t[0]))
+        columns = {"t_s": t - self.zero} | self._placed(batch)
+        if batch.kind == PLOTS:
+            self.sign.take(batch)
+        if self.truth is not None:
+            columns |= self.truth.columns(batch, self.reader.of_day)
+        if not self.done.columns:
+            self.done.columns = ("t_s", "track", *(name for name in columns if name != "t_s"))
+        self.done.rows += len(t)
+        cells = [[_cell(value) for value in columns[name].tolist()] for name in columns]
+        return zip(cells[0], batch.track, *cells[1:], strict=True)
+
+    def _zero(self, first: float) -> float:
+        """What t_s counts from, in the times of the recording."""
+        zero = self.options.zero
+        if zero == "first":
+            return first
+        if zero == "midnight":
+            return first - first % DAY_S
+        zero = float(zero)
+        return zero % DAY_S if self.reader.of_day else zero
+
+    def _placed(self, batch: Batch) -> dict[str, np.ndarray]:
+        """Range, bearing, velocity and what follows from the place of the radar."""
+        site, given = self.options.site, batch.columns
+        if batch.kind == POSITIONS:
+            if site is None:
+                raise ConfigError("at: must say where the radar stands, LAT,LON,HEIGHT: the recording has positions "
+                                  "on the earth, not ranges")  # fmt: skip
+            seen = site.seen(given)
+            columns = {name: seen[name] for name in (*PLACED, "level_elevation_rad", *LOCAL)}
+            return columns | {"altitude_m": given["altitude_m"]} | self._angles(columns)
+        columns = {name: given[name] for name in (*PLACED, "span_mps", "altitude_m")}
+        if site is None:
+            return columns
+        local = site.local(given["range_m"], given["bearing_rad"], given["altitude_m"])
+        self.unplaced += int(np.isnan(local[:, 1]).sum())
+        columns |= {"level_elevation_rad": described(local)["level_elevation_rad"]}
+        columns |= dict(zip(LOCAL, local.T, strict=True))
+        return columns | self._angles(columns)
+
+    def _angles(self, columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        if self.options.antenna is None:
+            return {}
+        angles = biconical(np.stack([columns[name] for name in LOCAL], axis=-1), self.options.antenna)
+        self.behind += int(np.isnan(angles["elevation_rad"]).sum())
+        return angles
+
+    def comment(self) -> list[str]:
+        """The lines before the header: what the columns are."""
+        site, antenna = self.options.site, self.options.antenna
+        lines = [
+            f"# made by radarsim import from a recording in the format {self.done.format}",
+            f"# t_s: seconds from {self._zero_words()}; track: as in the recording",
+            "# range_m: slant range; bearing_rad: from north to east; velocity_mps: radial and positive where the "
+            "range grows; span_mps: what a folded velocity is ambiguous by",
+        ]
+        if site:
+            lat, lon, height = site.place
+            lines.append(f"# radar (WGS 84): {lat:.6f} deg {lon:.6f} deg {height:g} m; x_m north y_m up z_m east of it")
+            lines.append("# level_elevation_rad: above the plane that is level at the radar")
+        if antenna:
+            degrees = " ".join(f"{math.degrees(angle):g} deg" for angle in antenna)
+            lines.append(
+                f"# elevation_rad and azimuth_rad: from the normal of an antenna at azimuth and elevation {degrees}"
+            )
+        return lines
+
+    def _zero_words(self) -> str:
+        zero = self.options.zero
+        if not isinstance(zero, str):
+            return datetime.datetime.fromtimestamp(zero, datetime.UTC).isoformat()
+        return "midnight (UTC) before the first record" if zero == "midnight" else "the first record"
+
+    def nothing(self) -> str:
+        """The fault of a recording that leaves no row."""
+        path = getattr(self.reader, "path", "the recording")
+        if self.options.tracks and self.seen:
+            there = sorted(self.seen)
+            more = " …" if len(there) >= MOST_LISTED else ""
+            return f"{path}: track: must be one of {', '.join(there)}{more}; got {', '.join(self.options.tracks)}"
+        passed = counted(self.reader.skipped)
+        why = f" ({'; '.join(passed)} passed over)" if passed else ""
+        return f"{path}: has no plots; {self.reader.records} records were read{why}"
+
+    def finished(self) -> Imported:
+        """What was done, with what the user should know of it."""
+        done = self.done
+        done.records = self.reader.records
+        done.skipped = [*counted(self.reader.skipped), *counted(self.left)]
+        if self.unplaced:
+            fault = "have no height, or one that their range cannot have: x_m, y_m, z_m are empty there"
+            done.notes.append(f"{self.unplaced} of {done.rows} plots {fault}")
+        if self.behind:
+            fault = "are behind the antenna or without height: elevation_rad and azimuth_rad are empty there"
+            done.notes.append(f"{self.behind} of {done.rows} plots {fault}")
+        if self.truth is not None:
+            done.notes += self.truth.notes(done.rows)
+        if unnamed := done.tracks.get("", 0):
+            done.notes.append(f"{unnamed} of {done.rows} plots belong to no track; `radarsim track` passes them over")
+        if note := self.sign.note(self.options.towards):
+            done.notes.append(note)
+        return done
+
+
+class _Truth:
+    """Where each aircraft was: positions of the second recording, or of the same one (category 062 beside 048)."""
+
+    def __init__(self, path: str, options: Options):
+        assert options.site is not None
+        self.matched = 0
+        self.own = options.truth is None
+        self.tables: dict[str, list[np.ndarray]] = {}
+        self.ready: dict[str, Callable[[np.ndarray], np.ndarray]] = {}
+        self.of_day = False
+        if self.own:
+            self._read_own(path, options)
+        else:
+            assert options.truth is not None
+            with opened(options.truth, Options()) as (_, reader):
+                self._read(reader, options.site)
+            if not self.tables:
+                raise ConfigError(f"{options.truth}: has no positions on the earth, which the truth must have")
+
+    def _read_own(self, path: str, options: Options) -> None:
+        """The positions beside the plots of one ASTERIX file; a stream, which is read once, has none."""
+        assert options.site is not None
+        if not os.path.isfile(path):
+            self.own = False
+            return
+        with opened(path, options) as (kind, reader):
+            if kind == "asterix":
+                plots = self._read(reader, options.site)
+            self.own = kind == "asterix" and plots > 0 and bool(self.tables)
+        if not self.own:
+            self.tables = {}
+
+    def _read(self, reader: Reader, site: Site) -> int:
+        """Take the positions in; how many plots there were beside them."""
+        plots, self.of_day = 0, reader.of_day
+        for batch in reader.batches():
+            if batch.kind == PLOTS:
+                plots += len(batch.track)
+                continue
+            seen = site.seen(batch.columns)
+            table = np.stack([batch.columns["t_s"], *(seen[name] for name in LOCAL)], axis=-1)
+            for name in set(batch.address):
+                rows = [i for i, one in enumerate(batch.address) if one == name]
+                self.tables.setdefault(name, []).append(table[rows])
+        return plots
+
+    def columns(self, batch: Batch, of_day: bool) -> dict[str, np.ndarray]:
+        """The truth at the times of a batch: true range, bearing, velocity, coordinates and speeds (n,)."""
+        if not self.tables:
+            return {}
+        t, states = batch.columns["t_s"], np.full((len(batch.track), 6), np.nan)
+        if of_day != self.of_day:
+            t = t % DAY_S
+        names = batch.address if any(batch.address) else batch.track
+        for name in set(names):
+            rows = [i for i, one in enumerate(names) if one == name]
+            path = self._path(name, of_day)
+            if path is not None:
+                states[rows] = path(t[rows])
+        known = np.isfinite(states[:, 0])
+        self.matched += int(known.sum())
+        seen = described(states[:, :3])
+        radial = np.einsum("ni,ni->n", states[:, :3], states[:, 3:]) / seen["range_m"]
+        columns = {"range_m": seen["range_m"], "bearing_rad": seen["bearing_rad"], "velocity_mps": radial}
+        columns |= dict(zip((*LOCAL, *SPEEDS), states.T, strict=True))
+        return {f"true_{name}": column for name, column in columns.items()}
+
+    def _path(self, name: str, of_day: bool) -> Callable[[np.ndarray], np.ndarray] | None:
+        """Position and speed (n, 6) of one aircraft by time; of a lone one whatever its name."""
+        if name not in self.tables and len(self.tables) == 1:
+            (name,) = self.tables
+        if name not in self.tables:
+            return None
+        if name not in self.ready:
+            table = np.concatenate(self.tables[name])
+            if of_day != self.of_day:
+                table[:, 0] %= DAY_S
+            self.ready[name] = interpolated(table)
+        return self.ready[name]
+
+    def notes(self, rows: int) -> list[str]:
+        """How much of the plots has a truth."""
+        return [f"truth: {self.matched} of {rows} plots"] if self.tables else []
+
+
+def interpolated(table: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """Positions and speeds (m, 6) at times (m,), from fixes (n, 4) of time and position: piecewise cubic with the
+    slopes of the neighbouring fixes; not-a-number outside, and in gaps over LONGEST_GAP_S."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    times, places = np.unique(table[:, 0], return_index=True)
+    fixes = table[places, 1:]
+    if len(times) < 2:
+        return lambda t: np.full((len(t), 6), np.nan)
+    curve = CubicHermiteSpline(times, fixes, np.gradient(fixes, times, axis=0))
+    slope = curve.derivative()
+
+    def at(t: np.ndarray) -> np.ndarray:
+        after = np.clip(np.searchsorted(times, t), 1, len(times) - 1)
+        near = (t >= times[0]) & (t <= times[-1]) & (times[after] - times[after - 1] <= LONGEST_GAP_S)
+        return np.where(near[:, None], np.concatenate([curve(t), slope(t)], axis=1), np.nan)
+
+    return at
+
+
+class _Sign:
+    """Whether Doppler speeds fit the change of the range as they stand, or with the other sign; folded ones too."""
+
+    def __init__(self) -> None:
+        self.last: dict[str, tuple[float, float]] = {}
+        self.as_is: list[float] = []
+        self.turned: list[float] = []
+
+    def take(self, batch: Batch) -> None:
+        """Look at pairs of plots of one track."""
+        names = ("t_s", "range_m", "velocity_mps", "span_mps")
+        values = zip(batch.track, *(batch.columns[name].tolist() for name in names), strict=True)
+        for track, t, r, v, span in values:
+            if len(self.as_is) >= SIGN_TESTS:
+                return
+            before = self.last.get(track)
+            self.last[track] = (t, r)
+            if not track or before is None or math.isnan(v) or not 0 < t - before[0] < LONGEST_GAP_S:
+                continue
+            rate = (r - before[1]) / (t - before[0])
+            for misses, sign in ((self.as_is, 1), (self.turned, -1)):
+                miss = sign * v - rate
+                misses.append(abs(miss if math.isnan(span) else miss - span * round(miss / span)))
+
+    def note(self, towards: bool) -> str | None:
+        """What the user should know, if the other sign fits clearly better."""
+        if len(self.as_is) < LEAST_TESTS:
+            return None
+        as_is, turned = float(np.median(self.as_is)), float(np.median(self.turned))
+        if turned >= 0.5 * as_is:
+            return None
+        cure = "leave out" if towards else "give"
+        return (
+            f"the Doppler speeds miss the change of the range by {as_is:.1f} m/s (median), with the other sign by "
+            f"{turned:.1f} m/s: {cure} --doppler-towards"
+        )
+
+
+def zero_of(text: str) -> str | float:
+    """What t_s counts from: "first", "midnight", or a date and time of ISO 8601 (UTC) as s from 1970."""
+    if text in ("first", "midnight"):
+        return text
+    try:
+        moment = datetime.datetime.fromisoformat(text)
+    except ValueError:
+        raise ConfigError(f"time-from: must be first, midnight or a date and time (ISO 8601), got {text!r}") from None
+    return (moment if moment.tzinfo else moment.replace(tzinfo=datetime.UTC)).timestamp()
+
+
+def columns_of(texts: Sequence[str]) -> dict[str, str]:
+    """Columns named by hand, `OURS=THEIRS` each."""
+    faults = [text for text in texts if "=" not in text]
+    if faults:
+        raise ConfigError(*(f"column: must be OURS=THEIRS, got {text!r}" for text in faults))
+    return {ours.strip(): theirs.strip() for ours, _, theirs in (text.partition("=") for text in texts)}
+
+
+def _cell(value: float) -> str:
+    return "" if math.isnan(value) else repr(value)
