@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Iterable, Sequence
 
-from radarsim.report.text import plural, printable
+from radarsim.report.text import plural, printable, significant_digits
 from radarsim.track import accuracy
 from radarsim.track.follow import Followed
 
@@ -18,7 +18,7 @@ def echo(rows: Iterable[Sequence[str]]) -> None:
 def report(followed: Followed, judged: Sequence[accuracy.Judged], stderr: bool = False) -> None:
     """Print what was found; to stderr where the track itself goes to stdout."""
     stream = sys.stderr if stderr else sys.stdout
-    for line in [*_rows(followed), *(_line(one) for one in judged if one.tests), *_advice(judged)]:
+    for line in [*_rows(followed), *_errors(followed), *(_line(one) for one in judged if one.tests), *_advice(judged)]:
         stream.write(printable(line) + "\n")
 
 
@@ -41,6 +41,16 @@ def _rows(followed: Followed) -> list[str]:
             f"gaps     {followed.gaps} of over three times the usual interval, {followed.median_s:g} s; {longest}"
         )
     return lines
+
+
+def _errors(followed: Followed) -> list[str]:
+    """What the filters missed the truth by, where the file has it."""
+    return [
+        f"{one.filter}, {one.component}: error against the truth {significant_digits(one.rms)} {one.unit} RMS, "
+        f"{significant_digits(one.ratio, '#.3g')} of what the filter believes ({one.count} estimates)"
+        for one in followed.errors.values()
+        if one.count
+    ]
 
 
 def _line(one: accuracy.Judged) -> str:

@@ -185,7 +185,8 @@ def track(
     a filter's numbers after it would be only rounding errors is a fault, reported with its line: split the file there.
 
     A file with a column `track`, as `radarsim import` writes it, holds several tracks, each followed by itself; then
-    TRACK.csv begins with the column recorded_track, and figures are drawn of the longest.
+    TRACK.csv begins with the column recorded_track, and figures are drawn of the longest. Where columns true_… give the
+    truth, as `radarsim simulate` and `radarsim import` write it, the errors against it are reported.
 
     \b
     Example

@@ -25,6 +25,8 @@ from radarsim.track.rounding import Twin
 MOST_DRAWN = 2000  # rows kept for figures; of more, every second is dropped again and again
 GAP = 3.0  # intervals' median lengths that make a gap
 MOST_NAMED = 12  # configs or values listed where one must be chosen
+BEFORE = 10  # estimates of a filter's start that do not count against the truth
+UNITS = {"m/s": "mps", "m/s2": "mps2", "rad/s": "radps", "rad/s2": "radps2"}  # as in the names of columns
 HEAD = 5000  # rows that a better σ is looked for on
 
 
@@ -107,6 +109,39 @@ class Tally:
 
 
 @dataclass
+class Errors:
+    """A filter's errors against the truth in one component: how many, the sum of their squares, plain and over the
+    variances that it believes. The first BEFORE estimates, those of its start, are left out."""
+
+    filter: str
+    component: str
+    unit: str
+    seen: int = 0
+    count: int = 0
+    squares: float = 0.0
+    normed: float = 0.0
+
+    def add(self, error: np.ndarray, sigma: np.ndarray) -> None:
+        """Count errors (n,) with the standard deviations (n,) that the filter believes."""
+        skip = max(0, BEFORE - self.seen)
+        self.seen += len(error)
+        error, sigma = error[skip:], sigma[skip:]
+        self.count += len(error)
+        self.squares += float((error**2).sum())
+        self.normed += float(((error / sigma) ** 2).sum())
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square error, in the component's unit."""
+        return (self.squares / self.count) ** 0.5 if self.count else np.nan
+
+    @property
+    def ratio(self) -> float:
+        """Root of the mean square of the error in believed standard deviations: 1 for a filter that is right."""
+        return (self.normed / self.count) ** 0.5 if self.count else np.nan
+
+
+@dataclass
 class Followed:
     """The filters over a file of plots: rows, time, gaps, missing values, tests; and what figures and checks need."""
 
@@ -126,6 +161,7 @@ class Followed:
     median_s: float = np.nan
     tracks: dict[str, "Followed"] = field(default_factory=dict)  # of a file that tells several apart, by name
     passed_over: int = 0  # rows that belong to no track
+    errors: dict[tuple[str, str], Errors] = field(default_factory=dict)  # by filter and component, where there is truth
 
     def take(self, columns: Mapping[str, np.ndarray], track: Track) -> None:
         """Count one more piece of the file."""
@@ -146,6 +182,19 @@ class Followed:
             self.head = {name: column[:HEAD] for name, column in columns.items()}
         self._draw(track)
         self.rows += len(t)
+
+    def compare(self, track: Track, t_s: np.ndarray, truth: Mapping[str, np.ndarray]) -> None:
+        """Count the errors of a piece of the track; truth: columns (n,) `true_COMPONENT_UNIT` at times t_s (n,)."""
+        rows = np.searchsorted(t_s, track.t_s)  # of several plots of a time the track has one row
+        for c, (component, unit) in enumerate(track.components):
+            column = truth.get(f"{plots.TRUE}{component}_{UNITS.get(unit, unit)}")
+            if column is None:
+                continue
+            error = track.estimate[:, :, c] - column[rows]
+            for f, name in enumerate(track.filters):
+                known = np.isfinite(error[f]) & (track.sigma[f, :, c] > 0)
+                one = self.errors.setdefault((name, component), Errors(name, component, unit))
+                one.add(error[f, known], track.sigma[f, known, c])
 
     @property
     def silent(self) -> list[str]:
@@ -205,8 +254,11 @@ class Follower:
         self.tracker, self.followed = of.tracker(case), Followed(case)
         self.twin = Twin(of.tracker(case), of.scan_period_s(case.spec))
 
-    def feed(self, columns: dict[str, np.ndarray]) -> Track:
-        """The estimates over the next rows of the track; raises ConfigError where they are only rounding errors."""
+    def feed(self, columns: dict[str, np.ndarray], truth: Mapping[str, np.ndarray]) -> Track:
+        """The estimates over the next rows of the track; raises ConfigError where they are only rounding errors.
+
+        truth: columns (n,), counted against the estimates where their names fit the components.
+        """
         try:
             track = self.tracker.feed(columns)
             lost = self.twin.lost(columns, track)
@@ -219,6 +271,7 @@ class Follower:
                 raise ConfigError(f"{plots.place_of(self.source, self.twin.gap_row)}: t_s: {fault}")
             raise ConfigError(f"{self.source}: {self._named()}row {self.twin.gap_row + 1} of it: t_s: {fault}")
         self.followed.take(columns, track)
+        self.followed.compare(track, columns["t_s"], truth)
         return track
 
     def _named(self) -> str:
@@ -244,37 +297,42 @@ def follow(
     size = tracker.most_rows or plots.CHUNK
     followers: dict[str | None, Follower] = {}
     passed_over = 0
-    for columns, tracks in plots.pieces(source, of.columns(case.spec), size, tracker.several):
+    for piece in plots.pieces(source, of.columns(case.spec), size, tracker.several):
         if followers and tracker.most_rows:
             raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
-        for name, rows in _by_track(columns, tracks):
+        for name, columns, truth in _by_track(piece):
             if name == "":
-                passed_over += len(rows["t_s"])
+                passed_over += len(columns["t_s"])
                 continue
             if name not in followers:
                 followers[name] = Follower(case, source, name)
-            sink(followers[name].feed(rows), name)
+            sink(followers[name].feed(columns, truth), name)
     if not followers:
         raise ConfigError(f"{source}: track: must name the track of some rows, all {passed_over} are empty")
     found = {name: one.followed for name, one in followers.items()}
     return found[None] if None in found else together(case, found, passed_over)
 
 
-def _by_track(
-    columns: dict[str, np.ndarray], tracks: list[str] | None
-) -> Iterator[tuple[str | None, dict[str, np.ndarray]]]:
-    """The rows of each track by its name, or all of them where tracks are not told apart."""
-    if tracks is None:
-        yield None, columns
+Columns = dict[str, np.ndarray]
+
+
+def _by_track(piece: plots.Piece) -> Iterator[tuple[str | None, Columns, Columns]]:
+    """Measured and true columns of each track by its name, or of all rows where tracks are not told apart."""
+    if piece.tracks is None:
+        yield None, piece.columns, piece.truth
         return
-    for name, rows in plots.grouped(tracks).items():
-        yield name, {key: column[rows] for key, column in columns.items()}
+    for name, rows in plots.grouped(piece.tracks).items():
+        measured, true = (
+            {key: column[rows] for key, column in columns.items()} for columns in (piece.columns, piece.truth)
+        )
+        yield name, measured, true
 
 
 def together(case: Case, found: Mapping[str | None, Followed], passed_over: int) -> Followed:
     """What was found over several tracks: sums, and what is drawn and tried again of the longest of them."""
     longest = max(found.values(), key=lambda one: one.rows)
-    whole = replace(longest, tallies={}, missing={}, estimating=set(), rows=0, gaps=0, passed_over=passed_over)
+    whole = replace(longest, tallies={}, missing={}, estimating=set(), rows=0, gaps=0, errors={})
+    whole.passed_over = passed_over
     whole.tracks = {str(name): one for name, one in found.items()}
     for one in found.values():
         whole.rows += one.rows
@@ -288,6 +346,10 @@ def together(case: Case, found: Mapping[str | None, Followed], passed_over: int)
         for key, tally in one.tallies.items():
             sums = whole.tallies.setdefault(key, Tally(tally.filter, tally.name, tally.freedom))
             sums.count, sums.total = sums.count + tally.count, sums.total + tally.total
+        for key, own in one.errors.items():
+            total = whole.errors.setdefault(key, Errors(own.filter, own.component, own.unit))
+            total.count, total.squares = total.count + own.count, total.squares + own.squares
+            total.normed += own.normed
     return whole
 
 

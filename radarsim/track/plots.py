@@ -10,7 +10,7 @@ import math
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,7 @@ MOST_FAULTS = 20  # reported at once; a file of the wrong kind would have one in
 LARGEST = 1e18  # of any number, as in configs
 SEPARATORS = {";": "semicolons", "\t": "tabulators"}  # of other programs
 DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
+TRUE = "true_"  # what the names of the truth's columns begin with
 TRACK = "track"  # the column that tells several tracks of a file apart
 CHUNK = 20_000  # rows read, filtered and written at a time
 
@@ -47,14 +48,23 @@ def chunks(
 
     After the first fault no more rows come: the rest is read for its faults, and ConfigError raised at the end.
     """
-    for columns, _ in pieces(path, choices, size, several):
-        yield columns
+    for piece in pieces(path, choices, size, several):
+        yield piece.columns
+
+
+class Piece(NamedTuple):
+    """Some rows of a file of plots: the columns (n,) that are measured; the track of each row, none where the file does
+    not tell tracks apart; the columns (n,) of the truth, `true_…`."""
+
+    columns: dict[str, np.ndarray]
+    tracks: list[str] | None
+    truth: dict[str, np.ndarray]
 
 
 def pieces(
     path: str | os.PathLike, choices: Sequence[Sequence[str]], size: int = CHUNK, several: bool = False
-) -> Iterator[tuple[dict[str, np.ndarray], list[str] | None]]:
-    """As `chunks`, with the track of each row, where the file has a column of that name: times rise within a track."""
+) -> Iterator[Piece]:
+    """As `chunks`, with tracks and truth; where there are tracks the times rise within each."""
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
             yield from _Reader(str(path), csv.reader(file, strict=True), choices, several).chunks(size)
@@ -89,21 +99,27 @@ class _Reader:
         self.wanted = _chosen(path, header, choices)
         self.width, self.places = len(header), [header.index(name) for name in self.wanted]
         self.track = header.index(TRACK) if TRACK in header else None
+        self.true = {name: place for place, name in enumerate(header) if name.startswith(TRUE)}
         self.last: dict[str, float] = {}
 
-    def chunks(self, size: int) -> Iterator[tuple[dict[str, np.ndarray], list[str] | None]]:
-        """The wanted columns and the rows' tracks, `size` rows at a time."""
+    def chunks(self, size: int) -> Iterator[Piece]:
+        """The wanted columns, the rows' tracks and their truth, `size` rows at a time."""
         any_row = False
         while True:
             lines, values, tracks = self._some(size)
             if not lines:
                 break
             any_row = True
-            array = np.array(values, dtype=float).reshape(-1, len(self.wanted))
+            table = np.array(values, dtype=float).reshape(-1, len(self.wanted) + len(self.true))
+            array, truth = table[:, : len(self.wanted)], table[:, len(self.wanted) :]
             self._judge(array, lines)
             self._in_order(array[:, 0], lines, tracks)
             if not self.faults:
-                yield dict(zip(self.wanted, array.T.copy(), strict=True)), None if self.track is None else tracks
+                yield Piece(
+                    dict(zip(self.wanted, array.T.copy(), strict=True)),
+                    None if self.track is None else tracks,
+                    dict(zip(self.true, truth.T.copy(), strict=True)),
+                )
         if not any_row and not self.faults:
             self.faults.append(f"{self.path}: has no rows")
         if not self.faults and not self.measured:
@@ -157,8 +173,10 @@ class _Reader:
         """The wanted numbers of a row; faults are noted and stand as not-a-number."""
         if len(row) != self.width:
             self.faults.append(f"{self.path}:{line}: must have {self.width} cells as the header, got {len(row)}")
-            return [math.nan] * len(self.wanted)
-        return [self._number(row[p].strip(), line, p, name) for name, p in zip(self.wanted, self.places, strict=True)]
+            return [math.nan] * (len(self.wanted) + len(self.true))
+        wanted = zip(self.wanted, self.places, strict=True)
+        measured = [self._number(row[place].strip(), line, place, name) for name, place in wanted]
+        return [*measured, *(_number_or_missing(row[place]) for place in self.true.values())]
 
     def _number(self, text: str, line: int, place: int, name: str) -> float:
         if not text and name != "t_s":
@@ -173,6 +191,15 @@ class _Reader:
             self.faults.append(f"{where}: must be a finite number, got {text[:60]!r}{hint}")
             return math.nan
         return value
+
+
+def _number_or_missing(text: str) -> float:
+    """A number of a column that is only compared with, not-a-number where it is none."""
+    try:
+        value = float(text)
+    except ValueError:
+        return math.nan
+    return value if abs(value) <= LARGEST else math.nan
 
 
 def grouped(names: Sequence[str]) -> dict[str, np.ndarray]:

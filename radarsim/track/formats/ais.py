@@ -30,6 +30,15 @@ MOST_OPEN = 100  # messages of several sentences that wait for their end
 LEAST_GOOD = 0.5  # of the sentences; a file with fewer is no AIS
 
 
+def sound(sentence: bytes) -> bool:
+    """Whether a sentence has the sum that it states after its asterisk: the exclusive or of all its characters."""
+    body, star, stated = sentence[1:].partition(b"*")
+    total = 0
+    for byte in body:
+        total ^= byte
+    return bool(star) and stated[:2].upper() == b"%02X" % total
+
+
 class Ais:
     """A file of AIS sentences; class A and B reports of position are read, all others passed over."""
 
@@ -49,11 +58,11 @@ class Ais:
         gathered, damaged, first = Gathered(POSITIONS, POSITION_COLUMNS), 0, ""
         for number, line in enumerate(self.file, start=1):
             sentence = SENTENCE.search(line)
-            if not sentence:
-                if line.strip() and not line.lstrip().startswith((b"#", b"$")):
-                    damaged, first = damaged + 1, first or f"{self.path}:{number}"
+            if not sentence and (not line.strip() or line.lstrip().startswith((b"#", b"$"))):
                 continue
             try:
+                if not sentence or not sound(sentence[0]):
+                    raise AISBaseException
                 message = self._decoded(sentence[0])
             except AISBaseException:
                 damaged, first = damaged + 1, first or f"{self.path}:{number}"
@@ -114,6 +123,9 @@ class Ais:
         latitude, longitude = getattr(message, "lat", None), getattr(message, "lon", None)
         if latitude is None or longitude is None or message.msg_type not in (1, 2, 3, 18, 19):
             self._skip("messages that are no ship's position")
+            return
+        if None in (message.second, message.speed, message.course):
+            self._skip("messages cut short")
             return
         second = int(message.second)
         if abs(latitude) > 90 or abs(longitude) > 180 or (math.isnan(stated) and second >= NO_SECOND):

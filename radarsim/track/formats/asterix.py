@@ -462,11 +462,5 @@ class Asterix:
 
 
 def looks_like(head: bytes) -> bool:
-    """Whether a file that begins so may be ASTERIX: data blocks, one after the other, of categories that there are."""
-    at = blocks = 0
-    while at + 3 <= len(head) and blocks < 20:
-        length = int.from_bytes(head[at + 1 : at + 3], "big")
-        if head[at] == 0 or length < 4:
-            return False
-        at, blocks = at + length, blocks + 1
-    return blocks > 0 and head[0] in (*READ, 34, 8, 20, 21)
+    """Whether a file that begins so may be ASTERIX: a data block at least, of a category that radars send."""
+    return len(head) >= 4 and head[0] in (*READ, 8, 20, 21, 34) and int.from_bytes(head[1:3], "big") >= 4

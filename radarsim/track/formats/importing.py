@@ -350,7 +350,8 @@ class _Truth:
         self.matched += int(known.sum())
         seen = described(states[:, :3])
         radial = np.einsum("ni,ni->n", states[:, :3], states[:, 3:]) / seen["range_m"]
-        columns = {"range_m": seen["range_m"], "bearing_rad": seen["bearing_rad"], "velocity_mps": radial}
+        # Named as the components of the studies' filters are.
+        columns = {"r_m": seen["range_m"], "Vr_mps": radial, "b_rad": seen["bearing_rad"]}
         columns |= dict(zip((*LOCAL, *SPEEDS), states.T, strict=True))
         return {f"true_{name}": column for name, column in columns.items()}
 

@@ -1,0 +1,526 @@
+"""Recordings become plots: files made here byte by byte from the specifications, and read back to the last step."""
+
+import csv
+import io
+import math
+import struct
+
+import numpy as np
+import pytest
+
+from radarsim.errors import ConfigError
+from radarsim.track.formats.importing import Options, import_recording
+from radarsim.track.formats.records import Unrolled
+from radarsim.track.formats.site import Antenna, Site, biconical, described
+from radarsim.track.formats.text import split
+
+pytest.importorskip("asterix.base", reason="libasterix is not installed")
+NM, STEP = 1852.0, 2 * math.pi / 65536
+PLAIN = Options()
+SITE = Site(52.3, 4.76, 12.0)
+
+
+def block(category, *records):
+    """A data block: category, length, records."""
+    data = b"".join(records)
+    return bytes([category]) + struct.pack(">H", len(data) + 3) + data
+
+
+def plot_048(time=100.0, rho=12800, theta=5000, **more):
+    """A record of category 048: field specification and items 010, 140, 020, 040, then those that are given.
+
+    time in s; rho in 1/256 NM and theta in 2**-16 turns as they stand in the file; level in 1/4 flight levels; address,
+    track; calculated Doppler speed and (raw speed, span, MHz).
+    """
+    items = {1: b"\x19\x0a", 2: round(time * 128).to_bytes(3, "big"), 3: b"\x21\x00", 4: struct.pack(">HH", rho, theta)}
+    if "level" in more:
+        items[6] = struct.pack(">H", more["level"] & 0x3FFF | more.get("invalid", 0) << 15)
+    if "address" in more:
+        items[8] = more["address"].to_bytes(3, "big")
+    if "comment" in more:  # item 250: a number of blocks of eight bytes, here of zeros
+        items[10] = bytes([more["comment"]]) + bytes(8 * more["comment"])
+    if "track" in more:
+        items[11] = struct.pack(">H", more["track"])
+    if "calculated" in more:
+        items[20] = b"\x80" + struct.pack(">H", more["calculated"] & 0x3FF | more.get("doubtful", 0) << 15)
+    if "raw" in more:
+        first = items.get(20, b"")[1:]
+        parts = 0xC0 if first else 0x40
+        items[20] = bytes([parts]) + first + b"\x01" + struct.pack(">hHH", *more["raw"])
+    return specified(items)
+
+
+def specified(items):
+    """Items by their numbers, after the field specification that names them."""
+    size = (max(items) + 6) // 7
+    bits = [[number in items for number in range(7 * i + 1, 7 * i + 8)] for i in range(size)]
+    head = bytes(sum(bit << (7 - j) for j, bit in enumerate(own)) | (i < size - 1) for i, own in enumerate(bits))
+    return head + b"".join(items[number] for number in sorted(items))
+
+
+def position_062(time, latitude, longitude, **more):
+    """A record of category 062: 010, 070, 105, and speeds, track, address, geometric height (ft)."""
+    items = {
+        1: b"\x19\x01",
+        4: round(time * 128).to_bytes(3, "big"),
+        5: struct.pack(">ii", round(latitude * 2**25 / 180), round(longitude * 2**25 / 180)),
+    }
+    if "speeds" in more:
+        items[7] = struct.pack(">hh", *(round(4 * speed) for speed in more["speeds"]))
+    if "address" in more:
+        items[11] = b"\x80" + more["address"].to_bytes(3, "big")
+    if "track" in more:
+        items[12] = struct.pack(">H", more["track"])
+    if "height_ft" in more:
+        items[18] = struct.pack(">h", round(more["height_ft"] / 6.25))
+    return specified(items)
+
+
+def imported(tmp_path, data, options=PLAIN, name="recording"):
+    """What was done, and the columns that were written: numbers, and the tracks' names."""
+    source, output = tmp_path / name, tmp_path / "plots.csv"
+    source.write_bytes(data)
+    done = import_recording(source, output, options)
+    lines = output.read_text().splitlines()
+    rows = list(csv.DictReader(io.StringIO("\n".join(line for line in lines if not line.startswith("#")))))
+    columns = {key: np.array([float(row[key] or "nan") for row in rows]) for key in rows[0] if key != "track"}
+    return done, columns, [row["track"] for row in rows]
+
+
+def refused(tmp_path, data, options=PLAIN):
+    """The lines of the fault; nothing is written."""
+    source, output = tmp_path / "recording", tmp_path / "plots.csv"
+    source.write_bytes(data)
+    with pytest.raises(ConfigError) as caught:
+        import_recording(source, output, options)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["recording"]
+    return [line.replace(f"{tmp_path}/", "") for line in caught.value.lines]
+
+
+# ---- ASTERIX ---------------------------------------------------------------------------------------------------------
+
+
+def test_category_048_to_the_last_step(tmp_path):
+    rng = np.random.default_rng(1)
+    rho, theta = rng.integers(1, 65536, 200), rng.integers(0, 65536, 200)
+    time, level = np.sort(rng.integers(1, 2**23, 200)) / 128, rng.integers(-40, 2000, 200)
+    speed, span = rng.integers(-400, 400, 200), rng.integers(1, 900, 200)
+    records = [
+        plot_048(float(t), int(r), int(a), level=int(f), address=0x4CA123 + i, track=i, raw=(int(v), int(d), 2800))
+        for i, (t, r, a, f, v, d) in enumerate(zip(time, rho, theta, level, speed, span, strict=True))
+    ]
+    data = b"".join(block(48, *records[i : i + 7]) for i in range(0, 200, 7))
+    done, columns, tracks = imported(tmp_path, data, Options(zero="midnight"))
+    assert (done.format, done.records, done.rows) == ("asterix", 200, 200)
+    np.testing.assert_array_equal(columns["t_s"], time)
+    np.testing.assert_allclose(columns["range_m"], rho * NM / 256, rtol=1e-15)
+    np.testing.assert_allclose(columns["bearing_rad"], theta * STEP, rtol=1e-15)
+    np.testing.assert_allclose(columns["altitude_m"], level * 25 * 0.3048, rtol=1e-15)
+    np.testing.assert_array_equal(columns["velocity_mps"], speed)
+    np.testing.assert_array_equal(columns["span_mps"], span)
+    assert tracks == [str(i) for i in range(200)]
+
+
+def test_category_048_what_is_silent_is_empty(tmp_path):
+    records = [
+        plot_048(1, track=1),
+        plot_048(2, track=1, level=400, invalid=1, calculated=-300),
+        plot_048(3, track=1, calculated=200, doubtful=1),
+        plot_048(4, track=1, calculated=511, raw=(7, 30, 1000)),
+        plot_048(5, address=0xABCDEF),
+    ]
+    _, columns, tracks = imported(tmp_path, block(48, *records))
+    np.testing.assert_array_equal(columns["velocity_mps"], [np.nan, -300, np.nan, 7, np.nan])
+    np.testing.assert_array_equal(columns["span_mps"], [np.nan, np.nan, np.nan, 30, np.nan])
+    assert np.isnan(columns["altitude_m"]).all()
+    assert tracks == ["1", "1", "1", "1", "abcdef"]
+    np.testing.assert_array_equal(columns["t_s"], np.arange(5))
+
+
+def test_midnight_passes_and_other_categories_are_passed_over(tmp_path):
+    data = block(34, b"\x80\x19\x0a") + block(48, plot_048(86399.5, track=1)) + block(48, plot_048(3.5, track=1))
+    done, columns, _ = imported(tmp_path, data)
+    np.testing.assert_array_equal(columns["t_s"], [0, 4])
+    assert done.skipped == ["1 data blocks of category 034"]
+
+
+def test_category_001_takes_its_time_from_the_sectors(tmp_path):
+    """Plots carry 16 bits of 1/128 s, sector messages of category 002 the whole time of day."""
+
+    def plot(time, kind, **more):
+        items = {1: b"\x19\x0a", 2: bytes([kind << 7])}
+        place, truncated = struct.pack(">HH", 128 * 100, 8192), struct.pack(">H", round(time * 128) % 65536)
+        if kind:  # a track
+            return specified(items | {3: struct.pack(">H", more["track"]), 4: place, 9: truncated, 12: b"\xfe"})
+        return specified(items | {3: place, 7: truncated})
+
+    def sector(time):
+        return block(2, specified({1: b"\x19\x0a", 2: b"\x02", 4: round(time * 128).to_bytes(3, "big")}))
+
+    data = sector(40000.0) + block(1, plot(40001.0, 1, track=5), plot(40001.5, 0)) + sector(40448.0)
+    data += block(1, plot(40449.25, 1, track=5))
+    done, columns, tracks = imported(tmp_path, data, Options(zero="midnight"))
+    np.testing.assert_array_equal(columns["t_s"], [40001.0, 40001.5, 40449.25])
+    assert tracks == ["5", "", "5"]
+    np.testing.assert_allclose(columns["velocity_mps"], [-2 * NM / 256, np.nan, -2 * NM / 256])
+    assert any("belong to no track" in note for note in done.notes)
+
+
+def test_category_062_is_the_truth_of_the_plots_beside_it(tmp_path):
+    """An aircraft that flies straight north at 250 m/s, seen by a radar to its south."""
+    data, degree = b"", 111_250.0
+    for k in range(30):
+        data += block(62, position_062(4.0 * k, 53 + 1000.0 * k / degree, 4.76, address=0xA1, track=7, height_ft=30000))
+        if k % 2:
+            data += block(48, plot_048(4.0 * k - 1.5, 12800 + 137 * k, 40, address=0xA1, track=3, level=1200))
+    done, columns, tracks = imported(tmp_path, data, Options(site=SITE))
+    assert tracks == ["3"] * 15
+    assert done.notes[-1] == "truth: 15 of 15 plots"
+    height = 30000 * 0.3048
+    t = columns["t_s"] + 2.5
+    for half, names in ((0.0, ("x_m", "y_m", "z_m")), (2.0, ("vx_mps", "vy_mps", "vz_mps"))):
+        ends = [[local(53 + 250 * (s + sign * half) / degree, 4.76, height) for s in t] for sign in (-1, 1)]
+        wanted = np.subtract(*ends[::-1]) / (2 * half) if half else np.array(ends[0])
+        found = np.stack([columns[f"true_{name}"] for name in names], axis=-1)
+        # A step of the file's latitude is 0.6 m.
+        np.testing.assert_allclose(found, wanted, atol=0.6 if not half else 0.3)
+    np.testing.assert_allclose(np.sin(columns["true_b_rad"]), 0, atol=1e-5)
+
+
+FIRST = block(48, plot_048(1, track=1), plot_048(2, track=1, comment=2))
+SECOND = block(48, plot_048(3, track=1), plot_048(4, track=1))
+MUST = "must be a data block: category, length from 4 on, and as many bytes; got category 48"
+
+
+@pytest.mark.parametrize(
+    ("second", "place", "expected"),
+    [
+        (SECOND[:-4], len(FIRST), f"{MUST}, length {len(SECOND)}, {len(SECOND) - 4} bytes"),
+        (b"\x30\x00\x02" + SECOND[3:], len(FIRST), f"{MUST}, length 2, 3 bytes"),
+        (
+            block(48, b"\x01\x01\x01\x01\x80" + bytes(9)),
+            len(FIRST) + 3,
+            "an item of number 29, which the category has not",
+        ),
+        (block(48, plot_048(3, track=1)[:-1]), len(FIRST) + 3, "item 161 ends after the data block"),
+        (block(48, b"\xff"), len(FIRST) + 3, "a field specification that does not end"),
+    ],
+)
+def test_a_damaged_file_is_refused_with_its_place(tmp_path, second, place, expected):
+    (line,) = refused(tmp_path, FIRST + second)
+    assert line.startswith(f"recording: byte {place}")
+    assert expected in line
+    assert line.endswith("; 2 records were read before")
+
+
+def test_every_length_of_item_is_followed(tmp_path):
+    """Extended, repeated, compound and explicit items before the one that is read."""
+    items = {
+        1: b"\x19\x0a", 2: b"\x00\x32\x00", 3: b"\x21\x01\x00", 4: b"\x10\x00\x10\x00",
+        7: b"\xfe" + bytes(7),
+        10: b"\x02" + bytes(16), 11: b"\x00\x2a", 16: b"\x03\x05\x02", 20: b"\x40\x01" + bytes(6),
+        28: b"\x04\x01\x02\x03",
+    }  # fmt: skip
+    _, columns, tracks = imported(tmp_path, block(48, specified(items), plot_048(200, 4096, 0, track=9)))
+    assert tracks == ["42", "9"]
+    np.testing.assert_array_equal(columns["range_m"], 4096 * NM / 256)
+
+
+def test_a_clock_that_turns():
+    unrolled = Unrolled(60.0)
+    assert [unrolled(t) for t in (50, 58, 3, 59, 4, 30, 59, 1)] == [50, 58, 63, 59, 64, 90, 119, 121]
+
+
+# ---- positions -------------------------------------------------------------------------------------------------------
+
+ADSB = """time,icao24,lat,lon,velocity,heading,vertrate,callsign,onground,geoaltitude
+1700000000,a1b2c3,52.6,4.76,200,0,0,KLM1,False,9000
+1700000010,a1b2c3,52.618,4.76,200,0,0,KLM1,False,9000
+1700000010,0000ff,52.3,5.5,,,,,False,
+"""
+
+
+def cartesian(latitude_deg, longitude_deg, height_m):
+    """Earth-fixed coordinates, by the ellipsoid of WGS 84: a textbook's, apart from the library."""
+    a, f = 6378137.0, 1 / 298.257223563
+    e2, lat, lon = f * (2 - f), math.radians(latitude_deg), math.radians(longitude_deg)
+    n = a / math.sqrt(1 - e2 * math.sin(lat) ** 2)
+    flat = (n + height_m) * math.cos(lat)
+    return np.array([flat * math.cos(lon), flat * math.sin(lon), (n * (1 - e2) + height_m) * math.sin(lat)])
+
+
+def axes(latitude_deg, longitude_deg):
+    """North, up and east at a place, as rows."""
+    lat, lon = math.radians(latitude_deg), math.radians(longitude_deg)
+    up = [math.cos(lat) * math.cos(lon), math.cos(lat) * math.sin(lon), math.sin(lat)]
+    east = [-math.sin(lon), math.cos(lon), 0.0]
+    return np.array([np.cross(up, east), up, east])
+
+
+def local(*place):
+    """North, up and east of the radar."""
+    return axes(*SITE.place[:2]) @ (cartesian(*place) - cartesian(*SITE.place))
+
+
+def radial(latitude_deg, longitude_deg, height_m, north_mps):
+    """The radial velocity of one that moves north."""
+    line = cartesian(latitude_deg, longitude_deg, height_m) - cartesian(*SITE.place)
+    return north_mps * axes(latitude_deg, longitude_deg)[0] @ line / np.linalg.norm(line)
+
+
+def test_positions_are_seen_from_the_radar(tmp_path):
+    done, columns, tracks = imported(tmp_path, ADSB.encode(), Options(site=SITE))
+    assert (done.format, tracks) == ("opensky", ["a1b2c3", "a1b2c3", "0000ff"])
+    for i, place in enumerate([(52.6, 4.76, 9000), (52.618, 4.76, 9000), (52.3, 5.5, 0)]):
+        wanted = local(*place)
+        found, r = [columns[name][i] for name in ("x_m", "y_m", "z_m")], np.linalg.norm(wanted)
+        np.testing.assert_allclose(found, wanted, atol=1e-6)
+        assert columns["range_m"][i] == pytest.approx(r, rel=1e-12)
+        assert columns["level_elevation_rad"][i] == pytest.approx(math.asin(wanted[1] / r), abs=1e-12)
+    wanted = [radial(52.6, 4.76, 9000, 200), radial(52.618, 4.76, 9000, 200)]
+    np.testing.assert_allclose(columns["velocity_mps"][:2], wanted)
+    assert np.isnan(columns["velocity_mps"][2])
+    np.testing.assert_array_equal(columns["t_s"], [0, 10, 10])
+
+
+def test_a_ship_beyond_the_horizon_is_below_the_level(tmp_path):
+    _, columns, _ = imported(tmp_path, ADSB.encode(), Options(site=SITE, tracks=("0000ff",)))
+    r = columns["range_m"][0]
+    assert columns["y_m"][0] == pytest.approx(-(r**2) / (2 * 6.38e6) - 12, rel=0.01)
+
+
+def test_a_plot_of_known_height_is_placed_where_that_height_is():
+    """There and back, out to 400 km, from below the radar to 20 km."""
+    rng = np.random.default_rng(2)
+    n = 500
+    columns = {
+        "latitude_deg": rng.uniform(49.5, 55, n), "longitude_deg": rng.uniform(0, 9, n),
+        "altitude_m": rng.uniform(-50, 20e3, n), **{name: np.zeros(n) for name in ("east_mps", "north_mps", "up_mps")},
+    }  # fmt: skip
+    seen = SITE.seen(columns)
+    local = SITE.local(seen["range_m"], seen["bearing_rad"], columns["altitude_m"])
+    np.testing.assert_allclose(local, np.stack([seen[name] for name in ("x_m", "y_m", "z_m")], axis=-1), atol=0.2)
+    impossible = SITE.local(np.array([1000.0, 1000.0]), np.zeros(2), np.array([5000.0, np.nan]))
+    assert np.isnan(impossible[:, 1]).all()
+
+
+def test_the_angles_of_an_antenna_are_those_that_multimodel_takes(tmp_path):
+    antenna = Antenna(math.radians(10), math.radians(5))
+    local = np.array([[50e3, 4e3, 9e3], [-50e3, 4e3, 9e3]])
+    angles = biconical(local, antenna)
+    normal = np.array(
+        [math.cos(antenna[1]) * math.cos(antenna[0]), math.sin(antenna[1]), math.cos(antenna[1]) * math.sin(antenna[0])]
+    )
+    right = np.array([-math.sin(antenna[0]), 0, math.cos(antenna[0])])
+    unit = local[0] / np.linalg.norm(local[0])
+    assert angles["azimuth_rad"][0] == pytest.approx(math.asin(unit @ right), abs=1e-15)
+    assert angles["elevation_rad"][0] == pytest.approx(math.asin(unit @ np.cross(right, normal)), abs=1e-15)
+    assert np.isnan(angles["azimuth_rad"][1])
+    _, columns, _ = imported(tmp_path, ADSB.encode(), Options(site=SITE, antenna=antenna))
+    assert np.isfinite(columns["azimuth_rad"]).all()
+    done, columns, _ = imported(tmp_path, ADSB.encode(), Options(site=SITE, antenna=Antenna(math.pi / 2 + 0.1, 0.0)))
+    assert np.isnan(columns["azimuth_rad"]).tolist() == [True, True, False]
+    assert any("2 of 3 plots are behind the antenna" in note for note in done.notes)
+
+
+def test_ships_by_ais(tmp_path):
+    pyais = pytest.importorskip("pyais")
+    lines = []
+    for k in range(5):
+        report = {
+            "msg_type": 1,
+            "mmsi": 244660000,
+            "lat": 52.4 + 0.001 * k,
+            "lon": 4.3,
+            "speed": 12.0,
+            "course": 0.0,
+            "second": (50 + 10 * k) % 60,
+        }
+        (sentence,) = pyais.encode_dict(report, talker_id="AI")
+        lines.append(sentence)
+    stamped = [f"\\s:r3669961,c:{1700000000 + 10 * k}*00\\{line}" for k, line in enumerate(lines)]
+    dated = [f"2023-11-14T22:13:{20 + 7 * k}Z {line}" for k, line in enumerate(lines)]
+    for text, step in ((lines, 10), (stamped, 10), (dated, 7)):
+        done, columns, tracks = imported(tmp_path, "\n".join(text).encode(), Options(site=SITE))
+        assert (done.format, set(tracks)) == ("ais", {"244660000"})
+        np.testing.assert_allclose(columns["t_s"], step * np.arange(5))
+        assert columns["velocity_mps"][0] == pytest.approx(radial(52.4, 4.3, 0, 12 * NM / 3600))
+    imported(
+        tmp_path,
+        b"\n".join([lines[0].encode(), b"!AIVDM,1,1,,A,broken,0*00", *(x.encode() for x in lines[1:])]),
+        Options(site=SITE),
+    )
+    (tmp_path / "plots.csv").unlink()
+    (line,) = refused(tmp_path, b"!AIVDM,1,1,,A,broken,0*00\nnothing\n", Options(site=SITE))
+    assert "must be AIS sentences" in line
+
+
+# ---- tables ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_spreadsheet_with_its_own_names_and_units(tmp_path):
+    text = "Time,Slant Range [km],Azimuth (deg),Radial_velocity_kn,flight\n"
+    text += "2024-05-01T12:00:00Z,50,90,100,A\n2024-05-01T14:00:10+02:00,49.5,90,,A\n"
+    done, columns, tracks = imported(tmp_path, text.encode())
+    assert (done.format, tracks) == ("csv", ["A", "A"])
+    np.testing.assert_allclose(columns["range_m"], [50e3, 49.5e3])
+    np.testing.assert_allclose(columns["bearing_rad"], math.pi / 2)
+    np.testing.assert_allclose(columns["velocity_mps"], [100 * NM / 3600, np.nan])
+    np.testing.assert_array_equal(columns["t_s"], [0, 10])
+
+
+def test_names_and_units():
+    assert [split(name) for name in ("Range [km]", "range_km", "Azimuth (deg)", "time", "slant range", "t_s")] == [
+        ("range", "km"), ("range", "km"), ("azimuth", "deg"), ("time", ""), ("slant_range", ""), ("t", "s"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a,b\n1,2\n", "recording:1: must have columns of time, and of latitude and longitude or of range"),
+        ("time,range\n1,x\n2,3\n3,y\n", "recording:2:2: range: must be a number, got 'x'"),
+        ("time,range\nnoon,5\n", "recording:2:1: time: must be a time in s or ISO 8601, got 'noon'"),
+        ("time,range\n1\n", "recording:2: must have 2 cells as the header, got 1"),
+        ("time,range_parsec\n1,2\n", "recording:1: must have columns of time"),
+        ("time,range [parsec]\n1,2\n", "the unit must be one of m, s, mps"),
+        ("time,lat,lon\n1,95,4\n", "recording:2:2: lat: must be from -90 to 90 degrees, got 95"),
+        ("time,range\n,\n", "has no plots; 1 records were read (1 records without time or position passed over)"),
+        ("", "recording: is empty"),
+        ("hello\n", "must be a recording in one of asterix, opensky, ais, csv"),
+    ],
+)
+def test_faults_of_tables(tmp_path, text, expected):
+    assert expected in refused(tmp_path, text.encode(), Options(site=SITE))[0]
+
+
+def test_all_faults_of_a_table_at_once(tmp_path):
+    assert len(refused(tmp_path, b"time,range\n1,x\n2,3\n3,y\n")) == 2
+
+
+def test_positions_need_a_radar(tmp_path):
+    (line,) = refused(tmp_path, ADSB.encode())
+    assert line.startswith("at: must say where the radar stands, LAT,LON,HEIGHT")
+
+
+def test_a_column_named_by_hand(tmp_path):
+    text = b"when,d1,d2\n1,100,200\n2,101,201\n"
+    columns = {"t_s": "when", "range_m": "d2"}
+    assert imported(tmp_path, text, Options(columns=columns))[1]["range_m"].tolist() == [200, 201]
+    (line,) = refused_again(tmp_path, text, Options(columns={"range_m": "d3"}))
+    assert "must name a column of when, d1, d2" in line
+
+
+def refused_again(tmp_path, data, options):
+    """As `refused`, in a folder that holds an earlier output, which stays as it was."""
+    before = (tmp_path / "plots.csv").read_bytes()
+    with pytest.raises(ConfigError) as caught:
+        import_recording(tmp_path / "recording", tmp_path / "plots.csv", options)
+    assert (tmp_path / "plots.csv").read_bytes() == before
+    return list(caught.value.lines)
+
+
+# ---- all -------------------------------------------------------------------------------------------------------------
+
+
+def test_an_unknown_track_names_those_there_are(tmp_path):
+    (line,) = refused(tmp_path, block(48, plot_048(1, track=4), plot_048(2, track=8)), Options(tracks=("5",)))
+    assert line == "recording: track: must be one of 4, 8; got 5"
+
+
+def test_rows_that_are_not_later_are_left_out(tmp_path):
+    done, columns, _ = imported(tmp_path, block(48, *(plot_048(t, track=1) for t in (1, 2, 2, 3))))
+    np.testing.assert_array_equal(columns["t_s"], [0, 1, 2])
+    assert done.skipped == ["1 rows not later than the one before of their track"]
+
+
+@pytest.mark.parametrize("span", [0, 60])
+def test_a_doppler_speed_of_the_other_sign_is_seen(tmp_path, span):
+    """A target that leaves at 100 m/s, its speed counted as positive for approach; folded into 60 m/s and not."""
+    speed = -100 if not span else 20
+    more = {"raw": (speed, span, 3000)} if span else {"calculated": speed}
+    records = [plot_048(4 * k, 12800 + round(4 * k * 100 / NM * 256), track=1, **more) for k in range(1, 60)]
+    done, *_ = imported(tmp_path, block(48, *records))
+    assert any("give --doppler-towards" in note for note in done.notes)
+    done, columns, _ = imported(tmp_path, block(48, *records), Options(towards=True))
+    assert not done.notes
+    np.testing.assert_array_equal(columns["velocity_mps"], -speed)
+
+
+def test_described_is_textbook():
+    seen = described(np.array([[3.0, 12.0, 4.0], [-1.0, 0.0, -1.0]]))
+    np.testing.assert_allclose(seen["range_m"], [13, math.sqrt(2)])
+    np.testing.assert_allclose(seen["bearing_rad"], [math.atan2(4, 3), 1.25 * math.pi])
+    np.testing.assert_allclose(seen["level_elevation_rad"], [math.asin(12 / 13), 0])
+
+
+def spoiled(rng, data):
+    """The data with some bytes changed, cut out or doubled."""
+    data = bytearray(data)
+    for _ in range(rng.integers(1, 6)):
+        at = int(rng.integers(len(data)))
+        match rng.integers(4):
+            case 0:
+                data[at] = rng.integers(256)
+            case 1:
+                del data[at : at + int(rng.integers(1, 20))]
+            case 2:
+                data[at:at] = data[at : at + int(rng.integers(1, 20))]
+            case _:
+                data[at:at] = bytes(rng.integers(0, 256, int(rng.integers(1, 8))).tolist())
+        if not data:
+            return b"0"
+    return bytes(data)
+
+
+def recordings():
+    """A small sound file of each format."""
+    records = [plot_048(t, 12800 + t, 40, level=1200, track=3, address=0xA1, raw=(5, 60, 3000)) for t in range(1, 20)]
+    positions = [position_062(t, 53 + t / 1000, 4.76, address=0xA1, track=7, height_ft=3e4) for t in range(20)]
+    yield block(62, *positions) + block(48, *records)
+    yield block(2, b"\x10\x00\x10\x00") + block(1, b"\x80\x19\x0a") + block(48, *records)
+    yield ADSB.encode()
+    yield b"time,range_km,azimuth\n1,50,20\n2,51,21\n"
+    yield b"!AIVDM,1,1,,A,13HOI:0P0000VOHLCnHQKwvL05Ip,0*23\n" * 3
+    yield (
+        b"!AIVDM,2,1,3,B,55P5TL01VIaAL@7WKO@mBplU@<PDhh000000001S;AJ::4A80?4i@E53,0*3E\n"
+        b"!AIVDM,2,2,3,B,1@0000000000000,2*55\n!AIVDM,1,1,,A,13HOI:0P0000VOHLCnHQKwvL05Ip,0*23\n"
+    )
+
+
+def fault_of(source, output):
+    """The fault that a recording is refused with; none of a sound one."""
+    try:
+        import_recording(source, output, Options(site=SITE))
+    except ConfigError as fault:
+        return fault
+    return None
+
+
+def fuzz(tmp_path, count, seed):
+    """Spoiled files of every format: a fault in one line or a file that is whole, never anything else."""
+    rng, source, output = np.random.default_rng(seed), tmp_path / "recording", tmp_path / "plots.csv"
+    sound = list(recordings())
+    refusals = 0
+    for i in range(count):
+        source.write_bytes(spoiled(rng, sound[i % len(sound)]))
+        output.unlink(missing_ok=True)
+        fault = fault_of(source, output)
+        if fault:
+            refusals += 1
+            assert all("\n" not in line for line in fault.lines)
+            assert not output.exists()
+        else:
+            lines = output.read_text().splitlines()
+            assert len({line.count(",") for line in lines if not line.startswith("#")}) == 1
+        assert len(list(tmp_path.iterdir())) <= 2
+    assert 0 < refusals < count
+
+
+def test_spoiled_files(tmp_path):
+    fuzz(tmp_path, 300, 1)
+
+
+@pytest.mark.slow
+def test_many_spoiled_files(tmp_path):
+    fuzz(tmp_path, 10_000, 2)
