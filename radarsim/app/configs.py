@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from radarsim.config import load as reading
-from radarsim.config import lookup, own
+from radarsim.config import lookup
 from radarsim.config.experiment import Experiment
 from radarsim.config.fields import Model
 from radarsim.errors import ConfigError
@@ -44,6 +44,8 @@ def new(name: str, like: str | os.PathLike[str], folder: str | os.PathLike[str] 
 
     Raises ConfigError where it is there already, StoreError where it cannot be written.
     """
+    from radarsim.config import own
+
     name, text = own.new(name, like, registry)
     path = Path(folder) / name
     try:

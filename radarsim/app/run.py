@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from radarsim.app import arguments, simulation, stored_claims
 from radarsim.app.configs import load
@@ -28,8 +28,10 @@ from radarsim.engine.results import CaseResult
 from radarsim.engine.stopping import Signals, Stop
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.report import files
-from radarsim.report.claims import PaperClaims
 from radarsim.studies import registry
+
+if TYPE_CHECKING:
+    from radarsim.report.claims import PaperClaims
 
 
 def load_all(sources: Sequence[str | os.PathLike[str]], overrides: Sequence[str] = ()) -> list[Experiment]:
@@ -293,7 +295,7 @@ def finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def papers() -> list[PaperClaims]:
+def papers() -> "list[PaperClaims]":
     """The claims of every paper, in the order of the studies."""
     return [of for of in registry.parts(lambda study: study.claims()).values() if of is not None]
 
