@@ -42,13 +42,14 @@ GROUND = ("errors", "kernels", "physics", *CASE)
 KEYS = ("errors", "config.faults", "config.fields", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
-SHOWN = (*SUMS, "tables", "figures", "map")
+SHOWN = (*SUMS, "cost", "tables", "figures", "map")
 READ = (*SHOWN, "words", "claims", "measures")
 ROLES = {
     "kernels": (("kernels",), ("kernels",)),
     "config": (KEYS, ("config",)),
     "design": ((*GROUND, *DATA, "studies.noise"), DESIGN),  # world, filters, exact, and whatever else prepares numbers
     "study": ((*GROUND, *DATA, "studies.noise"), SUMS),
+    "cost": ((*GROUND, *DATA), (*SUMS, "cost")),
     "tables": ((*GROUND, *DATA, "report"), SHOWN),
     "figures": ((*GROUND, *DATA, "report"), SHOWN),
     "words": ((*GROUND, *DATA, "report"), READ),

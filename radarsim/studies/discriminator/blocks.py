@@ -75,7 +75,7 @@ class Tables:
         starts, drawn = np.append(0, ends[:-1]), self.sums[:, : ends[-1]]
         count = np.diff(self.edges[: ends[-1] + 1])
 
-        def mean(x):
+        def mean(x: np.ndarray) -> np.ndarray:
             return np.add.reduceat(count * x, starts) / np.add.reduceat(count, starts)
 
         joined = np.repeat(np.arange(len(ends)), ends - starts)

@@ -1,10 +1,13 @@
 """Keys of the discriminator study (P4): a burst, its echo, a forecast, estimators of Doppler and its derivatives."""
 
+from collections.abc import Iterator
+from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
 from radarsim.config.fields import (
+    At,
     Design,
     Display,
     Flag,
@@ -15,11 +18,11 @@ from radarsim.config.fields import (
     Positive,
     Scenario,
     Study,
+    Whole,
     at,
     cross_check,
     of_each,
     unique_names,
-    whole,
 )
 
 MOST_SAMPLES = 1_000_000
@@ -36,7 +39,7 @@ class Burst(Model):
     pulse_period_s: Positive = Field(description="time from pulse to pulse, s")
     pulse_length_s: Positive = Field(description="length of a pulse, s")
     sampling_period_s: Positive = Field(description="time from sample to sample inside a pulse, s")
-    pulses: whole(FEWEST_PULSES, MOST_SAMPLES) = Field(description="number of pulses")
+    pulses: Annotated[int, Whole(FEWEST_PULSES, MOST_SAMPLES)] = Field(description="number of pulses")
     amplitude: Positive = Field(description="amplitude of the echo, in the samples' unit")
     noise_variance: Positive = Field(
         description="variance of the white noise in each real number sampled, in the samples' unit squared"
@@ -44,12 +47,12 @@ class Burst(Model):
     samples: Literal["real", "complex"] = Field("real", description="what the receiver gives")
 
     @cross_check
-    def _pulses_fit(self):
+    def _pulses_fit(self) -> Iterator[At]:
         if self.pulse_length_s > self.pulse_period_s:
             yield at("pulse_length_s", "must be at most the pulse period")
 
     @cross_check
-    def _few_samples(self):
+    def _few_samples(self) -> Iterator[At]:
         if self.pulses * self.pulse_length_s / self.sampling_period_s > MOST_SAMPLES:
             yield at("sampling_period_s", f"the burst has over {MOST_SAMPLES} samples")
 
@@ -72,23 +75,21 @@ class Truth(Model):
     velocities_mps: Annotated[tuple[Number, ...], Field(min_length=2, max_length=100)] | None = Field(
         None, description="radial velocity at these instants, towards the radar positive, m/s"
     )
-    derivatives: whole(0, MOST_DERIVATIVES) = Field(
+    derivatives: Annotated[int, Whole(0, MOST_DERIVATIVES)] = Field(
         3, description="with a velocity profile: derivatives of the Doppler frequency that are estimated"
     )
 
     @cross_check
-    def _one_kind(self):
-        profile = self.times_s is not None and self.velocities_mps is not None
-        if profile == (self.doppler_derivatives is not None):
+    def _one_kind(self) -> Iterator[At]:
+        times, velocities = self.times_s, self.velocities_mps
+        if (times is not None and velocities is not None) == (self.doppler_derivatives is not None):
             yield at("doppler_derivatives", "give either doppler_derivatives or times_s and velocities_mps")
-        elif profile and len(self.times_s) != len(self.velocities_mps):
+        elif times is not None and velocities is not None and len(times) != len(velocities):
             yield at("velocities_mps", "must have as many values as times_s")
 
     @cross_check
-    def _times_rise(self):
-        if self.times_s is not None and (
-            self.times_s[0] != 0 or any(b <= a for a, b in zip(self.times_s, self.times_s[1:], strict=False))
-        ):
+    def _times_rise(self) -> Iterator[At]:
+        if self.times_s is not None and (self.times_s[0] != 0 or any(b <= a for a, b in pairwise(self.times_s))):
             yield at("times_s", "must begin with 0 and rise")
 
     @property
@@ -113,14 +114,14 @@ class Prior(Model):
     )
 
     @cross_check
-    def _one_kind(self):
+    def _one_kind(self) -> Iterator[At]:
         if (self.spread_over_potential is None) == (self.sigma is None):
             yield at("spread_over_potential", "give either spread_over_potential or sigma")
 
     @property
     def given(self) -> tuple[float, ...]:
         """Whichever is given."""
-        return self.spread_over_potential if self.sigma is None else self.sigma
+        return self.sigma or self.spread_over_potential or ()
 
 
 class Estimator(Model):
@@ -141,16 +142,22 @@ class Estimator(Model):
     minimum_energy_ratio: NonNegative = Field(
         0.0, description="energy ratio μ_min of (17), below which no window begins; 0: none"
     )
-    density: whole(1, 10) = Field(1, description="windows for each designed one; 2: one at each geometric mean between")
-    first_windows: whole(1, MOST_WINDOWS) | None = Field(None, description="stop after so many windows; default: all")
+    density: Annotated[int, Whole(1, 10)] = Field(
+        1, description="windows for each designed one; 2: one at each geometric mean between"
+    )
+    first_windows: Annotated[int, Whole(1, MOST_WINDOWS)] | None = Field(
+        None, description="stop after so many windows; default: all"
+    )
     start: Literal["prior", "truth"] = Field("prior", description="where the first window starts")
-    phases: whole(0, 64) = Field(0, description="phases tried in the first window; 0: the phase in closed form")
-    steps: whole(1, 1000) = Field(40, description="scoring steps in a window, at most")
+    phases: Annotated[int, Whole(0, 64)] = Field(
+        0, description="phases tried in the first window; 0: the phase in closed form"
+    )
+    steps: Annotated[int, Whole(1, 1000)] = Field(40, description="scoring steps in a window, at most")
     tolerance: Positive = Field(1e-3, description="ε: step, in standard deviations, that ends a window")
     coherence_step: Flag = Field(
         False, description="let steps heed the coherence: far from the maximum the curvature is less than Fisher's"
     )
-    search_points: whole(0, 10) = Field(
+    search_points: Annotated[int, Whole(0, 10)] = Field(
         0, description="cure at a hand-over: points on each side along the leading direction of R_Δ; 0: none"
     )
     search_spacing_rad: Positive = Field(0.8, description="distance of these points, rms over the window, rad")
@@ -162,8 +169,8 @@ class Estimator(Model):
     )
 
     @cross_check
-    def _rises(self):
-        if self.schedule != "designed" and any(b <= a for a, b in zip(self.schedule, self.schedule[1:], strict=False)):
+    def _rises(self) -> Iterator[At]:
+        if self.schedule != "designed" and any(b <= a for a, b in pairwise(self.schedule)):
             yield at("schedule", "window lengths must rise")
 
 
@@ -184,43 +191,43 @@ class Keys(Study):
         description="block_sums: exact sums over short blocks are drawn; samples: every step over every sample; "
         "demodulated: samples drawn and demodulated once; auto: block_sums where it is valid, else samples",
     )
-    blocks_per_window: Annotated[whole(4, 1000) | None, Design()] = Field(
+    blocks_per_window: Annotated[int | None, Whole(4, 1000), Design()] = Field(
         None,
         description="a block is a window over this; default: 20, or 24 where the Doppler frequency is near zero; "
         "32 for demodulated",
     )
 
     @cross_check
-    def _prior_fits(self):
+    def _prior_fits(self) -> Iterator[At]:
         size = self.truth.parameters
         if len(self.prior.given) != size:
             key = "spread_over_potential" if self.prior.sigma is None else "sigma"
             yield at(f"prior.{key}", f"must have {size} values: phase, Doppler frequency and {size - 2} derivatives")
 
     @cross_check
-    def _profile_fits(self):
+    def _profile_fits(self) -> Iterator[At]:
         if self.truth.times_s is not None and self.truth.times_s[-1] < self.burst.duration_s * (1 - 1e-9):
             yield at("truth.times_s", "must reach the end of the burst")
 
     @cross_check
-    def _estimators_fit(self):
+    def _estimators_fit(self) -> Iterator[At]:
         for check in (self._schedule_fits, self._ridge_fits, self._engine_fits):
             yield from of_each(self.estimators, check)
 
-    def _schedule_fits(self, i: int, estimator: Estimator):
+    def _schedule_fits(self, i: int, estimator: Estimator) -> Iterator[At]:
         if estimator.schedule != "designed" and estimator.schedule[-1] > self.burst.duration_s * (1 + 1e-9):
             yield at(f"estimators.{i}.schedule", "must not reach beyond the burst")
         fewest = self.truth.parameters
         if estimator.schedule != "designed" and estimator.schedule[0] < (fewest - 0.5) * self.burst.pulse_period_s:
             yield at(f"estimators.{i}.schedule", f"no window must be shorter than {fewest} pulses, one a parameter")
 
-    def _ridge_fits(self, i: int, estimator: Estimator):
+    def _ridge_fits(self, i: int, estimator: Estimator) -> Iterator[At]:
         if estimator.method == "ridge" and self.burst.pulse_length_s > 1.5 * self.burst.sampling_period_s:
             yield at(f"estimators.{i}.method", "ridge needs one sample a pulse")
         elif estimator.method == "ridge" and self.burst.pulses < 1024:
             yield at(f"estimators.{i}.method", "ridge needs at least 1024 pulses")
 
-    def _engine_fits(self, i: int, estimator: Estimator):
+    def _engine_fits(self, i: int, estimator: Estimator) -> Iterator[At]:
         if self.engine == "block_sums" and self.needs_samples(estimator):
             yield at("engine", f"block_sums cannot serve estimator {estimator.name}: it needs the samples")
 

@@ -2,12 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SYMBOLS = {
     "phi0": ("$|\\Delta\\varphi_0|$, rad", "phase"),
@@ -33,7 +38,7 @@ MOST_TICKS = 8
 SURE = 0.99
 
 
-def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
+def figures(results: Sequence[CaseResult], made: Mapping, experiment: Experiment) -> dict[str, Figure]:
     """residuals, locks and accuracy of each case without a sweep; a figure for each family of swept cases."""
     drawn: dict[str, Figure] = {}
 
@@ -64,7 +69,7 @@ def of_case(figure: Figure, case: str) -> Figure:
     return replace(figure, name=f"{figure.name}_{case}", title=f"{figure.title}, {case}")
 
 
-def numbers(values: Sequence[float]) -> tuple[tuple[float, str], ...]:
+def numbers(values: np.ndarray) -> tuple[tuple[float, str], ...]:
     """Ticks at whole numbers, every one or every few."""
     return tuple((v, f"{v:g}") for v in values[:: -(-len(values) // MOST_TICKS)])
 
@@ -146,7 +151,7 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
 def accuracy(result: CaseResult, made: Mapping) -> Figure:
     """σ of the locked over the bound with the prior, a panel for each estimator that locks."""
     rows = common.groups(made["curves"], "case", "filter", "component")
-    drawn = []
+    drawn: list[Panel] = []
     for name in result.axes.filters:
         marks: list = [Reference(1.0)]
         for n, (component, _) in enumerate(result.axes.components):
@@ -168,7 +173,7 @@ def accuracy(result: CaseResult, made: Mapping) -> Figure:
     return Figure("accuracy", "Accuracy of the locked bursts", caption, tuple(drawn), columns, PAGE_MM, 52.0)
 
 
-def final(made: Mapping, result: CaseResult, name: str):
+def final(made: Mapping, result: CaseResult, name: str) -> "pd.Series":
     """The row of locks at the last window of an estimator."""
     rows = made["locks"]
     return rows[(rows["case"] == result.name) & (rows["filter"] == name)].iloc[-1]
@@ -179,7 +184,8 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
     x = np.array([float(member.swept[0][1]) for member in members])
     if key == "lock_probability":
         x = 1.0 - x
-    order, marks = np.argsort(x), [Reference(SURE)]
+    order = np.argsort(x)
+    marks: list[Line | Reference] = [Reference(SURE)]
     for n, estimator in enumerate(members[0].axes.filters):
         ends = [final(made, members[i], estimator) for i in order]
         value, lo, hi = (np.array([row[c] for row in ends], float) for c in ("lock_rate", "lock_lo", "lock_hi"))
@@ -231,5 +237,7 @@ def region(keys: tuple[str, ...], members: Sequence[CaseResult], made: Mapping, 
         reach = np.minimum.accumulate(sure, axis=0).sum(axis=0)
         border = np.where(reach > 0, y[np.maximum(reach, 1) - 1], np.nan)
         marks.append(Line(x, border, estimator, Style(n, n % 4, n)))
-    axes = (Axis(KEYS.get(key, key), "log" if a.min() > 0 else "linear") for key, a in zip(keys, (x, y), strict=True))
-    return Panel(*axes, tuple(marks), f"locked in over {SURE:g}", direct=False)
+    across, up = (
+        Axis(KEYS.get(key, key), "log" if a.min() > 0 else "linear") for key, a in zip(keys, (x, y), strict=True)
+    )
+    return Panel(across, up, tuple(marks), f"locked in over {SURE:g}", direct=False)

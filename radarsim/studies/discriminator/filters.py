@@ -116,7 +116,7 @@ def estimators(
     windows = np.zeros((len(designs), max(len(d.windows) for d in designs)), WINDOW)
     options = np.zeros(len(designs), OPTIONS)
     for e, design in enumerate(designs):
-        for name in OPTIONS.names:
+        for name in OPTIONS.names or ():
             options[e][name] = len(design.windows) if name == "windows" else getattr(design, name)
         directions = handover_directions(designer, list(design.windows)) if design.search else None
         for k, pulses in enumerate(design.windows):

@@ -6,8 +6,6 @@ stretches of what is left, unwrapped, give the phase, and a least-squares polyno
 whole burst follows, in the kernels. The prior is used nowhere.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy import fft
 
@@ -19,22 +17,19 @@ ROUNDS = 4  # of fitting to the inliers
 SUMS = (150, 300)  # sums in which the demodulated burst is unwrapped, first coarse
 
 
-@dataclass(frozen=True)
 class Ridge:
     """Samples (n,), one a pulse, to phase coefficients (size,) in turns over the burst."""
 
-    pulses: int
-    size: int
-
-    def __post_init__(self) -> None:
-        starts = np.arange(0, self.pulses - STRETCH + 1, STRETCH // 2)
-        object.__setattr__(self, "stretches", starts[:, None] + np.arange(STRETCH))
-        object.__setattr__(self, "centres", (starts + 0.5 * (STRETCH - 1)) / self.pulses)
-        object.__setattr__(self, "t", np.arange(self.pulses) / self.pulses)
+    def __init__(self, pulses: int, size: int):
+        self.pulses, self.size = pulses, size
+        starts = np.arange(0, pulses - STRETCH + 1, STRETCH // 2)
+        self.stretches = starts[:, None] + np.arange(STRETCH)
+        self.centres = (starts + 0.5 * (STRETCH - 1)) / pulses
+        self.t = np.arange(pulses) / pulses
         # One stretch from each of as many equal parts of the burst as the polynomial has coefficients; fixed draws.
-        bounds = np.linspace(0, len(starts), self.size).astype(int)
-        draws = np.random.default_rng(1).random((TRIALS, self.size - 1))
-        object.__setattr__(self, "trials", bounds[:-1] + (draws * np.diff(bounds)).astype(int))
+        bounds = np.linspace(0, len(starts), size).astype(int)
+        draws = np.random.default_rng(1).random((TRIALS, size - 1))
+        self.trials = bounds[:-1] + (draws * np.diff(bounds)).astype(int)
 
     def __call__(self, samples: np.ndarray) -> np.ndarray:
         rough = self.from_frequencies(self.frequencies(samples))

@@ -119,6 +119,11 @@ class Designer:
 
         return form
 
+    def handover_excess(self, before_s: float) -> Callable[[float], float]:
+        """Condition (16) on the length of the window after one of before_s."""
+        form = self.handover(before_s)
+        return lambda after_s: excess(form(after_s).values, self.condition)
+
     def longest(self, criterion: Callable[[float], float], shortest_s: float) -> int:
         """Pulses of the longest window that meets a criterion: its root, rounded to the nearest whole pulse."""
         from scipy.optimize import brentq
@@ -141,10 +146,7 @@ class Designer:
             if len(sequence) == MOST_WINDOWS:
                 raise NoSchedule(f"it needs over {MOST_WINDOWS} windows")
             before = sequence[-1] * period
-            form = self.handover(before)
-            following = self.longest(
-                lambda after, form=form: excess(form(after).values, self.condition), before * (1.0 + 1e-9)
-            )
+            following = self.longest(self.handover_excess(before), before * (1.0 + 1e-9))
             sequence.append(max(following, sequence[-1] + 1))
         return sequence
 

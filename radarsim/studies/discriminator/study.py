@@ -14,6 +14,7 @@ from radarsim.studies.discriminator import exact
 from radarsim.studies.discriminator import filters as plans
 from radarsim.studies.discriminator import schedule as schedules
 from radarsim.studies.discriminator import world as model
+from radarsim.studies.discriminator.config import Estimator, Keys
 from radarsim.studies.discriminator.kernels import sequence as kernels
 from radarsim.studies.discriminator.kernels import strip as strips
 from radarsim.studies.discriminator.kernels import sums as sums_of
@@ -85,7 +86,7 @@ class Phase:
     theta: np.ndarray
 
 
-def burst_of(spec) -> model.Burst:
+def burst_of(spec: Keys) -> model.Burst:
     """The configured burst."""
     b = spec.burst
     return model.Burst(
@@ -100,20 +101,20 @@ def burst_of(spec) -> model.Burst:
     )
 
 
-def phase_of(spec, burst: model.Burst) -> Phase:
+def phase_of(spec: Keys, burst: model.Burst) -> Phase:
     """The configured truth."""
     t, truth = model.sample_times(burst, burst.pulses), spec.truth
     if truth.doppler_derivatives is not None:
         theta = np.array([truth.phase_rad, *truth.doppler_derivatives])
         turns = model.phase_turns(theta, t)
         return Phase(turns, turns, theta)
-    profile = model.VelocityProfile(truth.times_s, truth.velocities_mps)
+    profile = model.VelocityProfile(truth.times_s or (), truth.velocities_mps or ())
     turns = profile.phase_turns(t, burst.wavelength_m, truth.phase_rad)
     theta = model.fitted_parameters(turns, t, truth.parameters)
     return Phase(turns, model.phase_turns(theta, t), theta)
 
 
-def forecast(spec, burst: model.Burst) -> np.ndarray:
+def forecast(spec: Keys, burst: model.Burst) -> np.ndarray:
     """Standard deviations (size,) of the forecast as the estimators believe them."""
     given = np.array(spec.prior.given) * spec.prior.scale
     if spec.prior.sigma is None:
@@ -121,7 +122,7 @@ def forecast(spec, burst: model.Burst) -> np.ndarray:
     return given
 
 
-def windows_of(spec, burst: model.Burst, designer: schedules.Designer) -> list[list[int]]:
+def windows_of(spec: Keys, burst: model.Burst, designer: schedules.Designer) -> list[list[int]]:
     """Window lengths of every estimator in pulses; estimators of one condition are designed once."""
 
     @cache
@@ -142,7 +143,7 @@ def windows_of(spec, burst: model.Burst, designer: schedules.Designer) -> list[l
     return found
 
 
-def mode_of(spec) -> int:
+def mode_of(spec: Keys) -> int:
     """The engine: as configured, or block sums where every estimator can be served by them."""
     if spec.engine != "auto":
         return MODES[spec.engine]
@@ -211,7 +212,7 @@ def padded(values: np.ndarray, filling: float = 0.0) -> np.ndarray:
     return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, missing)], constant_values=filling)
 
 
-def design_of(estimator, windows: list[int]) -> plans.Design:
+def design_of(estimator: Estimator, windows: list[int]) -> plans.Design:
     """An estimator as the kernels' options."""
     return plans.Design(
         windows=tuple(windows),
@@ -228,7 +229,9 @@ def design_of(estimator, windows: list[int]) -> plans.Design:
     )
 
 
-def bounds(burst, windows, theta, sigma) -> tuple[np.ndarray, np.ndarray]:
+def bounds(
+    burst: model.Burst, windows: list[list[int]], theta: np.ndarray, sigma: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Potential spreads (F, K, size) of each window without and with the prior; ones where there is no window."""
     size, most = len(sigma), max(map(len, windows))
     shape = (len(windows), most, size)
@@ -245,7 +248,15 @@ def bounds(burst, windows, theta, sigma) -> tuple[np.ndarray, np.ndarray]:
     return potential, posterior
 
 
-def axes(spec, burst, windows, phase: Phase, sigma, potential, posterior) -> DiscriminatorAxes:
+def axes(
+    spec: Keys,
+    burst: model.Burst,
+    windows: list[list[int]],
+    phase: Phase,
+    sigma: np.ndarray,
+    potential: np.ndarray,
+    posterior: np.ndarray,
+) -> DiscriminatorAxes:
     """Labels: filters are the estimators, scans their windows; each has window lengths of its own."""
     names, size = tuple(e.name for e in spec.estimators), len(sigma)
     most = max(map(len, windows))

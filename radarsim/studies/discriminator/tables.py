@@ -1,6 +1,7 @@
 """P4's tables: curves of locked bursts, locks, windows, residuals, bounds, motion, passes."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,11 +12,14 @@ from radarsim.studies.discriminator import exact
 from radarsim.studies.discriminator.kernels.sums import LOCKS as COUNTED
 from radarsim.studies.discriminator.kernels.sums import bin_edges
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 WAVELENGTHS_M = (("metre", 1.8), ("decimetre", 0.15), ("centimetre", 0.03))  # P1's five radars have these three
 QUANTILES = (0.05, 0.5, 0.95)
 
 
-def tables(results: Sequence[CaseResult]) -> dict:
+def tables(results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
     """curves and gains in place of the common ones, and locks, windows, residuals, bounds, motion, passes."""
     return {
         "curves": curves(results),
@@ -32,7 +36,7 @@ def tables(results: Sequence[CaseResult]) -> dict:
 CURVES = (*common.CURVES, "sigma_all", "posterior_sigma")
 
 
-def curves(results: Sequence[CaseResult]):
+def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """σ of the locked bursts in place of the common table."""
     return common.joined([_curves(result) for result in results], CURVES)
 
@@ -70,7 +74,8 @@ def _labels(result: CaseResult, f: np.ndarray, k: np.ndarray, c: np.ndarray | No
 
 def _at_windows(result: CaseResult) -> tuple[np.ndarray, np.ndarray]:
     """Indices (filter, window) of all windows there are."""
-    return np.nonzero(result.axes.available[..., 0])
+    f, k = np.nonzero(result.axes.available[..., 0])
+    return f, k
 
 
 LOCKS = (

@@ -1,15 +1,20 @@
 """What P4's report says: the question of an experiment, and its answer in sentences."""
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 from radarsim.report import tables as common
 
+if TYPE_CHECKING:
+    import pandas as pd
 
-def question(experiment) -> str:
+
+def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
     names = list(dict.fromkeys(e.name for case in experiment.cases for e in case.spec.estimators))
     listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
@@ -52,12 +57,12 @@ def _over(results: Sequence[CaseResult], made: Mapping, name: str) -> str:
     return f"{name}: locked in {least} to {most}; {len(found)} cases of {panels.realisations(found)}."
 
 
-def _last(made: Mapping, result: CaseResult, name: str):
+def _last(made: Mapping, result: CaseResult, name: str) -> "pd.Series":
     """An estimator's row of locks at its last window."""
     return common.groups(made["locks"], "case", "filter")[(result.name, name)].iloc[-1]
 
 
-def _lock(row) -> str:
+def _lock(row: "pd.Series") -> str:
     """A share of bursts with its interval; of all or none the bound to as many digits as it has."""
     value, low, high = (100 * row[name] for name in ("lock_rate", "lock_lo", "lock_hi"))
     if 0 < value < 100:

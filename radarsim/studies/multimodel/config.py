@@ -1,12 +1,14 @@
 """Keys of the multimodel study (P2): a radar in biconical coordinates, a flight, filters with banks of motion
 models."""
 
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
 from radarsim.config.fields import (
+    At,
     DataFile,
     Design,
     Display,
@@ -20,10 +22,10 @@ from radarsim.config.fields import (
     Probability,
     Scenario,
     Study,
+    Whole,
     at,
     cross_check,
     unique_names,
-    whole,
 )
 
 MOST_SCANS = 100_000
@@ -61,7 +63,7 @@ class Sensor(Model):
     )
 
     @cross_check
-    def _one_frame(self):
+    def _one_frame(self) -> Iterator[At]:
         biconical = [self.sigma_range_m, self.sigma_elevation_rad, self.sigma_azimuth_rad]
         local = [self.sigma_x_m, self.sigma_y_m, self.sigma_z_m]
         if biconical.count(None) + local.count(None) != 3 or (None in biconical and None in local):
@@ -71,16 +73,17 @@ class Sensor(Model):
             )
 
     @cross_check
-    def _scans_in_order(self):
+    def _scans_in_order(self) -> Iterator[At]:
         if 2 * self.jitter_s >= self.scan_period_s:
             yield at("jitter_s", "must be under half the scan period")
 
     @property
     def sigma(self) -> tuple[float, float, float]:
         """Of range (m), elevation and azimuth (rad), or of x, y, z (m)."""
-        if self.sigma_range_m is None:
-            return self.sigma_x_m, self.sigma_y_m, self.sigma_z_m
-        return self.sigma_range_m, self.sigma_elevation_rad, self.sigma_azimuth_rad
+        biconical = (self.sigma_range_m, self.sigma_elevation_rad, self.sigma_azimuth_rad)
+        given = (*biconical, self.sigma_x_m, self.sigma_y_m, self.sigma_z_m)
+        first, second, third = (sigma for sigma in given if sigma is not None)  # by _one_frame
+        return first, second, third
 
 
 class Stage(Model):
@@ -97,20 +100,20 @@ class Target(Model):
     """What all targets share: the stages by which tables are made."""
 
     stages: Annotated[Stages, Design()] = Field(
-        (Stage(name="all"),), description="stages in order, the last without an end"
+        (Stage(name="all", end_s=None),), description="stages in order, the last without an end"
     )
 
     @property
-    def stage_ends_s(self) -> tuple[float | None, ...]:
+    def stage_ends_s(self) -> tuple[float, ...]:
         """Ends of all stages but the last, s from the first plot."""
-        return tuple(stage.end_s for stage in self.stages[:-1])
+        return tuple(stage.end_s for stage in self.stages if stage.end_s is not None)
 
     @cross_check
-    def _in_order(self):
+    def _in_order(self) -> Iterator[At]:
         ends = [stage.end_s for stage in self.stages]
         if None in ends[:-1] or ends[-1] is not None:
             yield at("stages", "all but the last need end_s, and only they")
-        elif any(b <= a for a, b in pairwise(ends[:-1])):
+        elif any(b <= a for a, b in pairwise(end for end in ends if end is not None)):
             yield at("stages", "must follow one another in time")
 
 
@@ -137,7 +140,7 @@ class Flight(Target):
     phases: Annotated[tuple[Phase, ...], Field(min_length=1, max_length=64)] = Field(description="phases, in order")
 
     @cross_check
-    def _phases_in_order(self):
+    def _phases_in_order(self) -> Iterator[At]:
         starts = [phase.start_s for phase in self.phases]
         if starts[0] != 0:
             yield at("phases.0.start_s", "must be 0")
@@ -145,7 +148,7 @@ class Flight(Target):
             yield at("phases", "must follow one another in time")
 
     @cross_check
-    def _moves(self):
+    def _moves(self) -> Iterator[At]:
         if self.velocity_mps == (0, 0, 0):
             yield at("velocity_mps", "must not be zero")
 
@@ -198,13 +201,13 @@ class Filter(Model):
     )
 
     @cross_check
-    def _family_fits(self):
+    def _family_fits(self) -> Iterator[At]:
         size = len(self.models)
         if self.family == "kalman" and size != 1:
             yield at("models", f"kalman has one model, got {size}; take imm, gpb1 or gpb2")
 
     @cross_check
-    def _transition_fits(self):
+    def _transition_fits(self) -> Iterator[At]:
         size = len(self.models)
         if len(self.transition) != size or any(len(row) != size for row in self.transition):
             yield at("transition", f"must be {size} rows of {size} probabilities, one for each model")
@@ -232,9 +235,9 @@ class Keys(Study):
     start_acceleration_mps2: Annotated[NonNegative, Design()] = Field(
         30.0, description="spread of the acceleration that the start of a track allows for, m/s²"
     )
-    scans: Annotated[whole(4, MOST_SCANS) | None, Design()] = Field(
+    scans: Annotated[int | None, Whole(4, MOST_SCANS), Design()] = Field(
         None, description="number of plots; default: to the end of the flight"
     )
-    report_every: Annotated[whole(1, MOST_SCANS), Design()] = Field(
+    report_every: Annotated[int, Whole(1, MOST_SCANS), Design()] = Field(
         1, description="tables and figures keep every such scan and the last; stages are made of all"
     )

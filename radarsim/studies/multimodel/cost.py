@@ -7,7 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from radarsim.studies.multimodel import filters
+from radarsim.studies.multimodel.config import Filter
 from radarsim.studies.multimodel.kernels.records import MODEL_NUMBERS, OUTPUT, PLOT, SIZE, START
+from radarsim.studies.multimodel.study import Plan
 
 # Additions, subtractions, multiplications, divisions, roots and exponentials of one step, all three axes, counted on
 # the formulas of `radarsim.kernels.symmetric` and `kernels.hypothesis` (a test counts them again); PREDICT, UPDATE by
@@ -32,13 +34,13 @@ def operations(family: str, transition: np.ndarray, accelerates: Sequence[bool])
     return float(advanced + likelihoods + predicted), MERGE, MERGE_ONCE
 
 
-def operations_of(options) -> tuple[float, float, float]:
+def operations_of(options: Filter) -> tuple[float, float, float]:
     """`operations` of a filter of a config."""
     accelerates = [filters.MOTIONS[model.motion][1] > 0 for model in options.models]
     return operations(options.family, filters.transition_matrix(options.transition), accelerates)
 
 
-def seconds_per_update(plan) -> dict[str, float]:
+def seconds_per_update(plan: Plan) -> dict[str, float]:
     """CPU seconds of one update of one realisation by filter, outputs included, noise, plots and sums not.
 
     The least of some passes over the first scans of the flight, in a thread of a pool as kernels run.
@@ -58,7 +60,7 @@ def seconds_per_update(plan) -> dict[str, float]:
     return {name: s / (WIDTH * (count - START)) for name, s in zip(plan.axes.filters, seconds, strict=True)}
 
 
-def _seconds(plan, f: int, found: np.ndarray, count: int) -> float:
+def _seconds(plan: Plan, f: int, found: np.ndarray, count: int) -> float:
     """CPU seconds of filter f over the scans after the start of its track."""
     from radarsim.kernels.lanes import rows
     from radarsim.studies.multimodel.kernels import hypothesis, strip

@@ -3,10 +3,11 @@ consistency."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 from radarsim.report import tables as common
@@ -14,6 +15,8 @@ from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Re
 from radarsim.studies.multimodel.filters import labels
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from radarsim.studies.multimodel.study import FlightAxes
 
 TIME = Axis(panels.TIME, limits=(0, None))
@@ -24,7 +27,9 @@ SPREAD = 0.5  # of the points of a stage, stages being one apart
 MOST_LOOKS = 8  # filters, each of a colour, dash and marker of its own
 
 
-def figures(results: Sequence[CaseResult], made: Mapping, experiment) -> dict[str, Figure]:
+def figures(
+    results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", experiment: Experiment
+) -> dict[str, Figure]:
     """All figures that these results can fill, by name; each shows the cases that the config names for it."""
 
     def chosen(name: str) -> list[CaseResult]:
@@ -64,7 +69,7 @@ def _styles(result: CaseResult) -> list[Style]:
     return [Style(RULES.index(of.merge), mark, mark) for of, mark in zip(options, marks, strict=True)]
 
 
-def _keys(result: CaseResult, **look) -> tuple[tuple[str, Style], ...]:
+def _keys(result: CaseResult, **look: Any) -> tuple[tuple[str, Style], ...]:
     """What the looks of many filters say: colours of rules, marks of families; look: how they differ from _styles."""
     styled = list(zip(result.spec.filters, _styles(result), strict=True))
     rules = {of.merge: replace(style, dash=0, marker=0) for of, style in styled}
@@ -74,7 +79,7 @@ def _keys(result: CaseResult, **look) -> tuple[tuple[str, Style], ...]:
     return tuple((label, replace(style, **look)) for label, style in named)
 
 
-def _beside(drawn: Sequence[Panel], result: CaseResult, **look) -> list[Panel]:
+def _beside(drawn: Sequence[Panel], result: CaseResult, **look: Any) -> list[Panel]:
     """Panels with one legend in a cell of its own; look: see `_keys`."""
     made = panels.in_legend(drawn)
     if _many(result):
@@ -127,7 +132,7 @@ def _stage_lines(results: Sequence[CaseResult]) -> tuple[Reference, ...]:
     return tuple(Reference(float(end), "x") for end in ends.pop()) if len(ends) == 1 else ()
 
 
-def sigma(results: Sequence[CaseResult], curves, component: str) -> Figure | None:
+def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str) -> Figure | None:
     """σ of height or climb against time on a logarithmic scale (figures 5 and 6), a panel for each case."""
     rows = common.groups(curves[curves["component"] == component], "case", "filter")
     words, unit = SIGMAS[component]
@@ -155,10 +160,10 @@ def sigma(results: Sequence[CaseResult], curves, component: str) -> Figure | Non
     return _several(f"sigma_{component}", f"σ of the {words.split(' $')[0]} (figure {number})", caption, drawn, 76)
 
 
-def probabilities(results: Sequence[CaseResult], table) -> Figure | None:
+def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure | None:
     """Mean probabilities of the models against time (figure 7), a panel for each filter of two or more models."""
     rows = common.groups(table, "case", "filter", "model")
-    drawn = []
+    drawn: list[Panel] = []
     for result in results:
         for name, options in zip(result.axes.filters, result.spec.filters, strict=True):
             if len(options.models) < 2 or len(drawn) >= panels.MOST:
@@ -241,7 +246,7 @@ def _unnamed(lines: Sequence) -> list:
     return [replace(line, label="", name=line.name or line.label) if isinstance(line, Line) else line for line in lines]
 
 
-def consistency(results: Sequence[CaseResult], table) -> Figure | None:
+def consistency(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure | None:
     """NEES and NIS per degree of freedom by stage of the first case shown, a line of points for each filter."""
     if not results:
         return None

@@ -9,6 +9,7 @@ from radarsim.engine.moments import Layout
 from radarsim.engine.results import Axes
 from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.studies.multimodel import filters
+from radarsim.studies.multimodel.config import Keys
 from radarsim.studies.multimodel.kernels import plots, records, sums
 from radarsim.studies.multimodel.world import intervals, plot_truth, sensor_frame, truth
 from radarsim.studies.noise import noise_key
@@ -50,7 +51,7 @@ class Plan:
     gaussian = False
 
 
-def banks(spec, times: np.ndarray) -> records.Banks:
+def banks(spec: Keys, times: np.ndarray) -> records.Banks:
     """The filters' arrays, padded to eights, for the different intervals times (U,) in s."""
     count = len(spec.filters)
     numbers, models = np.zeros((count, 8), dtype=np.int64), np.zeros((count, 16))
@@ -69,7 +70,7 @@ def banks(spec, times: np.ndarray) -> records.Banks:
     return records.Banks(numbers, models, transitions, probabilities)
 
 
-def stages(spec, t: np.ndarray, reported: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def stages(spec: Keys, t: np.ndarray, reported: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Stage of each scan (K,), and lengths (S, 2): scans of a stage from the third on, and the reported ones."""
     stage = np.searchsorted(np.array(spec.target.stage_ends_s), t, side="right").astype(np.int64)
     counted = np.arange(len(t)) >= records.START
@@ -103,7 +104,7 @@ def prepare(case: Case) -> Plan:
     return Plan(Layout(**shapes), axes(spec, t, x, reported, lengths), world, banks(spec, times))
 
 
-def axes(spec, t: np.ndarray, x: np.ndarray, reported: np.ndarray, lengths: np.ndarray) -> FlightAxes:
+def axes(spec: Keys, t: np.ndarray, x: np.ndarray, reported: np.ndarray, lengths: np.ndarray) -> FlightAxes:
     """Labels of the sums; nothing of this study is known exactly."""
     shape = (len(spec.filters), int(reported.sum()), records.STATES)
     names = tuple(f.name for f in spec.filters)

@@ -1,7 +1,7 @@
 """P2's own tables: probabilities of the models, stages of the flight, consistency, operations, cost."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,12 +13,14 @@ from radarsim.studies.multimodel import filters
 from radarsim.studies.multimodel.kernels.records import MERGED, MERGES, NEES, NIS
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from radarsim.studies.multimodel.study import FlightAxes
 
 FREEDOM = 3  # degrees of freedom of a position's or a plot's normalised error squared
 
 
-def tables(results: Sequence[CaseResult]) -> dict:
+def tables(results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
     """The tables beyond curves and gains: probabilities, stages, consistency, operations."""
     return {
         "probabilities": probabilities(results),
@@ -33,7 +35,7 @@ PROBABILITIES = (
 )
 
 
-def probabilities(results: Sequence[CaseResult]):
+def probabilities(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """Mean probability of each model by scan, with its interval; models count from 1 (contract: probabilities.csv)."""
     return common.joined([_probabilities(result) for result in results], PROBABILITIES)
 
@@ -67,7 +69,7 @@ STAGES = (
 )
 
 
-def stages(results: Sequence[CaseResult]):
+def stages(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """σ over each stage of the flight, of all its scans, and the paired gain against the baseline filter."""
     rows = [row for result in results for row in _stages(result)]
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(STAGES)})
@@ -115,7 +117,7 @@ def _stages(result: CaseResult) -> list[tuple]:
 CONSISTENCY = ("case", "filter", "stage", "n", *consistency.columns("nees"), *consistency.columns("nis"))
 
 
-def normalised_errors(results: Sequence[CaseResult]):
+def normalised_errors(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """NEES and NIS of each filter by stage, per degree of freedom, with bounds and verdicts.
 
     NEES of the position with the filter's own covariance, at the reported scans; NIS of the plot against what the
@@ -131,7 +133,7 @@ def _normalised_errors(result: CaseResult) -> dict[str, np.ndarray]:
     s = np.array([names.index(stage) for stage, *_ in stage_bounds(result)])
     filters = len(axes.filters)
     sums = np.asarray(result.sums["stage"])[:, s].reshape(filters * s.size, -1, 2)
-    found = {}
+    found: dict[str, np.ndarray] = {}
     for quantity, place in (("nees", NEES), ("nis", NIS)):
         total, square = sums[:, place, 0] / FREEDOM, sums[:, place, 1] / FREEDOM**2
         bounds = consistency.bounds_from_spread(total, square, n, len(sums))
@@ -149,7 +151,7 @@ def _normalised_errors(result: CaseResult) -> dict[str, np.ndarray]:
 OPERATIONS = ("case", "filter", "family", "merge", "models", "stage", "merged", "merges", "operations")
 
 
-def operations(results: Sequence["CaseResult[FlightAxes]"]):
+def operations(results: Sequence["CaseResult[FlightAxes]"]) -> "pd.DataFrame":
     """Arithmetic operations of one update of one realisation, counted: mean over the scans of each stage, and over all.
 
     merged: hypotheses that went into merges of more than one; merges: their number; both a scan.
@@ -169,7 +171,7 @@ def operations(results: Sequence["CaseResult[FlightAxes]"]):
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(OPERATIONS)})
 
 
-def cost(made: Mapping, run: Mapping):
+def cost(made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
     """Operations counted and nanoseconds measured of one update, with σ of the height by stage; None if not measured.
 
     run: the facts of the run, with `seconds_per_update`.

@@ -1,5 +1,6 @@
 """Recorded plots: the study's filters over them, and the plots of one simulated realisation as such a record."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from radarsim.kernels import random
 from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.studies.interface import RecordedPlots
 from radarsim.studies.multimodel import filters
+from radarsim.studies.multimodel.config import Filter, Keys
 from radarsim.studies.multimodel.kernels import strip as strips
 from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
 from radarsim.studies.multimodel.kernels.plots import NORMALS, STRIP
@@ -39,14 +41,14 @@ CHUNK = 4096  # recorded plots filtered at a time
 TESTED = (("plot", 3),)
 
 
-def plot_columns(spec) -> tuple[tuple[str, ...], ...]:
+def plot_columns(spec: Keys) -> tuple[tuple[str, ...], ...]:
     """The columns that `track` reads of a file of recorded plots."""
     if spec.sensor.sigma_range_m is None:
         return (("t_s", "x_m", "y_m", "z_m"),)
     return (("t_s", "range_m", "elevation_rad", "azimuth_rad"),)
 
 
-def sigmas(spec) -> dict[str, tuple[str, ...]]:
+def sigmas(spec: Keys) -> dict[str, tuple[str, ...]]:
     """Which of the sensor's standard deviations stand behind what is tested: all, for the plot is tested as a whole."""
     biconical = ("sigma_range_m", "sigma_elevation_rad", "sigma_azimuth_rad")
     names = biconical if spec.sensor.sigma_range_m is not None else ("sigma_x_m", "sigma_y_m", "sigma_z_m")
@@ -85,7 +87,7 @@ def normals(key: np.ndarray, realisation: int, count: int) -> np.ndarray:
 class _State(NamedTuple):
     """A filter between chunks: its keys, the kernel's memory and whole numbers."""
 
-    options: object
+    options: Filter
     work: np.ndarray
     numbers: np.ndarray
 
@@ -97,8 +99,8 @@ class Tracker:
     times of the others the estimate is the extrapolated one.
     """
 
-    most_rows = None
-    several = False
+    most_rows: int | None = None
+    several: bool = False
 
     def __init__(self, case: Case):
         self.spec = case.spec
@@ -108,7 +110,7 @@ class Tracker:
         self.held: list[tuple[float, np.ndarray]] = []
         self.begun, self.last = False, 0.0
 
-    def feed(self, recorded: dict[str, np.ndarray]) -> Track:
+    def feed(self, recorded: Mapping[str, np.ndarray]) -> Track:
         """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
         t = recorded["t_s"]
         z, R, whole = local_plots(self.spec.sensor, np.stack(list(recorded.values())[1:], axis=1))
@@ -172,7 +174,7 @@ def track(case: Case, recorded: dict[str, np.ndarray]) -> Track:
     return Tracker(case).feed(recorded)
 
 
-def _filtered(spec, state: _State, t: np.ndarray, plots: np.ndarray, frame: np.ndarray) -> np.ndarray:
+def _filtered(spec: Keys, state: _State, t: np.ndarray, plots: np.ndarray, frame: np.ndarray) -> np.ndarray:
     """Outputs (n, OUTPUT) over the next n plots of one filter; t (n + 1,) with the time of the row before."""
     index, times = intervals(t)
     own = banks(spec.model_copy(update={"filters": (state.options,)}), times)
@@ -209,17 +211,17 @@ def _lanes(plots: np.ndarray) -> np.ndarray:
 class Recorded(RecordedPlots):
     """The study's part in `radarsim track` and `radarsim simulate`."""
 
-    def columns(self, spec):
+    def columns(self, spec: Keys) -> tuple[tuple[str, ...], ...]:
         return plot_columns(spec)
 
-    def sigmas(self, spec):
+    def sigmas(self, spec: Keys) -> dict[str, tuple[str, ...]]:
         return sigmas(spec)
 
-    def scan_period_s(self, spec):
+    def scan_period_s(self, spec: Keys) -> float:
         return spec.sensor.scan_period_s
 
-    def simulated(self, case, realisation):
+    def simulated(self, case: Case, realisation: int) -> dict[str, np.ndarray]:
         return simulated(case, realisation)
 
-    def tracker(self, case):
+    def tracker(self, case: Case) -> Tracker:
         return Tracker(case)

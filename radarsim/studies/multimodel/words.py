@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 
+from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 
 
-def question(experiment) -> str:
+def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
     filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
     names = ", ".join(filters[:-1]) + (" and " if len(filters) > 1 else "") + filters[-1]

@@ -9,6 +9,7 @@ from radarsim.errors import ConfigError
 from radarsim.kernels import random
 from radarsim.physics import frames
 from radarsim.studies.multimodel import flight
+from radarsim.studies.multimodel.config import Keys, Sensor
 from radarsim.studies.multimodel.kernels import plots, records
 from radarsim.studies.noise import noise_key
 
@@ -22,7 +23,9 @@ def points(path: str) -> tuple[np.ndarray, np.ndarray]:
         header = next(reader, [])
         if missing := [name for name in columns if name not in header]:
             raise ConfigError(f"{path}:1: no column {', '.join(missing)}; needed: {', '.join(columns)}")
-        at, rows, faults = [header.index(name) for name in columns], [], []
+        at = [header.index(name) for name in columns]
+        rows: list[list[float]] = []
+        faults: list[str] = []
         for line in reader:
             try:
                 row = [float(line[i]) for i in at]
@@ -43,7 +46,7 @@ def points(path: str) -> tuple[np.ndarray, np.ndarray]:
     return table[:, 0], table[:, 1:]
 
 
-def scan_times(spec, case: Case, duration: float) -> np.ndarray:
+def scan_times(spec: Keys, case: Case, duration: float) -> np.ndarray:
     """Times (K,) of the scans, s from the first plot: regular, or with a jitter drawn once from the seed."""
     period = spec.sensor.scan_period_s
     count = int(np.floor(duration / period * (1 + 1e-12))) + 1
@@ -101,7 +104,7 @@ def plot_truth(case: Case, t: np.ndarray, x: np.ndarray) -> np.ndarray:
     return np.stack([r, s_e, np.sqrt(1 - s_e**2), s_a, np.sqrt(1 - s_a**2), *position.T], axis=1)
 
 
-def sensor_frame(sensor) -> np.ndarray:
+def sensor_frame(sensor: Sensor) -> np.ndarray:
     """The numbers (n,) of a sensor as the kernels take them; see `kernels.plots.frame`."""
     R = frames.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
     form = records.BICONICAL if sensor.sigma_range_m is not None else records.CARTESIAN
@@ -119,7 +122,7 @@ def intervals(t: np.ndarray, tolerance: float = 1e-9) -> tuple[np.ndarray, np.nd
     return index.astype(np.int64), times
 
 
-def local_plots(sensor, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def local_plots(sensor: Sensor, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Recorded plots (n, 3) in the local frame: positions (n, 3), covariances (n, 6), and which are whole (n,).
 
     A plot counts where all three values are there and, of biconical ones, where it lies in front of the antenna.
