@@ -232,7 +232,7 @@ def test_a_halved_correlation_and_another_start(moved):
     """Functions and properties of a config that its numbers are made with."""
     path = "studies/sonar/config.py"
     tree = ast.parse(text_of(path))
-    for name in ("correlation_of", "range_0"):
+    for name in ("correlation_of", "initial_range_m"):
         text = text_of(path)
         found = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name == name]
         last = next(node for node in ast.walk(found[0]) if isinstance(node, ast.Return))

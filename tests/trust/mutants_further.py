@@ -36,6 +36,9 @@ FALSE_PLOTS = (
             "S = (S[0], S[1]",
             f"{LAWS}::test_pairs_of_false_plots_follow_their_exact_law",
         ),
+    ),
+    *mutants(
+        "radarsim/studies/sonar/clutter/kernels/rules.py",
         (
             "hits + (n - age) >= m else NONE",
             "hits + (n - age) > m else NONE",
@@ -50,12 +53,15 @@ FALSE_PLOTS = (
     *mutants(
         "radarsim/studies/sonar/clutter/kernels/field.py",
         ("np.floor((low - least) / step), 0.0)", "np.ceil((low - least) / step), 0.0)", f"{AMONG} {LAWS}"),
-        ("return bb * per, -rb * per,", "return bb * per, rb * per,", AMONG),
         (
             "while u >= share[n]:",
             "while n < 1 and u >= share[n]:",
             f"{CLUTTER}::test_the_field_is_poisson_and_even_in_area",
         ),
+    ),
+    *mutants(
+        "radarsim/studies/sonar/clutter/kernels/gate.py",
+        ("return bb * per, -rb * per,", "return bb * per, rb * per,", AMONG),
     ),
     *mutants(
         "radarsim/studies/sonar/clutter/kernels/tracks.py",

@@ -1,14 +1,17 @@
-"""Sonar filters as the arrays that the kernels take: a filter's specification, its design, and banks of filters."""
+"""Sonar filters as arrays for the kernels: the specification of a filter, its design, and banks of filters."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from radarsim.physics.motion import transition
 from radarsim.studies.sonar import filters
-from radarsim.studies.sonar.detectors import AdaptiveRule, DetectorTests, ModelPair, adaptive_rules, model_pairs
+from radarsim.studies.sonar.detectors import AdaptiveRule, ModelPair
 from radarsim.studies.sonar.kernels import patterns
-from radarsim.studies.sonar.kernels import shared_gains as kernels
+from radarsim.studies.sonar.kernels.detector import AdaptiveRules, Detectors
+from radarsim.studies.sonar.kernels.imm import ModelPairs
+from radarsim.studies.sonar.kernels.shared_gains import SharedBank
 from radarsim.studies.sonar.world import step_correlations
 
 KINDS = {
@@ -25,9 +28,10 @@ KINDS = {
 
 @dataclass(frozen=True)
 class FilterSpec:
-    """A configured filter: kind, size of the state, plots of a window or of a least-squares start.
+    """A configured filter: kind, size of the state, length in plots of a window, of a least-squares start or of a test.
 
-    By coordinate the manoeuvre variance (C,) and ρ (C,). A filter that responds to manoeuvres has its rule or models.
+    variance (C,) of a manoeuvre and correlation rho (C,) in each coordinate; response: the rule or the models of a
+    filter that responds to manoeuvres.
     """
 
     kind: str
@@ -39,7 +43,7 @@ class FilterSpec:
 
 
 def recursive_design(spec: FilterSpec, c: int, plots: filters.Plots) -> filters.Design:
-    """The design of a recursive filter in coordinate c."""
+    """The design of a recursive filter for coordinate c."""
     size = spec.size
     match spec.kind:
         case "growing_memory":
@@ -52,25 +56,26 @@ def recursive_design(spec: FilterSpec, c: int, plots: filters.Plots) -> filters.
             return filters.augmented(plots, size, spec.rho[c], spec.variance[c])
         case "kalman_differenced":
             return filters.differenced(plots, size, spec.rho[c])
-    raise ValueError(f"no recursive filter: {spec.kind}")
+    raise ValueError(f"not a recursive filter: {spec.kind}")
 
 
 @dataclass(frozen=True)
 class FilterDesign:
-    """A filter designed for one coordinate's plots: covariance (M, K, 3, 3), and its recursion or its window rows.
+    """A filter designed for the plots of one coordinate.
 
-    window_rows are (first scan, weights (M, 3, n)) at every scan.
+    covariance (M, K, 3, 3) that it believes for M patterns of plots; its recursion, or for a window at every scan the
+    first scan in it and the weights (M, 3, n) of the plots from there on.
     """
 
     spec: FilterSpec
     plots: filters.Plots
     covariance: np.ndarray
     recursion: filters.Design | None = None
-    window_rows: tuple = ()
+    window_rows: tuple[tuple[int, np.ndarray], ...] = ()
 
     @property
     def known(self) -> np.ndarray:
-        """Number (M, K) of components estimated: plots of a single time determine a value and no rate."""
+        """The number (M, K) of estimated components: plots at a single time determine a value but no rate."""
         return (np.diagonal(self.covariance, axis1=2, axis2=3) > 0).sum(axis=2)
 
 
@@ -79,30 +84,32 @@ def design_filter(spec: FilterSpec, c: int, plots: filters.Plots) -> FilterDesig
     if spec.kind != "window":
         design = recursive_design(spec, c, plots)
         return FilterDesign(spec, plots, design.covariance, design)
-    found = [filters.window_weights(plots, k, spec.length, spec.size) for k in range(len(plots.t))]
-    covariance = np.stack([P for _, _, P in found], axis=1)
-    return FilterDesign(spec, plots, covariance, window_rows=tuple(row[:2] for row in found))
+    rows = [filters.window_weights(plots, k, spec.length, spec.size) for k in range(len(plots.t))]
+    covariance = np.stack([P for _, _, P in rows], axis=1)
+    return FilterDesign(spec, plots, covariance, window_rows=tuple((first, weights) for first, weights, _ in rows))
 
 
 def apply_filter(spec: FilterSpec, c: int, plots: filters.Plots, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Estimates (n, 3) and covariances (n, 3, 3) over recorded plots z (n,), any number where the weight is zero."""
-    found, x = design_filter(spec, c, plots), np.zeros((len(plots.t), 3))
-    for k, (first, weights) in enumerate(found.window_rows):
+    """Estimates (n, 3) and covariances (n, 3, 3) from recorded plots z (n,), arbitrary where the weight is zero."""
+    design, x = design_filter(spec, c, plots), np.zeros((len(plots.t), 3))
+    for k, (first, weights) in enumerate(design.window_rows):
         x[k] = weights[0] @ z[first : k + 1]
-    now, e, design = np.zeros(3), 0.0, found.recursion
-    for k in range(len(plots.t)) if design is not None else ():
-        now, e = transition(plots.t[k] - plots.t[max(k - 1, 0)]) @ now, design.carry[k] * e
-        innovation = z[k] - now[0] - e
-        now, e = now + design.gain[0, k, :3] * innovation, e + design.gain[0, k, 3] * innovation
-        x[k] = now
-    return x, found.covariance[0]
+    if design.recursion is not None:
+        carry, gain = design.recursion.carry, design.recursion.gain[0]
+        state, e = np.zeros(3), 0.0
+        for k, dt in enumerate(np.diff(plots.t, prepend=plots.t[0])):
+            state, e = transition(dt) @ state, carry[k] * e
+            innovation = z[k] - state[0] - e
+            state, e = state + gain[k, :3] * innovation, e + gain[k, 3] * innovation
+            x[k] = state
+    return x, design.covariance[0]
 
 
 def packed_inverse(P: np.ndarray, ready: np.ndarray, size: int) -> np.ndarray:
-    """Inverses (K, 6), packed by rows, of P (K, 3, 3) in its leading block, where `ready` (K,); zeros elsewhere."""
+    """Inverses (K, 6), packed by rows, of the leading blocks of P (K, 3, 3) where `ready` (K,); zeros elsewhere."""
     out = np.zeros((len(P), 6))
     block = P[ready][:, :size, :size]
-    unit = np.sqrt(np.diagonal(block, axis1=1, axis2=2))  # m, m/s and m/s² brought to one size before inverting
+    unit = np.sqrt(np.diagonal(block, axis1=1, axis2=2))  # brings m, m/s and m/s² to one size before inverting
     scale = unit[:, :, None] * unit[:, None, :]
     full = np.zeros((len(block), 3, 3))
     full[:, :size, :size] = np.linalg.inv(block / scale) / scale
@@ -110,9 +117,9 @@ def packed_inverse(P: np.ndarray, ready: np.ndarray, size: int) -> np.ndarray:
     return out
 
 
-def shared_bank(specs: list[FilterSpec], designs: list[list[FilterDesign]]) -> kernels.SharedBank:
+def shared_bank(specs: Sequence[FilterSpec], designs: Sequence[Sequence[FilterDesign]]) -> SharedBank:
     """The bank of filters whose gains all realisations share; designs[f][c] are for a single pattern of plots."""
-    plots = [one.plots for one in designs[0]]
+    plots = [design.plots for design in designs[0]]
     F, K, C = len(specs), len(plots[0].t), len(plots)
     length = np.array([f.length if f.kind == "window" else 0 for f in specs])
     longest = int(length.max())
@@ -120,41 +127,40 @@ def shared_bank(specs: list[FilterSpec], designs: list[list[FilterDesign]]) -> k
     weights, inverse = np.zeros((F, K, C, 3, longest)), np.zeros((F, K, C, 6))
     detected = np.stack([p.weight[0] > 0 for p in plots], axis=1)
     order = np.cumsum(detected, axis=0) - 1
-    known = np.stack([np.stack([one.known[0] for one in row], axis=1) for row in designs])
+    known = np.stack([np.stack([design.known[0] for design in row], axis=1) for row in designs])
     for f, spec in enumerate(specs):
-        for c, one in enumerate(designs[f]):
-            if one.recursion is None:
-                weights[f, :, c] = ring_weights(one, order[:, c], longest)
+        for c, design in enumerate(designs[f]):
+            if design.recursion is None:
+                weights[f, :, c] = ring_weights(design, order[:, c], longest)
             else:
-                gain[f, :, c], carry[f, :, c] = one.recursion.gain[0], one.recursion.carry
-            inverse[f, :, c] = packed_inverse(one.covariance[0], known[f, :, c] == spec.size, spec.size)
-    size = np.array([f.size for f in specs])
-    return kernels.SharedBank(
+                gain[f, :, c], carry[f, :, c] = design.recursion.gain[0], design.recursion.carry
+            inverse[f, :, c] = packed_inverse(design.covariance[0], known[f, :, c] == spec.size, spec.size)
+    return SharedBank(
         gain=gain,
         carry=carry,
-        carries=gain[..., 3].any(axis=(1, 2)),
+        carries=np.asarray(gain[..., 3].any(axis=(1, 2))),
         length=length,
         weights=weights,
         slot=np.where(detected, order % max(longest, 1), -1),
         known=known,
-        size=size,
+        size=np.array([f.size for f in specs]),
         inverse=inverse,
     )
 
 
-def ring_weights(one: FilterDesign, order: np.ndarray, longest: int) -> np.ndarray:
-    """Weights (K, 3, longest) of a window by the places of its plots in the kernel's ring: number modulo its length."""
-    out = np.zeros((len(one.window_rows), 3, longest))
-    for k, (first, weights) in enumerate(one.window_rows):
+def ring_weights(design: FilterDesign, order: np.ndarray, longest: int) -> np.ndarray:
+    """Weights (K, 3, longest) of a window by slots of the kernel's ring, which plot n enters at n mod longest."""
+    out = np.zeros((len(design.window_rows), 3, longest))
+    for k, (first, weights) in enumerate(design.window_rows):
         for j in np.flatnonzero(weights[0].any(axis=0)):
             out[k, :, order[first + j] % longest] = weights[0, :, j]
     return out
 
 
 def per_realisation_bank(
-    specs: list[FilterSpec], t: np.ndarray, period: float, nominal: np.ndarray, tests: DetectorTests
+    specs: Sequence[FilterSpec], t: np.ndarray, period: float, nominal: np.ndarray, detectors: Detectors
 ) -> patterns.RealisationBank:
-    """The bank of filters with gains of each realisation's own; nominal (C,) σ of a plot, tests of all detectors."""
+    """The bank of filters whose gains differ between realisations; nominal (C,) σ of a plot."""
     F, C = len(specs), len(nominal)
     manoeuvre, settled = np.zeros((F, C)), np.zeros((F, C, 3))
     carry = np.zeros((F, len(t), C))
@@ -172,7 +178,38 @@ def per_realisation_bank(
         carry=carry,
         manoeuvre=manoeuvre,
         settled=settled,
-        memory=max([tests.longest, *(f.length for f in specs if f.kind == "window")]),
-        switching=adaptive_rules([f.response for f in specs], [f.length for f in specs], tests, C),
-        interacting=model_pairs([f.response for f in specs], [f.size for f in specs], period, nominal),
+        memory=max([*detectors.plots.tolist(), *(f.length for f in specs if f.kind == "window")], default=0),
+        period=period,
+        sigma=nominal,
+        adaptive=adaptive_rules(specs, detectors, C),
+        interacting=model_pairs(specs, period, nominal),
     )
+
+
+def needed_tests(specs: Sequence[FilterSpec]) -> list[tuple[int, int]]:
+    """The tests of adaptive filters: plots, and scans from one test to the next."""
+    return [(spec.length, spec.response.every) for spec in specs if isinstance(spec.response, AdaptiveRule)]
+
+
+def adaptive_rules(specs: Sequence[FilterSpec], detectors: Detectors, coordinates: int) -> AdaptiveRules:
+    """The rules of F filters; those of filters without a rule are never read."""
+    F = len(specs)
+    detector, group = np.zeros(F, dtype=np.int64), np.zeros((F, coordinates), dtype=np.int64)
+    threshold, raises, quiet = np.zeros((F, coordinates)), np.zeros(F, dtype=np.bool_), np.ones(F, dtype=np.int64)
+    for f, spec in enumerate(specs):
+        rule = spec.response
+        if isinstance(rule, AdaptiveRule):
+            detector[f] = np.flatnonzero((detectors.plots == spec.length) & (detectors.every == rule.every))[0]
+            group[f] = coordinates if rule.joint else np.arange(coordinates)
+            threshold[f], raises[f], quiet[f] = rule.threshold, rule.raises, rule.quiet
+    return AdaptiveRules(detector, group, threshold, raises, quiet)
+
+
+def model_pairs(specs: Sequence[FilterSpec], period: float, nominal: np.ndarray) -> ModelPairs:
+    """The models of F filters, for nominal plots (C,) and periods; those of filters without models are never read."""
+    manoeuvre, stay = np.zeros((len(specs), len(nominal), 2)), np.full((len(specs), 2), 0.5)
+    for f, spec in enumerate(specs):
+        if isinstance(spec.response, ModelPair):
+            manoeuvre[f] = spec.response.variance * period ** (2 * spec.size) / nominal[:, None] ** 2
+            stay[f] = spec.response.stay
+    return ModelPairs(manoeuvre, stay)

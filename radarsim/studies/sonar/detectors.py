@@ -1,19 +1,18 @@
-"""Detectors of manoeuvres and the filters that respond to them, as the arrays that the kernels take."""
+"""Manoeuvre detectors as arrays for the kernels, and how filters respond to manoeuvres."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.studies.sonar.kernels.detector import AdaptiveRules, Detectors
-from radarsim.studies.sonar.kernels.imm import ModelPairs
+from radarsim.studies.sonar.kernels.detector import Detectors
 
 
 class AdaptiveRule(NamedTuple):
-    """How an adaptive filter responds: threshold (C,) of its detector, tests every so many scans, jointly or not.
+    """How an adaptive filter responds to its detector.
 
-    raises the degree, else holds its memory short; quiet tests without an alarm end the manoeuvre.
+    threshold (C,) of the statistic; every: scans from one test to the next; joint: one test of all coordinates. raises:
+    an alarm raises the degree, else it keeps the memory short; quiet tests without an alarm end the manoeuvre.
     """
 
     threshold: np.ndarray
@@ -30,66 +29,33 @@ class ModelPair(NamedTuple):
     stay: np.ndarray
 
 
-@dataclass(frozen=True)
-class DetectorTests:
-    """All tests of a case: (plots, scans from one to the next) of each, and thresholds (G, T) of the measured ones.
+class DetectorTest(NamedTuple):
+    """A test of the last plots, every so many scans, with thresholds (G, T); none where only a filter needs it."""
 
-    The measured ones come first; the others are what adaptive filters need.
+    plots: int
+    every: int
+    thresholds: np.ndarray
+
+
+def detector_arrays(
+    measured: Sequence[DetectorTest], needed: Iterable[tuple[int, int]], phase: np.ndarray, coordinates: int
+) -> Detectors:
+    """The measured detectors, then those that adaptive filters need in addition; phase (K,) of the manoeuvre.
+
+    needed holds plots, and scans from one test to the next.
     """
-
-    kinds: tuple[tuple[int, int], ...]
-    thresholds: tuple[np.ndarray, ...] = ()
-
-    @property
-    def longest(self) -> int:
-        """Plots that must be kept."""
-        return max((plots for plots, _ in self.kinds), default=0)
-
-
-def detector_tests(
-    measured: Sequence[tuple[int, int]], thresholds: Sequence[np.ndarray], responses: Sequence
-) -> DetectorTests:
-    """The measured detectors, then those of adaptive filters not among them; responses: (rule or None, plots)."""
-    kinds = list(measured)
-    for response, plots in responses:
-        if isinstance(response, AdaptiveRule) and (plots, response.every) not in kinds:
-            kinds.append((plots, response.every))
-    return DetectorTests(tuple(kinds), tuple(thresholds))
-
-
-def detector_arrays(tests: DetectorTests, phase: np.ndarray, coordinates: int) -> Detectors:
-    """The kernels' detectors; phase (K,) of the manoeuvre."""
-    count = [limits.shape[1] for limits in tests.thresholds] + [0] * (len(tests.kinds) - len(tests.thresholds))
-    threshold = np.zeros((len(tests.kinds), coordinates + 1, max(count, default=0)))
-    for d, limits in enumerate(tests.thresholds):
-        threshold[d, :, : limits.shape[1]] = limits
+    tests, none = list(measured), np.zeros((coordinates + 1, 0))
+    for plots, every in needed:
+        if (plots, every) not in [test[:2] for test in tests]:
+            tests.append(DetectorTest(plots, every, none))
+    count = np.array([test.thresholds.shape[1] for test in tests], dtype=np.int64)
+    threshold = np.zeros((len(tests), coordinates + 1, max(count, default=0)))
+    for d, test in enumerate(tests):
+        threshold[d, :, : count[d]] = test.thresholds
     return Detectors(
-        plots=np.array([plots for plots, _ in tests.kinds], dtype=np.int64),
-        every=np.array([every for _, every in tests.kinds], dtype=np.int64),
+        plots=np.array([test.plots for test in tests], dtype=np.int64),
+        every=np.array([test.every for test in tests], dtype=np.int64),
         threshold=threshold,
-        thresholds=np.array(count, dtype=np.int64),
+        thresholds=count,
         phase=phase,
     )
-
-
-def adaptive_rules(responses: Sequence, plots: Sequence[int], tests: DetectorTests, coordinates: int) -> AdaptiveRules:
-    """Rules of F filters; those of filters without one are not read."""
-    F = len(responses)
-    detector, group = np.zeros(F, dtype=np.int64), np.zeros((F, coordinates), dtype=np.int64)
-    threshold, raises, quiet = np.zeros((F, coordinates)), np.zeros(F, dtype=np.bool_), np.ones(F, dtype=np.int64)
-    for f, rule in enumerate(responses):
-        if isinstance(rule, AdaptiveRule):
-            detector[f] = tests.kinds.index((plots[f], rule.every))
-            group[f] = coordinates if rule.joint else np.arange(coordinates)
-            threshold[f], raises[f], quiet[f] = rule.threshold, rule.raises, rule.quiet
-    return AdaptiveRules(detector, group, threshold, raises, quiet)
-
-
-def model_pairs(responses: Sequence, sizes: Sequence[int], period: float, nominal: np.ndarray) -> ModelPairs:
-    """Models of F filters in nominal plots (C,) and periods; those of filters without any are not read."""
-    manoeuvre, stay = np.zeros((len(responses), len(nominal), 2)), np.full((len(responses), 2), 0.5)
-    for f, models in enumerate(responses):
-        if isinstance(models, ModelPair):
-            manoeuvre[f] = models.variance * period ** (2 * sizes[f]) / nominal[:, None] ** 2
-            stay[f] = models.stay
-    return ModelPairs(manoeuvre, stay)

@@ -1,15 +1,16 @@
-"""Filters of P3 for one coordinate, designed once: how each weighs the plots, given when they come.
+"""Filters of P3 for one coordinate: the weights that each gives to plots at known times, computed once.
 
-All filters that recur share one form, in which an innovation moves the state (value, rate, acceleration) and, where
-errors are taken as correlated, the carried error e of the last plot:
+All recursive filters have one form. The innovation corrects the state (value, rate, acceleration) and, in filters that
+model correlated errors, the carried error e of the last plot:
 
     innovation = z - (F x)₀ - c e        x⁺ = F x + g innovation        e⁺ = c e + g₃ innovation
 
-so a design is its gains (M, K, 4), for M patterns of missed plots at once; a missed plot has gain zero. Inside, times
-are in periods T₀ and weights relative to the nominal plot, as in the paper; gains and covariances come out in m, s
-(or rad, s).
+A design is therefore its gains (M, K, 4), for M patterns of missed plots at once; a missed plot has gain zero.
+Internally times are in periods T₀ and weights relative to the nominal plot, as in the paper; gains and covariances are
+returned in m, s (or rad, s).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,10 +21,10 @@ from radarsim.studies.sonar.world import step_correlations
 
 @dataclass(frozen=True)
 class Plots:
-    """When and how well one coordinate is measured.
+    """Times and weights of the plots of one coordinate, for M patterns of missed plots.
 
-    t (K,) s; weight (M, K) = (sigma / σ of the plot)², zero where it is missed; period T₀ in s, which also scales
-    correlation; sigma of a nominal plot.
+    t (K,) in s; weight (M, K) = (sigma / σ of the plot)², zero where it is missed; period T₀ in s, in which lags of the
+    correlation are counted too; sigma of a nominal plot.
     """
 
     t: np.ndarray
@@ -36,18 +37,18 @@ class Plots:
         return (self.t[k] - self.t[k - 1]) / self.period if k else 0.0
 
     def moments(self) -> np.ndarray:
-        """Number (M, K) of distinct times of plots so far: what determines a polynomial."""
+        """The number (M, K) of distinct times of plots so far: as many unknowns of a polynomial can be determined."""
         fresh, last = self.weight > 0, np.full(len(self.weight), -np.inf)
         for k, time in enumerate(self.t):
             last, fresh[:, k] = np.where(fresh[:, k], time, last), fresh[:, k] & (time > last)
         return np.cumsum(fresh, axis=1)
 
     def early(self, size: int) -> np.ndarray:
-        """Where (M, K) plots of fewer than `size` times came before: a filter of that size still starts."""
+        """Where (M, K) there were plots at fewer than `size` times before, so that a filter is still starting."""
         return np.pad(self.moments(), ((0, 0), (1, 0)))[:, :-1] < size
 
     def scaled(self, manoeuvre_variance: float, size: int) -> float:
-        """A manoeuvre variance in nominal plots' variances and periods."""
+        """A manoeuvre variance in units of the variance of a nominal plot and of the period."""
         return manoeuvre_variance * self.period ** (2 * size) / self.sigma**2
 
 
@@ -63,8 +64,9 @@ class Design:
 
 
 def leading_inverse(Y: np.ndarray, rank: np.ndarray) -> np.ndarray:
-    """Inverses (M, 3, 3) of the leading blocks of Y (M, 3, 3) of size rank (M,), zero outside: fewer plots, lower
-    degree.
+    """Inverses (M, 3, 3) of the leading blocks, of size rank (M,), of Y (M, 3, 3); zero outside the blocks.
+
+    With few plots only a polynomial of lower degree is determined.
     """
     P = np.zeros_like(Y)
     for size in (1, 2, 3):
@@ -75,7 +77,7 @@ def leading_inverse(Y: np.ndarray, rank: np.ndarray) -> np.ndarray:
 
 
 def _finished(plots: Plots, size: int, gain: np.ndarray, carry: np.ndarray, P: np.ndarray) -> Design:
-    """From periods and nominal weights to seconds and units."""
+    """Convert gains and covariances from periods and nominal weights to s and to m or rad."""
     scale = plots.period ** -np.arange(3.0)
     gain = gain * np.append(scale, 1.0)
     covariance = P * plots.sigma**2 * np.outer(scale, scale)
@@ -83,10 +85,11 @@ def _finished(plots: Plots, size: int, gain: np.ndarray, carry: np.ndarray, P: n
 
 
 def line(plots: Plots) -> Design:
-    """The paper's recursion (12)-(14) for a straight line: any weights and intervals, missed plots, from zeros.
+    """The paper's recursion (12)-(14) for a straight line, with any weights, intervals and missed plots.
 
-    With h' before the interval τ (in periods), h = h' + 2g'τ + f'τ², g = g' + f'τ, then f += w and K += w h; gains h
-    w / K and g w / K. While K = 0, that is up to the second plot, the estimate is the plots' mean.
+    All sums start from zero. Over an interval τ, in periods, h becomes h + 2gτ + fτ² and g becomes g + fτ; then f
+    increases by w and K by w h, and the gains are h w / K and g w / K. While K = 0, before the second plot, the
+    estimate is the mean of the plots.
     """
     patterns, scans = plots.weight.shape
     gain, P = np.zeros((patterns, scans, 4)), np.zeros((patterns, scans, 3, 3))
@@ -116,7 +119,7 @@ def _information(plots: Plots, size: int, rho: float) -> tuple[np.ndarray, np.nd
         Y = back.T @ Y @ back
         age, c, seen = age + step, c * carry[k], w > 0
         row = np.array([1.0, 0.0, 0.0]) - c[:, None] * np.stack([np.ones(patterns), -age, age**2 / 2], axis=1)
-        new = 1 - c * c  # nothing new comes with a plot at the very time of the last one
+        new = 1 - c * c  # a plot at the very time of the last one contains nothing new
         weight = np.where(new > 1e-12, w / np.maximum(new, 1e-12), 0.0)
         Y = Y + weight[:, None, None] * row[:, :, None] * row[:, None, :]
         P[:, k] = leading_inverse(Y, rank[:, k])
@@ -127,43 +130,62 @@ def _information(plots: Plots, size: int, rho: float) -> tuple[np.ndarray, np.nd
 
 
 def differenced(plots: Plots, size: int, rho: float) -> Design:
-    """Least squares that recurs, in information form: of the differences u_n - ρ^m u_{n-m}, or of the plots at ρ = 0.
+    """Recursive least squares in information form, on the differences u_n - ρ^m u_{n-m}, or on the plots for ρ = 0.
 
-    The first plot enters with its full weight, then each difference (after eq. 15) with 1/(1 - ρ^2m) and the row
-    H - ρ^m H F(-m) at the present state, m the interval since the last plot. With fewer plots than unknowns the leading
-    block alone is solved: a polynomial of lower degree.
+    The first plot has its full weight. Each difference (after eq. 15) has the weight 1/(1 - ρ^2m) and the row
+    H - ρ^m H F(-m) at the present state, where m is the interval since the last plot. With fewer plots than unknowns
+    only the leading block is solved, for a polynomial of lower degree.
     """
     gain, carry, P = _information(plots, size, rho)
     return _finished(plots, size, gain, carry, P)
 
 
-def kalman(plots: Plots, size: int, manoeuvre_variance: float) -> Design:
-    """Kalman-Bucy filter (11), started as least squares from the first `size` plots.
+def _started_recursion(
+    plots: Plots,
+    size: int,
+    manoeuvre_variance: float,
+    start: int,
+    updated: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
+) -> Design:
+    """A filter that starts as least squares on the first `start` plots and then predicts and updates at every scan.
 
-    manoeuvre_variance is of a random derivative of order `size`, constant between scans: (m/s²)² for size 2.
+    updated gives gain (M, size) and covariance (M, size, size) from the predicted covariance and the weight (M,) of the
+    plot.
     """
     gain, carry, P = _information(plots, size, 0.0)
-    variance, early = plots.scaled(manoeuvre_variance, size), plots.early(size)
+    variance, early = plots.scaled(manoeuvre_variance, size), plots.early(start)
     state = np.zeros((len(gain), size, size))
     for k in range(len(plots.t)):
-        step, w = plots.step(k), plots.weight[:, k]
+        step = plots.step(k)
         F = transition(step, size)
         state = F @ state @ F.T + manoeuvre_covariance(variance, step, size)
-        K = state[:, :, 0] * (w / (1 + w * state[:, 0, 0]))[:, None]
-        state = state - K[:, :, None] * state[:, None, 0, :]
-        state = (state + state.transpose(0, 2, 1)) / 2
+        K, state = updated(state, plots.weight[:, k])
         gain[:, k, :size] = np.where(early[:, k, None], gain[:, k, :size], K)
         state = np.where(early[:, k, None, None], P[:, k, :size, :size], state)
         P[:, k, :size, :size] = state
     return _finished(plots, size, gain, carry, P)
 
 
-def augmented(plots: Plots, size: int, rho: float, manoeuvre_variance: float) -> Design:
-    """The state with the plot's error beside it, the plot then exact: H = [H | I], with the plus that step 4 lacks.
+def kalman(plots: Plots, size: int, manoeuvre_variance: float) -> Design:
+    """Kalman-Bucy filter (11), started as least squares on the first `size` plots.
 
-    Its covariance is singular after every plot (H x + e is known). Where the innovation is singular too, a plot at
-    the very time of the last one, it tells nothing new and has gain zero. Started as least squares from the first
-    `size` plots.
+    manoeuvre_variance is that of a random derivative of order `size`, constant between scans: (m/s²)² for size 2.
+    """
+
+    def updated(state: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        K = state[:, :, 0] * (w / (1 + w * state[:, 0, 0]))[:, None]
+        state = state - K[:, :, None] * state[:, None, 0, :]
+        return K, (state + state.transpose(0, 2, 1)) / 2
+
+    return _started_recursion(plots, size, manoeuvre_variance, size, updated)
+
+
+def augmented(plots: Plots, size: int, rho: float, manoeuvre_variance: float) -> Design:
+    """The Kalman filter of the state and the plot's error, the plot then being exact: H = [H | I].
+
+    The paper's step 4 lacks a plus. The covariance is singular after every plot (H x + e is known). Where the
+    innovation is singular too, for a plot at the very time of the last one, the plot contains nothing new and has gain
+    zero. The filter starts as least squares on the first `size` plots.
     """
     gain, carry, P = _information(plots, size, rho)
     variance, early = plots.scaled(manoeuvre_variance, size), plots.early(size)
@@ -188,7 +210,7 @@ def augmented(plots: Plots, size: int, rho: float, manoeuvre_variance: float) ->
 
 
 def _with_error(P: np.ndarray) -> np.ndarray:
-    """Joint covariance of state and last plot's error from the state's, right after a plot: e = z - H x exactly."""
+    """Joint covariance of state and last plot's error from that of the state after a plot: e = z - H x exactly."""
     across = -P[:, :, :1]
     upper = np.concatenate([P, across], axis=2)
     lower = np.concatenate([across.transpose(0, 2, 1), P[:, :1, :1]], axis=2)
@@ -196,7 +218,7 @@ def _with_error(P: np.ndarray) -> np.ndarray:
 
 
 def steady_gain(period: float, sigma: float, size: int, manoeuvre_variance: float) -> np.ndarray:
-    """Gains (size,) of the settled Kalman filter: α, β/T₀ (and γ/T₀²), from the algebraic Riccati equation."""
+    """Steady-state gains (size,) of the Kalman filter: α, β/T₀ (and γ/T₀²), from the algebraic Riccati equation."""
     from scipy.linalg import solve_discrete_are
 
     F, H = transition(1.0, size), np.eye(size)[:, :1]
@@ -206,35 +228,28 @@ def steady_gain(period: float, sigma: float, size: int, manoeuvre_variance: floa
 
 
 def fixed_gain(plots: Plots, size: int, manoeuvre_variance: float, start: int = 0) -> Design:
-    """The α-β(-γ) filter: least squares from the first plots, then the settled gains, and none at a missed plot.
+    """The α-β(-γ) filter: least squares on the first plots, then the steady-state gains, and none at a missed plot.
 
-    start is the number of these plots; the least is `size`. After so few the settled gains, small as they are, need
-    long to mend the first velocity.
-
-    What it believes is the covariance of its own recursion under that manoeuvre variance.
+    start is the number of these plots, at least `size`. After so few the steady-state gains, small as they are, take
+    long to correct the first velocity. The covariance is that of the filter's own recursion under the manoeuvre
+    variance.
     """
-    gain, carry, P = _information(plots, size, 0.0)
-    variance, early = plots.scaled(manoeuvre_variance, size), plots.early(max(size, start))
     settled = steady_gain(plots.period, plots.sigma, size, manoeuvre_variance) * plots.period ** np.arange(float(size))
-    state = np.zeros((len(gain), size, size))
-    for k in range(len(plots.t)):
-        step, w = plots.step(k), plots.weight[:, k]
-        F = transition(step, size)
-        state = F @ state @ F.T + manoeuvre_covariance(variance, step, size)
+
+    def updated(state: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         K = np.where((w > 0)[:, None], settled, 0.0)
         left = np.eye(size) - K[:, :, None] * np.eye(size)[0]
         noise = np.where(w > 0, 1 / np.where(w > 0, w, 1.0), 0.0)
-        state = left @ state @ left.transpose(0, 2, 1) + noise[:, None, None] * K[:, :, None] * K[:, None, :]
-        gain[:, k, :size] = np.where(early[:, k, None], gain[:, k, :size], K)
-        state = np.where(early[:, k, None, None], P[:, k, :size, :size], state)
-        P[:, k, :size, :size] = state
-    return _finished(plots, size, gain, carry, P)
+        return K, left @ state @ left.transpose(0, 2, 1) + noise[:, None, None] * K[:, :, None] * K[:, None, :]
+
+    return _started_recursion(plots, size, manoeuvre_variance, max(size, start), updated)
 
 
 def window_weights(plots: Plots, k: int, length: int, size: int) -> tuple[int, np.ndarray, np.ndarray]:
     """Least squares on the last `length` plots up to scan k, extrapolated to k where k itself is missed.
 
-    Gives the first scan that they reach back to, their weights (M, 3, n) from it on, and the covariance (M, 3, 3).
+    Returns the first scan of the window, the weights (M, 3, n) of the plots from there on, and the covariance
+    (M, 3, 3).
     """
     seen = plots.weight[:, : k + 1] > 0
     count = np.cumsum(seen, axis=1)

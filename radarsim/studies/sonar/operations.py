@@ -1,15 +1,16 @@
-"""How many operations a scan of P3's filters takes: their formulas run on numbers that count.
+"""The number of operations of P3's filters in a scan, counted by running their formulas on numbers that count.
 
-The paper's formulas for one coordinate and degree 1, written out for one plot; nothing is reckoned twice. Claims on
-cost are judged by these counts, never by a clock.
+The formulas are the paper's, for one coordinate, degree 1 and one plot, with no intermediate result computed twice.
+Claims about cost are judged by these counts, never by a clock.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 
 @dataclass
 class Tally:
-    """What was counted."""
+    """The operations counted so far."""
 
     products: int = 0
     sums: int = 0
@@ -21,35 +22,44 @@ class Tally:
 
 
 class Number:
-    """A number that counts what is done with it; a division counts as a product, a zero costs like any other number."""
+    """A number that counts its operations; a division counts as a product, and zeros count like any other number."""
 
     def __init__(self, value: float, tally: Tally):
         self.value, self.tally = value, tally
 
-    def _done(self, value: float, kind: str) -> "Number":
-        setattr(self.tally, kind, getattr(self.tally, kind) + 1)
+    def _sum(self, value: float) -> "Number":
+        self.tally.sums += 1
         return Number(value, self.tally)
 
-    def __add__(self, other):
-        return self._done(self.value + other.value, "sums")
+    def _product(self, value: float) -> "Number":
+        self.tally.products += 1
+        return Number(value, self.tally)
 
-    def __sub__(self, other):
-        return self._done(self.value - other.value, "sums")
+    def __add__(self, other: "Number") -> "Number":
+        return self._sum(self.value + other.value)
 
-    def __mul__(self, other):
-        return self._done(self.value * other.value, "products")
+    def __sub__(self, other: "Number") -> "Number":
+        return self._sum(self.value - other.value)
 
-    def __truediv__(self, other):
-        return self._done(self.value / other.value, "products")
+    def __mul__(self, other: "Number") -> "Number":
+        return self._product(self.value * other.value)
+
+    def __truediv__(self, other: "Number") -> "Number":
+        return self._product(self.value / other.value)
 
 
-def line_step(memory, estimate, u, w, step):
+Matrix = Sequence[Sequence[Number]]
+
+
+def line_step(
+    memory: Sequence[Number], estimate: Sequence[Number], u: Number, w: Number, step: Number
+) -> tuple[Sequence[Number], Sequence[Number]]:
     """One scan of (12)-(14): memory (f, g, h, K), estimate (r, v), plot u, weight w, interval `step`, unit period."""
     f, g, h, K = memory
     r, v = estimate
-    way = f * step
-    h = h + (g + g + way) * step
-    g = g + way
+    f_step = f * step
+    h = h + (g + g + f_step) * step
+    g = g + f_step
     f, K = f + w, K + w * h
     per = w / K
     r = r + v * step
@@ -57,8 +67,8 @@ def line_step(memory, estimate, u, w, step):
     return (f, g, h, K), (r + h * per * residual, v + g * per * residual)
 
 
-def batch(times, plots, weights):
-    """Weighted least squares (2) on all plots anew: five sums and Cramer's rule; the estimate at the last time."""
+def batch(times: Sequence[Number], plots: Sequence[Number], weights: Sequence[Number]) -> tuple[Number, Number]:
+    """Weighted least squares (2) on all plots: five sums and Cramer's rule; the estimate at the last time."""
     zero = plots[0] - plots[0]
     s0 = s1 = s2 = b0 = b1 = zero
     for t, u, w in zip(times, plots, weights, strict=True):
@@ -70,28 +80,28 @@ def batch(times, plots, weights):
     return r + v * times[-1], v
 
 
-def product(A, B):
+def product(A: Matrix, B: Matrix) -> list[list[Number]]:
     """Matrix product of lists of rows."""
-    out = []
-    for row in A:
-        line = []
-        for j in range(len(B[0])):
-            total = row[0] * B[0][j]
-            for a, b in zip(row[1:], B[1:], strict=True):
-                total = total + a * b[j]
-            line.append(total)
-        out.append(line)
-    return out
+    return [[_dot(row, column) for column in zip(*B, strict=True)] for row in A]
 
 
-def kalman_step(F, H, Q, R, x, P, u):
+def _dot(row: Sequence[Number], column: Sequence[Number]) -> Number:
+    total = row[0] * column[0]
+    for a, b in zip(row[1:], column[1:], strict=True):
+        total = total + a * b
+    return total
+
+
+def kalman_step(
+    F: Matrix, H: Matrix, Q: Matrix | None, R: Number | None, x: Matrix, P: Matrix, u: Number
+) -> tuple[Matrix, Matrix]:
     """One scan of (11) in matrices, one plot: F and P (s, s), H (1, s), Q (s, s), R a number, x (s, 1), u the plot."""
     size = len(x)
     x = product(F, x)
-    P = product(product(F, P), [list(column) for column in zip(*F, strict=True)])
+    P = product(product(F, P), list(zip(*F, strict=True)))
     if Q is not None:
         P = [[p + q for p, q in zip(row, more, strict=True)] for row, more in zip(P, Q, strict=True)]
-    column = product(P, [[H[0][j]] for j in range(size)])
+    column = product(P, [[element] for element in H[0]])
     S = product(H, column)[0][0]
     if R is not None:
         S = S + R
@@ -103,7 +113,7 @@ def kalman_step(F, H, Q, R, x, P, u):
 
 
 def recursion() -> Tally:
-    """A scan of the recursion (12)-(14), whatever the number of plots."""
+    """A scan of the recursion (12)-(14), for any number of plots."""
     tally = Tally()
     one = Number(1.0, tally)
     line_step((one,) * 4, (one, one), one, one, one)
@@ -111,35 +121,31 @@ def recursion() -> Tally:
 
 
 def batch_of(n: int) -> Tally:
-    """Least squares on n plots anew."""
+    """Least squares on n plots from scratch."""
     tally = Tally()
     row = [Number(float(i + 1), tally) for i in range(n)]
     batch(row, row, row)
     return tally
 
 
-def kalman_of(size: int) -> Tally:
-    """A scan of (11) with a state of that size and white errors."""
-    return _kalman(size, noise=False, measured=True)
-
-
-def augmented() -> Tally:
-    """A scan of the augmented filter: line and error, three states, exact plots, new noise in the error."""
-    return _kalman(3, noise=True, measured=False)
-
-
-def differenced() -> Tally:
-    """A scan of the differenced filter: two states, and the difference u - ρ u' to be made beforehand."""
-    tally = _kalman(2, noise=False, measured=True)
-    one = Number(1.0, tally)
-    _ = one - one * one
-    return tally
-
-
-def _kalman(size: int, noise: bool, measured: bool) -> Tally:
+def kalman_of(size: int, noise: bool = False, measured: bool = True) -> Tally:
+    """A scan of (11) with a state of this size; noise: Q is added; measured: R is added."""
     tally = Tally()
     one = Number(1.0, tally)
     square = [[Number(float(i == j) + 0.5, tally) for j in range(size)] for i in range(size)]
     H = [[one] * size]
     kalman_step(square, H, square if noise else None, one if measured else None, [[one]] * size, square, one)
+    return tally
+
+
+def augmented() -> Tally:
+    """A scan of the augmented filter: line and error, three states, exact plots, new noise in the error."""
+    return kalman_of(3, noise=True, measured=False)
+
+
+def differenced() -> Tally:
+    """A scan of the differenced filter: two states, and the difference u - ρ u' that is formed in advance."""
+    tally = kalman_of(2)
+    one = Number(1.0, tally)
+    _ = one - one * one
     return tally

@@ -1,9 +1,14 @@
-"""Filters that respond to manoeuvres, over recorded plots, by the simulation's kernels: one track in all lanes."""
+"""Filters that respond to manoeuvres, run over recorded plots by the kernels of the simulation.
+
+The kernels process a chunk of realisations; here all of them are the same track.
+"""
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from radarsim.studies.sonar import banks
-from radarsim.studies.sonar.detectors import detector_arrays, detector_tests
+from radarsim.studies.sonar.detectors import detector_arrays
 from radarsim.studies.sonar.kernels import detector, patterns
 from radarsim.studies.sonar.kernels.imm import ROWS
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK
@@ -11,20 +16,24 @@ from radarsim.studies.sonar.kernels.steps import remember
 
 
 def estimate_recorded(
-    specs: list[banks.FilterSpec], t: np.ndarray, period: float, sigma: np.ndarray, z: np.ndarray, weight: np.ndarray
+    specs: Sequence[banks.FilterSpec],
+    t: np.ndarray,
+    period: float,
+    sigma: np.ndarray,
+    z: np.ndarray,
+    weight: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Estimates (F, n, C, 3) and covariances (F, n, C, 3, 3) over plots z (C, n) of weights (C, n), zero where missing.
+    """Estimates (F, n, C, 3) and covariances (F, n, C, 3, 3) from plots z (C, n) of weights (C, n), zero where missing.
 
-    t (n,) s; sigma (C,) of a plot of weight one. A detector that tests every so many scans counts the rows.
+    t (n,) in s; sigma (C,) of a plot of weight one. A detector that tests every so many scans counts the rows.
     """
     F, C, n = len(specs), len(z), len(t)
-    tests = detector_tests([], [], [(one.response, one.length) for one in specs])
-    bank = banks.per_realisation_bank(specs, t, period, sigma, tests)
-    detectors = detector_arrays(tests, np.zeros(n, dtype=np.int64), C)
+    detectors = detector_arrays([], banks.needed_tests(specs), np.zeros(n, dtype=np.int64), C)
+    bank = banks.per_realisation_bank(specs, t, period, sigma, detectors)
     x, Y, further = (np.zeros((F, C, rows, CHUNK)) for rows in (4, 8, ROWS))
     filters = patterns.Filters(x, Y, further, np.empty((6, CHUNK)))
-    recent, T = np.zeros((C, 3, bank.memory, CHUNK)), np.zeros((len(tests.kinds), C + 1, CHUNK))
-    count, observation = np.zeros((C, CHUNK)), _observation(period, sigma)
+    recent, T = np.zeros((C, 3, bank.memory, CHUNK)), np.zeros((len(detectors.plots), C + 1, CHUNK))
+    count = np.zeros((C, CHUNK))
     estimates, covariances = np.zeros((F, n, C, 3)), np.zeros((F, n, C, 3, 3))
     scale = period ** -np.arange(3.0)
     packed = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
@@ -36,23 +45,7 @@ def estimate_recorded(
         detector.detector_statistics(detectors, k, recent, sigma, count, w, T)
         plots = patterns.Plots(plot, w, before, count, recent, T)
         for f, c in np.ndindex(F, C):
-            patterns.filter_scan(bank, observation, f, c, k, dt, filters, plots)
+            patterns.filter_scan(bank, f, c, k, dt, filters, plots)
             estimates[f, k, c] = x[f, c, :3, 0]
             covariances[f, k, c] = filters.P[packed, 0] * sigma[c] ** 2 * np.outer(scale, scale)
     return estimates, covariances
-
-
-def _observation(period: float, sigma: np.ndarray) -> patterns.Observation:
-    """The fields that a scan of a filter reads, period and σ; the others describe simulated plots."""
-    none = np.zeros((0, 2))
-    return patterns.Observation(
-        misses=np.zeros(2, dtype=np.uint64),
-        certain=np.zeros(0, dtype=np.int64),
-        probability=1.0,
-        weight=none,
-        period=period,
-        sigma=sigma,
-        frame=0,
-        measured=none,
-        spread=np.zeros(2),
-    )

@@ -1,13 +1,14 @@
-"""P3 (Butyrskiy): what its parts compute in common: the kernels' world, labels and exact values, sums of errors.
+"""P3 (Butyrskiy): what its parts compute in common: arrays for the kernels, labels and exact values, sums of errors.
 
-Sums of F filters over K scans and components (coordinate by coordinate: value, rate and, where a filter has it,
-acceleration): `error`, `paired`, `estimates` as everywhere; `believed` Σ of the variances that the filter believes; by
-coordinate C: `joint` Σq, Σq², Σp, Σp² of q = eᵀP⁻¹e and p the product of the errors in value and rate, and `ahead` Σe
-… Σe⁴ of the value extrapolated by one scan, in the row of the scan that it was extrapolated from.
+Sums of F filters over K scans and components (for each coordinate: value, rate and, where a filter has it,
+acceleration): `error`, `paired`, `estimates` as in every study; `believed` Σ of the variances that the filter believes.
+For each of C coordinates: `joint` Σq, Σq², Σp, Σp² of q = eᵀP⁻¹e and of p, the product of the errors in value and rate;
+and `ahead` Σe … Σe⁴ of the value extrapolated by one scan, in the row of the scan that it is extrapolated from.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,184 +16,200 @@ from radarsim.config.experiment import Case
 from radarsim.engine.moments import Layout
 from radarsim.studies.noise import noise_key
 from radarsim.studies.sonar import banks
-from radarsim.studies.sonar import world as models
 from radarsim.studies.sonar.axes import GivenPlotsAxes
+from radarsim.studies.sonar.config import Keys
+from radarsim.studies.sonar.exact_values import exact_values
 from radarsim.studies.sonar.kernels import detector as detector_kernels
 from radarsim.studies.sonar.kernels import patterns as pattern_kernels
 from radarsim.studies.sonar.kernels import shared_gains as kernels
-from radarsim.studies.sonar.scene import Scene, patterns, plots_of, third_of
+from radarsim.studies.sonar.scene import Scene, third_coordinate
+from radarsim.studies.sonar.world import conversion_bias, step_correlations
 
 BLOCK = 4096
-NAMES = {
-    "polar": (("r", "m"), ("b", "rad")),
-    "cartesian": (("x", "m"), ("y", "m")),
-    "cartesian_unbiased": (("x", "m"), ("y", "m")),
-}
+FRAMES = ("polar", "cartesian", "cartesian_unbiased")
 THIRD = {"depth": ("d", "m"), "elevation": ("e", "rad")}
 
 
-# ---- what the kernels look at -------------------------------------------------------------------------------------
-def world(case: Case, seen: Scene) -> kernels.World:
+# ---- what the kernels observe -------------------------------------------------------------------------------------
+def world(case: Case, scene: Scene) -> kernels.World:
     """The kernels' world; its coordinates are padded to an even number."""
-    K, C = seen.sigma.shape
+    K, C = scene.sigma.shape
     wide = C + C % 2
-    measured = np.isfinite(seen.sigma)
-    sigma = np.where(measured, seen.sigma, 0.0)
-    steps = np.stack([models.step_correlations(rho, seen.t, seen.period) for rho in seen.rho], axis=1)
-    fresh, truth, walk = np.zeros((K, wide)), np.zeros((K, wide, 3)), np.zeros(wide)
-    fresh[:, :C], truth[:, :C], walk[:C] = sigma * np.sqrt(1 - steps**2), seen.truth, seen.walk
-    padded = np.zeros((K, wide))
-    padded[:, :C] = steps
-    dt = np.diff(seen.t, prepend=seen.t[0])
-    return kernels.World(noise_key(case, "plots"), noise_key(case, "motion"), dt, truth, padded, fresh, walk)
+    fresh, truth, walk, steps = np.zeros((K, wide)), np.zeros((K, wide, 3)), np.zeros(wide), np.zeros((K, wide))
+    for c in range(C):
+        steps[:, c] = step_correlations(scene.rho[c], scene.t, scene.period)
+    sigma = np.where(np.isfinite(scene.sigma), scene.sigma, 0.0)
+    fresh[:, :C], truth[:, :C], walk[:C] = sigma * np.sqrt(1 - steps[:, :C] ** 2), scene.truth, scene.walk
+    dt = np.diff(scene.t, prepend=scene.t[0])
+    return kernels.World(noise_key(case, "plots"), noise_key(case, "motion"), dt, truth, steps, fresh, walk)
 
 
-def observation(case: Case, seen: Scene) -> pattern_kernels.Observation:
-    """Which plots come and how they are converted, for filters that go along with each realisation."""
-    frame = ("polar", "cartesian", "cartesian_unbiased").index(case.spec.frame)
-    return pattern_kernels.Observation(
-        misses=noise_key(case, "misses"),
-        certain=seen.certain,
-        probability=seen.probability,
-        weight=(seen.nominal / seen.sigma) ** 2,
-        period=seen.period,
-        sigma=seen.nominal,
-        frame=frame,
-        measured=np.ascontiguousarray(seen.polar[:, :2, 0]),
-        spread=seen.sigma[0, :2].copy(),
+def detections(case: Case, scene: Scene) -> pattern_kernels.Detections:
+    """Which scans give a plot."""
+    return pattern_kernels.Detections(noise_key(case, "misses"), scene.certain, scene.probability)
+
+
+def conversion(case: Case, scene: Scene) -> pattern_kernels.Conversion:
+    """How plots are converted to the frame of the filters."""
+    return pattern_kernels.Conversion(
+        weight=(scene.nominal / scene.sigma) ** 2,
+        frame=FRAMES.index(case.spec.frame),
+        measured=np.ascontiguousarray(scene.polar[:, :2, 0]),
+        spread=scene.sigma[0, :2].copy(),
     )
 
 
-def detection_patterns(spec, seen: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Patterns (M, K') of plots over which exact values are means, and their probabilities (M,).
+def designs(specs: Sequence[banks.FilterSpec], scene: Scene, detected: np.ndarray) -> list[list[banks.FilterDesign]]:
+    """The designs of each filter in each coordinate, for patterns detected (M, K') of plots.
 
-    None in the cartesian frames: weights go with the plots there, and nothing is known.
+    A filter that responds to manoeuvres has none, because its gains depend on the plots.
     """
-    return patterns(seen) if spec.frame == "polar" else (np.zeros((0, 0)), np.zeros(0))
-
-
-def designs(specs: Sequence[banks.FilterSpec], seen: Scene, detected: np.ndarray) -> list[list[banks.FilterDesign]]:
-    """The designs of each filter by coordinate, for patterns detected (M, K') of plots.
-
-    A filter has none where there is no pattern, or where it responds to manoeuvres: its gains depend on the plots.
-    """
-    coordinates = range(len(seen.nominal)) if len(detected) else ()
     return [
-        [banks.design_filter(one, c, plots_of(seen, c, detected)) for c in coordinates if one.response is None]
-        for one in specs
+        [banks.design_filter(spec, c, scene.plots(c, detected)) for c in range(len(scene.nominal))]
+        if spec.response is None
+        else []
+        for spec in specs
     ]
 
 
 # ---- labels -------------------------------------------------------------------------------------------------------
-def coordinates(spec) -> tuple[tuple[str, str], ...]:
+def coordinates(spec: Keys) -> tuple[tuple[str, str], ...]:
     """Names and units of the coordinates that the filters work in."""
-    third, _ = third_of(spec.sensor)
-    return (*NAMES[spec.frame], *([THIRD[third]] if third else []))
+    third, _ = third_coordinate(spec.sensor)
+    first_two = (("r", "m"), ("b", "rad")) if spec.frame == "polar" else (("x", "m"), ("y", "m"))
+    return (*first_two, *([THIRD[third]] if third else []))
 
 
-def labels(spec, size: int) -> tuple[tuple[str, str], ...]:
+def labels(spec: Keys, size: int) -> tuple[tuple[str, str], ...]:
     """Names and units of all components: each coordinate with its rate and, for size 3, its acceleration."""
     rates = (("", ""), ("v", "/s"), ("a", "/s2"))[:size]
-    return tuple((before + name, unit + after) for name, unit in coordinates(spec) for before, after in rates)
+    return tuple((prefix + name, unit + per) for name, unit in coordinates(spec) for prefix, per in rates)
 
 
-def baseline(spec) -> int:
-    """Place of the filter that gains are against."""
-    return [one.name for one in spec.filters].index(spec.baseline) if spec.baseline else 0
+def common_labels(
+    spec: Keys, scene: Scene, sizes: np.ndarray, available: np.ndarray, values: Mapping[str, np.ndarray]
+) -> dict[str, Any]:
+    """The fields of `SonarAxes`, by name; available (F, K, C, size), values as `exact_values` returns them."""
+    F, K, C, size = available.shape
+    flat = (F, K, C * size)
+    names = tuple(member.name for member in spec.filters)
+    return {
+        "filters": names,
+        "components": labels(spec, size),
+        "k": np.arange(1, K + 1),
+        "t_s": scene.t,
+        "available": available.reshape(flat),
+        "baseline": names.index(spec.baseline) if spec.baseline else 0,
+        "exact_sigma": np.where(available, values["sigma"], np.nan).reshape(flat),
+        "exact_bias": np.where(available, values["bias"], np.nan).reshape(flat),
+        "coordinates": coordinates(spec),
+        "sizes": sizes,
+        "exact_ahead": values["ahead"],
+        "exact_nees": values["nees"],
+        "scan_period_s": scene.period,
+        "sigma": scene.nominal,
+    }
 
 
 def axes(
-    spec, seen: Scene, specs: Sequence[banks.FilterSpec], values: Mapping[str, np.ndarray], known: np.ndarray | None
+    spec: Keys,
+    scene: Scene,
+    specs: Sequence[banks.FilterSpec],
+    values: Mapping[str, np.ndarray],
+    known: np.ndarray | None = None,
 ) -> GivenPlotsAxes:
-    """Labels and exact values, as `exact_values` gives them; known (F, K, C) components, or as many as may be."""
-    F, K, C, size = values["sigma"].shape
-    detected = (seen.certain != 0).astype(float)[None]  # what may come
-    degree = np.array([one.size for one in specs])
+    """Labels and exact values; known (F, K, C) estimated components, by default as many as plots may determine."""
+    size = values["sigma"].shape[3]
+    possible = (scene.certain != 0).astype(float)[None]
+    sizes = np.array([one.size for one in specs])
     if known is None:
-        most = np.stack([plots_of(seen, c, detected).moments()[0] for c in range(C)], axis=1)
-        known = np.minimum(most[None], degree[:, None, None])
-    available = known[..., None] > np.arange(size)
-    flat = (F, K, C * size)
-    return GivenPlotsAxes(
-        filters=tuple(f.name for f in spec.filters),
-        components=labels(spec, size),
-        k=np.arange(1, K + 1),
-        t_s=seen.t,
-        available=available.reshape(flat),
-        baseline=baseline(spec),
-        exact_sigma=np.where(available, values["sigma"], np.nan).reshape(flat),
-        exact_bias=np.where(available, values["bias"], np.nan).reshape(flat),
-        coordinates=coordinates(spec),
-        sizes=degree,
-        exact_ahead=values["ahead"],
-        exact_nees=values["nees"],
-        scan_period_s=seen.period,
-        sigma=seen.nominal,
-        rho=seen.rho,
-        sigma_of_plots=np.where(detected.T > 0, seen.sigma, np.inf),
-        conversion_bias=plain_bias(spec, seen),
-        polar=seen.polar,
-    )
-
-
-def plain_bias(spec, seen: Scene) -> float:
-    """Mean error, along the line of sight, of the converted first plot, m; zero for the unbiased conversion."""
+        times = [scene.plots(c, possible).moments()[0] for c in range(len(scene.nominal))]
+        known = np.minimum(np.stack(times, axis=1)[None], sizes[:, None, None])
     plain = spec.frame == "cartesian"
-    return float(models.conversion_bias(seen.polar[0, 0, 0], spec.sensor.sigma_bearing_rad)) if plain else 0.0
+    return GivenPlotsAxes(
+        **common_labels(spec, scene, sizes, known[..., None] > np.arange(size), values),
+        rho=scene.rho,
+        sigma_of_plots=np.where(possible.T > 0, scene.sigma, np.inf),
+        conversion_bias=float(conversion_bias(scene.polar[0, 0, 0], spec.sensor.sigma_bearing_rad)) if plain else 0.0,
+        polar=scene.polar,
+    )
 
 
 # ---- sums ---------------------------------------------------------------------------------------------------------
 def shapes(F: int, K: int, C: int, size: int) -> dict[str, tuple[int, ...]]:
-    """Shapes of the sums that all cases with gains have, of F filters with `size` components a coordinate at most."""
-    found = dict.fromkeys(("paired", "estimates", "believed"), (F, K, C * size))
-    return found | {"error": (F, K, C * size, 4), "joint": (F, K, C, 4), "ahead": (F, K, C, 4)}
+    """Shapes of the sums of all cases with gains, for F filters with at most `size` components in a coordinate."""
+    sums = dict.fromkeys(("paired", "estimates", "believed"), (F, K, C * size))
+    return sums | {"error": (F, K, C * size, 4), "joint": (F, K, C, 4), "ahead": (F, K, C, 4)}
 
 
 def empty_sums(F: int, K: int, C: int) -> kernels.Sums:
-    """What the kernels add to: three components a coordinate, whatever the filters estimate."""
+    """The sums that the kernels add to: always three components in a coordinate."""
     tails = {"error": (3, 4), "paired": (3,), "joint": (4,), "ahead": (4,), "believed": (3,), "estimates": (3,)}
     return kernels.Sums(**{name: np.zeros((F, K, C, *tail)) for name, tail in tails.items()})
 
 
 def packed(layout: Layout, sums: kernels.Sums, **more: np.ndarray) -> np.ndarray:
-    """The sums of a block in the order of a layout, of which it may leave some out; more: those of one part alone."""
+    """The sums of a block in the order of a layout, without those that it does not contain; more: those of one part."""
     size = layout.shapes["error"][2] // sums.error.shape[2]
-    found = dict(more)
+    arrays = dict(more)
     for name, values in sums._asdict().items():
         if name in layout.shapes:
             own = values if name in ("joint", "ahead") else values[:, :, :, :size]
-            found[name] = own.reshape(layout.shapes[name])
-    return layout.pack(**found)
+            arrays[name] = own.reshape(layout.shapes[name])
+    return layout.pack(**{name: values for name, values in arrays.items() if name in layout.shapes})
 
 
 @dataclass(frozen=True)
 class RealisationPlan:
-    """A plan of filters whose gains go along with each realisation's own plots.
-
-    kept (A,) are the scans at which estimates are kept for further sums of a block.
-    """
+    """A plan of filters whose gains differ between realisations; kept (A,) are scans whose estimates are kept."""
 
     layout: Layout
     axes: GivenPlotsAxes
     world: kernels.World
+    detections: pattern_kernels.Detections
+    conversion: pattern_kernels.Conversion
     bank: pattern_kernels.RealisationBank
-    observation: pattern_kernels.Observation
     detectors: detector_kernels.Detectors
     kept: np.ndarray
     block: int = BLOCK
     gaussian = False
 
     def simulate(self, first: int, count: int) -> np.ndarray:
-        """Sums of one block, in the order of the layout."""
-        return packed(self.layout, self.added(first, count).errors)
+        """The sums of one block, in the order of the layout."""
+        return packed(self.layout, self.block_sums(first, count).errors)
 
-    def added(self, first: int, count: int) -> pattern_kernels.BlockSums:
-        """What the kernels add up in one block."""
+    def block_sums(self, first: int, count: int) -> pattern_kernels.BlockSums:
+        """The sums of one block as the kernels compute them."""
         F, K, C = self.bank.carry.shape
         D, G, T = self.detectors.threshold.shape
         alarms = detector_kernels.Alarms(np.zeros((D, G, K)), np.zeros((D, G, T, K)), np.zeros((D, G, T, K)))
         estimates = np.zeros((len(self.kept), F, 2, 6, count))
         sums = pattern_kernels.BlockSums(empty_sums(F, K, C), alarms, np.zeros((F, K, C, 3)), self.kept, estimates)
-        looked_at = (self.world, self.observation, self.bank, self.detectors)
-        pattern_kernels.simulate_block(*looked_at, first, count, self.axes.baseline, sums)
+        inputs = (self.world, self.detections, self.conversion, self.bank, self.detectors)
+        pattern_kernels.simulate_block(*inputs, first, count, self.axes.baseline, sums)
         return sums
+
+
+def realisation_plan(
+    case: Case, scene: Scene, specs: Sequence[banks.FilterSpec], detectors: detector_kernels.Detectors
+) -> RealisationPlan:
+    """The plan of a case whose gains differ between realisations, with exact values by patterns of plots.
+
+    None are known in the cartesian frames, where weights depend on the plots.
+    """
+    spec, (K, C), size = case.spec, scene.sigma.shape, max(one.size for one in specs)
+    if spec.frame == "polar":
+        detected, probability = scene.patterns()
+        values = exact_values(scene, designs(specs, scene, detected), probability, size)
+    else:
+        values = exact_values(scene, [[]] * len(specs), np.zeros(0), size)
+    return RealisationPlan(
+        layout=Layout(**shapes(len(specs), K, C, size)),
+        axes=axes(spec, scene, specs, values),
+        world=world(case, scene),
+        detections=detections(case, scene),
+        conversion=conversion(case, scene),
+        bank=banks.per_realisation_bank(specs, scene.t, scene.period, scene.nominal, detectors),
+        detectors=detectors,
+        kept=np.zeros(0, dtype=np.int64),
+    )

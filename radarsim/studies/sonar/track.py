@@ -1,136 +1,125 @@
-"""Sonar plots of one realisation, and filters that are given their plots over recorded ones."""
+"""Sonar plots of one realisation, and filters over recorded plots that are known to be the target's."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
-from radarsim.kernels import random
-from radarsim.studies.noise import noise_key
-from radarsim.studies.sonar import banks, filters
+from radarsim.studies.sonar import banks, filters, world
 from radarsim.studies.sonar import study as base
-from radarsim.studies.sonar import world as models
+from radarsim.studies.sonar.config import Keys
+from radarsim.studies.sonar.kernels import patterns as pattern_kernels
 from radarsim.studies.sonar.kernels import shared_gains as kernels
 from radarsim.studies.sonar.responding import estimate_recorded
-from radarsim.studies.sonar.scene import Scene, filter_specs, scene, third_of
+from radarsim.studies.sonar.scene import build_scene, filter_specs, third_coordinate
 
-MOST_ROWS = 200_000  # that the filters take: their designs stand in memory as a whole
+MOST_ROWS = 200_000  # of a file: designs of all rows are kept in memory
 UNITS = {"m": "m", "m/s": "mps", "m/s2": "mps2", "rad": "rad", "rad/s": "radps", "rad/s2": "radps2"}
 RANGE, BEARING = "sensor.sigma_range_m", "sensor.sigma_bearing_rad"
-OPTIMAL = ("growing_memory", "window", "kalman")  # whose residuals' variance is known, if errors are white
-LEAST_FREEDOM = 1e-6  # of a plot's variance; less is a plot that the estimate goes through
+THIRD = {"depth": ("depth_m", "sensor.sigma_depth_m"), "elevation": ("elevation_rad", "sensor.sigma_elevation_rad")}
+OPTIMAL = ("growing_memory", "window", "kalman")  # kinds whose residuals have a known variance if errors are white
+LEAST_FREEDOM = 1e-6  # of a plot's variance; with less the estimate passes through the plot
 
 
-def plot_columns(spec) -> tuple[tuple[str, ...], ...]:
-    """The columns that `track` reads of a file of recorded plots."""
-    third, _ = third_of(spec.sensor)
-    more = {"depth": ("depth_m",), "elevation": ("elevation_rad",)}.get(third, ())
-    return (("t_s", "range_m", "bearing_rad", *more),)
+def plot_columns(spec: Keys) -> tuple[tuple[str, ...], ...]:
+    """The columns that `track` reads from a file of recorded plots."""
+    third, _ = third_coordinate(spec.sensor)
+    return (("t_s", "range_m", "bearing_rad", *([THIRD[third][0]] if third else [])),)
 
 
-def sigmas(spec) -> dict[str, tuple[str, ...]]:
-    """Which of the sensor's standard deviations stand behind each number that is measured."""
-    third, _ = third_of(spec.sensor)
-    own = {"range_m": (RANGE,), "bearing_rad": (BEARING,)}
+def sigmas(spec: Keys) -> dict[str, tuple[str, ...]]:
+    """The keys of the standard deviations that determine the accuracy of each measured quantity."""
+    third, _ = third_coordinate(spec.sensor)
+    keys: dict[str, tuple[str, ...]] = {"range_m": (RANGE,), "bearing_rad": (BEARING,)}
     if spec.frame != "polar":
-        own = {"x_m": (RANGE, BEARING), "y_m": (RANGE, BEARING)}
-    more = {"depth": ("depth_m", "sensor.sigma_depth_m"), "elevation": ("elevation_rad", "sensor.sigma_elevation_rad")}
-    return own | ({more[third][0]: (more[third][1],)} if third else {})
+        keys = {"x_m": (RANGE, BEARING), "y_m": (RANGE, BEARING)}
+    return keys | ({THIRD[third][0]: (THIRD[third][1],)} if third else {})
 
 
 def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     """The plots of one realisation of the study and the truth, columns (K,).
 
-    Not-a-number where a plot is missed, or where a further sonar does not measure that coordinate.
+    NaN where a plot is missed, or where a further sonar does not measure the coordinate.
     """
-    spec, seen = case.spec, scene(case.spec)
-    drawn = _drawn(case, seen, realisation)
-    C = seen.truth.shape[1]
-    deviation, error = drawn[:, :C, 2:], drawn[:, :C, 1]
-    truth = seen.truth.copy()
-    truth[..., :2] += deviation
+    spec, scene = case.spec, build_scene(case.spec)
+    K, C = scene.sigma.shape
+    kernel_world, detections = base.world(case, scene), base.detections(case, scene)
+    plots, detected = np.zeros((kernel_world.truth.shape[1], 4, 1)), np.empty(1)
+    drawn, there = np.empty((K, C, 4)), np.empty(K, dtype=bool)  # plot, error, deviation of value and rate
+    for k in range(K):
+        kernels.move_and_measure(kernel_world, realisation, k, plots)
+        pattern_kernels.detect(detections, realisation, k, detected)
+        drawn[k], there[k] = plots[:C, :, 0], detected[0] > 0
+    truth = scene.truth.copy()
+    truth[..., :2] += drawn[..., 2:]
     if spec.frame == "polar":
-        values, exact = drawn[:, :C, 0], truth[..., 0]
+        values, exact = drawn[..., 0], truth[..., 0]
     else:
-        values, exact = seen.polar[..., 0] + error, seen.polar[..., 0]
-    there = (_detected(case, seen, realisation) > 0)[:, None] & np.isfinite(seen.sigma)
+        values, exact = scene.polar[..., 0] + drawn[..., 1], scene.polar[..., 0]
+    measured_there = there[:, None] & np.isfinite(scene.sigma)
     t, *names = plot_columns(spec)[0]
-    columns = {t: seen.t} | dict(zip(names, np.where(there, values, np.nan).T, strict=True))
+    columns = {t: scene.t} | dict(zip(names, np.where(measured_there, values, np.nan).T, strict=True))
     columns |= {f"true_{name}": exact[:, c] for c, name in enumerate(names)}
-    flat = truth.reshape(len(seen.t), -1)
-    true = {f"true_{name}_{UNITS[unit]}": flat[:, i] for i, (name, unit) in enumerate(base.labels(spec, 3))}
-    return columns | true
+    components = zip(base.labels(spec, 3), truth.reshape(K, -1).T, strict=True)
+    return columns | {f"true_{name}_{UNITS[unit]}": state for (name, unit), state in components}
 
 
-def _drawn(case: Case, seen: Scene, realisation: int) -> np.ndarray:
-    """Plot, error, and deviation of value and rate from the course (K, C, 4) of a realisation."""
-    world = base.world(case, seen)
-    held = np.zeros((world.truth.shape[1], 4, 1))
-    made = np.empty((len(seen.t), *held.shape[:2]))
-    for k in range(len(seen.t)):
-        kernels.move_and_measure(world, realisation, k, held)
-        made[k] = held[:, :, 0]
-    return made
+class Derived(NamedTuple):
+    """Quantities derived from tracks: names and units of U quantities, values and their σ (F, n, U)."""
 
-
-def _detected(case: Case, seen: Scene, realisation: int) -> np.ndarray:
-    """Whether each scan has a plot (K,), as `kernels.patterns.detect`."""
-    key, detected, a, b = noise_key(case, "misses"), seen.certain.copy(), np.empty(1), np.empty(1)
-    for k in np.flatnonzero(seen.certain < 0):
-        random.fill_uniform_pairs(key, realisation, int(k), a, b)
-        detected[k] = int(a[0] < seen.probability)
-    return detected
+    names: tuple[tuple[str, str], ...]
+    values: np.ndarray
+    sigma: np.ndarray
 
 
 class Tracker:
     """The filters of a case over recorded plots.
 
-    Windows and bulk designs reach back over many rows, so all are taken in one piece: `most_rows` tells the reader to.
-    Bearings are made continuous from plot to plot, so an estimate may leave -pi … pi. In the cartesian frames a plot
-    needs both range and bearing. Further sonars of the config play no part: all plots are taken as the first one's.
+    Windows and designs computed in advance need many rows, so all rows are processed at once: `most_rows` limits their
+    number. Bearings are made continuous from plot to plot, so an estimate may leave -pi … pi. In the cartesian frames a
+    plot needs both range and bearing. Further sonars of the config are ignored: all plots are taken as the first one's.
     """
 
     most_rows = MOST_ROWS
     several = False
 
     def __init__(self, case: Case):
-        self.spec = case.spec
+        self.spec: Any = case.spec
 
     def specs(self) -> list[banks.FilterSpec]:
         """The filters."""
         return filter_specs(self.spec)
 
-    def derived(
-        self, t: np.ndarray, x: np.ndarray, P: np.ndarray, known: np.ndarray
-    ) -> tuple[tuple[tuple[str, str], ...], np.ndarray, np.ndarray]:
-        """What is made of the tracks beside: names and units of U quantities, values and their σ (F, n, U).
+    def derived(self, t: np.ndarray, x: np.ndarray, P: np.ndarray, known: np.ndarray) -> Derived:
+        """Quantities derived from the tracks; here none.
 
-        t (n,) from the first plot; x (F, n, C, 3), P (F, n, C, 3, 3) and known (F, n, C, 3). Here: nothing.
+        t (n,) from the first plot; x (F, n, C, 3), P (F, n, C, 3, 3) and known (F, n, C, 3).
         """
         none = np.zeros((*x.shape[:2], 0))
-        return (), none, none
+        return Derived((), none, none)
 
-    def feed(self, recorded: Mapping[str, np.ndarray]) -> Track:
-        """The estimates over all rows: columns (n,), not-a-number where a value is missing."""
+    def feed(self, columns: Mapping[str, np.ndarray]) -> Track:
+        """The estimates over all rows: columns (n,), NaN where a value is missing."""
         spec, specs = self.spec, self.specs()
-        t = recorded["t_s"] - recorded["t_s"][0]
-        z, weight, sigma = measured(spec, list(recorded.values())[1:])
+        t = columns["t_s"] - columns["t_s"][0]
+        z, weight, sigma = measured(spec, list(columns.values())[1:])
         x, P, known = _estimated(specs, t, spec.sensor.scan_period_s, z, weight, sigma)
         size = max(one.size for one in specs)
         flat = (len(specs), len(t), len(z) * size)
         variance = np.diagonal(P, axis1=3, axis2=4)
         estimate = np.where(known, x, np.nan)[..., :size].reshape(flat)
         spread = np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)[..., :size].reshape(flat)
-        names, values, their_spread = self.derived(t, x, P, known)
+        derived = self.derived(t, x, P, known)
         residual, nis = self._residuals(z, weight, sigma, estimate[..., ::size], spread[..., ::size])
         measures = tuple(sigmas(spec))
         return Track(
-            filters=tuple(f.name for f in spec.filters),
-            components=(*base.labels(spec, size), *names),
-            t_s=recorded["t_s"],
-            estimate=np.concatenate([estimate, values], axis=2),
-            sigma=np.concatenate([spread, their_spread], axis=2),
+            filters=tuple(member.name for member in spec.filters),
+            components=(*base.labels(spec, size), *derived.names),
+            t_s=columns["t_s"],
+            estimate=np.concatenate([estimate, derived.values], axis=2),
+            sigma=np.concatenate([spread, derived.sigma], axis=2),
             measured=tuple((name, name.rpartition("_")[2]) for name in measures),
             residual=residual,
             tested=tuple((name, 1) for name in measures),
@@ -145,17 +134,22 @@ class Tracker:
         with np.errstate(divide="ignore", invalid="ignore"):
             variance = np.where(weight > 0, sigma[:, None] ** 2 / weight, np.nan).T[None]
             freedom = variance - spread**2
-            # For least squares and Kalman filters the residual left after the update has variance R - P, and its square
-            # over that is the squared innovation over its own.
+            # For least squares and Kalman filters the residual after the update has variance R - P, and its normalised
+            # square equals that of the innovation.
             nis = np.where(freedom > LEAST_FREEDOM * variance, residual**2 / freedom, np.nan)
-        nis[[f.kind not in OPTIMAL for f in self.spec.filters]] = np.nan
+        nis[[member.kind not in OPTIMAL for member in self.spec.filters]] = np.nan
         return residual, nis
 
 
 def _estimated(
-    specs: list[banks.FilterSpec], t: np.ndarray, period: float, z: np.ndarray, weight: np.ndarray, sigma: np.ndarray
+    specs: Sequence[banks.FilterSpec],
+    t: np.ndarray,
+    period: float,
+    z: np.ndarray,
+    weight: np.ndarray,
+    sigma: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Estimates (F, n, C, 3), covariances (F, n, C, 3, 3), which are known (F, n, C, 3), over plots as `measured`."""
+    """Estimates (F, n, C, 3), covariances (F, n, C, 3, 3) and which are known (F, n, C, 3), of `measured` plots."""
     plots = [filters.Plots(t, w[None], period, unit) for w, unit in zip(weight, sigma, strict=True)]
     x, P = np.zeros((len(specs), len(t), len(z), 3)), np.zeros((len(specs), len(t), len(z), 3, 3))
     known = np.zeros(x.shape, dtype=bool)
@@ -170,23 +164,21 @@ def _estimated(
     return x, P, known
 
 
-def measured(spec, columns: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Plots (C, n), their weights (C, n), zero where missing, and nominal σ (C,), in the frame that the filters work
-    in.
-    """
+def measured(spec: Keys, columns: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Plots (C, n), their weights (C, n), zero where missing, and nominal σ (C,), in the frame of the filters."""
     sensor = spec.sensor
-    third, other = third_of(sensor)
-    sigma = np.array([sensor.sigma_range_m, sensor.sigma_bearing_rad, *([other] if third else [])])
+    third, third_sigma = third_coordinate(sensor)
+    sigma = np.array([sensor.sigma_range_m, sensor.sigma_bearing_rad, *([third_sigma] if third else [])])
     z = np.stack(columns)
     z[1] = continuous(z[1])
     weight = np.isfinite(z).astype(float)
     if spec.frame != "polar":
         detected = np.flatnonzero(weight[:2].all(axis=0))
-        plain = spec.frame == "cartesian" or not len(detected)
-        place = z[:2, detected] if plain else models.places(*z[:2, detected])
-        convert = models.converted if spec.frame == "cartesian" else models.converted_unbiased
-        x, y, _ = convert(*z[:2, detected], *sigma[:2])
-        xx, _, yy = convert(*place, *sigma[:2])[2]
+        plots = z[:2, detected]
+        convert = world.converted if spec.frame == "cartesian" else world.converted_unbiased
+        x, y, _ = convert(*plots, *sigma[:2])
+        position = plots if spec.frame == "cartesian" or not len(detected) else world.places(*plots)
+        xx, _, yy = convert(*position, *sigma[:2])[2]
         weight[:2], z[:2] = 0.0, 0.0
         sigma[:2] = np.sqrt([xx[0], yy[0]]) if len(detected) else 1.0
         z[0, detected], z[1, detected] = x, y
@@ -196,7 +188,7 @@ def measured(spec, columns: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, n
 
 def continuous(bearing: np.ndarray) -> np.ndarray:
     """Bearings (n,) without jumps of a full turn between neighbouring plots; gaps stay."""
-    seen = np.isfinite(bearing)
+    there = np.isfinite(bearing)
     out = bearing.copy()
-    out[seen] = np.unwrap(bearing[seen])
+    out[there] = np.unwrap(bearing[there])
     return out

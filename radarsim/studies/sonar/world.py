@@ -11,14 +11,15 @@ import numpy as np
 
 from radarsim.physics.targets import polynomial
 
-PLACED = 8  # plots in the mean place at which the unbiased conversion's covariance is reckoned
+PLACED = 8  # plots in the mean position at which the covariance of the unbiased conversion is computed
+Values = float | np.ndarray
 
 
 # ---- errors of plots -------------------------------------------------------------------------------------------------
 def correlation(rho: float, lags: np.ndarray) -> np.ndarray:
-    """ρ to the power of the lags in periods, of any shape (P3 eq. 15).
+    """ρ to the power of the lags, in periods, an array of any shape (P3 eq. 15).
 
-    A negative ρ means something at whole periods only: lags are rounded.
+    A negative ρ has a meaning at whole periods only, so its lags are rounded.
     """
     if rho < 0:
         lags = np.rint(lags)
@@ -32,7 +33,7 @@ def step_correlations(rho: float, t: np.ndarray, period: float) -> np.ndarray:
 
 
 def error_covariance(sigma: np.ndarray, rho: float, t: np.ndarray, period: float) -> np.ndarray:
-    """Covariance (K, K) of the stationary errors of a coordinate whose plots have standard deviations sigma (K,)."""
+    """Covariance (K, K) of the stationary errors of plots with standard deviations sigma (K,), in one coordinate."""
     C = np.outer(sigma, sigma) * correlation(rho, np.abs(t[:, None] - t[None, :]) / period)
     return C if rho else np.diag(np.diag(C))
 
@@ -43,8 +44,8 @@ def turning(
 ) -> tuple[np.ndarray, np.ndarray]:
     """States (K, 3) in x and y of a target on straight legs and arcs, at constant speed (m/s).
 
-    turns holds (start, end, rate): seconds, seconds, rad/s, positive to starboard (course grows); in order, not
-    overlapping. Right at the start of a turn the acceleration is already the turn's.
+    turns holds (start, end, rate) in s, s and rad/s, positive to starboard (the course increases), in order and
+    without overlap. At the very start of a turn the acceleration is already that of the turn.
     """
     states = np.zeros((2, len(t), 3))
     legs, clock = [], 0.0
@@ -65,7 +66,7 @@ def turning(
 def _arc(position: np.ndarray, speed: float, course: float, rate: float, elapsed: np.ndarray) -> np.ndarray:
     """States (2, n, 3) after `elapsed` seconds of a turn.
 
-    The chord of angle a has length speed · elapsed · sinc(a / 2).
+    The chord of an arc of angle a has length speed · elapsed · sinc(a / 2).
     """
     half = rate * elapsed / 2
     chord = speed * elapsed * np.sinc(half / np.pi)
@@ -80,19 +81,19 @@ def accelerating(
 ) -> tuple[np.ndarray, np.ndarray]:
     """States (K, 3) in x and y of a target on a straight course, accelerated along it from start to end (s, m/s²).
 
-    Right at the start the acceleration is there already, at the end no more.
+    The acceleration acts from the very start, and no longer at the end.
     """
     on, off = np.maximum(t - start, 0.0), np.maximum(t - end, 0.0)
-    way = speed * t + acceleration * (on**2 - off**2) / 2
-    pace = speed + acceleration * (on - off)
-    along = np.stack([way, pace, np.where((t >= start) & (t < end), acceleration, 0.0)], axis=1)
+    distance = speed * t + acceleration * (on**2 - off**2) / 2
+    rate = speed + acceleration * (on - off)
+    along = np.stack([distance, rate, np.where((t >= start) & (t < end), acceleration, 0.0)], axis=1)
     origin = np.array([[x], [y]]) * np.array([1.0, 0.0, 0.0])
     states = origin[:, None, :] + np.array([math.cos(course), math.sin(course)])[:, None, None] * along
     return states[0], states[1]
 
 
 def polar_states(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """States (K, 3) of range and (unwrapped) bearing from those of x and y."""
+    """States (K, 3) of range and unwrapped bearing from those of x and y."""
     r = np.hypot(x[:, 0], y[:, 0])
     b = np.unwrap(np.arctan2(y[:, 0], x[:, 0]))
     cb, sb = np.cos(b), np.sin(b)
@@ -118,22 +119,26 @@ def polynomials(coefficients: Sequence[Sequence[float]], t: np.ndarray) -> tuple
 
 
 # ---- conversion ------------------------------------------------------------------------------------------------------
-def converted(r, b, sigma_r, sigma_b):
+def converted(
+    r: np.ndarray, b: np.ndarray, sigma_r: Values, sigma_b: Values
+) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Plain conversion: x, y and the linearised covariance (xx, xy, yy) of plots r, b; broadcasts.
 
-    The mean of x and y is exp(-σ_b²/2) of the true one: see `conversion_bias`.
+    The mean of x and y is exp(-σ_b²/2) times the true value: see `conversion_bias`.
     """
     c, s = np.cos(b), np.sin(b)
     along, across = sigma_r**2 + 0 * r, (r * sigma_b) ** 2
     return r * c, r * s, (along * c**2 + across * s**2, (along - across) * c * s, along * s**2 + across * c**2)
 
 
-def converted_unbiased(r, b, sigma_r, sigma_b):
-    """Unbiased conversion exp(σ_b²/2) (r cos b, r sin b), and its covariance were the target where the plot is.
+def converted_unbiased(
+    r: np.ndarray, b: np.ndarray, sigma_r: Values, sigma_b: Values
+) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Unbiased conversion exp(σ_b²/2) (r cos b, r sin b), and its covariance for a target at the plot's position.
 
-    With independent Gaussian errors E cos(b + e) = exp(-σ²/2) cos b and E cos 2(b + e) = exp(-2σ²) cos 2b, which
-    makes the factor exact and gives the second moments (Longbin, Xiaoquan, Yiyu, Kang, Bar-Shalom 1998 use the same
-    identities).
+    For independent Gaussian errors E cos(b + e) = exp(-σ²/2) cos b and E cos 2(b + e) = exp(-2σ²) cos 2b, which makes
+    the factor exact and gives the second moments. Longbin, Xiaoquan, Yiyu, Kang and Bar-Shalom (1998) use the same
+    identities.
     """
     c, s = np.cos(b), np.sin(b)
     grow, shrink = np.exp(sigma_b**2), np.exp(-2 * sigma_b**2)
@@ -144,11 +149,11 @@ def converted_unbiased(r, b, sigma_r, sigma_b):
 
 
 def places(r: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the covariance of the unbiased conversion is reckoned: means of the plots before; r and b (n,) in order.
+    """Positions at which the covariance of the unbiased conversion is computed; r and b (n,) are plots in order.
 
-    A running mean of up to `PLACED` plots, of the first plot itself. At the plot's own place a weight would go with the
-    error of its plot, and weighted estimates be biased again; so they are at a place of few plots, less the more
-    there are.
+    Each is the running mean of up to `PLACED` earlier plots; for the first plot it is the plot itself. At the plot's
+    own position the weight would be correlated with the error of the plot, and weighted estimates would be biased
+    again. The mean of a few plots reduces this bias, the more plots the better.
     """
     out, mean, count = np.empty((2, len(r))), np.array([r[0], b[0]]), 0
     for k, plot in enumerate(np.stack([r, b], axis=1)):
@@ -158,6 +163,6 @@ def places(r: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return out[0], out[1]
 
 
-def conversion_bias(r, sigma_b):
-    """Mean error, along the line of sight, of the plain conversion: (exp(-σ_b²/2) - 1) r, exact for Gaussian errors."""
+def conversion_bias(r: Values, sigma_b: Values) -> Values:
+    """Mean error of the plain conversion along the line of sight: (exp(-σ_b²/2) - 1) r, exact for Gaussian errors."""
     return np.expm1(-(sigma_b**2) / 2) * r

@@ -75,7 +75,7 @@ def test_the_example_of_the_contract():
             "filters.0.manoeuvre_variance: growing_memory allows for no manoeuvre",
         ),
         ({"filters__0__error_correlation": 0.5}, "filters.0.error_correlation: only kalman_augmented and"),
-        ({"frame": "cartesian", "filters__0__kind": "kalman_augmented"}, "filters.0.kind: kalman_augmented works in"),
+        ({"frame": "cartesian", "filters__0__kind": "kalman_augmented"}, "filters.0.kind: kalman_augmented works only"),
         ({"frame": "cartesian", "target__fluctuation_mps2": 0.1}, "frame: must be polar for a fluctuating target"),
         ({"frame": "spherical"}, "frame"),
         ({"baseline": "nobody"}, "baseline: must be the name of a filter: growing"),

@@ -49,7 +49,7 @@ def plots(plan, realisation, rho, probability, missed=()):
         fresh = SIGMA * np.array([a[0], b[0]])
         e[k] = fresh if k == 0 else rho * e[k - 1] + np.sqrt(1 - rho**2) * fresh
         if probability < 1 and k > 0:
-            fill_uniform_pairs(plan.observation.misses, realisation, k, a, b)
+            fill_uniform_pairs(plan.detections.key, realisation, k, a, b)
             detected[k] = a[0] < probability
     detected[list(missed)] = False
     return e, detected

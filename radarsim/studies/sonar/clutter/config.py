@@ -1,11 +1,24 @@
-"""Keys of tracks among false and missed plots (P3): the surveyed sector, and what makes a filter a tracker."""
+"""Keys of tracks among false and missed plots (P3): the surveyed sector, and what turns a filter into a tracker."""
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from radarsim.config.fields import Design, Model, NonNegative, Number, Positive, Probability, at, cross_check, whole
+from radarsim.config.fields import (
+    At,
+    Design,
+    Model,
+    NonNegative,
+    Number,
+    Positive,
+    Probability,
+    Whole,
+    at,
+    cross_check,
+)
+from radarsim.studies.sonar import config
 
 FIGURES = ("track_map", "confirmation", "track_life", "false_tracks", "track_classes")
 MOST_FALSE = 1e7  # in a scan of the whole sector
@@ -18,58 +31,61 @@ DEFAULTS = {
 
 
 class Sector(Model):
-    """The surveyed sector: false plots lie in it, and a target outside it is not seen."""
+    """The surveyed sector, which contains all false plots; a target outside it is not detected."""
 
-    range_m: tuple[NonNegative, Positive] = Field(description="nearest and farthest range, m")
+    range_m: tuple[NonNegative, Positive] = Field(description="smallest and largest range, m")
     bearing_rad: tuple[Number, Number] = Field(description="first and last bearing, from north to east, rad")
 
     @cross_check
-    def _order(self):
+    def _order(self) -> Iterator[At]:
         if self.range_m[1] <= self.range_m[0]:
             yield at("range_m", "must be a smaller and a larger range")
         if not 0 < self.bearing_rad[1] - self.bearing_rad[0] <= 2 * math.pi + 1e-9:
             yield at("bearing_rad", "must be a smaller and a larger bearing, at most a full circle apart")
 
     def area_m2(self) -> float:
-        """Its area, m²."""
+        """The area of the sector, m²."""
         return (self.bearing_rad[1] - self.bearing_rad[0]) * (self.range_m[1] ** 2 - self.range_m[0] ** 2) / 2
 
 
-class Surveyed(Model):
-    """What a sonar among false plots has beside: how many they are, and where."""
+class Sensor(config.Sensor):
+    """A sonar among false plots: how many there are, and where."""
 
     false_plots_per_km2: Annotated[NonNegative, Field(le=1e4), Design()] = Field(
         0.0, description="mean number of false plots a scan, per km² of the surveyed sector"
     )
     sector: Annotated[Sector | None, Design()] = Field(
-        None, description="the surveyed sector, of filters with an association; outside it there are no plots"
+        None, description="the surveyed sector of filters with an association; there are no plots outside it"
     )
 
 
 class Initiation(Model):
-    """A track is confirmed once m of its first n scans, that of its first plot among them, gave it a plot."""
+    """A track is confirmed once m of its first n scans gave it a plot; the scan of its first plot counts."""
 
-    m: whole(2, 20) = Field(description="plots that confirm a track")
-    n: whole(2, 20) = Field(description="scans within which they must come, the first plot's among them")
+    m: Annotated[int, Whole(2, 20)] = Field(description="number of plots that confirms a track")
+    n: Annotated[int, Whole(2, 20)] = Field(
+        description="number of scans, from that of the first plot on, within which they must come"
+    )
 
     @cross_check
-    def _order(self):
+    def _order(self) -> Iterator[At]:
         if self.n < self.m:
-            yield at("n", f"must be >= {self.m}, the plots that confirm a track")
+            yield at("n", f"must be >= {self.m}, the number of plots that confirms a track")
 
 
-class Tracking(Model):
-    """What a filter that has to find its plots among false ones needs; without `association` none of it."""
+class Filter(config.Filter):
+    """A filter that may have to find its plots among false ones; without `association` it does not."""
 
     association: Literal["nearest", "pda", "known"] | None = Field(
         None,
-        description="how plots are chosen: the nearest in the gate, probabilistic data association, or known by oracle",
+        description="how plots are chosen: the nearest in the gate, probabilistic data association, or the target's "
+        "own plots, as a reference",
     )
     gate_probability: Annotated[Probability, Field(gt=0)] | None = Field(
-        None, description="probability that the gate holds the target's plot; 1: open; default 0.99"
+        None, description="probability that the gate contains the target's plot; 1: an open gate; default 0.99"
     )
-    initiation: Initiation | None = Field(None, description="m of n; default 3 of 4")
-    drop_after_misses: whole(1, 1000) | None = Field(
+    initiation: Initiation | None = Field(None, description="the m of n rule of confirmation; default 3 of 4")
+    drop_after_misses: Annotated[int, Whole(1, 1000)] | None = Field(
         None, description="scans in a row without a plot after which a confirmed track is dropped; default 3"
     )
     speed_mps: Positive | None = Field(
@@ -82,45 +98,56 @@ class Tracking(Model):
     )
 
     def tracker(self, key: str) -> float:
-        """A number of the tracker, its default where it is not given."""
+        """A number of the tracker, or its default where it is not given."""
         given = getattr(self, key)
         return DEFAULTS[key] if given is None else given
 
     def m_of_n(self) -> tuple[int, int]:
-        """The rule of initiation."""
+        """The rule of confirmation."""
         return (self.initiation.m, self.initiation.n) if self.initiation else (3, 4)
 
     @cross_check
-    def _belongs_to_tracker(self):
+    def _belongs_to_tracker(self) -> Iterator[At]:
         for key in (*DEFAULTS, "initiation"):
             if self.association is None and getattr(self, key) is not None:
                 yield at(key, "belongs to a filter with an association: nearest, pda or known")
 
     @cross_check
-    def _kalman_line(self):
+    def _kalman_line(self) -> Iterator[At]:
         if self.association is not None and (self.kind != "kalman" or self.degree != 1):
             yield at("association", "needs a filter of kind kalman and degree 1")
 
 
-def tracker_misfits(spec):
-    """Faults of a sonar case whose filters are trackers; of one that has false plots and no tracker."""
-    sensor, some = spec.sensor, [f.association is not None for f in spec.filters]
-    if any(some) and not all(some):
-        yield at(f"filters.{some.index(False)}.association", "is needed where another filter has one")
-    if not any(some):
-        if sensor.false_plots_per_km2:
+class Keys(config.Keys):
+    """The keys of a case whose filters may be trackers."""
+
+    sensor: Sensor = Field(description="the sonar")
+    filters: tuple[Filter, ...]
+
+    @cross_check
+    def _trackers_fit(self) -> Iterator[At]:
+        tracking = [member.association is not None for member in self.filters]
+        if any(tracking) and not all(tracking):
+            yield at(f"filters.{tracking.index(False)}.association", "is needed where another filter has one")
+        if any(tracking):
+            yield from self._tracked_sensor()
+        elif self.sensor.false_plots_per_km2:
             yield at("filters.0.association", "is needed among false plots: nearest, pda or known")
-        return
-    if sensor.sector is None:
-        yield at("sensor.sector", "is needed by filters with an association")
-    elif sensor.false_plots_per_km2 * sensor.sector.area_m2() / 1e6 > MOST_FALSE:
-        yield at("sensor.false_plots_per_km2", f"must give at most {MOST_FALSE:.0e} false plots a scan in the sector")
-    if spec.frame != "polar":
-        yield at("frame", "must be polar for filters with an association")
-    if sensor.error_correlation != 0.0:
-        yield at("sensor.error_correlation", "must be 0 for filters with an association")
-    if sensor.further:
-        yield at("sensor.further", "must be empty for filters with an association")
-    for key in ("sigma_depth_m", "sigma_elevation_rad"):
-        if getattr(sensor, key) is not None:
-            yield at(f"sensor.{key}", "must not be given for filters with an association: they track range and bearing")
+
+    def _tracked_sensor(self) -> Iterator[At]:
+        sensor = self.sensor
+        if sensor.sector is None:
+            yield at("sensor.sector", "is needed by filters with an association")
+        elif sensor.false_plots_per_km2 * sensor.sector.area_m2() / 1e6 > MOST_FALSE:
+            message = f"must give at most {MOST_FALSE:.0e} false plots a scan in the sector"
+            yield at("sensor.false_plots_per_km2", message)
+        if self.frame != "polar":
+            yield at("frame", "must be polar for filters with an association")
+        if sensor.error_correlation != 0.0:
+            yield at("sensor.error_correlation", "must be 0 for filters with an association")
+        if sensor.further:
+            yield at("sensor.further", "must be empty for filters with an association")
+        for key in ("sigma_depth_m", "sigma_elevation_rad"):
+            if getattr(sensor, key) is not None:
+                message = "must not be given for filters with an association: they track range and bearing"
+                yield at(f"sensor.{key}", message)

@@ -1,24 +1,28 @@
-"""Trackers of P3 and the field of false plots as the arrays that the kernels take."""
+"""P3's trackers and the field of false plots as arrays for the kernels."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.studies.sonar.clutter.kernels import tracker as kernels
-from radarsim.studies.sonar.clutter.kernels.field import KNOWN, NEAREST, OPEN, PDA, Field
+from radarsim.studies.sonar.clutter.config import Keys, Sector
+from radarsim.studies.sonar.clutter.kernels.field import Cells, Field
+from radarsim.studies.sonar.clutter.kernels.gate import KNOWN, NEAREST, OPEN, PDA
+from radarsim.studies.sonar.clutter.kernels.tracker import Trackers
+from radarsim.studies.sonar.scene import lateral_scale
 
 ASSOCIATIONS = {"nearest": NEAREST, "pda": PDA, "known": KNOWN}
 THRESHOLDS = np.arange(0.0, 15.5, 0.5)  # of the score, in natural logarithms
-CELL = 8.0  # a cell in σ of a plot, each way; about a settled gate
-MOST_IN_CELL = 4.0  # mean number of false plots: fewer plots are looked at in vain, but more cells
+CELL = 8.0  # size of a cell in σ of a plot, in each direction; about the size of a settled gate
+MOST_IN_CELL = 4.0  # mean number of false plots: more cells to look at, but fewer plots outside the gate
 MOST_CELLS = 1 << 22
 
 
 @dataclass(frozen=True)
 class TrackerSpec:
-    """A tracker as chosen; speed in m/s, lost in σ of a plot, variance (2,) of the manoeuvre by coordinate."""
+    """A configured tracker; speed in m/s, lost in σ of a plot, variance (2,) of a manoeuvre in each coordinate."""
 
     association: str
     gate_probability: float
@@ -30,8 +34,42 @@ class TrackerSpec:
     variance: np.ndarray
 
 
+class Conditions(NamedTuple):
+    """What trackers know of the plots: period in s, sigma (2,) in m and rad, detection probability, and the density of
+    false plots per m².
+    """
+
+    period: float
+    sigma: np.ndarray
+    detection: float
+    density: float
+
+
+def conditions(spec: Keys) -> Conditions:
+    """The conditions of a case."""
+    sensor = spec.sensor
+    sigma = np.array([sensor.sigma_range_m, sensor.sigma_bearing_rad])
+    return Conditions(sensor.scan_period_s, sigma, sensor.detection_probability, sensor.false_plots_per_km2 / 1e6)
+
+
+def tracker_specs(spec: Keys) -> list[TrackerSpec]:
+    """The trackers of a case."""
+    return [
+        TrackerSpec(
+            member.association or "",
+            member.tracker("gate_probability"),
+            *member.m_of_n(),
+            int(member.tracker("drop_after_misses")),
+            member.tracker("speed_mps"),
+            member.tracker("lost_beyond_sigmas"),
+            (member.manoeuvre_variance or 0.0) * lateral_scale(spec, 2),
+        )
+        for member in spec.filters
+    ]
+
+
 def gate_threshold(probability: float) -> float:
-    """χ² of two degrees of freedom below which an innovation lies with that probability; a large number for 1."""
+    """χ² with two degrees of freedom that an innovation stays below with this probability; a large number for 1."""
     return -2.0 * math.log1p(-probability) if probability < 1 else OPEN
 
 
@@ -47,15 +85,17 @@ def poisson_share(mean: float) -> np.ndarray:
     return np.array([*out[:-1], 1.0])
 
 
-def field(key: np.ndarray, sector, density: float, sigma: np.ndarray) -> Field:
-    """The field of false plots of a sector (range_m, bearing_rad), density per m²; sigma (2,) of a plot, m and rad.
+def field(key: np.ndarray, sector: Sector, given: Conditions) -> Field:
+    """The field of false plots of a sector.
 
-    Cells follow the plots' σ at the sector's mean range, and hold fewer false plots than MOST_IN_CELL.
+    Cells have the size of the plots' σ at the mean range of the sector, times CELL, and contain fewer false plots than
+    MOST_IN_CELL in the mean.
     """
     near, far = sector.range_m
     b0, b1 = sector.bearing_rad
     q0, q1 = near**2 / 2, far**2 / 2
     middle = math.sqrt(q0 + q1)
+    sigma, density = given.sigma, given.density
     area = (CELL * sigma[0] * middle) * (CELL * sigma[1])
     scale = min(1.0, math.sqrt(MOST_IN_CELL / max(density * area, 1e-12)))
     nq = max(1, round((q1 - q0) / (scale * CELL * sigma[0] * middle)))
@@ -64,15 +104,13 @@ def field(key: np.ndarray, sector, density: float, sigma: np.ndarray) -> Field:
         nq, nb = max(1, nq // 2), max(1, nb // 2)
     dq, db = (q1 - q0) / nq, (b1 - b0) / nb
     ring = abs(b1 - b0 - 2 * math.pi) < 1e-9
-    return Field(key, poisson_share(density * dq * db), q0, dq, nq, b0, db, nb, ring, density)
+    return Field(key, poisson_share(density * dq * db), Cells(q0, dq, nq, b0, db, nb, ring, density))
 
 
-def trackers(
-    specs: Sequence[TrackerSpec], period: float, sigma: np.ndarray, detection: float, density: float
-) -> kernels.Trackers:
-    """Trackers that know the detection probability and the density (per m²) of false plots."""
+def trackers(specs: Sequence[TrackerSpec], given: Conditions) -> Trackers:
+    """The arrays of trackers that know these conditions."""
     variance = np.stack([one.variance for one in specs])
-    return kernels.Trackers(
+    return Trackers(
         association=np.array([ASSOCIATIONS[one.association] for one in specs]),
         gate=np.array([gate_threshold(one.gate_probability) for one in specs]),
         inside=np.array([one.gate_probability for one in specs]),
@@ -81,10 +119,7 @@ def trackers(
         misses=np.array([float(one.misses) for one in specs]),
         speed=np.array([one.speed for one in specs]),
         lost=np.array([one.lost for one in specs]),
-        manoeuvre=variance * period**4 / sigma**2,
-        detection=float(detection),
-        density=float(density),
-        period=float(period),
-        sigma=sigma,
+        manoeuvre=variance * given.period**4 / given.sigma**2,
         thresholds=THRESHOLDS,
+        **given._asdict(),
     )

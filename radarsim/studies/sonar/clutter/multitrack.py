@@ -1,7 +1,7 @@
-"""All tracks of one tracker over the plots of many scans, among themselves: for recorded plots, and for the map.
+"""All tracks of one tracker over the plots of many scans: for recorded plots, and for the map.
 
-The steps are the kernels' own, one track in each lane. Beyond what they do for a single track, tracks compete: a plot
-goes to the track that it is nearest to, confirmed tracks before tentative ones, and what no track took begins a track.
+The steps are those of the kernels, with a track in each lane. In addition tracks compete for plots: a plot goes to the
+nearest track, confirmed tracks before tentative ones, and plots that no track takes begin new tracks.
 """
 
 from collections.abc import Iterable
@@ -9,50 +9,44 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from radarsim.studies.sonar.clutter.filters import TrackerSpec, trackers
-from radarsim.studies.sonar.clutter.kernels import tracker as kernels
-from radarsim.studies.sonar.clutter.kernels.field import CLOSEST, PDA, Rule, associate_innovations
+from radarsim.studies.sonar.clutter.filters import Conditions, TrackerSpec, trackers
+from radarsim.studies.sonar.clutter.kernels.gate import CLOSEST, PDA, Rule, associate_innovations
+from radarsim.studies.sonar.clutter.kernels.rules import CONFIRMED, NONE, TENTATIVE, next_state
 from radarsim.studies.sonar.clutter.kernels.tracks import Tracks, clear, no_tracks, predict, update
 from radarsim.studies.sonar.kernels.steps import CHUNK
 
 
 @dataclass
 class TrackHistory:
-    """One track: its lane, its state under the rules, and the estimates at each of its scans.
+    """One track: its lane (chunk, index), its state under the rules, and the estimates at each of its scans.
 
-    scans holds their numbers; states (n, 4) r, vr, b, vb with variances (n, 4), not-a-number for rates not yet known;
-    scores (n,); gates (n, 5) the predicted place and its innovation covariance.
+    scans holds the numbers of the scans; states (n, 4) r, vr, b, vb with variances (n, 4), NaN for rates not yet known;
+    scores (n,); gates (n, 5) the predicted position and the covariance of its innovation.
     """
 
     lane: tuple[int, int]
-    state: int = kernels.TENTATIVE
+    state: int = TENTATIVE
     age: int = 1
     hits: int = 1
     misses: int = 0
     since: float = 0.0
     score: float = 0.0
-    found: bool = False
-    scans: list = field(default_factory=list)
-    states: list = field(default_factory=list)
-    variances: list = field(default_factory=list)
-    scores: list = field(default_factory=list)
-    gates: list = field(default_factory=list)
+    was_confirmed: bool = False
+    scans: list[int] = field(default_factory=list)
+    states: list[np.ndarray] = field(default_factory=list)
+    variances: list[np.ndarray] = field(default_factory=list)
+    scores: list[float] = field(default_factory=list)
+    gates: list[np.ndarray] = field(default_factory=list)
 
 
 class MultiTracker:
     """The tracks of one tracker, alive and ended."""
 
-    def __init__(self, spec: TrackerSpec, period: float, sigma: np.ndarray, detection: float, density: float):
-        arrays = trackers([spec], period, sigma, detection, density)
-        self.spec, self.period, self.sigma, self.arrays = spec, period, sigma, arrays
-        self.rule = Rule(
-            int(arrays.association[0]),
-            arrays.gate[0],
-            arrays.detection,
-            arrays.inside[0],
-            arrays.density,
-            arrays.speed[0],
-        )
+    def __init__(self, spec: TrackerSpec, given: Conditions):
+        arrays = trackers([spec], given)
+        self.spec, self.given, self.manoeuvre = spec, given, arrays.manoeuvre[0]
+        association, gate = int(arrays.association[0]), arrays.gate[0]
+        self.rule = Rule(association, gate, given.detection, spec.gate_probability, given.density, spec.speed)
         self.chunks: list[Tracks] = []
         self.free: list[tuple[int, int]] = []
         self.alive: list[TrackHistory] = []
@@ -69,7 +63,7 @@ class MultiTracker:
         new = [self._begin(r[p], b[p], taken) for p in np.flatnonzero(owner < 0)]
         for chunk, rows in zip(self.chunks, taken, strict=True):
             joint = self.rule.association == PDA
-            update(chunk, dt, self.period, self.sigma, self.arrays.manoeuvre[0], joint, rows)
+            update(chunk, dt, self.given.period, self.given.sigma, self.manoeuvre, joint, rows)
         for track, gate in zip(self.alive, predicted, strict=True):
             self._judge(track)
             track.gates.append(gate)
@@ -81,11 +75,11 @@ class MultiTracker:
         self._remove_ended()
 
     def _predicted(self, dt: float) -> np.ndarray:
-        """Places and innovation covariances (A, 5) of the tracks alive; of one plot the speed of targets widens it."""
+        """Positions and innovation covariances (A, 5) of the live tracks; after one plot widened by targets' speed."""
         rows = []
         for chunk in self.chunks:
             rows.append(np.empty((5, CHUNK)))
-            predict(chunk, dt, self.period, self.sigma, self.arrays.manoeuvre[0], rows[-1])
+            predict(chunk, dt, self.given.period, self.given.sigma, self.manoeuvre, rows[-1])
         out = np.array([rows[c][:, i] for c, i in (track.lane for track in self.alive)]).reshape(-1, 5)
         for track, row in zip(self.alive, out, strict=True):
             track.since += dt
@@ -100,20 +94,20 @@ class MultiTracker:
         return bool(self.chunks[chunk].plots[i] > 1.5)
 
     def _distances(self, predicted: np.ndarray, r: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Innovations (2, A, n), bearings turned to within half a circle, and their squares (A, n) by S⁻¹."""
+        """Innovations (2, A, n), bearings within half a circle, and their normalised squares (A, n)."""
         nu_r = r - predicted[:, :1]
         nu_b = np.mod(b - predicted[:, 1:2] + np.pi, 2 * np.pi) - np.pi
         rr, rb, bb = (predicted[:, j, None] for j in (2, 3, 4))
         return np.stack([nu_r, nu_b]), (bb * nu_r**2 - 2 * rb * nu_r * nu_b + rr * nu_b**2) / (rr * bb - rb**2)
 
     def _owners(self, distance: np.ndarray) -> np.ndarray:
-        """The track (n,) that each plot goes to, -1 for none: the nearest, confirmed tracks first.
+        """The track (n,) that each plot goes to, -1 for none: the nearest one, but confirmed tracks first.
 
         Only probabilistic association takes more than one plot, and only for a track of two plots or more.
         """
         owner = np.full(distance.shape[1], -1)
         several = np.array([self.rule.association == PDA and self._settled(track) for track in self.alive])
-        confirmed = np.array([track.state == kernels.CONFIRMED for track in self.alive])
+        confirmed = np.array([track.state == CONFIRMED for track in self.alive])
         busy = np.zeros(len(self.alive), dtype=bool)
         for group in (confirmed, ~confirmed) if len(self.alive) else ():
             a, p = np.nonzero((distance <= self.rule.gate) & group[:, None])
@@ -126,13 +120,13 @@ class MultiTracker:
     def _associate(
         self, track: TrackHistory, gate: np.ndarray, innovations: np.ndarray, taken: list[np.ndarray]
     ) -> None:
-        """Let a track take of the plots that it owns, by their innovations (2, n); into the rows of its chunk."""
+        """Associate a track with the plots that it owns, given their innovations (2, n); writes to its chunk's rows."""
         nu = np.ascontiguousarray(innovations)
-        found = associate_innovations(self.rule, self._settled(track), gate[0], tuple(gate[2:]), *nu)
+        result = associate_innovations(self.rule, self._settled(track), gate[0], tuple(gate[2:]), *nu)
         chunk, i = track.lane
-        taken[chunk][:, i] = found.taken, found.nu_r, found.nu_b, found.rr, found.rb, found.bb
-        track.age, track.score = track.age + 1, track.score + found.score
-        if found.taken:
+        taken[chunk][:, i] = result.taken, result.nu_r, result.nu_b, result.rr, result.rb, result.bb
+        track.age, track.score = track.age + 1, track.score + result.score
+        if result.taken:
             track.hits, track.misses, track.since = track.hits + 1, 0, 0.0
         else:
             track.misses += 1
@@ -149,16 +143,16 @@ class MultiTracker:
         return TrackHistory((chunk, i))
 
     def _judge(self, track: TrackHistory) -> None:
-        rules = float(self.spec.m), float(self.spec.n), float(self.spec.misses)
-        now = kernels.next_state(track.state, float(track.hits), float(track.misses), float(track.age), *rules)
+        rule = float(self.spec.m), float(self.spec.n), float(self.spec.misses)
+        state = next_state(track.state, float(track.hits), float(track.misses), float(track.age), *rule)
         chunk, i = track.lane
         uncertain = self.chunks[chunk].P[:, 0, i].max() > self.spec.lost**2
-        track.state = kernels.NONE if track.state == kernels.CONFIRMED and uncertain else now
-        track.found |= track.state == kernels.CONFIRMED
+        track.state = NONE if track.state == CONFIRMED and uncertain else state
+        track.was_confirmed |= track.state == CONFIRMED
 
     def _record(self, track: TrackHistory, scan: int) -> None:
         chunk, i = track.lane
-        tracks, unit = self.chunks[chunk], np.repeat(self.sigma, 2) / np.tile([1.0, self.period], 2)
+        tracks, unit = self.chunks[chunk], np.repeat(self.given.sigma, 2) / np.tile([1.0, self.given.period], 2)
         x, P = tracks.x[:, :2, i].ravel(), tracks.P[:, [0, 3], i].ravel()
         known = np.array([True, self._settled(track)] * 2)
         track.scans.append(scan)
@@ -167,26 +161,22 @@ class MultiTracker:
         track.scores.append(track.score)
 
     def _remove_ended(self) -> None:
-        over = [track for track in self.alive if track.state == kernels.NONE]
-        self.alive = [track for track in self.alive if track.state != kernels.NONE]
-        self.free += [track.lane for track in over]
-        self.ended += over
+        ended = [track for track in self.alive if track.state == NONE]
+        self.alive = [track for track in self.alive if track.state != NONE]
+        self.free += [track.lane for track in ended]
+        self.ended += ended
 
     def confirmed(self) -> list[TrackHistory]:
-        """The tracks that were confirmed, by their first scan."""
-        return sorted((track for track in (*self.ended, *self.alive) if track.found), key=lambda track: track.scans[0])
+        """The tracks that were confirmed at some time, ordered by their first scan."""
+        tracks = (track for track in (*self.ended, *self.alive) if track.was_confirmed)
+        return sorted(tracks, key=lambda track: track.scans[0])
 
 
 def confirmed_tracks(
-    spec: TrackerSpec,
-    period: float,
-    sigma: np.ndarray,
-    detection: float,
-    density: float,
-    scans: Iterable[tuple[float, np.ndarray, np.ndarray]],
+    spec: TrackerSpec, given: Conditions, scans: Iterable[tuple[float, np.ndarray, np.ndarray]]
 ) -> list[TrackHistory]:
-    """The confirmed tracks over scans (t, r (n,), b (n,)) in order of time; density per m²."""
-    tracker, last = MultiTracker(spec, period, sigma, detection, density), None
+    """The confirmed tracks over scans (t, r (n,), b (n,)) in order of time."""
+    tracker, last = MultiTracker(spec, given), None
     for k, (t, r, b) in enumerate(scans):
         tracker.process(k, 0.0 if last is None else t - last, r, b)
         last = t

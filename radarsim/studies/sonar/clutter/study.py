@@ -1,7 +1,7 @@
 """P3's second half: tracks among false and missed plots.
 
-Sums besides those of `sonar.study`, where errors are of the tracks kept (confirmed, and on the target): `counts`,
-`begun`, `ratios`, `scores`, see `kernels.counts`.
+The errors in the sums of `sonar.study` are those of the tracks kept, which are confirmed and on the target. The sums
+`counts`, `begun`, `ratios` and `scores` are described in `kernels.counts`.
 """
 
 from dataclasses import dataclass
@@ -14,154 +14,111 @@ from radarsim.studies.noise import noise_key
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.clutter import exact
 from radarsim.studies.sonar.clutter import filters as design
+from radarsim.studies.sonar.clutter import world as observed
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
-from radarsim.studies.sonar.clutter.kernels import counts
-from radarsim.studies.sonar.clutter.kernels import tracker as kernels
+from radarsim.studies.sonar.clutter.config import Keys
+from radarsim.studies.sonar.clutter.kernels import blocks, counts
 from radarsim.studies.sonar.clutter.kernels.field import Field
-from radarsim.studies.sonar.clutter.world import observation_of
+from radarsim.studies.sonar.clutter.kernels.tracker import Trackers, workspace
 from radarsim.studies.sonar.exact_values import exact_values
-from radarsim.studies.sonar.kernels.patterns import Observation
-from radarsim.studies.sonar.kernels.shared_gains import World
-from radarsim.studies.sonar.scene import Scene, angular, filter_specs, scene
+from radarsim.studies.sonar.kernels.patterns import Detections
+from radarsim.studies.sonar.scene import Scene, build_scene, filter_specs
 
 COORDINATES, SIZE = 2, 2  # range and bearing, each a straight line
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A plan of trackers: the world with the target's plots, false plots about it, and about false tracks.
+    """A plan of trackers of a target and of false tracks.
 
-    seeds (2,) is the key of the stream of false tracks' first plots.
+    field_about_false holds the false plots among which false tracks live; seeds (2,) is the key of the stream of their
+    first plots.
     """
 
     layout: Layout
     axes: ClutterAxes
-    world: World
-    observation: Observation
-    field: Field
-    other_field: Field
+    trackers: Trackers
+    field_about_false: Field
     seeds: np.ndarray
-    trackers: kernels.Trackers
     block: int = base.BLOCK
     gaussian = False
 
     def simulate(self, first: int, count: int) -> np.ndarray:
-        """Sums of one block, in the order of the layout."""
-        F, K = len(self.axes.filters), len(self.axes.k)
+        """The sums of one block, in the order of the layout."""
+        axes = self.axes
+        F, K = len(axes.filters), len(axes.k)
         sums = base.empty_sums(F, K, COORDINATES)
-        own = {name: np.zeros(shape) for name, shape in counts.shapes(F, K, len(self.axes.thresholds)).items()}
-        track_sums, work = counts.TrackSums(sums, **own), kernels.workspace(F)
-        looked_at = (self.world, self.observation, self.field, self.trackers)
-        kernels.simulate_block(*looked_at, work, first, count, track_sums)
-        if self.field.density > 0:
-            false = (self.seeds, self.other_field, self.trackers)
-            kernels.simulate_false(*false, work, self.world.dt, first, count, track_sums)
+        own = {name: np.zeros(shape) for name, shape in counts.shapes(F, K, len(axes.thresholds)).items()}
+        track_sums, work = counts.TrackSums(sums, **own), workspace(F)
+        inputs = (axes.world, axes.detections, axes.field, self.trackers)
+        blocks.simulate_block(*inputs, work, first, count, track_sums)
+        if axes.field.cells.density > 0:
+            false = (self.seeds, self.field_about_false, self.trackers)
+            blocks.simulate_false(*false, work, axes.world.dt, first, count, track_sums)
         return base.packed(self.layout, sums, **own)
 
 
 def prepare(case: Case) -> Plan:
     """Design the trackers of a case, and compute the exact laws of their errors and of initiation."""
-    spec, seen = case.spec, scene(case.spec)
-    sensor, specs, world = spec.sensor, tracker_specs(spec), base.world(case, seen)
-    F, K = len(specs), len(seen.t)
-    density = sensor.false_plots_per_km2 / 1e6
-    observation = observation_of(case, seen)
-    fields = [design.field(noise_key(case, name), sensor.sector, density, seen.nominal) for name in ("false", "seeds")]
+    spec, scene = case.spec, build_scene(case.spec)
+    given, specs = design.conditions(spec), design.tracker_specs(spec)
+    F, K = len(specs), len(scene.t)
     common = base.shapes(F, K, COORDINATES, SIZE)
-    layout = Layout(
-        **{name: common[name] for name in ("error", "estimates", "believed", "joint", "ahead")},
-        **counts.shapes(F, K, len(design.THRESHOLDS)),
-    )
+    del common["paired"]  # trackers keep tracks in different realisations
     return Plan(
-        layout=layout,
-        axes=axes(spec, seen, specs, world, observation, fields[0]),
-        world=world,
-        observation=observation,
-        field=fields[0],
-        other_field=fields[1],
+        layout=Layout(**common, **counts.shapes(F, K, len(design.THRESHOLDS))),
+        axes=axes(case, scene, specs, given),
+        trackers=design.trackers(specs, given),
+        field_about_false=design.field(noise_key(case, "seeds"), spec.sensor.sector, given),
         seeds=noise_key(case, "places"),
-        trackers=design.trackers(specs, seen.period, seen.nominal, sensor.detection_probability, density),
     )
 
 
-def tracker_specs(spec) -> list[design.TrackerSpec]:
-    """The trackers of a case."""
-    return [
-        design.TrackerSpec(
-            f.association,
-            f.tracker("gate_probability"),
-            *f.m_of_n(),
-            int(f.tracker("drop_after_misses")),
-            f.tracker("speed_mps"),
-            f.tracker("lost_beyond_sigmas"),
-            (f.manoeuvre_variance or 0.0) * angular(spec, 2),
-        )
-        for f in spec.filters
-    ]
-
-
-def axes(
-    spec, seen: Scene, specs: list[design.TrackerSpec], world: World, observation: Observation, field: Field
-) -> ClutterAxes:
-    """Labels, exact σ of an oracle's filters where every plot's coming is certain, exact laws of initiation."""
-    F, K = len(specs), len(seen.t)
-    values = oracle_values(spec, seen, observation.certain)
+def axes(case: Case, scene: Scene, specs: list[design.TrackerSpec], given: design.Conditions) -> ClutterAxes:
+    """Labels; exact σ of filters that know the target's plots, where all detections are certain; laws of initiation."""
+    spec, detections = case.spec, observed.detections(case, scene)
+    F, K = len(specs), len(scene.t)
     least = np.array([2 if one.association == "known" else one.m for one in specs])
-    available = np.repeat((np.arange(1, K + 1) >= least[:, None])[..., None], COORDINATES * SIZE, axis=2)
-    confirmed, begun = initiation_laws(spec, seen, specs, observation.certain)
-    flat = (F, K, COORDINATES * SIZE)
+    available = np.broadcast_to((np.arange(1, K + 1) >= least[:, None])[..., None, None], (F, K, COORDINATES, SIZE))
+    values = reference_values(spec, scene, detections.certain)
+    confirmed, begun = initiation_laws(spec, specs, given, detections)
     return ClutterAxes(
-        filters=tuple(f.name for f in spec.filters),
-        components=base.labels(spec, SIZE),
-        k=np.arange(1, K + 1),
-        t_s=seen.t,
-        available=available,
-        baseline=base.baseline(spec),
-        exact_sigma=np.where(available, values["sigma"].reshape(flat), np.nan),
-        exact_bias=np.where(available, values["bias"].reshape(flat), np.nan),
-        coordinates=base.coordinates(spec),
-        sizes=np.full(F, SIZE),
-        exact_ahead=values["ahead"],
-        exact_nees=values["nees"],
-        scan_period_s=seen.period,
-        sigma=seen.nominal,
+        **base.common_labels(spec, scene, np.full(F, SIZE), available, values),
         associations=tuple(one.association for one in specs),
         thresholds=design.THRESHOLDS,
         exact_confirmed=confirmed,
         exact_begun=begun,
         area_m2=spec.sensor.sector.area_m2(),
-        world=world,
-        observation=observation,
-        field=field,
+        world=base.world(case, scene),
+        detections=detections,
+        field=design.field(noise_key(case, "false"), spec.sensor.sector, given),
     )
 
 
 def initiation_laws(
-    spec, seen: Scene, specs: list[design.TrackerSpec], certain: np.ndarray
+    spec: Keys, specs: list[design.TrackerSpec], given: design.Conditions, detections: Detections
 ) -> tuple[np.ndarray, np.ndarray]:
     """Probabilities (F, K) that a track of the target was confirmed by each scan, and one begun by a false plot at it.
 
-    Not-a-number where no law is known: the first needs open gates and no false plots, the second a rule 2 of n.
+    NaN where no law is known: the first needs open gates and no false plots, the second a rule 2 of n.
     """
-    F, K = len(specs), len(seen.t)
-    sector, density = spec.sensor.sector, spec.sensor.false_plots_per_km2 / 1e6
-    probability = np.where(certain < 0, seen.probability, certain)
-    confirmed, begun = np.full((F, K), np.nan), np.full((F, K), np.nan)
+    probability = np.where(detections.certain < 0, detections.probability, detections.certain)
+    confirmed, begun = np.full((2, len(specs), len(probability)), np.nan)
     for f, one in enumerate(specs):
         if one.association == "known":
             continue
-        if density == 0 and one.gate_probability == 1:
+        if given.density == 0 and one.gate_probability == 1:
             confirmed[f] = exact.confirmed_by(probability, one.m, one.n)
-        if one.m == 2:
-            begun[f] = exact.false_pairs(sector.range_m, sector.bearing_rad, density, seen.nominal, one, seen.period, K)
+        if one.m == 2 and spec.sensor.sector:
+            begun[f] = exact.false_pairs(spec.sensor.sector, given, one, len(probability))
     return confirmed, begun
 
 
-def oracle_values(spec, seen: Scene, certain: np.ndarray) -> dict[str, np.ndarray]:
-    """Exact errors, as `exact_values` gives them, of filters that are given the target's plots."""
-    known = np.array([f.association == "known" for f in spec.filters])
-    if (certain < 0).any() or certain[0] == 0 or not known.any():
-        return exact_values(seen, [[]] * len(known), np.zeros(0), SIZE)
-    designs = base.designs(filter_specs(spec), seen, certain[None].astype(float))
-    values = exact_values(seen, designs, np.ones(1), SIZE)
-    return {name: np.where(known.reshape(-1, *[1] * (v.ndim - 1)), v, np.nan) for name, v in values.items()}
+def reference_values(spec: Keys, scene: Scene, certain: np.ndarray) -> dict[str, np.ndarray]:
+    """Exact errors, as `exact_values` returns them, of filters that know the target's plots."""
+    known = np.array([member.association == "known" for member in spec.filters])
+    if (certain < 0).any() or certain[0] == 0:
+        known[:] = False
+    specs = [one if is_known else None for one, is_known in zip(filter_specs(spec), known, strict=True)]
+    designs = [base.designs([one], scene, certain[None].astype(float))[0] if one else [] for one in specs]
+    return exact_values(scene, designs, np.ones(1), SIZE)

@@ -1,33 +1,23 @@
-"""What trackers among false plots observe of the target: which scans give its plot, within the surveyed sector."""
+"""Which scans give a plot of the target among false plots: only those in which it is within the surveyed sector."""
 
 import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.studies.noise import noise_key
-from radarsim.studies.sonar.kernels.patterns import Observation
+from radarsim.studies.sonar.clutter.config import Sector
+from radarsim.studies.sonar.kernels.patterns import Detections
 from radarsim.studies.sonar.scene import Scene
 
 
-def certain_detections(spec, seen: Scene) -> np.ndarray:
-    """Which scans give a plot of the target (K,): 0 never (missed, or outside the sector), 1 always, else -1."""
-    sensor = spec.sensor
-    certain = np.where(seen.certain == 0, 0, 1 if sensor.detection_probability == 1 else -1)
-    (near, far), (first, last) = sensor.sector.range_m, sensor.sector.bearing_rad
-    r, b = seen.polar[:, 0, 0], seen.polar[:, 1, 0]
-    turned = first + np.mod(b - first, 2 * np.pi)
-    return np.where((near <= r) & (r <= far) & (turned <= last), certain, 0)
+def detections(case: Case, scene: Scene) -> Detections:
+    """Which scans give a plot of the target."""
+    open_scans = np.where(scene.certain == 0, 0, 1 if scene.probability == 1 else -1)  # the first one too
+    certain = np.where(within(case.spec.sensor.sector, scene), open_scans, 0)
+    return Detections(noise_key(case, "misses"), certain, scene.probability)
 
 
-def observation_of(case: Case, seen: Scene) -> Observation:
-    """When the target's plots come."""
-    return Observation(
-        misses=noise_key(case, "misses"),
-        certain=certain_detections(case.spec, seen),
-        probability=seen.probability,
-        weight=np.ones((len(seen.t), 2)),
-        period=seen.period,
-        sigma=seen.nominal,
-        frame=0,
-        measured=np.ascontiguousarray(seen.polar[:, :2, 0]),
-        spread=seen.sigma[0, :2].copy(),
-    )
+def within(sector: Sector, scene: Scene) -> np.ndarray:
+    """Whether the target is within the sector at each scan (K,)."""
+    (near, far), (first, last) = sector.range_m, sector.bearing_rad
+    r, b = scene.polar[:, 0, 0], scene.polar[:, 1, 0]
+    return (near <= r) & (r <= far) & (first + np.mod(b - first, 2 * np.pi) <= last)

@@ -1,9 +1,9 @@
-"""Sonar filters with gains of each realisation's own, for patterns of missed plots or weights that differ.
+"""Sonar filters whose gains differ between realisations, because plots are missed at random or have random weights.
 
-The same filters as in `shared_gains`, with what `filters` computes once now computed for each realisation, in chunks.
-All but the windows take least squares in information form up to their start; growing memory and the differenced
-filter go on with it, the Kalman filters and those of fixed gain go over to covariances. The steps are in `steps`, and
-the letters too; F filters, C coordinates, K scans.
+These are the filters of `shared_gains`, but what the module `filters` computes once for all realisations is computed
+here for each of them, in chunks. All filters but the windows start by least squares in information form. Growing memory
+and the differenced filter continue so; the Kalman filters and those of fixed gain switch to covariances. The steps and
+the letters are those of `steps`; F filters, C coordinates, K scans.
 """
 
 from typing import NamedTuple
@@ -22,14 +22,7 @@ from radarsim.studies.sonar.kernels.detector import (
     add_alarms,
     detector_statistics,
 )
-from radarsim.studies.sonar.kernels.imm import (
-    PROBABILITY,
-    ROWS,
-    ModelPair,
-    ModelPairs,
-    interact,
-    mode_sums,
-)
+from radarsim.studies.sonar.kernels.imm import PROBABILITY, ROWS, ModelPair, ModelPairs, interact, mode_sums
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK, Sums, move_and_measure
 from radarsim.studies.sonar.kernels.steps import Memory, Model, Plot, fit, recur, remember
 from radarsim.studies.sonar.kernels.sums import Counted, Course, Estimate, add_ahead, add_sums
@@ -38,32 +31,36 @@ INFORMATION, COVARIANCE, FIXED, WINDOW, ADAPTIVE, IMM = range(6)
 PLACED = 8.0  # as world.PLACED
 
 
-class Observation(NamedTuple):
-    """Which scans are detected, and how plots are turned into the filters' coordinates.
-
-    misses (2,) is the key of the stream of detections; certain (K,) is 1 where the plot is always detected, 0 where
-    never, else -1: with `probability`. weight (K, C) of a detected plot; period in s and nominal sigma (C,) make gains
-    physical. frame is 0 for coordinates as measured, 1 for the plain conversion of the first two, 2 for the unbiased
-    one; measured (K, 2) then holds the true range and bearing and spread (2,) their standard deviations.
+class Detections(NamedTuple):
+    """Which scans give a plot: key (2,) of the noise stream; certain (K,) is 1 where a scan always gives one, 0 where
+    it never does, else -1, which means with this probability.
     """
 
-    misses: np.ndarray
+    key: np.ndarray
     certain: np.ndarray
     probability: float
+
+
+class Conversion(NamedTuple):
+    """How plots are converted to the coordinates of the filters.
+
+    weight (K, C) of a plot that is not converted. frame is 0 for coordinates as measured, 1 for the plain conversion of
+    the first two, 2 for the unbiased one; measured (K, 2) then holds the true range and bearing and spread (2,) the
+    standard deviations of their plots.
+    """
+
     weight: np.ndarray
-    period: float
-    sigma: np.ndarray
     frame: int
     measured: np.ndarray
     spread: np.ndarray
 
 
 class RealisationBank(NamedTuple):
-    """F filters: kind (F,), size (F,) of the state, length (F,) of a window or of the start of a fixed filter.
+    """F filters: kind (F,), size (F,) of the state, length (F,) of a window or of the start of a fixed-gain filter.
 
-    carry (F, K, C) correlation c that the filter assumes, manoeuvre (F, C) variance q in nominal plots and periods,
-    settled (F, C, 3) gains of a fixed filter, likewise. memory is how many plots are kept for windows and detectors;
-    baseline the filter that gains are against.
+    carry (F, K, C) is the correlation c that the filter assumes; manoeuvre (F, C) the variance q and settled (F, C, 3)
+    the gains of a fixed-gain filter, both in nominal plots and periods; memory the number of plots that are kept for
+    windows and detectors. period in s and sigma (C,) of a nominal plot convert to m or rad, and s.
     """
 
     kind: np.ndarray
@@ -73,16 +70,19 @@ class RealisationBank(NamedTuple):
     manoeuvre: np.ndarray
     settled: np.ndarray
     memory: int
-    switching: AdaptiveRules
+    period: float
+    sigma: np.ndarray
+    adaptive: AdaptiveRules
     interacting: ModelPairs
 
 
 class BlockSums(NamedTuple):
-    """Sums of a block over realisations: errors, alarms, and of filters that respond to manoeuvres; and kept estimates.
+    """Sums of a block over realisations, and estimates that are kept one by one.
 
-    modes (F, K, C, 3): Σp, Σp² of the probability of a manoeuvre, and Σ of the plots in memory. at (A,) are scans, and
-    kept (A, F, 2, 6, count) of the first two coordinates there: value, rate, variance of the value, covariance,
-    variance of the rate, all as believed, and 1 where the state is complete.
+    errors and alarms; modes (F, K, C, 3): Σp and Σp² of the probability of a manoeuvre, and Σ of the plots in memory,
+    of filters that respond to manoeuvres. at (A,) are the scans whose estimates are kept; kept (A, F, 2, 6, count)
+    holds for the first two coordinates value, rate, believed variance of the value, covariance and variance of the
+    rate, and 1 where the state is complete.
     """
 
     errors: Sums
@@ -94,11 +94,11 @@ class BlockSums(NamedTuple):
 
 # ---- plots --------------------------------------------------------------------------------------------------------
 @kernel
-def detect(observation, first, k, detected):
-    """Whether the plot of scan k is detected, 1 or 0, into detected (n,)."""
-    k0, k1, start, limit = observation.misses[0], observation.misses[1], U(first), observation.probability
-    if observation.certain[k] >= 0:
-        detected[:] = float(observation.certain[k])
+def detect(detections, first, k, detected):
+    """Set detected (n,) to 1 for the realisations, from number `first` on, in which scan k gives a plot, else to 0."""
+    k0, k1, start, limit = detections.key[0], detections.key[1], U(first), detections.probability
+    if detections.certain[k] >= 0:
+        detected[:] = float(detections.certain[k])
         return
     for i in range(detected.size):
         a, _ = uniforms(k0, k1, start + U(i), k)
@@ -106,30 +106,30 @@ def detect(observation, first, k, detected):
 
 
 @kernel
-def convert(observation, k, plots, detected, place, z, weight):
-    """Plots z (C, n) in the filters' coordinates and their weights (C, n), of measured plots (C', 4, n), rows 0 and 1.
+def convert(conversion, sigma, k, plots, detected, place, z, weight):
+    """Plots z (C, n) in the coordinates of the filters and their weights (C, n), from measured plots (C', 4, n).
 
-    place (3, n) holds mean range and bearing of the last plots, and their number. The plain conversion takes weights
-    from the plot itself; the unbiased one from the plots before, so that a weight is not correlated with the error of
-    its own plot, which would be a bias again (the decorrelation of Bordonaro, Willett and Bar-Shalom 2014, who take
-    the predicted place). See `world.places`.
+    sigma (C,) of a nominal plot; place (3, n) holds mean range and bearing of the last plots, and their number. The
+    plain conversion computes weights at the plot itself, the unbiased one at earlier plots: a weight that is correlated
+    with the error of its own plot would cause a bias again. Bordonaro, Willett and Bar-Shalom (2014) decorrelate it
+    likewise, by the predicted position. See `world.places`.
     """
     for c in range(z.shape[0]):
-        w = observation.weight[k, c]
+        w = conversion.weight[k, c]
         for i in range(detected.size):
             z[c, i] = plots[c, 0, i]
             weight[c, i] = w * detected[i]
-    if observation.frame == 0:
+    if conversion.frame == 0:
         return
-    sr, sb = observation.spread[0] ** 2, observation.spread[1] ** 2
-    nominal_x, nominal_y = observation.sigma[0] ** 2, observation.sigma[1] ** 2
-    grow = np.exp(sb) if observation.frame == 2 else 1.0
+    sr, sb = conversion.spread[0] ** 2, conversion.spread[1] ** 2
+    nominal_x, nominal_y = sigma[0] ** 2, sigma[1] ** 2
+    grow = np.exp(sb) if conversion.frame == 2 else 1.0
     root, shrink = np.sqrt(grow), np.exp(-2.0 * sb)
     for i in range(detected.size):
-        r, b = observation.measured[k, 0] + plots[0, 1, i], observation.measured[k, 1] + plots[1, 1, i]
+        r, b = conversion.measured[k, 0] + plots[0, 1, i], conversion.measured[k, 1] + plots[1, 1, i]
         co, si = np.cos(b), np.sin(b)
         z[0, i], z[1, i] = root * r * co, root * r * si
-        if observation.frame == 1:
+        if conversion.frame == 1:
             across = r * r * sb
             xx, yy = sr * co * co + across * si * si, sr * si * si + across * co * co
         else:
@@ -147,8 +147,8 @@ def convert(observation, k, plots, detected, place, z, weight):
 
 
 class Filters(NamedTuple):
-    """What F filters keep of a chunk in C coordinates, as `steps.Memory`: x (F, C, 4, CHUNK), Y (F, C, 8, CHUNK),
-    further (F, C, >= 10, CHUNK) rows; P (6, CHUNK) of the filter that was last stepped.
+    """The memory of F filters in C coordinates for a chunk, as `steps.Memory`: x (F, C, 4, CHUNK), Y (F, C, 8, CHUNK),
+    further rows (F, C, >= 10, CHUNK); P (6, CHUNK) of the filter that was updated last.
     """
 
     x: np.ndarray
@@ -158,9 +158,9 @@ class Filters(NamedTuple):
 
 
 class Plots(NamedTuple):
-    """Plots of a chunk at a scan: z, weight, n of plots before the scan and n_now up to it, each (C, CHUNK).
+    """Plots of a chunk at a scan: z, weight, number n of plots before the scan and n_now up to it, each (C, CHUNK).
 
-    recent (C, 3, L, CHUNK) are the last plots: plot, age, weight; T (D, G, CHUNK) the statistics of the detectors.
+    recent (C, 3, L, CHUNK) holds the last plots: plot, age, weight; T (D, G, CHUNK) the statistics of the detectors.
     """
 
     z: np.ndarray
@@ -172,19 +172,19 @@ class Plots(NamedTuple):
 
 
 @kernel
-def filter_scan(bank, observation, f, c, k, dt, filters, plots):
-    """Scan k of filter f in coordinate c, in place, dt after the scan before."""
-    size, length, kind, period = bank.size[f], bank.length[f], bank.kind[f], observation.period
+def filter_scan(bank, f, c, k, dt, filters, plots):
+    """Update filter f in coordinate c with scan k, in place, dt after the scan before."""
+    size, length, kind, period = bank.size[f], bank.length[f], bank.kind[f], bank.period
     memory, P = Memory(filters.x[f, c], filters.Y[f, c], filters.further[f, c]), filters.P
     plot = Plot(plots.z[c], plots.weight[c], plots.n[c])
     if kind == ADAPTIVE:
-        rules = bank.switching
+        rules = bank.adaptive
         T = plots.T[rules.detector[f], rules.group[f, c]]
         rule = AdaptiveRule(size, length, rules.raises[f], rules.threshold[f, c], rules.quiet[f])
         adapt(rule, dt, period, memory, plot, plots.recent[c], T, P)
     elif kind == IMM:
         models = ModelPair(size, bank.interacting.manoeuvre[f, c], bank.interacting.stay[f])
-        interact(models, dt, period, observation.sigma[c], memory, plot, P)
+        interact(models, dt, period, bank.sigma[c], memory, plot, P)
     elif kind == WINDOW:
         fit(memory.x, plots.recent[c], length, size, period, plots.n_now[c], P)
     else:
@@ -197,7 +197,7 @@ def filter_scan(bank, observation, f, c, k, dt, filters, plots):
 # ---- sums ---------------------------------------------------------------------------------------------------------
 @part
 def add_modes(kind, further, used, out, modes):
-    """Add the modes of a filter of that kind with these further rows to modes (3,); out (3,) is scratch."""
+    """Add the modes of a filter of this kind, with these further rows, to modes (3,); out (3,) is scratch."""
     if kind == ADAPTIVE:
         mode_sums(further, MODE, PLOTS, used, out)
     elif kind == IMM:
@@ -210,8 +210,8 @@ def add_modes(kind, further, used, out, modes):
 
 @part
 def keep(x, P, n, size, units, first, count, kept):
-    """A coordinate's estimate and its believed covariance, of `count` realisations, into kept (6, total) from `first`
-    on; n (CHUNK,) plots so far, units (σ, period).
+    """Store the estimate of a coordinate and its believed covariance, of `count` realisations, in kept (6, total) from
+    `first` on; n (CHUNK,) plots so far, units (σ, period).
     """
     sigma, period = units
     for i in range(count):
@@ -224,8 +224,8 @@ def keep(x, P, n, size, units, first, count, kept):
 
 # ---- a block ------------------------------------------------------------------------------------------------------
 class Chunk(NamedTuple):
-    """A chunk of a block at a scan: realisations from number `first` of the block on, of which `count` count, scan k
-    and its interval dt; used (CHUNK,) 1 for those that count; the course of the targets in all coordinates.
+    """A chunk of a block at a scan: `count` realisations from number `first` of the block on, scan k, and dt since the
+    scan before; used (CHUNK,) is 1 for these realisations; the course of the targets in all coordinates.
     """
 
     first: int
@@ -237,16 +237,16 @@ class Chunk(NamedTuple):
 
 
 @part
-def step_filters(bank, observation, baseline, chunk, filters, plots, out, sums):
-    """One scan of all filters in all coordinates, and its sums; out (7,) is scratch."""
+def step_filters(bank, baseline, chunk, filters, plots, out, sums):
+    """Update all filters in all coordinates with one scan, and add its sums; out (7,) is scratch."""
     k, course = chunk.k, chunk.course
     for c in range(plots.z.shape[0]):
-        units = (observation.sigma[c], observation.period)
+        units = (bank.sigma[c], bank.period)
         course_c, counted = Course(course.truth[c], course.shift[c]), Counted(plots.n_now[c], chunk.used)
         x_base, size_base = filters.x[baseline, c], bank.size[baseline]
-        for j in range(bank.size.size):  # the baseline first: gains of the others are against its estimates
+        for j in range(bank.size.size):  # the baseline first: gains of the others refer to its estimates
             f = baseline if j == 0 else (j - 1 if j <= baseline else j)
-            filter_scan(bank, observation, f, c, k, chunk.dt, filters, plots)
+            filter_scan(bank, f, c, k, chunk.dt, filters, plots)
             add_modes(bank.kind[f], filters.further[f, c], chunk.used, out, sums.modes[f, k, c])
             for a in range(sums.at.size if c < 2 else 0):
                 if sums.at[a] == k:
@@ -257,10 +257,10 @@ def step_filters(bank, observation, baseline, chunk, filters, plots, out, sums):
 
 
 @kernel
-def simulate_block(world, observation, bank, detectors, first, total, baseline, sums):
-    """Add the sums of realisations first … first + total - 1 to sums, a BlockSums.
+def simulate_block(world, detections, conversion, bank, detectors, first, total, baseline, sums):
+    """Add the sums of realisations first … first + total - 1 to sums, a BlockSums; gains refer to filter `baseline`.
 
-    A partial chunk is computed in full and summed in part.
+    The last chunk is always computed in full, and only the realisations asked for are summed.
     """
     F, K, C = bank.carry.shape
     rows = ROWS if (bank.kind == IMM).any() else 10
@@ -277,8 +277,8 @@ def simulate_block(world, observation, bank, detectors, first, total, baseline, 
         for k in range(K):
             dt, course = world.dt[k], Course(world.truth[k], shift)
             move_and_measure(world, first + done, k, measured)
-            detect(observation, first + done, k, detected)
-            convert(observation, k, measured, detected, place, z, weight)
+            detect(detections, first + done, k, detected)
+            convert(conversion, bank.sigma, k, measured, detected, place, z, weight)
             shift[:, :2] = measured[:C, 2:]
             if k > 0:
                 add_ahead(bank.size, x, course, Counted(n_now, used), k, dt, out, sums.errors)
@@ -286,8 +286,8 @@ def simulate_block(world, observation, bank, detectors, first, total, baseline, 
             n_now += weight > 0.0
             for c in range(C):
                 if recent.shape[2] > 0:
-                    remember(recent[c], z[c], weight[c], dt / observation.period)
-            detector_statistics(detectors, k, recent, observation.sigma, n_now, weight, T)
+                    remember(recent[c], z[c], weight[c], dt / bank.period)
+            detector_statistics(detectors, k, recent, bank.sigma, n_now, weight, T)
             add_alarms(detectors, k, T, used, passed, sums.alarms)
             chunk = Chunk(done, min(CHUNK, total - done), k, dt, used, course)
-            step_filters(bank, observation, baseline, chunk, filters, plots, out, sums)
+            step_filters(bank, baseline, chunk, filters, plots, out, sums)

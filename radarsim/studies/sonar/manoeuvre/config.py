@@ -1,12 +1,13 @@
 """Keys of the sonar study (P3) about manoeuvres: detectors, filters that respond to them, uses of a track."""
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
 from radarsim.config.fields import (
     At,
+    Design,
     Display,
     Model,
     Name,
@@ -14,112 +15,116 @@ from radarsim.config.fields import (
     Number,
     Positive,
     Probability,
+    Whole,
     at,
     cross_check,
     of_each,
     readable,
     unique_names,
-    whole,
 )
+from radarsim.studies.sonar import config
 
 MOST_TESTED = 200_000  # scans x thresholds of all detectors: 10 MB of sums a block
 FIGURES = ("roc", "detection", "delay", "response", "modes", "uses")
-RESPONDING_KINDS = ("adaptive", "imm")  # kinds of filters whose gains are each realisation's own
+RESPONDING_KINDS = ("adaptive", "imm")  # kinds of filters whose gains differ between realisations
 Rate = Annotated[Probability, Field(gt=0, lt=1)]
 Rates = Annotated[tuple[Rate, ...], Field(min_length=1, max_length=32)]
 Thresholds = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=32)]
-WindowPlots = whole(3, 100)
+WindowPlots = Annotated[int, Whole(3, 100)]
+TestPeriod = Annotated[int, Whole(1, 1000)]
+
+
+def either_threshold(detector: "OwnDetector | Detector") -> Iterator[At]:
+    """Check that a detector has thresholds or false alarm probabilities, not both."""
+    if (detector.threshold_k is None) == (detector.false_alarm_probability is None):
+        yield at("threshold_k", "give either threshold_k or false_alarm_probability")
 
 
 class OwnDetector(Model):
-    """The detector of an adaptive filter: acceleration of a parabola through the last plots against its own spread."""
+    """The detector of an adaptive filter: it tests the acceleration of a parabola through the last plots."""
 
     plots: WindowPlots = Field(description="plots n of the parabola")
     threshold_k: Positive | None = Field(
         None, description="threshold k: a manoeuvre is declared where the squared acceleration exceeds k σ_a²"
     )
     false_alarm_probability: Rate | None = Field(
-        None, description="in place of threshold_k: probability of an alarm a test without a manoeuvre"
+        None, description="replaces threshold_k: probability of an alarm in a test without a manoeuvre"
     )
     coordinates: Literal["each", "joint"] = Field(
-        "each", description="each: by coordinate, as in the paper; joint: one test of the sum over all of them"
+        "each", description="each: a test of each coordinate, as in the paper; joint: one test of the sum over all"
     )
-    test_every: whole(1, 1000) = Field(1, description="scans from one test to the next")
+    test_every: TestPeriod = Field(1, description="scans from one test to the next")
 
     @cross_check
-    def _one_of(self):
-        if (self.threshold_k is None) == (self.false_alarm_probability is None):
-            yield at("threshold_k", "give either threshold_k or false_alarm_probability")
+    def _either_threshold(self) -> Iterator[At]:
+        yield from either_threshold(self)
 
 
 class Detector(Model):
-    """A detector of manoeuvres to be measured at one or several thresholds."""
+    """A manoeuvre detector that is measured at one or several thresholds."""
 
-    name: Annotated[Name, Display()] = Field(description="label, unlike that of any other detector")
+    name: Annotated[Name, Display()] = Field(description="label; must differ from those of the other detectors")
     plots: WindowPlots = Field(description="plots n of the parabola")
     threshold_k: Thresholds | None = Field(
         None, description="thresholds k: a manoeuvre is declared where the squared acceleration exceeds k σ_a²"
     )
     false_alarm_probability: Rates | None = Field(
-        None, description="in place of threshold_k: probabilities of an alarm a test without a manoeuvre"
+        None, description="replaces threshold_k: probabilities of an alarm in a test without a manoeuvre"
     )
-    test_every: whole(1, 1000) = Field(
-        1, description="scans from one test to the next; from `plots` on tests are independent, and the delay is exact"
+    test_every: TestPeriod = Field(
+        1,
+        description="scans from one test to the next; from `plots` on the tests are independent and the delay is exact",
     )
 
     @cross_check
-    def _one_of(self):
-        if (self.threshold_k is None) == (self.false_alarm_probability is None):
-            yield at("threshold_k", "give either threshold_k or false_alarm_probability")
+    def _either_threshold(self) -> Iterator[At]:
+        yield from either_threshold(self)
 
-    def wanted(self) -> tuple[float, ...]:
+    def levels(self) -> tuple[float, ...]:
         """The thresholds or the probabilities, whichever are given."""
-        return self.threshold_k or self.false_alarm_probability
-
-
-Detectors = Annotated[tuple[Detector, ...], Field(max_length=8), AfterValidator(unique_names)]
+        return self.threshold_k or self.false_alarm_probability or ()
 
 
 class OwnShip(Model):
-    """The vessel that carries the sonar, or that is to be kept clear of: at the first plot, and steady."""
+    """The vessel that carries the sonar, or another to be kept clear of; its course and speed are constant."""
 
-    x_m: Number = Field(0.0, description="way north of the sonar's origin at the first plot, m")
-    y_m: Number = Field(0.0, description="way east of it, m")
-    speed_mps: NonNegative = Field(0.0, description="its speed, m/s")
-    course_rad: Number = Field(0.0, description="its course, from north to east, rad")
+    x_m: Number = Field(default=0.0, description="distance north of the sonar's origin at the first plot, m")
+    y_m: Number = Field(default=0.0, description="distance east of the sonar's origin at the first plot, m")
+    speed_mps: NonNegative = Field(default=0.0, description="speed, m/s")
+    course_rad: Number = Field(default=0.0, description="course, from north to east, rad")
 
 
 class Uses(Model):
-    """What a track is used for: course, speed, predicted position, closest point of approach."""
+    """Quantities derived from a track: course, speed, predicted position, closest point of approach."""
 
     horizon_s: Positive = Field(description="how far ahead the position is predicted, s")
     at_s: Annotated[tuple[NonNegative, ...], Field(min_length=1, max_length=16)] | None = Field(
-        None, description="when they are asked for, s from the first plot: at the scan then or next; default: the last"
+        None, description="times, s from the first plot: the scan then or the next one; default: the last scan"
     )
-    own_ship: OwnShip = Field(OwnShip(), description="the vessel that the closest approach is to")
+    own_ship: OwnShip = Field(OwnShip(), description="the vessel that the closest approach refers to")
 
 
-class Adapting(Model):
-    """What a filter needs that responds to manoeuvres: kinds `adaptive` and `imm`."""
+class Filter(config.Filter):
+    """A filter that may respond to manoeuvres: kinds `adaptive` and `imm`."""
 
-    detector: OwnDetector | None = Field(None, description="of an adaptive filter: what tells it of a manoeuvre")
+    detector: OwnDetector | None = Field(None, description="manoeuvre detector of an adaptive filter")
     response: Literal["raise_degree", "shorten_memory"] | None = Field(
         None,
-        description="of an adaptive filter to a manoeuvre: a parabola from the detector's plots on (default), or a "
-        "window of these plots while it lasts",
+        description="response of an adaptive filter to a manoeuvre: a parabola that starts with the detector's plots "
+        "(default), or a window of these plots while the manoeuvre lasts",
     )
-    end_after: whole(1, 100) | None = Field(
-        None, description="tests without an alarm, in a row, that end a manoeuvre; default 1"
+    end_after: Annotated[int, Whole(1, 100)] | None = Field(
+        None, description="number of successive tests without an alarm that ends a manoeuvre; default 1"
     )
-    manoeuvre_variances: Annotated[tuple[NonNegative, NonNegative], Field()] | None = Field(
+    manoeuvre_variances: tuple[NonNegative, NonNegative] | None = Field(
         None, description="of the two models of an imm, steady and manoeuvring, (m/s²)², as manoeuvre_variance"
     )
-    stay_probabilities: Annotated[tuple[Rate, Rate], Field()] | None = Field(
+    stay_probabilities: tuple[Rate, Rate] | None = Field(
         None, description="of an imm: probabilities that the steady and the manoeuvring model last from scan to scan"
     )
 
     @cross_check
-    def _adaptive_complete(self):
+    def _adaptive_complete(self) -> Iterator[At]:
         if self.kind == "adaptive" and self.detector is None:
             yield at("detector", "is needed by an adaptive filter")
         for key in ("detector", "response", "end_after"):
@@ -127,12 +132,12 @@ class Adapting(Model):
                 yield at(key, "belongs to an adaptive filter")
 
     @cross_check
-    def _parabola(self):
+    def _parabola(self) -> Iterator[At]:
         if self.kind == "adaptive" and self.response != "shorten_memory" and self.degree == 2:
-            yield at("degree", "must be 1 where a manoeuvre raises the degree; or take response: shorten_memory")
+            yield at("degree", "must be 1 where a manoeuvre raises the degree; or use response: shorten_memory")
 
     @cross_check
-    def _models_complete(self):
+    def _models_complete(self) -> Iterator[At]:
         for key in ("manoeuvre_variances", "stay_probabilities"):
             if self.kind == "imm" and getattr(self, key) is None:
                 yield at(key, "is needed by an imm")
@@ -140,56 +145,60 @@ class Adapting(Model):
                 yield at(key, "belongs to an imm")
 
     @cross_check
-    def _second_moves_more(self):
+    def _second_moves_more(self) -> Iterator[At]:
         if self.manoeuvre_variances is not None and not self.manoeuvre_variances[0] < self.manoeuvre_variances[1]:
             yield at("manoeuvre_variances", "must rise: first the steady model, then the manoeuvring one")
 
 
-# ---- what must go together in a whole config ----------------------------------------------------------------------
-def detector_misfits(spec: Any) -> Iterator[At]:
-    """Faults of the measured detectors of a sonar study."""
+class Keys(config.Keys):
+    """The keys of a case with detectors, filters that respond to manoeuvres, or uses of a track."""
 
-    def check(i: int, one: Detector):
-        if one.plots > spec.scans:
-            yield at(f"detectors.{i}.plots", f"must be <= {spec.scans}, the number of scans")
+    filters: tuple[Filter, ...]
+    detectors: Annotated[tuple[Detector, ...], Field(max_length=8), AfterValidator(unique_names), Design()] = Field(
+        (), description="manoeuvre detectors that are measured on the plots"
+    )
+    uses: Annotated[Uses | None, Design()] = Field(
+        None, description="course, speed, predicted position and closest approach, with their σ; none: left out"
+    )
 
-    yield from of_each(spec.detectors, check)
-    if spec.scans * sum(readable(spec.detectors, lambda one: len(one.wanted()))) > MOST_TESTED:
-        yield at("detectors", f"must have at most {MOST_TESTED // spec.scans} thresholds for {spec.scans} scans")
+    def about_manoeuvres(self) -> Iterator[str]:
+        """The keys that make a case one about manoeuvres: detectors, uses, kinds of filters that respond."""
+        if self.detectors:
+            yield "detectors"
+        if self.uses is not None:
+            yield "uses"
+        yield from (f"filters.{i}.kind" for i, one in enumerate(self.filters) if one.kind in RESPONDING_KINDS)
 
+    @cross_check
+    def _detectors_fit(self) -> Iterator[At]:
+        def check(i: int, detector: Detector) -> Iterator[At]:
+            if detector.plots > self.scans:
+                yield at(f"detectors.{i}.plots", f"must be <= {self.scans}, the number of scans")
 
-def uses_misfits(spec: Any) -> Iterator[At]:
-    """Faults of the uses of a sonar study."""
-    if spec.uses is None:
-        return
-    last = (spec.scans - 1) * spec.sensor.scan_period_s
-    if any(when > last for when in spec.uses.at_s or ()):
-        yield at("uses.at_s", f"must be <= {last:g}, the time of the last scan")
-    if getattr(spec.target, "fluctuation_mps2", 0.0):
-        yield at("uses", "needs a target that does not move at random: its future is not known")
+        yield from of_each(self.detectors, check)
+        if self.scans * sum(readable(self.detectors, lambda detector: len(detector.levels()))) > MOST_TESTED:
+            yield at("detectors", f"must have at most {MOST_TESTED // self.scans} thresholds for {self.scans} scans")
 
+    @cross_check
+    def _uses_fit(self) -> Iterator[At]:
+        if self.uses is None:
+            return
+        last = (self.scans - 1) * self.sensor.scan_period_s
+        if any(when > last for when in self.uses.at_s or ()):
+            yield at("uses.at_s", f"must be <= {last:g}, the time of the last scan")
+        if self.target.fluctuation_mps2:
+            yield at("uses", "needs a target that does not move at random: its future is not known")
 
-def response_misfits(spec: Any) -> Iterator[At]:
-    """Faults of the filters of a sonar study that respond to manoeuvres."""
+    @cross_check
+    def _responses_fit(self) -> Iterator[At]:
+        def check(i: int, member: Filter) -> Iterator[At]:
+            if member.detector is not None and member.detector.plots > self.scans:
+                yield at(f"filters.{i}.detector.plots", f"must be <= {self.scans}, the number of scans")
 
-    def check(i: int, one: Adapting):
-        if one.detector is not None and one.detector.plots > spec.scans:
-            yield at(f"filters.{i}.detector.plots", f"must be <= {spec.scans}, the number of scans")
+        yield from of_each(self.filters, check)
 
-    yield from of_each(spec.filters, check)
-
-
-def further_misfits(spec: Any) -> Iterator[At]:
-    """What is asked about manoeuvres is of one sonar."""
-    if spec.sensor.further:
-        for key in asked(spec):
-            yield at(key, "does not go with further sonars")
-
-
-def asked(spec: Any) -> Iterator[str]:
-    """The keys by which a sonar study asks about manoeuvres: detectors, uses, kinds of filters that respond."""
-    if spec.detectors:
-        yield "detectors"
-    if spec.uses is not None:
-        yield "uses"
-    yield from (f"filters.{i}.kind" for i, one in enumerate(spec.filters) if one.kind in RESPONDING_KINDS)
+    @cross_check
+    def _manoeuvres_of_one_sonar(self) -> Iterator[At]:
+        if self.sensor.further:
+            for key in self.about_manoeuvres():
+                yield at(key, "does not go with further sonars")

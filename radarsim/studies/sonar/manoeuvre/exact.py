@@ -1,46 +1,50 @@
-"""Exact laws of P3's detector of manoeuvres: false alarms, detection, and delay where tests are independent.
+"""Exact laws of P3's manoeuvre detector: false alarms, detection, and delay where tests are independent.
 
-The statistic is â²/σ_a² (P3 eq. 3, with the estimate that the print leaves out), â the acceleration of a parabola
-through n plots: linear in the plots, so Gaussian where their errors are. Alone it is χ² of one degree of freedom,
-off-centre by (mean of â / σ_a)² in a manoeuvre; the sum over C coordinates is χ² of C degrees. This holds for any
-deterministic course.
+The statistic is â²/σ_a² (P3 eq. 3, with the estimate that the paper leaves out), where â is the acceleration of a
+parabola through n plots. â is linear in the plots, so it is Gaussian where their errors are. The statistic of one
+coordinate is χ² with one degree of freedom, noncentral by (mean of â / σ_a)² in a manoeuvre; the sum over C coordinates
+is χ² with C degrees of freedom. This holds for any deterministic course.
 """
+
+from typing import Any
 
 import numpy as np
 
+from radarsim.studies.sonar.world import Values
 
-def threshold(false_alarm, coordinates: int = 1):
-    """Threshold k whose tests give an alarm with that probability without a manoeuvre; broadcasts."""
-    from scipy import stats  # here, for it takes a second to load
+
+def threshold(false_alarm: Values, coordinates: int | np.ndarray = 1) -> Any:
+    """Threshold k of a test that gives an alarm with this probability without a manoeuvre; broadcasts."""
+    from scipy import stats  # here, because it takes a second to load
 
     return stats.chi2.isf(false_alarm, coordinates)
 
 
-def false_alarm(k, coordinates: int = 1):
-    """Probability of an alarm a test without a manoeuvre: 0.317 at the paper's k = 1; broadcasts."""
-    from scipy import stats  # here, for it takes a second to load
+def false_alarm(k: Values, coordinates: int | np.ndarray = 1) -> Any:
+    """Probability of an alarm in a test without a manoeuvre: 0.317 at the paper's k = 1; broadcasts."""
+    from scipy import stats  # here, because it takes a second to load
 
     return stats.chi2.sf(k, coordinates)
 
 
-def detection(k, shift, coordinates: int = 1):
-    """Probability of an alarm a test where the means of â lie `shift` of their σ_a from zero; broadcasts.
+def detection(k: Values, shift: Values, coordinates: int = 1) -> Any:
+    """Probability of an alarm in a test where the mean of â is `shift` σ_a from zero; broadcasts.
 
-    Of several coordinates the shift is the root of the sum of squares.
+    For several coordinates the shift is the root of the sum of squares.
     """
-    from scipy import special, stats  # here, for they take a second to load
+    from scipy import special, stats  # here, because they take a second to load
 
     if coordinates == 1:
         return special.ndtr(shift - np.sqrt(k)) + special.ndtr(-shift - np.sqrt(k))
-    centred = np.asarray(shift) == 0
-    off = np.where(centred, 1.0, np.square(shift))
-    return np.where(centred, stats.chi2.sf(k, coordinates), stats.ncx2.sf(k, coordinates, off))
+    central = np.asarray(shift) == 0
+    noncentrality = np.where(central, 1.0, np.square(shift))
+    return np.where(central, stats.chi2.sf(k, coordinates), stats.ncx2.sf(k, coordinates, noncentrality))
 
 
 def shift_for(probability: float, k: float) -> float:
-    """Acceleration in units of σ_a that one coordinate's test at threshold k detects with that probability.
+    """Acceleration, in units of σ_a, that a test of one coordinate at threshold k detects with this probability.
 
-    Zero where false alarms alone reach it. At k = 1 and 0.683 it is 1.456.
+    Zero if false alarms alone reach the probability. At k = 1 and 0.683 it is 1.456.
     """
     from scipy.optimize import brentq
 
@@ -52,19 +56,20 @@ def shift_for(probability: float, k: float) -> float:
 def acceleration_law(
     weights: np.ndarray, course: np.ndarray, C: np.ndarray, pushes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and variance (M,) of an acceleration that is weights (M, n) times plots.
+    """Mean and variance (M,) of an acceleration with weights (M, n) of the plots.
 
-    course (n,) holds the true values, C (n, n) covers the errors, pushes (n, m) what m unit random accelerations add to
-    the values.
+    course (n,) holds the true values, C (n, n) is the covariance of the errors, and pushes (n, m) holds what m
+    independent unit accelerations add to the values.
     """
     moved = weights @ pushes
     return weights @ course, np.einsum("mi,ij,mj->m", weights, C, weights) + (moved**2).sum(axis=1)
 
 
 def by_then(p: np.ndarray) -> np.ndarray:
-    """Probability (…, n) of a first event up to each of n independent tests of probabilities p (…, n).
+    """Probability (…, n) that a first event has come by each of n independent tests of probabilities p (…, n).
 
-    Overlapping windows are not independent, and their law is a multivariate normal one without a closed form. Where no
-    target manoeuvres and errors are white it is an upper bound there (Šidák 1967): alarms come in runs.
+    Tests of overlapping windows are not independent; their law is multivariate normal and has no closed form. For them
+    this is an upper bound if the target does not manoeuvre and errors are white (Šidák 1967), because alarms come in
+    runs.
     """
     return 1 - np.cumprod(1 - p, axis=-1)

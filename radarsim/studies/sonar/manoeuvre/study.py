@@ -1,293 +1,259 @@
-"""Manoeuvres (P3): detectors and their exact laws, filters that respond to them, and what a track is used for.
+"""Manoeuvres (P3): detectors and their exact laws, filters that respond to them, and uses of a track.
 
-Sums by D detectors, G groups (each coordinate, then all jointly), T thresholds and K scans: `tested`, `alarms`, `first`
-as in kernels.detector.Alarms; `modes` (F, K, C, 3) and, at A moments, `uses` (F, A, U, 5): n, Σe, Σe², Σe⁴ and Σ of the
-first-order variance.
+Sums for D detectors, G groups (each coordinate, then all jointly), T thresholds and K scans: `tested`, `alarms`,
+`first` as in kernels.detector.Alarms; `modes` (F, K, C, 3) as in kernels.patterns.BlockSums; and for A times `uses`
+(F, A, U, 5): n, Σe, Σe², Σe⁴ and Σ of the first-order variance.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.moments import Layout
-from radarsim.studies.sonar import banks, filters
 from radarsim.studies.sonar import study as base
-from radarsim.studies.sonar import world as models
-from radarsim.studies.sonar.banks import FilterSpec
-from radarsim.studies.sonar.detectors import (
-    AdaptiveRule,
-    DetectorTests,
-    ModelPair,
-    detector_arrays,
-    detector_tests,
-)
-from radarsim.studies.sonar.exact_values import exact_values
-from radarsim.studies.sonar.kernels import detector as kernels
-from radarsim.studies.sonar.kernels import patterns
+from radarsim.studies.sonar.banks import FilterSpec, needed_tests
+from radarsim.studies.sonar.config import Accelerating, Target, Turning
+from radarsim.studies.sonar.detectors import AdaptiveRule, DetectorTest, ModelPair, detector_arrays
+from radarsim.studies.sonar.filters import window_weights
+from radarsim.studies.sonar.kernels.detector import Detectors
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre import uses as tracks
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes, UsesAxes
-from radarsim.studies.sonar.manoeuvre.config import RESPONDING_KINDS
-from radarsim.studies.sonar.scene import Scene, angular, courses, filter_specs, plots_of, scene
-
-
-@dataclass(frozen=True)
-class DetectorPlan:
-    """Detector tests of a case, of which the first are measured, the same as kernel arrays, and scans (A,) of uses."""
-
-    spec: Any
-    seen: Scene
-    tests: DetectorTests
-    detectors: kernels.Detectors
-    measured: int
-    at: np.ndarray
+from radarsim.studies.sonar.manoeuvre.config import RESPONDING_KINDS, Detector, Filter, Keys, Uses
+from radarsim.studies.sonar.scene import Scene, build_scene, courses, filter_specs, lateral_scale
+from radarsim.studies.sonar.world import error_covariance
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plan(base.RealisationPlan):
-    """A plan with detectors, filters that respond to manoeuvres, or uses of a track."""
+    """A plan of a case with detectors, filters that respond to manoeuvres, or uses of a track."""
 
-    detector_plan: DetectorPlan
+    axes: ManoeuvreAxes
+    spec: Keys
+    scene: Scene
 
     def simulate(self, first: int, count: int) -> np.ndarray:
-        """Sums of one block, in the order of the layout."""
-        sums = self.added(first, count)
-        return base.packed(self.layout, sums.errors, **added_up(self.detector_plan, sums))
+        """The sums of one block, in the order of the layout."""
+        sums = self.block_sums(first, count)
+        measured = len(self.spec.detectors)
+        more = {name: values[:measured] for name, values in sums.alarms._asdict().items()} | {"modes": sums.modes}
+        if self.spec.uses and self.axes.uses:
+            more["uses"] = use_sums(self.spec.uses, self.spec.frame, self.axes.uses, self.scene.t[self.kept], sums.kept)
+        return base.packed(self.layout, sums.errors, **more)
 
 
 def prepare(case: Case) -> Plan:
     """Design the filters and detectors of a case, and compute the exact values of their errors and alarms."""
-    spec, seen = case.spec, scene(case.spec)
-    specs = with_manoeuvre_response(spec, filter_specs(spec))
-    size, (K, C) = max(one.size for one in specs), seen.sigma.shape
-    detected, probability = base.detection_patterns(spec, seen)
-    plan = detector_plan(spec, seen, specs)
-    values = exact_values(seen, base.designs(specs, seen, detected), probability, size)
-    return Plan(
-        layout=Layout(**base.shapes(len(specs), K, C, size), **shapes(plan, len(specs))),
-        axes=axes(plan, base.axes(spec, seen, specs, values, None), detected, probability),
-        world=base.world(case, seen),
-        bank=banks.per_realisation_bank(specs, seen.t, seen.period, seen.nominal, plan.tests),
-        observation=base.observation(case, seen),
-        detectors=plan.detectors,
-        kept=plan.at,
-        detector_plan=plan,
-    )
+    spec, scene = case.spec, build_scene(case.spec)
+    specs = responding_filters(spec, filter_specs(spec))
+    detectors = all_detectors(spec, scene, specs)
+    plan = base.realisation_plan(case, scene, specs, detectors)
+    at = np.zeros(0, dtype=np.int64)
+    if spec.uses:
+        at = np.searchsorted(scene.t, np.array(spec.uses.at_s or [scene.t[-1]]) - 1e-9)
+    more = shapes(spec, detectors, len(scene.t), len(at))
+    fields = vars(plan) | {"kept": at, "layout": Layout(**plan.layout.shapes, **more)}
+    return Plan(**fields | {"axes": axes(spec, scene, plan.axes, detectors.phase, at)}, spec=spec, scene=scene)
 
 
-def times_of(target) -> tuple[float, float] | None:
-    """When a target begins to manoeuvre and ends, s; none where it does not, or at random."""
-    if target.kind == "turning":
+def manoeuvre_times(target: Target) -> tuple[float, float] | None:
+    """Start and end of a target's manoeuvre, s; None if it does not manoeuvre, or moves at random."""
+    if isinstance(target, Turning):
         turns = [turn for turn in target.turns if turn.rate_radps]
         return (turns[0].start_s, turns[-1].end_s) if turns else None
-    if target.kind == "accelerating":
+    if isinstance(target, Accelerating):
         end = math.inf if target.end_s is None else target.end_s
         return (target.start_s, end) if target.acceleration_mps2 else None
-    keys = ("range_m", "bearing_rad") if target.frame == "polar" else ("x_m", "y_m")
-    bent = any(any(getattr(target, key)[2:]) for key in keys)
-    return (0.0, math.inf) if bent else None
+    given = (target.range_m, target.bearing_rad) if target.frame == "polar" else (target.x_m, target.y_m)
+    curved = any(any(coefficients[2:]) for coefficients in given if coefficients)
+    return (0.0, math.inf) if curved else None
 
 
-def phases(target, t: np.ndarray) -> np.ndarray:
-    """0 before the manoeuvre, 1 while it lasts, 2 after it, at every time (K,); what has just begun shows next time."""
-    times = times_of(target)
+def phases(target: Target, t: np.ndarray) -> np.ndarray:
+    """0 before the manoeuvre, 1 during it, 2 after it, at every time (K,); its effects show one scan later."""
+    times = manoeuvre_times(target)
     if times is None:
         return np.zeros(len(t), dtype=np.int64)
     return (t > times[0]).astype(np.int64) + (t > times[1])
 
 
 # ---- from keys to rules and tests ---------------------------------------------------------------------------------
-def with_manoeuvre_response(spec, specs: list[FilterSpec]) -> list[FilterSpec]:
-    """The filters of a case; those that respond to manoeuvres have their rule or models."""
-    found = []
-    for filter_spec, one in zip(specs, spec.filters, strict=True):
-        length = one.detector.plots if one.detector else filter_spec.length
-        found.append(replace(filter_spec, response=_response(spec, one), length=length))
-    return found
+def responding_filters(spec: Keys, specs: Sequence[FilterSpec]) -> list[FilterSpec]:
+    """The filters of a case, of which those that respond to manoeuvres have their rule or models."""
+    scale = lateral_scale(spec, 2)
+    return [
+        replace(one, response=_response(member, scale), length=member.detector.plots if member.detector else one.length)
+        for one, member in zip(specs, spec.filters, strict=True)
+    ]
 
 
-def _response(spec, one) -> AdaptiveRule | ModelPair | None:
-    """What a configured filter does about manoeuvres."""
-    scale = angular(spec, 2)
-    if one.kind == "imm":
-        return ModelPair(scale[:, None] * np.array(one.manoeuvre_variances), np.array(one.stay_probabilities))
-    if one.kind != "adaptive":
+def _response(member: Filter, scale: np.ndarray) -> AdaptiveRule | ModelPair | None:
+    """The response of a configured filter to manoeuvres; scale (C,) converts (m/s²)² to each coordinate's units."""
+    if member.manoeuvre_variances and member.stay_probabilities:
+        return ModelPair(scale[:, None] * np.array(member.manoeuvre_variances), np.array(member.stay_probabilities))
+    detector = member.detector
+    if detector is None:
         return None
-    own, joint = one.detector, one.detector.coordinates == "joint"
-    limit = own.threshold_k
-    if limit is None:
-        limit = float(exact.threshold(own.false_alarm_probability, len(scale) if joint else 1))
-    raises = one.response != "shorten_memory"
-    return AdaptiveRule(np.full(len(scale), limit), own.test_every, joint, raises, one.end_after or 1)
+    joint, limit = detector.coordinates == "joint", detector.threshold_k
+    if detector.false_alarm_probability is not None:
+        limit = float(exact.threshold(detector.false_alarm_probability, len(scale) if joint else 1))
+    raises = member.response != "shorten_memory"
+    return AdaptiveRule(np.full(len(scale), limit), detector.test_every, joint, raises, member.end_after or 1)
 
 
-def thresholds_of(one, coordinates: int) -> np.ndarray:
+def thresholds(detector: Detector, coordinates: int) -> np.ndarray:
     """Thresholds (G, T) of a configured detector."""
+    if detector.threshold_k is not None:
+        return np.tile(np.array(detector.threshold_k), (coordinates + 1, 1))
     freedom = np.append(np.ones(coordinates, dtype=int), coordinates)[:, None]
-    if one.threshold_k is not None:
-        return np.tile(np.array(one.threshold_k), (coordinates + 1, 1))
-    return exact.threshold(np.array(one.false_alarm_probability), freedom)
+    return exact.threshold(np.array(detector.false_alarm_probability), freedom)
 
 
-def detector_plan(spec, seen: Scene, specs: list[FilterSpec]) -> DetectorPlan:
-    """The detector tests of a case, those of its adaptive filters included."""
-    C = seen.truth.shape[1]
-    measured = [(one.plots, one.test_every) for one in spec.detectors]
-    tests = detector_tests(
-        measured, [thresholds_of(one, C) for one in spec.detectors], [(one.response, one.length) for one in specs]
-    )
-    at = np.zeros(0, dtype=np.int64)
-    if spec.uses is not None:
-        at = np.searchsorted(seen.t, np.array(spec.uses.at_s or [seen.t[-1]]) - 1e-9)
-    return DetectorPlan(spec, seen, tests, detector_arrays(tests, phases(spec.target, seen.t), C), len(measured), at)
+def all_detectors(spec: Keys, scene: Scene, specs: Sequence[FilterSpec]) -> Detectors:
+    """The measured detectors of a case, then those of its adaptive filters."""
+    C = len(scene.nominal)
+    measured = [DetectorTest(one.plots, one.test_every, thresholds(one, C)) for one in spec.detectors]
+    return detector_arrays(measured, needed_tests(specs), phases(spec.target, scene.t), C)
 
 
 # ---- exact laws ---------------------------------------------------------------------------------------------------
-def shift_laws(seen: Scene, c: int, detected: np.ndarray, plots: int, k: int) -> tuple[np.ndarray, ...]:
-    """Mean of â, true and believed variance (M,) of a coordinate's parabola through the last plots at scan k."""
-    own = plots_of(seen, c, detected)
-    first, weights, believed = filters.window_weights(own, k, plots, 3)
-    row, last = weights[:, 2], k + 1
-    t, sigma = seen.t[first:last], seen.sigma[first:last, c]
-    C = models.error_covariance(np.where(np.isfinite(sigma), sigma, 0.0), seen.rho[c], t, seen.period)
+def shift_laws(scene: Scene, c: int, detected: np.ndarray, plots: int, k: int) -> tuple[np.ndarray, ...]:
+    """Mean, true and believed variance (M,) of the acceleration â of a parabola through the last plots at scan k."""
+    first, weights, believed = window_weights(scene.plots(c, detected), k, plots, 3)
+    t, sigma = scene.t[first : k + 1], scene.sigma[first : k + 1, c]
+    C = error_covariance(np.where(np.isfinite(sigma), sigma, 0.0), scene.rho[c], t, scene.period)
     steps = np.diff(t)
     after = np.maximum(t[:, None] - t[1:], 0.0)  # since the end of the interval; a push within it moves by dt²/2
-    pushes = np.where(t[:, None] >= t[1:], steps**2 / 2 + steps * after, 0.0) * seen.walk[c]
-    mean, variance = exact.acceleration_law(row, seen.truth[first:last, c, 0], C, pushes)
+    pushes = np.where(t[:, None] >= t[1:], steps**2 / 2 + steps * after, 0.0) * scene.walk[c]
+    mean, variance = exact.acceleration_law(weights[:, 2], scene.truth[first : k + 1, c, 0], C, pushes)
     return mean, variance, believed[:, 2, 2]
 
 
-def exact_alarms(spec, seen: Scene, detected: np.ndarray, probability: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Probability (D, G, T, K) of an alarm at a test, and shift (D, G, K) of its mean; not-a-number where not known.
+def exact_alarms(spec: Keys, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Probability (D, G, T, K) of an alarm at a test, and shift (D, G, K) of its mean; NaN where not known.
 
-    Means over the patterns `detected` (M, K') of plots, of these probabilities, in which there is a test. In the
-    cartesian frames weights go with the plots, and nothing is known.
+    Both are means over the patterns of plots in which there is a test. In the cartesian frames weights depend on the
+    plots, and nothing is known.
     """
-    K, C = len(seen.t), seen.truth.shape[1]
-    most = max((len(one.wanted()) for one in spec.detectors), default=0)
-    alarms, shifts = (
-        np.full((len(spec.detectors), C + 1, most, K), np.nan),
-        np.full((len(spec.detectors), C + 1, K), np.nan),
-    )
-    for d, one in enumerate(spec.detectors) if probability.size else ():
-        limits = thresholds_of(one, C)
-        for k in range(one.plots - 1, detected.shape[1], one.test_every):
-            tested = (detected[:, k] > 0) & (detected[:, : k + 1].sum(axis=1) >= one.plots)
+    K, C = scene.truth.shape[:2]
+    most = max((len(detector.levels()) for detector in spec.detectors), default=0)
+    alarms = np.full((len(spec.detectors), C + 1, most, K), np.nan)
+    shifts = np.full((len(spec.detectors), C + 1, K), np.nan)
+    if spec.frame != "polar":
+        return alarms, shifts
+    detected, probability = scene.patterns()
+    for d, detector in enumerate(spec.detectors):
+        limits = thresholds(detector, C)
+        for k in range(detector.plots - 1, detected.shape[1], detector.test_every):
+            tested = (detected[:, k] > 0) & (detected[:, : k + 1].sum(axis=1) >= detector.plots)
             share = probability[tested]
-            if not share.sum() > 0:
-                continue
-            laws = np.array([shift_laws(seen, c, detected[tested], one.plots, k) for c in range(C)])
-            mean, true, believed = laws[:, 0], laws[:, 1], laws[:, 2]
-            ratio, shift = believed / true, mean / np.sqrt(true)
-            weight = share / share.sum()
-            for c in range(C):
-                found = exact.detection(limits[c][:, None] * ratio[c], shift[c])
-                alarms[d, c, : limits.shape[1], k], shifts[d, c, k] = found @ weight, np.abs(shift[c]) @ weight
-            together = np.sqrt((shift**2).sum(axis=0))
-            shifts[d, C, k] = together @ weight
-            if np.allclose(ratio, ratio[0], rtol=1e-9):
-                found = exact.detection(limits[C][:, None] * ratio[0], together, C)
-                alarms[d, C, : limits.shape[1], k] = found @ weight
+            if share.sum() > 0:
+                laws = [shift_laws(scene, c, detected[tested], detector.plots, k) for c in range(C)]
+                found = _alarm_law(np.array(laws), limits, share / share.sum())
+                alarms[d, :, : limits.shape[1], k], shifts[d, :, k] = found
     return alarms, shifts
 
 
-def independent(one, seen: Scene) -> bool:
+def _alarm_law(laws: np.ndarray, limits: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Probability (G, T) of an alarm and shift (G,), means with weight (M,) over laws (C, 3, M) as in `shift_laws`."""
+    C = len(laws)
+    mean, true, believed = laws[:, 0], laws[:, 1], laws[:, 2]
+    ratio, shift = believed / true, mean / np.sqrt(true)
+    alarms, shifts = np.full(limits.shape, np.nan), np.empty(C + 1)
+    for c in range(C):
+        alarms[c] = exact.detection(limits[c][:, None] * ratio[c], shift[c]) @ weight
+        shifts[c] = np.abs(shift[c]) @ weight
+    together = np.sqrt((shift**2).sum(axis=0))
+    shifts[C] = together @ weight
+    if np.allclose(ratio, ratio[0], rtol=1e-9):
+        alarms[C] = exact.detection(limits[C][:, None] * ratio[0], together, C) @ weight
+    return alarms, shifts
+
+
+def independent(detector: Detector, scene: Scene) -> bool:
     """Whether a detector's tests are independent of one another: windows apart, errors white, no random motion."""
-    return one.test_every >= one.plots and (seen.certain > 0).all() and not seen.rho.any() and not seen.walk.any()
+    apart, certain = detector.test_every >= detector.plots, (scene.certain > 0).all()
+    return bool(apart and certain and not scene.rho.any() and not scene.walk.any())
 
 
-def axes(
-    plan: DetectorPlan, common: base.GivenPlotsAxes, detected: np.ndarray, probability: np.ndarray
-) -> ManoeuvreAxes:
-    """Labels of a case, and its exact laws over patterns detected (M, K') of plots with these probabilities (M,)."""
-    spec, seen = plan.spec, plan.seen
-    alarms, shifts = exact_alarms(spec, seen, detected, probability)
+def axes(spec: Keys, scene: Scene, common: base.GivenPlotsAxes, phase: np.ndarray, at: np.ndarray) -> ManoeuvreAxes:
+    """Labels of a case and its exact laws; phase (K,) of the manoeuvre, at (A,) scans of uses."""
+    alarms, shifts = exact_alarms(spec, scene)
     return ManoeuvreAxes(
         **vars(common),
         exact_alarms=alarms,
         shifts=shifts,
-        thresholds=plan.tests.thresholds,
-        independent=tuple(independent(one, seen) for one in spec.detectors),
-        phase=plan.detectors.phase,
-        manoeuvre_s=times_of(spec.target),
-        uses=_uses_axes(spec, seen, plan.at) if spec.uses else None,
+        thresholds=tuple(thresholds(detector, len(scene.nominal)) for detector in spec.detectors),
+        independent=tuple(independent(detector, scene) for detector in spec.detectors),
+        phase=phase,
+        manoeuvre_s=manoeuvre_times(spec.target),
+        uses=uses_axes(spec.uses, spec, scene, at) if spec.uses else None,
     )
 
 
-def _uses_axes(spec, seen: Scene, at: np.ndarray) -> UsesAxes:
-    apart = tracks.flat(seen.truth[at, :2, :2], spec.frame == "polar") - own_ship(spec, seen.t[at])
-    return UsesAxes(at=at, true=true_uses(spec, seen, at), closing_mps=np.hypot(apart[:, 2], apart[:, 3]))
-
-
 # ---- uses ---------------------------------------------------------------------------------------------------------
-def own_ship(spec, t: np.ndarray) -> np.ndarray:
+def own_ship(uses: Uses, t: np.ndarray) -> np.ndarray:
     """The own ship's x, y and rates (n, 4) at times t."""
-    own = spec.uses.own_ship
+    own = uses.own_ship
     rate = own.speed_mps * np.array([math.cos(own.course_rad), math.sin(own.course_rad)])
     return np.concatenate([np.array([own.x_m, own.y_m]) + t[:, None] * rate, np.tile(rate, (len(t), 1))], axis=1)
 
 
-def true_uses(spec, seen: Scene, at: np.ndarray) -> np.ndarray:
-    """True values (A, 6): the closest approach if both kept course and speed, the position where the target will be."""
-    t, horizon = seen.t[at], spec.uses.horizon_s
-    now = tracks.flat(seen.truth[at, :2, :2], spec.frame == "polar")
-    found = tracks.uses(now, own_ship(spec, t), horizon)
-    _, later = courses(spec.target, t + horizon, None)
-    found[:, 2:4] = later[:, :2, 0]
-    return found
+def uses_axes(uses: Uses, spec: Keys, scene: Scene, at: np.ndarray) -> UsesAxes:
+    """True values at scans (A,): the closest approach at constant courses, the position where the target will be."""
+    t = scene.t[at]
+    track, own = tracks.flat(scene.truth[at, :2, :2], spec.frame == "polar"), own_ship(uses, t)
+    true = tracks.uses(track, own, uses.horizon_s)
+    _, later = courses(spec.target, t + uses.horizon_s, None)
+    true[:, 2:4] = later[:, :2, 0]
+    relative = track - own
+    return UsesAxes(at=at, true=true, closing_mps=np.hypot(relative[:, 2], relative[:, 3]))
 
 
-def uses_of(spec, t: np.ndarray, x: np.ndarray, P: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Uses of tracks and their first-order σ (F, n, 6), not-a-number where a state is not complete.
+def estimated_uses(
+    uses: Uses, frame: str, t: np.ndarray, x: np.ndarray, P: np.ndarray, known: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Uses of tracks and their first-order σ (F, n, 6), NaN where a state is not complete.
 
     t (n,) from the first plot; x (F, n, C, 3), P (F, n, C, 3, 3) and known (F, n, C, 3), of which the first two
-    coordinates count.
+    coordinates are used.
     """
-    state, polar, own = x[:, :, :2, :2], spec.frame == "polar", own_ship(spec, t)
+    state, polar, own = x[:, :, :2, :2], frame == "polar", own_ship(uses, t)
     spread = np.stack([P[:, :, :2, 0, 0], P[:, :, :2, 0, 1], P[:, :, :2, 1, 1]], axis=-1)
-    ready = known[:, :, :2, :2].all(axis=(2, 3))[..., None]
-    found = tracks.uses(tracks.flat(state, polar), own, spec.uses.horizon_s)
-    variance = tracks.variances(state, spread, polar, own, spec.uses.horizon_s)
-    return np.where(ready, found, np.nan), np.where(ready, np.sqrt(variance), np.nan)
+    complete = np.all(known[:, :, :2, :2], axis=(2, 3), keepdims=True)[..., 0]
+    values = tracks.uses(tracks.flat(state, polar), own, uses.horizon_s)
+    variance = tracks.variances(state, spread, polar, own, uses.horizon_s)
+    return np.where(complete, values, np.nan), np.where(complete, np.sqrt(variance), np.nan)
 
 
-def use_sums(spec, seen: Scene, at: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """Sums (F, A, 6, 5) from estimates kept (A, F, 2, 6, count), over those whose state is complete."""
-    polar, own = spec.frame == "polar", own_ship(spec, seen.t[at])
-    true = true_uses(spec, seen, at)
+def use_sums(uses: Uses, frame: str, labels: UsesAxes, t: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Sums (F, A, 6, 5) over the complete states of the estimates kept (A, F, 2, 6, count) at times t (A,)."""
+    polar, own = frame == "polar", own_ship(uses, t)
     A, F = kept.shape[:2]
     sums = np.zeros((F, A, len(tracks.QUANTITIES), 5))
     for a, f in np.ndindex(A, F):
-        ready = (kept[a, f, :, 5] > 0).all(axis=0)
-        one = np.moveaxis(kept[a, f][:, :, ready], -1, 0)
-        found = tracks.uses(tracks.flat(one[..., :2], polar), own[a], spec.uses.horizon_s)
-        e = tracks.errors(found, true[a])
-        spread = tracks.variances(one[..., :2], one[..., 2:5], polar, own[a], spec.uses.horizon_s)
-        parts = [np.ones_like(e), e, e**2, e**4, spread]
-        sums[f, a] = np.stack([part.sum(axis=0) for part in parts], axis=-1)
+        complete = (kept[a, f, :, 5] > 0).all(axis=0)
+        estimates = np.moveaxis(kept[a, f][:, :, complete], -1, 0)
+        values = tracks.uses(tracks.flat(estimates[..., :2], polar), own[a], uses.horizon_s)
+        e = tracks.errors(values, labels.true[a])
+        spread = tracks.variances(estimates[..., :2], estimates[..., 2:5], polar, own[a], uses.horizon_s)
+        sums[f, a] = np.stack([part.sum(axis=0) for part in (np.ones_like(e), e, e**2, e**4, spread)], axis=-1)
     return sums
 
 
 # ---- sums ---------------------------------------------------------------------------------------------------------
-def shapes(plan: DetectorPlan, F: int) -> dict[str, tuple[int, ...]]:
-    """Shapes of the sums that a case has beside the common ones."""
-    D, G, T = plan.detectors.threshold.shape
-    K, D = len(plan.seen.t), plan.measured
-    found = {"tested": (D, G, K), "alarms": (D, G, T, K), "first": (D, G, T, K)} if D else {}
-    if any(one.kind in RESPONDING_KINDS for one in plan.spec.filters):
-        found["modes"] = (F, K, G - 1, 3)
-    if plan.spec.uses:
-        found["uses"] = (F, len(plan.at), len(tracks.QUANTITIES), 5)
-    return found
-
-
-def added_up(plan: DetectorPlan, sums: patterns.BlockSums) -> dict[str, np.ndarray]:
-    """The sums of a block, as `shapes` names them."""
-    D = plan.measured
-    found = {name: values[:D] for name, values in sums.alarms._asdict().items()} | {"modes": sums.modes}
-    if plan.spec.uses:
-        found["uses"] = use_sums(plan.spec, plan.seen, plan.at, sums.kept)
-    return {name: found[name] for name in shapes(plan, len(sums.modes))}
+def shapes(spec: Keys, detectors: Detectors, K: int, A: int) -> dict[str, tuple[int, ...]]:
+    """Shapes of the sums that a case has in addition to the common ones."""
+    G, T = detectors.threshold.shape[1:]
+    D, F = len(spec.detectors), len(spec.filters)
+    sums: dict[str, tuple[int, ...]] = {}
+    if D:
+        sums |= {"tested": (D, G, K), "alarms": (D, G, T, K), "first": (D, G, T, K)}
+    if any(member.kind in RESPONDING_KINDS for member in spec.filters):
+        sums["modes"] = (F, K, G - 1, 3)
+    if spec.uses:
+        sums["uses"] = (F, A, len(tracks.QUANTITIES), 5)
+    return sums

@@ -1,4 +1,4 @@
-"""Filters that respond to manoeuvres over recorded plots, and what their tracks are used for."""
+"""Filters that respond to manoeuvres over recorded plots, and quantities derived from their tracks."""
 
 import numpy as np
 
@@ -9,16 +9,14 @@ from radarsim.studies.sonar.manoeuvre.uses import QUANTITIES
 
 
 class Tracker(base.Tracker):
-    """The filters of a case over recorded plots, with course, speed and what else the config's `uses` asks for."""
+    """The filters of a case over recorded plots, with the quantities that `uses` of the config asks for."""
 
     def specs(self) -> list[FilterSpec]:
-        """The filters, those that respond to manoeuvres with their rule or models."""
-        return study.with_manoeuvre_response(self.spec, super().specs())
+        """The filters; those that respond to manoeuvres have their rule or models."""
+        return study.responding_filters(self.spec, super().specs())
 
-    def derived(
-        self, t: np.ndarray, x: np.ndarray, P: np.ndarray, known: np.ndarray
-    ) -> tuple[tuple[tuple[str, str], ...], np.ndarray, np.ndarray]:
-        """Uses of the tracks and their σ (F, n, U), by names and units."""
+    def derived(self, t: np.ndarray, x: np.ndarray, P: np.ndarray, known: np.ndarray) -> base.Derived:
+        """The uses of the tracks."""
         if self.spec.uses is None:
             return super().derived(t, x, P, known)
-        return QUANTITIES, *study.uses_of(self.spec, t, x, P, known)
+        return base.Derived(QUANTITIES, *study.estimated_uses(self.spec.uses, self.spec.frame, t, x, P, known))

@@ -1,8 +1,8 @@
-"""What a track is used for: course, speed, predicted position, closest point of approach; to first order their spread.
+"""Quantities derived from a track, with their first-order σ: course, speed, predicted position, closest approach.
 
-A track gives value and rate of two coordinates, range and bearing or x (north) and y (east): state (…, 2, 2), and of
-each the variance of the value, the covariance, the variance of the rate: (…, 2, 3). The coordinates are filtered apart,
-so nothing connects them. Course and speed are taken to last.
+A track gives value and rate of two coordinates, range and bearing or x (north) and y (east): state (…, 2, 2), and for
+each coordinate the variance of the value, the covariance, and the variance of the rate: (…, 2, 3). The coordinates are
+filtered separately, so their errors are independent. Course and speed are assumed to be constant.
 """
 
 import numpy as np
@@ -11,7 +11,9 @@ QUANTITIES = (("course", "rad"), ("speed", "m/s"), ("x_ahead", "m"), ("y_ahead",
 
 
 def last(parts: list[np.ndarray]) -> np.ndarray:
-    """Arrays of one shape (…,) side by side on a last axis; each stays in one piece of memory: a quarter less time."""
+    """Stack arrays of one shape (…,) along a last axis; each stays contiguous in memory, which saves a quarter of the
+    time.
+    """
     return np.moveaxis(np.stack(parts), 0, -1)
 
 
@@ -27,13 +29,13 @@ def flat(state: np.ndarray, polar: bool) -> np.ndarray:
 def uses(track: np.ndarray, own: np.ndarray, horizon: float) -> np.ndarray:
     """The QUANTITIES (…, 6) of x, y and their rates (…, 4).
 
-    own (…, 4) are those of the vessel that the closest approach is to; horizon in s. t_cpa is counted from now, and
+    own (…, 4) are those of the vessel that the closest approach refers to; horizon in s. t_cpa is counted from now, and
     negative where the closest approach has passed.
     """
     x, y, vx, vy = np.moveaxis(track, -1, 0)
     px, py, wx, wy = np.moveaxis(track - own, -1, 0)
     square = wx**2 + wy**2
-    with np.errstate(divide="ignore", invalid="ignore"):  # a target that keeps its place has no closest approach
+    with np.errstate(divide="ignore", invalid="ignore"):  # a target without relative motion has no closest approach
         cpa, when = np.abs(px * wy - py * wx) / np.sqrt(square), -(px * wx + py * wy) / square
     ahead = x + horizon * vx, y + horizon * vy
     return last([np.arctan2(vy, vx), np.hypot(vx, vy), *ahead, cpa, when])
@@ -42,9 +44,9 @@ def uses(track: np.ndarray, own: np.ndarray, horizon: float) -> np.ndarray:
 def gradients(track: np.ndarray, own: np.ndarray, horizon: float) -> np.ndarray:
     """Derivatives (…, 6, 4) of the QUANTITIES with respect to x, y and their rates.
 
-    With u the unit vector from the own ship to the target at the closest approach, which is normal to the relative
-    velocity, d cpa = u · (dp + t_cpa dv). At a distance of zero u is one of the two normals, and the first order fails:
-    a distance cannot be negative.
+    Let u be the unit vector from the own ship to the target at the closest approach, which is normal to the relative
+    velocity; then d cpa = u · (dp + t_cpa dv). At a distance of zero u is one of the two normals and the first order
+    fails, because a distance cannot be negative.
     """
     vx, vy = track[..., 2], track[..., 3]
     px, py, wx, wy = np.moveaxis(track - own, -1, 0)
@@ -77,16 +79,16 @@ def variances(state: np.ndarray, P: np.ndarray, polar: bool, own: np.ndarray, ho
         rate = g[2] * c + g[3] * s, g[3] * x - g[2] * y
     else:
         value, rate = (g[0], g[1]), (g[2], g[3])
-    found = 0.0
+    variance = np.zeros(1)
     for coordinate in range(2):
         a, d = value[coordinate], rate[coordinate]
         xx, xv, vv = (P[..., coordinate, i, None] for i in range(3))
-        found = found + a * a * xx + 2 * a * d * xv + d * d * vv
-    return found
+        variance = variance + a * a * xx + 2 * a * d * xv + d * d * vv
+    return variance
 
 
-def errors(found: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Estimated less true QUANTITIES (…, 6), the course within half a turn."""
-    off = found - true
-    off[..., 0] = np.remainder(off[..., 0] + np.pi, 2 * np.pi) - np.pi
-    return off
+def errors(estimated: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Errors of estimated QUANTITIES (…, 6), the course within half a turn."""
+    error = estimated - true
+    error[..., 0] = np.remainder(error[..., 0] + np.pi, 2 * np.pi) - np.pi
+    return error

@@ -1,7 +1,7 @@
 """Smoothing and extrapolation of sonar plots (P3): missed plots, correlated errors, several sonars, two frames.
 
-Where the pattern of plots is the same in all realisations, gains are computed once and errors are Gaussian; else they
-go along with each realisation's own plots.
+Where all realisations have the same pattern of plots, gains are computed once and errors are Gaussian. Otherwise each
+realisation has gains of its own.
 """
 
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from radarsim.engine.moments import Layout
 from radarsim.studies.sonar import banks
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.axes import GivenPlotsAxes
-from radarsim.studies.sonar.detectors import detector_arrays, detector_tests
+from radarsim.studies.sonar.detectors import detector_arrays
 from radarsim.studies.sonar.exact_values import exact_values
 from radarsim.studies.sonar.kernels import shared_gains as kernels
-from radarsim.studies.sonar.scene import Scene, filter_specs, scene
+from radarsim.studies.sonar.scene import Scene, build_scene, filter_specs
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class SharedPlan:
     gaussian = True
 
     def simulate(self, first: int, count: int) -> np.ndarray:
-        """Sums of one block, in the order of the layout."""
+        """The sums of one block, in the order of the layout."""
         sums = base.empty_sums(*self.bank.known.shape)
         kernels.simulate_block(self.world, self.bank, first, count, self.axes.baseline, sums)
         sums.believed[:] = count * self.believed
@@ -42,38 +42,24 @@ class SharedPlan:
 
 def prepare(case: Case) -> SharedPlan | base.RealisationPlan:
     """Design the filters of a case and compute the exact values of its errors."""
-    seen = scene(case.spec)
-    shared = case.spec.frame == "polar" and (seen.certain >= 0).all()
-    return _shared_plan(case, seen) if shared else _realisation_plan(case, seen)
+    scene, specs = build_scene(case.spec), filter_specs(case.spec)
+    if case.spec.frame == "polar" and (scene.certain >= 0).all():
+        return _shared_plan(case, scene, specs)
+    K, C = scene.sigma.shape
+    return base.realisation_plan(case, scene, specs, detector_arrays([], [], np.zeros(K, dtype=np.int64), C))
 
 
-def _shared_plan(case: Case, seen: Scene) -> SharedPlan:
-    spec, specs = case.spec, filter_specs(case.spec)
+def _shared_plan(case: Case, scene: Scene, specs: list[banks.FilterSpec]) -> SharedPlan:
     size = max(one.size for one in specs)
-    designs = base.designs(specs, seen, np.maximum(seen.certain, 0)[None])
+    designs = base.designs(specs, scene, np.maximum(scene.certain, 0)[None])
     bank = banks.shared_bank(specs, designs)
-    covariance = np.array([[one.covariance[0] for one in row] for row in designs])
+    F, K, C = bank.known.shape
+    covariance = np.array([[design.covariance[0] for design in row] for row in designs])
+    values = exact_values(scene, designs, np.ones(1), size)
     return SharedPlan(
-        layout=Layout(**base.shapes(*bank.known.shape, size)),
-        axes=base.axes(spec, seen, specs, exact_values(seen, designs, np.ones(1), size), bank.known),
-        world=base.world(case, seen),
+        layout=Layout(**base.shapes(F, K, C, size)),
+        axes=base.axes(case.spec, scene, specs, values, bank.known),
+        world=base.world(case, scene),
         bank=bank,
         believed=np.diagonal(covariance, axis1=3, axis2=4).transpose(0, 2, 1, 3),
-    )
-
-
-def _realisation_plan(case: Case, seen: Scene) -> base.RealisationPlan:
-    spec, specs = case.spec, filter_specs(case.spec)
-    size, (K, C) = max(one.size for one in specs), seen.sigma.shape
-    detected, probability = base.detection_patterns(spec, seen)
-    tests = detector_tests([], [], [])
-    values = exact_values(seen, base.designs(specs, seen, detected), probability, size)
-    return base.RealisationPlan(
-        layout=Layout(**base.shapes(len(specs), K, C, size)),
-        axes=base.axes(spec, seen, specs, values, None),
-        world=base.world(case, seen),
-        bank=banks.per_realisation_bank(specs, seen.t, seen.period, seen.nominal, tests),
-        observation=base.observation(case, seen),
-        detectors=detector_arrays(tests, np.zeros(K, dtype=np.int64), C),
-        kept=np.zeros(0, dtype=np.int64),
     )

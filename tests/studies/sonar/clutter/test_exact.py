@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from radarsim.studies.sonar.clutter import exact
+from radarsim.studies.sonar.clutter.filters import Conditions
 
 
 def enumerated(chance, m, n):
@@ -38,8 +39,8 @@ def test_pairs_of_false_plots_far_from_any_edge():
     """A gate that no edge cuts: the mean number in it is density · r · π γ √|S|, and the chance follows."""
     sigma, rule = np.array([30.0, 0.0175]), SimpleNamespace(n=3, speed=10.0, gate_probability=0.99)
     near, far = 9000.0, 9000.001
-    ring = (-np.pi, np.pi)
-    found = exact.false_pairs((near - 2e3, far + 2e3), ring, 1e-6, sigma, rule, 5.0, 10)
+    ring = SimpleNamespace(range_m=(near - 2e3, far + 2e3), bearing_rad=(-np.pi, np.pi))
+    found = exact.false_pairs(ring, Conditions(5.0, sigma, 0.9, 1e-6), rule, 10)
     r = np.sqrt(np.linspace((near - 2e3) ** 2, (far + 2e3) ** 2, 20_001))  # evenly in area
     gate, none, wanted = -2 * np.log(0.01), 1.0, []
     for k in (1, 2):
@@ -56,6 +57,7 @@ def test_pairs_of_false_plots_far_from_any_edge():
 
 def test_quadrature_has_converged():
     sigma, rule = np.array([30.0, 0.0175]), SimpleNamespace(n=4, speed=10.0, gate_probability=0.99)
-    of = ((7e3, 11e3), (0.1, 0.7), 1e-6, sigma, rule, 5.0, 6)
-    coarse, fine = exact.false_pairs(*of), exact.false_pairs(*of, nodes=120)
+    sector = SimpleNamespace(range_m=(7e3, 11e3), bearing_rad=(0.1, 0.7))
+    given = (sector, Conditions(5.0, sigma, 0.9, 1e-6), rule, 6)
+    coarse, fine = exact.false_pairs(*given), exact.false_pairs(*given, nodes=120)
     assert coarse == pytest.approx(fine, rel=1e-3)

@@ -5,7 +5,7 @@ import pytest
 
 from radarsim.studies.sonar.clutter import filters as design
 from radarsim.studies.sonar.clutter import multitrack
-from radarsim.studies.sonar.clutter.kernels.field import OPEN
+from radarsim.studies.sonar.clutter.kernels.gate import OPEN
 
 SIGMA, T = np.array([30.0, 0.0175]), 5.0
 
@@ -15,7 +15,7 @@ def choice(association="nearest", gate=0.99, m=3, n=4, misses=3):
 
 
 def charted(of, scans, density=0.0, detection=0.9):
-    return multitrack.confirmed_tracks(of, T, SIGMA, detection, density, scans)
+    return multitrack.confirmed_tracks(of, design.Conditions(T, SIGMA, detection, density), scans)
 
 
 def course(r, b, scans, seed, missed=()):

@@ -10,8 +10,8 @@ from radarsim.kernels import random
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter import filters as design
 from radarsim.studies.sonar.clutter import track as plots
+from radarsim.studies.sonar.clutter.filters import tracker_specs
 from radarsim.studies.sonar.clutter.kernels import counts as places
-from radarsim.studies.sonar.clutter.study import tracker_specs
 from tests.studies.sonar.clutter import naive as naive
 
 T, SIGMA = 5.0, np.array([30.0, np.radians(1)])
@@ -55,8 +55,8 @@ def test_estimates_are_the_twins(density):
     wanted, t, compared = tracker_specs(case.spec), plan.axes.t_s, 0
     for realisation in (0, 1, 2, 3, 511, 70_000):
         sums = sums_of(plan, realisation)
-        z, true = plots.target_plots(plan.world, plan.observation, realisation)
-        false = [plots.false_plots(plan.field, realisation, k).T for k in range(len(t))]
+        z, true = plots.target_plots(plan.axes.world, plan.axes.detections, realisation)
+        false = [plots.false_plots(plan.axes.field, realisation, k).T for k in range(len(t))]
         for f, choice in enumerate(wanted):
             gate = design.gate_threshold(choice.gate_probability)
             of = (choice, SIGMA, 0.8, choice.gate_probability, gate, density / 1e6, T)
@@ -64,7 +64,7 @@ def test_estimates_are_the_twins(density):
                 assert sums["counts"][f, k, places.KEPT] == (state == 2)
                 assert sums["counts"][f, k, places.TRYING] == (state == 1)
                 if state == 2:
-                    error = x - plan.world.truth[k, :, :2].ravel()
+                    error = x - plan.axes.world.truth[k, :, :2].ravel()
                     unit = np.sqrt(np.diag(P))
                     assert np.abs((sums["error"][f, k, :, 0] - error) / unit).max() < 1e-10
                     assert sums["believed"][f, k] == pytest.approx(unit**2, rel=1e-10)
@@ -81,8 +81,8 @@ def test_without_clutter_trackers_are_the_plain_filter_to_the_last_bit():
         plain = STUDY.prepare(case)
         plain = dataclasses.replace(
             plain,
-            world=plain.world._replace(plots=plan.world.plots, motion=plan.world.motion),
-            observation=plain.observation._replace(certain=np.ones(30, dtype=np.int64)),
+            world=plain.world._replace(plots=plan.axes.world.plots, motion=plan.axes.world.motion),
+            detections=plain.detections._replace(certain=np.ones(30, dtype=np.int64)),
         )
         for realisation in (0, 5, 12345):
             error = sums_of(plan, realisation)["error"][..., 0]
@@ -105,7 +105,7 @@ def test_the_field_is_poisson_and_even_in_area():
     """Numbers in a sector, over realisations, and places of their plots, against their laws."""
     _, plan = prepared([tracker("pda")], density=2.0)
     area = plan.axes.area_m2
-    found = [plots.false_plots(plan.field, i, 3) for i in range(2000)]
+    found = [plots.false_plots(plan.axes.field, i, 3) for i in range(2000)]
     number = np.array([one.shape[1] for one in found])
     mean = 2e-6 * area
     assert abs(number.mean() - mean) < 3.9 * np.sqrt(mean / 2000)

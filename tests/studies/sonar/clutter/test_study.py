@@ -67,7 +67,7 @@ def test_gates_hold_target_and_false_plots_as_they_should():
     assert (false >= stats.poisson.ppf(RATE, expected)).all()
     assert (false <= stats.poisson.isf(RATE, expected)).all()
     # The area of the gate is known beforehand, and its centre's mean range is the target's.
-    n, truth = np.arange(2, 6), plan.world.truth[2:, 0, 0]
+    n, truth = np.arange(2, 6), plan.axes.world.truth[2:, 0, 0]
     ahead = 1 + 2 * (2 * n + 1) / (n * (n - 1))
     area = truth * np.pi * -2 * np.log(1 - wanted[:, None]) * 30.0 * np.radians(1) * ahead
     assert expected == pytest.approx(N * 1e-6 * area, rel=1e-4)
@@ -144,7 +144,7 @@ def test_probabilistic_association_keeps_a_track_longer():
 def test_a_target_outside_the_sector_is_not_seen():
     plan = prepared([tracker("a", "known")], sector={"range_m": [7e3, 8990.0], "bearing_deg": [5, 40]})
     kept = simulated(plan, 512)["counts"][0, :, places.KEPT]
-    assert plan.observation.certain.tolist() == [0] + [1] * 9  # 9000 m at first, 4 m/s less
+    assert plan.axes.detections.certain.tolist() == [0] + [1] * 9  # 9000 m at first, 4 m/s less
     assert kept.tolist() == [0, 0] + [512] * 8
 
 
@@ -193,4 +193,4 @@ def test_noise_of_the_target_is_that_of_plain_filters():
     plain = config([{"name": "plain", "kind": "kalman"}])
     plain["sensor"].pop("sector")
     other = load(plain).cases[0]
-    assert (STUDY.prepare(one).world.plots == STUDY.prepare(other).world.plots).all()
+    assert (STUDY.prepare(one).axes.world.plots == STUDY.prepare(other).world.plots).all()

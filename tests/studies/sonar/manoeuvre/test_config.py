@@ -66,9 +66,9 @@ def test_what_is_taken():
     made = config(target=VESSEL, filters=[ADAPTIVE, IMM], detectors=[DETECTOR], uses={"horizon_s": 60.0})
     spec = load(made).cases[0].spec
     assert spec.parts == ("smoothing", "manoeuvre")
-    assert spec.detectors[0].wanted() == (1.0,)
+    assert spec.detectors[0].levels() == (1.0,)
     assert spec.target.course_rad == pytest.approx(np.pi)
-    assert spec.target.range_0() == 9e3
+    assert spec.target.initial_range_m == 9e3
     assert load(config()).cases[0].spec.parts == ("smoothing",)
 
 

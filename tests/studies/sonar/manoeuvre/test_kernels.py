@@ -57,7 +57,7 @@ def plots(plan, realisation, probability):
     for k in range(SCANS):
         fill_normal_pairs(plan.world.plots, realisation, k, a, b)
         z[k] += SIGMA * np.array([a[0], b[0]])
-        fill_uniform_pairs(plan.observation.misses, realisation, k, a, b)
+        fill_uniform_pairs(plan.detections.key, realisation, k, a, b)
         if k and a[0] >= probability:
             z[k] = np.nan
     return z

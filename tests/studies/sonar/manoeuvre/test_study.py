@@ -11,7 +11,7 @@ from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar import exact as least_squares
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre import study as manoeuvres
-from radarsim.studies.sonar.scene import scene
+from radarsim.studies.sonar.scene import build_scene
 from tests.studies.sonar.manoeuvre.test_kernels import DETECTORS, FILTERS, SCANS, SIGMA, TARGET, VESSEL, T, config, twin
 
 N = 16_384
@@ -91,9 +91,9 @@ def test_pushes_are_what_the_motion_makes_of_them():
     """Variance of an acceleration under random pushes, one interval's push after the other, moved step by step."""
     target = {"kind": "polynomial", "frame": "polar", "range_m": [6e3, -5], "bearing_deg": [10, 0.01]}
     spec = load(config(filters=PLAIN) | {"target": target | {"fluctuation_mps2": 0.2}}).cases[0].spec
-    seen = scene(spec)
-    _, variance, believed = manoeuvres.shift_laws(seen, 0, np.ones((1, SCANS)), 6, 20)
-    weights, _ = least_squares.generalised_least_squares(seen.t[15:21], np.eye(6), 3)
+    scene = build_scene(spec)
+    _, variance, believed = manoeuvres.shift_laws(scene, 0, np.ones((1, SCANS)), 6, 20)
+    weights, _ = least_squares.generalised_least_squares(scene.t[15:21], np.eye(6), 3)
     total = 100.0 * weights[2] @ weights[2]
     assert believed == pytest.approx(total)
     for pushed in range(1, 6):

@@ -1,4 +1,4 @@
-"""Where each number stands in the sums of tracks among false plots; kernels add and tables read there."""
+"""The layout of the sums of tracks among false plots, which kernels write and tables read."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,19 +16,21 @@ ENDS_PER_SCAN, WRONG_PER_PLOT = range(RATIOS)
 
 
 class TrackSums(NamedTuple):
-    """Sums of a block, of F trackers over K scans.
+    """Sums of a block, for F trackers over K scans.
 
     Attributes:
-        errors: of the tracks kept, as everywhere in the sonar.
-        counts: (F, K, COUNTS) at each scan how many realisations have a tentative track of the target (TRYING) or a
-            confirmed one (KEPT), confirm their first one (FOUND), lose a confirmed one (LOST) or drop it (DROPPED),
-            drop a tentative one (FAILED); of settled tracks how many looked for a plot (LOOKED), the target's plots
-            then (PLOTS), those in the gate (INSIDE), false plots in it (FALSE) and their expected number (EXPECTED).
-        begun: (F, K, FALSE_COUNTS) how many tracks begun by false plots are tentative, are confirmed, and become so.
-        ratios: (F, RATIOS, 5) Σa, Σa², Σb, Σb², Σab over realisations: of ends of tracks over scans held
-            (ENDS_PER_SCAN), of the weight of false plots over plots taken (WRONG_PER_PLOT).
-        scores: (2, F, T + 1) how many of the target's first tracks, and of false ones, reached each of T thresholds of
-            the score, and last how many tracks there were.
+        errors: of the tracks kept, as in all parts of the sonar.
+        counts: (F, K, COUNTS) numbers of realisations that at a scan have a tentative track of the target (TRYING) or
+            a confirmed one (KEPT), confirm their first one (FOUND), lose a confirmed one (LOST) or drop it (DROPPED),
+            or drop a tentative one (FAILED); then, of settled tracks, the number that looked for a plot (LOOKED), of
+            the target's plots (PLOTS), of those in the gate (INSIDE), of false plots in the gate (FALSE), and the
+            expected number of these (EXPECTED).
+        begun: (F, K, FALSE_COUNTS) numbers of tracks begun by false plots that are tentative, are confirmed, and become
+            confirmed.
+        ratios: (F, RATIOS, 5) Σa, Σa², Σb, Σb², Σab over realisations: a ends of tracks and b scans held
+            (ENDS_PER_SCAN); a weight of false plots and b plots taken (WRONG_PER_PLOT).
+        scores: (2, F, T + 1) numbers of the target's first tracks, and of false ones, whose score reached each of T
+            thresholds, and last the number of all these tracks.
     """
 
     errors: "Sums"
@@ -39,5 +41,5 @@ class TrackSums(NamedTuple):
 
 
 def shapes(F: int, K: int, T: int) -> dict[str, tuple[int, ...]]:
-    """Shapes of these sums but the errors, for F trackers, K scans and T thresholds of the score."""
+    """Shapes of these sums except the errors, for F trackers, K scans and T thresholds of the score."""
     return {"counts": (F, K, COUNTS), "begun": (F, K, FALSE_COUNTS), "ratios": (F, RATIOS, 5), "scores": (2, F, T + 1)}

@@ -9,9 +9,9 @@ from radarsim.studies.sonar.kernels.sums import Course, Estimate, add_sums, ahea
 
 @part
 def add_scores(thresholds, n, first, best, scores):
-    """How many first tracks' scores reached each threshold, and how many first tracks there were: scores (T + 1,).
+    """Add to scores (T + 1,) the number of first tracks whose score reached each threshold, and that of first tracks.
 
-    first (CHUNK,) is negative where a realisation had no track, best (CHUNK,) the greatest score of its first.
+    first (CHUNK,) is negative where a realisation had no track; best (CHUNK,) is the greatest score of its first track.
     """
     for i in range(n):
         if first[i] >= 0.0:
@@ -22,20 +22,19 @@ def add_scores(thresholds, n, first, best, scores):
 
 @part
 def add_ratio(a, b, n, ratio):
-    """Σa, Σa², Σb, Σb², Σab over n realisations."""
+    """Add Σa, Σa², Σb, Σb², Σab over n realisations to ratio (5,)."""
     for i in range(n):
-        one, other = a[i], b[i]
-        ratio[0] += one
-        ratio[1] += one * one
-        ratio[2] += other
-        ratio[3] += other * other
-        ratio[4] += one * other
+        ratio[0] += a[i]
+        ratio[1] += a[i] * a[i]
+        ratio[2] += b[i]
+        ratio[3] += b[i] * b[i]
+        ratio[4] += a[i] * b[i]
 
 
 @part
 def add_errors(trackers, tracks, f, k, course, counted, out, sums):
     """Add the errors of the tracks kept of tracker f at scan k, in range and in bearing; out (7,) is scratch."""
-    size = tracks.x.shape[0]  # two, but as a number known to the compiler all that is inlined would be compiled twice
+    size = tracks.x.shape[0]  # two; were it a constant, the compiler would unroll the loop and compile everything twice
     for c in range(size):
         estimate = Estimate(tracks.x[c], tracks.P[c], size, tracks.x[c], 0)
         units = (trackers.sigma[c], trackers.period)

@@ -1,0 +1,93 @@
+"""Blocks of realisations of trackers among false plots: the target's track, and tracks that false plots begin.
+
+Every plot that no track takes begins a track. The target's plots do so one at a time. Of the false plots one begins a
+track in each realisation, at a position drawn uniformly over the sector. By the theorem of Slivnyak and Mecke the plots
+about it are again those of the field, and the expected number of false tracks is their density times the share that is
+confirmed. Letters as in `tracker`.
+"""
+
+import numpy as np
+
+from radarsim.kernels.compile import kernel
+from radarsim.kernels.random import uniforms
+from radarsim.studies.sonar.clutter.kernels.counts import COUNTS, ENDS_PER_SCAN, WRONG_PER_PLOT
+from radarsim.studies.sonar.clutter.kernels.gate import KNOWN
+from radarsim.studies.sonar.clutter.kernels.rules import (
+    BEST,
+    ENDS,
+    FIRST,
+    HELD,
+    TAKEN,
+    WRONG,
+    judge,
+    judge_false,
+    judge_known,
+)
+from radarsim.studies.sonar.clutter.kernels.sums import add_ahead, add_errors, add_ratio, add_scores
+from radarsim.studies.sonar.clutter.kernels.tracker import Scan, Target, reset, step, tracks_of
+from radarsim.studies.sonar.kernels.patterns import detect
+from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
+from radarsim.studies.sonar.kernels.steps import CHUNK
+from radarsim.studies.sonar.kernels.sums import Counted, Course
+
+
+@kernel
+def simulate_block(world, detections, field, trackers, work, first, total, sums):
+    """Add the sums of the target's tracks in realisations first … first + total - 1 to sums, a TrackSums."""
+    F, K, status = trackers.gate.size, world.dt.size, work.status
+    plots, shift, z = np.empty((2, 4, CHUNK)), np.zeros((2, 3, CHUNK)), np.empty((2, CHUNK))
+    detected, used, kept = np.empty(CHUNK), np.ones(CHUNK), np.empty((F, CHUNK))
+    counts, out, target = np.zeros(COUNTS), np.empty(7), Target(detected, z, True)
+    for done in range(0, total, CHUNK):
+        reset(work)
+        plots[:], kept[:] = 0.0, 0.0
+        n = min(CHUNK, total - done)
+        used[n:] = 0.0
+        for k in range(K):
+            scan, course = Scan(first + done, n, k, world.dt[k]), Course(world.truth[k], shift)
+            move_and_measure(world, first + done, k, plots)
+            detect(detections, first + done, k, detected)
+            shift[:, :2], z[:] = plots[:, 2:], plots[:, 0]
+            for f in range(F):
+                tracks, counted = tracks_of(work, f), Counted(kept[f], used)
+                if k > 0:
+                    add_ahead(tracks, f, k, scan.dt, course, counted, out, sums.errors)
+                counts[:] = 0.0
+                step(trackers, f, field, scan, tracks, target, work, counts)
+                if trackers.association[f] == KNOWN:
+                    judge_known(tracks, status[f], n, kept[f], counts)
+                else:
+                    judge(trackers, f, n, tracks, status[f], course, kept[f], counts)
+                sums.counts[f, k] += counts
+                add_errors(trackers, tracks, f, k, course, counted, out, sums.errors)
+        for f in range(F):
+            add_ratio(status[f, ENDS], status[f, HELD], n, sums.ratios[f, ENDS_PER_SCAN])
+            add_ratio(status[f, WRONG], status[f, TAKEN], n, sums.ratios[f, WRONG_PER_PLOT])
+            add_scores(trackers.thresholds, n, status[f, FIRST], status[f, BEST], sums.scores[0, f])
+
+
+@kernel
+def simulate_false(key, field, trackers, work, dt, first, total, sums):
+    """Add the sums of tracks that false plots begin at scan 0: one plot a realisation, uniform over the sector.
+
+    key (2,) of the stream of their positions; dt (K,) intervals before each scan.
+    """
+    q0, dq, nq, b0, db, nb, _, _ = field.cells
+    z, detected, counts, nothing = np.empty((2, CHUNK)), np.ones(CHUNK), np.zeros(COUNTS), np.zeros(CHUNK)
+    for done in range(0, total, CHUNK):
+        reset(work)
+        n = min(CHUNK, total - done)
+        for i in range(n):
+            u, v = uniforms(key[0], key[1], first + done + i, 0)
+            z[0, i] = np.sqrt(2.0 * (q0 + dq * nq * u))
+            z[1, i] = b0 + db * nb * v
+        for f in range(trackers.gate.size):
+            tracks, status = tracks_of(work, f), work.status[f]
+            if trackers.association[f] == KNOWN:
+                continue
+            for k in range(dt.size):
+                target = Target(detected if k == 0 else nothing, z, k == 0)
+                step(trackers, f, field, Scan(first + done, n, k, dt[k]), tracks, target, work, counts)
+                if not judge_false(trackers, f, n, tracks, status, sums.begun[f, k]):
+                    break
+            add_scores(trackers.thresholds, n, status[FIRST], status[BEST], sums.scores[1, f])
