@@ -185,7 +185,7 @@ class Accelerating(Vessel):
             yield at("end_s", "must come after start_s")
 
 
-class Turn(Model):
+class TimedTurn(Model):
     """A turn between two times."""
 
     start_s: NonNegative = Field(description="start of the turn, s from the first plot")
@@ -203,7 +203,7 @@ class Turning(Vessel):
 
     kind: Literal["turning"] = Field(description="straight legs and turns at constant speed")
     speed_mps: Positive = Field(description="speed, m/s")
-    turns: Annotated[tuple[Turn, ...], Field(min_length=1, max_length=16)] = Field(description="the turns, in order")
+    turns: Annotated[tuple[TimedTurn, ...], Field(min_length=1, max_length=16)] = Field(description="the turns, in order")
 
     @cross_check
     def _in_order(self) -> Iterator[At]:
