@@ -203,7 +203,9 @@ class Turning(Vessel):
 
     kind: Literal["turning"] = Field(description="straight legs and turns at constant speed")
     speed_mps: Positive = Field(description="speed, m/s")
-    turns: Annotated[tuple[TimedTurn, ...], Field(min_length=1, max_length=16)] = Field(description="the turns, in order")
+    turns: Annotated[tuple[TimedTurn, ...], Field(min_length=1, max_length=16)] = Field(
+        description="the turns, in order of time"
+    )
 
     @cross_check
     def _in_order(self) -> Iterator[At]:
