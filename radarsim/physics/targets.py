@@ -25,6 +25,14 @@ def acceleration_start(coefficients: Sequence[float], acceleration: float, start
     return polynomial(coefficients, t) + acceleration * step
 
 
+def acceleration_pulse(
+    coefficients: Sequence[float], acceleration: float, start: float, duration: float, t: np.ndarray
+) -> np.ndarray:
+    """A polynomial with a constant acceleration (m/s²) from `start` for `duration` (s): (K, 3) at times t (K,)."""
+    ended = acceleration_start((0.0,), acceleration, start + duration, t)
+    return acceleration_start(coefficients, acceleration, start, t) - ended
+
+
 def jerk_pulse(coefficients: Sequence[float], jerk: float, start: float, duration: float, t: np.ndarray) -> np.ndarray:
     """A polynomial with a constant jerk (m/s³) from `start` for `duration` (s), then acceleration: (K, 3) at t (K,)."""
 

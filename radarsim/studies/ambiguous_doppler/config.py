@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -32,6 +32,13 @@ PROPORTION = 1e6  # largest ratio of what the prior leaves open to what a plot t
 DISTINCT = 1e-9  # relative difference from which two spans are two
 UNFOLDING = {"hypotheses": 300, "prune_below": 1e-6, "merge": "never", "estimate": "mean"}  # and its defaults
 
+COMBINING = {  # keys of a combination: of which, and the default
+    "stay_probability": ("likelihood", 0.95),
+    "manoeuvres": ("expected_error", None),
+    "interval_sigmas": ("intersection", 2.0),
+}
+
+Order = Annotated[int, Whole(0, 2)]
 Coefficients = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
 
 
@@ -105,21 +112,44 @@ class RandomPolynomial(Model):
     )
 
 
-Target = Annotated[Polynomial | RandomPolynomial, Field(discriminator="kind")]
+class AccelerationPulse(Model):
+    """A polynomial with a constant acceleration for a while; the velocity it has built up stays."""
+
+    kind: Literal["acceleration_pulse"] = Field(description="a constant acceleration for a while")
+    coefficients: Coefficients = Field(
+        description="derivatives of range at the first plot: m, m/s, m/s², … (the sum of c_i t^i / i!)"
+    )
+    acceleration_g: Annotated[Number, Field(ge=-100, le=100)] = Field(
+        description="radial acceleration added, standard gravities"
+    )
+    start_s: NonNegative = Field(description="time from the first scan at which it begins, s")
+    duration_s: Positive = Field(description="how long it lasts, s")
+
+
+Target = Annotated[Polynomial | RandomPolynomial | AccelerationPulse, Field(discriminator="kind")]
+
+
+class Manoeuvres(Model):
+    """A class of manoeuvres: a constant radial acceleration for a while, that begins at any scan, each as likely."""
+
+    acceleration_mps2: Positive = Field(description="size of the acceleration, m/s²")
+    duration_s: Positive = Field(description="how long it lasts, s")
 
 
 class Filter(Model):
-    """A Kalman filter of range, with the Doppler velocity or without, and what it does about its folds."""
+    """A Kalman filter of range, or several of different order, with the velocity or without."""
 
     name: Annotated[Name, Display()] = Field(description="label, unlike that of any other filter")
     doppler: Literal["none", "unfolded", "folded"] = Field(
         description="none: range alone; unfolded: the velocity with its true fold, a bound; folded: as measured"
     )
-    manoeuvre_variance: NonNegative = Field(
-        description="variance of the random derivative it allows for: jerk (m/s³)² of order 2, acceleration (m/s²)² of "
-        "order 1, velocity (m/s)² of order 0"
+    orders: Annotated[tuple[Order, ...], Field(min_length=1, max_length=3)] = Field(
+        (2,), description="orders of its models: 2 has an acceleration, 1 a velocity, 0 a range that moves at random"
     )
-    order: Annotated[int, Whole(0, 2)] = Field(2, description="order of its model: 2 has an acceleration, 1 a velocity")
+    manoeuvre_variance: NonNegative | tuple[NonNegative, ...] = Field(
+        description="variance of the random derivative that a model allows for: jerk (m/s³)² of order 2, acceleration "
+        "(m/s²)² of order 1, velocity (m/s)² of order 0; a list for several orders, in their order"
+    )
     hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = Field(
         None, description="folded: most sequences of folds that it keeps; 1: the nearest fold; default: 300"
     )
@@ -134,9 +164,52 @@ class Filter(Model):
     estimate: Literal["best", "mean"] | None = Field(
         None, description="folded: the best hypothesis, or the mean of all by their probabilities; default: mean"
     )
+    combine: Literal["likelihood", "expected_error", "intersection"] | None = Field(
+        None,
+        description="several orders: likelihood (IMM, with transitions between orders), expected_error (the linear "
+        "combination of least error over `manoeuvres`), intersection (the smoothest whose interval meets all rougher)",
+    )
+    stay_probability: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="likelihood: probability that an order lasts from scan to scan; default: 0.95"
+    )
+    manoeuvres: Manoeuvres | None = Field(None, description="expected_error: the manoeuvres that are expected")
+    interval_sigmas: Positive | None = Field(
+        None, description="intersection: half width of an interval in fluctuation errors; default: 2"
+    )
+
+    @property
+    def variances(self) -> tuple[float, ...]:
+        """The manoeuvre variance of each order."""
+        given = self.manoeuvre_variance
+        return given if isinstance(given, tuple) else (given,)
 
     @cross_check
-    def _has_effect(self) -> Iterator[At]:
+    def _orders_and_variances(self) -> Iterator[At]:
+        if len(self.variances) != len(self.orders):
+            many = len(self.orders)
+            yield at(
+                "manoeuvre_variance", f"must be a list of {many}, one for each order" if many > 1 else "must be one"
+            )
+
+    @cross_check
+    def _orders_differ(self) -> Iterator[At]:
+        if list(self.orders) != sorted(set(self.orders)):
+            yield at("orders", "must rise, each once")
+
+    @cross_check
+    def _combined(self) -> Iterator[At]:
+        if len(self.orders) > 1 and self.combine is None:
+            yield at("combine", "is needed by several orders: likelihood, expected_error or intersection")
+        elif len(self.orders) == 1 and self.combine is not None:
+            yield at("combine", "has no effect on one order; leave it out")
+        elif self.combine == "expected_error" and self.manoeuvres is None:
+            yield at("manoeuvres", "is needed by combine: expected_error")
+        for key, (of, _) in COMBINING.items():
+            if getattr(self, key) is not None and self.combine != of:
+                yield at(key, f"has no effect without combine: {of}; leave it out")
+
+    @cross_check
+    def _unfolding(self) -> Iterator[At]:
         for key in UNFOLDING:
             if getattr(self, key) is None:
                 continue
@@ -144,13 +217,16 @@ class Filter(Model):
                 yield at(key, f"has no effect with doppler: {self.doppler}; leave it out")
             elif self.merge == "each_scan" and key != "merge":
                 yield at(key, "has no effect with merge: each_scan, which leaves one hypothesis; leave it out")
+            elif self.combine == "likelihood" and (key, self.merge) != ("merge", "each_scan"):
+                yield at(key, "has no effect with combine: likelihood, which needs merge: each_scan; leave it out")
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
         """The same with the defaults of what has an effect written out."""
-        if self.doppler != "folded":
-            return self
-        defaults = {"merge": "never"} if self.merge == "each_scan" else UNFOLDING
+        defaults: dict[str, Any] = {key: value for key, (of, value) in COMBINING.items() if of == self.combine}
+        if self.doppler == "folded":
+            merged = self.combine == "likelihood" or self.merge == "each_scan"
+            defaults |= {"merge": "each_scan"} if merged else UNFOLDING
         missing = {key: value for key, value in defaults.items() if getattr(self, key) is None}
         return self.model_copy(update=missing) if missing else self
 
@@ -161,8 +237,8 @@ class Keys(Study):
     figure_names = (
         *(f"{kind}_{component}" for component in ("r", "Vr", "ar") for kind in ("sigma", "gain", "dynamic")),
         "right",
-        "calibration",
         "hypotheses",
+        "orders",
     )
 
     radar: Radar = Field(description="the radar")
@@ -204,7 +280,7 @@ class Keys(Study):
         if prior.sigma_acceleration_mps2 * radar.scan_period_s > PROPORTION * radar.sigma_velocity_mps:
             few = f"{PROPORTION:g} times the velocity's accuracy a scan period"
             yield at("prior.sigma_acceleration_mps2", f"must be at most {few}")
-        if isinstance(self.target, Polynomial):
+        if isinstance(self.target, Polynomial | AccelerationPulse):
             reach = sum(abs(c) * last**i / math.factorial(i) for i, c in enumerate(self.target.coefficients))
             if reach > radar.sigma_range_m * 1e11:
                 yield at(
@@ -212,12 +288,19 @@ class Keys(Study):
                 )
 
     @cross_check
+    def _every_plot(self) -> Iterator[At]:
+        for i, one in enumerate(self.filters):
+            if one.combine in ("expected_error", "intersection") and self.radar.detection_probability < 1:
+                yield at(f"filters.{i}.combine", f"{one.combine} needs every plot: radar.detection_probability 1")
+
+    @cross_check
     def _variances_in_proportion(self) -> Iterator[At]:
         yield from of_each(self.filters, self._variance_in_proportion)
 
     def _variance_in_proportion(self, i: int, one: Filter) -> Iterator[At]:
         radar = self.radar
-        grown = math.sqrt(one.manoeuvre_variance) * radar.scan_period_s**one.order
+        powers = zip(one.orders, one.variances, strict=False)
+        grown = max(math.sqrt(variance) * radar.scan_period_s**order for order, variance in powers)
         if grown > PROPORTION * radar.sigma_velocity_mps:
             few = f"{PROPORTION:g} times the velocity's accuracy a scan"
             yield at(

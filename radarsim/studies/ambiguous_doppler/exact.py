@@ -1,12 +1,15 @@
 """What is known without sampling: errors of the filters that fold nothing, and how often the nearest fold is right."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 
+from radarsim.physics import targets
 from radarsim.studies.ambiguous_doppler import filters
+from radarsim.studies.ambiguous_doppler.filters import Member
 
 
 @dataclass(frozen=True)
@@ -25,8 +28,8 @@ class Gains:
     believed: np.ndarray
 
 
-def gains(one: Any, prior: Any, sigma: np.ndarray, dt: float, scans: int) -> Gains:
-    """The Kalman filter of one filter's options; sigma (2,) of the plots."""
+def gains(one: Member, prior: Any, sigma: np.ndarray, dt: float, scans: int) -> Gains:
+    """The Kalman filter of a member; sigma (2,) of the plots."""
     F, Q = filters.model(one.order, one.manoeuvre_variance, dt)
     P = np.diag([0.0, *filters.prior_variances(one.order, prior)])
     of_range, of_velocity = np.zeros((scans, 3)), np.zeros((scans, 3))
@@ -53,34 +56,72 @@ def _taken(P: np.ndarray, component: int, sigma: float) -> tuple[np.ndarray, np.
     return kept @ P @ kept.T + sigma**2 * np.outer(gain, gain), gain, S
 
 
-def errors(
-    of: Gains, truth: np.ndarray, drawn: np.ndarray, spread: np.ndarray, sigma: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Bias (K, 3) and covariance (K, 3, 3) of the error of a filter whose folds are right, of any truth.
+def errors(of: Sequence[Gains], motions: np.ndarray, sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What I filters whose folds are right make of given motions (M, K, 3), and of the noise of plots of sigma (2,).
 
-    truth (K, 3) is the mean motion, drawn (M, K, 3) the motions that a realisation adds with normal factors of standard
-    deviations spread (M,), sigma (2,) of the plots. The error is linear in all of these: the recursion
-    e⁺ = (I − h eᵥᵀ)(I − g eᵣᵀ)(F e + F x − x⁺) + noise runs for each motion, and for the noise's covariance.
+    Errors (M, I, K, 3) without noise, and covariances (K, I, 3, I, 3) of the errors by noise, between the filters too.
+    The error is linear in all of these: e⁺ = (I − h eᵥᵀ)(I − g eᵣᵀ)(F e + F x − x⁺) + noise runs for each motion, and
+    for the noise's covariance with all filters' states one below the other.
     """
-    motions = np.concatenate([truth[None], drawn])
-    bias, noise = np.zeros_like(motions), np.zeros((len(truth), 3, 3))
-    R, R_v = sigma**2
-    for k in range(len(truth)):
-        take_v = np.eye(3) - np.outer(of.velocity[k], [0, 1, 0])
-        if k == 0:
-            bias[:, 0] = (motions[:, 0] * [0, -1, -1]) @ take_v.T
-            before, g = np.zeros((3, 3)), np.array([1.0, 0, 0])
-            A = take_v
-        else:
-            g = of.range[k]
-            A = take_v @ (np.eye(3) - np.outer(g, [1, 0, 0]))
-            defect = motions[:, k - 1] @ of.F.T - motions[:, k]
-            bias[:, k] = (bias[:, k - 1] @ of.F.T + defect) @ A.T
-            before = of.F @ noise[k - 1] @ of.F.T
-        g, h = take_v @ g, of.velocity[k]
-        noise[k] = A @ before @ A.T + R * np.outer(g, g) + R_v * np.outer(h, h)
-    random = np.einsum("mki,mkj,m->kij", bias[1:], bias[1:], spread**2)
-    return bias[0], noise + random
+    count, scans = len(of), motions.shape[1]
+    bias, noise = np.zeros((len(motions), count, scans, 3)), np.zeros((scans, 3 * count, 3 * count))
+    A, of_range, of_velocity = np.zeros((3 * count, 3 * count)), np.zeros(3 * count), np.zeros(3 * count)
+    for k in range(scans):
+        for i, one in enumerate(of):
+            own = slice(3 * i, 3 * i + 3)
+            take = np.eye(3) - np.outer(one.velocity[k], [0, 1, 0])
+            g = one.range[k] if k else np.array([1.0, 0, 0])  # the first range is taken as it is
+            A[own, own] = step = take @ (np.eye(3) - np.outer(g, [1, 0, 0])) @ (one.F if k else np.eye(3))
+            of_range[own], of_velocity[own] = take @ g, one.velocity[k]
+            if k == 0:
+                bias[:, i, 0] = (motions[:, 0] * [0, -1, -1]) @ take.T
+            else:
+                kept = take @ (np.eye(3) - np.outer(g, [1, 0, 0]))
+                defect = motions[:, k - 1] @ one.F.T - motions[:, k]
+                bias[:, i, k] = bias[:, i, k - 1] @ step.T + defect @ kept.T
+        before = A @ noise[k - 1] @ A.T if k else np.zeros_like(A)
+        noise[k] = before + sigma[0] ** 2 * np.outer(of_range, of_range)
+        noise[k] += sigma[1] ** 2 * np.outer(of_velocity, of_velocity)
+    return bias, noise.reshape(scans, count, 3, count, 3)
+
+
+def joint(bias: np.ndarray, noise: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """The joint second moments E_ij = b_i b_j + C_ij of the errors of I filters by scan and component (K, 3, I, I).
+
+    bias (M, I, K, 3) of M motions whose squares are weighted by weight (M,); noise (K, I, 3, I, 3).
+    """
+    return np.einsum("mikx,mjkx,m->kxij", bias, bias, weight) + np.einsum("kixjx->kxij", noise)
+
+
+def best_shares(E: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Shares (K, I, 3), of sum one, of the linear combination of least error: E⁻¹1/(1ᵀE⁻¹1); they may be negative.
+
+    E (K, 3, I, I); known (I, 3) says which filter estimates which component; all zero where none does.
+    """
+    shares = np.zeros((E.shape[0], E.shape[2], 3))
+    for c in range(3):
+        own = np.flatnonzero(known[:, c])
+        if own.size:
+            shares[:, own, c] = _least(E[:, c][:, own][:, :, own])
+    return shares
+
+
+def _least(E: np.ndarray) -> np.ndarray:
+    """E⁻¹1/(1ᵀE⁻¹1) of matrices (K, I, I): (K, I)."""
+    spread = np.diagonal(E, axis1=1, axis2=2)
+    scale = 1 / np.sqrt(np.where(spread > 0, spread, 1.0))
+    solved = np.linalg.pinv(E * scale[:, :, None] * scale[:, None, :], rcond=1e-12, hermitian=True)
+    raw = scale * np.einsum("kij,kj->ki", solved, scale)
+    total = raw.sum(axis=1, keepdims=True)
+    certain = (spread == 0).any(axis=1)[:, None]  # a filter without error: it has the whole share
+    total = np.where(certain, 1.0, total)
+    return np.where(certain, np.eye(E.shape[1])[spread.argmin(axis=1)], raw / total)
+
+
+def expected_motions(manoeuvres: Any, t: np.ndarray) -> np.ndarray:
+    """What a class of manoeuvres adds at times t (K,): motions (K, K, 3), one for each scan at which it may begin."""
+    size, length = manoeuvres.acceleration_mps2, manoeuvres.duration_s
+    return np.stack([targets.acceleration_pulse((0.0,), size, begin, length, t) for begin in t])
 
 
 def all_right(of: Gains, spans: np.ndarray) -> np.ndarray:

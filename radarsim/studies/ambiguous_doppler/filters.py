@@ -1,7 +1,9 @@
 """From a filter's options to the arrays that the kernels read: designs, which give gains, and banks, which unfold."""
 
 import math
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -9,7 +11,38 @@ from radarsim.kernels.linear import plain
 from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.studies.ambiguous_doppler.kernels import records
 
-BOTTOMLESS = 1e300  # the depth of a list that nothing is dropped from
+BOTTOMLESS = 10.0**300  # the depth of a list that nothing is dropped from
+COMBINATIONS = {"expected_error": records.WEIGHS, "intersection": records.CHOOSES}
+
+
+class Member(NamedTuple):
+    """One Kalman filter: the order of its model, what it does with the velocity, and its manoeuvre variance."""
+
+    order: int
+    doppler: str
+    manoeuvre_variance: float
+
+    @property
+    def components(self) -> tuple[bool, bool, bool]:
+        """Which of range, velocity and acceleration it estimates."""
+        return True, self.order > 0 or self.doppler != "none", self.order > 1
+
+
+def members(one: Any) -> tuple[Member, ...]:
+    """The Kalman filters of a filter's options: of each order; combined but by likelihood, also without the velocity.
+
+    Likelihoods can be compared of the same plots alone.
+    """
+    pairs = list(zip(one.orders, one.variances, strict=True))
+    ways = [one.doppler]
+    if one.combine in COMBINATIONS and one.doppler != "none":
+        ways.append("none")
+    return tuple(Member(order, way, variance) for way in ways for order, variance in pairs)
+
+
+def components(one: Any) -> tuple[bool, ...]:
+    """Which of range, velocity and acceleration a filter estimates: what any of its members does."""
+    return tuple(map(any, zip(*(member.components for member in members(one)), strict=True)))
 
 
 def model(order: int, variance: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
@@ -33,55 +66,112 @@ def prior_variances(order: int, prior: Any) -> np.ndarray:
     return np.array([prior.sigma_velocity_mps**2, prior.sigma_acceleration_mps2**2 if order == 2 else 0.0])
 
 
-def components(one: Any) -> tuple[bool, bool, bool]:
-    """Which of range, velocity and acceleration a filter estimates."""
-    return True, one.order > 0 or one.doppler != "none", one.order > 1
-
-
-def design_row(one: Any, prior: Any, dt: float) -> np.ndarray:
-    """The numbers (DESIGN,) of a filter's design, as `kernels.records` has them."""
-    F, Q = model(one.order, one.manoeuvre_variance, dt)
+def design_row(member: Member, prior: Any, dt: float) -> np.ndarray:
+    """The numbers (DESIGN,) of a member's design, as `kernels.records` has them."""
+    F, Q = model(member.order, member.manoeuvre_variance, dt)
     row = np.zeros(records.DESIGN)
     row[records.MOTION : records.MOTION + 5] = F[0, 1], F[0, 2], F[1, 1], F[1, 2], F[2, 2]
     row[records.NOISE : records.NOISE + 6] = Q[np.triu_indices(3)]
-    row[records.PRIOR : records.PRIOR + 2] = prior_variances(one.order, prior)
-    row[records.TAKES_VELOCITY] = one.doppler != "none"
+    row[records.PRIOR : records.PRIOR + 2] = prior_variances(member.order, prior)
+    row[records.TAKES_VELOCITY] = member.doppler != "none"
     return row
 
 
-def kind(one: Any) -> int:
-    """What a filter's bank does about the folds."""
-    if one.doppler != "folded":
-        return records.NONE if one.doppler == "none" else records.UNFOLDS
+def kind(one: Any, doppler: str) -> int:
+    """What the bank of a member of a filter does about the folds."""
+    if doppler != "folded":
+        return records.NONE if doppler == "none" else records.UNFOLDS
     if one.merge == "each_scan":
         return records.MERGES
     return records.NEAREST if one.hypotheses == 1 else records.REMEMBERS
 
 
-def banks(spec: Any) -> records.Banks:
-    """The filters' arrays; filters that differ in their estimate alone share a bank, those of one model a design."""
-    designs: dict[bytes, tuple[int, np.ndarray]] = {}
-    made: dict[tuple, int] = {}
-    bank, place = [], []
-    for one in spec.filters:
-        row = design_row(one, spec.prior, spec.radar.scan_period_s)
-        number, _ = designs.setdefault(row.tobytes(), (len(designs), row))
-        remembers = kind(one) == records.REMEMBERS
-        deepest = -math.log(one.prune_below) if remembers and one.prune_below > 0 else BOTTOMLESS
-        key = (number, kind(one), one.hypotheses if remembers else 1, deepest)
-        bank.append(made.setdefault(key, len(made)))
-        place.append(records.BEST if one.estimate == "best" else records.MEAN)
+class Bank(NamedTuple):
+    """A bank: what it does, its designs (of likelihood) or its one, or the banks it combines; see `records.Banks`."""
+
+    kind: int
+    parts: tuple[int, ...]
+    orders: tuple[int, ...] = ()
+    most: int = 1
+    deepest: float = BOTTOMLESS
+    stay: float = 1.0
+    unfolding: int = records.NONE
+    shares: bytes = b""
+
+
+@dataclass
+class Gathered:
+    """Designs and banks so far, each once: filters that differ in their estimate alone share a bank."""
+
+    designs: dict[bytes, np.ndarray] = field(default_factory=dict)
+    banks: list[Bank] = field(default_factory=list)
+
+    def design(self, row: np.ndarray) -> int:
+        """The number of a design."""
+        self.designs.setdefault(row.tobytes(), row)
+        return list(self.designs).index(row.tobytes())
+
+    def bank(self, one: Bank) -> int:
+        """The number of a bank."""
+        if one not in self.banks:
+            self.banks.append(one)
+        return self.banks.index(one)
+
+
+def banks(spec: Any, shares: Callable[[Any], np.ndarray]) -> records.Banks:
+    """The filters' arrays; shares(filter) gives, for one that combines, the numbers (K, MEMBERS, 3) that it needs."""
+    gathered = Gathered()
+    bank = [_bank(gathered, one, spec, shares) for one in spec.filters]
     names = [one.name for one in spec.filters]
-    oracles = [i for i, one in enumerate(spec.filters) if one.doppler == "unfolded"]
-    columns = [plain(column, len(made), dtype=np.int64) for column in list(zip(*made, strict=True))[:3]]
+    oracles = [i for i, one in enumerate(spec.filters) if one.doppler == "unfolded" and one.combine is None]
+    made, count = gathered.banks, len(gathered.banks)
+    held = np.zeros((count, spec.scans, records.MEMBERS, 3))
+    for b, one in enumerate(made):
+        if one.shares:
+            held[b] = np.frombuffer(one.shares).reshape(held.shape[1:])
+    parts, orders = np.zeros((count, records.MEMBERS), np.int64), np.zeros((count, records.MEMBERS), np.int64)
+    for b, one in enumerate(made):
+        parts[b, : len(one.parts)], orders[b, : len(one.orders)] = one.parts, one.orders
+    whole = {"dtype": np.int64}
+    place = [records.BEST if one.estimate == "best" and one.combine is None else records.MEAN for one in spec.filters]
     return records.Banks(
-        designs=plain([row for _, row in designs.values()], len(designs), records.DESIGN),
-        design=columns[0],
-        kind=columns[1],
-        most=columns[2],
-        deepest=plain([key[3] for key in made], len(made)),
-        bank=plain(bank, len(bank), dtype=np.int64),
-        place=plain(place, len(place), dtype=np.int64),
+        designs=plain(list(gathered.designs.values()), len(gathered.designs), records.DESIGN),
+        kind=plain([one.kind for one in made], count, **whole),
+        parts=parts,
+        orders=orders,
+        size=plain([len(one.parts) for one in made], count, **whole),
+        most=plain([one.most for one in made], count, **whole),
+        deepest=plain([one.deepest for one in made], count),
+        stay=plain([one.stay for one in made], count),
+        unfolding=plain([one.unfolding for one in made], count, **whole),
+        shares=held,
+        bank=plain(bank, len(bank), **whole),
+        place=plain(place, len(place), **whole),
         baseline=names.index(spec.baseline) if spec.baseline else 0,
         oracle=oracles[0] if oracles else -1,
     )
+
+
+def _bank(gathered: Gathered, one: Any, spec: Any, shares: Callable[[Any], np.ndarray]) -> int:
+    """The number of a filter's bank; what it needs is gathered before it."""
+    every, dt = members(one), spec.radar.scan_period_s
+    designs = [gathered.design(design_row(member, spec.prior, dt)) for member in every]
+    orders = tuple(member.order for member in every)
+    if one.combine == "likelihood":
+        unfolding = kind(one, one.doppler)
+        return gathered.bank(
+            Bank(records.INTERACTS, tuple(designs), orders, stay=one.stay_probability, unfolding=unfolding)
+        )
+    parts = [gathered.bank(_single(one, design, member.doppler)) for design, member in zip(designs, every, strict=True)]
+    if one.combine is None:
+        return parts[0]
+    return gathered.bank(Bank(COMBINATIONS[one.combine], tuple(parts), orders, shares=shares(one).tobytes()))
+
+
+def _single(one: Any, design: int, doppler: str) -> Bank:
+    """The bank of one design."""
+    what = kind(one, doppler)
+    if what != records.REMEMBERS:
+        return Bank(what, (design,))
+    deepest = -math.log(one.prune_below) if one.prune_below > 0 else BOTTOMLESS
+    return Bank(what, (design,), most=one.hypotheses, deepest=deepest)

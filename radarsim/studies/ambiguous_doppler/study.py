@@ -42,30 +42,50 @@ def prepare(case: Case) -> Plan:
         spans=np.resize(np.array(radar.spans_mps), spec.scans),
         detection=float(radar.detection_probability),
     )
-    banks = filters.banks(spec)
+    banks = filters.banks(spec, lambda one: shares(spec, one, observed))
     return Plan(Layout(**records.shapes(len(spec.filters), spec.scans)), axes(spec, observed, banks), observed, banks)
 
 
+def shares(spec: Any, one: Any, observed: records.World) -> np.ndarray:
+    """What a filter that combines its members needs, (K, MEMBERS, 3): shares, or half widths of intervals."""
+    members = filters.members(one)
+    of = [exact.gains(member, spec.prior, observed.sigma, spec.radar.scan_period_s, spec.scans) for member in members]
+    drawn = world.drawn_motions(observed.t)
+    known = np.array([member.components for member in members])
+    bias, noise = exact.errors(of, drawn, observed.sigma)
+    prior = spec.prior.sigma_velocity_mps**2, spec.prior.sigma_acceleration_mps2**2
+    made = np.zeros((spec.scans, records.MEMBERS, 3))
+    if one.combine == "intersection":
+        # What is drawn from the prior is no manoeuvre: a velocity, and an acceleration to a model that has one.
+        models = np.array([member.order > 1 for member in members])[:, None, None]
+        variance = np.einsum("kixix->ikx", noise) + bias[0] ** 2 * prior[0] + bias[1] ** 2 * prior[1] * models
+        made[:, : len(members)] = one.interval_sigmas * np.sqrt(variance).swapaxes(0, 1) * known
+    elif one.combine == "expected_error":
+        manoeuvres = exact.expected_motions(one.manoeuvres, observed.t)
+        motions = np.concatenate([drawn[:1], manoeuvres])
+        weight = np.array([prior[0], *np.full(len(manoeuvres), 1 / len(manoeuvres))])
+        bias, noise = exact.errors(of, motions, observed.sigma)
+        made[:, : len(members)] = exact.best_shares(exact.joint(bias, noise, weight), known)
+    return made
+
+
 def axes(spec: Any, observed: records.World, banks: records.Banks) -> FoldedAxes:
-    """Labels and exact values."""
+    """Labels and exact values; none where plots are missed, as each realisation then has gains of its own."""
     shape = (len(spec.filters), spec.scans, 3)
-    sigma, bias, oracle = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan)
+    known = {
+        name: np.full(shape, np.nan) for name in ("sigma", "bias", "oracle_sigma", "best_order", "best_combination")
+    }
     right = np.full(shape[:2], np.nan)
     available = np.broadcast_to(np.array([filters.components(one) for one in spec.filters])[:, None], shape)
-    for f, one in enumerate(spec.filters):
-        if observed.detection < 1:
-            break  # the gains are then another's in each realisation
-        of = exact.gains(one, spec.prior, observed.sigma, spec.radar.scan_period_s, spec.scans)
-        mean, covariance = exact.errors(
-            of, observed.truth, world.drawn_motions(observed.t), observed.spread, observed.sigma
-        )
-        rms = np.where(available[f], np.sqrt(np.diagonal(covariance, axis1=1, axis2=2) + mean**2), np.nan)
-        if one.doppler == "folded":
-            oracle[f] = rms
-        else:
-            sigma[f], bias[f] = rms, np.where(available[f], mean, np.nan)
-        if filters.kind(one) == records.NEAREST and follows_the_model(spec, one):
-            right[f] = exact.all_right(of, observed.spans)
+    if observed.detection == 1:
+        for f, one in enumerate(spec.filters):
+            found = exact_values(spec, one, observed, banks.shares[banks.bank[f]])
+            for name, values in found.items():
+                known[name][f] = np.where(available[f], values, np.nan)
+            if one.hypotheses == 1 and follows_the_model(spec, one):
+                (member,) = filters.members(one)
+                of = exact.gains(member, spec.prior, observed.sigma, spec.radar.scan_period_s, spec.scans)
+                right[f] = exact.all_right(of, observed.spans)
     return FoldedAxes(
         filters=tuple(one.name for one in spec.filters),
         components=COMPONENTS,
@@ -73,14 +93,43 @@ def axes(spec: Any, observed: records.World, banks: records.Banks) -> FoldedAxes
         t_s=observed.t,
         available=available,
         baseline=banks.baseline,
-        exact_sigma=sigma,
-        exact_bias=bias,
+        exact_sigma=known["sigma"],
+        exact_bias=known["bias"],
         spans=observed.spans,
         folded=np.array([one.doppler == "folded" for one in spec.filters]),
-        remembers=np.array([filters.kind(one) == records.REMEMBERS for one in spec.filters]),
+        remembers=banks.kind[banks.bank] == records.REMEMBERS,
+        combines=np.array([one.combine is not None for one in spec.filters]),
         exact_right=right,
-        oracle_sigma=oracle,
+        oracle_sigma=known["oracle_sigma"],
+        best_order=known["best_order"],
+        best_combination=known["best_combination"],
     )
+
+
+def exact_values(spec: Any, one: Any, observed: records.World, held: np.ndarray) -> dict[str, np.ndarray]:
+    """What is known of a filter without sampling, each (K, 3), by the name in `axes`; held (K, MEMBERS, 3) its shares.
+
+    σ and bias of a linear filter, with all folds right (oracle_sigma) of one that folds. Of one that combines its
+    members, with all folds right: the least error of a single one, and of a linear combination, at each scan.
+    """
+    members = filters.members(one)
+    of = [exact.gains(member, spec.prior, observed.sigma, spec.radar.scan_period_s, spec.scans) for member in members]
+    motions = np.concatenate([observed.truth[None], world.drawn_motions(observed.t)])
+    bias, noise = exact.errors(of, motions, observed.sigma)
+    E = exact.joint(bias, noise, np.array([1.0, *observed.spread**2]))
+    known = np.array([member.components for member in members])
+    single = np.sqrt(np.where(known, np.einsum("kxii->kix", E), np.inf).min(axis=1))
+    found = {}
+    if one.combine:
+        best = exact.best_shares(E, known)
+        found = {"best_order": single, "best_combination": np.sqrt(np.einsum("kix,kxij,kjx->kx", best, E, best))}
+    own = held[:, : len(members)] if one.combine == "expected_error" else np.ones((spec.scans, 1, 3))
+    if one.combine in (None, "expected_error"):
+        sigma = np.sqrt(np.einsum("kix,kxij,kjx->kx", own, E, own))
+        if one.doppler == "folded":
+            return found | {"oracle_sigma": sigma}
+        return found | {"sigma": sigma, "bias": np.einsum("kix,ikx->kx", own, bias[0])}
+    return found
 
 
 def follows_the_model(spec: Any, one: Any) -> bool:
@@ -88,7 +137,7 @@ def follows_the_model(spec: Any, one: Any) -> bool:
     target, prior = spec.target, spec.prior
     return (
         target.kind == "random_polynomial"
-        and (one.order, one.manoeuvre_variance) == (2, 0)
+        and (one.orders, one.variances) == ((2,), (0,))
         and target.sigma_velocity_mps == prior.sigma_velocity_mps
         and target.sigma_acceleration_mps2 == prior.sigma_acceleration_mps2
     )

@@ -25,13 +25,22 @@ FOLDS = (
     *("case", "filter", "k", "t_s", "n", "right", "right_lo", "right_hi", "exact_right"),
     *("listed", "hypotheses", "beyond", "beyond_lo", "beyond_hi"),
 )
+ORDERS = (
+    *("case", "filter", "order", "k", "t_s", "n", "weight", "weight_lo", "weight_hi"),
+    *("best_order_sigma_r", "best_combination_sigma_r"),
+)
 CALIBRATION = ("case", "filter", "k", "bin_lo", "bin_hi", "n", "right", "right_lo", "right_hi", "expected")
 ABOVE = ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")
 
 
 def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
-    """The tables beyond curves: gains (with what is lost against the oracle), folds, calibration."""
-    return {"gains": gains(results), "folds": folds(results), "calibration": calibration(results)}
+    """The tables beyond curves: gains (with what is lost against the oracle), folds, calibration, orders."""
+    return {
+        "gains": gains(results),
+        "folds": folds(results),
+        "calibration": calibration(results),
+        "orders": orders(results),
+    }
 
 
 def gains(results: Sequence[Result]) -> "pd.DataFrame":
@@ -68,7 +77,8 @@ def folds(results: Sequence[Result]) -> "pd.DataFrame":
 
 def _folds(result: Result) -> dict[str, np.ndarray]:
     axes = result.axes
-    shown = np.broadcast_to(axes.folded[:, None], axes.exact_right.shape)
+    unfolds = np.array([one.doppler == "folded" and one.combine in (None, "likelihood") for one in result.spec.filters])
+    shown = np.broadcast_to(unfolds[:, None], axes.exact_right.shape)
     at = f, k = np.nonzero(shown & (np.asarray(result.sums["estimates"])[..., 0] > 0))
     n = np.asarray(result.sums["estimates"])[..., 0][at]
     of = np.asarray(result.sums["folds"])[at]
@@ -110,6 +120,36 @@ def _calibration(result: Result) -> dict[str, np.ndarray]:
         "n": n.astype(np.int64),
         **dict(zip(("right", "right_lo", "right_hi"), right, strict=True)),
         "expected": counted[at][:, 2] / n,
+    }
+
+
+def orders(results: Sequence[Result]) -> "pd.DataFrame":
+    """Mean weight of each order in the range, by scan, of filters that combine orders.
+
+    The weight is the probability of the order, its share (of several members the sum; it may be negative), or how often
+    it is chosen. best_order_sigma_r and best_combination_sigma_r are exact bounds of the same members on this target,
+    all folds right: the best member at each scan, and the best linear combination.
+    """
+    return common.joined([_orders(result) for result in results], ORDERS)
+
+
+def _orders(result: Result) -> dict[str, np.ndarray]:
+    axes, given = result.axes, [set(one.orders) for one in result.spec.filters]
+    own = np.array([[axes.combines[f] and order in given[f] for order in range(3)] for f in range(len(given))])
+    counted = np.asarray(result.sums["estimates"])[..., 0]
+    f, order, k = np.nonzero(own[:, :, None] & (counted > 0)[:, None])
+    n, sums = counted[f, k], np.asarray(result.sums["orders"])[f, k, order]
+    weight = statistics.mean(sums[:, 0], sums[:, 1], n)
+    return {
+        "case": np.full(f.size, result.name, dtype=object),
+        "filter": common.names(axes.filters, f),
+        "order": order,
+        "k": np.asarray(axes.k)[k],
+        "t_s": np.asarray(axes.t_s, dtype=float)[k],
+        "n": n.astype(np.int64),
+        **dict(zip(("weight", "weight_lo", "weight_hi"), weight, strict=True)),
+        "best_order_sigma_r": axes.best_order[f, k, 0],
+        "best_combination_sigma_r": axes.best_combination[f, k, 0],
     }
 
 

@@ -1,21 +1,32 @@
 """What is observed, without the plots' noise: a mean motion, and the motions that a realisation adds to it."""
 
+from typing import Any
+
 import numpy as np
 
 from radarsim.physics import targets
+from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
 
 
-def truth(target: object, t: np.ndarray) -> np.ndarray:
+def truth(target: Any, t: np.ndarray) -> np.ndarray:
     """Mean range, radial velocity and acceleration (K, 3) of a configured target at times t (K,), in m, m/s, m/s²."""
-    match target.kind:  # type: ignore[attr-defined]
+    match target.kind:
         case "polynomial":
-            return targets.polynomial(target.coefficients, t)  # type: ignore[attr-defined]
+            return targets.polynomial(target.coefficients, t)
+        case "acceleration_pulse":
+            return targets.acceleration_pulse(
+                target.coefficients,
+                target.acceleration_g * STANDARD_GRAVITY_MPS2,
+                target.start_s,
+                target.duration_s,
+                t,
+            )
         case "random_polynomial":
-            return targets.polynomial((target.range_m,), t)  # type: ignore[attr-defined]
+            return targets.polynomial((target.range_m,), t)
     raise ValueError(f"no such target: {target}")
 
 
-def spread(target: object) -> np.ndarray:
+def spread(target: Any) -> np.ndarray:
     """Standard deviations (2,) of the velocity (m/s) and acceleration (m/s²) that each realisation draws, or zeros."""
     own = (getattr(target, name, 0.0) for name in ("sigma_velocity_mps", "sigma_acceleration_mps2"))
     return np.array([value or 0.0 for value in own])

@@ -19,8 +19,9 @@ class Kalman:
     """A Kalman filter of one set of options: predictions and joint updates of a state and a covariance."""
 
     def __init__(self, one, prior, sigma, dt):
-        self.F, self.Q = model(one.order, one.manoeuvre_variance, dt)
-        self.P0 = np.diag([0.0, *prior_variances(one.order, prior)])
+        (order,), (variance,) = one.orders, one.variances
+        self.F, self.Q = model(order, variance, dt)
+        self.P0 = np.diag([0.0, *prior_variances(order, prior)])
         self.sigma = np.asarray(sigma, dtype=float)
         self.observes = 1 if one.doppler == "none" else 2
 
@@ -130,7 +131,7 @@ def enumerated(one, prior, sigma, dt, plots, spans, folds):
 
     No recursion: all plots are linear in (first range, V, a, random derivatives); of each sequence the least squares.
     """
-    F, Q = model(one.order, one.manoeuvre_variance, dt)
+    F, Q = model(2, one.manoeuvre_variance, dt)
     K = len(plots)
     jumps = Q[:, [2]] / np.sqrt(Q[2, 2]) if Q.any() else np.zeros((3, 0))  # order 2: one random number a scan
     size = 3 + jumps.shape[1] * (K - 1)
@@ -143,7 +144,7 @@ def enumerated(one, prior, sigma, dt, plots, spans, folds):
         states.append(state)
     A = np.concatenate([state[:2] for state in states])
     scale = np.tile(1 / np.asarray(sigma, dtype=float), K)
-    information = np.diag(np.concatenate([[0.0], 1 / prior_variances(one.order, prior), np.ones(size - 3)]))
+    information = np.diag(np.concatenate([[0.0], 1 / prior_variances(2, prior), np.ones(size - 3)]))
     B = scale[:, None] * A
     solve = np.linalg.solve(information + B.T @ B, B.T)  # of whitened plots, the estimate
     whole = np.eye(2 * K) - B @ solve
@@ -155,3 +156,56 @@ def enumerated(one, prior, sigma, dt, plots, spans, folds):
     cost = 0.5 * np.einsum("ni,ij,nj->n", y, whole, y)
     w = np.exp(cost.min() - cost)
     return states[-1] @ solve @ (w @ y / w.sum()), w.max() / w.sum()
+
+
+def interacting(kalmans, plots, spans, stay, folds=0):
+    """Means (K, 3) and probabilities (K, M) of filters that interact (IMM); so many folds to either side are merged.
+
+    Likelihoods are of range and velocity at once; of a track's first plot, of the velocity alone.
+    """
+    M = len(kalmans)
+    p = np.full((M, M), (1 - stay) / (M - 1)) + np.eye(M) * (stay - (1 - stay) / (M - 1))
+    states = [(np.zeros(3), one.P0) for one in kalmans]
+    mu, started, made = np.full(M, 1 / M), False, []
+    for k, (r, v, u, came) in enumerate(plots):
+        c = p.T @ mu
+        share = p * mu[:, None] / c
+        mean = [sum(share[j, i] * states[j][0] for j in range(M)) for i in range(M)]
+        spread = [[np.outer(states[j][0] - mean[i], states[j][0] - mean[i]) for j in range(M)] for i in range(M)]
+        P = [sum(share[j, i] * (states[j][1] + spread[i][j]) for j in range(M)) for i in range(M)]
+        states, logs = list(zip(mean, P, strict=True)), np.zeros(M)
+        for i, one in enumerate(kalmans):
+            x, P = one.predicted(*states[i]) if k > 0 else states[i]
+            if came:
+                x, P, logs[i] = one.updated(x, P, [r], [0]) if started else (*one.started(r, P), 0.0)
+                if one.observes == 2:
+                    near = x[1] + wrapped(v - x[1], spans[k]) if folds else u
+                    every = [one.updated(x, P, [near + n * spans[k]], [1]) for n in range(-folds, folds + 1)]
+                    most = max(branch[2] for branch in every)
+                    w = np.exp([branch[2] - most for branch in every])
+                    logs[i] += most + np.log(w.sum())
+                    w /= w.sum()
+                    x = sum(a * branch[0] for a, branch in zip(w, every, strict=True))
+                    P = sum(a * (b[1] + np.outer(b[0] - x, b[0] - x)) for a, b in zip(w, every, strict=True))
+            states[i] = x, P
+        started = started or came > 0
+        mu = c * np.exp(logs - logs.max())
+        mu /= mu.sum()
+        made.append((*sum(m * x for m, (x, _) in zip(mu, states, strict=True)), *mu))
+    made = np.array(made)
+    return made[:, :3], made[:, 3:]
+
+
+def intersected(estimates, widths):
+    """The smoothest of estimates (I,) whose interval meets those of all rougher; widths (I,) half, 0: not there."""
+    order = [i for i in np.argsort(-np.asarray(widths), kind="stable") if widths[i] > 0]
+    found = order[0] if order else None
+    for n in range(1, len(order) + 1):
+        some = order[:n]
+        meets = all(
+            abs(estimates[i] - estimates[j]) <= widths[i] + widths[j] for a, i in enumerate(some) for j in some[:a]
+        )
+        if not meets:
+            break
+        found = some[-1]
+    return found

@@ -30,7 +30,7 @@ def test_range_only_and_oracle_are_exact(radar, target):
 
 @pytest.mark.parametrize("order", [0, 1])
 def test_lower_orders_are_exact_of_what_they_estimate(order):
-    filters = [RANGE_ONLY | {"order": order}, ORACLE | {"order": order}]
+    filters = [RANGE_ONLY | {"orders": [order]}, ORACLE | {"orders": [order]}]
     plan, sums = summed(made("RLS 2", filters, 15, FIXED, 25.0), N)
     known = np.isfinite(plan.axes.exact_sigma)
     assert np.array_equal(known, plan.axes.available)

@@ -19,14 +19,16 @@ RANGE, VELOCITY, UNFOLDED, CAME, FIRST, STARTED, TRUTH, PLOT = 0, 1, 2, 3, 4, 5,
 WEIGHT, RANGE_GAIN, VARIANCE, VELOCITY_GAIN, GAINS = 0, 1, 4, 5, 8
 
 # A scan's output of a bank: the mean of its hypotheses (3) and the best one (3); whether that has all folds right,
-# whether any listed has, how many there are, and the probability of the best.
-MEAN, BEST, RIGHT, LISTED, COUNT, PROBABILITY, OUTPUT = 0, 3, 6, 7, 8, 9, 10
+# whether any listed has, how many there are, and the probability of the best; of several orders the weight of each (3).
+MEAN, BEST, RIGHT, LISTED, COUNT, PROBABILITY, WEIGHTS, OUTPUT = 0, 3, 6, 7, 8, 9, 10, 13
 
 # Numbers of a design: F above its diagonal of ones and zeros (5) and Q (6) as `kernels.symmetric` has them, the prior
 # variances of velocity and acceleration, 1 where it takes the velocity.
 MOTION, NOISE, PRIOR, TAKES_VELOCITY, DESIGN = 0, 5, 11, 13, 16
 
 NONE, UNFOLDS, NEAREST, MERGES, REMEMBERS = 0, 1, 2, 3, 4  # what a bank does about the folds
+INTERACTS, WEIGHS, CHOOSES = 5, 6, 7  # and one that combines orders: by likelihood, by fixed shares, by intersection
+MEMBERS = 6  # most that are combined: three orders, with the velocity and without
 
 RIGHT_SUM, LISTED_SUM, COUNT_SUM, BEYOND_SUM, FOLD_SUMS = 0, 1, 2, 3, 4  # last axis of `Sums.folds`
 BINS = 10  # of the best hypothesis's probability
@@ -57,20 +59,31 @@ class Banks(NamedTuple):
     """The filters.
 
     designs  (D, DESIGN)  see above
-    design   (B,)         of each bank
-    kind     (B,)         NONE … REMEMBERS
+    kind     (B,)         NONE … CHOOSES
+    parts    (B, MEMBERS) a bank's design; INTERACTS: its designs; WEIGHS, CHOOSES: banks before it
+    orders   (B, MEMBERS) of the parts of a bank that combines
+    size     (B,)         how many parts there are
     most     (B,)         hypotheses kept
     deepest  (B,)         logarithm of the largest ratio of the best hypothesis's probability to a kept one's
+    stay     (B,)         INTERACTS: probability that an order lasts from scan to scan
+    unfolding (B,)        INTERACTS: what it does about the folds
+    shares   (B, K, MEMBERS, 3)  WEIGHS: the parts' shares in each component; CHOOSES: half widths of their intervals,
+                          zero of a part that does not estimate the component
     bank     (F,)         of each filter
     place    (F,)         MEAN or BEST
     baseline, oracle      numbers of filters; oracle -1: there is none
     """
 
     designs: np.ndarray
-    design: np.ndarray
     kind: np.ndarray
+    parts: np.ndarray
+    orders: np.ndarray
+    size: np.ndarray
     most: np.ndarray
     deepest: np.ndarray
+    stay: np.ndarray
+    unfolding: np.ndarray
+    shares: np.ndarray
     bank: np.ndarray
     place: np.ndarray
     baseline: int
@@ -91,6 +104,7 @@ class Memory(NamedTuple):
     listed: np.ndarray
     children: np.ndarray
     parents: np.ndarray
+    interacting: np.ndarray
     room: int
 
 
@@ -105,6 +119,7 @@ class Sums(NamedTuple):
                                     the velocity's error is over half the span
     calibration (F, K, BINS, 3)     by the probability of the best hypothesis: realisations, those where it is right,
                                     and the sum of these probabilities
+    orders      (F, K, 3, 2)        weights of the orders 0, 1, 2 and their squares, of filters that combine orders
     """
 
     error: np.ndarray
@@ -113,6 +128,7 @@ class Sums(NamedTuple):
     estimates: np.ndarray
     folds: np.ndarray
     calibration: np.ndarray
+    orders: np.ndarray
 
 
 def shapes(filters: int, scans: int) -> Mapping[str, tuple[int, ...]]:
@@ -125,6 +141,7 @@ def shapes(filters: int, scans: int) -> Mapping[str, tuple[int, ...]]:
         "estimates": each,
         "folds": (filters, scans, FOLD_SUMS),
         "calibration": (filters, scans, BINS, 3),
+        "orders": (*each, 2),
     }
 
 
@@ -142,5 +159,6 @@ def memory(scans: int, banks: Banks) -> Memory:
         listed=rows(10 * room // WIDTH),
         children=rows(3 * children // WIDTH),
         parents=np.zeros(children, dtype=np.int64),
+        interacting=rows(2 * 3 * 12),
         room=room,
     )

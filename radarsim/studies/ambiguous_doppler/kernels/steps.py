@@ -177,7 +177,10 @@ def run_single(kind, design, spans, plots, gains, out):
 
 @inline
 def folds_merged(e, S, D):
-    """Mean and variance of the innovation e + n D over all whole n, with weights exp(-(e + n D)²/2S); |e| <= D/2."""
+    """Mean and variance of the innovation e + n D over all whole n, with weights exp(-(e + n D)²/2S); |e| <= D/2.
+
+    And the sum of the weights over that of e.
+    """
     total, mean, square = full(1.0), e, e * e
     limit, scale = root(S * FARTHEST), -0.5 / S
     n = 1.0
@@ -188,7 +191,7 @@ def folds_merged(e, S, D):
             total, mean, square = total + weight, mean + weight * f, square + weight * f * f
         n += 1.0
     mean = mean / total
-    return mean, square / total - mean * mean
+    return mean, square / total - mean * mean, total
 
 
 @part
@@ -211,7 +214,7 @@ def run_merged(design, sigma, spans, plots, out):
         e = e - D * nearest(e / D)
         right = whether_right(right, plot, x[1] + e, D)
         P, S, g = velocity_taken(P, came, sigma[1] * sigma[1])
-        mean, variance = folds_merged(e, S, D)
+        mean, variance, _ = folds_merged(e, S, D)
         x = moved(x, g, mean)
         P = (
             P[0] + g[0] * g[0] * variance,

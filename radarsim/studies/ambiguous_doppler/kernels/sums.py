@@ -5,14 +5,17 @@ import numpy as np
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, total, where_greater
 from radarsim.studies.ambiguous_doppler.kernels.hypotheses import Lists, run_remembering
+from radarsim.studies.ambiguous_doppler.kernels.orders import run_choosing, run_interacting, run_weighing
 from radarsim.studies.ambiguous_doppler.kernels.plots import fill_plots
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     BEYOND_SUM,
     BINS,
     CAME,
+    CHOOSES,
     COUNT,
     COUNT_SUM,
     GAINS,
+    INTERACTS,
     LISTED,
     LISTED_SUM,
     MERGES,
@@ -24,6 +27,8 @@ from radarsim.studies.ambiguous_doppler.kernels.records import (
     RIGHT_SUM,
     STARTED,
     TRUTH,
+    WEIGHS,
+    WEIGHTS,
     Banks,
     Sums,
     World,
@@ -41,10 +46,19 @@ def run_filters(world, banks, memory, fresh):
         for d in range(banks.designs.shape[0]):
             fill_gains(address(banks.designs[d]), sigma, scans, plots, row(address(memory.gains), d * scans * GAINS))
     for b in range(banks.kind.size):
-        kind, design = banks.kind[b], address(banks.designs[banks.design[b]])
-        gains = row(address(memory.gains), banks.design[b] * scans * GAINS)
-        out = row(address(memory.out), b * scans * OUTPUT)
-        if kind == REMEMBERS:
+        kind, part, size = banks.kind[b], banks.parts[b, 0], banks.size[b]
+        parts, orders, shares = address(banks.parts[b]), address(banks.orders[b]), address(banks.shares[b])
+        outputs = address(memory.out)
+        out = row(outputs, b * scans * OUTPUT)
+        if kind == WEIGHS:
+            run_weighing(outputs, parts, orders, size, shares, scans, out)
+        elif kind == CHOOSES:
+            run_choosing(outputs, parts, orders, size, shares, scans, out)
+        elif kind == INTERACTS:
+            designs, room = address(banks.designs), address(memory.interacting)
+            how, stay = banks.unfolding[b], banks.stay[b]
+            run_interacting(designs, parts, orders, size, stay, how, sigma, world.spans, plots, out, room)
+        elif kind == REMEMBERS:
             lists = Lists(
                 address(memory.listed),
                 address(memory.children),
@@ -54,19 +68,20 @@ def run_filters(world, banks, memory, fresh):
             )
             for lane in range(WIDTH):
                 run_remembering(
-                    design,
+                    address(banks.designs[part]),
                     banks.most[b],
                     banks.deepest[b],
                     world.spans,
                     address(memory.plots[lane:]),
-                    address(memory.gains[banks.design[b] * scans * GAINS * WIDTH + lane :]),
+                    address(memory.gains[part * scans * GAINS * WIDTH + lane :]),
                     address(memory.out[b * scans * OUTPUT * WIDTH + lane :]),
                     lists,
                 )
         elif kind == MERGES:
-            run_merged(design, sigma, world.spans, plots, out)
+            run_merged(address(banks.designs[part]), sigma, world.spans, plots, out)
         else:
-            run_single(kind, design, world.spans, plots, gains, out)
+            gains = row(address(memory.gains), part * scans * GAINS)
+            run_single(kind, address(banks.designs[part]), world.spans, plots, gains, out)
 
 
 @inline
@@ -142,6 +157,11 @@ def add_group(world, banks, memory, sums):
             folds[COUNT_SUM] += total(counted * get(bank, COUNT))
             if banks.kind[banks.bank[f]] == REMEMBERS:
                 add_calibration(bank, plot, address(sums.calibration[f, k]))
+            elif banks.kind[banks.bank[f]] >= INTERACTS:
+                for order in range(3):
+                    w = counted * get(bank, WEIGHTS + order)
+                    sums.orders[f, k, order, 0] += total(w)
+                    sums.orders[f, k, order, 1] += total(w * w)
 
 
 @kernel

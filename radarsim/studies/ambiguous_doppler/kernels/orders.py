@@ -1,0 +1,257 @@
+"""Filters of several orders made into one estimate: by likelihood, by fixed shares, by intersection of intervals.
+
+By likelihood they interact (IMM: Blom & Bar-Shalom 1988), and the folds of each scan are merged in each order. Letters
+as in `kernels.steps`, of each order j
+
+    mu   its probability after this scan's plot; c before it
+    p    probability to pass from one order to another, `stay` to remain
+"""
+
+from radarsim.kernels.compile import inline, part
+from radarsim.kernels.lanes import exponential, full, get, nearest, put, root, row, where_greater
+from radarsim.kernels.symmetric import predicted_axis, predicted_own
+from radarsim.studies.ambiguous_doppler.kernels.records import (
+    CAME,
+    DESIGN,
+    FIRST,
+    MEAN,
+    MEMBERS,
+    NONE,
+    OUTPUT,
+    PLOT,
+    RANGE,
+    TAKES_VELOCITY,
+    UNFOLDED,
+    UNFOLDS,
+    VELOCITY,
+    WEIGHTS,
+)
+from radarsim.studies.ambiguous_doppler.kernels.steps import (
+    folds_merged,
+    motion,
+    moved,
+    prior,
+    put_single,
+    put_three,
+    range_taken,
+    three,
+    velocity_taken,
+    whether_right,
+)
+
+# Rows of one order in memory: state, covariance, probability after the scan, and before it, distance of its plot.
+STATE, COVARIANCE, PROBABILITY, BEFORE, DISTANCE, ROWS = 0, 3, 9, 10, 11, 12
+FAR = 1e300
+
+
+@inline
+def six(at, number):
+    """Six rows."""
+    return (
+        get(at, number),
+        get(at, number + 1),
+        get(at, number + 2),
+        get(at, number + 3),
+        get(at, number + 4),
+        get(at, number + 5),
+    )
+
+
+@inline
+def put_six(at, number, P):
+    """Write six rows."""
+    put_three(at, number, (P[0], P[1], P[2]))
+    put_three(at, number + 3, (P[3], P[4], P[5]))
+
+
+@part
+def mixed(old, new, size, stay):
+    """States before a scan: of each order the mixture of all by the probabilities to pass into it."""
+    zero, tiny = full(0.0), full(1e-300)
+    for i in range(size):
+        own = row(new, i * ROWS)
+        c = zero
+        for j in range(size):
+            p = stay if i == j else (1.0 - stay) / (size - 1)
+            c = c + p * get(row(old, j * ROWS), PROBABILITY)
+        put(own, BEFORE, c)
+        c = where_greater(c, tiny, c, tiny)
+        x, P = (zero, zero, zero), (zero, zero, zero, zero, zero, zero)
+        for j in range(size):
+            p, other = stay if i == j else (1.0 - stay) / (size - 1), row(old, j * ROWS)
+            share = p * get(other, PROBABILITY) / c
+            y = three(other, STATE)
+            x = x[0] + share * y[0], x[1] + share * y[1], x[2] + share * y[2]
+        for j in range(size):
+            p, other = stay if i == j else (1.0 - stay) / (size - 1), row(old, j * ROWS)
+            share = p * get(other, PROBABILITY) / c
+            y, Y = three(other, STATE), six(other, COVARIANCE)
+            d0, d1, d2 = y[0] - x[0], y[1] - x[1], y[2] - x[2]
+            P = (
+                P[0] + share * (Y[0] + d0 * d0),
+                P[1] + share * (Y[1] + d0 * d1),
+                P[2] + share * (Y[2] + d0 * d2),
+                P[3] + share * (Y[3] + d1 * d1),
+                P[4] + share * (Y[4] + d1 * d2),
+                P[5] + share * (Y[5] + d2 * d2),
+            )
+        put_three(own, STATE, x)
+        put_six(own, COVARIANCE, P)
+
+
+@part
+def taken(own, design, sigma, plot, D, unfolding, moves):
+    """Predict one order over a scan and take its plot, in place; PROBABILITY becomes a factor of the likelihood.
+
+    That is exp(-DISTANCE/2) times this factor, apart from constants.
+    """
+    F, Q = motion(design)
+    zero, one = full(0.0), full(1.0)
+    x, P = three(own, STATE), six(own, COVARIANCE)
+    came, first = get(plot, CAME), get(plot, FIRST)
+    if moves:
+        x, P = predicted_axis(x, F), predicted_own(P, F, Q)
+    P, weight, g = range_taken(P, first, came - first, sigma[0] * sigma[0])
+    z = get(plot, RANGE)
+    e = z - x[0]
+    distance, factor = 2.0 * weight * (e * e), where_greater(weight, zero, root(weight), one)
+    x = moved(x, g, e)
+    x = where_greater(first, zero, z, x[0]), x[1], x[2]
+    if unfolding != NONE:
+        e = get(plot, UNFOLDED) - x[1]
+        if unfolding != UNFOLDS:
+            e = get(plot, VELOCITY) - x[1]
+            e = e - D * nearest(e / D)
+        P, S, g = velocity_taken(P, came * design[TAKES_VELOCITY], sigma[1] * sigma[1])
+        mean, variance, total = e, zero, one
+        if unfolding != UNFOLDS:
+            mean, variance, total = folds_merged(e, S, D)
+        distance = distance + came * (e * e) / S
+        factor = factor * where_greater(came, zero, total / root(S), one)
+        x = moved(x, g, mean)
+        P = (
+            P[0] + g[0] * g[0] * variance,
+            P[1] + g[0] * g[1] * variance,
+            P[2] + g[0] * g[2] * variance,
+            P[3] + g[1] * g[1] * variance,
+            P[4] + g[1] * g[2] * variance,
+            P[5] + g[2] * g[2] * variance,
+        )
+    put_three(own, STATE, x)
+    put_six(own, COVARIANCE, P)
+    put(own, PROBABILITY, factor)
+    put(own, DISTANCE, distance)
+
+
+@part
+def weighed(new, size):
+    """Probabilities of the orders after a plot, from those before it and the likelihoods."""
+    least, total = get(new, DISTANCE), full(0.0)
+    for i in range(1, size):
+        distance = get(row(new, i * ROWS), DISTANCE)
+        least = where_greater(least, distance, distance, least)
+    for i in range(size):
+        own = row(new, i * ROWS)
+        mu = get(own, BEFORE) * get(own, PROBABILITY) * exponential(0.5 * (least - get(own, DISTANCE)))
+        put(own, PROBABILITY, mu)
+        total = total + mu
+    for i in range(size):
+        own = row(new, i * ROWS)
+        put(own, PROBABILITY, get(own, PROBABILITY) / total)
+
+
+@part
+def run_interacting(designs, parts, orders, size, stay, unfolding, sigma, spans, plots, out, memory):
+    """Orders that interact, over all scans; memory has room for two times three orders."""
+    zero = full(0.0)
+    old, new = row(memory, 0), row(memory, 3 * ROWS)
+    right = full(1.0)
+    for i in range(size):
+        own = row(old, i * ROWS)
+        put_three(own, STATE, (zero, zero, zero))
+        put_six(own, COVARIANCE, prior(row(designs, parts[i] * (DESIGN // 8))))
+        put(own, PROBABILITY, full(1.0 / size))
+    for k in range(spans.size):
+        plot, D = row(plots, k * PLOT), spans[k]
+        mixed(old, new, size, stay)
+        velocity = zero
+        for i in range(size):
+            own, design = row(new, i * ROWS), row(designs, parts[i] * (DESIGN // 8))
+            taken(own, design, sigma, plot, D, unfolding, k > 0)
+        weighed(new, size)
+        x, w = (zero, zero, zero), (zero, zero, zero)
+        for i in range(size):
+            own = row(new, i * ROWS)
+            mu, y = get(own, PROBABILITY), three(own, STATE)
+            x = x[0] + mu * y[0], x[1] + mu * y[1], x[2] + mu * y[2]
+            velocity = velocity + mu * y[1]
+            w = (
+                w[0] + (mu if orders[i] == 0 else zero),
+                w[1] + (mu if orders[i] == 1 else zero),
+                w[2] + (mu if orders[i] == 2 else zero),
+            )
+        z = get(plot, VELOCITY)
+        right = whether_right(right, plot, z + D * nearest((velocity - z) / D), D)
+        to = row(out, k * OUTPUT)
+        put_single(to, x, right)
+        put_three(to, WEIGHTS, w)
+        old, new = new, old
+
+
+@part
+def run_weighing(outputs, parts, orders, size, shares, scans, out):
+    """Fixed shares of other banks, over all scans: shares (K, MEMBERS, 3); outputs of all banks."""
+    zero, one = full(0.0), full(1.0)
+    for k in range(scans):
+        to = row(out, k * OUTPUT)
+        x, w = (zero, zero, zero), (0.0, 0.0, 0.0)
+        for i in range(size):
+            y, share = three(row(outputs, (parts[i] * scans + k) * OUTPUT), MEAN), 3 * (k * MEMBERS + i)
+            x = (
+                x[0] + shares[share] * y[0],
+                x[1] + shares[share + 1] * y[1],
+                x[2] + shares[share + 2] * y[2],
+            )
+            w = (
+                w[0] + (shares[share] if orders[i] == 0 else 0.0),
+                w[1] + (shares[share] if orders[i] == 1 else 0.0),
+                w[2] + (shares[share] if orders[i] == 2 else 0.0),
+            )
+        put_single(to, x, one)
+        put_three(to, WEIGHTS, (full(0.0) + w[0], full(0.0) + w[1], full(0.0) + w[2]))
+
+
+@part
+def chosen(outputs, parts, orders, size, widths, scans, k, c):
+    """Of component c at scan k: the smoothest whose interval meets those of all rougher ones, and its order."""
+    x, order = full(0.0), full(0.0)
+    low, high, meets, used = full(-FAR), full(FAR), full(1.0), 0
+    for _ in range(size):
+        pick, width = -1, 0.0
+        for i in range(size):
+            own = widths[3 * (k * MEMBERS + i) + c]
+            if (used >> i) & 1 == 0 and own > width:
+                pick, width = i, own
+        if pick < 0:
+            break
+        used |= 1 << pick
+        y = get(row(outputs, (parts[pick] * scans + k) * OUTPUT), MEAN + c)
+        low, high = where_greater(y - width, low, y - width, low), where_greater(high, y + width, y + width, high)
+        meets = where_greater(low, high, full(0.0), meets)
+        x = where_greater(meets, full(0.5), y, x)
+        order = where_greater(meets, full(0.5), full(float(orders[pick])), order)
+    return x, order
+
+
+@part
+def run_choosing(outputs, parts, orders, size, widths, scans, out):
+    """The intersection of intervals, component by component, over all scans: widths (K, MEMBERS, 3) half ones."""
+    zero, one = full(0.0), full(1.0)
+    for k in range(scans):
+        x0, order = chosen(outputs, parts, orders, size, widths, scans, k, 0)
+        x1, _ = chosen(outputs, parts, orders, size, widths, scans, k, 1)
+        x2, _ = chosen(outputs, parts, orders, size, widths, scans, k, 2)
+        to = row(out, k * OUTPUT)
+        put_single(to, (x0, x1, x2), one)
+        zeroth, second = where_greater(full(0.5), order, one, zero), where_greater(order, full(1.5), one, zero)
+        put_three(to, WEIGHTS, (zeroth, one - zeroth - second, second))

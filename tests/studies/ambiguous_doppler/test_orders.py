@@ -1,0 +1,107 @@
+"""Filters of several orders: textbook twins, exact errors, bounds, and what the published experiment finds."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from radarsim.app.configs import load
+from radarsim.studies.ambiguous_doppler import exact, filters, study
+from radarsim.studies.ambiguous_doppler.filters import Member
+from radarsim.studies.ambiguous_doppler.kernels import records, sums
+from tests.studies.ambiguous_doppler import naive
+from tests.studies.ambiguous_doppler.conftest import FIXED, ORACLE, RANGE_ONLY, made, summed
+
+ALL = {"orders": [0, 1, 2], "manoeuvre_variance": [9e4, 4.0, 1e-3]}
+LIKELIHOOD = {"name": "likelihood", "combine": "likelihood"} | ALL
+EXPECTED = {"name": "expected error", "combine": "expected_error"} | ALL
+EXPECTED |= {"manoeuvres": {"acceleration_mps2": 20.0, "duration_s": 30.0}}
+INTERSECTION = {"name": "intersection", "combine": "intersection"} | ALL
+PULSE = {"kind": "acceleration_pulse", "coefficients": [100e3, -250.0], "acceleration_g": 2.0}
+PULSE |= {"start_s": 60.0, "duration_s": 30.0}
+SCALE = np.array([1e5, 1e3, 10.0])
+
+
+def outputs(case):
+    plan = study.prepare(case)
+    plots, out = sums.simulated(plan.world, plan.banks, 8)
+    columns = plots[:, [records.RANGE, records.VELOCITY, records.UNFOLDED, records.CAME]]
+    return plan, columns, out
+
+
+@pytest.mark.parametrize("detection", [1.0, 0.6])
+@pytest.mark.parametrize("doppler", ["none", "unfolded", "folded"])
+def test_interacting_orders(doppler, detection):
+    case = made("RLS 2", [LIKELIHOOD | {"doppler": doppler}], 12, PULSE, detection_probability=detection)
+    plan, plots, out = outputs(case)
+    one = case.spec.filters[0]
+    kalmans = [
+        naive.Kalman(
+            SimpleNamespace(orders=(m.order,), variances=(m.manoeuvre_variance,), doppler=m.doppler),
+            case.spec.prior,
+            (250.0, 15.0),
+            10.0,
+        )
+        for m in filters.members(one)
+    ]
+    for lane in range(4):
+        own = plots[:, :, lane]
+        x, mu = naive.interacting(kalmans, own, plan.world.spans, 0.95, 40 if doppler == "folded" else 0)
+        there = np.cumsum(own[:, 3]) > 0
+        assert np.abs((out[0, :, :3, lane] - x) / SCALE)[there].max() < 1e-9
+        assert np.abs(out[0, :, records.WEIGHTS :, lane] - mu)[there].max() < 1e-9
+
+
+def test_intersection_of_intervals():
+    case = made("RLS 2", [INTERSECTION | {"doppler": "unfolded"}], 15, PULSE)
+    plan, _, out = outputs(case)
+    one, widths = case.spec.filters[0], plan.banks.shares[plan.banks.bank[0]]
+    members, own = filters.members(one), out[plan.banks.bank[0]]
+    parts = out[plan.banks.parts[plan.banks.bank[0], : len(members)]]
+    seen = set()
+    for k in range(15):
+        for lane in range(8):
+            for c in range(3):
+                i = naive.intersected(parts[:, k, c, lane], widths[k, : len(members), c])
+                assert own[k, c, lane] == (0.0 if i is None else parts[i, k, c, lane])
+                if c == 0:
+                    assert own[k, records.WEIGHTS + members[i].order, lane] == 1
+                    seen.add(members[i])
+    assert len(seen) > 2  # through a manoeuvre it changes
+
+
+def test_expected_error_is_exact_and_never_beats_the_clairvoyant():
+    n = 50_000
+    plan, found = summed(made("RLS 2", [RANGE_ONLY, EXPECTED | {"doppler": "unfolded"}], 15, PULSE), n)
+    sigma = np.sqrt(found.error[1, :, :, 1] / n)
+    known = plan.axes.exact_sigma[1] > 0
+    z = (sigma / np.where(known, plan.axes.exact_sigma[1], 1) - 1)[known] * np.sqrt(2 * n)
+    assert np.abs(z).max() < 5.85
+    assert (plan.axes.best_combination[1] <= plan.axes.exact_sigma[1] * (1 + 1e-9)).all()
+    assert (plan.axes.best_combination[1] <= plan.axes.best_order[1] * (1 + 1e-9)).all()
+
+
+def test_shares_of_least_error():
+    """Against the solution of the constrained problem by hand: two independent errors of variances 1 and 3."""
+    E = np.broadcast_to(np.diag([1.0, 3.0]), (1, 3, 2, 2))
+    assert np.allclose(exact.best_shares(E, np.ones((2, 3), bool)), np.array([0.75, 0.25])[None, :, None])
+    alone = exact.best_shares(E, np.array([[True, False, False], [True, True, False]]))
+    assert np.allclose(alone[0], [[0.75, 0, 0], [0.25, 1, 0]])
+    certain = np.broadcast_to(np.diag([0.0, 3.0]), (1, 3, 2, 2))
+    assert np.allclose(exact.best_shares(certain, np.ones((2, 3), bool))[0, :, 0], [1, 0])
+
+
+def test_published_numbers_of_the_manoeuvre():
+    """RLS 2, σ_r at 140 s after 2 g for 30 s, in m: orders 1 and 2 with Doppler, the best combination of all."""
+    case = load("orders").cases[0]
+    plan = study.prepare(case)
+    sigma = dict(zip(plan.axes.filters, plan.axes.exact_sigma[:, -1, 0], strict=True))
+    assert sigma["order 1"] == pytest.approx(162, abs=1)
+    assert sigma["order 2"] == pytest.approx(347, abs=6)
+    assert plan.axes.best_combination[-1, -1, 0] == pytest.approx(155, abs=3)
+    straight = made("RLS 2", [ORACLE | {"orders": [1], "manoeuvre_variance": 4.0}, ORACLE | {"name": "two"}], 15, FIXED)
+    members = [Member(1, "unfolded", 4.0), Member(2, "unfolded", 1e-3)]
+    of = [exact.gains(one, straight.spec.prior, np.array([250.0, 15.0]), 10.0, 15) for one in members]
+    _, noise = exact.errors(of, np.zeros((0, 15, 3)), np.array([250.0, 15.0]))
+    one, two = np.sqrt([noise[-1, i, 0, i, 0] for i in range(2)])
+    assert one / two == pytest.approx(1.01, abs=0.005)
