@@ -174,7 +174,7 @@ class Filter(Model):
     )
     manoeuvres: Manoeuvres | None = Field(None, description="expected_error: the manoeuvres that are expected")
     interval_sigmas: Positive | None = Field(
-        None, description="intersection: half width of an interval in fluctuation errors; default: 2"
+        None, description="intersection: half width of an interval, in standard deviations (no unit); default: 2"
     )
 
     @property
