@@ -43,7 +43,7 @@ KEYS = ("errors", "config.faults", "config.fields", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
 SHOWN = (*SUMS, "cost", "tables", "figures", "map")
-READ = (*SHOWN, "words", "claims", "measures")
+READ = (*SHOWN, "words", "claims", "measures", "readings", "search")
 ROLES = {
     "kernels": (("kernels",), ("kernels",)),
     "config": (KEYS, ("config",)),
@@ -55,6 +55,8 @@ ROLES = {
     "words": ((*GROUND, *DATA, "report"), READ),
     "claims": ((*GROUND, *DATA, "report"), READ),
     "measures": ((*GROUND, *DATA, "report"), READ),
+    "readings": ((*GROUND, *DATA, "report"), READ),  # what the paper leaves open
+    "search": ((*GROUND, *DATA, "report"), READ),  # its printed numbers under many readings
     "track": ((*GROUND, *DATA, "studies.noise", "studies.interface"), (*SUMS, "track")),
     "map": ((*GROUND, *DATA), (*SUMS, "track")),  # one realisation followed as recorded plots are, for a figure
     "part": (

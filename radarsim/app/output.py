@@ -25,13 +25,18 @@ def tables(results: Sequence[CaseResult], control_variate: bool = False) -> dict
     A study whose errors are not of all realisations at common scans makes its own curves and gains.
     """
     of = study(results[0].study)
-    own = of.tables(results)
-    shared = {"curves": common.curves, "gains": common.gains}
-    made = {name: own[name] if name in own else table(results) for name, table in shared.items()} | own
+    made = measured(results)
     if control_variate and of.exact_errors:
         made["controlled"] = controlled.controlled(results)
     made["claims"] = claims.judged(of.claims(), results, made, configs.shipped)
     return notes.noted(made, results)
+
+
+def measured(results: Sequence[CaseResult]) -> dict:
+    """The tables of what was measured alone: curves, gains, and the study's own."""
+    own = study(results[0].study).tables(results)
+    shared = {"curves": common.curves, "gains": common.gains}
+    return {name: own[name] if name in own else table(results) for name, table in shared.items()} | own
 
 
 def figures(

@@ -20,6 +20,7 @@ A study that follows this declares an object and writes no class:
 | `question`, `answer` | functions of `words` |
 | `claims`, if there is a paper | `claims.CLAIMS`, judged by `measures.Evidence` |
 | `seconds_per_update`, if offered | the function of `cost` |
+| `readings`, if offered | an object of the class `readings.Readings` |
 | `recorded`, if offered | an object of the class `track.Recorded` |
 | `shipped`, if offered | the folder `shipped` |
 
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from radarsim.config.fields import Study as Keys
     from radarsim.engine.results import CaseResult
     from radarsim.report.claims import PaperClaims
+    from radarsim.report.claims.readings import PaperReadings
     from radarsim.report.drawing import Figure
 
 
@@ -120,6 +122,9 @@ class StudyFolder(Study):
 
         paper, page, may_grow = self.paper
         return PaperClaims(self.file("claims").CLAIMS, self.file("measures").Evidence, paper, page, may_grow)
+
+    def readings(self) -> "PaperReadings | None":
+        return self.file("readings").Readings() if "readings" in self.offers else super().readings()
 
     # ---- beside --------------------------------------------------------------------------------------------------
     def recorded(self) -> RecordedPlots | None:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from radarsim.engine.moments import Layout
     from radarsim.engine.results import Axes, CaseResult, Track
     from radarsim.report.claims import PaperClaims
+    from radarsim.report.claims.readings import PaperReadings
     from radarsim.report.drawing import Figure
 
 
@@ -92,7 +93,7 @@ class Paper(NamedTuple):
     may_grow: tuple[str, ...] = ()
 
 
-OptionalPart = Literal["curves", "inputs", "cost", "seconds_per_update", "recorded", "shipped"]
+OptionalPart = Literal["curves", "inputs", "cost", "seconds_per_update", "readings", "recorded", "shipped"]
 
 
 class Study(ABC):
@@ -173,6 +174,10 @@ class Study(ABC):
 
     def claims(self) -> "PaperClaims | None":
         """The paper's claims. Default: none."""
+        return None
+
+    def readings(self) -> "PaperReadings | None":
+        """What the paper leaves open, and its claims under each reading. Default: nothing."""
         return None
 
     # ---- beside --------------------------------------------------------------------------------------------------

@@ -1,0 +1,77 @@
+"""Specification curves: a claim under every reading, sorted by how it comes out, and below what each reading takes."""
+
+import numpy as np
+
+from radarsim.report.claims import rule
+from radarsim.report.claims.over import Over, Under, depth
+from radarsim.report.claims.readings import Choice, PaperReadings
+from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
+
+FURTHEST = 5.0  # margins: what lies further is drawn there
+LETTERS = 44  # of an alternative beside the panel
+KINDS = {
+    rule.EQUIVALENT: ("as shipped, or equivalent", Style(colour=0, dash=None, marker=0)),
+    rule.UNSTATED: ("the paper does not say", Style(colour=1, dash=None, marker=1)),
+    rule.AGAINST: ("against the print", Style(colour=2, dash=None, marker=2)),
+}
+
+
+def specification(of: PaperReadings, over: Over) -> Figure:
+    """The curve of a claim: above its worst part's distance from the paper's words, below the alternatives taken."""
+    judged = [(one, depth(one)) for one in over.under if one.outcome is not None]
+    judged.sort(key=lambda pair: pair[1][0])
+    every = [one for one, _ in judged]
+    where = np.arange(1, len(every) + 1)
+    ends = np.clip(np.array([found for _, found in judged]), -FURTHEST, FURTHEST)
+    varied = [choice for choice in of.choices if len({one.reading[choice.key] for one in every}) > 1]
+    return Figure(
+        name=over.claim.id,
+        title=f"{over.claim.id} under every reading",
+        caption=f"{over.claim.statement}. Above: how far the worst part of the claim lies from what the paper says, in "
+        f"margins of that part, cut at ± {FURTHEST:g}; under 0 it holds, over 1 it fails beyond the margin. Below: what each "
+        f"reading takes. {over.sentence().capitalize()}.",
+        panels=(_above(every, where, ends, over), *([_below(varied, every, where)] if varied else [])),
+        width_mm=PAGE_MM,
+        panel_height_mm=max(62.0, 4.2 * sum(len(choice.alternatives) + 1 for choice in varied)),
+    )
+
+
+def _above(every: list[Under], where: np.ndarray, ends: np.ndarray, over: Over) -> Panel:
+    marks = []
+    for kind, (label, style) in KINDS.items():
+        of = np.array([one.kind == kind for one in every])
+        if of.any():
+            value, lo, hi = ends[of].T
+            marks.append(Line(where[of], value, label, style, lo, hi))
+    return Panel(
+        Axis("reading, sorted", limits=(0, len(every) + 1)),
+        Axis("distance of the worst part, margins"),
+        (*marks, Reference(0.0, label="as the paper says"), Reference(1.0, label="beyond the margin")),
+        title=f"{over.claim.id}: {over.sentence()}",
+        direct=False,
+    )
+
+
+def _below(varied: list[Choice], every: list[Under], where: np.ndarray) -> Panel:
+    ticks, marks, height = [], [], 0
+    for number, choice in enumerate(varied):
+        for one in choice.alternatives:
+            height -= 1
+            ticks.append((float(height), _short(f"{choice.key}: {one.name}")))
+            taken = np.array([reading.reading[choice.key] == one.name for reading in every])
+            if taken.any():
+                style = Style(
+                    colour=KINDS[one.kind][1].colour, dash=None, marker=KINDS[one.kind][1].marker, size_pt=2.6
+                )
+                marks.append(Line(where[taken], np.full(taken.sum(), float(height)), "", style))
+        height -= 1 if number + 1 < len(varied) else 0
+    return Panel(
+        Axis("reading, sorted", limits=(0, len(every) + 1)),
+        Axis("", limits=(height - 1.0, 0.0), ticks=tuple(reversed(ticks))),
+        tuple(marks),
+        legend="none",
+    )
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= LETTERS else text[: LETTERS - 1] + "…"

@@ -1,0 +1,167 @@
+"""Verdicts on a claim under every reading of its paper: the table readings.csv, and what the claim depends on."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from radarsim.report.claims import rule
+from radarsim.report.claims.declared import Claim, Part
+from radarsim.report.claims.evidence import Evidence, Missing
+from radarsim.report.claims.readings import PaperReadings, Reading
+from radarsim.report.claims.rule import Judged, Outcome
+
+FIRST = ("claim", "part", "reading", "kind")
+LAST = (
+    *("measured", "lo", "hi", "exact", "expected_lo", "expected_hi", "margin", "verdict"),
+    *("unit", "what", "outcome", "miss", "n", "reason"),
+)
+
+
+@dataclass(frozen=True)
+class Under:
+    """A claim under one reading: its parts with their numbers, in the order of the claim, and what became of them.
+
+    why says what kept it from being judged: it cannot be flown or designed, or there is nothing to measure.
+    """
+
+    claim: Claim
+    reading: Reading
+    name: str
+    kind: str
+    parts: tuple[tuple[Part, Judged], ...] = ()
+    outcome: Outcome | None = None
+    why: str = ""
+
+    @property
+    def counted(self) -> bool:
+        """Whether the paper allows the reading."""
+        return self.kind != rule.AGAINST and self.outcome is not None
+
+    def as_rule(self) -> rule.Reading:
+        """What the rule looks at."""
+        outcome = self.outcome.kind if self.outcome else ""
+        return rule.Reading(self.name, self.kind, dict(self.reading.taken), outcome)
+
+
+def under(of: PaperReadings, claim: Claim, reading: Reading, evidence: Evidence) -> Under:
+    """Judge a claim by the evidence of a reading."""
+    name, kind = of.name(reading), of.kind(reading)
+    try:
+        parts = tuple((part, _judged(part, evidence, of.exact)) for part in of.parts(claim))
+    except Missing as missing:
+        return Under(claim, reading, name, kind, why=_why(missing))
+    outcome = rule.claim([judged for _, judged in parts], unstated=bool(claim.unstated), joint=claim.joint)
+    return Under(claim, reading, name, kind, parts, outcome)
+
+
+def _judged(part: Part, seen: Evidence, exact: bool) -> Judged:
+    measured = part.measure(seen)
+    nothing = math.nan
+    return Judged(
+        *((nothing,) * 3 if exact else (float(value) for value in measured)),
+        expected_lo=part.expected.lo,
+        expected_hi=part.expected.hi,
+        margin=part.expected.margin * (part.scale(seen) if part.scale else 1.0),
+        kind=part.expected.kind,
+        exact=float(measured.value) if exact else nothing,
+        ceiling=part.ceiling(seen) if part.ceiling else nothing,
+        statement=part.statement,
+        number=part.number,
+        asserted=part.asserted,
+    )
+
+
+@dataclass(frozen=True)
+class Over:
+    """A claim over all readings of its paper, the default one first."""
+
+    claim: Claim
+    under: tuple[Under, ...]
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """What the rule says of it; None where the default reading was not judged."""
+        own = self.under[0].outcome
+        return own and rule.over_readings(own, [one.as_rule() for one in self.under])
+
+    @property
+    def against_print(self) -> list[Under]:
+        """The readings against the print under which it comes out otherwise than in the default one."""
+        own = self.under[0].outcome
+        judged = [one for one in self.under if one.kind == rule.AGAINST and one.outcome]
+        return [one for one in judged if own and one.outcome and one.outcome.kind != own.kind]
+
+    @property
+    def impossible(self) -> list[Under]:
+        """The readings that were not judged, which say why."""
+        return [one for one in self.under if one.outcome is None]
+
+    def sentence(self) -> str:
+        """One line: in how many readings it holds, on what it depends, what would have to be changed."""
+        found = self.outcome
+        if found is None:
+            return f"not judged: {self.under[0].why}"
+        words = [f"holds in {found.holds_in or 0} of {found.readings or 0} readings"]
+        if found.depends_on:
+            words.append(f"depends on: {', '.join(found.depends_on)}")
+        held = [one for one in self.against_print if one.outcome and one.outcome.kind == rule.CONFIRMED]
+        if held and found.holds_in == 0:
+            words.append(f"against the print it holds with {' | '.join(one.name for one in held)}")
+        if self.impossible:
+            words.append(f"{len(self.impossible)} not possible")
+        return "; ".join(words)
+
+
+def columns(every: Iterable[PaperReadings]) -> tuple[str, ...]:
+    """The columns of readings.csv: one for each choice of these papers."""
+    choices = dict.fromkeys(choice.key for of in every for choice in of.choices)
+    return (*FIRST, *choices, *LAST)
+
+
+def rows(one: Under, names: Sequence[str]) -> list[dict[str, Any]]:
+    """Rows of readings.csv: one a part; one alone with the reason where it was not judged."""
+    choices = dict(one.reading.taken)
+    blank: dict[str, Any] = dict.fromkeys(names, "") | {"claim": one.claim.id, "reading": one.name, "kind": one.kind}
+    blank |= {key: value for key, value in choices.items() if key in names}
+    if one.outcome is None:
+        return [blank | {"verdict": "not possible", "reason": one.why}]
+    many = sum(judged.sampled for _, judged in one.parts)
+    return [
+        blank
+        | {
+            **{name: _cell(getattr(judged, name)) for name in ("measured", "lo", "hi", "exact", "margin")},
+            **{name: _cell(getattr(judged, name)) for name in ("expected_lo", "expected_hi")},
+            **{"part": number, "what": part.what, "unit": part.unit, "verdict": rule.verdict(judged, many)},
+            **{"outcome": one.outcome.kind, "miss": _cell(rule.miss(judged))},
+        }
+        for number, (part, judged) in enumerate(one.parts, 1)
+    ]
+
+
+def _cell(value: float) -> float | str:
+    """A number as the table holds it: at twelve digits, empty where there is none."""
+    return float(f"{value:.12g}") if math.isfinite(value) else ""
+
+
+def depth(one: Under) -> tuple[float, float, float]:
+    """How far the worst part lies from what the words say, in margins, with the ends of its interval.
+
+    Negative inside: by as much as it could move before it left.
+    """
+    found = [_depth(judged) for _, judged in one.parts if judged.asserted and not judged.void]
+    return max(found, default=(math.nan,) * 3, key=lambda ends: ends[0])
+
+
+def _depth(judged: Judged) -> tuple[float, float, float]:
+    def of(value: float) -> float:
+        return max(judged.expected_lo - value, value - judged.expected_hi) / judged.margin
+
+    ends = rule.ends(judged)
+    every = [of(value) for value in (*ends, judged.value)]
+    return of(judged.value), min(every), max(every)
+
+
+def _why(missing: Missing) -> str:
+    given = next((one for one in missing.args if isinstance(one, str)), "")
+    return given or "there is nothing to measure it by"

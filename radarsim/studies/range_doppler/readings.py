@@ -1,0 +1,274 @@
+"""What P1 leaves open, and its claims under each reading: all by the exact recursion, nothing is run."""
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from radarsim.report.claims import Missing, Series
+from radarsim.report.claims.declared import Claim, PaperClaims
+from radarsim.report.claims.readings import Alternative, Choice, PaperReadings, Reading, Seen
+from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED
+from radarsim.report.claims.search import Search
+from radarsim.report.statistics import Estimate
+from radarsim.studies.range_doppler import measures, recursion
+from radarsim.studies.range_doppler.measures import RADARS
+
+NUMBERS = tuple(f"P1.{n}" for n in range(1, 26) if n != 16)  # P1.16 is algebra of the radars alone
+FAST = ("P1.4", "P1.5", "P1.6", "P1.7", "P1.11", "P1.12", "P1.14", "P1.15", "P1.19", "P1.20", "P1.22", "P1.24")
+FALLS = ("P1.5", "P1.6")
+SETTLES = ("P1.14", "P1.15")
+SWEPT = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # D_M of the config manoeuvre_variance
+LONG = 250  # scans after which a filter is taken as steady
+FILTERS = ("r", "r+Vr")
+PERIOD = {n: radar[2] for n, radar in RADARS.items()}
+DOPPLER = {
+    n: 2 * 300 / wavelength_m / 1e3 for n, wavelength_m in ((1, 1.8), (2, 0.15), (3, 0.15), (4, 0.03), (5, 0.03))
+}
+
+CHOICES = (
+    Choice(
+        "start",
+        "How the filter starts, and with which covariance",
+        "Инициализация фильтра Калмана второго порядка проводится за три первых контакта при наблюдении дальности и за "
+        "два контакта – при условии наблюдения дальности и радиальной скорости. […] Параметры инициализации "
+        "рассчитываются по конечной выборке (методом наименьших квадратов).",
+        "The filter starts from three contacts where the range is observed, from two where the velocity is too […] by "
+        "least squares on a finite sample.",
+        (
+            Alternative("weighted", UNSTATED, "least squares, each measurement by its own σ"),
+            Alternative("unweighted", UNSTATED, "least squares without weights, in m and m/s: the paper names none"),
+            Alternative("process_noise", UNSTATED, "least squares on a state that M moves during the start too"),
+            Alternative("first_differences", AGAINST, "the last plot and differences: not least squares"),
+            Alternative("three_and_three", AGAINST, "three contacts for both, where the print has two with velocity"),
+            Alternative("four_and_four", AGAINST, "four contacts for both"),
+            Alternative("five_and_five", AGAINST, "five contacts for both"),
+        ),
+        NUMBERS,
+    ),
+    Choice(
+        "points",
+        "How long the radars of Δt = 5 s are watched",
+        "Задающее воздействие – полиномиальная модель 2-го порядка, в соответствии с которой рассчитано 15 точек "
+        "траектории.",
+        "The input is a polynomial of the second order, by which 15 points of the trajectory were computed.",
+        (
+            Alternative("to 140 s", UNSTATED, "the figures go over time, and the text speaks of 100 s for Δt = 5 s"),
+            Alternative("fifteen each", UNSTATED, "fifteen points as printed: RLS 3 and 5 end at 70 s"),
+        ),
+        FAST,
+    ),
+    Choice(
+        "falls_to",
+        "When the value is read to which a gain falls",
+        "… с последующим спадом до 18 %. […] постепенно убывая с 80–90 % (Δt = 5 с, 10 с) до 25 %. […] применение "
+        "оценок радиальной скорости становится неэффективным примерно с 90–100-й секунды наблюдения.",
+        "… falls to 18 % afterwards. […] gradually decreasing from 80–90 % (Δt = 5 s, 10 s) to 25 %. […] from about "
+        "the 90th to 100th second on the velocity is of no use.",
+        (
+            Alternative("the last point", UNSTATED, "the end of the curve"),
+            Alternative("100 s", UNSTATED, "the time to which the passage speaks"),
+        ),
+        FALLS,
+    ),
+    Choice(
+        "settled_within",
+        "How near the steady value counts as settled",
+        "Оптимальным стоит рассматривать значение D_M, если время сходимости меньше 10Δt.",
+        "A value of D_M should be taken as optimal if the time of convergence is under 10 Δt.",
+        (
+            Alternative("5 %", UNSTATED, "the usual tolerance of settling"),
+            Alternative("2 %", UNSTATED, "the other usual one"),
+            Alternative("10 %", UNSTATED, "a coarse one"),
+        ),
+        SETTLES,
+    ),
+    Choice(
+        "manoeuvre_variance",
+        "D_M of the gains, (m/s³)²",
+        "… графически представлены на рис. 1, б для пяти типов РЛС (см. табл.) при D_M = 10⁻³.",
+        "… are shown in figure 1b for the five radars of the table at D_M = 10⁻³.",
+        (
+            Alternative("0.001", EQUIVALENT, "as printed"),
+            Alternative("0.0003", AGAINST, "another value than printed"),
+            Alternative("0.0007", AGAINST, "another value than printed: RLS 3 then falls to 18 %"),
+            Alternative("0.0015", AGAINST, "another value than printed: RLS 2 then falls to 25 %"),
+            Alternative("0.003", AGAINST, "another value than printed"),
+        ),
+        NUMBERS,
+    ),
+    Choice(
+        "process_noise",
+        "What M is, of which D_M is the size",
+        "M = ‖Δt⁶/36 Δt⁵/12 Δt⁴/6; Δt⁵/12 Δt⁴/4 Δt³/2; Δt⁴/6 Δt³/2 Δt²‖ · D_M (6)",
+        "M is printed: the covariance of a jerk that is constant over the scan.",
+        (
+            Alternative("random_jerk", EQUIVALENT, "as printed"),
+            Alternative("white_jerk", AGAINST, "D_M the spectral density of a white jerk"),
+            Alternative("white_jerk_rate", AGAINST, "D_M Δt that density"),
+            Alternative("acceleration_step", AGAINST, "D_M the variance of a step of acceleration"),
+            Alternative("normalised", AGAINST, "the printed number is C_M = D_M/σ_r² of (5)"),
+        ),
+        NUMBERS,
+    ),
+    Choice(
+        "truth",
+        "How the target moves",
+        "Задающее воздействие – полиномиальная модель 2-го порядка …",
+        "The input is a polynomial model of the second order …",
+        (
+            Alternative("quadratic", EQUIVALENT, "as printed"),
+            Alternative("as believed", AGAINST, "a target that manoeuvres as the filter believes"),
+        ),
+        NUMBERS,
+    ),
+)
+
+
+class Readings(PaperReadings):
+    """P1's readings."""
+
+    paper = "P1"
+    choices = CHOICES
+
+    @property
+    def exact(self) -> bool:
+        return True
+
+    def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> "ExactEvidence":
+        return ExactEvidence(reading, limit_s=100.0 if reading["falls_to"] == "100 s" else np.inf)
+
+    def search(self) -> Search:
+        from radarsim.studies.range_doppler import search
+
+        return search.search()
+
+    def versions(self) -> list[recursion.Version]:
+        """Every version of the filters that a declared reading asks for, with the D_M of the shipped sweep."""
+        found: dict[recursion.Version, None] = {}
+        for one in self.declared():
+            form, start = cast(recursion.Form, one["process_noise"]), cast(recursion.Start, one["start"])
+            for variance in (float(one["manoeuvre_variance"]), *SWEPT):
+                found[form, variance, start] = None
+        return list(found)
+
+
+@cache
+def _table() -> Mapping[int, Mapping[recursion.Version, "_Sigmas"]]:
+    """σ over LONG scans by radar and version, all by one recursion a radar."""
+    versions = Readings().versions()
+
+    def of_radar(number: int) -> dict[recursion.Version, _Sigmas]:
+        found = recursion.both(RADARS[number], versions, LONG)
+        return {
+            one: _Sigmas(*(tuple(e.true[i] for e in found), tuple(e.believed[i] for e in found)))
+            for i, one in enumerate(versions)
+        }
+
+    with ThreadPoolExecutor() as pool:  # NumPy computes outside the interpreter's lock
+        return dict(zip(RADARS, pool.map(of_radar, RADARS), strict=True))
+
+
+class _Sigmas(NamedTuple):
+    """σ (K, 3) of the filters r and r+Vr, on a quadratic and on a truth that moves as they believe."""
+
+    true: tuple[np.ndarray, ...]
+    believed: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True)
+class _Axes:
+    """Scans and times of a radar's run."""
+
+    k: np.ndarray
+    t_s: np.ndarray
+    scan_period_s: float
+
+
+@dataclass(frozen=True)
+class _Radar:
+    """What stands in for a case: one radar at one D_M."""
+
+    name: str
+    number: int
+    variance: float
+    axes: _Axes
+    count: int = 0
+
+
+class ExactEvidence(measures.Evidence):
+    """P1's curves and gains by the exact recursion, under a reading; series end at limit_s."""
+
+    def __init__(self, reading: Reading, limit_s: float = np.inf):
+        super().__init__((), {}, {})
+        self._reading, self._limit_s = reading, limit_s
+        self._own = float(reading["manoeuvre_variance"])
+
+    def case(self, key: Any) -> Any:
+        """key: the number of a radar (at the reading's D_M), or (number, D_M)."""
+        number, variance = key if isinstance(key, tuple) else (key, self._own)
+        period = PERIOD[number]
+        scans = 15 if period == 10 or self._reading["points"] == "fifteen each" else 29
+        k = np.arange(1, scans + 1)
+        return _Radar(f"rls{number}", number, variance, _Axes(k, (k - 1.0) * period, period))
+
+    def filter(self, key: Any, observes: tuple[str, ...]) -> str:
+        """r or r+Vr."""
+        return FILTERS[len(observes) - 1]
+
+    def curve(self, key: Any, filter_name: str, component: str) -> Series:
+        """σ(k) of a filter."""
+        return self._series(key, self._sigma(key)[FILTERS.index(filter_name)][:, self._place(component)])
+
+    def gain(self, key: Any, filter_name: str, component: str) -> Series:
+        """Relative gain of the filter with velocity, %, from the scan at which it has filtered."""
+        base, own = (sigma[:, self._place(component)] for sigma in self._sigma(key))
+        gain = recursion.gain(base, own)
+        gain[: recursion.first_scan(self._start, 2) - 1] = np.nan
+        return self._series(key, gain)
+
+    def settling(self, key: Any, observes: tuple[str, ...], component: str = "r") -> Estimate:
+        """Scan periods from the first plot to settling for good; infinite where it does not within the run."""
+        sigma = self.curve(key, self.filter(key, observes), component)
+        radar = self.case(key)
+        steady = self._sigma(key)[len(observes) - 1][-1, self._place(component)]
+        wide = float(self._reading["settled_within"].split()[0]) / 100
+        wrong = np.flatnonzero(~(abs(sigma.value / steady - 1) <= wide))
+        first = wrong[-1] + 1 if wrong.size else 0
+        when = sigma.t[first] / radar.axes.scan_period_s if first < len(sigma.t) else np.inf
+        return Estimate(float(when), float(when), float(when))
+
+    def variances(self, radar: int) -> list[float]:
+        """Those of the shipped sweep."""
+        return list(SWEPT)
+
+    def row(self, table: str, **equal: object) -> Mapping[str, Any]:
+        """The Doppler frequency of 300 m/s at 1 kHz in repetition rates: no reading changes it."""
+        if table != "radar":
+            raise Missing(table)
+        number = int(str(equal["case"])[3:])
+        return {"doppler_per_repetition_rate": DOPPLER[number]}
+
+    @property
+    def _start(self) -> recursion.Start:
+        return cast(recursion.Start, self._reading["start"])
+
+    def _sigma(self, key: Any) -> tuple[np.ndarray, ...]:
+        """σ (LONG, 3) of the two filters."""
+        radar = self.case(key)
+        version = cast(recursion.Form, self._reading["process_noise"]), radar.variance, self._start
+        of = _table()[radar.number][version]
+        return of.believed if self._reading["truth"] == "as believed" else of.true
+
+    @staticmethod
+    def _place(component: str) -> int:
+        return tuple(measures.COMPONENTS).index(component)
+
+    def _series(self, key: Any, values: np.ndarray) -> Series:
+        axes = self.case(key).axes
+        values = values[: len(axes.k)]
+        kept = np.isfinite(values) & (axes.t_s <= self._limit_s + 1e-6)
+        return Series(axes.k[kept], axes.t_s[kept], *(values[kept],) * 3)
