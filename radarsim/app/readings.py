@@ -1,26 +1,30 @@
 """Verdicts under every reading that the papers allow: computed exactly or by small stored runs, and written."""
 
 import csv
+import hashlib
 import io
-from collections.abc import Callable, Sequence
+import json
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from radarsim import __version__
 from radarsim.app import configs, output, simulation
 from radarsim.app.simulation import RunOptions
 from radarsim.config.experiment import Case, Experiment
+from radarsim.engine.stopping import Signals
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.report import files
 from radarsim.report.claims import PaperClaims
 from radarsim.report.claims.declared import Claim
-from radarsim.report.claims.over import Over, Under, columns, rows, under
+from radarsim.report.claims.over import Over, Under, columns, depth, rows, under
 from radarsim.report.claims.readings import PaperReadings, Reading, Seen, Unreadable
 from radarsim.report.claims.search import Search
 from radarsim.studies import registry
 
 Progress = Callable[[int, int, int], None]
-FOLDER, TABLE = "readings", "readings.csv"
+FOLDER, TABLE, DRAWN = "readings", "readings.csv", "drawn.json"
 
 
 @dataclass(frozen=True)
@@ -60,58 +64,93 @@ def papers() -> dict[str, Paper]:
     return dict(sorted(found.items()))
 
 
-def asked(names: Sequence[str]) -> list[tuple[Paper, list[Claim], bool]]:
-    """The papers that are asked for, their claims, and whether as wholes; all, where no name is given.
+@dataclass(frozen=True)
+class Asked:
+    """What is wanted of a paper: its claims, which readings of them, and whether it is wanted as a whole."""
 
-    Raises ConfigError for a name that is neither a paper nor a claim, saying what is allowed.
+    paper: Paper
+    claims: list[Claim]
+    whole: bool
+    only: Mapping[str, str] = field(default_factory=dict)
+
+    def readings(self, claim: Claim) -> list[Reading]:
+        """The readings of a claim, the default one first, and with `only` those that take these alternatives."""
+        default, *others = self.paper.readings.of_claim(claim.id)
+        return [default, *(one for one in others if all(one[key] == value for key, value in self.only.items()))]
+
+
+def asked(names: Sequence[str] = (), only: Sequence[str] = ()) -> list[Asked]:
+    """What names of papers (P1) and claims (P1.4) ask for; all papers, where there is no name.
+
+    only: texts CHOICE=VALUE. Raises ConfigError for a paper, claim, choice or value that is not there, saying which
+    are.
     """
     every = papers()
     owner = {claim.id: key for key, paper in every.items() for claim in paper.claims.claims}
-    faults = []
-    for name in names:
-        if name not in every and name not in owner:
-            paper = name.partition(".")[0]
-            ids = [claim for claim, key in owner.items() if key == paper]
-            allowed = f"claims of {paper}: {', '.join(ids)}" if ids else f"papers: {', '.join(every)}; or a claim: P1.4"
-            faults.append(f"readings: no paper or claim {name!r}; {allowed}")
+    faults = [_unknown(name, every, owner) for name in names if name not in every and name not in owner]
     if faults:
         raise ConfigError(*faults)
+    kept = _only(
+        only, [paper for key, paper in every.items() if not names or any(n.split(".")[0] == key for n in names)]
+    )
     found = []
     for key, paper in every.items():
         whole = not names or key in names
-        claims = [claim for claim in paper.claims.claims if whole or claim.id in names]
+        claims = [one for one in paper.claims.claims if (whole or one.id in names) and not one.extension]
         if claims:
-            found.append((paper, [claim for claim in claims if not claim.extension], whole))
+            found.append(Asked(paper, claims, whole, kept))
+    return found
+
+
+def _unknown(name: str, every: Mapping[str, Paper], owner: Mapping[str, str]) -> str:
+    ids = [claim for claim, key in owner.items() if key == name.partition(".")[0]]
+    allowed = f"its claims: {', '.join(ids)}" if ids else f"papers: {', '.join(every)}; claims as P1.4"
+    return f"readings: no paper or claim {name!r}; {allowed}"
+
+
+def _only(texts: Sequence[str], wanted: Sequence[Paper]) -> dict[str, str]:
+    choices = {choice.key: choice for paper in wanted for choice in paper.readings.choices}
+    found, faults = {}, []
+    for text in texts:
+        key, _, value = (part.strip() for part in text.partition("="))
+        if key not in choices:
+            faults.append(f"--only {text}: no choice {key!r}; choices: {', '.join(choices)}")
+        elif value not in (values := [one.name for one in choices[key].alternatives]):
+            faults.append(f"--only {text}: no value {value!r} of {key}; values: {', '.join(values)}")
+        found[key] = value
+    if faults:
+        raise ConfigError(*faults)
     return found
 
 
 def readings(
-    names: Sequence[str] = (),
+    wanted: Sequence[Asked],
     *,
     out: str | Path,
     realisations: int | None = None,
     options: RunOptions | None = None,
     progress: Progress | None = None,
-    write: bool = True,
+    figures: bool = True,
+    stop: Signals | None = None,
 ) -> Done:
     """Judge claims under every reading and write table and specification curves into out/readings.
 
-    names are papers (P1) and claims (P1.4); none: all. realisations of each run, where runs are needed; default: what
-    the paper's readings declare. Runs go through the store of blocks under out, so that a second call continues.
-    Raises ConfigError for an unknown name, TargetUnmet where a time limit left something undone.
+    wanted is of `asked`. realisations of each run, where runs are needed; default: what the paper's readings declare.
+    Runs go through the store of blocks under out, so that a second call continues. Raises TargetUnmet where a time
+    limit left something undone, Interrupted where `stop` saw a signal.
     """
-    wanted = asked(names)
     options = replace(options or RunOptions(), out=out)
-    plans = [Plan(paper, claims, realisations or paper.readings.realisations) for paper, claims, _ in wanted]
+    plans = [Plan(one, realisations or one.paper.readings.realisations) for one in wanted]
     total, done = sum(plan.total for plan in plans), 0
     read = []
-    for plan, (paper, _, whole) in zip(plans, wanted, strict=True):
-        over = plan.judged(options, _after(progress, done, total))
+    for plan, one in zip(plans, wanted, strict=True):
+        over = plan.judged(options, _after(progress, done, total), stop)
         done += plan.total
-        read.append(Read(paper, over, paper.readings.search() if whole else None))
+        search = one.paper.readings.search() if one.whole and not one.only else None
+        read.append(Read(one.paper, over, search))
     made = Done(read, Path(out) / FOLDER)
-    if write:
-        made.files = _write(made)
+    if not any(one.only for one in wanted):
+        made.files = _write(made, figures)
     return made
 
 
@@ -122,16 +161,16 @@ def _after(progress: Progress | None, before: int, total: int) -> Progress | Non
 class Plan:
     """The runs that a paper's readings need, each once, and the verdicts from them."""
 
-    def __init__(self, paper: Paper, claims: Sequence[Claim], realisations: int):
-        self._paper, self._claims, self._n = paper, list(claims), realisations
+    def __init__(self, wanted: Asked, realisations: int):
+        self._wanted, self._paper, self._n = wanted, wanted.paper, realisations
         self._experiments: dict[str, Experiment] = {}
         self._jobs: dict[tuple[str, ...], list[tuple[Case, Case]]] = {}  # key: original and changed cases
         self._key: dict[tuple[str, Reading], tuple[str, ...]] = {}
         self._impossible: dict[tuple[str, Reading], str] = {}
         self._seen: dict[tuple[str, ...], Seen] = {}
-        if not paper.readings.exact:
-            for claim in self._claims:
-                for reading in paper.readings.of_claim(claim.id):
+        for claim in wanted.claims:
+            if not self._paper.readings.exact(claim):
+                for reading in wanted.readings(claim):
                     self._add(claim, reading)
 
     def _add(self, claim: Claim, reading: Reading) -> None:
@@ -158,7 +197,7 @@ class Plan:
         """Realisations over all runs."""
         return sum(len(pairs) for pairs in self._jobs.values()) * self._n
 
-    def judged(self, options: RunOptions, progress: Progress | None) -> list[Over]:
+    def judged(self, options: RunOptions, progress: Progress | None, stop: Signals | None) -> list[Over]:
         """Every claim under every reading."""
         done = 0
         for key, pairs in self._jobs.items():
@@ -166,10 +205,14 @@ class Plan:
                 self._seen[key] = self._run(key[0], pairs, options, _shifted(progress, done))
             except ConfigError as error:
                 self._fail(key, error.lines[0])
+            except TargetUnmet:
+                if stop is not None:
+                    stop.raise_if_received()
+                raise
             done += len(pairs) * self._n
         return [
-            Over(claim, tuple(self._under(claim, one) for one in self._paper.readings.of_claim(claim.id)))
-            for claim in self._claims
+            Over(claim, tuple(self._under(claim, one) for one in self._wanted.readings(claim)))
+            for claim in self._wanted.claims
         ]
 
     def _run(
@@ -198,7 +241,7 @@ class Plan:
         why = self._impossible.get((claim.id, reading))
         if why is None:
             try:
-                seen = None if of.exact else self._seen[self._key[claim.id, reading]]
+                seen = None if of.exact(claim) else self._seen[self._key[claim.id, reading]]
                 return under(of, claim, reading, of.evidence(claim, reading, seen, self._paper.claims))
             except Unreadable as error:
                 why = str(error)
@@ -210,19 +253,43 @@ def _shifted(progress: Progress | None, before: int) -> Progress | None:
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
-def _write(done: Done) -> tuple[str, ...]:
-    """Write the table, with the stored rows of claims that were not asked for, and a curve a claim."""
+def _write(done: Done, figures: bool) -> tuple[str, ...]:
+    """Write the table, with the stored rows of claims that were not asked for, and a curve a claim.
+
+    A curve whose claim came out as it did before is not drawn again: `drawn.json` keeps what the files were drawn of.
+    """
+    contents = {TABLE: _table(done).encode()}
+    if figures:
+        drawn = _drawn(done.folder)
+        for over in (over for read in done.read for over in read.over):
+            if len(over.under) > 1 and over.outcome is not None:
+                contents |= _curve(done, over, drawn)
+        contents[DRAWN] = (json.dumps(drawn, indent=1, sort_keys=True) + "\n").encode()
+    files.replace_all(done.folder, contents)
+    return tuple(sorted(name for name in contents if name != DRAWN))
+
+
+def _curve(done: Done, over: Over, drawn: dict[str, str]) -> dict[str, bytes]:
+    """The files of a claim's specification curve; none where they stand there already."""
+    of = next(read.paper.readings for read in done.read if over in read.over)
+    content = repr([(one.name, one.kind, depth(one), one.why) for one in over.under]) + over.sentence() + __version__
+    mark = hashlib.sha256(content.encode()).hexdigest()
+    name = f"{over.claim.id}.svg"
+    if drawn.get(name) == mark and (done.folder / name).is_file():
+        return {}
     from radarsim.report import figures as drawing  # Matplotlib
     from radarsim.report.claims import curve
 
-    contents = {TABLE: _table(done).encode()}
-    for read in done.read:
-        for over in read.over:
-            if len(over.under) > 1 and over.outcome is not None:
-                figure = curve.specification(read.paper.readings, over)
-                contents |= {f"{over.claim.id}.{kind}": data for kind, data in drawing.save(figure).items()}
-    files.replace_all(done.folder, contents)
-    return tuple(sorted(contents))
+    drawn[name] = mark
+    return {name: drawing.save(curve.specification(of, over), ("svg",))["svg"]}
+
+
+def _drawn(folder: Path) -> dict[str, str]:
+    try:
+        found = json.loads(files.read(folder / DRAWN))
+    except (OSError, ValueError):
+        return {}
+    return {str(name): str(mark) for name, mark in found.items()} if isinstance(found, dict) else {}
 
 
 def _table(done: Done) -> str:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from radarsim.app.doctor import Inspection
     from radarsim.app.inventory import Inventory
     from radarsim.app.outlook import Outlook
+    from radarsim.app.readings import Done
     from radarsim.app.result import Result
     from radarsim.app.simulation import Shares
     from radarsim.config.experiment import Experiment
@@ -306,6 +307,22 @@ def _print_claim_lines(rows: Sequence[dict[str, Any]], measured: Callable[[Mappi
         if row["overall"] != "not run":
             part = f"{row['case']}: {row['what']} {measured(row)}; expected {row['expected']}"
             say(f"       {row['verdict']:<20} {part}")
+
+
+def print_readings(done: "Done", detailed: bool) -> None:
+    """A line a claim, of single claims a line a reading too, and what the joint search came to."""
+    for read in done.read:
+        for over in read.over:
+            if detailed:
+                for one in over.under:
+                    outcome = one.outcome.kind if one.outcome else f"not possible: {one.why}"
+                    say(f"       {one.kind}  {outcome:<24} {one.name}")
+            found = over.outcome
+            say(f"{over.claim.id:<6} {found.words if found else 'not judged':<24} {over.sentence()}")
+        if read.search is not None:
+            say(f"{read.search.paper}: {read.search.sentence()}")
+    if done.files:
+        say(f"table    {done.folder / 'readings.csv'}; curves: {plural(len(done.files) - 1, 'figure')} drawn anew")
 
 
 def print_inventory(inventory: "Inventory") -> None:

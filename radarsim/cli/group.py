@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 SECTIONS = {
     "Run": ("run", "check"),
-    "Read": ("report", "claims"),
+    "Read": ("report", "claims", "readings"),
     "Design": ("solve",),
     "Own data": ("new", "import", "simulate", "track", "new-study"),
     "Maintenance": ("list", "schema", "doctor", "clean"),

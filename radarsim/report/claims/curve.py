@@ -27,9 +27,9 @@ def specification(of: PaperReadings, over: Over) -> Figure:
     return Figure(
         name=over.claim.id,
         title=f"{over.claim.id} under every reading",
-        caption=f"{over.claim.statement}. Above: how far the worst part of the claim lies from what the paper says, in "
-        f"margins of that part, cut at ± {FURTHEST:g}; under 0 it holds, over 1 it fails beyond the margin. Below: what each "
-        f"reading takes. {over.sentence().capitalize()}.",
+        caption=f"{over.claim.statement}. Above: how far the worst part of the claim is from what the paper says, in "
+        f"margins of that part, cut at ± {FURTHEST:g}; under 0 it holds, over 1 it fails beyond the margin. Below: "
+        f"what each reading takes. {over.sentence().capitalize()}.",
         panels=(_above(every, where, ends, over), *([_below(varied, every, where)] if varied else [])),
         width_mm=PAGE_MM,
         panel_height_mm=max(62.0, 4.2 * sum(len(choice.alternatives) + 1 for choice in varied)),

@@ -150,9 +150,8 @@ class PaperReadings(ABC):
         assert seen is not None  # a paper whose values are exact gives evidence of its own
         return of.evidence(seen.results, seen.tables, seen.places)
 
-    @property
-    def exact(self) -> bool:
-        """Whether the evidence is exact, so that nothing is run."""
+    def exact(self, claim: Claim) -> bool:
+        """Whether the evidence of a claim is exact, so that nothing is run. Default: no."""
         return False
 
     def search(self) -> "Search | None":

@@ -134,8 +134,7 @@ class Readings(PaperReadings):
     paper = "P1"
     choices = CHOICES
 
-    @property
-    def exact(self) -> bool:
+    def exact(self, claim: Claim) -> bool:
         return True
 
     def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> "ExactEvidence":

@@ -32,6 +32,7 @@ R, V, A = range(3)
 
 
 INFINITE = np.inf
+LOWEST = -1e300  # under every gain
 
 
 def _printed(
@@ -191,7 +192,7 @@ def _when_largest(values: np.ndarray) -> np.ndarray:
 
 def _rises(top: np.ndarray) -> np.ndarray:
     """Where a running maximum (B, K) is a new one."""
-    return np.diff(np.nan_to_num(top, nan=-INFINITE), axis=1, prepend=-INFINITE) > 0
+    return np.diff(np.nan_to_num(top, nan=LOWEST), axis=1, prepend=LOWEST) > 0
 
 
 def _first_gone(values: np.ndarray, last: np.ndarray) -> np.ndarray:

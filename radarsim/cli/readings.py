@@ -1,0 +1,76 @@
+"""The command that judges the papers' claims under every reading. Heavy imports wait inside it."""
+
+import click
+
+from radarsim.cli.group import Positive, figures_option, json_option, main, out_option, realisations_option
+
+
+@main.command()
+@click.argument("names", nargs=-1, metavar="[CLAIM | PAPER …]")
+@realisations_option
+@click.option(
+    "--only", "only", multiple=True, metavar="CHOICE=VALUE", help="Readings that take this alone; writes no file."
+)
+@click.option("--threads", type=click.IntRange(1, 1024), metavar="T", help="Threads; default: all cores.")
+@click.option("--time-limit", type=Positive("SECONDS"), metavar="SECONDS", help="Stop cleanly then, keep what is done.")
+@out_option
+@figures_option
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@json_option
+@click.option("--markdown", is_flag=True, help="The pages docs/readings_….md of these papers, in place of text.")
+def readings(
+    names: tuple[str, ...],
+    realisations: int | None,
+    only: tuple[str, ...],
+    threads: int | None,
+    time_limit: float | None,
+    out: str,
+    no_figures: bool,
+    quiet: bool,
+    as_json: bool,
+    markdown: bool,
+) -> None:
+    """A verdict under every reading that the paper allows.
+
+    A paper leaves choices open: how a filter starts, which flight, which of two printed numbers. Each claim is judged
+    under all of them, exactly where that is possible, else by small runs that are stored and continued. E and U
+    readings (equivalent, unstated) decide how robust a verdict is; N (against the print) shows what would have to be
+    changed. PAPER is P1, P2, P3 or P4; without any, all. Writes DIR/readings/readings.csv and a specification curve a
+    claim; of whole papers it also searches for the choices that give most of the printed numbers.
+
+    \b
+    Examples
+      radarsim readings P1
+      radarsim readings P1.4                          with every reading of this claim
+      radarsim readings P2 -n 200 --threads 2         a quick look; the same with more continues
+      radarsim readings P1.4 --only start=unweighted
+      radarsim readings P1 --json | jq '.[] | select(.depends_on != [])'
+    """
+    from radarsim.engine import stopping
+
+    limit = stopping.time_limit(time_limit) if time_limit else None
+    with stopping.Signals() as stop:
+        from radarsim.app import documents
+        from radarsim.app import readings as app
+        from radarsim.app.simulation import RunOptions
+        from radarsim.cli import console
+
+        wanted = app.asked(names, only)
+        silent = quiet or as_json or markdown
+        with console.Progress("readings", quiet=silent) as progress:
+            options = RunOptions(out, threads, stopping.Either(stop, limit))
+            done = app.readings(
+                wanted,
+                out=out,
+                realisations=realisations,
+                options=options,
+                progress=progress.update,
+                figures=not no_figures,
+                stop=stop,
+            )
+        if as_json:
+            click.echo(documents.text(app.documents(done)))
+        elif markdown:
+            click.echo(app.pages(done), nl=False)
+        elif not quiet:
+            console.print_readings(done, detailed=any("." in name for name in names))

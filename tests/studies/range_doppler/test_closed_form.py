@@ -1,0 +1,88 @@
+"""The groups, the limit of fast scans and the sign of the gain in acceleration, against the recursion."""
+
+import numpy as np
+import pytest
+
+from radarsim.studies.range_doppler import closed_form, exact, recursion
+from radarsim.studies.range_doppler.measures import RADARS
+
+VERSION = [("random_jerk", 1e-3, "weighted")]
+
+
+def gains(radar, variance, scans=15):
+    base, own = recursion.both(radar, [("random_jerk", variance, "weighted")], scans)
+    return recursion.gain(base.true[0], own.true[0])[2:]
+
+
+def test_gains_depend_on_the_scan_and_the_two_groups_alone():
+    rng = np.random.default_rng(5)
+    for _ in range(300):
+        sigma_r, sigma_V, dt = 10 ** rng.uniform([0, -1, -1], [3, 2, 2])
+        variance = 10 ** rng.uniform(-6, 2)
+        of = closed_form.groups(sigma_r, sigma_V, dt, variance)
+        # Another radar with the same groups: a range and a period of its own, the rest follows.
+        other_r, other_dt = 10 ** rng.uniform([0, -1], [3, 2])
+        other_V = other_r / (other_dt * np.sqrt(of.C_theta))
+        other_variance = (of.Lambda * other_r / other_dt**3) ** 2
+        same = closed_form.groups(other_r, other_V, other_dt, other_variance)
+        assert np.allclose(same, of, rtol=1e-12)
+        own, other = gains((sigma_r, sigma_V, dt), variance), gains((other_r, other_V, other_dt), other_variance)
+        # Gains are differences of two σ: rounding is that of σ, amplified where the groups are extreme.
+        np.testing.assert_allclose(own, other, atol=1e-6 * (1 + abs(own).max()))
+
+
+@pytest.mark.parametrize("c", [0.1, 0.698, 3.0, 30.0, 300.0])
+def test_the_error_polynomial_is_that_of_the_riccati_gain(c):
+    K = closed_form.steady_gain(c)
+    closed = closed_form.MOTION - np.column_stack([K, np.zeros(3)])
+    np.testing.assert_allclose(np.poly(closed), closed_form.error_polynomial(c), rtol=1e-9)
+
+
+def test_without_velocity_the_variances_are_simple_fractions():
+    np.testing.assert_allclose(closed_form.noise_variances(0.0), [5 / 3, 3 / 2, 1 / 3], rtol=1e-12)
+    np.testing.assert_allclose(closed_form.error_polynomial(0.0), [1, 2, 2, 1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("c", [0.3, 1.0, 10.0, 100.0])
+def test_the_limit_is_that_of_the_recursion_for_fast_scans(c):
+    sigma_r, variance = 100.0, 1e-2
+    memory = closed_form.filter_memory(sigma_r, variance)
+    sigma = np.array([sigma_r, sigma_r / (memory * np.sqrt(c))])
+    away = []
+    for share in (0.02, 0.01):
+        both = [exact.steady_state(observes, variance, sigma, share * memory)[1] for observes in (1, 2)]
+        base, own = (np.sqrt(np.diag(S)) for S in both)
+        away.append(recursion.gain(base, own) - closed_form.steady_gains(c))
+    np.testing.assert_allclose(2 * away[1] - away[0], 0, atol=0.02)  # of first order in Δt: extrapolated, per cent
+    assert np.all(abs(away[1]) < 0.03 * 100)
+    unit = sigma_r**2 * share * memory**1 / memory * np.array([1, memory**-2, memory**-4])
+    np.testing.assert_allclose(np.diag(both[1]), unit * closed_form.noise_variances(c), rtol=0.1)
+
+
+def test_the_acceleration_gain_changes_sign_at_c_of_seven_tenths():
+    at = closed_form.no_acceleration_gain()
+    assert at == pytest.approx(0.698, abs=5e-4)
+    assert closed_form.steady_gains(0.9 * at)[2] < 0 < closed_form.steady_gains(1.1 * at)[2]
+
+
+def test_what_it_says_of_the_papers_radars():
+    of = {n: closed_form.groups(*radar, 1e-3) for n, radar in RADARS.items()}
+    assert of[2].c == pytest.approx(of[3].c) and of[4].c == pytest.approx(of[5].c)  # differ in Δt alone
+    assert [round(of[n].c, 2) for n in (1, 2, 4)] == [0.29, 0.70, 18.42]
+    assert closed_form.steady_gains(of[1].c)[2] < -1  # RLS 1 loses in acceleration
+    assert abs(closed_form.steady_gains(of[2].c)[2]) < 0.1  # RLS 2 and 3 neither lose nor gain
+    assert closed_form.steady_gains(of[4].c)[2] > 20
+
+
+def test_a_target_that_moves_as_believed_never_loses_by_the_velocity():
+    variances = (1e-4, 1e-3, 1e-2)
+    for radar in RADARS.values():
+        for start, from_scan in (("process_noise", 0), ("weighted", 40)):
+            base, own = recursion.both(radar, [("random_jerk", v, start) for v in variances], 120)
+            assert np.nanmin(recursion.gain(base.believed, own.believed)[:, from_scan:]) > -1e-6
+    # Two that do not heed the manoeuvre while they start, one over two scans and one over three, are not comparable.
+    base, own = recursion.both(RADARS[1], [("random_jerk", 1e-2, "weighted")], 60)
+    assert np.nanmin(recursion.gain(base.believed, own.believed)) < -1
+    # And the same filters lose on a truth that does not manoeuvre, where c is small.
+    base, own = recursion.both(RADARS[1], VERSION, 60)
+    assert np.nanmin(recursion.gain(base.true, own.true)[:, 40:]) < -1
