@@ -12,7 +12,7 @@ STUDY = StudyFolder(
         "method: ridge": "the classical rival: short-time spectrum, robust fit, unwrapping, then scoring; no prior",
     },
     paper=Paper("Uss, Baryshev & Djavad 2010", page="discriminator", may_grow=("estimators",)),
-    offers=("curves",),
+    offers=("curves", "readings"),
     exact_errors=False,  # exact_sigma is the bound, which an estimator reaches or does not
     draws_sweeps=True,  # lock is what is swept for, and has figures of its own
 )

@@ -1,0 +1,307 @@
+"""What P4 leaves open, and its claims under each reading.
+
+Spreads and windows are exact. Locks and accuracies are small runs of the shipped configs whose noise, forecast and
+windows are those of the reading.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Any, cast
+
+import numpy as np
+
+from radarsim.config.experiment import Case
+from radarsim.report.claims import certain
+from radarsim.report.claims.declared import Claim, PaperClaims, Part
+from radarsim.report.claims.readings import Alternative, Choice, PaperReadings, Reading, Seen, Unreadable
+from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED
+from radarsim.report.claims.search import Search
+from radarsim.report.statistics import Estimate
+from radarsim.studies.discriminator import measures, versions
+from radarsim.studies.discriminator.measures import COMPONENTS, COMPUTED
+from radarsim.studies.discriminator.versions import Burst, Version
+
+BURST = Burst(1e-5, (100.0, 150.0, 500.0, 1000.0, 2000.0))
+PRINTED_PRIOR = (6.1, 67.5, 6.1e3, 183.38e3, 2.426e6)  # rad, Hz, Hz/s, Hz/s², Hz/s³
+SHIPPED_NOISE = measures.READINGS[COMPUTED][0]
+LEAST_RATIO = 5.0  # μ_min
+EXACT = ("P4.1", "P4.2", "P4.3", "P4.8")
+WINDOWS = ("P4.2", "P4.3", "P4.8")
+RUN = ("P4.4", "P4.5", "P4.6", "P4.7", "P4.9", "P4.10")
+NO_ROOT = "(15) has no root: with the phase in it, its left side is over c at every length"
+
+CHOICES = (
+    Choice(
+        "noise_variance",
+        "σ_η² of the experiment",
+        "Амплитуду отраженного сигнала на приемной стороне условно примем равной единице, A = 1, а дисперсию помехи "
+        "σ_η² = 9. […] σ_φ0(T) = 0,061; σ_f0(T) = 0,45 Гц; …",
+        "The amplitude is taken as one, A = 1, and the variance of the noise as 9. […] The printed potential spreads "
+        "are those of a quarter of it.",
+        (
+            Alternative("9", UNSTATED, "as printed among the parameters"),
+            Alternative("2.25", UNSTATED, "as the printed spreads have it: the print contradicts itself"),
+        ),
+    ),
+    Choice(
+        "threshold",
+        "c, under which a start lies in the main lobe",
+        "Δθᵀ·H(T)·Δθ < 1 (10); P(Δθᵀ·H(T)·Δθ < 0.5) > P_Δ (11); tr(…) + 3·√(…) ≤ 1 (14)",
+        "The condition is printed with 1 in (10) and (14) to (16), and with 0.5 in (11).",
+        (
+            Alternative("0.5", UNSTATED, "as in (11), and as Z < μ before (10) gives it"),
+            Alternative("1", UNSTATED, "as in (10) and (14) to (16)"),
+        ),
+        (*WINDOWS, *RUN),
+    ),
+    Choice(
+        "forecast",
+        "The spreads of the forecast",
+        "… СКО в 100, 150, 500, 1000 и 2000 раз выше потенциальных … √diag(R_пр) = (6,1; 67,5 Гц; 6,1·10³ Гц²; "
+        "183,38·10³ Гц³; 2,426·10⁶ Гц⁴)",
+        "… standard deviations 100, 150, 500, 1000 and 2000 times the potential ones … and the numbers of it.",
+        (
+            Alternative("numbers", UNSTATED, "the printed numbers"),
+            Alternative("multiples", UNSTATED, "the printed multiples of the reading's own potential spreads"),
+        ),
+        (*WINDOWS, *RUN),
+    ),
+    Choice(
+        "first_phase",
+        "The phase in (15), of which there is no forecast",
+        "Так как прогноз θ_пр не содержит оценки начальной фазы, то на первом этапе нужно дополнительно выполнить поиск "
+        "по начальной фазе.",
+        "As the forecast holds no estimate of the initial phase, a search over it is needed at the first step.",
+        (
+            Alternative("left out of the form", UNSTATED, "unknown, and searched for: no part of the start's error"),
+            Alternative("left out of the problem", UNSTATED, "as if known: no row of any matrix"),
+            Alternative("kept", UNSTATED, "as (15) is printed, with the forecast's spread of 6.1 rad"),
+        ),
+        WINDOWS,
+    ),
+    Choice(
+        "rounding",
+        "How a window becomes a whole number of pulses",
+        "При этом нужно учитывать, что T_k может принимать только дискретные значения, кратные T_имп.",
+        "T_k can take discrete values only, multiples of the pulse period.",
+        (
+            Alternative("nearest", UNSTATED, "the nearest"),
+            Alternative("up", UNSTATED, "the next longer"),
+            Alternative("down", UNSTATED, "the next shorter, which alone keeps (14)"),
+        ),
+        WINDOWS,
+    ),
+    Choice(
+        "curvature",
+        "The window of H in (16)",
+        "H = H(T_{k+1}) = (Φ(T_{k+1}) + R_пр⁻¹)/(2μ); tr(R_Δθ(T_k, T_{k+1})·H(T_k)) + "
+        "3·√(2 tr([H(T_{k+1})·R_Δθ]²)) = 1 (16)",
+        "Defined at T_{k+1}; in (16) printed at T_k in the first term and at T_{k+1} in the second.",
+        (
+            Alternative("next", UNSTATED, "at T_{k+1} in both, as defined before (16)"),
+            Alternative("as printed", UNSTATED, "at T_k in the first term, as printed in (16)"),
+            Alternative("before", AGAINST, "at T_k in both"),
+        ),
+        (*WINDOWS, "P4.4", "P4.5"),
+    ),
+    Choice(
+        "pulses",
+        "How many pulses there are",
+        "n_пачки = 30000, T_пачки = T = 0,3 c",
+        "30000 pulses, 0.3 s",
+        (
+            Alternative("30000", EQUIVALENT, "as printed"),
+            Alternative("29999", UNSTATED, "as many periods as lie between 30000 pulses: sums over l = 0 … 29 998"),
+        ),
+        EXACT,
+    ),
+    Choice(
+        "sum",
+        "Whether Φ is a sum over pulses or its integral",
+        "Φ_θ(T) … μ = (A²·T·t_имп)/(4σ_η²·Δt·T_имп)",
+        "The matrix is given as an integral over T.",
+        (
+            Alternative("closed form", EQUIVALENT, "the integral"),
+            Alternative("pulse by pulse", EQUIVALENT, "the sum that it stands for"),
+        ),
+        EXACT,
+    ),
+    Choice(
+        "factor",
+        "How many standard deviations go with P_Δ = 0.99",
+        "Полагая P_Δ = 0,99 … tr(R_Δθ·H) + 3·√(2 tr([H·R_Δθ]²)) ≤ 1",
+        "With P_Δ = 0.99 … three standard deviations",
+        (
+            Alternative("3", EQUIVALENT, "as printed"),
+            Alternative("2.326", AGAINST, "the normal quantile of 0.99"),
+        ),
+        WINDOWS,
+    ),
+    Choice(
+        "counted",
+        "Which windows count as iterations",
+        "… начиная с T_0 = 1,79 ms требуется 12 итераций.",
+        "… beginning with T₀ = 1.79 ms it takes 12 iterations.",
+        (
+            Alternative("after the first", UNSTATED, "T₁ … T₁₂"),
+            Alternative("in all", UNSTATED, "T₀ … T₁₁"),
+        ),
+        ("P4.3",),
+    ),
+)
+
+
+class Readings(PaperReadings):
+    """P4's readings."""
+
+    paper = "P4"
+    choices = CHOICES
+    realisations = 500
+
+    def exact(self, claim: Claim) -> bool:
+        return claim.id in EXACT
+
+    def of_claim(self, claim: str) -> list[Reading]:
+        """Of what is exact all combinations of E and U; of what is run, of the choices that bear on it."""
+        own = [choice for choice in self.choices if choice.bears_on(claim)]
+        singly = [
+            self.reading(**{choice.key: one.name})
+            for choice in own
+            for one in choice.alternatives
+            if one.kind == AGAINST
+        ]
+        return list(dict.fromkeys([*self.combined(own), *singly]))
+
+    def parts(self, claim: Claim) -> Sequence[Part]:
+        """Of parts that stand there in both shipped readings, those of one: the reading takes its place."""
+        of_both = [part for part in claim.parts if part.cases[0] in measures.READINGS]
+        return [part for part in claim.parts if part not in of_both or part.cases[0] == COMPUTED]
+
+    def changed(self, claim: Claim, case: Case, reading: Reading) -> Case | None:
+        """The case with the noise and forecast of a reading, and its windows in place of those of its estimators.
+
+        One of the two shipped readings takes the place of any; of the sweeps, those that a part asks for.
+        """
+        keys = {key for part in claim.parts for key in part.cases if isinstance(key, tuple)}
+        noise = case.spec.burst.noise_variance
+        wanted = any(_is_swept(case, *key) for key in keys) if case.swept else noise == SHIPPED_NOISE
+        if not wanted:
+            return None
+        own = version(reading)
+        given = {"sigma": own.sigma, "spread_over_potential": None if own.sigma else BURST.multiples}
+        changes = {
+            "burst": case.spec.burst.model_copy(update={"noise_variance": noise * own.noise_variance / SHIPPED_NOISE}),
+            "prior": case.spec.prior.model_copy(update=given),
+            "estimators": tuple(_changed(one, own) for one in case.spec.estimators),
+        }
+        return replace(case, spec=case.spec.model_copy(update=changes))
+
+    def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> measures.Evidence:
+        if seen is None:
+            return ExactEvidence(reading)
+        return super().evidence(claim, reading, seen, of)
+
+    def search(self) -> Search:
+        from radarsim.studies.discriminator import search
+
+        return search.search()
+
+
+def _is_swept(case: Case, key: str, value: float) -> bool:
+    """Whether a case varies this key alone, and takes this value."""
+    return len(case.swept) == 1 and case.swept[0][0] == key and np.isclose(float(str(case.swept[0][1])), value)
+
+
+def _changed(estimator: Any, own: Version) -> Any:
+    """An estimator as a reading has it: its threshold, and the windows that no key of a config asks for.
+
+    Those of which no claim speaks are cut to one window: they are not looked at.
+    """
+    kind = measures.kind_of(estimator, measures.READINGS[COMPUTED][1])
+    if kind == "other":
+        return estimator.model_copy(update={"first_windows": 1, "phases": 0, "steps": 5, "density": 1})
+    if estimator.schedule != "designed":
+        return estimator
+    changes: dict[str, Any] = {"main_lobe_threshold": own.threshold}
+    if own.curvature != "next":
+        lengths = tuple(n * BURST.period_s for n in windows(own))
+        changes |= {"schedule": lengths[: estimator.first_windows], "first_windows": None}
+    return estimator.model_copy(update=changes)
+
+
+def version(reading: Reading) -> Version:
+    """What the readings' names mean for (14) to (16)."""
+    return Version(
+        float(reading["noise_variance"]),
+        float(reading["threshold"]),
+        float(reading["factor"]),
+        PRINTED_PRIOR if reading["forecast"] == "numbers" else None,
+        cast(versions.Phase, reading["first_phase"]),
+        cast(versions.Rounding, reading["rounding"]),
+        cast(versions.Curvature, reading["curvature"]),
+        int(reading["pulses"]),
+        cast(versions.Sum, reading["sum"]),
+    )
+
+
+SCALES = (10.0, 1.0, 0.1, 0.01, 0.001)  # of the forecast, in P4.8
+
+
+@cache
+def _designed() -> Mapping[Version, tuple[np.ndarray, list[int] | None]]:
+    """Spreads and windows of every version that a declared reading asks for, all at once."""
+    of = Readings()
+    plain = {version(one) for claim in ("P4.1", *WINDOWS) for one in of.of_claim(claim)}
+    found = versions.designed(BURST, every := list(plain))
+    return {one: (spreads, own) for one, spreads, own in zip(every, found.spreads, found.windows, strict=True)}
+
+
+@cache
+def _scaled() -> Mapping[tuple[Version, float], int | None]:
+    """The first windows with the forecast's spreads times each of SCALES."""
+    plain = {version(one) for one in Readings().of_claim("P4.8")}
+    every = [(one, scale) for one in plain for scale in SCALES]
+    asked = []
+    for one, scale in every:
+        sigma = one.sigma or tuple(np.array(BURST.multiples) * _designed()[one][0])
+        asked.append(one._replace(sigma=tuple(scale * float(value) for value in sigma)))
+    first = versions.first_windows(BURST, asked)
+    return {key: int(n) or None for key, n in zip(every, first, strict=True)}
+
+
+def windows(own: Version) -> list[int]:
+    """The windows of a version in pulses; raises Unreadable where there are none."""
+    known = _designed()
+    found = known[own][1] if own in known else versions.designed(BURST, [own]).windows[0]
+    if found is None:
+        raise Unreadable(NO_ROOT)
+    return found
+
+
+class ExactEvidence(measures.Evidence):
+    """P4's spreads and windows under a reading, whatever reading of the shipped ones a part asks for."""
+
+    def __init__(self, reading: Reading):
+        super().__init__((), {}, {})
+        self._reading, self._version = reading, version(reading)
+
+    def windows(self, key: Any, kind: str = "sequence") -> np.ndarray:
+        """Window lengths in s; of a forecast with the scale that a key of a sweep names, the first alone."""
+        if isinstance(key, tuple):
+            first = _scaled()[self._version, float(key[1])]
+            if first is None:
+                raise Unreadable(NO_ROOT)
+            return np.array([first * BURST.period_s])
+        found = windows(self._version)
+        # Parts count the windows after the first; where all count, the first is one of them.
+        counted = [0, *found] if self._reading["counted"] == "in all" else found
+        return np.array(counted) * BURST.period_s
+
+    def potential(self, key: Any, component: str) -> Estimate:
+        return certain(_designed()[self._version][0][COMPONENTS.index(component)])
+
+    def shortest_window(self, key: Any, amplitude: float) -> Estimate:
+        """T_min (17), ms: one sample a pulse."""
+        noise = self._version.noise_variance
+        return certain(1e3 * 4 * LEAST_RATIO * noise * BURST.period_s / amplitude**2)
