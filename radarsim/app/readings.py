@@ -327,6 +327,13 @@ def stored(out: str | Path) -> list[dict[str, Any]]:
     return found
 
 
+def pages(done: Done) -> str:
+    """The page of each paper, one after the other."""
+    from radarsim.report.claims.readings_page import page
+
+    return "\n".join(page(read.paper.readings, read.paper.claims.paper, read.over, read.search) for read in done.read)
+
+
 def documents(done: Done) -> list[dict[str, Any]]:
     """What --json prints: a document a claim, with every reading."""
     found = []

@@ -56,15 +56,17 @@ def under(of: PaperReadings, claim: Claim, reading: Reading, evidence: Evidence)
 
 
 def _judged(part: Part, seen: Evidence, exact: bool) -> Judged:
-    measured = part.measure(seen)
-    nothing = math.nan
+    found, nothing = part.measure(seen), math.nan
+    measured, lo, hi = (nothing,) * 3 if exact else (float(found.value), float(found.lo), float(found.hi))
     return Judged(
-        *((nothing,) * 3 if exact else (float(value) for value in measured)),
+        measured,
+        lo,
+        hi,
         expected_lo=part.expected.lo,
         expected_hi=part.expected.hi,
         margin=part.expected.margin * (part.scale(seen) if part.scale else 1.0),
         kind=part.expected.kind,
-        exact=float(measured.value) if exact else nothing,
+        exact=float(found.value) if exact else nothing,
         ceiling=part.ceiling(seen) if part.ceiling else nothing,
         statement=part.statement,
         number=part.number,

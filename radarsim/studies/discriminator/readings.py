@@ -4,6 +4,7 @@ Spreads and windows are exact. Locks and accuracies are small runs of the shippe
 windows are those of the reading.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -12,7 +13,7 @@ from typing import Any, cast
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.report.claims import certain
+from radarsim.report.claims import Evidence, certain
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
 from radarsim.report.claims.readings import Alternative, Choice, PaperReadings, Reading, Seen, Unreadable
 from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED
@@ -70,8 +71,8 @@ CHOICES = (
     Choice(
         "first_phase",
         "The phase in (15), of which there is no forecast",
-        "Так как прогноз θ_пр не содержит оценки начальной фазы, то на первом этапе нужно дополнительно выполнить поиск "
-        "по начальной фазе.",
+        "Так как прогноз θ_пр не содержит оценки начальной фазы, то на первом этапе нужно дополнительно выполнить "
+        "поиск по начальной фазе.",
         "As the forecast holds no estimate of the initial phase, a search over it is needed at the first step.",
         (
             Alternative("left out of the form", UNSTATED, "unknown, and searched for: no part of the start's error"),
@@ -197,7 +198,7 @@ class Readings(PaperReadings):
         }
         return replace(case, spec=case.spec.model_copy(update=changes))
 
-    def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> measures.Evidence:
+    def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> Evidence:
         if seen is None:
             return ExactEvidence(reading)
         return super().evidence(claim, reading, seen, of)
@@ -210,7 +211,7 @@ class Readings(PaperReadings):
 
 def _is_swept(case: Case, key: str, value: float) -> bool:
     """Whether a case varies this key alone, and takes this value."""
-    return len(case.swept) == 1 and case.swept[0][0] == key and np.isclose(float(str(case.swept[0][1])), value)
+    return len(case.swept) == 1 and case.swept[0][0] == key and math.isclose(float(str(case.swept[0][1])), value)
 
 
 def _changed(estimator: Any, own: Version) -> Any:

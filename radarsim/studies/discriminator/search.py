@@ -62,9 +62,13 @@ def search() -> Search:
 def _version(*names: str) -> Version:
     of: Any = dict(zip(AXES, names, strict=True))
     return Version(
-        *(float(of[key]) for key in ("noise_variance", "threshold", "factor")),
+        float(of["noise_variance"]),
+        float(of["threshold"]),
+        float(of["factor"]),
         FORECASTS[of["forecast"]],
-        *(of[key] for key in ("first_phase", "rounding", "curvature")),
+        of["first_phase"],
+        of["rounding"],
+        of["curvature"],
         int(of["pulses"]),
         of["sum"],
     )

@@ -14,5 +14,5 @@ STUDY = StudyFolder(
         "covariance_at": "the plot's covariance at the plot or at its prediction",
     },
     paper=Paper("Sychev & Osipov 2023", page="multimodel", may_grow=("filters",)),
-    offers=("cost", "seconds_per_update", "recorded"),
+    offers=("cost", "readings", "seconds_per_update", "recorded"),
 )

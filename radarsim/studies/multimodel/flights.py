@@ -58,6 +58,16 @@ def _spiral(size: float, held_s: float, turns: int) -> list[dict[str, Any]]:
 
 
 FLIGHTS: dict[str, Flight] = {
+    "gentle, up and aside 40": _flight(
+        [
+            {"start_s": BEGINS, "normal_mps2": 40},
+            {"start_s": 135},
+            {"start_s": 140, "lateral_mps2": 40, "normal_mps2": 10},
+            {"start_s": 150},
+            {"start_s": 155, "lateral_mps2": -40, "normal_mps2": 20},
+        ],
+        ends=165,
+    ),
     "lateral weave 40": _flight(_weave(20, lateral_mps2=40)),
     "lateral weave 100": _flight(_weave(12, lateral_mps2=100)),
     "lateral reversals 100": _flight(_reversals("lateral_mps2", 100, 9, normal_mps2=20)),

@@ -5,6 +5,8 @@ Cases are found by target, scan period and what their filters are, whatever thei
 and bank.
 """
 
+from typing import Any
+
 import numpy as np
 
 from radarsim.engine.results import CaseResult
@@ -36,6 +38,11 @@ STAGES = {  # the shipped flights, as their stages tell them apart: names, and e
 AEROBALLISTIC = ("start", "ballistic", "manoeuvre", "after")
 
 
+def is_flight(target: Any, flight: str) -> bool:
+    """Whether a target of a shipped config is this flight."""
+    return tuple((stage.name, stage.end_s) for stage in target.stages) == STAGES[flight]
+
+
 class Evidence(claims.Evidence):
     """Finds cases by (target's stages and kind, scan period), and filters by what they are."""
 
@@ -58,8 +65,9 @@ class Evidence(claims.Evidence):
 
         Only cases with the keys of a shipped config are asked for, so its stages tell which it is.
         """
-        stages = tuple((stage.name, stage.end_s) for stage in result.spec.target.stages)
-        return stages == STAGES[flight] and result.axes.t_s[-1] >= DURATION - result.spec.sensor.scan_period_s
+        return (
+            is_flight(result.spec.target, flight) and result.axes.t_s[-1] >= DURATION - result.spec.sensor.scan_period_s
+        )
 
     def _index(self, result: CaseResult, wanted: tuple) -> int | None:
         """The number of a case's filter (family, rule, bank[, matrix]); the paper's matrix where none is named."""

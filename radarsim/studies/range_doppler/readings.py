@@ -220,14 +220,14 @@ class ExactEvidence(measures.Evidence):
 
     def curve(self, key: Any, filter_name: str, component: str) -> Series:
         """σ(k) of a filter."""
-        return self._series(key, self._sigma(key)[FILTERS.index(filter_name)][:, self._place(component)])
+        return self._cut(key, self._sigma(key)[FILTERS.index(filter_name)][:, self._place(component)])
 
     def gain(self, key: Any, filter_name: str, component: str) -> Series:
         """Relative gain of the filter with velocity, %, from the scan at which it has filtered."""
         base, own = (sigma[:, self._place(component)] for sigma in self._sigma(key))
         gain = recursion.gain(base, own)
         gain[: recursion.first_scan(self._start, 2) - 1] = np.nan
-        return self._series(key, gain)
+        return self._cut(key, gain)
 
     def settling(self, key: Any, observes: tuple[str, ...], component: str = "r") -> Estimate:
         """Scan periods from the first plot to settling for good; infinite where it does not within the run."""
@@ -266,7 +266,7 @@ class ExactEvidence(measures.Evidence):
     def _place(component: str) -> int:
         return tuple(measures.COMPONENTS).index(component)
 
-    def _series(self, key: Any, values: np.ndarray) -> Series:
+    def _cut(self, key: Any, values: np.ndarray) -> Series:
         axes = self.case(key).axes
         values = values[: len(axes.k)]
         kept = np.isfinite(values) & (axes.t_s <= self._limit_s + 1e-6)

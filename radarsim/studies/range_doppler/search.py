@@ -242,4 +242,4 @@ def _fine() -> Fine:
     """The windows in D_M, 200 values a decade."""
     values = numbers([(FORMS[0], variance, START_NAMES[0]) for variance in FINE])
     strict = _inside(values, [one.strict for one in PRINTED])
-    return Fine(FINE, strict[:, :, 0, SCANS.index(int(SHIPPED["scans"]))])
+    return Fine(FINE.tolist(), strict[:, :, 0, SCANS.index(int(SHIPPED["scans"]))])
