@@ -132,8 +132,8 @@ def rows(one: Under, names: Sequence[str]) -> list[dict[str, Any]]:
     return [
         blank
         | {
-            **{name: _cell(getattr(judged, name)) for name in ("measured", "lo", "hi", "exact", "margin")},
-            **{name: _cell(getattr(judged, name)) for name in ("expected_lo", "expected_hi")},
+            **{name: _cell(getattr(judged, name), never=True) for name in ("measured", "lo", "hi", "exact")},
+            **{name: _cell(getattr(judged, name)) for name in ("expected_lo", "expected_hi", "margin")},
             **{"part": number, "what": part.what, "unit": part.unit, "verdict": rule.verdict(judged, many)},
             **{"outcome": one.outcome.kind, "miss": _cell(rule.miss(judged))},
         }
@@ -141,8 +141,10 @@ def rows(one: Under, names: Sequence[str]) -> list[dict[str, Any]]:
     ]
 
 
-def _cell(value: float) -> float | str:
-    """A number as the table holds it: at twelve digits, empty where there is none."""
+def _cell(value: float, never: bool = False) -> float | str:
+    """A number as the table holds it: at twelve digits, empty where there is none; never: `inf` of what never comes."""
+    if never and math.isinf(value):
+        return value
     return float(f"{value:.12g}") if math.isfinite(value) else ""
 
 

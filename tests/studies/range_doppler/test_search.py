@@ -55,7 +55,7 @@ def plainly(taken):
         ("P1.4", "RLS 3, largest range gain"): max(gain[3][0].values()),
         ("P1.4", "RLS 2, time of it"): time[2],
         ("P1.5", "RLS 3, final range gain"): list(gain[3][0].values())[-1],
-        ("P1.6", "RLS 2, first velocity gain"): list(gain[2][1].values())[0],
+        ("P1.6", "RLS 2, first velocity gain"): next(iter(gain[2][1].values())),
         ("P1.7", "RLS 2, first time without acceleration gain"): gone[0] * 10 if gone else np.inf,
         ("P1.9", "RLS 3–5, largest velocity gain"): max(max(gain[n][1].values()) for n in (3, 4, 5)),
         ("P1.11", "time of the largest range gain, RLS 3 : RLS 2"): time[3] / time[2],

@@ -1,0 +1,206 @@
+"""Readings as a whole: names, table, curves, what is said of a claim, what cannot be done; small runs that continue."""
+
+import csv
+import dataclasses
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from radarsim.app import readings as app
+from radarsim.app.simulation import RunOptions
+from radarsim.cli import main
+from radarsim.errors import ConfigError, StoreError, TargetUnmet
+from radarsim.report.claims import rule
+from radarsim.report.claims.readings import Alternative, Choice, PaperReadings, Unreadable
+from radarsim.studies import registry
+
+COLUMNS = "measured,lo,hi,exact,expected_lo,expected_hi,margin,verdict"
+
+
+def table(out):
+    with (out / "readings/readings.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory):
+    """The first paper under all its readings."""
+    out = tmp_path_factory.mktemp("results")
+    return out, app.readings(app.asked(["P1"]), out=out, figures=False)
+
+
+def test_the_table_has_a_column_a_choice_and_a_row_a_part(first):
+    out, _done = first
+    text = (out / "readings/readings.csv").read_text(encoding="utf-8")
+    header = text.split("\n", 1)[0]
+    assert header.startswith("claim,part,reading,kind,")
+    assert COLUMNS in header
+    assert set(dict.fromkeys(c.key for p in app.papers().values() for c in p.readings.choices)) < set(header.split(","))
+    rows = table(out)
+    paper = app.papers()["P1"]
+    for claim in paper.claims.claims:
+        own = [row for row in rows if row["claim"] == claim.id]
+        readings = paper.readings.of_claim(claim.id)
+        assert {row["reading"] for row in own} == {paper.readings.name(one) for one in readings}
+        shipped = [row for row in own if row["reading"] == "as shipped"]
+        assert len(shipped) == len(claim.parts)
+        assert all(row["exact"] and not row["measured"] for row in shipped if row["verdict"] != "not possible")
+
+
+def test_a_verdict_is_that_of_the_rule_on_the_table(first):
+    """What the last line of a claim says, counted in the table by hand."""
+    out, done = first
+    rows = table(out)
+    for over in done.read[0].over:
+        own = [row for row in rows if row["claim"] == over.claim.id and row["kind"] in "EU" and row["outcome"]]
+        by_reading = {row["reading"]: row["outcome"] for row in own}
+        found = over.outcome
+        assert found.readings == len(by_reading)
+        assert found.holds_in == sum(one == rule.CONFIRMED for one in by_reading.values())
+        assert over.sentence().startswith(f"holds in {found.holds_in} of {found.readings} readings")
+        if found.depends_on:
+            assert f"depends on: {', '.join(found.depends_on)}" in over.sentence()
+
+
+def test_what_is_known_of_the_first_paper(first):
+    _, done = first
+    said = {over.claim.id: over.outcome for over in done.read[0].over}
+    assert said["P1.18"].kind == rule.REFUTED  # in every reading: robust
+    assert said["P1.18"].holds_in == 0
+    assert said["P1.9"].kind == said["P1.25"].kind == rule.CONFIRMED
+    assert said["P1.7"].depends_on  # fifteen points end at 70 s where Δt is 5 s
+    search = done.read[0].search
+    assert search.count(granular=False)[search.place] == search.count(granular=False).max() == 25
+
+
+def test_the_readings_agree_with_the_stored_run_of_the_shipped_config(first, tmp_path):
+    """Exact values as shipped against the exact columns of a run: the two recursions are apart."""
+    import radarsim
+
+    gains = radarsim.run("range_doppler", realisations=64).gains
+    rows = [row for row in table(first[0]) if row["reading"] == "as shipped"]
+    last = gains[(gains["t_s"] == 140) & (gains["component"] == "r")].set_index("case")["exact_percent"]
+    final = {row["part"]: float(row["exact"]) for row in rows if row["claim"] == "P1.5"}
+    assert final["1"] == pytest.approx(last["rls2"], rel=1e-9)
+    assert final["2"] == pytest.approx(last["rls3"], rel=1e-9)
+
+
+def test_other_claims_keep_their_rows(first):
+    out, _ = first
+    before = table(out)
+    app.readings(app.asked(["P1.4"]), out=out, figures=False)
+    assert table(out) == before
+
+
+def test_unknown_names_say_what_is_allowed():
+    with pytest.raises(ConfigError) as caught:
+        app.asked(["P9", "P1.99"])
+    assert caught.value.lines[0].startswith("readings: no paper or claim 'P9'; papers: P1, ")
+    assert "its claims: P1.1, P1.2" in caught.value.lines[1]
+    with pytest.raises(ConfigError) as caught:
+        app.asked(["P1"], ["strat=weighted", "start=none"])
+    assert "no choice 'strat'; choices: start, points" in caught.value.lines[0]
+    assert "no value 'none' of start; values: weighted, unweighted" in caught.value.lines[1]
+
+
+def test_a_damaged_table_is_reported(tmp_path):
+    (tmp_path / "readings").mkdir()
+    (tmp_path / "readings/readings.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(StoreError, match="is no table of readings"):
+        app.readings(app.asked(["P1.4"]), out=tmp_path, figures=False)
+
+
+def test_the_command(tmp_path):
+    def run(*arguments, code=0):
+        result = CliRunner().invoke(main, ["readings", *arguments, "--out", str(tmp_path)], catch_exceptions=False)
+        assert result.exit_code == code, result.output
+        return result
+
+    text = run("P1.7").stdout
+    assert "holds in" in text
+    assert (tmp_path / "readings/P1.7.svg").stat().st_size > 10_000
+    drawn = (tmp_path / "readings/P1.7.svg").stat().st_mtime_ns
+    run("P1.7")
+    assert (tmp_path / "readings/P1.7.svg").stat().st_mtime_ns == drawn  # nothing new to draw
+    (document,) = json.loads(run("P1.7", "--json").stdout)
+    assert set(document) == {"claim", "verdict", "holds", "of", "depends_on", "readings"}
+    assert document["readings"][0]["reading"] == "as shipped"
+    kept = (tmp_path / "readings/readings.csv").read_bytes()
+    few = json.loads(run("P1.7", "--only", "start=unweighted", "--json").stdout)[0]["readings"]
+    assert {one["choices"]["start"] for one in few[1:]} == {"unweighted"}
+    assert (tmp_path / "readings/readings.csv").read_bytes() == kept
+    assert "# P1 by reading" in run("P1.7", "--markdown").stdout
+    assert "papers: P1" in run("P0", code=2).stderr
+
+
+# ---- readings that are run: a small paper of our own ---------------------------------------------------------------
+class Velocities(PaperReadings):
+    """P1's claim on the final range gain, with other radars: runs of the shipped config."""
+
+    paper = "P1"
+    realisations = 64
+    choices = (
+        Choice(
+            "sigma_velocity",
+            "How accurate the velocity is",
+            "nothing",
+            "nothing",
+            (
+                Alternative("shipped", rule.UNSTATED, "as in the table"),
+                Alternative("useless", rule.UNSTATED, "a hundred times worse"),
+                Alternative("none", rule.UNSTATED, "no such radar"),
+            ),
+        ),
+    )
+
+    def changed(self, claim, case, reading):
+        factor = {"shipped": 1.0, "useless": 1e2}.get(reading["sigma_velocity"])
+        if factor is None:
+            raise Unreadable("there is no such radar")
+        radar = case.spec.radar.model_copy(update={"sigma_velocity_mps": factor * case.spec.radar.sigma_velocity_mps})
+        return dataclasses.replace(case, spec=case.spec.model_copy(update={"radar": radar}))
+
+
+@pytest.fixture
+def ran():
+    """That paper, wanted for the claim on gains over 50 % (P1.8)."""
+    claims = registry.study("range_doppler").claims()
+    claim = next(one for one in claims.claims if one.id == "P1.8")
+    return app.Asked(app.Paper(Velocities(), claims, "range_doppler"), [claim], whole=False)
+
+
+def test_readings_that_are_run(ran, tmp_path):
+    seen = []
+    done = app.readings([ran], out=tmp_path, figures=False, progress=lambda *of: seen.append(of))
+    (over,) = done.read[0].over
+    by_name = {one.reading["sigma_velocity"]: one for one in over.under}
+    assert by_name["shipped"].outcome.kind == rule.CONFIRMED
+    assert by_name["useless"].outcome.kind == rule.REFUTED
+    assert by_name["none"].outcome is None
+    assert by_name["none"].why == "there is no such radar"
+    assert over.outcome.words == "depends on sigma_velocity"
+    assert (over.outcome.holds_in, over.outcome.readings) == (1, 2)
+    assert "not possible" in over.sentence()
+    _part, judged = by_name["shipped"].parts[0]
+    assert judged.lo < judged.measured < judged.hi
+    computed = seen[-1]
+    assert computed[0] == computed[1]  # all that was foreseen is done
+    again = []
+    app.readings([ran], out=tmp_path, figures=False, progress=lambda *of: again.append(of))
+    assert again[-1][2] == again[-1][1]  # all of it from the store
+
+
+def test_a_reading_as_shipped_measures_what_a_run_of_the_config_does(ran, tmp_path):
+    import radarsim
+
+    result = radarsim.run("range_doppler", realisations=64, out=tmp_path, figures=False)
+    stored = result.tables["claims"].set_index(["claim", "what", "case"])["measured"]
+    done = app.readings([ran], out=tmp_path, figures=False)
+    for part, judged in done.read[0].over[0].under[0].parts:
+        assert judged.measured == stored["P1.8", part.what, f"rls{part.cases[0]}"]
+
+
+def test_a_time_limit_stops_cleanly(ran, tmp_path):
+    with pytest.raises(TargetUnmet, match="the same command continues"):
+        app.readings([ran], out=tmp_path, options=RunOptions(stop=lambda: "time limit reached"), figures=False)

@@ -1,0 +1,51 @@
+"""The flights of the readings: within the printed axes, ballistic at first, vertical and lateral ones among them."""
+
+import numpy as np
+import pytest
+
+from radarsim.studies.multimodel import flight
+from radarsim.studies.multimodel.flights import BEGINS, FLIGHTS
+from radarsim.studies.multimodel.readings import CHOICES
+
+T = np.arange(0, 186.2, 0.5)
+UNFLYABLE = {"dive 60"}
+
+
+def flown(of):
+    phases = [
+        flight.Phase(p.start_s, p.lateral_mps2, p.normal_mps2, p.axial_mps2, p.period_s or 0.0, p.trimmed)
+        for p in of.phases
+    ]
+    return flight.fly(of.position_m, of.velocity_mps, of.ballistic_coefficient_kgpm2, of.lag_s, phases, T)
+
+
+@pytest.mark.parametrize("name", sorted(set(FLIGHTS) - UNFLYABLE))
+def test_a_flight_is_within_the_printed_axes(name):
+    track = flown(FLIGHTS[name])
+    north, up, east = track[:, 0], track[:, 3], track[:, 6]
+    assert north.min() >= 0
+    assert north.max() <= 200e3
+    assert abs(east).max() <= 100.5e3  # the shipped one reaches 100 km
+    assert np.linalg.norm(track[:, 1::3], axis=1).max() < 2000
+    assert up.min() > 0
+    # In the sector of an antenna that looks 30° up: biconical angles are singular where they add to 90°.
+    slant, e = np.linalg.norm(track[:, ::3], axis=1), np.radians(30)
+    elevation = np.arcsin((up * np.cos(e) - north * np.sin(e)) / slant)
+    azimuth = np.arcsin(east / slant)
+    assert np.degrees(abs(elevation) + abs(azimuth)).max() < 85
+    ballistic = track[(T > 0) & (T < BEGINS)]
+    assert np.allclose(ballistic[:, [2, 8]], 0, atol=1.0)  # gravity and little drag: no force to the side
+
+
+@pytest.mark.parametrize("name", sorted(UNFLYABLE))
+def test_one_that_cannot_be_flown_says_why(name):
+    with pytest.raises(flight.Unflyable, match="hits the ground"):
+        flown(FLIGHTS[name])
+
+
+def test_there_are_enough_of_both_kinds():
+    of = CHOICES[0]
+    assert of.key == "flight"
+    assert len(of.alternatives) == len(FLIGHTS) + 1 >= 9
+    assert sum("vertical" in name or "pull-up" in name for name in FLIGHTS) >= 4
+    assert sum("lateral" in name or "turn" in name for name in FLIGHTS) >= 4
