@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from radarsim import __version__
 from radarsim.app import configs, output, simulation
 from radarsim.app.simulation import RunOptions
 from radarsim.config.experiment import Case, Experiment
@@ -272,7 +271,7 @@ def _write(done: Done, figures: bool) -> tuple[str, ...]:
 def _curve(done: Done, over: Over, drawn: dict[str, str]) -> dict[str, bytes]:
     """The files of a claim's specification curve; none where they stand there already."""
     of = next(read.paper.readings for read in done.read if over in read.over)
-    content = repr([(one.name, one.kind, depth(one), one.why) for one in over.under]) + over.sentence() + __version__
+    content = repr([(one.name, one.kind, depth(one), one.why) for one in over.under]) + over.sentence()
     mark = hashlib.sha256(content.encode()).hexdigest()
     name = f"{over.claim.id}.svg"
     if drawn.get(name) == mark and (done.folder / name).is_file():

@@ -139,7 +139,7 @@ class Velocities(PaperReadings):
     """P1's claim on the final range gain, with other radars: runs of the shipped config."""
 
     paper = "P1"
-    realisations = 64
+    realisations = 2000
     choices = (
         Choice(
             "sigma_velocity",
@@ -194,7 +194,7 @@ def test_readings_that_are_run(ran, tmp_path):
 def test_a_reading_as_shipped_measures_what_a_run_of_the_config_does(ran, tmp_path):
     import radarsim
 
-    result = radarsim.run("range_doppler", realisations=64, out=tmp_path, figures=False)
+    result = radarsim.run("range_doppler", realisations=2000, out=tmp_path, figures=False)
     stored = result.tables["claims"].set_index(["claim", "what", "case"])["measured"]
     done = app.readings([ran], out=tmp_path, figures=False)
     for part, judged in done.read[0].over[0].under[0].parts:

@@ -76,7 +76,7 @@ class Search:
 
     def measured(self, place: tuple[int, ...]) -> np.ndarray:
         """The numbers (n,) at a combination."""
-        return self.values[(slice(None), *place)]
+        return np.moveaxis(self.values, 0, -1)[place]
 
     def sentence(self) -> str:
         """What the search comes to."""

@@ -110,8 +110,7 @@ class Evidence(claims.Evidence):
         own = own[(own["t_s"] >= t[0]) & (own["t_s"] < t[1])]
         return Estimate(*(float(own[name].mean()) for name in ("probability", "probability_lo", "probability_hi")))
 
-    @staticmethod
-    def _bounds(of: CaseResult, stage: str) -> tuple[float, float]:
+    def _bounds(self, of: CaseResult, stage: str) -> tuple[float, float]:
         if stage == "whole":
             return 0.0, np.inf
         for name, begin, end in tables.stage_bounds(of):

@@ -147,4 +147,4 @@ class Flown(measures.Evidence):
         return tables.stage_names(self._ran[self.case(key).name]).index(name)
 
     def _bounds(self, of: Any, stage: str) -> tuple[float, float]:
-        return measures.Evidence._bounds(self._ran[of.name], stage)
+        return super()._bounds(self._ran[of.name], stage)

@@ -223,5 +223,5 @@ def both(radar: tuple[float, float, float], versions: Sequence[Version], scans: 
 
 
 def gain(base: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Relative gain (17) in % of σ, over that of range only."""
+    """Relative gain (17) in % of own σ over base, that of range only: arrays of any shape."""
     return 100 * (base - own) / base

@@ -38,8 +38,8 @@ def switched_window(
     squares = []
     for weights in (line, parabola):
         bias = windows @ weights - truth
-        slope = sigma**2 * (weights @ acceleration) / spread  # of the error on the acceleration, per σ of it
-        rest = sigma**2 * weights @ weights - slope**2
+        slope = float(sigma**2 * (weights @ acceleration) / spread)  # of the error on the acceleration, per σ of it
+        rest = float(sigma**2 * weights @ weights - slope**2)
         squares.append((bias**2 + slope**2 + rest, _outside(bias, slope, rest, low, high)))
     (whole_line, alarmed_line), (whole_parabola, alarmed) = squares
     return Switched(*(np.sqrt(each) for each in (whole_line, whole_parabola, whole_line - alarmed_line + alarmed)))
