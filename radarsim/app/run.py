@@ -130,8 +130,7 @@ def run(
 
 def share(
     experiment: Experiment,
-    number: int,
-    of: int,
+    part: tuple[int, int],
     *,
     out: str | os.PathLike[str],
     threads: int | None = None,
@@ -140,9 +139,9 @@ def share(
     progress: Progress | None = None,
     stop: Signals | None = None,
 ) -> simulation.Shares:
-    """Compute share `number` of `of` of every case into the store under out; no tables. Arguments as those of `run`."""
+    """Compute a part of every case, as (2, 3) the second of three, into the store under out; no tables. See `run`."""
     options = RunOptions(out, threads, stopping.Either(stop, time_limit), executor)
-    done = simulation.shared(experiment, number, of, options, progress=progress)
+    done = simulation.shared(experiment, part, options, progress=progress)
     if stop is not None:
         stop.raise_if_received()
     return done

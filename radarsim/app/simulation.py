@@ -191,11 +191,14 @@ def check_precision(experiments: Sequence[Experiment], percent: float) -> None:
 
 
 def shared(
-    experiment: Experiment, number: int, of: int, options: RunOptions, *, progress: Progress | None = None
+    experiment: Experiment, part: tuple[int, int], options: RunOptions, *, progress: Progress | None = None
 ) -> Shares:
-    """Put share `number` of `of` of every case into the store under options.out; ends early where it is stopped."""
+    """Put a part of every case, as (2, 3) the second of three, into the store under options.out.
+
+    It ends early where it is stopped.
+    """
     assert options.out is not None  # a share is nothing but what it stores
-    total = sum(case.realisations for case in experiment.cases) // of
+    total = sum(case.realisations for case in experiment.cases) // part[1]
     made: set[tuple[str, int]] = set()
     shares: dict[str, Shared] = {}
     done = held = 0
@@ -211,8 +214,7 @@ def shared(
         one = share(
             work,
             case.realisations,
-            number,
-            of,
+            part,
             store=options.out,
             threads=options.threads,
             progress=over_all,
@@ -225,7 +227,7 @@ def shared(
         held += one.from_store
         if one.stopped:
             break
-    return Shares(experiment.stem, number, of, shares)
+    return Shares(experiment.stem, *part, shares)
 
 
 def result_of(case: Case, work: CaseWork, collected: Collected) -> CaseResult:

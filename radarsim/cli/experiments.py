@@ -1,5 +1,7 @@
 """Commands that run experiments and read their results. Heavy imports wait inside the commands."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -24,6 +26,7 @@ from radarsim.errors import ClusterError, TargetUnmet
 if TYPE_CHECKING:
     from radarsim.app.result import Result
     from radarsim.app.simulation import Shares
+    from radarsim.config.experiment import Experiment
 
 
 @main.command()
@@ -76,60 +79,79 @@ def run(
       radarsim run rls2 -n 1e8 --workers 8              or --scheduler tcp://host:8786
       radarsim run rls2 --json | jq '.[0].last_scan[0].sigma'
     """
-    if shard and precision:
-        raise click.UsageError("--shard and --precision do not go together: a precision is judged on all blocks")
+    _refuse_together(shard, precision, workers or scheduler, threads)
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler do not go together: give one of them")
-    if threads and (workers or scheduler):
-        raise click.UsageError("--threads and a cluster do not go together: its workers compute, not this process")
     from radarsim.engine import stopping
 
     limit = stopping.time_limit(time_limit) if time_limit else None
     with stopping.Signals() as stop:
-        from radarsim.app import documents, simulation
         from radarsim.app import run as experiment
-        from radarsim.cli import console
 
         overrides = experiment.merged(overrides, realisations, seed)
-        loaded = experiment.load_all(configs, overrides)
-        if precision is not None:
-            simulation.check_precision(loaded, precision)
-        made: list[dict[str, Any]] = []
-        unmet: list[str] = []
+        loaded = _loaded(configs, overrides, precision)
         if scheduler and not quiet and (line := experiment.trust(scheduler)):
             click.echo(f"note: {line}", err=True)
         with experiment.cluster(workers, scheduler) as pool:
-            for one in loaded:
-                options: dict[str, Any] = {"out": out, "threads": threads, "executor": pool, "time_limit": limit}
-                done: Result | Shares
-                with console.Progress(one.stem, quiet=quiet) as progress:
-                    options |= {"stop": stop, "progress": progress.update}
-                    try:
-                        if shard:
-                            done = experiment.share(one, *shard, **options)
-                        else:
-                            figures = False if no_figures else formats or True
-                            done = experiment.run(
-                                one, overrides=overrides, precision=precision, figures=figures, **options
-                            )
-                    except ClusterError:
-                        raise  # for the other experiments too
-                    except TargetUnmet as error:
-                        unmet += error.lines
-                        continue
-                unmet += [f"{one.stem}: {reason}" for reason in done.unmet]
-                if isinstance(done, simulation.Shares):
-                    made.append(documents.share(done))
-                    if not (quiet or as_json):
-                        console.print_share(done, out)
-                else:
-                    made.append(documents.result(done))
-                    if not (quiet or as_json):
-                        console.print_result(done)
-        if as_json:
-            click.echo(documents.text(made))
-        if unmet:
-            raise TargetUnmet(*unmet)
+            means: dict[str, Any] = {"out": out, "threads": threads, "executor": pool}
+            means |= {"time_limit": limit, "stop": stop}
+            figures = False if no_figures else formats or True
+            compute: Callable[..., Result | Shares]
+            compute = partial(experiment.run, overrides=overrides, precision=precision, figures=figures)
+            if shard:
+                compute = partial(experiment.share, part=shard)
+            _compute_each(loaded, partial(compute, **means), out, quiet, as_json)
+
+
+def _refuse_together(shard: object, precision: object, cluster: object, threads: object) -> None:
+    """Raises UsageError for options that do not go together."""
+    if shard and precision:
+        raise click.UsageError("--shard and --precision do not go together: a precision is judged on all blocks")
+    if threads and cluster:
+        raise click.UsageError("--threads and a cluster do not go together: its workers compute, not this process")
+
+
+def _loaded(configs: tuple[str, ...], overrides: tuple[str, ...], precision: float | None) -> "list[Experiment]":
+    """The experiments, all checked, a precision too."""
+    from radarsim.app import run, simulation
+
+    loaded = run.load_all(configs, overrides)
+    if precision is not None:
+        simulation.check_precision(loaded, precision)
+    return loaded
+
+
+def _compute_each(
+    loaded: "list[Experiment]", compute: "Callable[..., Result | Shares]", out: str, quiet: bool, as_json: bool
+) -> None:
+    """Compute experiments one by one and print what came of each; raises TargetUnmet at the end for what was not."""
+    from radarsim.app import documents, simulation
+    from radarsim.cli import console
+
+    made: list[dict[str, Any]] = []
+    unmet: list[str] = []
+    for one in loaded:
+        try:
+            with console.Progress(one.stem, quiet=quiet) as progress:
+                done = compute(one, progress=progress.update)
+        except ClusterError:
+            raise  # for the other experiments too
+        except TargetUnmet as error:
+            unmet += error.lines
+            continue
+        unmet += [f"{one.stem}: {reason}" for reason in done.unmet]
+        if isinstance(done, simulation.Shares):
+            made.append(documents.share(done))
+            if not (quiet or as_json):
+                console.print_share(done, out)
+        else:
+            made.append(documents.result(done))
+            if not (quiet or as_json):
+                console.print_result(done)
+    if as_json:
+        click.echo(documents.text(made))
+    if unmet:
+        raise TargetUnmet(*unmet)
 
 
 @main.command()

@@ -37,8 +37,7 @@ def collect(
 def share(
     work: Work,
     realisations: int,
-    number: int,
-    of: int,
+    part: tuple[int, int],
     *,
     store: str | os.PathLike,
     threads: int | None = None,
@@ -46,12 +45,12 @@ def share(
     stop: Stop | None = None,
     executor: Executor | None = None,
 ) -> Shared:
-    """Put share `number` (from 1) of `of` of the blocks of N realisations into the store, and nothing else.
+    """Put a part of the blocks of N realisations into the store, and nothing else: (2, 3) is the second of three.
 
     Shares are runs of blocks, as equal as blocks can be cut; the last holds the cut block. Stores in which all shares
     are done are united by copying: `collect` then finds every block. The other arguments are those of `collect`.
     """
-    run = Share(work, realisations, number, of, store, progress)
+    run = Share(work, realisations, part, store, progress)
     return run.finished(None if run.restored() else _computed(run, threads, stop, executor))
 
 

@@ -238,13 +238,13 @@ class Share(Dispatch):
         self,
         work: Work,
         realisations: int,
-        number: int,
-        of: int,
+        part: tuple[int, int],
         store: str | os.PathLike[str],
         progress: Callable[[int, int, int], None] | None,
     ):
         super().__init__(work, realisations, None, progress)
         self._keeper: Keeper = Keeper(Store(store, work))
+        number, of = part
         blocks = self.full + (self.rest > 0)
         self.first, self.stop = (min(blocks * bound // of, self.full) for bound in (number - 1, number))
         self.rest = self.rest if number == of else 0

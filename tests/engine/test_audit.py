@@ -61,7 +61,7 @@ def test_what_runs_of_any_sizes_leave_is_whole(tmp_path, blocks, sizes):
 
 
 def test_shares_and_stopped_runs_are_whole(tmp_path, blocks):
-    share(WORK, N, 2, 3, store=tmp_path)
+    share(WORK, N, (2, 3), store=tmp_path)
     asked = iter([None] * 8)
     cut = collect(Fake(pause_s=1e-3), N, store=tmp_path, threads=2, stop=lambda: next(asked, "enough"))
     assert audited(blocks, cut.count or None).faults == []

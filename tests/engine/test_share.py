@@ -20,7 +20,7 @@ def held(directory):
 
 @given(st.integers(1, 5_000), st.integers(1, 40))
 def test_shares_tile_the_blocks_and_the_last_has_the_cut_one(realisations, of):
-    shares = [Share(WORK, realisations, number, of, "unwritten", None) for number in range(1, of + 1)]
+    shares = [Share(WORK, realisations, (number, of), "unwritten", None) for number in range(1, of + 1)]
     assert [one.first for one in shares] == [0, *(one.stop for one in shares[:-1])]
     assert shares[-1].stop == realisations // 16
     assert [one.rest for one in shares] == [0] * (of - 1) + [realisations % 16]
@@ -36,7 +36,7 @@ def test_united_by_copying_they_give_the_bytes_of_one_run(tmp_path_factory, real
     numbers = list(range(1, of + 1))
     draw.shuffle(numbers)
     for number in numbers:
-        share(WORK, realisations, number, of, store=root / str(number), threads=0)
+        share(WORK, realisations, (number, of), store=root / str(number), threads=0)
         shutil.copytree(root / str(number), root / "all", dirs_exist_ok=True)
     united = collect(WORK, realisations, store=root / "all", threads=0)
     assert same(united, realisations)
@@ -44,28 +44,28 @@ def test_united_by_copying_they_give_the_bytes_of_one_run(tmp_path_factory, real
 
 
 def test_a_share_is_stored_without_a_total_and_counted_once(tmp_path):
-    first = share(WORK, N, 2, 3, store=tmp_path, threads=2)
+    first = share(WORK, N, (2, 3), store=tmp_path, threads=2)
     assert (first.asked, first.done, first.computed, first.from_store, first.stopped) == (1664, 1664, 1664, 0, None)
     assert not [piece for piece in Store(tmp_path, WORK).pieces() if isinstance(piece, Total)]
     assert held(tmp_path) == 1664
-    again = share(WORK, N, 2, 3, store=tmp_path, threads=2)
+    again = share(WORK, N, (2, 3), store=tmp_path, threads=2)
     assert (again.done, again.computed, again.from_store) == (1664, 0, 1664)
     assert stored(WORK, N, tmp_path) is None
 
 
 def test_shares_may_write_into_one_store(tmp_path):
     for number in (3, 1, 2):
-        share(WORK, N, number, 3, store=tmp_path, threads=2)
+        share(WORK, N, (number, 3), store=tmp_path, threads=2)
     assert same(stored(WORK, N, tmp_path))
 
 
 def test_a_share_finds_what_a_whole_run_has_stored(tmp_path):
     collect(WORK, N, store=tmp_path)
-    assert share(WORK, N, 2, 5, store=tmp_path).computed == 0
+    assert share(WORK, N, (2, 5), store=tmp_path).computed == 0
 
 
 def test_more_shares_than_blocks_leave_some_with_nothing_to_do(tmp_path):
-    done = [share(WORK, 20, number, 7, store=tmp_path, threads=0).done for number in range(1, 8)]
+    done = [share(WORK, 20, (number, 7), store=tmp_path, threads=0).done for number in range(1, 8)]
     assert sorted(done) == [0, 0, 0, 0, 0, 4, 16]
     assert same(stored(WORK, 20, tmp_path), 20)
 
@@ -74,15 +74,15 @@ def test_more_shares_than_blocks_leave_some_with_nothing_to_do(tmp_path):
 def test_a_stopped_share_keeps_what_it_did_and_goes_on(tmp_path, number):
     asked = iter([None] * 8)
     slow = Fake(pause_s=1e-3)
-    cut = share(slow, 16 * 900, number, 3, store=tmp_path, threads=2, stop=lambda: next(asked, "enough"))
+    cut = share(slow, 16 * 900, (number, 3), store=tmp_path, threads=2, stop=lambda: next(asked, "enough"))
     assert cut.stopped == "enough"
     assert 0 < cut.done < cut.asked == 16 * 300
     assert held(tmp_path) == cut.done
-    whole = share(WORK, 16 * 900, number, 3, store=tmp_path, threads=2)
+    whole = share(WORK, 16 * 900, (number, 3), store=tmp_path, threads=2)
     assert (whole.done, whole.from_store) == (16 * 300, cut.done)
 
 
 def test_progress_is_that_of_the_share(tmp_path):
     seen = []
-    share(WORK, 1_600, 1, 4, store=tmp_path, progress=lambda *given: seen.append(given))
+    share(WORK, 1_600, (1, 4), store=tmp_path, progress=lambda *given: seen.append(given))
     assert seen[-1] == (400, 400, 0)

@@ -327,8 +327,8 @@ ENGINE = (
     *mutants(
         "radarsim/studies/noise.py",
         (
-            "digest(world(case.spec))",
-            "digest(canonical(case.spec))",
+            "digest(world(keyed_by))",
+            "digest(canonical(keyed_by))",
             "studies/range_doppler/test_study.py::test_cases_that_differ_only_in_filters_share_their_noise",
         ),
     ),

@@ -86,7 +86,7 @@ def test_workers(expected, workers):
 def test_shares(expected, study, of, tmp_path):
     loaded = CASES[study].loaded()
     for number in random.Random(of).sample(range(1, of + 1), of):
-        experiment.share(loaded, number, of, out=tmp_path / str(number), threads=2)
+        experiment.share(loaded, (number, of), out=tmp_path / str(number), threads=2)
         shutil.copytree(tmp_path / str(number), tmp_path / "all", dirs_exist_ok=True)
     result = experiment.run(loaded, out=tmp_path / "all", figures=False)
     assert result.facts["realisations_computed"] == 0

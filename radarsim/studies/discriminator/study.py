@@ -297,20 +297,11 @@ def doppler_error(burst: model.Burst, phase: Phase) -> float:
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
     errors, passes = estimate(plan, first, count)
-    sums = {name: np.zeros(shape) for name, shape in plan.layout.shapes.items()}
-    sums_of.accumulate(
-        errors,
-        plan.layout.shapes["error"][2],
-        plan.options,
-        plan.potential,
-        plan.posterior,
-        sums["error"],
-        sums["error_all"],
-        sums["locks"],
-        sums["residuals"],
-    )
-    sums["passes"][:, 0], sums["passes"][:, 1] = passes.sum(axis=0), (passes**2).sum(axis=0)
-    return plan.layout.pack(**sums)
+    values = np.zeros(plan.layout.size)
+    sums = sums_of.Sums(**plan.layout.unpack(values))
+    sums_of.accumulate(errors, plan.options, plan.potential, plan.posterior, sums)
+    sums.passes[:, 0], sums.passes[:, 1] = passes.sum(axis=0), (passes**2).sum(axis=0)
+    return values
 
 
 def estimate(plan: Plan, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -310,7 +310,8 @@ def test_sums_of_errors_against_numpy():
     potential, posterior = rng.uniform(0.5, 2, (2, 2, 4, 6))
     error, every = np.zeros((2, 2, 4, size, 4))
     locks, residuals = np.zeros((2, 4, 6)), np.zeros((2, 4, size, added.BINS))
-    added.accumulate(errors, size, options, potential, posterior, error, every, locks, residuals)
+    sums = added.Sums(error, every, locks, residuals, np.zeros((2, 2)))
+    added.accumulate(errors, options, potential, posterior, sums)
     for f, windows in enumerate((4, 2)):
         ratio, narrow = errors[:, f, :windows, :size] / potential[f, :windows, :size], None
         narrow = np.abs(errors[:, f, :windows, :size] / posterior[f, :windows, :size]).max(axis=2)

@@ -1,5 +1,7 @@
 """Sums over the errors of bursts: moments of the locked and of all, locks, histograms of the residuals (P4)."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from radarsim.kernels.compile import inline, kernel
@@ -9,6 +11,23 @@ BINS = BINS_PER_OCTAVE * OCTAVES
 # What `locks` counts, in its order: bursts within 5 and 3 potential bounds, within 5 and 3 posterior ones, and within 3
 # of either at this and all earlier windows.
 LOCKS = ("lock", "three", "posterior", "posterior_three", "always_three", "always_posterior_three")
+
+
+class Sums(NamedTuple):
+    """Sums over bursts of F estimators, K windows and C components of θ, with their shapes.
+
+    error (F, K, C, 4)         Σe … Σe⁴ of the locked bursts, in units of the potential bound of the window
+    error_all (F, K, C, 4)     the same of all bursts
+    locks (F, K, 6)            counted bursts, see LOCKS
+    residuals (F, K, C, BINS)  histograms of |e| over the posterior bound
+    passes (F, 2)              passes over the data, and their squares
+    """
+
+    error: np.ndarray
+    error_all: np.ndarray
+    locks: np.ndarray
+    residuals: np.ndarray
+    passes: np.ndarray
 
 
 @inline
@@ -39,20 +58,19 @@ def add_component(e, within, potential, posterior, error, error_all, residuals):
 
 
 @kernel
-def accumulate(errors, size, options, potential, posterior, error, error_all, locks, residuals):
+def accumulate(errors, options, potential, posterior, sums):
     """Sums over errors (n, F, K, 6), in turns over the burst, of locked and of all realisations.
 
-    potential and posterior (F, K, 6) are the bounds without and with the prior, in the same unit. error and error_all
-    (F, K, size, 4) become Σe … Σe⁴, in units of the potential bound; to residuals (F, K, size, BINS) the histogram of
-    |e| over the posterior bound is added. locks (F, K, 6) counts bursts, see LOCKS.
+    potential and posterior (F, K, 6) are the bounds without and with the prior, in the same unit; sums is a `Sums`, of
+    which `passes` stays as it is.
     """
-    n = errors.shape[0]
+    n, size = errors.shape[0], sums.error.shape[2]
     e, within = np.empty((size, n)), np.empty(n)
     always, always_posterior = np.empty(n), np.empty(n)
     for f in range(options.size):
         always[:], always_posterior[:] = 1.0, 1.0
         for k in range(options[f].windows):
-            a, b, own = 1.0 / potential[f, k], 1.0 / posterior[f, k], locks[f, k]
+            a, b, own = 1.0 / potential[f, k], 1.0 / posterior[f, k], sums.locks[f, k]
             for i in range(n):
                 worst = worst_posterior = 0.0
                 for j in range(size):
@@ -69,4 +87,5 @@ def accumulate(errors, size, options, potential, posterior, error, error_all, lo
                 own[4] += always[i]
                 own[5] += always_posterior[i]
             for j in range(size):
-                add_component(e[j], within, a[j], b[j], error[f, k, j], error_all[f, k, j], residuals[f, k, j])
+                error, error_all, residuals = sums.error[f, k, j], sums.error_all[f, k, j], sums.residuals[f, k, j]
+                add_component(e[j], within, a[j], b[j], error, error_all, residuals)
