@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from radarsim.config import load as reading
@@ -39,14 +40,19 @@ def shipped(stem: str) -> tuple[Model, ...] | None:
     return None
 
 
-def new(name: str, like: str | os.PathLike[str], folder: str | os.PathLike[str] = ".") -> Path:
-    """Write folder/NAME.yaml, the suffix given or not, after a known config; its path.
+def new(
+    name: str,
+    like: str | os.PathLike[str],
+    folder: str | os.PathLike[str] = ".",
+    values: Mapping[str, float] = MappingProxyType({}),
+) -> Path:
+    """Write folder/NAME.yaml, the suffix given or not, after a known config with some values changed; its path.
 
     Raises ConfigError where it is there already, StoreError where it cannot be written.
     """
     from radarsim.config import own
 
-    name, text = own.new(name, like, registry)
+    name, text = own.new(name, like, registry, values)
     path = Path(folder) / name
     try:
         files.create(path, text.encode())

@@ -4,8 +4,12 @@ import sys
 from collections.abc import Iterable, Sequence
 
 from radarsim.report.text import plural, printable, significant_digits
-from radarsim.track import accuracy
+from radarsim.track import accuracy, advice, fit
+from radarsim.track.advice import Advice, Finding
+from radarsim.track.fit import Fit
 from radarsim.track.follow import Followed
+
+CLEAR = 3.0  # of the logarithm of a likelihood, twenty times: from there on one filter is clearly the best
 
 
 def echo(rows: Iterable[Sequence[str]]) -> None:
@@ -15,10 +19,12 @@ def echo(rows: Iterable[Sequence[str]]) -> None:
     csv.writer(sys.stdout, lineterminator="\n").writerows(rows)
 
 
-def report(followed: Followed, judged: Sequence[accuracy.Judged], stderr: bool = False) -> None:
-    """Print what was found; to stderr where the track itself goes to stdout."""
+def report(followed: Followed, judged: Sequence[accuracy.Judged], advised: Advice | None, stderr: bool = False) -> None:
+    """Print what was found; to stderr where the track itself goes to stdout. advised: where a likelihood is known."""
     stream = sys.stderr if stderr else sys.stdout
-    for line in [*_rows(followed), *_errors(followed), *(_line(one) for one in judged if one.tests), *_advice(judged)]:
+    lines = [_line(one, advised is None) for one in judged if one.tests]
+    advice = _advice(judged) if advised is None else _likely(advised)
+    for line in [*_rows(followed), *_errors(followed), *lines, *advice]:
         stream.write(printable(line) + "\n")
 
 
@@ -53,7 +59,8 @@ def _errors(followed: Followed) -> list[str]:
     ]
 
 
-def _line(one: accuracy.Judged) -> str:
+def _line(one: accuracy.Judged, cured: bool) -> str:
+    """One test; cured: with the σ under which it would be passed, where it is not."""
     finding = {
         accuracy.FITS: "the stated σ fits",
         accuracy.SMALL: "the stated σ is too small, or the target manoeuvres harder than the filter allows",
@@ -62,11 +69,16 @@ def _line(one: accuracy.Judged) -> str:
     }[one.verdict]
     bounds = f"NIS {one.nis:.3g} of {plural(one.tests, 'plot')}, 95 % of right filters [{one.lo:.3g}, {one.hi:.3g}]"
     better = ", ".join(f"{key} {value:.4g}" for key, value in one.better.items())
-    return f"{one.filter}, {one.name}: {bounds}: {finding}" + (f"; {better} would" if better else "")
+    return f"{one.filter}, {one.name}: {bounds}: {finding}" + (f"; {better} would" if better and cured else "")
 
 
 def _advice(judged: Sequence[accuracy.Judged]) -> list[str]:
     """What to write into the config: of the filter whose tests are most nearly right."""
+    verdicts: dict[str, set[str]] = {}
+    for one in judged:
+        verdicts.setdefault(one.filter, set()).add(one.verdict)
+    if fitting := [name for name, found in verdicts.items() if found == {accuracy.FITS}]:
+        return [f"         {', '.join(fitting)}: all tests fit"] if len(fitting) < len(verdicts) else []
     wrong = [one for one in judged if one.better]
     if not wrong or len({one.filter for one in wrong}) < 2:
         return []
@@ -74,3 +86,47 @@ def _advice(judged: Sequence[accuracy.Judged]) -> list[str]:
     own = {key: value for one in wrong if one.filter == best.filter for key, value in one.better.items()}
     settings = " ".join(f"--set {key}={value:.4g}" for key, value in own.items())
     return [f"         nearest is {best.filter}; with its better values: {settings}"]
+
+
+def _likely(advised: Advice) -> list[str]:
+    """Which filter foretells the plots best, and what is wrong with its numbers."""
+    compared, lines = advised.compared, []
+    if len(compared.behind) > 1:
+        behind = sorted((name, gap) for name, gap in compared.behind.items() if name != compared.best)
+        others = ", ".join(f"exp({-gap:.1f}) times under {name}" for name, gap in behind)
+        clear = "" if min(gap for _, gap in behind) > CLEAR else " (not clearly)"
+        lines.append(f"best     {compared.best}{clear}; elsewhere the plots are less likely: {others}")
+    if not advised.findings:
+        lines.append(f"advice   nothing is wrong with the stated numbers, as far as {plural(advised.rows, 'row')} tell")
+    for one in advised.findings:
+        lines.append(f"advice   {_explained(one)}; the plots are then more likely by exp({one.gain:.1f})")
+    return lines
+
+
+def _explained(one: Finding) -> str:
+    """What is wrong, in words."""
+    if one.what == advice.OUTLIERS:
+        return f"outliers: {significant_digits(100 * one.value, '#.2g')} % of the plots err by ten times their σ"
+    if one.what == advice.BIAS:
+        return f"the measured velocities are off by {significant_digits(one.value, '#.3g')} of their σ, all alike"
+    return f"--set {one.what}={one.value:.4g}"
+
+
+def report_fit(found: Fit) -> None:
+    """Print what was fitted, and the options that put it into the config."""
+    lines = [f"plots    {plural(found.rows, 'row')} of {plural(found.tracks, 'track')}; filter {found.filter}"]
+    for one in found.keys:
+        value, stated = significant_digits(one.value), significant_digits(one.stated)
+        lo, hi = significant_digits(one.lo), "no upper end" if one.hi == float("inf") else significant_digits(one.hi)
+        doubt = (
+            "" if one.identifiable else "; the plots do not tell it from " + ("zero" if one.lo == 0 else "larger ones")
+        )
+        lines.append(f"{one.key}: {value} [{lo}, {hi}], stated {stated}{doubt}")
+    if found.outliers is not None:
+        lines.append(f"outliers: {significant_digits(100 * found.outliers, '#.2g')} % of the plots")
+    settings = " ".join(f"--set {key}={value:g}" for key, value in fit.settings(found).items())
+    lines.append(f"         the stated values are less likely by a factor of exp({found.gain:.1f})")
+    if settings:
+        lines.append(f"         to use what the plots tell: {settings}")
+    for line in lines:
+        sys.stdout.write(printable(line) + "\n")

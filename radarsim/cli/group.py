@@ -20,7 +20,7 @@ SECTIONS = {
     "Run": ("run", "check"),
     "Read": ("report", "claims", "readings"),
     "Design": ("solve",),
-    "Own data": ("new", "import", "simulate", "track", "new-study"),
+    "Own data": ("new", "import", "simulate", "track", "fit", "new-study"),
     "Maintenance": ("list", "schema", "doctor", "clean"),
 }
 ORDER = tuple(name for names in SECTIONS.values() for name in names)

@@ -1,5 +1,6 @@
 """Commands for one's own data and one's own radar. Heavy imports wait inside the commands."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -197,7 +198,7 @@ def track(
     from radarsim.app import run as experiment
     from radarsim.cli import console, findings
     from radarsim.report.files import Writer
-    from radarsim.track import accuracy
+    from radarsim.track import accuracy, advice
     from radarsim.track import follow as recorded
     from radarsim.track import plots as files
 
@@ -217,9 +218,49 @@ def track(
         followed = recorded.follow(loaded, plots, sink)
     drawn = recorded.draw(followed, figures, [plots, *([loaded.path] if loaded.path else [])]) if figures else []
     if not quiet:
-        findings.report(followed, accuracy.judged(followed), stderr=output is None)
+        findings.report(followed, accuracy.judged(followed), advice.advised(followed), stderr=output is None)
     if output:
         click.echo(f"track    {output}")
     if drawn:
         click.echo(f"figures  {figures} ({', '.join(drawn)})")
     console.print_warnings(experiment.cache_troubles())
+
+
+@main.command()
+@config_argument
+@click.argument("plots", metavar="PLOTS.csv")
+@click.option("--filter", "filter_name", metavar="NAME", help="Whose model; default: that which takes most of a plot.")
+@click.option("--robust", is_flag=True, help="Allow for outliers: plots with ten times their σ.")
+@click.option("--write", metavar="MINE.yaml", help="Write the config with the fitted values; never overwritten.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON document in place of the lines.")
+@set_option
+def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -> None:
+    """What recorded plots say of σ and of the manoeuvre variance, with 95 % intervals.
+
+    The plots are as for `radarsim track`; of a file with several tracks all count together. Each key's value is that
+    under which the filter's predictions make the plots most likely; its interval holds what is not much less likely,
+    whatever the other keys are. A key whose interval has no lower or no upper end cannot be told from these plots.
+
+    \b
+    Example
+      radarsim simulate rls2 --set scans=60 -o plots.csv
+      radarsim fit rls2 plots.csv
+      radarsim fit rls2 plots.csv --write mine.yaml
+    """
+    import json
+
+    from radarsim.app import configs
+    from radarsim.app import run as experiment
+    from radarsim.cli import findings
+    from radarsim.track import fit as fitting
+
+    (loaded,) = experiment.load_all([config], overrides)
+    found = fitting.fit(loaded, plots, options["filter_name"], options["robust"])
+    if options["as_json"]:
+        click.echo(json.dumps(fitting.as_json(found), indent=2))
+    else:
+        findings.report_fit(found)
+    if options["write"]:
+        path = Path(options["write"])
+        made = configs.new(path.name, loaded.path or config, path.parent, fitting.settings(found))
+        click.echo(f"config   {made}", err=options["as_json"])

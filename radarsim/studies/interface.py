@@ -61,6 +61,30 @@ class Tracker(Protocol):
         """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
 
 
+class Likelihood(Protocol):
+    """How likely recorded plots are under a filter, by the keys of the config that it was designed with.
+
+    filter: its name; tracks and rows: how many there are; keys: dotted names; stated (n,): their values in the config;
+    least (n,): what counts as zero of them.
+    """
+
+    filter: str
+    tracks: int
+    rows: int
+    keys: tuple[str, ...]
+    stated: "np.ndarray"
+    least: "np.ndarray"
+
+    def __call__(self, values: "np.ndarray", outliers: float = 0.0, bias: float = 0.0) -> float:
+        """The logarithm of the likelihood of values (n,) of the keys.
+
+        outliers: the share of plots with ten times their σ; bias: a constant error of what can show one, in its σ.
+        """
+
+    def by_number(self, values: "np.ndarray") -> Mapping[str, float]:
+        """The same with the keys alone, summed for each number that a plot holds, by its column."""
+
+
 class RecordedPlots(ABC):
     """What a study does with recorded plots: `radarsim track` and `radarsim simulate`."""
 
@@ -83,6 +107,15 @@ class RecordedPlots(ABC):
     @abstractmethod
     def tracker(self, case: "Case") -> Tracker:
         """The filters of a case, before their first plot."""
+
+    def likelihood(
+        self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
+    ) -> "Likelihood | None":
+        """How likely tracks, columns (n,) each, are under a filter; of the one that takes most of a plot where None.
+
+        Default: not known; `radarsim fit` refuses its configs.
+        """
+        return None
 
 
 class Paper(NamedTuple):

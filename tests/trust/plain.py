@@ -231,7 +231,10 @@ def tracks():
     made["linear estimates"] = np.nan_to_num(linear.estimate(plan.problem, plots))
     one = work(*RUNS["linear"][:2])
     tracker = range_doppler_plots.Tracker(one.case)
-    made["linear track"] = np.nan_to_num(tracker.feed(range_doppler_plots.simulated(one.case, 3)).estimate)
+    recorded = range_doppler_plots.simulated(one.case, 3)
+    made["linear track"] = np.nan_to_num(tracker.feed(recorded).estimate)
+    likelihood = range_doppler_plots.PlotLikelihood(one.case, None, [recorded])
+    made["linear likelihood"] = np.array([likelihood(likelihood.stated), likelihood(likelihood.stated, 0.1, 0.5)])
     one = work(*RUNS["multimodel families"][:2])
     z, R, _ = multimodel.measured(one.plan, 0)
     made["multimodel plots"], made["multimodel covariances"] = z, R

@@ -1,16 +1,22 @@
 """Plots of the range_doppler study: those of one realisation, and the study's filters over recorded ones."""
 
+from collections.abc import Mapping, Sequence
+from functools import partial
+
 import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.kernels import linear as kernels
-from radarsim.physics.motion import transition
+from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.studies.interface import RecordedPlots
 from radarsim.studies.range_doppler.filters import observation
 from radarsim.studies.range_doppler.kernels import rows
+from radarsim.studies.range_doppler.kernels.likelihood import log_likelihood
 from radarsim.studies.range_doppler.study import COMPONENTS, prepare
 
+STARTING = 3  # rows of a track from which its state is found, in the likelihood
+LEAST_MANOEUVRE = 1e-6  # of the stated manoeuvre variance, which counts as none
 LONGEST_START = 200  # plots in which a start is looked for; a file of velocities alone never has one
 MEASURED = (("range_m", 1), ("velocity_mps", 1))
 SIGMAS = {"range_m": ("radar.sigma_range_m",), "velocity_mps": ("radar.sigma_velocity_mps",)}
@@ -115,6 +121,57 @@ class _One:
         self.held = []
 
 
+class PlotLikelihood:
+    """How likely tracks are under a filter's model: range and velocity of independent errors, acceleration that a
+    random jerk changes. The state before the first plot is taken as unknown, whatever start the config states."""
+
+    def __init__(self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]):
+        most = max(len(f.observes) for f in case.spec.filters)
+        (options,) = [f for f in case.spec.filters if f.name == filter_name] or [
+            f for f in case.spec.filters if len(f.observes) == most
+        ][:1]
+        self.filter, self.tracks = options.name, len(tracks)
+        self.rows = sum(len(columns["t_s"]) for columns in tracks)
+        radar, self.observes = case.spec.radar, len(options.observes)
+        sigmas = {"radar.sigma_range_m": radar.sigma_range_m, "radar.sigma_velocity_mps": radar.sigma_velocity_mps}
+        stated = dict(list(sigmas.items())[: self.observes]) | {"manoeuvre_variance": options.manoeuvre_variance}
+        self.sigma_velocity = radar.sigma_velocity_mps
+        self.keys, self.stated = tuple(stated), np.array(list(stated.values()), dtype=float)
+        self.least = self.stated * np.array([1e-4] * self.observes + [LEAST_MANOEUVRE])
+        self.problems = [self._problem(columns) for columns in tracks]
+
+    def _problem(self, columns: Mapping[str, np.ndarray]) -> tuple[np.ndarray, ...]:
+        """Transitions, process noises of unit variance, plots and what counts of them, of a track."""
+        dt = np.diff(columns["t_s"], prepend=columns["t_s"][0])
+        z = np.stack([columns["range_m"], columns["velocity_mps"]], axis=1)
+        there = np.isfinite(z) & (np.arange(2) < self.observes)
+        F, Q = (np.stack([of(step) for step in dt]) for of in (transition, partial(manoeuvre_covariance, 1.0)))
+        return F, Q, np.where(there, z, 0.0), there
+
+    def _scores(self, values: np.ndarray, outliers: float, bias: float) -> np.ndarray:
+        """Sums over all tracks for range and velocity (2,); the first rows, which find the state, are left out."""
+        numbers = np.zeros(5)
+        numbers[: self.observes] = np.square(values[: self.observes])
+        if self.observes == 1:
+            numbers[1] = self.sigma_velocity**2  # of what does not count
+        numbers[2:] = values[self.observes], bias * np.sqrt(numbers[1]), outliers
+        total = np.zeros(2)
+        for F, Q, z, there in self.problems:
+            score = np.empty(z.shape)
+            log_likelihood(F, Q, z, there, numbers, score)
+            total += score[STARTING:].sum(axis=0)
+        return total
+
+    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0) -> float:
+        """The logarithm of the likelihood; bias: of the velocity, in its σ."""
+        return float(self._scores(values, outliers, bias).sum())
+
+    def by_number(self, values: np.ndarray) -> dict[str, float]:
+        """The sums of range and velocity."""
+        total = self._scores(values, 0.0, 0.0)
+        return {name: float(part) for (name, _), part in zip(MEASURED[: self.observes], total, strict=False)}
+
+
 class Recorded(RecordedPlots):
     """The study's part in `radarsim track` and `radarsim simulate`."""
 
@@ -132,3 +189,6 @@ class Recorded(RecordedPlots):
 
     def tracker(self, case):
         return Tracker(case)
+
+    def likelihood(self, case, filter_name, tracks):
+        return PlotLikelihood(case, filter_name, tracks)

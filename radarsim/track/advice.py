@@ -1,0 +1,144 @@
+"""What is wrong with the config's numbers, if anything is, from the likelihood along each of them.
+
+Each explanation alone (a σ, the manoeuvre variance, a bias of the velocity, outliers) is fitted to the plots. The one
+that raises the likelihood most is named, if it raises it more than chance does in one recording of twenty, all
+explanations together; then the search goes on beside it. What a recording with sound numbers says is: nothing wrong.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from radarsim.studies.interface import Likelihood
+from radarsim.track.fit import LEAST_ROWS
+from radarsim.track.follow import Followed, recorded_of
+
+OUTLIERS, BIAS = "outliers", "bias"
+LEVEL = 0.05  # of finding something where nothing is wrong
+MOST_FOUND = 3
+MOST_TRACKS = 50  # asked
+LOWEST, HIGHEST = np.log(1e-4), np.log(1e4)  # of a key's factor
+MOST_BIAS = 50.0  # in σ of the velocity
+SHARES = (1e-3, 0.4)  # of outliers
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One explanation: the key (or OUTLIERS, BIAS), its value (a share; a bias in σ), and the gain of the logarithm of
+    the likelihood over what was found before."""
+
+    what: str
+    value: float
+    gain: float
+
+
+@dataclass(frozen=True)
+class Compared:
+    """How much better than each filter the best one foretells the plots: differences of the logarithm of the likelihood
+    of the numbers that all of them take."""
+
+    best: str
+    behind: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What the likelihood says of a config's filters over recorded plots: which is best, and what is wrong with its
+    numbers; rows: how many it was asked of."""
+
+    compared: Compared
+    findings: list[Finding]
+    rows: int
+
+
+def advised(followed: Followed) -> Advice | None:
+    """Advice from the first rows of each track; none where the study has no likelihood of recorded plots."""
+    case, of = followed.case, recorded_of(followed.case)
+    heads = [one.head for one in followed.tracks.values()] or [followed.head]
+    long = [head for head in heads if len(head["t_s"]) >= LEAST_ROWS]
+    if not long:
+        return None
+    found = [of.likelihood(case, member.name, long[:MOST_TRACKS]) for member in case.spec.members]
+    known = [one for one in found if one is not None]
+    if not known:
+        return None
+    best = compared(known)
+    (chosen,) = (one for one in known if one.filter == best.best)
+    return Advice(best, findings(chosen), chosen.rows)
+
+
+def findings(likelihood: Likelihood) -> list[Finding]:
+    """What is wrong with the stated numbers, the weightiest first; empty where nothing is."""
+    from scipy.stats import chi2
+
+    whats = [*likelihood.keys, OUTLIERS, *([BIAS] if len(likelihood.keys) > 2 else [])]
+    needed = 0.5 * float(chi2.ppf(1 - LEVEL / len(whats), 1))
+    chosen: list[str] = []
+    start: dict[str, float] = {}
+    reached, found = _value(likelihood, {}), []
+    while len(chosen) < min(MOST_FOUND, len(whats)):
+        trials = {what: _best(likelihood, [*chosen, what], start) for what in whats if what not in chosen}
+        what = max(trials, key=lambda name: trials[name][1])
+        values, top = trials[what]
+        if top - reached < needed:
+            break
+        found.append(Finding(what, values[what], top - reached))
+        chosen, start, reached = [*chosen, what], values, top
+    final = start
+    return [Finding(one.what, final[one.what], one.gain) for one in found]
+
+
+def compared(likelihoods: Sequence[Likelihood]) -> Compared:
+    """Which filter foretells the plots best, as stated."""
+    sums = {one.filter: one.by_number(np.asarray(one.stated)) for one in likelihoods}
+    common = set.intersection(*(set(parts) for parts in sums.values()))
+    totals = {name: sum(parts[number] for number in common) for name, parts in sums.items()}
+    best = max(totals, key=lambda name: totals[name])
+    return Compared(best, {name: totals[best] - total for name, total in totals.items()})
+
+
+def _value(likelihood: Likelihood, changed: dict[str, float]) -> float:
+    """The likelihood with some of the explanations at work."""
+    stated = zip(likelihood.keys, likelihood.stated, strict=True)
+    values = np.array([changed.get(key, value) for key, value in stated])
+    found = likelihood(values, changed.get(OUTLIERS, 0.0), changed.get(BIAS, 0.0))
+    return found if np.isfinite(found) else -1e300
+
+
+def _best(likelihood: Likelihood, whats: list[str], start: dict[str, float]) -> tuple[dict[str, float], float]:
+    """Where the likelihood is largest along some explanations, and its logarithm there."""
+    from scipy.optimize import minimize
+
+    stated = dict(zip(likelihood.keys, likelihood.stated.tolist(), strict=True))
+    scales = [_scale(what, stated) for what in whats]
+
+    def cost(at: np.ndarray) -> float:
+        return -_value(likelihood, {what: of(x) for what, (of, _), x in zip(whats, scales, at, strict=True)})
+
+    best: tuple[dict[str, float], float] = ({}, -np.inf)
+    new = whats[-1]
+    for first in (-2.0, 0.0, 2.0):
+        at = np.array([scales[i][1](start[what]) if what != new else first for i, what in enumerate(whats)])
+        simplex = np.concatenate([at[None], at + 0.5 * np.eye(len(at))])
+        options: Any = {"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-3, "maxfev": 400}
+        found = minimize(cost, at, method="Nelder-Mead", options=options)
+        if -found.fun > best[1]:
+            best = {what: of(x) for what, (of, _), x in zip(whats, scales, found.x, strict=True)}, -float(found.fun)
+    return best
+
+
+def _scale(what: str, stated: dict[str, float]) -> tuple[Callable[[float], float], Callable[[float], float]]:
+    """From what is searched to the value of an explanation, and back."""
+    if what == BIAS:
+        return lambda x: float(np.clip(x, -MOST_BIAS, MOST_BIAS)), lambda value: value
+    if what == OUTLIERS:
+        return (
+            lambda x: float(np.clip(1 / (1 + np.exp(3 - x)), *SHARES)),
+            lambda value: 3 - float(np.log(1 / value - 1)),
+        )
+    return (
+        lambda x: stated[what] * float(np.exp(np.clip(x, LOWEST, HIGHEST))),
+        lambda value: float(np.log(value / stated[what])),
+    )

@@ -1,0 +1,210 @@
+"""What recorded plots say of the config's numbers: by the likelihood of the innovations of a filter.
+
+The filter's predictions give each plot a density; their product is the likelihood of the numbers that it was built
+with (Schweppe 1965). Estimates are where it is largest; an interval holds the values of a key at which the largest
+likelihood over all other keys is within half the 95 % point of chi-square of it (profile likelihood).
+"""
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from radarsim.config.experiment import Experiment
+from radarsim.errors import ConfigError
+from radarsim.studies.interface import Likelihood
+from radarsim.track import plots
+from radarsim.track.follow import one_case, recorded_of
+
+HALF_CHI2_95 = 1.9207294103470  # half the 95 % point of chi-square with one degree of freedom
+LEAST_ROWS = 10  # of a track; shorter ones say next to nothing
+REACH = 1e4  # how many times larger or smaller than the estimate an end of an interval is looked for
+EVALUATIONS = 2000
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """One key: the value that fits best, its 95 % interval, and whether the plots tell it from all other values.
+
+    lo is 0 where the key may as well be zero, hi infinite where it has no upper end.
+    """
+
+    key: str
+    stated: float
+    value: float
+    lo: float
+    hi: float
+    identifiable: bool
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What was fitted: filter, tracks and plots used, the keys, the share of outliers where they were allowed for, and
+    by how much the logarithm of the likelihood is above that of the stated values."""
+
+    filter: str
+    tracks: int
+    rows: int
+    keys: tuple[Fitted, ...]
+    outliers: float | None
+    gain: float
+
+
+def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name: str | None = None) -> Likelihood:
+    """The likelihood of a filter of an experiment's one case over all tracks of a file; of the one that takes the most
+    of a plot where none is named. Raises ConfigError."""
+    case = one_case(experiment, "fit", f"radarsim fit {{}} {os.fspath(source)}")
+    of = recorded_of(case)
+    names = [member.name for member in case.spec.members]
+    if filter_name is not None and filter_name not in names:
+        raise ConfigError(f"filter: must be one of {', '.join(names)}; got {filter_name}")
+    tracks = _tracks(source, of.columns(case.spec))
+    long = [columns for columns in tracks if len(columns["t_s"]) >= LEAST_ROWS]
+    if not long:
+        raise ConfigError(f"{source}: must have a track of at least {LEAST_ROWS} rows")
+    found = of.likelihood(case, filter_name, long)
+    if found is None:
+        raise ConfigError(f"{case.study}: has no likelihood of recorded plots to fit by")
+    return found
+
+
+def _tracks(source: str | os.PathLike, choices: Sequence[Sequence[str]]) -> list[dict[str, np.ndarray]]:
+    """The columns (n,) of each track of a file of plots."""
+    parts: dict[str, list[dict[str, np.ndarray]]] = {}
+    for piece in plots.pieces(source, choices):
+        names = piece.tracks or ["all"] * len(piece.columns["t_s"])
+        for name, rows in plots.grouped(names).items():
+            if name:
+                parts.setdefault(name, []).append({key: column[rows] for key, column in piece.columns.items()})
+    return [{key: np.concatenate([part[key] for part in own]) for key in own[0]} for own in parts.values()]
+
+
+def fit(experiment: Experiment, source: str | os.PathLike, filter_name: str | None = None, robust: bool = False) -> Fit:
+    """The config's numbers as the plots of a file have them; robust: allowing for outliers. Raises ConfigError."""
+    return fitted(likelihood_of(experiment, source, filter_name), robust)
+
+
+def fitted(likelihood: Likelihood, robust: bool = False) -> Fit:
+    """The keys of a likelihood where it is largest, with profile intervals."""
+    search = _Search(likelihood, robust)
+    keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
+    share = float(search.natural(search.best)[-1]) if robust else None
+    stated = likelihood(np.array(likelihood.stated), 0.0)
+    return Fit(likelihood.filter, likelihood.tracks, likelihood.rows, keys, share, search.top - stated)
+
+
+class _Search:
+    """The maximum of a likelihood, and its profile along each key. Searched are logarithms of the keys, and the logit
+    of the share of outliers."""
+
+    def __init__(self, likelihood: Likelihood, robust: bool):
+        self.likelihood, self.robust = likelihood, robust
+        start = np.log(np.maximum(likelihood.stated, likelihood.least))
+        if robust:
+            start = np.append(start, _logit(0.05))
+        self.best, self.top = self._climbed(start, None)
+        # A second start far away: the likelihood of manoeuvre and plot errors may have two hills.
+        for factor in (0.1, 10.0):
+            moved = self.best + math.log(factor) * np.append(
+                np.ones(len(likelihood.stated)), np.zeros(int(self.robust))
+            )
+            other, top = self._climbed(moved, None)
+            if top > self.top + 1e-6:
+                self.best, self.top = other, top
+
+    def natural(self, searched: np.ndarray) -> np.ndarray:
+        """The keys, and the share of outliers at the end where they are allowed for."""
+        count = len(self.likelihood.stated)
+        keys = np.exp(np.clip(searched[:count], -200, 200))
+        keys = np.where(keys <= self.likelihood.least, 0.0, keys)
+        return np.append(keys, 1 / (1 + np.exp(-searched[count:]))) if self.robust else keys
+
+    def _value(self, searched: np.ndarray) -> float:
+        values = self.natural(searched)
+        count = len(self.likelihood.stated)
+        found = self.likelihood(values[:count], float(values[count]) if self.robust else 0.0)
+        return found if math.isfinite(found) else -1e300
+
+    def _climbed(self, start: np.ndarray, held: int | None) -> tuple[np.ndarray, float]:
+        """The top reached from a start, one coordinate held or none, and the logarithm of the likelihood there."""
+        from scipy.optimize import minimize
+
+        free = np.array([i for i in range(len(start)) if i != held])
+        whole = start.copy()
+
+        def cost(part: np.ndarray) -> float:
+            whole[free] = part
+            return -self._value(whole)
+
+        if not free.size:
+            return start, self._value(start)
+        simplex = np.concatenate([start[free][None], start[free] + 0.3 * np.eye(free.size)])
+        options: Any = {"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-5, "maxfev": EVALUATIONS}
+        found = minimize(cost, start[free], method="Nelder-Mead", options=options)
+        whole[free] = found.x
+        return whole, -float(found.fun)
+
+    def _profile(self, i: int, at: float, near: np.ndarray) -> tuple[float, np.ndarray]:
+        """The largest likelihood with key i held at the logarithm `at`, and where that is."""
+        start = near.copy()
+        start[i] = at
+        found, top = self._climbed(start, i)
+        return top, found
+
+    def interval(self, i: int) -> Fitted:
+        """The 95 % profile interval of key i."""
+        limit = self.top - HALF_CHI2_95
+        lo, hi = (self._end(i, direction, limit) for direction in (-1, 1))
+        value = float(self.natural(self.best)[i])
+        least = math.log(self.likelihood.least[i])
+        ends = (0.0 if lo is None or lo <= least else math.exp(lo), math.inf if hi is None else math.exp(hi))
+        stated = float(self.likelihood.stated[i])
+        return Fitted(self.likelihood.keys[i], stated, value, *ends, ends[0] > 0 and math.isfinite(ends[1]))
+
+    def _end(self, i: int, direction: int, limit: float) -> float | None:
+        """The logarithm of key i at which the profile falls to a limit; None where it does not within REACH."""
+        from scipy.optimize import brentq
+
+        least = math.log(self.likelihood.least[i])
+        near, step = self.best, 0.1
+        home = inside = max(float(self.best[i]), least)
+        while abs(inside - home) < math.log(REACH):
+            outside = inside + direction * step
+            top, found = self._profile(i, outside, near)
+            if top < limit:
+                start = near
+
+                def above(at: float, start: np.ndarray = start) -> float:
+                    return self._profile(i, at, start)[0] - limit
+
+                return float(brentq(above, min(inside, outside), max(inside, outside), xtol=1e-4))
+            if outside < least:
+                return None
+            near, inside, step = found, outside, 2 * step
+        return None
+
+
+def _logit(share: float) -> float:
+    return math.log(share / (1 - share))
+
+
+def settings(found: Fit) -> dict[str, float]:
+    """What to write into the config, by key, to four digits; keys that the plots do not tell stay as they are."""
+    return {one.key: float(f"{one.value:.4g}") for one in found.keys if one.identifiable}
+
+
+def as_json(found: Fit) -> list[dict[str, object]]:
+    """The keys as `fit --json` prints them; an interval without an upper end has none there."""
+    return [
+        {
+            "key": one.key,
+            "value": one.value,
+            "lo": one.lo,
+            "hi": one.hi if math.isfinite(one.hi) else None,
+            "identifiable": one.identifiable,
+        }
+        for one in found.keys
+    ]
