@@ -281,11 +281,6 @@ def test_arguments_that_are_none(arguments, words):
         radarsim.run("rls2", realisations=2000, **arguments)
 
 
-def test_a_target_behind_the_radar_is_refused():
-    with pytest.raises(ConfigError, match=r"target: its range must stay > 0, is 0 m at 40 s, scan 5 of 15"):
-        radarsim.run("rls2", realisations=200, overrides=["target={kind: polynomial, coefficients: [10e3, -250]}"])
-
-
 def test_a_sweep_without_effect_is_told_as_one():
     for key, words in (("wavelength_m=[0.1, 0.2]", True), ("sigma_velocity_mps=[1, 100]", False)):
         answer = radarsim.run("rls2", realisations=2000, overrides=[f"sweep.radar.{key}"]).answer

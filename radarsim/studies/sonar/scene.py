@@ -5,11 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from radarsim.config.experiment import Case
+from radarsim.errors import ConfigError
 from radarsim.studies.sonar import world
 from radarsim.studies.sonar.banks import FilterSpec
 from radarsim.studies.sonar.config import CORRELATED, Keys, Polynomial, Sensor, Target, Turning, correlation_of
 from radarsim.studies.sonar.filters import Plots
 
+NEAREST_M = 1e-3  # a course through the sonar passes it at the distance of a rounding, at rates without meaning
 MOST_OPEN = 9  # scans that may be missed up to which all patterns are enumerated for exact values: 512
 
 
@@ -53,12 +56,19 @@ class Scene:
         return detected, self.probability**count * (1 - self.probability) ** (len(free) - count)
 
 
-def build_scene(spec: Keys) -> Scene:
-    """The scene of a case."""
+def build_scene(case: Case) -> Scene:
+    """The scene of a case. Raises ConfigError where the target reaches the sonar, from where it has no bearing."""
+    spec: Keys = case.spec
     sensor = spec.sensor
     third, third_sigma = third_coordinate(sensor)
     t, sigma = schedule(sensor, spec.scans)
-    polar, cartesian = courses(spec.target, t, third)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        polar, cartesian = courses(spec.target, t, third)
+    if not (away := polar[:, 0, 0] > NEAREST_M).all():
+        k = int(np.argmin(away))
+        least = f"its range must stay > {NEAREST_M:g} m"
+        fault = f"{least}, is {polar[k, 0, 0]:.3g} m at {t[k]:g} s, plot {k + 1} of {len(t)}"
+        raise ConfigError(f"{case.name}: target: {fault}")
     if third is not None:
         first_sonar = np.isin(np.arange(len(t)), np.flatnonzero(sigma[:, 0] == sensor.sigma_range_m))
         sigma = np.column_stack([sigma, np.where(first_sonar, third_sigma, np.inf)])

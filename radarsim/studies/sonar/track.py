@@ -43,7 +43,7 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
 
     NaN where a plot is missed, or where a further sonar does not measure the coordinate.
     """
-    spec, scene = case.spec, build_scene(case.spec)
+    spec, scene = case.spec, build_scene(case)
     K, C = scene.sigma.shape
     kernel_world, detections = base.world(case, scene), base.detections(case, scene)
     plots, detected = np.zeros((kernel_world.truth.shape[1], 4, 1)), np.empty(1)

@@ -60,7 +60,7 @@ class Plan:
 
 def prepare(case: Case) -> Plan:
     """Design the trackers of a case, and compute the exact laws of their errors and of initiation."""
-    spec, scene = case.spec, build_scene(case.spec)
+    spec, scene = case.spec, build_scene(case)
     given, specs = design.conditions(spec), design.tracker_specs(spec)
     F, K = len(specs), len(scene.t)
     common = base.shapes(F, K, COORDINATES, SIZE)

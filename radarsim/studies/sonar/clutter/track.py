@@ -54,7 +54,7 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     true_target is 1 for the target's plots and 0 for false ones; true_range_m and true_bearing_rad are the target's. A
     scan without plots has one row without values.
     """
-    spec, scene = case.spec, build_scene(case.spec)
+    spec, scene = case.spec, build_scene(case)
     field = design.field(noise_key(case, "false"), spec.sensor.sector, design.conditions(spec))
     z, true = target_plots(base.world(case, scene), detections(case, scene), realisation)
     rows: list[tuple[float, ...]] = []

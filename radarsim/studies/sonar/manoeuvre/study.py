@@ -47,7 +47,7 @@ class Plan(base.RealisationPlan):
 
 def prepare(case: Case) -> Plan:
     """Design the filters and detectors of a case, and compute the exact values of their errors and alarms."""
-    spec, scene = case.spec, build_scene(case.spec)
+    spec, scene = case.spec, build_scene(case)
     specs = responding_filters(spec, filter_specs(spec))
     detectors = all_detectors(spec, scene, specs)
     plan = base.realisation_plan(case, scene, specs, detectors)

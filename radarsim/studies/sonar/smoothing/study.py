@@ -42,7 +42,7 @@ class SharedPlan:
 
 def prepare(case: Case) -> SharedPlan | base.RealisationPlan:
     """Design the filters of a case and compute the exact values of its errors."""
-    scene, specs = build_scene(case.spec), filter_specs(case.spec)
+    scene, specs = build_scene(case), filter_specs(case.spec)
     if case.spec.frame == "polar" and (scene.certain >= 0).all():
         return _shared_plan(case, scene, specs)
     K, C = scene.sigma.shape

