@@ -304,8 +304,8 @@ def _legend(axes: Axes, panel: Panel, handles: list[tuple[str, Style]], crosses:
 
 def _fitting(axes: Axes) -> int:
     """How many labels of one line fit one below the other beside a panel."""
-    canvas, place = axes.get_figure(root=True), axes.get_subplotspec()
-    assert canvas is not None
+    canvas, place = axes.figure, axes.get_subplotspec()
+    assert isinstance(canvas, Canvas)  # and no part of one
     assert place is not None  # every panel is a cell of its figure
     height = canvas.get_size_inches()[1] / place.get_gridspec().nrows
     return int(0.75 * height * 72 / (1.25 * STYLE["font.size"]))

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from radarsim.app import reproduce
+from radarsim.app import doctor, reproduce
 
 SMALL = ["realisations=100"]
 
@@ -63,6 +63,28 @@ def test_a_signal_ends_it_and_its_processes_in_time(tmp_path):
         assert time.monotonic() < sent + 3
         assert "run the same command again to continue" in run.stderr.read()  # until the last process has closed it
         assert time.monotonic() < sent + 4
+
+
+def test_two_at_once_into_one_folder(tmp_path):
+    """Both end well, and leave what one alone would have left."""
+    shell = [sys.executable, "-m", "radarsim.cli.reproduce"]
+    options = ["rls2", "rls4", "sonar_smoothing", "--no-figures", "--set", "realisations=3000"]
+    both = [
+        subprocess.Popen([*shell, str(tmp_path / "both"), *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        for _ in range(2)
+    ]
+    said = [process.communicate() for process in both]
+    assert [(process.returncode, errors) for process, (_, errors) in zip(both, said, strict=True)] == [(0, b"")] * 2
+    subprocess.run([*shell, str(tmp_path / "one"), *options], check=True, capture_output=True)
+    tables = {path.relative_to(tmp_path / "one") for path in (tmp_path / "one").glob("*/*.csv")}
+    assert len(tables) > 10
+    for path in tables:
+        assert (tmp_path / "both" / path).read_bytes() == (tmp_path / "one" / path).read_bytes(), path
+    for stem in options[:3]:
+        found = doctor.inspected(tmp_path / "both" / stem)
+        assert (found.faults, found.notes) == ([], []), stem
+    assert all(f"{stem}/report.html" in (tmp_path / "both/index.html").read_text() for stem in options[:3])
+    assert not [path for path in (tmp_path / "both").rglob("*") if path.suffix in (".tmp", ".damaged")]
 
 
 def test_output_that_nobody_can_take(tmp_path):

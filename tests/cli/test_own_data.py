@@ -207,6 +207,41 @@ def test_the_track_alone_goes_to_the_terminal_and_words_beside_it(tmp_path):
     assert radarsim("track", "rls2", source, "--quiet").stderr == ""
 
 
+def test_plots_may_come_through_a_pipe(tmp_path):
+    """`… | radarsim track CONFIG /dev/stdin > TRACK.csv`: the same as from a file and to a file."""
+    source, track = tmp_path / "plots.csv", tmp_path / "track.csv"
+    radarsim("simulate", "rls2", "-o", source)
+    radarsim("track", "rls2", source, "-o", track)
+    piped = [sys.executable, "-m", "radarsim", "track", "rls2", "/dev/stdin", "--quiet"]
+    plots_text = source.read_text()
+    done = subprocess.run(piped, input=plots_text, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr, done.stdout) == (0, "", track.read_text())
+    wrong = plots_text.replace("\n10.0,", "\nten,", 1)
+    refused = subprocess.run(piped, input=wrong, capture_output=True, text=True, check=False)
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert refused.stderr == "/dev/stdin:3:1: t_s: must be a finite number, got 'ten'\n"
+
+
+def test_a_gap_in_a_pipe_is_named_by_its_row():
+    """A pipe is read once, so the line cannot be looked up again."""
+    text = "t_s,range_m,velocity_mps\n0,1e5,-250\n10,9.75e4,-250\n20,9.5e4,-250\n30,9.25e4,-250\n1e15,1e5,-250\n"
+    ready, given = os.pipe()
+    with open(given, "w") as file:
+        file.write(text)
+    try:
+        fault = radarsim("track", "rls2", f"/dev/fd/{ready}", code=2).stderr
+    finally:
+        os.close(ready)
+    assert fault.startswith(f"/dev/fd/{ready}: row 5 after the header: t_s: after a gap of 1e+15 s"), fault
+
+
+@pytest.mark.parametrize("realisation", [2**62, 2**64 - 1, 2**64, 10**30])
+def test_a_realisation_that_no_run_has(tmp_path, realisation):
+    fault = radarsim("simulate", "rls2", "-i", realisation, "-o", tmp_path / "plots.csv", code=2).stderr
+    assert re.search("must be (from 0 to|<=) ", fault), fault
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -276,27 +311,33 @@ def test_the_choice_of_swept_mappings_and_of_configs_elsewhere(tmp_path, monkeyp
     radarsim(*advised(fault))
 
 
+LONG = """
+import sys
+for i in range(int(sys.argv[1])):
+    print(f"{i},{1e5 + i},1" if i else "t_s,range_m,velocity_mps\\n0,1e5,1")
+"""
+PEAK = """
+import resource, sys
+from radarsim.cli import main
+try:
+    main(["track", "rls2", "/dev/stdin", "-o", "/dev/null"])
+finally:
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+"""
+
+
 @pytest.mark.slow
-def test_memory_does_not_grow_with_the_file(tmp_path):
-    """Peak memory over 40 000 and over 400 000 rows: the same to a few megabytes."""
-    one = loaded("rls2")
-    peaks = []
-    for rows in (40_000, 400_000):
-        path, t = tmp_path / f"{rows}.csv", np.arange(float(rows))
-        plots.write_columns({"t_s": t, "range_m": 1e5 + t, "velocity_mps": np.ones(rows)}, path)
-        code = (
-            "from radarsim import experiment, plots, recorded\n"
-            "(one,) = experiment.load_all(['rls2'])\n"
-            f"with plots.Writer({str(tmp_path / 'out.csv')!r}) as out:\n"
-            f"    recorded.follow(one, {str(path)!r}, lambda piece: out.write(plots.rows_of(piece)))\n"
-            "print(*(line.split()[1] for line in open('/proc/self/status') if line.startswith('VmHWM')))"
-        )
-        finished = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ
-        )
-        peaks.append(int(finished.stdout) / 1024)
-    assert one.study == "range_doppler"
-    assert abs(peaks[1] - peaks[0]) < 15, peaks
+def test_memory_does_not_grow_with_the_file():
+    """Peak memory of the command over 10⁵ and over 10⁷ rows: the same to a few megabytes."""
+
+    def peak_mb(rows):
+        with subprocess.Popen([sys.executable, "-c", LONG, str(rows)], stdout=subprocess.PIPE) as long:
+            done = subprocess.run([sys.executable, "-c", PEAK], stdin=long.stdout, capture_output=True, text=True)
+        assert f"plots    {rows} rows" in done.stdout, done.stderr
+        return float(done.stdout.splitlines()[-1])
+
+    few, many = peak_mb(10**5), peak_mb(10**7)
+    assert many - few < 10, (few, many)
 
 
 EXAMPLES = {"range_doppler.csv": "rls2", "multimodel.csv": "multimodel_1hz", "sonar.csv": "sonar_smoothing"}
