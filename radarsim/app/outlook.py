@@ -88,8 +88,10 @@ def outlook(
     # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter and its libraries.
     memory = 200 + 8e-6 * largest * (2 * threads + 32)
     seconds = preparing + sum(c.seconds for c in cases) / threads
-    warnings = (NO_CONTROL,) if experiment.control_variate and not control else ()
-    return Outlook(tuple(cases), threads, seconds, memory, precision, warnings)
+    warnings = [*registry.study(experiment.study).warnings(experiment)]
+    if experiment.control_variate and not control:
+        warnings.append(NO_CONTROL)
+    return Outlook(tuple(cases), threads, seconds, memory, precision, tuple(warnings))
 
 
 def controls(axes: Axes) -> bool:

@@ -223,7 +223,8 @@ def from_store(experiment: Experiment, out: str | os.PathLike[str], overrides: S
 
 
 def result_of(experiment: Experiment, simulated: SimulatedCases, facts: dict[str, Any], again: str) -> Result:
-    """The result, `again` the command that repeats it; with a warning where a control variate is asked for in vain."""
+    """The result, `again` the command that repeats it; with what is to be warned of in the config."""
+    facts["warnings"] += registry.study(experiment.study).warnings(experiment)
     result = Result(experiment, finished(simulated), facts | {"command": again})
     if experiment.control_variate and not len(result.tables.get("controlled", ())):
         facts["warnings"].append(simulation.NO_CONTROL)

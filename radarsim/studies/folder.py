@@ -18,6 +18,7 @@ A study that follows this declares an object and writes no class:
 | `tables`; if offered `curves`, `inputs`, `cost` | functions of `tables` |
 | `figures` | the function of `figures` |
 | `question`, `answer` | functions of `words` |
+| `warnings`, if offered | the function of `words` |
 | `claims`, if there is a paper | `claims.CLAIMS`, judged by `measures.Evidence` |
 | `seconds_per_update`, if offered | the function of `cost` |
 | `readings`, if offered | an object of the class `readings.Readings` |
@@ -114,6 +115,9 @@ class StudyFolder(Study):
 
     def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
         return self.file("words").answer(results, made)
+
+    def warnings(self, experiment: "Experiment") -> Sequence[str]:
+        return self.file("words").warnings(experiment) if "warnings" in self.offers else super().warnings(experiment)
 
     def claims(self) -> "PaperClaims | None":
         if self.paper is None:

@@ -126,7 +126,7 @@ class Paper(NamedTuple):
     may_grow: tuple[str, ...] = ()
 
 
-OptionalPart = Literal["curves", "inputs", "cost", "seconds_per_update", "readings", "recorded", "shipped"]
+OptionalPart = Literal["curves", "inputs", "cost", "seconds_per_update", "readings", "recorded", "shipped", "warnings"]
 
 
 class Study(ABC):
@@ -196,6 +196,10 @@ class Study(ABC):
     @abstractmethod
     def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
         """The answer: sentences with numbers and 95 % intervals."""
+
+    def warnings(self, experiment: "Experiment") -> Sequence[str]:
+        """What a config allows but hardly means, a line each; the run goes on. Default: nothing."""
+        return ()
 
     def inputs(self, results: "Sequence[CaseResult]") -> "pd.DataFrame | None":
         """A table of what was put in, for the report. Default: none."""

@@ -12,5 +12,5 @@ STUDY = StudyFolder(
         "doppler: folded": "the same, unfolded by up to `hypotheses` sequences of folds; 1: the nearest fold",
         "merge: each_scan": "the same, hypotheses merged into one each scan (GPB1): no memory",
     },
-    offers=("inputs",),
+    offers=("inputs", "recorded", "warnings"),
 )

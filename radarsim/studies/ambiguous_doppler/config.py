@@ -237,6 +237,7 @@ class Keys(Study):
     figure_names = (
         *(f"{kind}_{component}" for component in ("r", "Vr", "ar") for kind in ("sigma", "gain", "dynamic")),
         "right",
+        "lost",
         "hypotheses",
         "orders",
     )

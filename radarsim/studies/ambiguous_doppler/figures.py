@@ -1,14 +1,16 @@
-"""The study's figures: σ and gains between their brackets, and how often all folds are right."""
+"""The study's figures: σ and gains between their brackets, right folds, lost tracks, hypotheses as a fan, orders."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from radarsim.config.experiment import Experiment
+from radarsim.config.experiment import Case, Experiment
 from radarsim.report import panels
 from radarsim.report import tables as common
-from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Reference
+from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
+from radarsim.studies.ambiguous_doppler.fan import Fan, fan
 from radarsim.studies.ambiguous_doppler.tables import Result
 
 if TYPE_CHECKING:
@@ -22,45 +24,151 @@ QUANTITIES = {
 
 
 def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
-    """sigma_r … gain_ar, and `right`."""
+    """sigma_r … gain_ar; right and lost; hypotheses; orders."""
     curves = common.groups(made["curves"], "case", "filter", "component")
     gains = common.groups(made["gains"], "case", "filter", "component")
 
     def chosen(name: str) -> list[str]:
         return [case.name for case in experiment.shown_in(name)]
 
-    drawn = panels.per_component(results, curves, gains, QUANTITIES, chosen)
-    some, left_out = panels.shown_families(results, chosen("right"))
-    figure = right_figure(some, made["folds"], left_out) if some else None
-    return drawn | ({"right": figure} if figure else {})
+    drawn = {
+        name: replace(figure, panels=tuple(map(_wide, figure.panels))) if name.startswith("sigma") else figure
+        for name, figure in panels.per_component(results, curves, gains, QUANTITIES, chosen).items()
+    }
+    for name, (column, words, caption) in SHARES.items():
+        some, left_out = panels.shown_families(results, chosen(name))
+        figure = share_figure(name, some, made["folds"], (column, words, caption + left_out)) if some else None
+        drawn |= {name: figure} if figure else {}
+    drawn |= hypotheses_figure(experiment.shown_in("hypotheses"))
+    some, left_out = panels.shown(results, chosen("orders"))
+    return drawn | orders_figure(some, made["orders"], left_out)
 
 
-def right_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: str) -> Figure | None:
-    """P(all folds right) against time: a panel for each config, a line for each filter and swept value."""
+WIDE = 30  # largest over least σ from which its axis is logarithmic
+
+
+def _wide(panel: Panel) -> Panel:
+    """A panel of σ with a logarithmic axis where a lost track would hide the others."""
+    values = np.concatenate([mark.y for mark in panel.marks if isinstance(mark, Line)] or [np.ones(1)])
+    least = values[values > 0].min(initial=np.inf)
+    return replace(panel, y=Axis(panel.y.label, "log")) if values.max() > WIDE * least else panel
+
+
+SHARES = {  # figure: column of folds.csv, what it is, caption
+    "right": (
+        "right",
+        "P(all folds right)",
+        "Share of realisations in which all folds so far are right, of the best hypothesis. Bands: 95 % intervals. "
+        "Crosses: exact, of the nearest fold where truth and filter agree.",
+    ),
+    "lost": (
+        "beyond",
+        "P(velocity off by over D/2)",
+        "Share of realisations whose velocity is off by more than half the span. Bands: 95 % intervals.",
+    ),
+}
+
+
+def share_figure(
+    name: str, results: Sequence[Result], table: "pd.DataFrame", of: tuple[str, str, str]
+) -> Figure | None:
+    """A share of realisations against time: a panel for each config, a line for each filter and swept value.
+
+    of is a value of SHARES: the column of the table, the axis, the caption.
+    """
     rows = common.groups(table, "case", "filter")
-    drawn = [_right_panel(members, rows) for members in panels.families(results).values()]
-    drawn = [panel for panel in drawn if len(panel.marks) > 1]
+    drawn = [_share_panel(members, rows, of[:2]) for members in panels.families(results).values()]
+    drawn = [panel for panel in drawn if panel.marks]
     if not drawn:
         return None
+    if len(drawn) > 1 or any(len(panel.marks) > panels.MOST_AT_ENDS for panel in drawn):
+        drawn = panels.in_legend(drawn)
+    columns = min(3, len(drawn))
+    width = COLUMN_MM if columns == 1 else PAGE_MM
+    return Figure(name, of[1], of[2], tuple(drawn), columns, width)
+
+
+def _share_panel(members: Sequence[Result], rows: Mapping, of: tuple[str, str]) -> Panel:
+    marks: list = []
+    shown = [(i, result, f) for i, result in enumerate(members) for f in result.axes.filters]
+    shown = [one for one in shown if (one[1].name, one[2]) in rows]
+    names = list(dict.fromkeys(f for _, _, f in shown))
+    for i, result, f in shown:
+        own = rows[(result.name, f)]
+        words = ", ".join(filter(None, (panels.literal(f) if len(names) > 1 else "", panels.swept(result))))
+        x, y, lo, hi = (own[name].to_numpy() for name in ("t_s", of[0], f"{of[0]}_lo", f"{of[0]}_hi"))
+        exact = own["exact_right"].to_numpy() if of[0] == "right" else np.full(x.shape, np.nan)
+        style = panels.look(names.index(f), i, len(members))
+        marks.append(Line(x, y, words or panels.literal(f), style, lo, hi, exact if np.isfinite(exact).any() else None))
+    y_axis = Axis(of[1], limits=(0, 1.05))
+    return Panel(Axis(panels.TIME, limits=(0, None)), y_axis, tuple(marks), panels.device(members[0]))
+
+
+def hypotheses_figure(cases: Sequence[Case]) -> dict[str, Figure]:
+    """The hypotheses of one realisation as a fan: a panel for each config, of the first filter that remembers."""
+    drawn: list[Panel] = []
+    seen: set[str] = set()
+    for case in cases:
+        remember = [i for i, one in enumerate(case.spec.filters) if (one.hypotheses or 1) > 1 and one.combine is None]
+        if remember and case.stem not in seen and len(drawn) < FANS:
+            seen.add(case.stem)
+            drawn.append(_fan_panel(case, fan(case, remember[-1], min(FAN_SCANS, case.spec.scans)), remember[-1]))
+    if not drawn:
+        return {}
     caption = (
-        "Share of realisations in which all folds so far are right, of the best hypothesis. Bands: 95 % intervals. "
-        "Crosses: exact, of the nearest fold where truth and filter agree."
+        "The hypotheses of one realisation (number 7): after each scan a line for every sequence of folds that is "
+        "kept, at its velocity and with its acceleration, up to the next scan; the brighter and broader, the more "
+        "probable. Dots: the true velocity."
     )
     columns = min(2, len(drawn))
     width = COLUMN_MM if columns == 1 else PAGE_MM
-    return Figure("right", "All folds right", caption + left_out, tuple(drawn), columns, width)
+    return {"hypotheses": Figure("hypotheses", "How hypotheses thin out", caption, tuple(drawn), columns, width, 70)}
 
 
-def _right_panel(members: Sequence[Result], rows: Mapping) -> Panel:
-    marks: list = [Reference(1)]
-    shown = [(result, f) for result in members for f in result.axes.filters if (result.name, f) in rows]
-    names = list(dict.fromkeys(f for _, f in shown))
-    for result, f in shown:
-        own = rows[(result.name, f)]
-        i = list(members).index(result)
-        words = ", ".join(filter(None, (panels.literal(f) if len(names) > 1 else "", panels.swept(result))))
-        x, y, lo, hi, exact = (own[name].to_numpy() for name in ("t_s", "right", "right_lo", "right_hi", "exact_right"))
-        style = panels.look(names.index(f), i, len(members))
-        marks.append(Line(x, y, words or panels.literal(f), style, lo, hi, exact if np.isfinite(exact).any() else None))
-    y_axis = Axis("P(all folds right)", limits=(0, 1.05))
-    return Panel(Axis(panels.TIME, limits=(0, None)), y_axis, tuple(marks), panels.device(members[0]))
+FANS, FAN_SCANS, FAN_LINES = 4, 8, 40  # panels; scans of one; most lines of a scan
+
+
+def _fan_panel(case: Case, of: Fan, number: int) -> Panel:
+    marks: list = []
+    dt = case.spec.radar.scan_period_s
+    for t, (v, a, p) in zip(of.t_s, of.lists, strict=True):
+        for velocity, acceleration, weight in zip(v[:FAN_LINES], a[:FAN_LINES], p[:FAN_LINES], strict=True):
+            ink = weight / p[0]
+            style = Style(0.15 + 0.85 * ink, 0, None, 0.25 + 1.75 * weight)
+            marks.append(
+                Line(np.array([t, t + 0.92 * dt]), velocity + acceleration * np.array([0, 0.92 * dt]), "", style)
+            )
+    marks.append(Line(of.t_s, of.truth, "", Style(1, None, 0, size_pt=3.5), name="true velocity"))
+    title = f"{panels.literal(case.spec.device or case.stem)}, {panels.literal(case.spec.filters[number].name)}"
+    low, high = of.truth.min() - FAN_SPANS * case.spec.radar.spans_mps[0], of.truth.max()
+    limits = (low, high + FAN_SPANS * case.spec.radar.spans_mps[0])
+    return Panel(Axis(panels.TIME), Axis("radial velocity, m/s", limits=limits), tuple(marks), title, direct=False)
+
+
+FAN_SPANS = 8  # spans shown to either side of the true velocities
+
+
+def orders_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: str) -> dict[str, Figure]:
+    """Mean weight of each order in the range against time: a panel for each filter that combines orders."""
+    drawn = []
+    for (case, name), own in common.groups(table, "case", "filter").items():
+        result = next((one for one in results if one.name == case), None)
+        if result is None:
+            continue
+        marks = tuple(
+            Line(rows["t_s"].to_numpy(), rows["weight"].to_numpy(), f"order {order}", panels.look(order, 0, 1))
+            for order, rows in ((n, own[own["order"] == n]) for n in range(3))
+            if len(rows)
+        )
+        words = panels.literal(name) if len(results) == 1 else f"{panels.label(result)}, {panels.literal(name)}"
+        drawn.append(Panel(Axis(panels.TIME, limits=(0, None)), Axis("mean weight in the range"), marks, words))
+    if not drawn:
+        return {}
+    caption = (
+        "Weights of the orders in the estimate of range, mean over realisations; shares may be negative." + left_out
+    )
+    columns = min(2, len(drawn))
+    shown = tuple(panels.in_legend(drawn[: panels.MOST])) if len(drawn) > 1 else tuple(drawn)
+    return {
+        "orders": Figure("orders", "Weights of orders", caption, shown, columns, PAGE_MM if columns > 1 else COLUMN_MM)
+    }

@@ -189,7 +189,13 @@ def simulate_block(world: World, banks: Banks, sums: Sums, first: int, count: in
 
 def simulated(world: World, banks: Banks, first: int) -> tuple[np.ndarray, np.ndarray]:
     """Plots (K, PLOT, 8) and outputs (B, K, OUTPUT, 8) of the realisations first … first + 7, see `records`."""
+    plots, out, _ = simulated_lists(world, banks, first)
+    return plots, out
+
+
+def simulated_lists(world: World, banks: Banks, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """As `simulated`, and the columns that the last list of hypotheses is left in, see `hypotheses.Lists`."""
     scans, work = len(world.t), memory(len(world.t), banks)
     fill_outputs(world, banks, work, first)
     shape = (len(banks.kind), scans, OUTPUT, WIDTH)
-    return work.plots.reshape(scans, PLOT, WIDTH), work.out.reshape(shape)
+    return work.plots.reshape(scans, PLOT, WIDTH), work.out.reshape(shape), work.listed

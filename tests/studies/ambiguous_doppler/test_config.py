@@ -1,0 +1,96 @@
+"""What the keys refuse, and the words that the user gets; what is warned of."""
+
+import pytest
+
+from radarsim.app.configs import load
+from radarsim.errors import ConfigError
+from radarsim.studies import registry
+
+
+def refused(stem, **keys):
+    with pytest.raises(ConfigError) as error:
+        load(stem, [f"{key.replace('__', '.')}={value}" for key, value in keys.items()])
+    return str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("filters.5.hypotheses", "0", "filters.5.hypotheses: must be >= 1, got 0"),
+        ("filters.5.hypotheses", "-3", "filters.5.hypotheses: must be >= 1, got -3"),
+        ("filters.5.hypotheses", "1e6", "filters.5.hypotheses: must be <= 100000, got 1000000"),
+        ("filters.5.prune_below", "1", "filters.5.prune_below: must be < 1, got 1"),
+        ("filters.5.prune_below", "-1e-3", "filters.5.prune_below: must be >= 0, got -0.001"),
+        ("filters.5.merge", "sometimes", "filters.5.merge: must be one of never, each_scan"),
+        ("filters.0.hypotheses", "10", "filters.0.hypotheses: has no effect with doppler: none; leave it out"),
+        ("filters.1.estimate", "best", "filters.1.estimate: has no effect with doppler: unfolded; leave it out"),
+        ("filters.3.hypotheses", "10", "filters.3.hypotheses: has no effect with merge: each_scan"),
+        ("filters.5.orders", "[3]", "filters.5.orders.0: must be <= 2, got 3"),
+        ("filters.5.orders", "[2, 1]", "filters.5.orders: must rise, each once"),
+        ("filters.5.orders", "[1, 2]", "filters.5.manoeuvre_variance: must be a list of 2, one for each order"),
+        ("filters.5.combine", "likelihood", "filters.5.combine: has no effect on one order; leave it out"),
+        ("filters.5.stay_probability", "0.9", "filters.5.stay_probability: has no effect without combine: likelihood"),
+        ("radar.repetition_rate_hz", "0", "radar.repetition_rate_hz: must be > 0, got 0"),
+        ("radar.repetition_rate_hz", "[1000, 1200, 1000]", "radar.repetition_rate_hz: must differ from rate to rate: "),
+        ("radar.repetition_rate_hz", "[]", "radar.repetition_rate_hz: must hold at least 1"),
+        ("radar.detection_probability", "0", "radar.detection_probability: must be > 0, got 0"),
+        ("prior.sigma_velocity_mps", "1e9", "prior.sigma_velocity_mps: must be at most 1e+06 times"),
+        ("prior.sigma_velocity_mps", "0", "prior.sigma_velocity_mps: must be > 0, got 0"),
+        ("filters.5.manoeuvre_variance", "-1", "filters.5.manoeuvre_variance: must be >= 0, got -1"),
+        ("filters.5.manoeuvre_variance", "1e15", "filters.5.manoeuvre_variance: out of proportion"),
+        ("scans", "1", "scans: must be >= 2, got 1"),
+        ("scans", "1e5", "scans: must be <= 10000, got 100000"),
+    ],
+)
+def test_what_is_refused(key, value, words):
+    with pytest.raises(ConfigError) as error:
+        load("ambiguous_rls4", [f"{key}={value}"])
+    assert words in str(error.value)
+
+
+def test_orders_need_to_be_combined():
+    assert "filters.4.combine: is needed by several orders" in refused_without("combine")
+    assert "filters.5.manoeuvres: is needed by combine: expected_error" in refused_without("manoeuvres")
+
+
+def refused_without(key):
+    case = load("orders").cases[0]
+    document = {"study": "ambiguous_doppler", **case.resolved()}
+    document = {name: value for name, value in document.items() if name not in ("case", "swept")}
+    for one in document["filters"]:
+        one.pop(key, None)
+    with pytest.raises(ConfigError) as error:
+        load(document)
+    return str(error.value)
+
+
+def test_combinations_of_fixed_shares_need_every_plot():
+    with pytest.raises(ConfigError, match=r"filters\.5\.combine: expected_error needs every plot"):
+        load("orders", ["radar.detection_probability=0.9"])
+
+
+def test_defaults_are_written_out():
+    spec = load("ambiguous_rls4").cases[0].spec
+    assert (spec.target.sigma_velocity_mps, spec.target.sigma_acceleration_mps2) == (300, 10)
+    range_only, _, nearest, no_memory, best, memory = spec.filters
+    assert (memory.hypotheses, memory.prune_below, memory.merge, memory.estimate) == (300, 1e-6, "never", "mean")
+    assert (nearest.hypotheses, best.estimate, range_only.hypotheses) == (1, "best", None)
+    assert (no_memory.merge, no_memory.hypotheses) == ("each_scan", None)
+
+
+def test_a_span_too_short_is_warned_of_and_runs():
+    study = registry.study("ambiguous_doppler")
+    assert study.warnings(load("ambiguous_rls4")) == []
+    (line,) = study.warnings(load("ambiguous_rls4", ["radar.repetition_rate_hz=120"]))
+    assert line.startswith("ambiguous_rls4: radar.repetition_rate_hz: its span of 1.8 m/s is under 2 σ_V, 2 m/s")
+    (line,) = study.warnings(load("ambiguous_rls4", ["radar.repetition_rate_hz=[120, 1000]"]))
+    assert "1.8 m/s" in line
+    assert study.warnings(load("orders", ["radar.repetition_rate_hz=1"])) == []  # nothing there is folded
+
+
+def test_cases_that_differ_in_what_filters_know_share_their_noise():
+    from radarsim.studies.noise import noise_key
+
+    cases = load("ambiguous_prior").cases
+    assert len({noise_key(case, "plots").tobytes() for case in cases}) == 1
+    assert len({noise_key(case, "plots").tobytes() for case in load("ambiguous_rate").cases}) == 5
