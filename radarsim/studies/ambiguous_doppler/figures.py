@@ -10,7 +10,7 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
-from radarsim.studies.ambiguous_doppler.fan import Fan, fan
+from radarsim.studies.ambiguous_doppler.map import Fan, fan
 from radarsim.studies.ambiguous_doppler.tables import Result
 
 if TYPE_CHECKING:

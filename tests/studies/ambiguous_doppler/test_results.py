@@ -7,7 +7,8 @@ import radarsim
 from radarsim.app.configs import load
 from radarsim.errors import ConfigError
 from radarsim.studies import registry
-from radarsim.studies.ambiguous_doppler import fan, study, track
+from radarsim.studies.ambiguous_doppler import map as fans
+from radarsim.studies.ambiguous_doppler import study, track
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +76,7 @@ def test_fan_holds_what_the_filter_estimates():
     case = load("ambiguous_rls4").cases[0]
     plan = study.prepare(case)
     _, out = study.sums.simulated(plan.world, plan.banks, 0)
-    shown = fan.fan(case, 5, 6)
+    shown = fans.fan(case, 5, 6)
     for k, (v, a, p) in enumerate(shown.lists):
         mean = out[plan.banks.bank[5], k, :3, 7]
         assert p @ v == pytest.approx(mean[1], rel=1e-9, abs=1e-6)
