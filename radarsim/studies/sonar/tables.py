@@ -1,111 +1,120 @@
-"""P3's tables that all its parts have: extrapolation, believed, consistency, operations."""
+"""Tables that all parts of P3 have: extrapolation, believed, consistency, operations; and how tables are composed.
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+The columns of a table have the order of the mapping that is made for one case.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import consistency, statistics
 from radarsim.report import tables as common
+from radarsim.report.statistics import Estimate
 from radarsim.studies.sonar import operations as counted
 from radarsim.studies.sonar.axes import SonarAxes
 
 if TYPE_CHECKING:
     import pandas as pd
 
+Columns = Mapping[str, np.ndarray]
+Index = tuple[np.ndarray, ...]
+
 
 def tables(results: Sequence[CaseResult[SonarAxes]]) -> "dict[str, pd.DataFrame]":
-    """The tables of these cases beside curves and gains."""
+    """The tables of these cases in addition to curves and gains."""
     return {
-        "extrapolation": common.joined([_extrapolation(result) for result in results], EXTRAPOLATION),
-        "believed": common.joined([_believed(result) for result in results], consistency.BELIEVED),
-        "consistency": common.joined([_normalised_errors(result) for result in results], CONSISTENCY),
+        "extrapolation": stacked(_extrapolation(result) for result in results),
+        "believed": stacked(_believed(result) for result in results),
+        "consistency": stacked(_normalised_errors(result) for result in results),
         "operations": operations(),
     }
 
 
-def coordinate_rows(result: CaseResult[SonarAxes], mask: np.ndarray):
-    """The leading columns of a coordinate's rows, and where mask (F, K, C) has them.
+# ---- parts of tables ----------------------------------------------------------------------------------------------
+def stacked(parts: Iterable[Columns]) -> "pd.DataFrame":
+    """One table of the columns of several cases, without those that have no rows."""
+    filled = [part for part in parts if any(len(values) for values in part.values())]
+    return common.joined(filled, tuple(filled[0]) if filled else ())
 
-    Returns indices (filter, scan, coordinate), each (n,), ordered filter, coordinate, scan; and the columns by name.
+
+def leading(
+    result: CaseResult[SonarAxes], f: np.ndarray, k: np.ndarray | None = None, **labels: np.ndarray
+) -> dict[str, np.ndarray]:
+    """The first columns of n rows: case, filter, further labels and, for scans k (n,), their number and time."""
+    columns = {"case": np.full(f.size, result.name, dtype=object), "filter": common.names(result.axes.filters, f)}
+    columns |= labels
+    if k is not None:
+        columns |= {"k": np.asarray(result.axes.k)[k], "t_s": np.asarray(result.axes.t_s, dtype=float)[k]}
+    return columns
+
+
+def interval(name: str, of: Estimate, ends: str | None = None) -> dict[str, Any]:
+    """An estimate as columns `name`, `…_lo` and `…_hi`; ends: what stands before `_lo`, by default the name."""
+    prefix = f"{name}_" if ends is None else ends and f"{ends}_"
+    return {name: of.value, f"{prefix}lo": of.lo, f"{prefix}hi": of.hi}
+
+
+def of_coordinates(result: CaseResult[SonarAxes], mask: np.ndarray) -> tuple[Index, dict[str, np.ndarray]]:
+    """Where mask (F, K, C) is true: indices (filter, scan, coordinate), each (n,), and the first columns of these rows.
+
+    Rows are ordered by filter, coordinate, scan.
     """
-    axes = result.axes
     f, c, k = np.nonzero(np.moveaxis(mask, 1, 2))
-    coordinates = axes.coordinates
-    columns = {
-        "case": np.full(f.size, result.name, dtype=object),
-        "filter": common.names(axes.filters, f),
-        "component": common.names([name for name, _ in coordinates], c),
-        "unit": common.names([unit for _, unit in coordinates], c),
-        "k": np.asarray(axes.k)[k],
-        "t_s": np.asarray(axes.t_s, dtype=float)[k],
-    }
-    return (f, k, c), columns
+    names, units = zip(*result.axes.coordinates, strict=True)
+    return (f, k, c), leading(result, f, k, component=common.names(names, c), unit=common.names(units, c))
 
 
+# ---- tables -------------------------------------------------------------------------------------------------------
 def complete(result: CaseResult[SonarAxes]) -> np.ndarray:
-    """Realisations (F, K, C) in which a filter's state is complete in a coordinate."""
-    sizes, counts = result.axes.sizes, np.asarray(result.sums["estimates"])
-    size = counts.shape[2] // len(result.axes.coordinates)
-    split = counts.reshape(*counts.shape[:2], -1, size)
-    return np.take_along_axis(split, (sizes - 1)[:, None, None, None], axis=3)[..., 0]
+    """The number of realisations (F, K, C) in which the state of a filter is complete in a coordinate."""
+    counts = np.asarray(result.sums["estimates"])
+    split = counts.reshape(*counts.shape[:2], len(result.axes.coordinates), -1)
+    return np.take_along_axis(split, (result.axes.sizes - 1)[:, None, None, None], axis=3)[..., 0]
 
 
-EXTRAPOLATION = (
-    *("case", "filter", "component", "unit", "k", "t_s", "n"),
-    *("sigma", "sigma_lo", "sigma_hi", "bias", "bias_se", "exact_sigma"),
-)
-
-
-def _extrapolation(result: CaseResult[SonarAxes]) -> dict:
-    """σ of each coordinate extrapolated by one scan, in the row of the scan that it was extrapolated from."""
+def _extrapolation(result: CaseResult[SonarAxes]) -> Columns:
+    """σ of each coordinate extrapolated by one scan, in the row of the scan that it is extrapolated from."""
     n = complete(result)
     mask = n > 0
     mask[:, -1] = False
-    at, columns = coordinate_rows(result, mask)
+    at, columns = of_coordinates(result, mask)
     of = statistics.errors(result.sums["ahead"][at], n[at])
-    return columns | {
+    return {
+        **columns,
         "n": n[at].astype(np.int64),
-        "sigma": of.sigma.value,
-        "sigma_lo": of.sigma.lo,
-        "sigma_hi": of.sigma.hi,
+        **interval("sigma", of.sigma),
         "bias": of.bias,
         "bias_se": of.bias_se,
         "exact_sigma": result.axes.exact_ahead[at],
     }
 
 
-def _believed(result: CaseResult[SonarAxes]) -> dict[str, np.ndarray]:
-    """σ beside the one that the filter believes, the root of its mean variance."""
+def _believed(result: CaseResult[SonarAxes]) -> Columns:
+    """The measured σ beside the σ that the filter believes, the root of its mean variance."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return consistency.believed(result, np.sqrt(result.sums["believed"] / common.realisations(result)))
 
 
-CONSISTENCY = ("case", "filter", "component", "unit", "k", "t_s", "n", *consistency.columns("nees", exact=True))
+def _normalised_errors(result: CaseResult[SonarAxes]) -> Columns:
+    """NEES eᵀP⁻¹e of the state in a coordinate, per component, where the state is complete.
 
-
-def _normalised_errors(result: CaseResult[SonarAxes]) -> dict:
-    """NEES eᵀP⁻¹e of a coordinate's state per component, where it is complete.
-
-    In 95 % of runs of a filter that is right about itself all its scans' means over as many realisations lie within
-    their bounds.
+    For a consistent filter the means of all its scans are within their bounds in 95 % of runs.
     """
     n = complete(result)
-    at, columns = coordinate_rows(result, n > 0)
+    at, columns = of_coordinates(result, n > 0)
     looks = np.sum(n > 0, axis=1)[at[0], at[2]]
     size, n = result.axes.sizes[at[0]], n[at]
     joint = result.sums["joint"][at]
     mean = statistics.mean_square(joint[:, 0] / size, joint[:, 1] / size**2, n)
     bounds = statistics.normalised_bounds(size * n, looks)
     nees = consistency.normalised("nees", mean, bounds, result.axes.exact_nees[at] / size)
-    return columns | {"n": n.astype(np.int64), **nees}
+    return {**columns, "n": n.astype(np.int64), **nees}
 
 
 def operations() -> "pd.DataFrame":
-    """Operations of a scan of one coordinate, degree 1: the recursion, least squares anew, Kalman, and for correlated
-    errors.
-    """
+    """Operations of one scan in one coordinate, degree 1, by algorithm, and the numbers that each keeps."""
     rows = [("recursion (12)-(14)", 2, counted.recursion())]
     rows += [(f"least squares (2) on {n} plots", 2 * n, counted.batch_of(n)) for n in (2, 3, 5, 6, 10)]
     rows += [("Kalman (11), degree 1", 2, counted.kalman_of(2)), ("differenced", 3, counted.differenced())]

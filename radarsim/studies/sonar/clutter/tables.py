@@ -1,54 +1,38 @@
 """P3's tables of tracks among false plots: tracks, tracking, gates, track_classes."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import statistics
-from radarsim.report import tables as common
-from radarsim.report.statistics import Z95, Estimate
+from radarsim.report.statistics import Z95, Estimate, Values
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
-from radarsim.studies.sonar.clutter.kernels.counts import (
-    DROPPED,
-    ENDS_PER_SCAN,
-    EXPECTED,
-    FAILED,
-    FALSE,
-    FALSE_FOUND,
-    FALSE_KEPT,
-    FOUND,
-    INSIDE,
-    KEPT,
-    LOOKED,
-    LOST,
-    PLOTS,
-    TRYING,
-    WRONG_PER_PLOT,
-)
+from radarsim.studies.sonar.clutter.kernels import counts as at
+from radarsim.studies.sonar.tables import Columns, interval, leading, stacked
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
 def tables(results: Sequence[CaseResult[ClutterAxes]]) -> "dict[str, pd.DataFrame]":
-    """The tables of these cases, all of trackers."""
+    """The tables of these cases, all of which have trackers."""
     return {
-        "tracks": common.joined([_tracks(result) for result in results], TRACKS),
-        "tracking": common.joined([_tracking(result) for result in results], TRACKING),
-        "gates": common.joined([_gates(result) for result in results], GATES),
-        "track_classes": common.joined([_classes(result) for result in results], CLASSES),
+        "tracks": stacked(_tracks(result) for result in results),
+        "tracking": stacked(_tracking(result) for result in results),
+        "gates": stacked(_gates(result) for result in results),
+        "track_classes": stacked(_classes(result) for result in results),
     }
 
 
 def trackers(result: CaseResult[ClutterAxes]) -> np.ndarray:
-    """Filters (n,) that have to find their plots; those given them have no track to lose."""
+    """Indices (n,) of the filters that have to find their plots; the others cannot lose a track."""
     return np.flatnonzero([kind != "known" for kind in result.axes.associations])
 
 
 def per_hour(result: CaseResult[ClutterAxes]) -> float:
-    """Scans an hour."""
+    """Scans per hour."""
     return 3600.0 / result.axes.scan_period_s
 
 
@@ -58,8 +42,8 @@ def false_plots(result: CaseResult[ClutterAxes]) -> float:
 
 
 # ---- statistics ------------------------------------------------------------------------------------------------------
-def poisson(count, exposure) -> Estimate:
-    """Rate of a Poisson number over an exposure with its 95 % interval: Garwood's, by Wilson and Hilferty."""
+def poisson(count: Values, exposure: Values) -> Estimate:
+    """Rate of a Poisson number over an exposure with Garwood's 95 % interval, approximated by Wilson and Hilferty."""
     count = np.asarray(count, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         low = count * np.maximum(1 - 1 / (9 * count) - Z95 / (3 * np.sqrt(count)), 0) ** 3
@@ -70,8 +54,8 @@ def poisson(count, exposure) -> Estimate:
 def ratio(sums: np.ndarray, n: int) -> Estimate:
     """Σa/Σb with its 95 % interval from sums (5,) Σa, Σa², Σb, Σb², Σab over n realisations.
 
-    By the spread of a − R b over realisations (the delta method), on the logarithm; with no event at all as a Poisson
-    number, and without exposure not-a-number.
+    The interval is that of the logarithm, from the spread of a − R b over realisations (the delta method). Without any
+    event it is that of a Poisson number; without exposure it is NaN.
     """
     a, aa, b, bb, ab = (float(part) for part in sums)
     if b <= 0:
@@ -99,177 +83,118 @@ def mean_of_counts(times: np.ndarray, counts: np.ndarray) -> Estimate:
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
-TRACKS = (
-    *("case", "filter", "k", "t_s", "n", "confirmed", "confirmed_lo", "confirmed_hi", "exact_confirmed"),
-    *("kept", "kept_lo", "kept_hi", "tentative", "lost", "dropped", "tentative_dropped"),
-)
+def _tracks(result: CaseResult[ClutterAxes]) -> Columns:
+    """By scan: probabilities that a track of the target was confirmed by then, and that one is kept.
 
-
-def _tracks(result: CaseResult[ClutterAxes]) -> dict:
-    """By scan: probability that a track of the target was confirmed by then, and that one is kept.
-
-    And how many of n realisations have a tentative one, lost or dropped a confirmed one, dropped a tentative one.
+    In addition, numbers of n realisations that have a tentative one, lost or dropped a confirmed one, or dropped a
+    tentative one.
     """
-    chosen = trackers(result)
-    counts, K = np.asarray(result.sums["counts"])[chosen], len(result.axes.k)
-    n = result.count
-    found = statistics.rate(np.cumsum(counts[:, :, FOUND], axis=1), n)
-    kept = statistics.rate(counts[:, :, KEPT], n)
-    whole = {"tentative": TRYING, "lost": LOST, "dropped": DROPPED, "tentative_dropped": FAILED}
+    chosen, K, n = trackers(result), len(result.axes.k), result.count
+    counts = np.asarray(result.sums["counts"])[chosen]
+    shown = {"tentative": at.TRYING, "lost": at.LOST, "dropped": at.DROPPED, "tentative_dropped": at.FAILED}
     return {
-        **_named(result, np.repeat(chosen, K)),
-        "k": np.tile(result.axes.k, len(chosen)),
-        "t_s": np.tile(np.asarray(result.axes.t_s, dtype=float), len(chosen)),
+        **leading(result, np.repeat(chosen, K), np.tile(np.arange(K), len(chosen))),
         "n": np.full(len(chosen) * K, n),
-        **_three("confirmed", found),
+        **interval("confirmed", statistics.rate(np.cumsum(counts[:, :, at.FOUND], axis=1).ravel(), n)),
         "exact_confirmed": result.axes.exact_confirmed[chosen].ravel(),
-        **_three("kept", kept),
-        **{name: counts[:, :, place].ravel().astype(np.int64) for name, place in whole.items()},
+        **interval("kept", statistics.rate(counts[:, :, at.KEPT].ravel(), n)),
+        **{name: counts[:, :, place].ravel().astype(np.int64) for name, place in shown.items()},
     }
 
 
-def _named(result: CaseResult[ClutterAxes], f: np.ndarray) -> dict:
-    return {"case": np.full(f.size, result.name, dtype=object), "filter": common.names(result.axes.filters, f)}
-
-
-def _three(name: str, of: Estimate) -> dict:
-    """Value and ends of an interval as columns."""
-    return {f"{name}{end}": np.ravel(part).astype(float) for end, part in zip(("", "_lo", "_hi"), of, strict=True)}
-
-
-TRACKING = (
-    *("case", "filter", "association", "gate_probability", "m", "of", "n"),
-    *("detection_probability", "false_plots_per_km2", "false_in_gate"),
-    *("confirmed", "confirmed_lo", "confirmed_hi", "time_to_confirm_s", "time_lo", "time_hi"),
-    *("kept_at_end", "kept_lo", "kept_hi", "lost", "dropped", "ends_per_hour", "ends_lo", "ends_hi"),
-    *("life_s", "life_lo", "life_hi", "wrong_share", "wrong_lo", "wrong_hi"),
-    *("false_confirmed", "false_confirmed_lo", "false_confirmed_hi", "exact_false_confirmed"),
-    *("false_tracks_per_hour", "false_lo", "false_hi", "false_tracks_at_once", "false_life_s"),
-)
-
-
-def _tracking(result: CaseResult[ClutterAxes]) -> dict:
+def _tracking(result: CaseResult[ClutterAxes]) -> Columns:
     """One row a tracker: how surely and soon it confirms the target's track, how long it keeps it, its false tracks.
 
-    The life is a track's mean time between ends, over all confirmed tracks' time. false_confirmed is the probability
-    that a track begun by a false plot is confirmed; false tracks are counted over the whole sector.
+    The life of a track is the mean time between ends, over the time of all confirmed tracks. false_confirmed is the
+    probability that a track begun by a false plot is confirmed; false tracks are counted over the whole sector.
     """
     rows = [_summary(result, f) for f in trackers(result)]
-    return {name: np.array([row[name] for row in rows]) if rows else [] for name in TRACKING}
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}
 
 
-def _summary(result: CaseResult[ClutterAxes], f: int) -> dict:
-    one, sensor, n, sums = result.spec.filters[f], result.spec.sensor, result.count, result.sums
-    counts, begun, t = sums["counts"][f], sums["begun"][f], np.asarray(result.axes.t_s, dtype=float)
-    found = counts[:, FOUND]
-    ends = ratio(sums["ratios"][f, ENDS_PER_SCAN], n)
-    hourly = Estimate(*(part * per_hour(result) for part in ends))
-    false = statistics.rate(begun[:, FALSE_FOUND].sum(), n)
-    rate = false_plots(result) * per_hour(result)
-    any_false = sensor.false_plots_per_km2 > 0
+def _summary(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
+    tracker, sensor, n = result.spec.filters[f], result.spec.sensor, result.count
+    counts, begun, ratios = (result.sums[name][f] for name in ("counts", "begun", "ratios"))
+    found, alive, false_found = counts[:, at.FOUND], begun[:, at.FALSE_KEPT].sum(), begun[:, at.FALSE_FOUND].sum()
+    ends_per_hour = Estimate(*(part * per_hour(result) for part in ratio(ratios[at.ENDS_PER_SCAN], n)))
+    false, any_false = statistics.rate(false_found, n), sensor.false_plots_per_km2 > 0
+    false_per_hour = Estimate(*(false_plots(result) * per_hour(result) * part for part in false))
     with np.errstate(divide="ignore", invalid="ignore"):
-        alive = begun[:, FALSE_KEPT].sum()
-        life = Estimate(*(3600.0 / np.float64(part) for part in (hourly.value, hourly.hi, hourly.lo)))
-        false_life = alive * result.axes.scan_period_s / begun[:, FALSE_FOUND].sum()
-        in_gate = counts[:, FALSE].sum() / counts[:, LOOKED].sum()
-    exact = result.axes.exact_begun[f].sum()
-    m, of = one.m_of_n()
+        life = Estimate(
+            *(3600.0 / np.float64(part) for part in (ends_per_hour.value, ends_per_hour.hi, ends_per_hour.lo))
+        )
+        false_life = alive * result.axes.scan_period_s / false_found
+        in_gate = counts[:, at.FALSE].sum() / counts[:, at.LOOKED].sum()
+    m, of = tracker.m_of_n()
     return {
-        **{"case": result.name, "filter": result.axes.filters[f], "association": one.association},
-        **{"gate_probability": one.tracker("gate_probability"), "m": m, "of": of, "n": n},
+        **{"case": result.name, "filter": result.axes.filters[f], "association": tracker.association},
+        **{"gate_probability": tracker.tracker("gate_probability"), "m": m, "of": of, "n": n},
         "detection_probability": sensor.detection_probability,
         "false_plots_per_km2": sensor.false_plots_per_km2,
-        "false_in_gate": float(in_gate),
-        **_named_three("confirmed", statistics.rate(found.sum(), n)),
-        **_named_three("time", mean_of_counts(t, found), "time_to_confirm_s"),
-        **_named_three("kept", statistics.rate(counts[-1, KEPT], n), "kept_at_end"),
-        **{"lost": int(counts[:, LOST].sum()), "dropped": int(counts[:, DROPPED].sum())},
-        **_named_three("ends", hourly, "ends_per_hour"),
-        **_named_three("life", life, "life_s"),
-        **_named_three("wrong", ratio(sums["ratios"][f, WRONG_PER_PLOT], n), "wrong_share"),
-        **_named_three("false_confirmed", false if any_false else Estimate(0.0, 0.0, 0.0)),
-        "exact_false_confirmed": float(exact) if any_false else 0.0,
-        **_named_three("false", Estimate(*(rate * part for part in false)), "false_tracks_per_hour"),
-        "false_tracks_at_once": float(false_plots(result) * alive / n),
-        "false_life_s": float(false_life),
+        "false_in_gate": in_gate,
+        **interval("confirmed", statistics.rate(found.sum(), n)),
+        **interval("time_to_confirm_s", mean_of_counts(np.asarray(result.axes.t_s, dtype=float), found), "time"),
+        **interval("kept_at_end", statistics.rate(counts[-1, at.KEPT], n), "kept"),
+        **{"lost": int(counts[:, at.LOST].sum()), "dropped": int(counts[:, at.DROPPED].sum())},
+        **interval("ends_per_hour", ends_per_hour, "ends"),
+        **interval("life_s", life, "life"),
+        **interval("wrong_share", ratio(ratios[at.WRONG_PER_PLOT], n), "wrong"),
+        **interval("false_confirmed", false if any_false else Estimate(0.0, 0.0, 0.0)),
+        "exact_false_confirmed": result.axes.exact_begun[f].sum() if any_false else 0.0,
+        **interval("false_tracks_per_hour", false_per_hour, "false"),
+        "false_tracks_at_once": false_plots(result) * alive / n,
+        "false_life_s": false_life,
     }
 
 
-def _named_three(name: str, of: Estimate, value: str = "") -> dict:
-    return {value or name: float(of.value), f"{name}_lo": float(of.lo), f"{name}_hi": float(of.hi)}
+def _gates(result: CaseResult[ClutterAxes]) -> Columns:
+    """By scan: the share of the target's plots in the gate, and false plots in it, for n tracks of two plots or more.
 
-
-GATES = (
-    *("case", "filter", "k", "t_s", "n", "plots", "inside", "inside_lo", "inside_hi", "exact_inside"),
-    *("false_in_gate", "false_lo", "false_hi", "exact_false_in_gate"),
-)
-
-
-def _gates(result: CaseResult[ClutterAxes]) -> dict:
-    """By scan: the share of the target's plots that lay in the gate, and false plots in it, of n tracks of two plots.
-
-    A filter that is given its plots, and whose model is the target's, has the gate's probability exactly. The expected
-    number of false plots is density times area, π γ √|S| times the range, over the gates as they were; a sector's edge
-    is not reckoned with.
+    The exact share, the gate's probability, holds for a filter that knows the target's plots and has the target's
+    model. The expected number of false plots is density times area, π γ √|S| times the range, over the gates as they
+    were; the edges of the sector are neglected.
     """
-    counts = np.asarray(result.sums["counts"])
-    f, k = np.nonzero(counts[:, :, LOOKED] > 0)
-    at = counts[f, k]
-    inside = statistics.rate(at[:, INSIDE], at[:, PLOTS])
-    false = poisson(at[:, FALSE], at[:, LOOKED])
-    exact = np.array([one.tracker("gate_probability") for one in result.spec.filters])[f]
-    steady = not getattr(result.spec.target, "fluctuation_mps2", 0.0)
-    own = np.array([one.association == "known" and not one.manoeuvre_variance for one in result.spec.filters])[f]
+    counts, filters = np.asarray(result.sums["counts"]), result.spec.filters
+    f, k = np.nonzero(counts[:, :, at.LOOKED] > 0)
+    rows = counts[f, k]
+    gate = np.array([one.tracker("gate_probability") for one in filters])
+    matched = np.array([one.association == "known" and not one.manoeuvre_variance for one in filters])
+    exact = np.where(matched & straight(result) & (not result.spec.target.fluctuation_mps2), gate, np.nan)
     return {
-        **_named(result, f),
-        "k": np.asarray(result.axes.k)[k],
-        "t_s": np.asarray(result.axes.t_s, dtype=float)[k],
-        "n": at[:, LOOKED].astype(np.int64),
-        "plots": at[:, PLOTS].astype(np.int64),
-        **_three("inside", inside),
-        "exact_inside": np.where(own & steady & straight(result), exact, np.nan),
-        "false_in_gate": false.value,
-        "false_lo": false.lo,
-        "false_hi": false.hi,
-        "exact_false_in_gate": at[:, EXPECTED] / at[:, LOOKED],
+        **leading(result, f, k),
+        "n": rows[:, at.LOOKED].astype(np.int64),
+        "plots": rows[:, at.PLOTS].astype(np.int64),
+        **interval("inside", statistics.rate(rows[:, at.INSIDE], rows[:, at.PLOTS])),
+        "exact_inside": exact[f],
+        **interval("false_in_gate", poisson(rows[:, at.FALSE], rows[:, at.LOOKED]), "false"),
+        "exact_false_in_gate": rows[:, at.EXPECTED] / rows[:, at.LOOKED],
     }
 
 
 def straight(result: CaseResult[ClutterAxes]) -> bool:
-    """Whether range and bearing change at constant rates, as the trackers' model has it."""
+    """Whether range and bearing change at constant rates, as the trackers' model assumes."""
     target = result.spec.target
     polar = target.kind == "polynomial" and target.frame == "polar"
     return polar and not any(any(c[2:]) for c in (target.range_m, target.bearing_rad))
 
 
-CLASSES = (
-    *("case", "filter", "threshold", "n_true", "true_called_false", "true_lo", "true_hi"),
-    *("n_false", "false_called_true", "false_lo", "false_hi", "bound"),
-)
+def _classes(result: CaseResult[ClutterAxes]) -> Columns:
+    """Error rates of calling a track true once its score reaches a threshold, and false if it ends before.
 
-
-def _classes(result: CaseResult[ClutterAxes]) -> dict:
-    """Error rates of calling a track true once its score reaches a threshold, false if it ends before.
-
-    Of the target's first tracks, and of tracks that false plots began. The score is the logarithm of the likelihood
-    ratio of all plots in the gate; on false tracks its exponential is a martingale of mean one, so that no more than
-    exp(−threshold) of them ever reach the threshold (Ville), whatever the tracker.
+    For the target's first tracks, and for tracks that false plots began. The score is the logarithm of the likelihood
+    ratio of all plots in the gate. For false tracks its exponential is a martingale of mean one, so that at most
+    exp(−threshold) of them ever reach the threshold (Ville), for any tracker.
     """
     chosen, thresholds = trackers(result), result.axes.thresholds
     scores = np.asarray(result.sums["scores"])[:, chosen]
-    n = np.broadcast_to(scores[:, :, -1:], scores[:, :, :-1].shape)
-    missed = statistics.rate(n[0] - scores[0, :, :-1], n[0])
-    taken = statistics.rate(scores[1, :, :-1], n[1])
+    true, false = scores[:, :, :-1].reshape(2, -1)
+    n_true, n_false = np.broadcast_to(scores[:, :, -1:], scores[:, :, :-1].shape).reshape(2, -1)
     return {
-        **_named(result, np.repeat(chosen, len(thresholds))),
+        **leading(result, np.repeat(chosen, len(thresholds))),
         "threshold": np.tile(thresholds, len(chosen)),
-        "n_true": n[0].ravel().astype(np.int64),
-        **dict(zip(("true_called_false", "true_lo", "true_hi"), _flat(missed), strict=True)),
-        "n_false": n[1].ravel().astype(np.int64),
-        **dict(zip(("false_called_true", "false_lo", "false_hi"), _flat(taken), strict=True)),
+        "n_true": n_true.astype(np.int64),
+        **interval("true_called_false", statistics.rate(n_true - true, n_true), "true"),
+        "n_false": n_false.astype(np.int64),
+        **interval("false_called_true", statistics.rate(false, n_false), "false"),
         "bound": np.tile(np.exp(-thresholds), len(chosen)),
     }
-
-
-def _flat(of: Estimate) -> list[np.ndarray]:
-    return [np.ravel(part).astype(float) for part in of]

@@ -1,4 +1,4 @@
-"""Tables of filters that are given their plots (P3): what plots buy, gains of growing memory, the conversion's bias."""
+"""Tables of filters that know their plots (P3): what each plot gains, gains of growing memory, bias of conversion."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -7,138 +7,122 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import statistics
-from radarsim.report import tables as common
 from radarsim.studies.sonar import exact
 from radarsim.studies.sonar.axes import GivenPlotsAxes
+from radarsim.studies.sonar.tables import Columns, interval, leading, stacked
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
 def tables(results: Sequence[CaseResult[GivenPlotsAxes]]) -> "dict[str, pd.DataFrame]":
-    """The tables of these cases beside those of all parts."""
+    """The tables of these cases in addition to those of all parts."""
+    textbook_cases = [result for result in results if textbook(result)]
     return {
-        "plots": common.joined([_plots(result) for result in results if textbook(result)], PLOTS),
-        "smoothing_gains": common.joined([_gains(result) for result in results if textbook(result)], GAINS),
-        "conversion": common.joined([_conversion(r) for r in results if r.spec.frame != "polar"], CONVERSION),
+        "plots": stacked(part for result in textbook_cases for part in _plots(result)),
+        "smoothing_gains": stacked(part for result in textbook_cases for part in _gains(result)),
+        "conversion": stacked(_conversion(result) for result in results if result.spec.frame != "polar"),
     }
 
 
 def textbook(result: CaseResult[GivenPlotsAxes]) -> bool:
-    """Whether a case is what the paper's closed forms are of: equal intervals and weights, white errors, no miss."""
+    """Whether the paper's closed forms apply: equal intervals and weights, white errors, no missed plots."""
     sensor, target = result.spec.sensor, result.spec.target
-    whole = sensor.detection_probability == 1 and not sensor.missed_scans and not sensor.further
-    steady = (
-        target.kind == "polynomial" and not target.fluctuation_mps2 and result.spec.frame == target.frame == "polar"
-    )
-    straight = steady and all(len(c) <= 2 or not any(c[2:]) for c in (target.range_m, target.bearing_rad))
-    return whole and straight and not result.axes.rho.any()
+    complete = sensor.detection_probability == 1 and not sensor.missed_scans and not sensor.further
+    polynomial = target.kind == "polynomial" and result.spec.frame == target.frame == "polar"
+    straight = polynomial and not any(any(c[2:]) for c in (target.range_m, target.bearing_rad))
+    return complete and straight and not target.fluctuation_mps2 and not result.axes.rho.any()
 
 
-PLOTS = (
-    *("case", "filter", "degree", "component", "what", "plots", "ratio", "ratio_lo", "ratio_hi", "formula"),
-    *("bought_percent", "formula_bought_percent"),
-)
+def _width(result: CaseResult[GivenPlotsAxes]) -> int:
+    """Components of a coordinate."""
+    return len(result.axes.components) // len(result.axes.coordinates)
 
 
-def _plots(result: CaseResult[GivenPlotsAxes]) -> dict:
-    """What each further plot buys: σ of growing memory per σ of a plot after n plots, smoothed and one scan ahead.
+def _plots(result: CaseResult[GivenPlotsAxes]) -> list[Columns]:
+    """The gain of each further plot: σ of growing memory after n plots, per σ of a plot.
 
-    `formula` is the paper's for degree 1, and its (3) for the acceleration of degree 2; `bought_percent` is what the
-    n-th plot takes off.
+    Smoothed, one scan ahead, and for degree 2 of the acceleration. `formula` is the paper's for degree 1, and its (3)
+    for the acceleration; `bought_percent` is the reduction by the n-th plot.
     """
-    parts = []
-    for f, choice in enumerate(result.spec.filters):
-        if choice.kind == "growing_memory":
-            for c in range(len(result.axes.coordinates)):
-                parts += [_bought(result, f, c, what) for what in ("smoothed", "extrapolated", "acceleration")]
-    parts = [part for part in parts if part]
-    return {name: np.concatenate([np.asarray(part[name]) for part in parts]) if parts else [] for name in PLOTS}
+    return [
+        _bought(result, f, c, what)
+        for f, member in enumerate(result.spec.filters)
+        if member.kind == "growing_memory"
+        for c in range(len(result.axes.coordinates))
+        for what in ("smoothed", "extrapolated", "acceleration")[: member.degree + 1]
+    ]
 
 
-def _bought(result: CaseResult[GivenPlotsAxes], f: int, c: int, what: str) -> dict | None:
-    axes, choice = result.axes, result.spec.filters[f]
-    size, width = choice.degree + 1, len(axes.components) // len(axes.coordinates)
-    sigma, period = axes.sigma[c], axes.scan_period_s
-    n = np.arange(size, len(axes.k) + (what != "extrapolated"))
-    if what == "acceleration" and size < 3:
-        return None
-    if what == "extrapolated":
-        moments, unit = result.sums["ahead"][f, n - 1, c], sigma
-    else:
-        j = 0 if what == "smoothed" else 2
-        moments, unit = result.sums["error"][f, n - 1, width * c + j], sigma / period**j
-    of = statistics.root_mean_square(moments[:, 1], moments[:, 3], result.count)
-    known = {"smoothed": exact.sigma_smoothed, "extrapolated": exact.sigma_extrapolated}.get(what)
+def _bought(result: CaseResult[GivenPlotsAxes], f: int, c: int, what: str) -> Columns:
+    axes, member = result.axes, result.spec.filters[f]
+    n = np.arange(member.degree + 1, len(axes.k) + (what != "extrapolated"))
+    formula: np.ndarray = np.full(len(n), np.nan)
     if what == "acceleration":
-        formula = exact.sigma_acceleration(n, 1.0)
+        unit, formula = axes.sigma[c] / axes.scan_period_s**2, np.asarray(exact.sigma_acceleration(n, 1.0))
+        moments = result.sums["error"][f, n - 1, _width(result) * c + 2]
+    elif what == "extrapolated":
+        unit, moments = axes.sigma[c], result.sums["ahead"][f, n - 1, c]
     else:
-        formula = known(n) if size == 2 else np.full(len(n), np.nan)
+        unit, moments = axes.sigma[c], result.sums["error"][f, n - 1, _width(result) * c]
+    if member.degree == 1:
+        known = exact.sigma_smoothed if what == "smoothed" else exact.sigma_extrapolated
+        formula = np.asarray(known(n))
+    of = statistics.root_mean_square(moments[:, 1], moments[:, 3], result.count)
     return {
-        "case": [result.name] * len(n),
-        "filter": [choice.name] * len(n),
-        "degree": [choice.degree] * len(n),
-        "component": [axes.coordinates[c][0]] * len(n),
-        "what": [what] * len(n),
+        **leading(result, np.full(len(n), f)),
+        "degree": np.full(len(n), member.degree),
+        "component": np.full(len(n), axes.coordinates[c][0], dtype=object),
+        "what": np.full(len(n), what, dtype=object),
         "plots": n,
-        "ratio": of.value / unit,
-        "ratio_lo": of.lo / unit,
-        "ratio_hi": of.hi / unit,
+        **interval("ratio", statistics.Estimate(*(part / unit for part in of))),
         "formula": formula,
         "bought_percent": np.append(np.nan, 100 * (1 - of.value[1:] / of.value[:-1])),
         "formula_bought_percent": np.append(np.nan, 100 * (1 - formula[1:] / formula[:-1])),
     }
 
 
-GAINS = ("case", "filter", "component", "plots", "A", "A_lo", "A_hi", "A_formula", "B", "B_lo", "B_hi", "B_formula")
+def _gains(result: CaseResult[GivenPlotsAxes]) -> list[Columns]:
+    """A_n and B_n of (14) as measured by filters of degree 1 without process noise.
 
-
-def _gains(result: CaseResult[GivenPlotsAxes]) -> dict:
-    """A_n and B_n of (14) as measured: a filter of degree 1 without process noise has var r / σ² = A, T₀ cov(r, v) /
-    σ² = B.
+    For them var r / σ² = A and T₀ cov(r, v) / σ² = B.
     """
     axes, parts = result.axes, []
-    width = len(axes.components) // len(axes.coordinates)
     n = np.arange(2, len(axes.k) + 1)
-    A, B = exact.gains_closed(n)
-    for f, choice in enumerate(result.spec.filters):
-        plain = choice.kind in ("growing_memory", "kalman") and not choice.manoeuvre_variance and choice.degree == 1
+    A_formula, B_formula = exact.gains_closed(n)
+    for f, member in enumerate(result.spec.filters):
+        plain = member.kind in ("growing_memory", "kalman") and not member.manoeuvre_variance and member.degree == 1
         for c, (name, _) in enumerate(axes.coordinates) if plain else ():
             unit = axes.sigma[c] ** 2
-            of = statistics.root_mean_square(*result.sums["error"][f, 1:, width * c, 1::2].T, result.count)
+            of = statistics.root_mean_square(*result.sums["error"][f, 1:, _width(result) * c, 1::2].T, result.count)
             joint = result.sums["joint"][f, 1:, c]
             both = statistics.mean(joint[:, 2], joint[:, 3], result.count)
-            parts.append(
-                {"case": [result.name] * len(n), "filter": [choice.name] * len(n), "component": [name] * len(n)}
-                | {"plots": n, "A_formula": A, "B_formula": B}
-                | {key: part**2 / unit for key, part in zip(("A", "A_lo", "A_hi"), of, strict=True)}
-                | {key: part * axes.scan_period_s / unit for key, part in zip(("B", "B_lo", "B_hi"), both, strict=True)}
-            )
-    return {name: np.concatenate([np.asarray(part[name]) for part in parts]) if parts else [] for name in GAINS}
+            A = statistics.Estimate(*(part**2 / unit for part in of))
+            B = statistics.Estimate(*(part * axes.scan_period_s / unit for part in both))
+            columns = leading(result, np.full(len(n), f), component=np.full(len(n), name, dtype=object)) | {"plots": n}
+            columns |= interval("A", A) | {"A_formula": A_formula} | interval("B", B) | {"B_formula": B_formula}
+            parts.append(columns)
+    return parts
 
 
-CONVERSION = (
-    *("case", "frame", "range_m", "sigma_range_m", "sigma_bearing_rad", "across_m"),
-    *("bias_m", "bias_lo", "bias_hi", "formula_m", "bias_to_sigma_range"),
-)
-
-
-def _conversion(result: CaseResult[GivenPlotsAxes]) -> dict:
+def _conversion(result: CaseResult[GivenPlotsAxes]) -> Columns:
     """Mean error along the line of sight of the converted first plot; `across_m` is range × bearing error."""
     axes, sensor = result.axes, result.spec.sensor
-    width = len(axes.components) // len(axes.coordinates)
     r, b = axes.polar[0, :2, 0]
-    of = statistics.errors(result.sums["error"][0, 0, [0, width]], result.count)
+    of = statistics.errors(result.sums["error"][0, 0, [0, _width(result)]], result.count)
     along = np.array([np.cos(b), np.sin(b)])
     bias, half = float(along @ of.bias), statistics.Z95 * float(np.hypot(*(along * of.bias_se)))
-    formula = axes.conversion_bias
-    row = (
-        result.name,
-        result.spec.frame,
-        r,
-        sensor.sigma_range_m,
-        sensor.sigma_bearing_rad,
-        r * sensor.sigma_bearing_rad,
-    )
-    row += (bias, bias - half, bias + half, formula, bias / sensor.sigma_range_m)
-    return {name: [value] for name, value in zip(CONVERSION, row, strict=True)}
+    row = {
+        "case": result.name,
+        "frame": result.spec.frame,
+        "range_m": r,
+        "sigma_range_m": sensor.sigma_range_m,
+        "sigma_bearing_rad": sensor.sigma_bearing_rad,
+        "across_m": r * sensor.sigma_bearing_rad,
+        "bias_m": bias,
+        "bias_lo": bias - half,
+        "bias_hi": bias + half,
+        "formula_m": axes.conversion_bias,
+        "bias_to_sigma_range": bias / sensor.sigma_range_m,
+    }
+    return {name: np.array([value], dtype=object if isinstance(value, str) else float) for name, value in row.items()}
