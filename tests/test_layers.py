@@ -63,7 +63,10 @@ ROLES = {
         (*GROUND, *DATA, "report", "studies.interface"),
         (*READ, "track"),
     ),  # of several: their type
-    "__init__": (("studies.interface", "studies.folder", "report.claims"), (*READ, "track", "part", "__init__")),
+    "__init__": (
+        (*CASE, *DATA, "studies.interface", "studies.folder", "report.claims", "report.drawing"),
+        (*READ, "track", "part", "__init__"),
+    ),
 }
 ALSO = {"schema": "config"}  # the keys of a study of several parts
 

@@ -1,12 +1,26 @@
 """P3 (Butyrskiy): smoothing and extrapolation of sonar plots, missed plots, correlated errors."""
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from radarsim.studies.interface import RecordedPlots, Study
+from radarsim.studies.interface import Plan, RecordedPlots, Study, Tracker
 from radarsim.studies.sonar.part import SonarPart
 
-Asked = TypeVar("Asked")  # a case, or the result of one
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+
+    from radarsim.config.experiment import Case, Experiment
+    from radarsim.engine.results import CaseResult
+    from radarsim.report.claims import PaperClaims
+    from radarsim.report.drawing import Figure
+    from radarsim.studies.sonar.clutter.study import Plan as ClutterPlan
+    from radarsim.studies.sonar.config import Keys
+    from radarsim.studies.sonar.schema import Sonar as AllKeys
+    from radarsim.studies.sonar.smoothing.study import SharedPlan
+    from radarsim.studies.sonar.study import RealisationPlan
+
+CaseOrResult = TypeVar("CaseOrResult", "Case", "CaseResult")
 
 
 class Sonar(Study):
@@ -14,68 +28,74 @@ class Sonar(Study):
 
     name = "sonar"
     about = "P3 (Butyrskiy): smoothing and extrapolation of sonar plots, missed plots, correlated errors."
-    filters: ClassVar = {
+    filters = {  # noqa: RUF012
         "kind: growing_memory": "least squares on all plots so far, the recursion (12)-(14)",
         "kind: window": "least squares on the last `plots` plots",
         "kind: kalman": "Kalman-Bucy (11), with manoeuvre_variance or without",
-        "kind: fixed_gain": "α-β (degree 1) or α-β-γ (degree 2) at the steady gains",
-        "kind: kalman_augmented": "plots' errors estimated beside the state, for correlated errors",
+        "kind: fixed_gain": "α-β (degree 1) or α-β-γ (degree 2) with steady-state gains",
+        "kind: kalman_augmented": "Kalman filter of the state and the plot's error, for correlated errors",
         "kind: kalman_differenced": "differences of neighbouring plots, for correlated errors",
-        "kind: adaptive": "growing memory, begun anew, raised or cut short by a detector of manoeuvres (3)",
+        "kind: adaptive": "growing memory that a manoeuvre detector (3) restarts, at a higher degree or kept short",
         "association: nearest": "a tracker among false plots: the nearest plot in the gate; of kind kalman, degree 1",
         "association: pda": "a tracker with probabilistic data association",
-        "association: known": "a filter that is given the target's plots, beside the trackers",
-        "kind: imm": "two Kalman filters that interact, steady and manoeuvring",
+        "association: known": "a filter that knows the target's plots, for comparison",
+        "kind: imm": "two interacting Kalman filters, steady and manoeuvring",
     }
 
-    def keys(self):
+    def keys(self) -> "type[AllKeys]":
         from radarsim.studies.sonar import schema
 
         return schema.Sonar
 
-    def computes_in(self, spec):
+    def computes_in(self, spec: "AllKeys") -> tuple[str, ...]:
         part = f"{__name__}.{spec.parts[-1]}"
         keys = __name__ if spec.parts[-1] == "smoothing" else part
         return f"{part}.study", f"{keys}.config"
 
-    def prepare(self, case):
-        # Not by way of `parts`: what a case is computed with is read off these imports, and what shows it is not.
+    def prepare(self, case: "Case") -> Plan:
+        # Imported here, not by `parts`: these imports tell which modules compute a case; `parts` also shows results.
         match case.spec.parts[-1]:
             case "smoothing":
-                from radarsim.studies.sonar.smoothing import study
-            case "manoeuvre":
-                from radarsim.studies.sonar.manoeuvre import study
-            case "clutter":
-                from radarsim.studies.sonar.clutter import study
-        return study.prepare(case)
+                from radarsim.studies.sonar.smoothing import study as smoothing
 
-    def simulate(self, plan, first, count):
+                return smoothing.prepare(case)
+            case "manoeuvre":
+                from radarsim.studies.sonar.manoeuvre import study as manoeuvre
+
+                return manoeuvre.prepare(case)
+        from radarsim.studies.sonar.clutter import study as clutter
+
+        return clutter.prepare(case)
+
+    def simulate(self, plan: "RealisationPlan | SharedPlan | ClutterPlan", first: int, count: int) -> "np.ndarray":
         return plan.simulate(first, count)
 
-    def tables(self, results):
+    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
         from radarsim.studies.sonar import tables
 
         made = tables.tables(results)
-        for part, own in asked_of(results):
-            made |= part.tables(own)
+        for part, chosen in by_part(results):
+            made |= part.tables(chosen)
         return {name: table for name, table in made.items() if len(table)}
 
-    def figures(self, results, made, experiment):
+    def figures(
+        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "dict[str, Figure]":
         from radarsim.studies.sonar import figures
 
-        drawn = figures.figures(results, made, experiment)
-        for part, own in asked_of(results):
-            drawn |= part.figures(own, made)
+        drawn: dict[str, Figure | None] = {**figures.figures(results, made, experiment)}
+        for part, chosen in by_part(results):
+            drawn |= part.figures(chosen, made)
         return {name: figure for name, figure in drawn.items() if figure}
 
-    def question(self, experiment):
-        part, cases = asked_of(experiment.cases)[-1]
+    def question(self, experiment: "Experiment") -> str:
+        part, cases = by_part(experiment.cases)[-1]
         return part.question([case.spec for case in cases])
 
-    def answer(self, results, made):
-        return [sentence for part, own in reversed(asked_of(results)) for sentence in part.answer(own, made)]
+    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> list[str]:
+        return [sentence for part, chosen in reversed(by_part(results)) for sentence in part.answer(chosen, made)]
 
-    def claims(self):
+    def claims(self) -> "PaperClaims":
         from radarsim.report.claims import PaperClaims
         from radarsim.studies.sonar.measures import Evidence
 
@@ -83,50 +103,50 @@ class Sonar(Study):
         claims.sort(key=lambda claim: int(claim.id.partition(".")[2]))
         return PaperClaims(claims, Evidence, paper="Butyrskiy", page="sonar", may_grow=("filters",))
 
-    def recorded(self):
+    def recorded(self) -> "Recorded":
         return Recorded()
 
 
 class Recorded(RecordedPlots):
-    """The study's side of `radarsim track` and `radarsim simulate`."""
+    """Recorded plots of all parts, for `radarsim track` and `radarsim simulate`."""
 
-    def columns(self, spec):
+    def columns(self, spec: "Keys") -> tuple[tuple[str, ...], ...]:
         from radarsim.studies.sonar import track
 
         return track.plot_columns(spec)
 
-    def sigmas(self, spec):
+    def sigmas(self, spec: "Keys") -> Mapping[str, Sequence[str]]:
         from radarsim.studies.sonar import track
 
         return track.sigmas(spec)
 
-    def scan_period_s(self, spec):
+    def scan_period_s(self, spec: "Keys") -> float:
         return spec.sensor.scan_period_s
 
-    def simulated(self, case, realisation):
+    def simulated(self, case: "Case", realisation: int) -> "Mapping[str, np.ndarray]":
         return part_of(case.spec).simulated(case, realisation)
 
-    def tracker(self, case):
+    def tracker(self, case: "Case") -> Tracker:
         return part_of(case.spec).tracker(case)
 
 
 # ---- which part -----------------------------------------------------------------------------------------------------
 def parts() -> Mapping[str, SonarPart]:
-    """The parts by name, each after those whose questions are asked of its cases too."""
+    """The parts by name; a part comes after those whose questions are asked of its cases too."""
     from radarsim.studies.sonar import clutter, manoeuvre, smoothing
 
     return {"smoothing": smoothing.PART, "manoeuvre": manoeuvre.PART, "clutter": clutter.PART}
 
 
-def part_of(spec) -> SonarPart:
+def part_of(spec: "AllKeys") -> SonarPart:
     """The part that computes a case."""
     return parts()[spec.parts[-1]]
 
 
-def asked_of(cases: Sequence[Asked]) -> list[tuple[SonarPart, list[Asked]]]:
-    """Each part of which some case, or result, asks, with all that do."""
-    found = [(part, [case for case in cases if name in case.spec.parts]) for name, part in parts().items()]
-    return [(part, own) for part, own in found if own]
+def by_part(cases: Sequence[CaseOrResult]) -> list[tuple[SonarPart, list[CaseOrResult]]]:
+    """The cases, or results, of each part whose questions some of them ask."""
+    chosen = [(part, [case for case in cases if name in case.spec.parts]) for name, part in parts().items()]
+    return [(part, members) for part, members in chosen if members]
 
 
 STUDY = Sonar()

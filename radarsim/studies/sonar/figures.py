@@ -1,6 +1,7 @@
-"""P3's figures that all its parts have, described: σ of each component against time."""
+"""Figures that all parts of P3 have: σ of each component against time; and lines of figures, from rows of tables."""
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.sonar.axes import SonarAxes
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 QUANTITIES = {
     "r": panels.Quantity("$r$", "range"),
     "vr": panels.Quantity("$v_r$", "radial velocity"),
@@ -18,10 +22,10 @@ QUANTITIES = {
     "b": panels.Quantity("$\\beta$", "bearing"),
     "vb": panels.Quantity("$v_\\beta$", "bearing rate"),
     "ab": panels.Quantity("$a_\\beta$", "second rate of the bearing"),
-    "x": panels.Quantity("$x$", "way north"),
+    "x": panels.Quantity("$x$", "distance north"),
     "vx": panels.Quantity("$v_x$", "velocity north"),
     "ax": panels.Quantity("$a_x$", "acceleration north"),
-    "y": panels.Quantity("$y$", "way east"),
+    "y": panels.Quantity("$y$", "distance east"),
     "vy": panels.Quantity("$v_y$", "velocity east"),
     "ay": panels.Quantity("$a_y$", "acceleration east"),
     "d": panels.Quantity("$d$", "depth"),
@@ -32,54 +36,67 @@ QUANTITIES = {
     "ae": panels.Quantity("$a_\\varepsilon$", "second rate of elevation"),
 }
 MOST_IN_PANEL = 5  # filters whose legend leaves room for the curves
+SIGMA = ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")  # columns of a line of σ against time
+TIME = Axis(panels.TIME, limits=(0, None))
 
 
-def figures(results: Sequence[CaseResult[SonarAxes]], made: Mapping, experiment: Experiment) -> dict[str, Figure]:
+def figures(
+    results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]", experiment: Experiment
+) -> dict[str, Figure]:
     """sigma_<component> of every component that some case has."""
     curves = common.groups(made["curves"], "case", "filter", "component")
-    drawn = {}
-    for component, of in QUANTITIES.items():
+    drawn: dict[str, Figure | None] = {}
+    for component in QUANTITIES:
         name = f"sigma_{component}"
         chosen, left_out = panels.shown(results, [case.name for case in experiment.shown_in(name)])
         if any(component in dict(result.axes.components) for result in chosen):
-            drawn[name] = sigma_figure(name, chosen, curves, component, of, left_out)
+            drawn[name] = sigma_figure(name, chosen, curves, component, left_out)
     return {name: figure for name, figure in drawn.items() if figure}
+
+
+def line(rows: "pd.DataFrame", columns: Sequence[str], label: str, style: Style | int, name: str = "") -> Line:
+    """A line of x and y from two columns of rows; further columns give the ends of its band, and exact values.
+
+    A style that is a number is that of the filter of this number.
+    """
+    x, y, *more = (rows[column].to_numpy(dtype=float) for column in columns)
+    lo, hi = more[:2] or (None, None)
+    exact = more[2] if more[2:] and np.isfinite(more[2]).any() else None
+    look = Style(style, style, style) if isinstance(style, int) else style
+    return Line(x, y, label, look, lo, hi, exact, name)
+
+
+def case_lines(
+    result: CaseResult[SonarAxes], groups: "Mapping[Any, pd.DataFrame]", component: str, columns: Sequence[str]
+) -> list[Line]:
+    """A line for each filter of a case that has rows; groups are by case, filter and component."""
+    places = enumerate((result.name, f, component) for f in result.axes.filters)
+    return [line(groups[place], columns, place[1], n) for n, place in places if place in groups]
 
 
 def sigma_figure(
     name: str,
     results: Sequence[CaseResult[SonarAxes]],
-    curves: Mapping,
+    curves: "Mapping[Any, pd.DataFrame]",
     component: str,
-    of: panels.Quantity,
     left_out: str,
 ) -> Figure | None:
     """σ(t) of one component: a panel for each case, a line for each filter."""
-    drawn = []
+    quantity, drawn = QUANTITIES[component], []
     for result in results:
-        marks = []
-        for n, f in enumerate(result.axes.filters):
-            rows = curves.get((result.name, f, component))
-            if rows is None:
-                continue
-            unit = rows["unit"].iloc[0]
-            v = {
-                key: rows[key].to_numpy(dtype=float) for key in ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")
-            }
-            known = v["exact_sigma"] if np.isfinite(v["exact_sigma"]).any() else None
-            marks.append(Line(v["t_s"], v["sigma"], f, Style(n, n, n), v["sigma_lo"], v["sigma_hi"], known))
+        marks = case_lines(result, curves, component, SIGMA)
         if marks:
-            y = Axis(panels.with_unit(f"$\\sigma$ of {of.symbol}", unit), limits=(0, None))
-            drawn.append(
-                Panel(Axis(panels.TIME, limits=(0, None)), y, tuple(marks), panels.swept(result), direct=False)
-            )
+            unit = dict(result.axes.components)[component]
+            y = Axis(panels.with_unit(f"$\\sigma$ of {quantity.symbol}", unit), limits=(0, None))
+            drawn.append(Panel(TIME, y, tuple(marks), panels.swept(result), direct=False))
     if not drawn:
         return None
     caption = (
-        f"Root-mean-square error of the {of.name} about the truth against time, of {results[0].count:,} realisations. "
-        "Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact values." + left_out
+        f"Root-mean-square error of the {quantity.name} about the truth against time, of {results[0].count:,} "
+        "realisations. Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact values." + left_out
     )
     if len(results[0].axes.filters) > MOST_IN_PANEL:
         drawn = panels.in_legend(drawn)
     columns = min(2, len(drawn))
-    return Figure(name, f"σ of the {of.name}", caption, tuple(drawn), columns, 95.0 if columns == 1 else PAGE_MM, 62)
+    width = 95.0 if columns == 1 else PAGE_MM
+    return Figure(name, f"σ of the {quantity.name}", caption, tuple(drawn), columns, width, 62)

@@ -1,8 +1,9 @@
-"""What each of the sonar's parts is: one of the paper's three questions, as the study sees it.
+"""The interface of the sonar's parts; each part is one of the paper's three questions.
 
 A part has cases of its own, which its module `study` computes: `prepare(case)` makes a plan whose `simulate(first,
-count)` makes the sums of a block. What stands here is what it shows of them, beside what all parts have in common, and
-what it does with recorded plots: functions of the same names in the part's files, as in `radarsim.studies.folder`.
+count)` makes the sums of a block. The interface here is for showing the results, in addition to what all parts have in
+common, and for recorded plots. It calls functions of the same names in the part's files, as in
+`radarsim.studies.folder`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,8 +29,8 @@ COMMON = __name__.rpartition(".")[0]
 class SonarPart:
     """A part.
 
-    package is its folder as Python imports it. claimed: whether the paper makes claims on it. tracker_in and
-    simulated_in are the packages whose file `track` has its `Tracker` and its `simulated`.
+    package is its folder as Python imports it. claimed: whether the paper makes claims about it. tracker_in and
+    simulated_in are the packages whose module `track` contains its `Tracker` and its `simulated`.
     """
 
     package: str
@@ -42,17 +43,17 @@ class SonarPart:
         return import_module(f"{self.package}.{name}")
 
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
-        """The tables of cases of which this part is asked, beside those of all parts; some may have no rows."""
+        """The tables of cases that ask this part's questions, in addition to common ones; some may have no rows."""
         return self.file("tables").tables(results)
 
     def figures(
         self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]"
     ) -> "dict[str, Figure | None]":
-        """The figures of such cases, beside those of all parts; None where there is nothing to draw."""
+        """The figures of such cases, in addition to common ones; None where there is nothing to draw."""
         return self.file("figures").figures(results, made)
 
     def question(self, specs: Sequence[Any]) -> str:
-        """What is asked of such cases, in one sentence."""
+        """The question of such cases, in one sentence."""
         return self.file("words").question(specs)
 
     def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> list[str]:
@@ -60,7 +61,7 @@ class SonarPart:
         return self.file("words").answer(results, made)
 
     def claims(self) -> "tuple[Claim, ...]":
-        """The paper's claims on it."""
+        """The paper's claims about it."""
         return self.file("claims").CLAIMS if self.claimed else ()
 
     def simulated(self, case: "Case", realisation: int) -> "Mapping[str, np.ndarray]":

@@ -1,6 +1,7 @@
-"""P3's figures of tracks among false plots, described: confirmation, life, accuracy, false tracks, classes, a map."""
+"""P3's figures of tracks among false plots: a map, confirmation, track life and accuracy, false tracks, classes."""
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,10 @@ from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.map import realisation_map
+from radarsim.studies.sonar.figures import TIME, line
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 KEYS = {
     "false_plots_per_km2": ("sensor.false_plots_per_km2", "false plots per km² and scan"),
@@ -17,10 +22,11 @@ KEYS = {
     "gate_probability": ("gate_probability", "gate probability"),
 }
 WIDE = 150.0
+Results = Sequence[CaseResult[ClutterAxes]]
 
 
-def figures(results: Sequence[CaseResult[ClutterAxes]], made: Mapping) -> dict[str, Figure | None]:
-    """The figures of these cases, all of trackers."""
+def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, Figure | None]:
+    """The figures of these cases, all of which have trackers."""
     if not results:
         return {}
     return {
@@ -32,54 +38,49 @@ def figures(results: Sequence[CaseResult[ClutterAxes]], made: Mapping) -> dict[s
     }
 
 
-def middle(results: Sequence[CaseResult[ClutterAxes]]) -> CaseResult:
-    """The case in the middle, for figures of one."""
+def middle(results: Results) -> CaseResult[ClutterAxes]:
+    """The case in the middle, for figures of a single case."""
     return results[(len(results) - 1) // 2]
 
 
-def axis_over(words: str, values) -> Axis:
-    """An axis of swept values: logarithmic where they span more than a factor of twenty."""
+def axis_over(label: str, values: "pd.Series") -> Axis:
+    """An axis of swept values, logarithmic if they span more than a factor of twenty."""
     least, most = float(np.min(values)), float(np.max(values))
-    return Axis(words, "log" if least > 0 and most / least > 20 else "linear")
+    return Axis(label, "log" if least > 0 and most / least > 20 else "linear")
 
 
-def swept_over(tracking) -> tuple[str, str] | None:
-    """The column that cases differ in most, and its words: density, detection probability or gate; None if in none."""
-    values = {column: tracking[column].nunique() for column in KEYS}
-    column = max(values, key=values.get)
-    return (column, KEYS[column][1]) if values[column] > 1 else None
+def swept_column(tracking: "pd.DataFrame") -> str | None:
+    """The column of KEYS that has the most different values; None if all cases have the same ones."""
+    counts = {column: tracking[column].nunique() for column in KEYS}
+    column = max(KEYS, key=lambda key: counts[key])
+    return column if counts[column] > 1 else None
 
 
-def lined(tracking, column: str) -> dict[tuple[str, str], str]:
-    """What the line is called that a tracker of a case is a point of: the tracker, and what else is swept beside."""
+def by_line(tracking: "pd.DataFrame", column: str) -> "pd.DataFrame":
+    """The rows with the name of their line, over column, in place of the filter: the tracker and what else is swept."""
     others = [other for other in KEYS if other != column and tracking[other].nunique() > 1]
-    names = {}
-    for _, row in tracking.iterrows():
-        beside = "".join(f", {KEYS[other][1]} {row[other]:g}" for other in others)
-        names[row["case"], row["filter"]] = row["filter"] + beside
-    return names
+    names = tracking["filter"].astype(object)
+    for other in others:
+        names = names + [f", {KEYS[other][1]} {value:g}" for value in tracking[other]]
+    return tracking.assign(filter=names)
 
 
-def confirmation_figure(results: Sequence[CaseResult[ClutterAxes]], tracks) -> Figure | None:
-    """Probability of a confirmed track by time: a panel for each case, a line for each tracker."""
-    groups, drawn = common.groups(tracks, "case", "filter"), []
+def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | None:
+    """Probability of a confirmed track against time: a panel for each case, a line for each tracker."""
+    groups = common.groups(tracks, "case", "filter")
+    confirmed = ("t_s", "confirmed", "confirmed_lo", "confirmed_hi", "exact_confirmed")
+    drawn: list[Panel] = []
     for result in results[: panels.MOST]:
         marks = []
         for n, f in enumerate(result.axes.filters):
-            rows = groups.get((result.name, f))
-            if rows is None:
-                continue
-            v = [rows[key].to_numpy(dtype=float) for key in ("t_s", "confirmed", "confirmed_lo", "confirmed_hi")]
-            known = rows["exact_confirmed"].to_numpy(dtype=float)
-            exact = known if np.isfinite(known).any() else None
-            marks.append(Line(v[0], v[1], panels.literal(f), Style(n, n, n), v[2], v[3], exact))
-            kept = [rows[key].to_numpy(dtype=float) for key in ("kept", "kept_lo", "kept_hi")]
-            marks.append(Line(v[0], kept[0], "", Style(n, n, None, 0.7), kept[1], kept[2]))
+            if (result.name, f) in groups:
+                rows = groups[result.name, f]
+                marks.append(line(rows, confirmed, panels.literal(f), n))
+                marks.append(line(rows, ("t_s", "kept", "kept_lo", "kept_hi"), "", Style(n, n, None, 0.7)))
         if marks:
             keys = (("thin: kept at that time", Style(0, 0, None, 0.7)),) if not drawn else ()
             y = Axis("probability", limits=(0, 1.02))
-            panel = Panel(Axis(panels.TIME, limits=(0, None)), y, tuple(marks), _words(result), keys, direct=False)
-            drawn.append(panel)
+            drawn.append(Panel(TIME, y, tuple(marks), _swept(result), keys, direct=False))
     if not drawn:
         return None
     left = len(results) - panels.MOST
@@ -87,144 +88,122 @@ def confirmation_figure(results: Sequence[CaseResult[ClutterAxes]], tracks) -> F
         f"Probability that a track of the target was confirmed by that time, of {panels.realisations(results)}; thin "
         "lines: that a confirmed track is there and on the target. Bands: 95 % intervals. Crosses: exact."
     ) + (f" {left} further cases are in the tables alone." if left > 0 else "")
-    return Figure(
-        "confirmation", "Probability of a confirmed track", caption, tuple(drawn), min(2, len(drawn)), PAGE_MM
-    )
+    title = "Probability of a confirmed track"
+    return Figure("confirmation", title, caption, tuple(drawn), min(2, len(drawn)), PAGE_MM)
 
 
-def _words(result: CaseResult[ClutterAxes]) -> str:
-    """A case's swept keys as words."""
+def _swept(result: CaseResult[ClutterAxes]) -> str:
+    """The swept keys of a case and their values."""
     names = dict(KEYS.values())
     parts = [f"{names.get(key, panels.symbol_of(key))}: {panels.number(value)}" for key, value in result.swept]
     return ", ".join(parts)
 
 
-def life_figure(results: Sequence[CaseResult[ClutterAxes]], made: Mapping) -> Figure | None:
-    """Track life, time to confirmation, wrong plots and accuracy of the kept tracks over what is swept."""
+def life_figure(results: Results, made: "Mapping[str, pd.DataFrame]") -> Figure | None:
+    """Track life, time to confirmation, wrong plots and accuracy of the tracks kept, over what is swept."""
     tracking = made["tracking"]
-    over = swept_over(tracking)
-    if over is None:
+    column = swept_column(tracking)
+    if column is None:
         return None
-    column, words = over
-    names = lined(tracking, column)
-    shown_rows = tracking.assign(filter=[names[key] for key in zip(tracking["case"], tracking["filter"], strict=True)])
-    axis = axis_over(words, tracking[column])
+    rows, x = by_line(tracking, column), axis_over(KEYS[column][1], tracking[column])
     shown = {
         "life": ("life_s", Axis("track life, s", "log")),
         "time": ("time_to_confirm_s", Axis("time to confirmation, s", limits=(0, None))),
         "wrong": ("wrong_share", Axis("share of wrong plots", limits=(0, None))),
     }
-    found = tuple(
-        Panel(axis, y, tuple(_lines(shown_rows, column, value, ends)), direct=False)
-        for ends, (value, y) in shown.items()
-    )
-    accuracy = _lines(_at_end(results, made["curves"], tracking, column), column, "sigma", "sigma")
+    drawn = [Panel(x, y, tuple(_lines(rows, column, value, ends)), direct=False) for ends, (value, y) in shown.items()]
+    curves = made["curves"]
+    at_end = curves[(curves["component"] == "r") & (curves["k"] == results[0].axes.k[-1])]
+    at_end = at_end.merge(tracking[["case", *KEYS]].drop_duplicates("case"), on="case", how="left")
     y = Axis("$\\sigma$ of $r$ of kept tracks, m", limits=(0, None))
-    found += (Panel(axis, y, tuple(accuracy), direct=False),)
+    drawn.append(Panel(x, y, tuple(_lines(by_line(at_end, column), column, "sigma", "sigma")), direct=False))
     caption = (
         "Mean time between ends of a confirmed track (no point: no end was seen), mean time to its confirmation, "
         "weight of false plots among those taken, and root-mean-square error of the range of the tracks kept at the "
         f"end, of {panels.realisations(results)}. Bands: 95 % intervals."
     )
-    return Figure("track_life", "Track life and accuracy", caption, found, 2, PAGE_MM, 58)
+    return Figure("track_life", "Track life and accuracy", caption, tuple(drawn), 2, PAGE_MM, 58)
 
 
-def _at_end(results: Sequence[CaseResult[ClutterAxes]], curves, tracking, column: str):
-    """Rows of the range's σ at the last scan, with the swept value and the line of their case."""
-    rows = curves[(curves["component"] == "r") & (curves["k"] == results[0].axes.k[-1])]
-    at = tracking.groupby("case")[column].first()
-    beside = {case: name.removeprefix(f) for (case, f), name in lined(tracking, column).items()}
-    names = [f + beside[case] for case, f in zip(rows["case"], rows["filter"], strict=True)]
-    return rows.assign(**{column: rows["case"].map(at), "filter": names})
-
-
-def _lines(table, x: str, value: str, ends: str) -> list[Line]:
-    """A line for each filter of a table's value over x, where it is finite, an infinite end of an interval left out."""
+def _lines(table: "pd.DataFrame", x: str, value: str, ends: str) -> list[Line]:
+    """A line for each filter of a table's finite values over x; an infinite end of an interval is left out."""
     lines = []
     for n, (name, rows) in enumerate(table.groupby("filter", sort=False)):
         rows = rows[np.isfinite(rows[value])].sort_values(x)
-        y, lo, hi = (rows[key].to_numpy(dtype=float) for key in (value, f"{ends}_lo", f"{ends}_hi"))
-        lo, hi = np.where(np.isfinite(lo), lo, y), np.where(np.isfinite(hi), hi, y)
-        lines.append(Line(rows[x].to_numpy(dtype=float), y, panels.literal(name), Style(n, n, n), lo, hi))
+        lo, hi = (rows[key].where(np.isfinite(rows[key]), rows[value]) for key in (f"{ends}_lo", f"{ends}_hi"))
+        lines.append(line(rows.assign(lo=lo, hi=hi), (x, value, "lo", "hi"), panels.literal(str(name)), n))
     return lines
 
 
-def false_figure(results: Sequence[CaseResult[ClutterAxes]], tracking) -> Figure | None:
-    """False tracks an hour over what is swept, on a logarithmic axis."""
-    over = swept_over(tracking)
-    rows = tracking[tracking["false_tracks_per_hour"] > 0]
-    if over is None or rows.empty:
+def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
+    """False tracks per hour over what is swept, on a logarithmic axis."""
+    column = swept_column(tracking)
+    rate = "false_tracks_per_hour"
+    if column is None or not (tracking[rate] > 0).any():
         return None
-    column, words = over
-    names, rules = lined(tracking, column), {}
-    for _, row in rows.iterrows():
-        rules[names[row["case"], row["filter"]]] = f"{row['m']:.0f} of {row['of']:.0f}"
-    rows = rows.assign(filter=[names[key] for key in zip(rows["case"], rows["filter"], strict=True)])
-    lines = [Line(m.x, m.y, m.label, m.style, np.maximum(m.lo, m.y / 10), m.hi) for m in _lines(rows, column, *FALSE)]
-    lines = [Line(m.x, m.y, f"{m.label} ({rules[m.label]})", m.style, m.lo, m.hi) for m in lines]
+    rows = by_line(tracking, column)
+    rows = rows[rows[rate] > 0]
+    rules = {row["filter"]: f"{row['m']:.0f} of {row['of']:.0f}" for _, row in rows.iterrows()}
+    rows = rows.assign(
+        filter=[f"{name} ({rules[name]})" for name in rows["filter"]],
+        false_lo=np.maximum(rows["false_lo"], rows[rate] / 10),
+    )
     caption = (
         "False tracks confirmed in an hour in the whole sector, every false plot beginning a tentative track, of "
         f"{panels.realisations(results)} such plots a case. Bands: 95 % intervals."
     )
-    panel = Panel(axis_over(words, rows[column]), Axis("false tracks per hour", "log"), tuple(lines), direct=False)
+    x, y = axis_over(KEYS[column][1], rows[column]), Axis("false tracks per hour", "log")
+    panel = Panel(x, y, tuple(_lines(rows, column, rate, "false")), direct=False)
     return Figure("false_tracks", "False tracks", caption, (panel,), width_mm=WIDE)
 
 
-FALSE = ("false_tracks_per_hour", "false")
-
-
-def classes_figure(results: Sequence[CaseResult[ClutterAxes]], classes) -> Figure | None:
-    """Error rates of the class by score, over its threshold, of one case."""
+def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
+    """Error rates of the classification by the score, over its threshold, of one case."""
     case = middle(results)
     table = classes[(classes["case"] == case.name) & (classes["n_false"] > 0)]
     if table.empty:
         return None
+    x = Axis("threshold of the score")
+    false = _lines(table[table["false_called_true"] > 0], "threshold", "false_called_true", "false")
+    true = _lines(table, "threshold", "true_called_false", "true")
     drawn = []
-    for value, ends, words, scale in (
-        ("false_called_true", "false", "false tracks called true", "log"),
-        ("true_called_false", "true", "target's tracks called false", "linear"),
-    ):
-        rows = table[table[value] > 0] if scale == "log" else table
-        marks = [Line(m.x, m.y, m.label, m.style, m.lo, m.hi) for m in _lines(rows, "threshold", value, ends)]
-        if value == "false_called_true" and marks:
-            longest = max(marks, key=lambda m: len(m.x))
-            marks.append(Line(longest.x, np.exp(-longest.x), "bound", Style(7, 1, None)))
-        if marks:
-            x = Axis("threshold of the score")
-            y = Axis(f"share of {words}", scale, (None, None) if scale == "log" else (0, None))
-            drawn.append(Panel(x, y, tuple(marks), direct=False))
+    if false:
+        longest = max(false, key=lambda mark: len(mark.x))
+        bound = Line(longest.x, np.exp(-longest.x), "bound", Style(7, 1, None))
+        y = Axis("share of false tracks called true", "log")
+        drawn.append(Panel(x, y, (*false, bound), direct=False))
+    if true:
+        y = Axis("share of target's tracks called false", limits=(0, None))
+        drawn.append(Panel(x, y, tuple(true), direct=False))
     caption = (
         "Error rates of calling a track true once its score (logarithm of the likelihood ratio) reaches a threshold, "
         f"of {panels.realisations(results)} tracks each. Left: of tracks that false plots began; no more than "
         "exp(−threshold) of them can (bound). Right: of the target's first tracks. Bands: 95 % intervals."
-        + (f" Case: {_words(case)}." if case.swept else "")
+        + (f" Case: {_swept(case)}." if case.swept else "")
     )
     return Figure("track_classes", "True or false by the score", caption, tuple(drawn), 2, PAGE_MM) if drawn else None
 
 
-def map_figure(result: CaseResult[ClutterAxes]) -> Figure | None:
-    """Plots, gates and tracks of realisation 0 of a case, on the map."""
-    seen = realisation_map(result)
+def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
+    """Plots, gates and tracks of realisation 0 of a case on a map."""
+    shown = realisation_map(result)
     km = 1e-3
     marks = [
-        Line(seen.false[1] * km, seen.false[0] * km, "false plots", Style(7, None, 0, 1.1, 1.0)),
-        Line(seen.truth[1] * km, seen.truth[0] * km, "target", Style(1, 1, None)),
-        Line(seen.plots[1] * km, seen.plots[0] * km, "its plots", Style(1, None, 1, 1.1, 2.0)),
+        Line(shown.false[1] * km, shown.false[0] * km, "false plots", Style(7, None, 0, 1.1, 1.0)),
+        Line(shown.truth[1] * km, shown.truth[0] * km, "target", Style(1, 1, None)),
+        Line(shown.plots[1] * km, shown.plots[0] * km, "its plots", Style(1, None, 1, 1.1, 2.0)),
     ]
-    for n, (x, y) in enumerate(seen.tracks):
-        marks.append(Line(y * km, x * km, "tracks" if n == 0 else "", Style(2, 0, None, 1.3)))
-    for n, (x, y) in enumerate(seen.gates):
-        marks.append(Line(y * km, x * km, "gates" if n == 0 else "", Style(3, 0, None, 0.6)))
-    (south, north), (west, east) = seen.window
+    curves = (("tracks", shown.tracks, Style(2, 0, None, 1.3)), ("gates", shown.gates, Style(3, 0, None, 0.6)))
+    for label, drawn, style in curves:
+        marks += [Line(y * km, x * km, "" if n else label, style) for n, (x, y) in enumerate(drawn)]
+    (south, north), (west, east) = shown.window
     caption = (
-        f"Realisation 0 of {result.name}, tracker {seen.tracker}: the target's course and plots, the false plots of "
+        f"Realisation 0 of {result.name}, tracker {shown.tracker}: the target's course and plots, the false plots of "
         f"all {len(result.axes.k)} scans, the confirmed tracks and their gates at every fourth scan, near the target."
     )
-    panel = Panel(
-        Axis("way east, km", limits=(west * km, east * km)),
-        Axis("way north, km", limits=(south * km, north * km)),
-        tuple(marks),
-        direct=False,
-        legend="right",
+    x, y = (
+        Axis("distance east, km", limits=(west * km, east * km)),
+        Axis("distance north, km", limits=(south * km, north * km)),
     )
+    panel = Panel(x, y, tuple(marks), direct=False, legend="right")
     return Figure("track_map", "Plots, gates and tracks", caption, (panel,), width_mm=WIDE, panel_height_mm=100)

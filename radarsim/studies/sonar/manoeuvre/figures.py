@@ -1,104 +1,108 @@
-"""P3's figures on manoeuvres: ROC, detection over its strength, delay, filters through it; uses of a track."""
+"""P3's figures on manoeuvres: ROC, detection by strength, delay, filters during the manoeuvre; uses of a track."""
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 from radarsim.report import tables as common
-from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
-from radarsim.studies.sonar.figures import QUANTITIES
+from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.studies.sonar.figures import QUANTITIES, SIGMA, TIME, case_lines, line
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
 
-USUAL = 0.01  # false alarms a test at which detectors are compared, or what comes nearest
+if TYPE_CHECKING:
+    import pandas as pd
+
+USUAL = 0.01  # false alarms per test at which detectors are compared, or the nearest rate to it
 MOST_PANELS = 4
 BESIDE_LEGEND = 3  # panels of a figure whose legend takes the place of one
 SYMBOLS = {"course": "course", "speed": "speed", "x_ahead": "$x$ ahead", "y_ahead": "$y$ ahead"}
 SYMBOLS |= {"cpa": "CPA", "t_cpa": "$t$ to CPA"}
 RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # ticks of a measured over a believed σ
 STRENGTHS = {"acceleration_mps2": "acceleration, m/s²", "rate_radps": "turn rate, rad/s"}
+Results = Sequence[CaseResult[ManoeuvreAxes]]
 
 
-def figures(results: Sequence[CaseResult[ManoeuvreAxes]], made: Mapping) -> dict[str, Figure | None]:
+def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, Figure | None]:
     """The figures of cases with detectors, filters that respond to manoeuvres, or uses."""
-    watched = [result for result in results if result.spec.detectors and "detections" in made]
-    moving = [result for result in watched if result.axes.manoeuvre_s]
+    measured = [result for result in results if result.spec.detectors and "detections" in made]
+    moving = [result for result in measured if result.axes.manoeuvre_s]
     responding = [result for result in results if "modes" in result.sums]
-    found = {
-        "roc": roc_figure(spread_out(moving), made["detections"]) if moving else None,
-        "detection": detection_figure(watched, made["detections"]) if moving else None,
-        "delay": delay_figure(spread_out(moving), made["delays"]) if moving else None,
-        "response": response_figure(spread_out(responding, BESIDE_LEGEND), made["curves"]) if responding else None,
-        "modes": modes_figure(spread_out(responding, BESIDE_LEGEND), made["modes"]) if responding else None,
-        "uses": uses_figure([r for r in results if "uses" in r.sums], made["uses"]) if "uses" in made else None,
-    }
-    return {name: figure for name, figure in found.items() if figure}
+    drawn: dict[str, Figure | None] = {}
+    if moving:
+        drawn["roc"] = roc_figure(spread_out(moving), made["detections"])
+        drawn["detection"] = detection_figure(measured, made["detections"])
+        drawn["delay"] = delay_figure(spread_out(moving), made["delays"])
+    if responding:
+        drawn["response"] = response_figure(spread_out(responding, BESIDE_LEGEND), made["curves"])
+        drawn["modes"] = modes_figure(spread_out(responding, BESIDE_LEGEND), made["modes"])
+    if "uses" in made:
+        drawn["uses"] = uses_figure([result for result in results if "uses" in result.sums], made["uses"])
+    return drawn
 
 
-def spread_out(
-    results: Sequence[CaseResult[ManoeuvreAxes]], most: int = MOST_PANELS
-) -> list[CaseResult[ManoeuvreAxes]]:
-    """At most so many of the cases, from the first to the last."""
+def spread_out(results: Results, most: int = MOST_PANELS) -> list[CaseResult[ManoeuvreAxes]]:
+    """At most so many of the cases, evenly spaced from the first to the last."""
     if len(results) <= most:
         return list(results)
     return [results[i] for i in np.linspace(0, len(results) - 1, most).round().astype(int)]
 
 
-def left_out(shown: Sequence, results: Sequence) -> str:
-    """Words on the cases that a figure does not show."""
-    return f" {len(results) - len(shown)} further cases are in the tables alone." if len(shown) < len(results) else ""
+def first_component(rows: "pd.DataFrame", detector: str) -> "pd.DataFrame":
+    """The rows of a detector in the first coordinate."""
+    rows = rows[rows["filter"] == detector]
+    return rows[rows["component"] == rows["component"].iloc[0]]
 
 
-def usual(rows, detector: str):
-    """The rows of a detector at the threshold whose false alarms come nearest the usual share, first coordinate."""
-    own = rows[rows["filter"] == detector]
-    own = own[own["component"] == own["component"].iloc[0]]
-    away = (np.log(own["false_alarm_probability"]) - np.log(USUAL)).abs()
-    return own[away <= away.min() + 1e-9]
+def usual(rows: "pd.DataFrame", detector: str) -> "pd.DataFrame":
+    """The rows of a detector, first coordinate, at the threshold whose false alarm rate is nearest the usual one."""
+    rows = first_component(rows, detector)
+    distance = (np.log(rows["false_alarm_probability"]) - np.log(USUAL)).abs()
+    return rows[distance <= distance.min() + 1e-9]
 
 
 def every_scan(result: CaseResult[ManoeuvreAxes]) -> list[str]:
-    """Detectors that test at every scan, and whose false alarms are about the usual ones."""
-    found = []
-    for one, limits in zip(result.spec.detectors, result.axes.thresholds, strict=True):
-        shares = exact.false_alarm(limits[0])
-        if one.test_every == 1 and np.min(np.abs(np.log(shares / USUAL))) < 0.1:
-            found.append(one.name)
-    return found
+    """The detectors that test at every scan and whose false alarm rate is about the usual one."""
+    names = []
+    for detector, limits in zip(result.spec.detectors, result.axes.thresholds, strict=True):
+        rates = exact.false_alarm(limits[0])
+        if detector.test_every == 1 and np.min(np.abs(np.log(rates / USUAL))) < 0.1:
+            names.append(detector.name)
+    return names
 
 
-def last_of(rows, phase: str):
+def last_of(rows: "pd.DataFrame", phase: str) -> "pd.DataFrame":
     """The rows of the last test of a phase."""
-    own = rows[rows["phase"] == phase]
-    return own[own["k"] == own["k"].max()]
+    rows = rows[rows["phase"] == phase]
+    return rows[rows["k"] == rows["k"].max()]
 
 
-def roc_figure(results: Sequence[CaseResult[ManoeuvreAxes]], detections) -> Figure | None:
-    """Probability of detection at the manoeuvre's last scan against that of a false alarm at the last before it."""
-    drawn = []
+def roc_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
+    """Detection probability at the manoeuvre's last scan against that of a false alarm at the last scan before it."""
+    drawn: list[Panel] = []
     for result in results:
         rows, marks = detections[detections["case"] == result.name], []
         for n, name in enumerate(every_scan(result)):
-            own = rows[rows["filter"] == name]
-            own = own[own["component"] == own["component"].iloc[0]]
-            before, during = (last_of(own, phase).sort_values("threshold_k") for phase in ("steady", "manoeuvre"))
+            before, during = (
+                last_of(first_component(rows, name), phase).sort_values("threshold_k")
+                for phase in ("steady", "manoeuvre")
+            )
             if not len(before) or not len(during):
                 continue
             shift = during["shift"].iloc[0]
             if np.isfinite(shift):
                 share = np.geomspace(3e-4, 0.5, 60)
                 marks.append(Line(share, exact.detection(exact.threshold(share), shift), name, Style(n, n)))
-            v = [during[key].to_numpy() for key in ("probability", "lo", "hi")]
+            points = during.assign(false_alarms=before["probability"].to_numpy())
             label = "" if np.isfinite(shift) else name
-            marks.append(Line(before["probability"].to_numpy(), v[0], label, Style(n, None, n), v[1], v[2]))
+            marks.append(line(points, ("false_alarms", "probability", "lo", "hi"), label, Style(n, None, n)))
         if marks:
             x = Axis("false alarms a test", "log", limits=(3e-4, 0.5))
             y = Axis("detection probability", limits=(0, 1.02))
-            drawn.append(
-                Panel(x, y, tuple(marks), _title(result), direct=False, legend="best" if not drawn else "none")
-            )
+            drawn.append(Panel(x, y, tuple(marks), _title(result), direct=False, legend=_first_legend(drawn)))
     caption = (
         "Detectors of manoeuvres in the range: probability of an alarm at the last scan of the manoeuvre against that "
         f"at the last scan before it. Lines: exact laws; markers: measured, of {results[0].count:,} realisations, with "
@@ -107,7 +111,7 @@ def roc_figure(results: Sequence[CaseResult[ManoeuvreAxes]], detections) -> Figu
     return _figure("roc", "What a detector sees, and what it imagines", caption, drawn)
 
 
-def detection_figure(results: Sequence[CaseResult[ManoeuvreAxes]], detections) -> Figure | None:
+def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
     """Probability of detection against the manoeuvre's strength, a line for each detector."""
     key = next((key for key, value in results[0].swept if key.rpartition(".")[2] in STRENGTHS), None)
     if key is None:
@@ -137,30 +141,27 @@ def detection_figure(results: Sequence[CaseResult[ManoeuvreAxes]], detections) -
     return _figure("detection", "Detection over the strength of the manoeuvre", caption, drawn)
 
 
-def _at_strongest(result: CaseResult[ManoeuvreAxes], detections, name: str):
-    own = usual(detections[detections["case"] == result.name], name)
-    during = last_of(own, "manoeuvre")
-    return (during if len(during) else last_of(own, "steady")).iloc[0]
+def _at_strongest(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame", name: str) -> "pd.Series":
+    rows = usual(detections[detections["case"] == result.name], name)
+    during = last_of(rows, "manoeuvre")
+    return (during if len(during) else last_of(rows, "steady")).iloc[0]
 
 
-def delay_figure(results: Sequence[CaseResult[ManoeuvreAxes]], delays) -> Figure | None:
+def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
     """Probability that an alarm has come, against the time since the manoeuvre began."""
-    drawn = []
+    drawn: list[Panel] = []
     for result in results:
         rows, marks = delays[delays["case"] == result.name], []
-        apart = [one.name for one, so in zip(result.spec.detectors, result.axes.independent, strict=True) if so]
+        detectors = zip(result.spec.detectors, result.axes.independent, strict=True)
+        apart = [detector.name for detector, independent in detectors if independent]
         for n, name in enumerate([*every_scan(result), *apart]):
-            own = usual(rows, name)
-            own = own[own["event"] == "alarm"]
-            if not len(own):
-                continue
-            v = [own[key].to_numpy(dtype=float) for key in ("delay_s", "probability", "lo", "hi", "exact")]
-            marks.append(Line(*v[:2], name, Style(n, n, n), *v[2:4], v[4] if np.isfinite(v[4]).all() else None))
+            alarms = usual(rows, name)
+            alarms = alarms[alarms["event"] == "alarm"]
+            if len(alarms):
+                marks.append(line(alarms, ("delay_s", "probability", "lo", "hi", "exact"), name, n))
         if marks:
             x, y = Axis("time since it began, s", limits=(0, None)), Axis("an alarm has come", limits=(0, 1.02))
-            drawn.append(
-                Panel(x, y, tuple(marks), _title(result), direct=False, legend="best" if not drawn else "none")
-            )
+            drawn.append(Panel(x, y, tuple(marks), _title(result), direct=False, legend=_first_legend(drawn)))
     caption = (
         "Probability that the first alarm of a detector in the range has come, against the time since the manoeuvre "
         f"began, at about {USUAL:g} false alarms a test. Crosses: exact, where windows are apart and tests "
@@ -169,21 +170,15 @@ def delay_figure(results: Sequence[CaseResult[ManoeuvreAxes]], delays) -> Figure
     return _figure("delay", "How soon a manoeuvre is seen", caption, drawn)
 
 
-def response_figure(results: Sequence[CaseResult[ManoeuvreAxes]], curves) -> Figure | None:
-    """σ of the first coordinate through the manoeuvre, a line for each filter."""
+def response_figure(results: Results, curves: "pd.DataFrame") -> Figure | None:
+    """σ of the first coordinate during the manoeuvre, a line for each filter."""
     groups = common.groups(curves, "case", "filter", "component")
     drawn = []
     for result in results:
-        (component, unit), marks = result.axes.components[0], _ends(result)
-        for n, f in enumerate(result.axes.filters):
-            rows = groups.get((result.name, f, component))
-            if rows is None:
-                continue
-            v = [rows[key].to_numpy(dtype=float) for key in ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")]
-            known = v[4] if np.isfinite(v[4]).any() else None
-            marks.append(Line(*v[:2], f, Style(n, n, n), *v[2:4], known))
+        component, unit = result.axes.components[0]
+        marks: tuple[Mark, ...] = (*_ends(result), *case_lines(result, groups, component, SIGMA))
         y = Axis(f"$\\sigma$ of {QUANTITIES[component].symbol}, {unit}", "log")
-        drawn.append(Panel(Axis(panels.TIME, limits=(0, None)), y, tuple(marks), _title(result), direct=False))
+        drawn.append(Panel(TIME, y, marks, _title(result), direct=False))
     caption = (
         f"Root-mean-square error of the first coordinate about the truth on the same plots, of "
         f"{results[0].count:,} realisations. Dashed: the manoeuvre begins and ends. Crosses: exact values."
@@ -191,19 +186,14 @@ def response_figure(results: Sequence[CaseResult[ManoeuvreAxes]], curves) -> Fig
     return _figure("response", "Filters through a manoeuvre", caption, _one_legend(drawn))
 
 
-def modes_figure(results: Sequence[CaseResult[ManoeuvreAxes]], modes) -> Figure | None:
-    """Probability of a manoeuvre that filters live by, against time."""
+def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
+    """Probability that filters assign to a manoeuvre, against time."""
     groups = common.groups(modes, "case", "filter", "component")
     drawn = []
     for result in results:
-        component, marks = result.axes.components[0][0], _ends(result)
-        for n, f in enumerate(result.axes.filters):
-            rows = groups.get((result.name, f, component))
-            if rows is not None:
-                v = [rows[key].to_numpy(dtype=float) for key in ("t_s", "probability", "lo", "hi")]
-                marks.append(Line(*v[:2], f, Style(n, n, n), *v[2:]))
-        y = Axis("manoeuvre taken for granted", limits=(0, 1.02))
-        drawn.append(Panel(Axis(panels.TIME, limits=(0, None)), y, tuple(marks), _title(result), direct=False))
+        lines = case_lines(result, groups, result.axes.components[0][0], ("t_s", "probability", "lo", "hi"))
+        y = Axis("probability of a manoeuvre", limits=(0, 1.02))
+        drawn.append(Panel(TIME, y, (*_ends(result), *lines), _title(result), direct=False))
     caption = (
         "Share of realisations in which an adaptive filter is in its manoeuvring mode, and mean probability of the "
         "manoeuvring model of an imm, first coordinate. Dashed: the manoeuvre begins and ends."
@@ -211,54 +201,56 @@ def modes_figure(results: Sequence[CaseResult[ManoeuvreAxes]], modes) -> Figure 
     return _figure("modes", "What filters take the target to be doing", caption, _one_legend(drawn))
 
 
-def uses_figure(results: Sequence[CaseResult[ManoeuvreAxes]], uses) -> Figure | None:
-    """Measured over believed σ of what a track is used for, a panel for each moment."""
+def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
+    """Measured over believed σ of the quantities derived from a track, a panel for each time."""
     result = results[0]
     rows, names = uses[uses["case"] == result.name], list(SYMBOLS)
+    ticks = tuple((float(i), label) for i, label in enumerate(SYMBOLS.values()))
     drawn = []
-    for when, own in rows.groupby("t_s", sort=True):
-        marks = [Reference(1.0, label="")]
-        for n, (f, part) in enumerate(own.groupby("filter", sort=False)):
+    for when, at_time in rows.groupby("t_s", sort=True):
+        marks: list[Mark] = [Reference(1.0, label="")]
+        for n, (f, part) in enumerate(at_time.groupby("filter", sort=False)):
             x = np.array([names.index(name) for name in part["component"]]) + 0.08 * (n - len(result.axes.filters) / 2)
-            v = [part[key].to_numpy(dtype=float) for key in ("ratio", "ratio_lo", "ratio_hi")]
-            marks.append(Line(x, v[0], f, Style(n, None, n), *v[1:]))
-        ticks = tuple((float(i), words) for i, words in enumerate(SYMBOLS.values()))
-        low, high = own["ratio"].min(), own["ratio"].max()
-        seen = tuple((value, f"{value:g}") for value in RATIOS if low <= value <= high or value == 1)
-        y = Axis("measured / believed $\\sigma$", "log", ticks=seen)
+            columns = ("x", "ratio", "ratio_lo", "ratio_hi")
+            marks.append(line(part.assign(x=x), columns, str(f), Style(n, None, n)))
+        low, high = at_time["ratio"].min(), at_time["ratio"].max()
+        shown = tuple((float(value), f"{value:g}") for value in RATIOS if low <= value <= high or value == 1)
+        y = Axis("measured / believed $\\sigma$", "log", ticks=shown)
         drawn.append(Panel(Axis("", ticks=ticks), y, tuple(marks), f"t = {when:g} s", direct=False))
+    case = f" ({panels.plain(_title(result))})" if result.swept else ""
+    left = len(results) - 1
     caption = (
-        f"σ about the truth over the one computed from the track's covariance to first order{_of(result)}, of "
+        f"σ about the truth over the one computed from the track's covariance to first order{case}, of "
         f"{result.count:,} realisations, with 95 % intervals."
-    )
-    return _figure("uses", "What a track is used for", caption + left_out([result], results), _one_legend(drawn), 2)
+    ) + (f" {left} further cases are in the tables alone." if left else "")
+    return _figure("uses", "What a track is used for", caption, _one_legend(drawn), 2)
 
 
-def _of(result: CaseResult[ManoeuvreAxes]) -> str:
-    return f" ({panels.plain(_title(result))})" if result.swept else ""
-
-
-def _ends(result: CaseResult[ManoeuvreAxes]) -> list:
-    """Lines where the manoeuvre begins and ends."""
+def _ends(result: CaseResult[ManoeuvreAxes]) -> list[Reference]:
+    """Lines at the start and the end of the manoeuvre."""
     times = result.axes.manoeuvre_s or ()
     return [Reference(when, "x") for when in times if 0 < when < result.axes.t_s[-1]]
 
 
 def _title(result: CaseResult[ManoeuvreAxes]) -> str:
     """The swept values, a strength with its unit."""
-    units = {key: words.rpartition(", ")[2] for key, words in STRENGTHS.items()}
-    words = [f"{panels.number(v)} {units.get(key.rpartition('.')[2], '')}".rstrip() for key, v in result.swept]
-    return ", ".join(words)
+    units = {key: label.rpartition(", ")[2] for key, label in STRENGTHS.items()}
+    return ", ".join(f"{panels.number(v)} {units.get(key.rpartition('.')[2], '')}".rstrip() for key, v in result.swept)
 
 
-def _one_legend(drawn: list[Panel]) -> list[Panel]:
-    """A legend of its own after panels that all have the same lines."""
+def _first_legend(drawn: Sequence[Panel]) -> str:
+    """The place of a panel's legend: only the first panel has one."""
+    return "none" if drawn else "best"
+
+
+def _one_legend(drawn: Sequence[Panel]) -> list[Panel]:
+    """Panels that all have the same lines, followed by a separate legend."""
     keys = tuple((mark.label, mark.style) for mark in drawn[0].marks if isinstance(mark, Line))
     bare = [Panel(p.x, p.y, p.marks, p.title, direct=False, legend="none") for p in drawn]
     return [*bare, Panel(Axis(""), Axis(""), (), keys=keys)]
 
 
-def _figure(name: str, title: str, caption: str, drawn: list[Panel], most: int = 3) -> Figure | None:
+def _figure(name: str, title: str, caption: str, drawn: Sequence[Panel], most: int = 3) -> Figure | None:
     if not drawn:
         return None
     columns = 2 if len(drawn) in (2, 4) else min(most, len(drawn))

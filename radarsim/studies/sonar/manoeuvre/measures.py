@@ -8,6 +8,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report.claims import Missing, Series, certain, ratio
 from radarsim.report.statistics import Z95, Estimate
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
+from radarsim.studies.sonar.manoeuvre.config import Filter
 from radarsim.studies.sonar.measures import CaseKey, Evidence, Measure
 
 USUAL = 0.01  # false alarms a test
@@ -88,7 +89,8 @@ def mean_delay(result: CaseResult[ManoeuvreAxes], plots: int) -> Estimate:
     scans = np.flatnonzero(result.axes.phase == 1)
     share = np.asarray(result.sums["first"])[d, 0, t, scans] / result.count
     share[-1] += 1 - share.sum()
-    delay = result.axes.t_s[scans] - result.axes.manoeuvre_s[0]
+    start, _ = result.axes.manoeuvre_s or (np.nan, np.nan)
+    delay = result.axes.t_s[scans] - start
     mean = share @ delay
     half = Z95 * np.sqrt((share @ delay**2 - mean**2) / result.count)
     return Estimate(float(mean), float(mean - half), float(mean + half))
@@ -136,15 +138,17 @@ def degrees_ratio(key: CaseKey, degree: int) -> Measure:
         switched = next((f.name for f in filters if _by_five(f)), None)
         if held is None or switched is None:
             raise Missing(key)
-        return ratio(*(_over_run(seen.curve(key, name, "r").since(5)) for name in (held, switched)))
+        over_run = [_over_run(seen.curve(key, name, "r").since(5)) for name in (held, switched)]
+        return ratio(over_run[0], over_run[1])
 
     return measure
 
 
-def _by_five(one) -> bool:
+def _by_five(one: Filter) -> bool:
     own = one.detector
-    simple = one.kind == "adaptive" and one.response != "shorten_memory" and (one.end_after or 1) == 1
-    return bool(simple and own.plots == 5 and own.false_alarm_probability == USUAL and own.coordinates == "each")
+    if own is None or one.response == "shorten_memory" or (one.end_after or 1) != 1:
+        return False
+    return own.plots == 5 and own.false_alarm_probability == USUAL and own.coordinates == "each"
 
 
 def _over_run(curve: Series) -> Estimate:

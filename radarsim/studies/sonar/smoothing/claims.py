@@ -14,7 +14,9 @@ IN_VARIANCE = same(1, 0.02)
 SAME = same(1, 1e-9)
 
 
-def _claim(number: int, place: str, statement: str, *parts: Part, reading: str = "", config: str = "sonar_smoothing"):
+def _claim(
+    number: int, place: str, statement: str, *parts: Part, reading: str = "", config: str = "sonar_smoothing"
+) -> Claim:
     return Claim(f"P3.{number}", place, statement, parts, reading, config)
 
 

@@ -1,6 +1,7 @@
 """How P3's claims on smoothing are measured: the cases they mean, and the numbers taken from tables and sums."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -111,7 +112,7 @@ def gain_falls(letter: str, early: int, late: int) -> Measure:
     return measure
 
 
-def _gain_row(seen: Evidence, n: int):
+def _gain_row(seen: Evidence, n: int) -> Mapping[str, Any]:
     name = seen.filter(TEXTBOOK, "growing_memory")
     return seen.row("smoothing_gains", case=seen.case(TEXTBOOK).name, filter=name, component="r", plots=n)
 

@@ -87,14 +87,16 @@ def _gains(result: CaseResult[GivenPlotsAxes]) -> list[Columns]:
 
     For them var r / σ² = A and T₀ cov(r, v) / σ² = B.
     """
-    axes, parts = result.axes, []
+    axes = result.axes
+    parts: list[Columns] = []
     n = np.arange(2, len(axes.k) + 1)
     A_formula, B_formula = exact.gains_closed(n)
     for f, member in enumerate(result.spec.filters):
         plain = member.kind in ("growing_memory", "kalman") and not member.manoeuvre_variance and member.degree == 1
         for c, (name, _) in enumerate(axes.coordinates) if plain else ():
             unit = axes.sigma[c] ** 2
-            of = statistics.root_mean_square(*result.sums["error"][f, 1:, _width(result) * c, 1::2].T, result.count)
+            square, fourth = result.sums["error"][f, 1:, _width(result) * c, 1::2].T
+            of = statistics.root_mean_square(square, fourth, result.count)
             joint = result.sums["joint"][f, 1:, c]
             both = statistics.mean(joint[:, 2], joint[:, 3], result.count)
             A = statistics.Estimate(*(part**2 / unit for part in of))

@@ -1,20 +1,23 @@
-"""What the report of smoothed plots asks and answers."""
+"""Question and answer of the report on smoothed plots."""
 
 from collections.abc import Mapping, Sequence
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 from radarsim.studies.sonar.axes import SonarAxes
+from radarsim.studies.sonar.config import Keys, correlation_of
 from radarsim.studies.sonar.figures import QUANTITIES
 
+if TYPE_CHECKING:
+    import pandas as pd
 
-def question(specs: Sequence) -> str:
-    """What is asked of cases whose filters are given their plots."""
+
+def question(specs: Sequence[Keys]) -> str:
+    """The question of cases whose filters know their plots."""
     if any(spec.frame != "polar" for spec in specs):
         return "What does it cost to convert range and bearing to x and y, and when does the conversion's bias matter?"
-    if any(np.any(np.array(_rho(spec)) != 0) for spec in specs):
+    if any(correlation_of(spec.sensor.error_correlation, c) for spec in specs for c in range(3)):
         return "What does it cost to ignore that the errors of neighbouring plots are correlated?"
     if any(spec.sensor.detection_probability < 1 or spec.sensor.missed_scans for spec in specs):
         return "What does a missed plot cost?"
@@ -22,27 +25,19 @@ def question(specs: Sequence) -> str:
     return f"How accurate are range and bearing smoothed by {', '.join(names)}?"
 
 
-def _rho(spec) -> tuple[float, ...]:
-    given = spec.sensor.error_correlation
-    return (given,) if isinstance(given, float) else (given.range, given.bearing, given.third)
-
-
-def answer(results: Sequence[CaseResult[SonarAxes]], made: Mapping) -> list[str]:
-    """Sentences with numbers and 95 % intervals: σ of the first coordinate at the end of the run, by filter.
-
-    And the most optimistic filter.
-    """
+def answer(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
+    """Sentences with 95 % intervals: σ of the first coordinate at the end, and the most optimistic filter."""
     shown, others = panels.told(results)
     best = [_best(result, made["curves"]) for result in shown]
-    wrong = _most_optimistic(results, made)
-    return [*best, *([wrong] if wrong else []), *others]
+    return [*best, *_most_optimistic(results, made), *others]
 
 
-def _best(result: CaseResult[SonarAxes], curves) -> str:
+def _best(result: CaseResult[SonarAxes], curves: "pd.DataFrame") -> str:
+    """The filters with the least and the largest σ at the end of a case."""
     first = result.axes.components[0][0]
     rows = curves[(curves["case"] == result.name) & (curves["component"] == first)]
     last = rows[rows["k"] == rows["k"].max()]
-    # By the exact values where all are known: filters of one accuracy must not be ranked by their noise.
+    # By exact values where all are known, so that filters of equal accuracy are not ranked by their noise.
     order = last["exact_sigma"].round(9) if last["exact_sigma"].notna().all() else last["sigma"]
     last = last.loc[order.sort_values(kind="stable").index]
     low, high = last.iloc[0], last.iloc[-1]
@@ -54,18 +49,18 @@ def _best(result: CaseResult[SonarAxes], curves) -> str:
     return f"{where + ': ' if where else ''}σ of the {QUANTITIES[first].name} after {low['t_s']:g} s: {ends}."
 
 
-def _most_optimistic(results: Sequence[CaseResult[SonarAxes]], made: Mapping) -> str:
-    """The worst case of a filter that believes itself more accurate than it is, its state complete."""
+def _most_optimistic(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
+    """The filter, of complete state, that overestimates its accuracy the most; none if no filter does."""
     names = [result.name for result in results]
     believed = made["believed"][made["believed"]["case"].isin(names)]
     table = believed.merge(made["consistency"][["case", "filter", "k"]].drop_duplicates())
-    worst = table.loc[table["ratio"].idxmax()]
+    worst = table.iloc[int(table["ratio"].argmax())]
     if worst["ratio_lo"] <= 1.05:
-        return ""
+        return []
     result = next(result for result in results if result.name == worst["case"])
     where = f" at {panels.plain(panels.swept(result))}" if result.swept else ""
-    return (
+    return [
         f"Most optimistic: {worst['filter']}{where}, whose true σ is "
         f"{worst['ratio']:.2f} [{worst['ratio_lo']:.2f}, {worst['ratio_hi']:.2f}] times the one it believes "
         f"({QUANTITIES[worst['component']].name}, scan {worst['k']})."
-    )
+    ]

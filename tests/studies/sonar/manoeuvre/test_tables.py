@@ -161,7 +161,7 @@ def test_claims_are_judged(result, tables):
 
 def test_words(result, tables):
     told = STUDY.answer(result.cases, tables)
-    assert STUDY.question(result.experiment).startswith("How surely and how soon is a manoeuvre seen")
+    assert STUDY.question(result.experiment).startswith("How surely and how soon is a manoeuvre detected")
     assert any("10 plots" in sentence for sentence in told)
     assert any(
         sentence.startswith("Measured σ of the track's uses over that from its covariance (growing, ")
