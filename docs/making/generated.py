@@ -19,5 +19,5 @@ def fill(app, name: str, source: list[str]) -> None:
 
 
 def outdated(app, env, added: set[str], changed: set[str], removed: set[str]) -> list[str]:
-    """Pages with marks are read anew in every build: what they are made of is no file that Sphinx looks at."""
+    """Pages with marks are read again in every build: what they are made of is no file that Sphinx looks at."""
     return [name for name in env.found_docs if MARK.search(Path(env.doc2path(name)).read_text(encoding="utf-8"))]

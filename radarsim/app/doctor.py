@@ -135,7 +135,7 @@ def _record(folder: Path) -> dict[str, Any]:
     except OSError as error:
         raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise StoreError(f"{path}: damaged, it is no record of a run; `radarsim run` makes it anew") from error
+        raise StoreError(f"{path}: damaged, it is no record of a run; `radarsim run` makes it again") from error
     return record
 
 

@@ -322,7 +322,7 @@ def stored(out: str | Path) -> list[dict[str, Any]]:
     table = csv.DictReader(io.StringIO(text, newline=""))
     found = list(table)
     if not {"claim", "reading", "kind", "outcome"} <= set(table.fieldnames or ()):
-        raise StoreError(f"{path}: is no table of readings; remove it, `radarsim readings` makes it anew")
+        raise StoreError(f"{path}: is no table of readings; remove it, `radarsim readings` makes it again")
     return found
 
 

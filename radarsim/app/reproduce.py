@@ -1,7 +1,7 @@
 """`make reproduce-figures`: every shipped config at its full size, a line each, and what came of the papers' claims.
 
 Two processes share the configs, so that one computes while the other draws: drawing keeps a single core busy, and takes
-about as long as computing. They are programs started anew, which take a line of JSON for each config and answer with
+about as long as computing. They are new processes, which take a line of JSON for each config and answer with
 one; the store is safe with both.
 """
 

@@ -135,7 +135,7 @@ class Result:
         return figures.render(self._described[name])
 
     def write(self, out: str | os.PathLike[str], figures: bool | str | Sequence[str] = True) -> "Written":
-        """Write tables, figures, claims, run.json and report.html into out/<stem>/, and out/index.html anew.
+        """Write tables, figures, claims, run.json and report.html into out/<stem>/, and out/index.html again.
 
         figures may name the formats of their files: svg, png, pdf. What was written comes back.
         """

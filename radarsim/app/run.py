@@ -241,7 +241,7 @@ def as_last_run(experiment: Experiment, out: Path) -> Experiment:
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or "damaged"
         raise StoreError(
-            f"{out / experiment.stem / 'run.json'}: cannot be read: {reason}; `radarsim run` makes it anew, "
+            f"{out / experiment.stem / 'run.json'}: cannot be read: {reason}; `radarsim run` makes it again, "
             "and so does `radarsim report` with -n"
         ) from error
     cases = tuple(replace(case, realisations=numbers.get(case.name, case.realisations)) for case in experiment.cases)

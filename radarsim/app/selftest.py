@@ -3,7 +3,7 @@
 radarsim/app/known holds for each study (the sonar is three) a config, and the tables that it gave on the platform of
 platform.json. Elsewhere (instruction set, compiler, BLAS, mathematical library) the last bits differ: an ulp here and
 there, which the arithmetic after it magnifies by its condition number κ. So a number may differ by what κ allows, see
-`Tolerance`. `make known` makes the tables anew, after a change that is meant to change numbers.
+`Tolerance`. `make known` makes the tables again, after a change that is meant to change numbers.
 A study of an installed package has its known answers in tests of its own; here it is only loaded.
 """
 
@@ -138,7 +138,7 @@ def _compared(name: str, value: float, centre: float) -> float:
 
 
 def write() -> None:
-    """Make the known tables anew, of this platform."""
+    """Make the known tables again, of this platform."""
     made = {study: tables(study) for study in TOLERANCES}
     contents = {f"{study}.{name}.csv": content for study, own in made.items() for name, content in own.items()}
     files.replace_all(KNOWN, contents | {"platform.json": (json.dumps(platform(), indent=2) + "\n").encode()})

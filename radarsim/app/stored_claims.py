@@ -28,7 +28,7 @@ def stored(path: Path) -> list[dict[str, Any]] | None:
             return _rows(path, content)
         if look < LOOKS - 1:
             time.sleep(PAUSE_S)
-    raise StoreError(f"{path}: altered since it was written; `radarsim report` makes it anew")
+    raise StoreError(f"{path}: altered since it was written; `radarsim report` makes it again")
 
 
 def _read(path: Path) -> bytes | None:
@@ -47,7 +47,7 @@ def _recorded(path: Path) -> str | None:
     try:
         digest = None if content is None else json.loads(content)["outputs"].get(path.name)
     except (ValueError, LookupError, TypeError, AttributeError) as error:
-        raise StoreError(f"{record}: is no record of a run; `radarsim report` makes it anew") from error
+        raise StoreError(f"{record}: is no record of a run; `radarsim report` makes it again") from error
     return digest
 
 
@@ -64,4 +64,4 @@ def _rows(path: Path, content: bytes) -> list[dict[str, Any]]:
             return [row | {name: float(row[name]) if row[name] else "" for name in NUMBERS} for row in rows]
     except (LookupError, TypeError, ValueError):
         pass  # reported like any other damaged table
-    raise StoreError(f"{path}: is no table of claims; `radarsim report` makes it anew")
+    raise StoreError(f"{path}: is no table of claims; `radarsim report` makes it again")

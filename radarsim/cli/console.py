@@ -322,7 +322,7 @@ def print_readings(done: "Done", detailed: bool) -> None:
         if read.search is not None:
             say(f"{read.search.paper}: {read.search.sentence()}")
     if done.files:
-        say(f"table    {done.folder / 'readings.csv'}; curves: {plural(len(done.files) - 1, 'figure')} drawn anew")
+        say(f"table    {done.folder / 'readings.csv'}; curves: {plural(len(done.files) - 1, 'figure')} drawn again")
 
 
 def print_inventory(inventory: "Inventory") -> None:

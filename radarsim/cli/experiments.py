@@ -65,8 +65,8 @@ def run(
     """Run experiments; resumes by itself.
 
     CONFIG is a YAML file, or the name of a shipped experiment (`radarsim list`). Finished blocks are kept under
-    DIR/.blocks: a run that was stopped continues, a larger N continues, an edited config starts anew. A precision or
-    time limit that left something undone ends in exit code 3, with tables of what is done.
+    DIR/.blocks: a run that was stopped continues, a larger N continues, an edited config starts from zero. A precision
+    or time limit that left something undone ends in exit code 3, with tables of what is done.
 
     \b
     Examples

@@ -150,7 +150,7 @@ def main() -> None:
       radarsim solve rls2 radar.sigma_velocity_mps --gain r --at 60 --equals 30
 
     Commands, options and configs complete with the tab key after
-    `eval "$(_RADARSIM_COMPLETE=bash_source radarsim)"` (bash; zsh_source, fish_source likewise).
+    `eval "$(_RADARSIM_COMPLETE=bash_source radarsim)"` (bash; or zsh_source, fish_source).
     """
 
 

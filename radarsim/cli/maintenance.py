@@ -49,7 +49,7 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
     RESULT is a folder such as results/rls2. Every output is checked against run.json, every stored block of its cases
     against its checksum, every total against its blocks; --recompute computes the N smallest pieces of each case again.
     Damage ends in exit code 4 and names each file: `radarsim run` computes what is missing, `radarsim report` makes
-    tables anew.
+    tables again.
 
     \b
     Examples

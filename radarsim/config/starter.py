@@ -1,4 +1,4 @@
-"""A config of one's own to begin with: a known one written anew, each key with its meaning beside it."""
+"""A config of one's own to begin with: a known one written again, each key with its meaning beside it."""
 
 import json
 import re

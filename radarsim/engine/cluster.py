@@ -287,7 +287,7 @@ def _for_workers(security: Any) -> str:  # whose fields Dask makes at run time
 class _Processes:
     """Worker processes on this machine, in sessions of their own: Ctrl-C in a terminal is for the run alone.
 
-    They are programs started anew, no forks of a process with live threads. One that dies is replaced; all end by
+    They are new processes, not forks of a process with live threads. One that dies is replaced; all end by
     themselves when the scheduler, and so this process, is gone.
     """
 

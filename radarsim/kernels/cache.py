@@ -75,12 +75,12 @@ class KernelCache(Cache):
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
-            _note("read", f"{path}: cannot be read: {error.strerror}; the kernel is compiled anew")
+            _note("read", f"{path}: cannot be read: {error.strerror}; the kernel is compiled again")
             return None
         try:
             return self._rebuilt(raw, key, target_context)
         except Exception as error:  # unpickling may raise anything
-            _note("damaged", f"{path}: damaged ({type(error).__name__}); the kernel is compiled anew")
+            _note("damaged", f"{path}: damaged ({type(error).__name__}); the kernel is compiled again")
             return None
 
     def _rebuilt(self, raw: bytes, key: tuple, target_context):
@@ -106,7 +106,7 @@ class KernelCache(Cache):
             finally:
                 temporary.unlink(missing_ok=True)
         except OSError as error:
-            _note("write", f"{self._path}: compiled kernels cannot be kept: {error.strerror}; each run compiles anew")
+            _note("write", f"{self._path}: compiled kernels cannot be kept: {error.strerror}; each run compiles again")
 
     def _key(self, sig, codegen) -> tuple:
         return self._path.name, self._name, *self._index_key(sig, codegen)
@@ -156,7 +156,7 @@ def cache_root() -> Path:
     except OSError as error:
         where = ", ".join(candidates)
         _note(
-            "write", f"{where}: cannot be written, nor a temporary directory: {error.strerror}; each run compiles anew"
+            "write", f"{where}: cannot be written, nor a temporary directory: {error.strerror}; each run compiles again"
         )
         return Path(candidates[0])
 

@@ -1,6 +1,6 @@
 """How every kernel is compiled. Where its machine code is kept: radarsim.kernels.cache.
 
-LLVM prefers registers of 256 bits on Intel processors that have 512, for the sake of programs that seldom use vectors.
+LLVM prefers registers of 256 bits on Intel processors that have 512, for the sake of programs that rarely use vectors.
 Kernels ask for 512 one by one, in an attribute of the LLVM function; elsewhere it changes nothing. Measured on a
 Cascade Lake: sums over samples 1.7 times faster, normals 1.3 times. Numba's CPU_FEATURES would do the same for the
 whole process, but only where no other user of Numba came first, and the order of sums would depend on who did.

@@ -2,7 +2,7 @@
 
 Threefry2x64-20 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11) and a Box-Muller
 transform with polynomials for log, sin and cos, because nothing vectorises the library's. The key is (seed, hash of the
-stream's name), the counter (realisation, pair number); one call gives two words, hence a pair of normals or uniforms.
+stream's name), the counter (realisation, pair number); one call gives two words, so a pair of normals or uniforms.
 LAYOUT is the version of that layout: results carry it, and a change of it starts new results.
 """
 

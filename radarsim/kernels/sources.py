@@ -63,7 +63,7 @@ def content(module: str) -> bytes | None:
 
 
 def forget() -> None:
-    """Look at all files anew; the syntax trees stay known."""
+    """Look at all files again; the syntax trees stay known."""
     for known in (top_spec, spec_of, content, source, part, data_files):
         known.cache_clear()
 

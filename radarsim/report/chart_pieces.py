@@ -91,7 +91,7 @@ def places(x: np.ndarray, y: np.ndarray) -> list[tuple[float, float]]:
 
 
 def path(x: np.ndarray, y: np.ndarray) -> str:
-    """A polyline through the finite points, in tenths of a unit, begun anew after a gap."""
+    """A polyline through the finite points, in tenths of a unit, started again after a gap."""
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     there = np.isfinite(x) & np.isfinite(y)
     tenths = np.stack([np.where(there, np.round(10 * v), 0) for v in (x, np.clip(y, -1e5, 1e5))]).astype(np.int64)

@@ -23,7 +23,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Style:
-    """How a mark is told apart, in grey too: each number picks from a list of its own.
+    """How a mark is distinguished, in grey too: each number picks from a list of its own.
 
     colour: an int picks a distinct colour, a float from 0 to 1 a shade of an ordered scale. dash and marker: ints,
     None for no line or no marker.

@@ -317,7 +317,7 @@ Columns = dict[str, np.ndarray]
 
 
 def _by_track(piece: plots.Piece) -> Iterator[tuple[str | None, Columns, Columns]]:
-    """Measured and true columns of each track by its name, or of all rows where tracks are not told apart."""
+    """Measured and true columns of each track by its name, or of all rows where tracks are not distinguished."""
     if piece.tracks is None:
         yield None, piece.columns, piece.truth
         return

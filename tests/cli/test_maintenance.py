@@ -120,7 +120,7 @@ def test_a_record_beyond_reading_is_made_anew_as_told(out):
     whole = contents(out / "rls2").keys()
     (out / "rls2" / "run.json").write_text("[" * 100_000)
     told = command("report", "rls2", "--no-figures", "--out", out, code=4).stderr
-    assert "`radarsim run` makes it anew, and so does `radarsim report` with -n" in told
+    assert "`radarsim run` makes it again, and so does `radarsim report` with -n" in told
     command("report", "rls2", "-n", 50_001, "--no-figures", "--out", out)
     command("run", "rls1", "-n", 50_001, "--no-figures", "--quiet", "--out", out)  # the index reads all records
     assert contents(out / "rls2").keys() == whole

@@ -148,7 +148,7 @@ def test_nowhere_to_keep_anything(monkeypatch, tmp_path, troubles):
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
     monkeypatch.setattr(cache.tempfile, "tempdir", str(blocked))
     assert cache.cache_root() == blocked
-    assert "each run compiles anew" in troubles["write"]
+    assert "each run compiles again" in troubles["write"]
 
 
 def test_a_function_of_no_file_is_not_kept():

@@ -109,7 +109,7 @@ def killed(study, out, after_s=None):
 @every_study
 def test_twenty_kills_of_the_run(study, tmp_path):
     """At moments spread over all that a run does, its start and the writing of its tables too; every one on the store
-    and the results that the last one left. One that ended before its kill is compared, and the next begins anew."""
+    and the results that the last one left. One that ended before its kill is compared, and the next starts again."""
     assert killed(study, tmp_path / "compiled") == 0
     since = time.perf_counter()
     assert killed(study, tmp_path / "whole") == 0

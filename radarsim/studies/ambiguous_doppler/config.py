@@ -139,7 +139,7 @@ class Manoeuvres(Model):
 class Filter(Model):
     """A Kalman filter of range, or several of different order, with the velocity or without."""
 
-    name: Annotated[Name, Display()] = Field(description="label, unlike that of any other filter")
+    name: Annotated[Name, Display()] = Field(description="label; every filter has its own")
     doppler: Literal["none", "unfolded", "folded"] = Field(
         description="none: range alone; unfolded: the velocity with its true fold, a bound; folded: as measured"
     )

@@ -49,7 +49,7 @@ def model(order: int, variance: float, dt: float) -> tuple[np.ndarray, np.ndarra
     """F and Q (3, 3) of a motion of order 0, 1 or 2 over dt, in a state of range, velocity and acceleration.
 
     Order 2 has a random jerk, order 1 a random acceleration, constant over the scan, of that variance (P1 eqs. 3, 6).
-    Order 0 has a random velocity, drawn anew each scan with that variance: measured, it moves the range; unmeasured, it
+    Order 0 has a random velocity, drawn at each scan with that variance: measured, it moves the range; unmeasured, it
     is a random walk's step.
     """
     F, Q = np.zeros((3, 3)), np.zeros((3, 3))

@@ -127,7 +127,7 @@ class Prior(Model):
 class Estimator(Model):
     """A sequence of windows that grow to the whole burst, Fisher scoring in each; or the classical rival."""
 
-    name: Annotated[Name, Display()] = Field(description="label, unlike that of any other estimator")
+    name: Annotated[Name, Display()] = Field(description="label; every estimator has its own")
     method: Literal["sequence", "ridge"] = Field(
         "sequence", description="sequence of discriminators, or short-time spectrum, robust fit, unwrapping, scoring"
     )

@@ -65,7 +65,7 @@ def figures(results: Sequence[CaseResult], made: Mapping, experiment: Experiment
 
 
 def of_case(figure: Figure, case: str) -> Figure:
-    """A figure told apart from its like of another case."""
+    """The figure of one of several cases, under a name of its own."""
     return replace(figure, name=f"{figure.name}_{case}", title=f"{figure.title}, {case}")
 
 

@@ -180,7 +180,7 @@ Column = Annotated[tuple[Probability, ...], Field(min_length=1, max_length=MOST_
 class Filter(Model):
     """A Kalman filter, or several that share what they know."""
 
-    name: Annotated[Name, Display()] = Field(description="label, unlike that of any other filter")
+    name: Annotated[Name, Display()] = Field(description="label; every filter has its own")
     family: Literal["kalman", "gpb1", "imm", "gpb2"] = Field(
         description="one model; or MMA1 (GPB1), MMA2 (IMM), MMA3 (GPB2) of the paper"
     )

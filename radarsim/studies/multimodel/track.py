@@ -179,7 +179,7 @@ def _filtered(spec: Keys, state: _State, t: np.ndarray, plots: np.ndarray, frame
     index, times = intervals(t)
     own = banks(spec.model_copy(update={"filters": (state.options,)}), times)
     size, count = own.numbers[0, SIZE], len(plots)
-    state.numbers[PREPARED] = -1  # the intervals of this chunk are numbered anew
+    state.numbers[PREPARED] = -1  # the intervals of this chunk are numbered from 0
     out, reported = rows(count * OUTPUT), np.ones(count, dtype=np.int64)
     scans = index[1:].copy(), times
     design = own.models[0, : MODEL_NUMBERS * size], own.transitions[0]

@@ -168,7 +168,7 @@ Target = Annotated[Polynomial | AccelerationStart | JerkPulse | Turn, Field(disc
 class Filter(Model):
     """A second-order Kalman filter started by least squares."""
 
-    name: Annotated[Name, Display()] = Field(description="label, unlike that of any other filter")
+    name: Annotated[Name, Display()] = Field(description="label; every filter has its own")
     observes: tuple[Literal["range", "velocity"], ...] = Field(
         description="what it measures: [range] or [range, velocity]"
     )

@@ -111,7 +111,7 @@ def gain_raised(seen: Evidence, slow: int, fast: int) -> Estimate:
 
 
 def peak_times(seen: Evidence, slow: int, fast: int) -> Estimate:
-    """Time of the largest range gain, fast : slow; the interval spans all times that cannot be told from it."""
+    """Time of the largest range gain, fast : slow; the interval spans all times not distinguishable from it."""
     a, b = seen.k_gain(fast, "r").when_largest(), seen.k_gain(slow, "r").when_largest()
     return Estimate(a.value / b.value, a.lo / b.hi, a.hi / b.lo)
 

@@ -70,7 +70,7 @@ class Gathered:
         self.rows.append(row)
 
     def taken(self) -> Batch:
-        """The records until now as a batch; it begins anew."""
+        """The records until now as a batch; it starts again."""
         table = np.array(self.rows, dtype=float).reshape(-1, len(self.names))
         batch = Batch(self.kind, self.track, self.address, dict(zip(self.names, table.T.copy(), strict=True)))
         self._empty()
@@ -78,7 +78,7 @@ class Gathered:
 
 
 class Unrolled:
-    """Times of a clock that begins anew after `period_s`, made to run on. Records out of order by half of it are seen
+    """Times of a clock that starts again after `period_s`, made to run on. Records out of order by half of it are seen
     as they are."""
 
     def __init__(self, period_s: float):

@@ -60,7 +60,7 @@ def designed(radar, variance_factor=1.0, velocity_factor=1.0):
 
 
 def with_shared_noise(monkeypatch):
-    """The block kernel compiled anew, with plots whose velocity noise is the range noise."""
+    """The block kernel compiled again, with plots whose velocity noise is the range noise."""
     fill_plots = kernels.fill_plots
 
     def reused(key, first, scan, mean, sigma, z, w):

@@ -39,7 +39,7 @@ from radarsim.studies.ambiguous_doppler.kernels.steps import fill_gains, run_mer
 
 @part
 def run_filters(world, banks, memory, fresh):
-    """Gains and outputs of all banks over the plots in memory; gains are made anew where `fresh`."""
+    """Gains and outputs of all banks over the plots in memory; gains are made again where `fresh`."""
     scans, plots = world.truth.shape[0], address(memory.plots)
     sigma = address(world.sigma)
     if fresh:

@@ -90,7 +90,7 @@ def put9(pointer, first, x):
 
 
 # ---- merging: eq. (4) with the shares of any rule --------
-# Addresses say which axis and block is meant: a number in the call would be compiled anew for each of its values.
+# Addresses say which axis and block is meant: a number in the call would be compiled again for each of its values.
 @inline
 def mixed_mean(listed, count, shares, means):
     """Mean of one axis (3): Σ mu x over the listed hypotheses; means: row of that axis."""

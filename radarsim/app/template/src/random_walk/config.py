@@ -43,7 +43,7 @@ class Target(Model):
 class Filter(Model):
     """A filter of the position."""
 
-    name: Annotated[Name, Display()] = Field(description="label, unlike that of any other filter")
+    name: Annotated[Name, Display()] = Field(description="label; every filter has its own")
     kind: Literal["kalman", "fixed_gain"] = Field(description="how its gain is made")
     gain: Annotated[Positive, Field(le=1)] | None = Field(
         None, description="fixed_gain: share of the innovation that is taken over, no unit"
