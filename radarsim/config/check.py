@@ -180,6 +180,9 @@ def _irrelevant(one: _Found, found: list[_Found], document: Document) -> bool:
         return False
     depth = len(one.path)
     others = [other for other in found if other.path[:depth] == one.path and other is not one]
+    forms = [other for other in found if other.path == one.path and other.kind in MAPPING | LIST | SCALAR]
+    if one is not forms[0] and all(other.kind in (MAPPING | LIST | SCALAR) - form for other in forms):
+        return True  # it has the form of no member: the first is named
     return any(len(other.path) > depth or other.kind not in (MAPPING | LIST | SCALAR) - form for other in others)
 
 

@@ -7,7 +7,7 @@ is understood as well (and `_degps` for `_radps`); the checked object holds radi
 import math
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from types import FunctionType
@@ -40,6 +40,13 @@ class Display:
 
 class Design:
     """Mark of a field that designs filters or says how long to look: no part of the world nor of its noise's key."""
+
+
+class Added:
+    """Mark of a key that earlier versions did not have, and did as its default says.
+
+    At its default it is left out of a case's identity and of its noise's key, so that the noise is what it was.
+    """
 
 
 @dataclass(frozen=True)
@@ -245,11 +252,13 @@ class Study(Model):
 
     bare_keys names the list whose members a bare key of `sweep` and `--set` speaks to. figure_names are all figures
     that the study's report may draw, with * for what depends on the config; None: not known here, and names under
-    `figures` go unchecked.
+    `figures` go unchecked. in_place_of names the key that a key stands in place of: where an override or a sweep sets
+    the one, the other goes.
     """
 
     bare_keys: ClassVar[str] = "filters"
     figure_names: ClassVar[tuple[str, ...] | None] = None
+    in_place_of: ClassVar[Mapping[str, str]] = {}
 
     @property
     def device(self) -> str | None:

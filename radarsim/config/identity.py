@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from radarsim.config.fields import DataFile, Design, Display, NameIn
+from radarsim.config.fields import Added, DataFile, Design, Display, NameIn
 
 
 def digest(value: object) -> str:
@@ -38,13 +38,18 @@ def _plain(value: object, leave_out: tuple[type, ...]) -> Any:
             name: _plain(_without_names(value, name, info) if leave_out else getattr(value, name), leave_out)
             for name, info in type(value).model_fields.items()
             if not any(isinstance(mark, leave_out) for mark in info.metadata)
-            and (leave_out or getattr(value, name) is not None)
+            and not (_at_its_default(value, name, info) if leave_out else getattr(value, name) is None)
         }
     if isinstance(value, tuple | list):
         return [_plain(item, leave_out) for item in value]
     if isinstance(value, dict):
         return {str(key): _plain(item, leave_out) for key, item in value.items()}
     return value
+
+
+def _at_its_default(model: BaseModel, name: str, info: FieldInfo) -> bool:
+    """Whether a field is one that earlier versions did not have, and does what they did."""
+    return any(isinstance(mark, Added) for mark in info.metadata) and getattr(model, name) == info.default
 
 
 def _without_names(model: BaseModel, name: str, info: FieldInfo) -> object:

@@ -35,7 +35,7 @@ def place(document: Document, model: type[Study], setting: Setting, read: Read, 
         if isinstance(document.data.get(first), str):
             return document  # no scenario, as noted, or a key without scenarios, as the check will report
     for path in key_paths(document, model, setting.key):
-        document = _without_twin(document, path).graft(path, setting.value, setting.origin)
+        document = _without_twin(document, path, model).graft(path, setting.value, setting.origin)
     return document
 
 
@@ -86,9 +86,11 @@ def _in_every_member(document: Document, model: type[Study], key: str) -> list[P
     return paths
 
 
-def _without_twin(document: Document, path: Path) -> Document:
-    """The document without the same quantity in the other unit, which the new value replaces."""
+def _without_twin(document: Document, path: Path, model: type[Study]) -> Document:
+    """The document without what the new value replaces: the same quantity in the other unit, or said another way."""
     twin = in_degrees(str(path[-1])) or in_radians(str(path[-1]))
+    if len(path) == 1:
+        twin = twin or model.in_place_of.get(str(path[0]))
     if twin is None or document.get((*path[:-1], twin)) is ABSENT:
         return document
     holder = document.get(path[:-1])

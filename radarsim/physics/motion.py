@@ -11,6 +11,36 @@ def transition(dt: float, size: int = 3) -> np.ndarray:
     return F
 
 
+def white_jerk_covariance(variance: float, dt: float) -> np.ndarray:
+    """Covariance (3, 3) that white jerk of spectral density variance · dt, in (m/s³)² s, adds over a scan.
+
+    A jerk that white noise gives has, averaged over a scan, the variance `variance`, (m/s³)². (Bar-Shalom, Li &
+    Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, eq. 6.2.3-7.)
+    """
+    g = [[dt**4 / 20, dt**3 / 8, dt**2 / 6], [dt**3 / 8, dt**2 / 3, dt / 2], [dt**2 / 6, dt / 2, 1.0]]
+    return variance * dt**2 * np.array(g)
+
+
+def acceleration_step_covariance(variance: float, dt: float) -> np.ndarray:
+    """Covariance (3, 3) that a step of the acceleration at the beginning of a scan, of variance · dt², adds by its end.
+
+    The piecewise constant Wiener acceleration (Bar-Shalom, Li & Kirubarajan 2001, eq. 6.3.3-4), with the acceleration
+    gaining in a scan what a jerk of this variance, (m/s³)², gives it.
+    """
+    g = np.array([dt**2 / 2, dt, 1.0])
+    return variance * dt**2 * np.outer(g, g)
+
+
+def process_noise(kind: str, variance: float, dt: float) -> np.ndarray:
+    """Q (3, 3) of a scan: `random_jerk` (P1 eq. 6), `white_jerk` or `white_acceleration`; variance is D_M, (m/s³)²."""
+    covariances = {
+        "random_jerk": manoeuvre_covariance,
+        "white_jerk": white_jerk_covariance,
+        "white_acceleration": acceleration_step_covariance,
+    }
+    return covariances[kind](variance, dt)
+
+
 def manoeuvre_covariance(variance: float, dt: float, size: int = 3) -> np.ndarray:
     """Covariance (size, size) that a random derivative of order `size`, constant over the scan, adds (P1 eq. 6, its M).
 

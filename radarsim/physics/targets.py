@@ -68,6 +68,17 @@ def turn(
     return np.stack([r, radial_velocity, radial_acceleration], axis=1)
 
 
+def fly_by(distance: float, speed: float, start_range: float, t: np.ndarray) -> np.ndarray:
+    """Radial motion of a target in straight flight past the radar, (K, 3) at times t (K,).
+
+    distance (m) of closest approach, speed (m/s), start_range (m) at t = 0, inbound. r² = d² + x², V = v x / r,
+    a = v² d² / r³ with x = v t − √(r₀² − d²) along the path.
+    """
+    along = speed * t - math.sqrt((start_range - distance) * (start_range + distance))
+    r = np.hypot(along, distance)
+    return np.stack([r, speed * along / r, speed**2 * distance**2 / r**3], axis=1)
+
+
 def _arc(speed: float, rate: float, aspect: float, elapsed: np.ndarray) -> np.ndarray:
     """Displacement (K, 2) after `elapsed` seconds of turning; a chord of angle x is speed·elapsed·sinc(x/2) long."""
     half = rate * elapsed / 2

@@ -35,7 +35,12 @@ class Quantity(NamedTuple):
 
 
 def number(value: object, powers: bool = False) -> str:
-    """A number for people: 0.001 as 10⁻³ (with powers, 0.1 as 10⁻¹), others at four digits; text as it is."""
+    """A number for people: 0.001 as 10⁻³ (with powers, 0.1 as 10⁻¹), others at four digits; text as it is.
+
+    A mapping of keys as "key value, key value".
+    """
+    if isinstance(value, Mapping):
+        return ", ".join(f"{literal(str(key))} {number(one)}" for key, one in value.items())
     if not isinstance(value, int | float) or isinstance(value, bool):
         return literal(str(value))
     power = f"{value:.0e}".partition("e")[2]

@@ -156,7 +156,8 @@ OVERRIDES = [
     ("study=sonr", "--set study: must be one of "),
     (
         "target.kind=trun",
-        "--set target.kind: must be one of polynomial, acceleration_start, jerk_pulse, turn, got 'trun'",
+        "--set target.kind: must be one of polynomial, acceleration_start, jerk_pulse, turn, fly_by, recorded, "
+        "got 'trun'",
     ),
     ("seed.x=3", "--set seed.x: seed has no keys of its own"),
     (

@@ -12,6 +12,7 @@ TRUTHS = {
     "acceleration_start": (targets.acceleration_start([1e5, -250.0], 12.0, 20.0, T), [20.0]),
     "jerk_pulse": (targets.jerk_pulse([1e5, -250.0, 4.0], 3.0, 20.0, 10.0, T), [20.0, 30.0]),
     "turn": (targets.turn(1e5, 300.0, 2.5, 3.0, 20.0, 10.0, T), [20.0, 30.0]),
+    "fly_by": (targets.fly_by(3e3, 250.0, 9e3, T), []),
     "turn of more than a circle": (targets.turn(4e4, 250.0, 3.0, -5.0, 5.0, 45.0, T), [5.0, 50.0]),
 }
 
@@ -66,3 +67,37 @@ def test_manoeuvre_covariance_is_the_papers_matrix():
         [dt**4 / 6, dt**3 / 2, dt**2],
     ]
     np.testing.assert_allclose(manoeuvre_covariance(D, dt), np.array(M) * D, rtol=1e-14)
+
+
+def test_a_fly_by_is_closest_when_it_has_flown_the_leg():
+    t = np.array([0.0, 4000.0 / 250.0, 8000.0 / 250.0])
+    x = targets.fly_by(3000.0, 250.0, 5000.0, t)
+    np.testing.assert_allclose(x[:, 0], [5000, 3000, 5000], rtol=1e-14)
+    np.testing.assert_allclose(x[:, 1], [-200, 0, 200], rtol=1e-14, atol=1e-12)
+    assert x[1, 2] == pytest.approx(250.0**2 / 3000.0, rel=1e-14)
+
+
+def numbers_of(kind, dt, steps=20000):
+    """Q of D_M = 1 by summing over a fine grid what each form of manoeuvre leads to."""
+    if kind == "white_jerk":  # ∫ F(s) e₃ e₃ᵀ F(s)ᵀ ds of density dt
+        s = (np.arange(steps) + 0.5) * dt / steps
+        g = np.stack([s**2 / 2, s, np.ones(steps)])
+        return dt * g @ g.T * dt / steps
+    effect = np.zeros(3)  # of one number drawn a scan
+    h = dt / steps
+    if kind == "white_acceleration":
+        effect[2] = dt
+    for _ in range(steps):
+        jerk = 1.0 if kind == "random_jerk" else 0.0
+        effect = effect + h * np.array([effect[1] + h * effect[2] / 2, effect[2] + h * jerk / 2, jerk])
+    return np.outer(effect, effect)
+
+
+@pytest.mark.parametrize("kind", ["random_jerk", "white_jerk", "white_acceleration"])
+def test_process_noise_is_what_the_manoeuvre_leads_to(kind):
+    from radarsim.physics.motion import process_noise
+
+    dt = 3.0
+    np.testing.assert_allclose(process_noise(kind, 2.0, dt), 2.0 * numbers_of(kind, dt), rtol=1e-7)
+    assert process_noise(kind, 2.0, dt)[2, 2] == pytest.approx(2.0 * dt**2)  # the acceleration gains the same in all
+    assert np.linalg.matrix_rank(process_noise(kind, 2.0, dt)) == (3 if kind == "white_jerk" else 1)

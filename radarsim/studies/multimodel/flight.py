@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
+from radarsim.physics.recorded import smoothed
 
 DENSITY_KGPM3, SCALE_HEIGHT_M = 1.225, 7200.0  # of an exponential atmosphere, fitted below 50 km
 ORBIT_MPS = 7900.0  # first cosmic velocity: a flat earth is no model of anything faster
@@ -114,16 +115,8 @@ def _check(track: np.ndarray, t: np.ndarray) -> None:
 def recorded(times: np.ndarray, positions: np.ndarray, t: np.ndarray) -> np.ndarray:
     """States (K, 9) at times t of a recorded flight: times (n,), at least 5 and increasing, positions (n, 3).
 
-    A cubic smoothing spline for each axis, its strength chosen by generalised cross-validation; its derivatives are
-    taken as the true velocity and acceleration. Raises Unflyable as `fly`.
+    As `physics.recorded.smoothed`; raises Unflyable as `fly`.
     """
-    from scipy.interpolate import make_smoothing_spline
-
-    since = times - times[0]
-    track = np.empty((len(t), 9))
-    for axis in range(3):
-        spline = make_smoothing_spline(since, positions[:, axis])
-        for order in range(3):
-            track[:, 3 * axis + order] = spline.derivative(order)(t) if order else spline(t)
+    track = smoothed(times, positions, t)
     _check(track, t)
     return track

@@ -1,49 +1,16 @@
 """The world of P2: the true flight, the times of the scans, the sensor, plots in the antenna's coordinates."""
 
-import csv
-
 import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.errors import ConfigError
 from radarsim.kernels import random
 from radarsim.physics import frames
+from radarsim.physics.recorded import Unreadable, points
 from radarsim.studies.multimodel import flight
 from radarsim.studies.multimodel.config import Keys, Sensor
 from radarsim.studies.multimodel.kernels import plots, records
 from radarsim.studies.noise import noise_key
-
-
-def points(path: str) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) in s and positions (n, 3) in m of a CSV file t_s,x_m,y_m,z_m; raises ConfigError by line and
-    column."""
-    columns = ("t_s", "x_m", "y_m", "z_m")
-    with open(path, newline="", encoding="utf-8") as file:
-        reader = csv.reader(file)
-        header = next(reader, [])
-        if missing := [name for name in columns if name not in header]:
-            raise ConfigError(f"{path}:1: no column {', '.join(missing)}; needed: {', '.join(columns)}")
-        at = [header.index(name) for name in columns]
-        rows: list[list[float]] = []
-        faults: list[str] = []
-        for line in reader:
-            try:
-                row = [float(line[i]) for i in at]
-            except (ValueError, IndexError):
-                faults.append(f"{path}:{reader.line_num}: must be four numbers, got {','.join(line)[:60]!r}")
-                continue
-            if not np.isfinite(row).all():
-                faults.append(f"{path}:{reader.line_num}: must be finite, got {','.join(line)[:60]!r}")
-            elif rows and row[0] <= rows[-1][0]:
-                faults.append(f"{path}:{reader.line_num}: t_s must increase, got {row[0]:g} after {rows[-1][0]:g}")
-            else:
-                rows.append(row)
-    if not faults and len(rows) < 5:
-        faults.append(f"{path}: needs at least 5 points, got {len(rows)}")
-    if faults:
-        raise ConfigError(*faults[:20])
-    table = np.array(rows)
-    return table[:, 0], table[:, 1:]
 
 
 def scan_times(spec: Keys, case: Case, duration: float) -> np.ndarray:
@@ -78,6 +45,8 @@ def truth(case: Case) -> tuple[np.ndarray, np.ndarray]:
             raise ConfigError(f"{case.name}: target: lasts only {len(t)} scans; at least 4 are needed")
         coefficient = target.ballistic_coefficient_kgpm2
         return t, flight.fly(target.position_m, target.velocity_mps, coefficient, target.lag_s, phases, t)
+    except Unreadable as error:
+        raise ConfigError(*error.faults) from None
     except flight.Unflyable as error:
         raise ConfigError(f"{case.name}: target: {error}") from None
 

@@ -1,28 +1,34 @@
 """Keys of the range_doppler study (P1): a radar, a target in range, linear filters with and without the velocity."""
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
 from radarsim.config.faults import short
 from radarsim.config.fields import (
+    Added,
+    At,
+    DataFile,
     Design,
     Display,
     Model,
     Name,
     NameIn,
     NonNegative,
+    NotRead,
     Number,
     Positive,
+    Probability,
     Scenario,
     Study,
+    Whole,
     at,
     cross_check,
     of_each,
     readable,
     unique_names,
-    whole,
 )
 from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
 
@@ -35,24 +41,75 @@ HARDEST_MPS2 = 1000.0  # about 100 g, more than any missile's
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
 
 
+LIGHT_MPS = 299_792_458.0
+LETTERS_HZ = {  # IEEE Std 521-2019, radar-frequency letter bands: from, to
+    "HF": (3e6, 30e6),
+    "VHF": (30e6, 300e6),
+    "UHF": (300e6, 1e9),
+    "L": (1e9, 2e9),
+    "S": (2e9, 4e9),
+    "C": (4e9, 8e9),
+    "X": (8e9, 12e9),
+    "Ku": (12e9, 18e9),
+    "K": (18e9, 27e9),
+    "Ka": (27e9, 40e9),
+    "V": (40e9, 75e9),
+    "W": (75e9, 110e9),
+    "mm": (110e9, 300e9),
+}
+EDGE = 0.02  # by how much a rounded wavelength may lie beyond the edge of its band
+Band = Literal[
+    "metre", "decimetre", "centimetre", "HF", "VHF", "UHF", "L", "S", "C", "X", "Ku", "K", "Ka", "V", "W", "mm"
+]
+
+
 class Radar(Model):
-    """A surveillance radar: accuracies of one plot and the period of its scans."""
+    """A surveillance radar: accuracies of one plot, the period of its scans, and what is wrong with its plots."""
 
     name: Annotated[Name | None, Display()] = Field(None, description="display name")
-    band: Annotated[Literal["metre", "decimetre", "centimetre"] | None, Display()] = Field(
-        None, description="wave band, for display"
+    band: Annotated[Band | None, Display()] = Field(
+        None, description="wave band, for display: by its wavelength, or by its letter (IEEE Std 521)"
     )
     wavelength_m: Positive = Field(description="wavelength, m: gives the Doppler frequency of a velocity")
     sigma_range_m: Positive = Field(description="standard deviation of a measured range, m")
     sigma_velocity_mps: Positive = Field(description="standard deviation of a measured radial velocity, m/s")
     scan_period_s: Positive = Field(description="time between two plots, s")
     repetition_rate_hz: Positive = Field(
-        1000.0, description="pulse repetition rate, Hz: gives the unambiguous velocity"
+        1000.0, description="pulse repetition rate, Hz: gives the unambiguous velocity; nothing is folded by it"
     )
+    detection_probability: Annotated[Probability, Field(gt=0), Added()] = Field(
+        1.0, description="probability that a scan gives its plot, range and velocity together"
+    )
+    bias_range_m: Annotated[Number, Added()] = Field(0.0, description="mean error of a measured range, m")
+    bias_velocity_mps: Annotated[Number, Added()] = Field(0.0, description="mean error of a measured velocity, m/s")
+    sigma_bias_range_m: Annotated[NonNegative, Added()] = Field(
+        0.0, description="standard deviation of a further error of range, drawn once a realisation, m"
+    )
+    sigma_bias_velocity_mps: Annotated[NonNegative, Added()] = Field(
+        0.0, description="standard deviation of a further error of velocity, drawn once a realisation, m/s"
+    )
+
+    @cross_check
+    def _in_its_band(self) -> Iterator[At]:
+        if self.band is not None and self.band in LETTERS_HZ:
+            longest, shortest = (LIGHT_MPS / f for f in LETTERS_HZ[self.band])
+            if not shortest * (1 - EDGE) <= self.wavelength_m <= longest * (1 + EDGE):
+                limits = f"{short(float(f'{shortest:.3g}'))} to {short(float(f'{longest:.3g}'))} m"
+                yield at("band", f"{self.band} is {limits}, wavelength_m is {short(self.wavelength_m)}")
+
+    @property
+    def as_the_papers(self) -> bool:
+        """Whether every scan gives a plot, and plots err by noise alone."""
+        errors = (self.bias_range_m, self.bias_velocity_mps, self.sigma_bias_range_m, self.sigma_bias_velocity_mps)
+        return self.detection_probability == 1 and not any(errors)
 
 
 Coefficients = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
 COEFFICIENTS = "derivatives of range at the first plot: m, m/s, m/s², … (the sum of c_i t^i / i!)"
+Spread = Annotated[tuple[NonNegative, ...], Field(max_length=3), Added()]
+
+
+DRAWN = "standard deviations with which the first three coefficients are drawn for each realisation"
 
 
 class Polynomial(Model):
@@ -60,6 +117,7 @@ class Polynomial(Model):
 
     kind: Literal["polynomial"] = Field(description="a polynomial of any degree up to 11")
     coefficients: Coefficients = Field(description=COEFFICIENTS)
+    sigma_coefficients: Spread = Field((), description=DRAWN)
 
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
@@ -75,16 +133,16 @@ class Starting(Model):
     """What targets that break the model share: a moment, in seconds or as a scan, at which they do."""
 
     start_s: NonNegative | None = Field(None, description="time from the first plot at which it begins, s")
-    start_scan: whole(1, MOST_SCANS) | None = Field(
+    start_scan: Annotated[int, Whole(1, MOST_SCANS)] | None = Field(
         None, description="scan, counted from 1, at which it begins; in place of start_s"
     )
 
     @cross_check
-    def _one_start(self):
+    def _one_start(self) -> Iterator[At]:
         if (self.start_s is None) == (self.start_scan is None):
             yield at("start_s", "give either start_s or start_scan")
 
-    def timed(self, period: float):
+    def timed(self, period: float) -> Self:
         """The same target with its start in seconds."""
         if self.start_scan is None:
             return self
@@ -96,6 +154,7 @@ class AccelerationStart(Starting):
 
     kind: Literal["acceleration_start"] = Field(description="a constant acceleration that sets in at a moment")
     coefficients: Coefficients = Field(description=COEFFICIENTS)
+    sigma_coefficients: Spread = Field((), description=DRAWN)
     acceleration_mps2: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = Field(
         description="radial acceleration added from then on, m/s²"
     )
@@ -110,6 +169,7 @@ class JerkPulse(Starting):
 
     kind: Literal["jerk_pulse"] = Field(description="a constant jerk for a while")
     coefficients: Coefficients = Field(description=COEFFICIENTS)
+    sigma_coefficients: Spread = Field((), description=DRAWN)
     jerk_mps3: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = Field(
         description="radial jerk added during the pulse, m/s³"
     )
@@ -138,6 +198,7 @@ class Turn(Starting):
 
     def closest_m(self, t: float) -> float:
         """The least distance from the radar up to a time t (s): of two straight legs and of the arc between them."""
+        assert self.start_s is not None  # timed
         begin, end = min(self.start_s, t), min(self.start_s + self.duration_s, t)
         rate = self.acceleration_g * STANDARD_GRAVITY_MPS2 / self.speed_mps
         x, y, heading = self.range_m, 0.0, self.aspect_rad
@@ -162,7 +223,49 @@ def straight_leg(x: float, y: float, heading: float, length: float) -> tuple[flo
     return nearest, x + length * math.cos(heading), y + length * math.sin(heading)
 
 
-Target = Annotated[Polynomial | AccelerationStart | JerkPulse | Turn, Field(discriminator="kind")]
+class FlyBy(Model):
+    """Straight flight at a constant speed past the radar, at a distance."""
+
+    kind: Literal["fly_by"] = Field(description="straight flight past the radar")
+    distance_m: Annotated[Positive, Field(ge=NEAREST_M)] = Field(description="distance of closest approach, m")
+    speed_mps: Annotated[Positive, Field(le=FASTEST_MPS)] = Field(description="speed, constant, m/s")
+    start_range_m: Positive = Field(description="range at the first plot, before closest approach, m")
+
+    @cross_check
+    def _begins_outside(self) -> Iterator[At]:
+        if self.start_range_m < self.distance_m:
+            yield at("start_range_m", f"must be >= distance_m, {short(self.distance_m)}")
+
+    def reach_m(self, t: float) -> float:
+        """A bound on the range up to a time t (s)."""
+        return self.start_range_m + self.speed_mps * t
+
+
+class Recorded(Model):
+    """A flight recorded in a file, smoothed by a spline whose derivatives are the true velocity and acceleration."""
+
+    kind: Literal["recorded"] = Field(
+        description="a flight from a CSV file with columns t_s, x_m, y_m, z_m, the radar at the origin"
+    )
+    file: Annotated[str, DataFile()] = Field(description="the file, from the folder of this one")
+
+    def reach_m(self, t: float) -> float:
+        """A bound on the range up to a time t (s): of what is in the file none is known here."""
+        return 0.0
+
+
+Target = Annotated[Polynomial | AccelerationStart | JerkPulse | Turn | FlyBy | Recorded, Field(discriminator="kind")]
+Noise = Literal["random_jerk", "white_jerk", "white_acceleration"]
+
+
+class Best(Model):
+    """A manoeuvre variance that is looked for: the one with which this filter's exact error on this target is least."""
+
+    minimise: Literal["sigma_r", "sigma_Vr", "sigma_ar"] = Field(description="the error that is to be least")
+    over: Literal["worst", "mean", "last"] = Field(
+        description="of its values from scan from_k on: the greatest, their mean, or the last"
+    )
+    from_k: Annotated[int, Whole(1, MOST_SCANS)] = Field(3, description="first scan that counts")
 
 
 class Filter(Model):
@@ -172,13 +275,20 @@ class Filter(Model):
     observes: tuple[Literal["range", "velocity"], ...] = Field(
         description="what it measures: [range] or [range, velocity]"
     )
-    manoeuvre_variance: Positive = Field(description="variance of the random jerk it allows for, (m/s³)²: D_M")
-    initial_scans: whole(2, MOST_SCANS) | None = Field(
-        None, description="scans in its least-squares start; default and least: 3 for range, 2 with velocity"
+    manoeuvre_variance: Positive | Best = Field(
+        description="variance of the random jerk it allows for, (m/s³)²: D_M; or what it is to make least"
+    )
+    initial_scans: Annotated[int, Whole(2, MOST_SCANS)] | None = Field(
+        None, description="plots in its least-squares start; default and least: 3 for range, 2 with velocity"
+    )
+    process_noise: Noise = Field(
+        "random_jerk",
+        description="how the allowed manoeuvre lies within a scan: a constant jerk (the paper's), white jerk, or a "
+        "step of the acceleration; each lets its variance grow by D_M times the period squared a scan",
     )
 
     @cross_check
-    def _can_start(self):
+    def _can_start(self) -> Iterator[At]:
         if self.observes not in (("range",), ("range", "velocity")):
             yield at("observes", "must be [range] or [range, velocity]")
         elif self.plots_to_start < PLOTS_NEEDED[len(self.observes)]:
@@ -186,7 +296,7 @@ class Filter(Model):
             yield at("initial_scans", f"must be >= {least} for a filter that observes {' and '.join(self.observes)}")
 
     @model_validator(mode="after")
-    def _completed(self):
+    def _completed(self) -> Self:
         return self.model_copy(update={"initial_scans": self.plots_to_start})
 
     @property
@@ -203,6 +313,7 @@ class Keys(Study):
         "settling",
         "consistency",
     )
+    in_place_of: ClassVar = {"scans": "duration_s", "duration_s": "scans"}
 
     radar: Radar = Field(description="the radar")
     target: Annotated[Target, Scenario()] = Field(description="the target: a scenario's stem, or inline")
@@ -212,24 +323,57 @@ class Keys(Study):
     baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
         None, description="name of the filter that gains are against; default: the first"
     )
-    scans: Annotated[whole(2, MOST_SCANS), Design()] = Field(description="number of plots")
+    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = Field(
+        None, description="number of scans; or give duration_s"
+    )
+    duration_s: Annotated[Positive | None, Design(), Added()] = Field(
+        None, description="time from the first scan to the last, s, in place of scans: to the last scan within it"
+    )
 
     @model_validator(mode="after")
-    def _completed(self):
-        return self.model_copy(update={"target": self._flown()}) if isinstance(self.target, Starting) else self
+    def _completed(self) -> Self:
+        target = self._flown() if isinstance(self.target, Starting) else self.target
+        return self.model_copy(update={"target": target, "scans": self.plots, "duration_s": None})
 
     def _flown(self) -> Starting:
+        assert isinstance(self.target, Starting)
         return self.target.timed(self.radar.scan_period_s)
 
-    @cross_check
-    def _long_enough(self):
-        starts = readable(self.filters, lambda one: (one.plots_to_start, one.name))
-        plots, slowest = max(starts, key=lambda start: start[0], default=(0, ""))
-        if self.scans < plots:
-            yield at("scans", f"must be >= {plots} for the initialisation of filter {slowest}")
+    @property
+    def plots(self) -> int:
+        """How many scans there are, given or by the duration."""
+        if self.duration_s is None:
+            if self.scans is None:
+                raise NotRead("scans")
+            return self.scans
+        return int(self.duration_s / self.radar.scan_period_s * (1 + 1e-12)) + 1
 
     @cross_check
-    def _accuracies_in_proportion(self):
+    def _length_given(self) -> Iterator[At]:
+        if self.scans is None and self.duration_s is None:
+            yield at("scans", "required key is missing, or duration_s in its place")
+        elif self.scans is not None and self.duration_s is not None:
+            yield at("duration_s", "stands in place of scans: give one of them")
+        elif not 2 <= self.plots <= MOST_SCANS:
+            yield at("duration_s", f"must be 2 to {MOST_SCANS} scans of radar.scan_period_s, makes {self.plots}")
+
+    @cross_check
+    def _long_enough(self) -> Iterator[At]:
+        starts = readable(self.filters, lambda one: (one.plots_to_start, one.name))
+        plots, slowest = max(starts, key=lambda start: start[0], default=(0, ""))
+        if self.plots < plots:
+            key = "scans" if self.duration_s is None else "duration_s"
+            many = "" if key == "scans" else " scans of radar.scan_period_s"
+            yield at(key, f"must be >= {plots}{many} for the initialisation of filter {slowest}")
+        yield from of_each(self.filters, self._counts_from)
+
+    def _counts_from(self, i: int, one: Filter) -> Iterator[At]:
+        best = one.manoeuvre_variance
+        if isinstance(best, Best) and best.from_k > self.plots:
+            yield at(f"filters.{i}.manoeuvre_variance.from_k", f"must be <= the number of scans, {self.plots}")
+
+    @cross_check
+    def _accuracies_in_proportion(self) -> Iterator[At]:
         """Refuse accuracies of which one makes the other meaningless.
 
         Beyond these limits the steady covariance drowns in rounding (SciPy's solver gives up at 1e15).
@@ -240,12 +384,14 @@ class Keys(Study):
             yield at("radar.sigma_velocity_mps", f"out of proportion: {ratio} must be from 1e-12 to 1e12")
 
     @cross_check
-    def _variances_in_proportion(self):
+    def _variances_in_proportion(self) -> Iterator[At]:
         """The same of manoeuvre variances."""
         if not any(True for _ in self._accuracies_in_proportion()):  # else that is the fault
             yield from of_each(self.filters, self._in_proportion)
 
-    def _in_proportion(self, i: int, one: Filter):
+    def _in_proportion(self, i: int, one: Filter) -> Iterator[At]:
+        if isinstance(one.manoeuvre_variance, Best):
+            return
         radar, dt = self.radar, self.radar.scan_period_s
         key = f"filters.{i}.manoeuvre_variance"
         if not 1e-28 <= one.manoeuvre_variance * dt**6 / radar.sigma_range_m**2 <= 1e12:
@@ -256,9 +402,9 @@ class Keys(Study):
             yield at(key, f"out of proportion: {ratio} must be <= 1e12")
 
     @cross_check
-    def _within_reach(self):
-        last = (self.scans - 1) * self.radar.scan_period_s
+    def _within_reach(self) -> Iterator[At]:
         radar = self.radar
+        last = (self.plots - 1) * radar.scan_period_s
         finest = min(radar.sigma_range_m, radar.sigma_velocity_mps * radar.scan_period_s)
         farthest = min(FARTHEST_M, finest * RESOLVED)
         if self.target.reach_m(last) > farthest:
@@ -266,5 +412,8 @@ class Keys(Study):
             yield at(
                 "target", f"{so_far}, at {short(last)} s: beyond, double precision does not resolve its accuracies"
             )
-        elif isinstance(self.target, Turn) and self._flown().closest_m(last) < NEAREST_M:
-            yield at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")
+        elif isinstance(self.target, Turn):
+            flown = self._flown()
+            assert isinstance(flown, Turn)
+            if flown.closest_m(last) < NEAREST_M:
+                yield at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")

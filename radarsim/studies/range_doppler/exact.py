@@ -6,7 +6,7 @@ process noise; where the truth leaves the model, the mean error (dynamic error, 
 
 import numpy as np
 
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.physics.motion import process_noise, transition
 
 
 def start_errors(weights: np.ndarray, truth: np.ndarray, sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -50,8 +50,21 @@ def error_recursion(
     return bias, covariance
 
 
+def bias_response(weights: np.ndarray, gains: np.ndarray, observes: int, dt: float) -> np.ndarray:
+    """The error (K, 3, 2) that a range one metre too long, and a velocity one m/s too high, in every plot lead to."""
+    scans, start = len(gains), weights.shape[2]
+    F, H, inputs = transition(dt), np.eye(3)[:observes], np.eye(2)[:observes]
+    response = np.zeros((scans, 3, 2))
+    response[: start - 1, :observes] = inputs
+    response[start - 1] = weights.sum(axis=2)
+    for k in range(start, scans):
+        K = gains[k, :, :observes]
+        response[k] = (np.eye(3) - K @ H) @ F @ response[k - 1] + K @ inputs
+    return response
+
+
 def steady_state(
-    observes: int, manoeuvre_variance: float, sigma: np.ndarray, dt: float
+    observes: int, manoeuvre_variance: float, sigma: np.ndarray, dt: float, noise: str = "random_jerk"
 ) -> tuple[np.ndarray, np.ndarray]:
     """Steady covariances (3, 3): the one the filter believes, and the true one on a truth without manoeuvre.
 
@@ -66,7 +79,7 @@ def steady_state(
     step = dt / unit
     F, H = transition(step), np.eye(3)[:observes]
     R = np.diag((sigma / scale[:2])[:observes] ** 2)
-    Q = manoeuvre_covariance(manoeuvre_variance * unit**6 / sigma[0] ** 2, step)
+    Q = process_noise(noise, manoeuvre_variance * unit**6 / sigma[0] ** 2, step)
     extrapolated = solve_discrete_are(F.T, H.T, Q, R)
     K = np.linalg.solve(H @ extrapolated @ H.T + R, H @ extrapolated).T
     kept = np.eye(3) - K @ H

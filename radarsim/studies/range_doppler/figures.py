@@ -1,15 +1,19 @@
 """P1's figures: 1a to 3b of the paper, steady error against settling, and what the filters believe of themselves."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from radarsim.engine.results import CaseResult
+from radarsim.config.experiment import Experiment
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
-from radarsim.studies.range_doppler.tables import PERIODS
+from radarsim.studies.range_doppler.tables import PERIODS, Result
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 QUANTITIES = {
     "r": panels.Quantity("$r$", "range"),
@@ -18,7 +22,7 @@ QUANTITIES = {
 }
 
 
-def figures(results: Sequence[CaseResult], made: dict, experiment) -> dict[str, Figure]:
+def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
     """sigma_r … gain_ar (the paper's figures 1a … 3b), and `settling` where the manoeuvre variance is swept."""
     curves = common.groups(made["curves"], "case", "filter", "component")
     gains = common.groups(made["gains"], "case", "filter", "component")
@@ -34,7 +38,7 @@ def figures(results: Sequence[CaseResult], made: dict, experiment) -> dict[str, 
     return drawn | ({"consistency": consistency_figure(some, made["consistency"], left_out)} if some else {})
 
 
-def consistency_figure(results: Sequence[CaseResult], table, left_out: str) -> Figure:
+def consistency_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: str) -> Figure:
     """NEES per component against time: a panel for each filter, a line for each case."""
     rows = common.groups(table, "case", "filter")
     names = list(dict.fromkeys(name for result in results for name in result.axes.filters))
@@ -56,7 +60,7 @@ LONG = 16  # letters of a label from which names do not fit beside half a page
 WIDE = 100  # largest over least NEES from which its axis is logarithmic
 
 
-def _consistency_panel(results: Sequence[CaseResult], rows: dict, name: str) -> Panel:
+def _consistency_panel(results: Sequence[Result], rows: dict[Any, Any], name: str) -> Panel:
     marks: list = [Reference(1)]
     for i, result in enumerate(results):
         if (result.name, name) in rows:
@@ -70,7 +74,7 @@ def _consistency_panel(results: Sequence[CaseResult], rows: dict, name: str) -> 
     return Panel(Axis(panels.TIME, limits=(0, None)), y, tuple(marks), panels.literal(name))
 
 
-def settling_figure(results: Sequence[CaseResult], table) -> Figure | None:
+def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure | None:
     """Steady σ of the range against its settling time over D_M, with the ten-period line and the best D_M named."""
     rows = table[table["component"] == "r"]
     drawn: list[Panel] = []
@@ -95,7 +99,7 @@ def settling_figure(results: Sequence[CaseResult], table) -> Figure | None:
     return Figure("settling", "Steady error against settling time", caption, tuple(drawn), columns, width)
 
 
-def _settling_panel(result: CaseResult, rows) -> Panel:
+def _settling_panel(result: Result, rows: "pd.DataFrame") -> Panel:
     """rows: of one radar and the range, one for each filter and manoeuvre variance."""
     settled = rows[np.isfinite(rows["settling_s"])]
     limit = PERIODS * result.axes.scan_period_s
@@ -121,9 +125,10 @@ def _settling_panel(result: CaseResult, rows) -> Panel:
     return Panel(x, y, tuple(marks), panels.device(result), tuple(keys), title, direct=False, remark=remark)
 
 
-def _not_settled(rows) -> str:
+def _not_settled(rows: "pd.DataFrame") -> str:
     """Words on the manoeuvre variances that do not settle within the run: a line for each."""
-    return "\n".join(
-        f"{panels.number(float(variance), powers=True)} ({panels.literal(', '.join(same['filter']))}): not settled"
-        for variance, same in rows.groupby("manoeuvre_variance")
-    )
+    found = [
+        (panels.number(same["manoeuvre_variance"].iloc[0], powers=True), panels.literal(", ".join(same["filter"])))
+        for _, same in rows.groupby("manoeuvre_variance")
+    ]
+    return "\n".join(f"{variance} ({names}): not settled" for variance, names in found)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.physics.motion import process_noise, transition
 
 
 @dataclass(frozen=True)
@@ -49,14 +49,39 @@ def least_squares_start(observes: int, start: int, sigma: np.ndarray, dt: float)
     return weights, solution @ solution.T
 
 
+def noise_by_time(noise: str, manoeuvre_variance: float, period: float) -> np.ndarray:
+    """Process noise over any time t, (2, 3, 3): Q_ij = a_ij t^(5 − i − j) + b_ij t^(6 − i − j), i and j from 0.
+
+    What `physics.motion.process_noise` adds over a scan period (s), for plots at uneven times: the jerk stays constant
+    between two plots; white jerk keeps its density; of the acceleration's steps there are as many as periods.
+    """
+    made = np.zeros((2, 3, 3))
+    of_a_second = process_noise(noise, manoeuvre_variance, 1.0)
+    made[int(noise == "random_jerk")] = of_a_second * (1.0 if noise == "random_jerk" else period)
+    return made
+
+
+def noise_over(noise: np.ndarray, t: float) -> np.ndarray:
+    """Q (3, 3) over a time t (s), of the coefficients (2, 3, 3) that `noise_by_time` gives."""
+    power = 5 - np.add.outer(np.arange(3), np.arange(3))
+    return np.asarray(noise[0] * t**power + noise[1] * t ** (power + 1))
+
+
 def design(
-    observes: int, start: int, manoeuvre_variance: float, sigma: np.ndarray, dt: float, scans: int
+    observes: int,
+    start: int,
+    manoeuvre_variance: float,
+    sigma: np.ndarray,
+    dt: float,
+    scans: int,
+    noise: str = "random_jerk",
 ) -> LinearFilter:
     """The paper's filter: least squares on `start` scans, then eqs. (5), (9), (13) with M of eq. (6); sigma (2,).
 
-    Before the start the estimates are the plots themselves: the range, and the velocity where it is observed.
+    Before the start the estimates are the plots themselves: the range, and the velocity where it is observed. `noise`
+    is the form of the process noise, see `physics.motion.process_noise`.
     """
-    F, Q = transition(dt), manoeuvre_covariance(manoeuvre_variance, dt)
+    F, Q = transition(dt), process_noise(noise, manoeuvre_variance, dt)
     H, R = observation(observes), np.diag(sigma[:observes] ** 2)
     weights, P = least_squares_start(observes, start, sigma, dt)
     gains, believed = np.zeros((scans, 3, 2)), np.zeros((scans, 3, 3))

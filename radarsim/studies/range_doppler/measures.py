@@ -15,6 +15,7 @@ from radarsim.report.statistics import Estimate, difference
 
 RADARS = {1: (25, 5, 10), 2: (250, 15, 10), 3: (250, 15, 5), 4: (50, 1, 10), 5: (50, 1, 5)}  # σ_r, σ_V, Δt
 VARIANCE = 1e-3  # the paper's D_M, (m/s³)²
+SPEED_MPS = 300.0  # the paper's example of an ambiguous Doppler frequency
 DURATION = 140.0  # s: fifteen points at Δt = 10 s
 R, RV = ("range",), ("range", "velocity")
 COMPONENTS = {"r": "range", "Vr": "velocity", "ar": "acceleration"}
@@ -36,7 +37,8 @@ class Evidence(claims.Evidence):
         """The number of the paper's radar that a case is; None for any other, or another target, or a shorter run."""
         radar, target = result.spec.radar, result.spec.target
         own = (radar.sigma_range_m, radar.sigma_velocity_mps, radar.scan_period_s)
-        fits = target.kind == "polynomial" and not any(target.coefficients[3:])
+        fits = target.kind == "polynomial" and not any(target.coefficients[3:]) and not any(target.sigma_coefficients)
+        fits = fits and radar.as_the_papers
         long_enough = result.axes.t_s[-1] >= DURATION - 1e-6
         found = [number for number, row in RADARS.items() if all(map(math.isclose, own, row))]
         return found[0] if found and fits and long_enough else None
@@ -46,7 +48,8 @@ class Evidence(claims.Evidence):
         """The manoeuvre variance of the paper's two filters; not-a-number where they are not these two."""
         filters = result.spec.filters
         plain = all(f.initial_scans == (3 if f.observes == R else 2) for f in filters)
-        alike = len({f.manoeuvre_variance for f in filters}) == 1
+        plain &= all(f.process_noise == "random_jerk" and isinstance(f.manoeuvre_variance, float) for f in filters)
+        alike = len({f.manoeuvre_variance for f in filters}) == 1 if plain else False
         if [f.observes for f in filters] != [R, RV] or not (plain and alike) or result.axes.baseline != 0:
             return float("nan")
         return filters[0].manoeuvre_variance
@@ -247,5 +250,10 @@ def earlier(radar: int, unit: str):
 
 
 def doppler(radar: int):
-    """Doppler frequency of 300 m/s in repetition rates."""
-    return lambda seen: certain(seen.row("radar", case=seen.case(radar).name)["doppler_per_repetition_rate"])
+    """Doppler frequency of the paper's 300 m/s in repetition rates."""
+
+    def measure(seen: Evidence) -> Estimate:
+        axes = seen.case(radar).axes
+        return certain(2 * SPEED_MPS / axes.wavelength_m / axes.repetition_rate_hz)
+
+    return measure

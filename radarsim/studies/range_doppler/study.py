@@ -1,5 +1,6 @@
 """P1 (Gorshkov & Zavizhenets 2017): range-only against range + Doppler Kalman filters of the second order."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,131 +9,269 @@ from radarsim.config.experiment import Case
 from radarsim.engine.moments import Layout
 from radarsim.engine.results import Axes
 from radarsim.errors import ConfigError
-from radarsim.kernels import linear as kernels
-from radarsim.physics import targets
+from radarsim.kernels import linear
+from radarsim.physics.motion import process_noise
 from radarsim.studies.noise import noise_key
-from radarsim.studies.range_doppler import exact, filters
+from radarsim.studies.range_doppler import exact, filters, patterns, tuning, world
+from radarsim.studies.range_doppler.config import Keys
+from radarsim.studies.range_doppler.kernels import missed
+from radarsim.studies.range_doppler.propagation import Plots
 
 COMPONENTS = (("r", "m"), ("Vr", "m/s"), ("ar", "m/s2"))
 BLOCK = 4096  # 8 chunks of 512; 0.4 ms with two filters and 15 scans
+PATTERN_SCANS = 60  # of a run with missed plots: beyond, the mean over patterns takes minutes
 
 
 @dataclass(frozen=True, kw_only=True)
 class RangeDopplerAxes(Axes):
     """Labels of P1's sums, and what its tables need beside them: F filters, K scans, components r, Vr, ar.
 
-    believed (F, K, 3, 3) is the covariance that a filter believes, in m, m/s, m/s²; zero where it has no estimate.
-    exact_nees (F, K) is the expectation of eᵀP⁻¹e per estimated component, no unit. observes (F,) is 1 for filters of
-    the range, 2 for those of range and velocity; manoeuvre_variance (F,) their D_M in (m/s³)². sigma (2,) holds the
-    standard deviations of the plots, m and m/s; C_theta is σ_r²/(Δt²σ_V²) (eq. 11), no unit.
+    believed (F, K, 3, 3) is the covariance that a filter believes, in m, m/s, m/s²; zero where it has no estimate, and
+    where plots may be missed, as then it differs from realisation to realisation. exact_nees (F, K) is the expectation
+    of eᵀP⁻¹e per estimated component, no unit; exact_gain (F, K, 3) the gain in per cent against the baseline, where
+    both have an estimate. observes (F,) is 1 for filters of the range, 2 for those of range and velocity;
+    manoeuvre_variance (F,) their D_M in (m/s³)²; process_noise the forms of their Q. sigma (2,) holds the standard
+    deviations of the plots, m and m/s; C_theta is σ_r²/(Δt²σ_V²) (eq. 11), no unit. speed_mps is the target's greatest
+    radial speed at a scan. plain: every scan has its plot, which errs by noise alone, as in the paper.
     """
 
     believed: np.ndarray
     exact_nees: np.ndarray
+    exact_gain: np.ndarray
     observes: np.ndarray
     manoeuvre_variance: np.ndarray
+    process_noise: tuple[str, ...]
     sigma: np.ndarray
     scan_period_s: float
     C_theta: float
     wavelength_m: float
     repetition_rate_hz: float
+    speed_mps: float
+    plain: bool
 
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a block needs."""
+    """All that a block needs: of the paper's world a problem for all gains alike, of any other one for each its own.
+
+    gaussian: whether the errors are, with the exact bias and σ of the axes, and in sums of the common kind.
+    """
 
     layout: Layout
     axes: RangeDopplerAxes
-    problem: kernels.Problem
+    problem: linear.Problem | missed.Problem
+    gaussian: bool
     block: int = BLOCK
-    gaussian = True  # the errors are, with the exact bias and σ of the axes
 
 
-def truth(target, t: np.ndarray) -> np.ndarray:
-    """Range, radial velocity and acceleration (K, 3) of a configured target at times t (K,)."""
-    match target.kind:
-        case "polynomial":
-            return targets.polynomial(target.coefficients, t)
-        case "acceleration_start":
-            return targets.acceleration_start(target.coefficients, target.acceleration_mps2, target.start_s, t)
-        case "jerk_pulse":
-            return targets.jerk_pulse(target.coefficients, target.jerk_mps3, target.start_s, target.duration_s, t)
-        case "turn":
-            return targets.turn(
-                target.range_m,
-                target.speed_mps,
-                target.aspect_rad,
-                target.acceleration_g,
-                target.start_s,
-                target.duration_s,
-                t,
-            )
-    raise ValueError(f"no such target: {target.kind}")
+@dataclass(frozen=True)
+class Designed:
+    """A case's filters and what they see: truth x (K, 3) at times t (K,), plots, D_M (F,), gains of full detection."""
+
+    spec: Keys
+    t: np.ndarray
+    x: np.ndarray
+    plots: Plots
+    variances: tuple[float, ...]
+    filters: tuple[filters.LinearFilter, ...]
+
+    @property
+    def dt(self) -> float:
+        """Scan period, s."""
+        return self.spec.radar.scan_period_s
+
+    @property
+    def noises(self) -> list[np.ndarray]:
+        """Q (3, 3) of each filter."""
+        pairs = zip(self.spec.filters, self.variances, strict=True)
+        return [process_noise(f.process_noise, variance, self.dt) for f, variance in pairs]
+
+
+def designed(case: Case) -> Designed:
+    """The filters of a case, designed; raises ConfigError for a target that cannot be."""
+    spec: Keys = case.spec
+    dt = spec.radar.scan_period_s
+    t, x = world.true_motion(case)
+    plots = plots_of(spec)
+    try:
+        variances = tuning.manoeuvre_variances(spec.filters, plots, x, dt)
+    except ValueError as error:
+        raise ConfigError(f"{case.name}: filters: manoeuvre_variance: {error}") from None
+    made = (
+        filters.design(len(f.observes), f.plots_to_start, variance, plots.sigma, dt, len(t), f.process_noise)
+        for f, variance in zip(spec.filters, variances, strict=True)
+    )
+    return Designed(spec, t, x, plots, variances, tuple(made))
+
+
+def plots_of(spec: Keys) -> Plots:
+    """What the plots of a config's radar are."""
+    radar = spec.radar
+    return Plots(
+        np.array([radar.sigma_range_m, radar.sigma_velocity_mps]),
+        np.array([radar.bias_range_m, radar.bias_velocity_mps]),
+        np.array([radar.sigma_bias_range_m, radar.sigma_bias_velocity_mps]),
+        radar.detection_probability,
+    )
 
 
 def prepare(case: Case) -> Plan:
     """Design the filters of a case, its truth, and the exact values of its errors."""
-    spec, radar = case.spec, case.spec.radar
-    dt, scans = radar.scan_period_s, spec.scans
-    sigma = np.array([radar.sigma_range_m, radar.sigma_velocity_mps])
-    t = np.arange(scans) * dt
-    x = truth(spec.target, t)
-    if not (x[:, 0] > 0).all():
-        k = int(np.flatnonzero(x[:, 0] <= 0)[0])
-        fault = f"its range must stay > 0, is {x[k, 0]:g} m at {t[k]:g} s, scan {k + 1} of {scans}"
-        raise ConfigError(f"{case.name}: target: {fault}")
-    designs = [
-        filters.design(len(f.observes), f.initial_scans, f.manoeuvre_variance, sigma, dt, scans) for f in spec.filters
-    ]
-    labels, longest = axes(spec, designs, x, sigma, t), max(d.start for d in designs)
-    problem = kernels.Problem(
+    made = designed(case)
+    labels = axes(made)
+    count, scans = len(made.filters), len(made.t)
+    if labels.plain and not world.sigma_state(made.spec.target).any():
+        return Plan(Layout(**linear.shapes(count, scans)), labels, shared_gains(case, made, labels).plain(), True)
+    return Plan(Layout(**missed.shapes(count, scans)), labels, own_gains(case, made, labels).plain(), False)
+
+
+def shared_gains(case: Case, made: Designed, labels: RangeDopplerAxes) -> linear.Problem:
+    """The paper's world for the kernel in which all realisations share the gains."""
+    longest = max(d.start for d in made.filters)
+    return linear.Problem(
         key=noise_key(case, "plots"),
-        truth=x,
-        sigma=sigma,
-        dt=dt,
+        truth=made.x,
+        sigma=made.plots.sigma,
+        dt=made.dt,
         observes=labels.observes,
-        start=np.array([d.start for d in designs]),
-        weights=np.stack([np.pad(d.weights, ((0, 0), (0, 0), (0, longest - d.start))) for d in designs]),
-        gains=np.stack([d.gains for d in designs]),
+        start=np.array([d.start for d in made.filters]),
+        weights=np.stack([np.pad(d.weights, ((0, 0), (0, 0), (0, longest - d.start))) for d in made.filters]),
+        gains=np.stack([d.gains for d in made.filters]),
         baseline=labels.baseline,
     )
-    return Plan(Layout(**kernels.shapes(len(designs), scans)), labels, problem.plain())
 
 
-def axes(
-    spec, designs: list[filters.LinearFilter], x: np.ndarray, sigma: np.ndarray, t: np.ndarray
-) -> RangeDopplerAxes:
-    """Labels and exact values: x (K, 3) the truth, sigma (2,) of the plots, t (K,) the times."""
-    dt, names = spec.radar.scan_period_s, tuple(f.name for f in spec.filters)
-    errors = [exact.error_recursion(d.weights, d.gains, d.observes, x, sigma, dt) for d in designs]
-    bias = np.stack([b for b, _ in errors])
-    variance = np.stack([np.diagonal(S, axis1=1, axis2=2) for _, S in errors])
-    moment = np.stack([S for _, S in errors]) + bias[..., :, None] * bias[..., None, :]
-    available, believed = np.stack([d.available for d in designs]), np.stack([d.believed for d in designs])
+def own_gains(case: Case, made: Designed, labels: RangeDopplerAxes) -> missed.Problem:
+    """Any other world for the kernel in which each realisation has gains of its own."""
+    upper = np.triu_indices(3)
+    return missed.Problem(
+        keys=np.stack([noise_key(case, what) for what in ("plots", "misses", "drawn")]),
+        truth=made.x,
+        sigma=made.plots.sigma,
+        bias=made.plots.bias,
+        sigma_bias=made.plots.sigma_bias,
+        sigma_state=world.sigma_state(made.spec.target),
+        detection=made.plots.detection,
+        dt=made.dt,
+        observes=labels.observes,
+        start=np.array([d.start for d in made.filters]),
+        Q=np.stack([Q[upper] for Q in made.noises]),
+        baseline=labels.baseline,
+    )
+
+
+def axes(made: Designed) -> RangeDopplerAxes:
+    """Labels and exact values."""
+    spec, radar = made.spec, made.spec.radar
+    names = tuple(f.name for f in spec.filters)
+    baseline = names.index(spec.baseline) if spec.baseline else 0
+    available = np.stack([d.available for d in made.filters])
+    known = exact_values(made, baseline) if radar.detection_probability == 1 else exact_means(made, baseline)
     return RangeDopplerAxes(
         filters=names,
         components=COMPONENTS,
-        k=np.arange(1, len(t) + 1),
-        t_s=t,
+        k=np.arange(1, len(made.t) + 1),
+        t_s=made.t,
         available=available,
-        baseline=names.index(spec.baseline) if spec.baseline else 0,
-        exact_sigma=np.where(available, np.sqrt(variance + bias**2), np.nan),
-        exact_bias=np.where(available, bias, np.nan),
-        believed=believed,
-        exact_nees=exact.normalised_error(believed, bias, moment, available)[0],
-        observes=np.array([d.observes for d in designs]),
-        manoeuvre_variance=np.array([f.manoeuvre_variance for f in spec.filters]),
-        sigma=sigma,
-        scan_period_s=dt,
-        C_theta=float(sigma[0] ** 2 / (dt**2 * sigma[1] ** 2)),
-        wavelength_m=spec.radar.wavelength_m,
-        repetition_rate_hz=spec.radar.repetition_rate_hz,
+        baseline=baseline,
+        exact_sigma=np.where(available, known.sigma, np.nan),
+        exact_bias=np.where(available, known.bias, np.nan),
+        believed=known.believed,
+        exact_nees=known.nees,
+        exact_gain=known.gain,
+        observes=np.array([d.observes for d in made.filters]),
+        manoeuvre_variance=np.array(made.variances),
+        process_noise=tuple(f.process_noise for f in spec.filters),
+        sigma=made.plots.sigma,
+        scan_period_s=made.dt,
+        C_theta=float(made.plots.sigma[0] ** 2 / (made.dt**2 * made.plots.sigma[1] ** 2)),
+        wavelength_m=radar.wavelength_m,
+        repetition_rate_hz=radar.repetition_rate_hz,
+        speed_mps=float(np.abs(made.x[:, 1]).max()),
+        plain=radar.as_the_papers,
     )
+
+
+@dataclass(frozen=True)
+class Known:
+    """Exact values: sigma, bias and gain (F, K, 3), NEES (F, K), and the believed covariance (F, K, 3, 3)."""
+
+    sigma: np.ndarray
+    bias: np.ndarray
+    gain: np.ndarray
+    nees: np.ndarray
+    believed: np.ndarray
+
+
+def exact_values(made: Designed, baseline: int) -> Known:
+    """Of filters that get every plot."""
+    sigma, plots = made.plots.sigma, made.plots
+    errors = [exact.error_recursion(d.weights, d.gains, d.observes, made.x, sigma, made.dt) for d in made.filters]
+    bias, covariance = np.stack([b for b, _ in errors]), np.stack([S for _, S in errors])
+    if not made.spec.radar.as_the_papers:
+        of = np.stack([exact.bias_response(d.weights, d.gains, d.observes, made.dt) for d in made.filters])
+        bias = bias + of @ plots.bias
+        covariance = covariance + np.einsum("fkic,c,fkjc->fkij", of, plots.sigma_bias**2, of)
+    available, believed = (np.stack([getattr(d, what) for d in made.filters]) for what in ("available", "believed"))
+    moment = covariance + bias[..., :, None] * bias[..., None, :]
+    root = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3) + bias**2)
+    return Known(root, bias, gains(root, root[baseline]), nees_of(believed, bias, moment, available), believed)
+
+
+def nees_of(believed: np.ndarray, bias: np.ndarray, moment: np.ndarray, available: np.ndarray) -> np.ndarray:
+    """The expectation (F, K) of eᵀP⁻¹e per estimated component."""
+    return exact.normalised_error(believed, bias, moment, available)[0]
+
+
+def gains(sigma: np.ndarray, base: np.ndarray) -> np.ndarray:
+    """Relative gains in per cent (eq. 17)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return 100 * (1 - sigma / base)
+
+
+def exact_means(made: Designed, baseline: int) -> Known:
+    """Of filters that miss plots, as means over the patterns: not-a-number where these are too many to be exact."""
+    shape = (len(made.filters), len(made.t), 3)
+    sigma, bias, gain = (np.full(shape, np.nan) for _ in range(3))
+    nees = np.full(shape[:2], np.nan)
+    if len(made.t) <= PATTERN_SCANS:
+        own = [patterns.Design(d.observes, d.start, Q) for d, Q in zip(made.filters, made.noises, strict=True)]
+        base = means(own[baseline], own, made)
+        for f, design in enumerate(own):
+            of = base if f == baseline else means(design, [own[baseline]], made)
+            sigma[f], bias[f], nees[f] = of.sigma, of.bias, of.nees
+            gain[f] = gains(of.beside[0], base.beside[f])
+    return Known(sigma, bias, gain, nees, np.zeros((*shape, 3)))
+
+
+@dataclass(frozen=True)
+class Means:
+    """As `patterns.Mixture`, where known: sigma and bias (K, 3), nees (K,), sigma beside G others (G, K, 3)."""
+
+    sigma: np.ndarray
+    bias: np.ndarray
+    nees: np.ndarray
+    beside: np.ndarray
+
+
+def means(design: patterns.Design, beside: Sequence[patterns.Design], made: Designed) -> Means:
+    """The means of one filter over the patterns."""
+    fine, coarse = (
+        patterns.mixture(design, made.plots, made.x, made.dt, most, beside) for most in (patterns.MOST, patterns.COARSE)
+    )
+    known = patterns.close(fine.moment, coarse.moment)
+    whole = patterns.close(fine.nees, coarse.nees) & known.all(axis=1)
+    others = np.where(patterns.close(fine.beside, coarse.beside), np.sqrt(fine.beside), np.nan)
+    sigma, bias = (np.where(known, values, np.nan) for values in (np.sqrt(fine.moment), fine.bias))
+    return Means(sigma, bias, np.where(whole, fine.nees, np.nan), others)
 
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
-    sums = kernels.Sums(**{name: np.zeros(shape) for name, shape in plan.layout.shapes.items()})
-    kernels.simulate_block(plan.problem, first, count, sums)
+    if isinstance(plan.problem, missed.Problem):
+        own = missed.Sums(**{name: np.zeros(shape) for name, shape in plan.layout.shapes.items()})
+        missed.simulate_block(plan.problem, first, count, own)
+        return plan.layout.pack(**own._asdict())
+    sums = linear.Sums(**{name: np.zeros(shape) for name, shape in plan.layout.shapes.items()})
+    linear.simulate_block(plan.problem, first, count, sums)
     return plan.layout.pack(**sums._asdict())

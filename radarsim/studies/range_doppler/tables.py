@@ -1,6 +1,7 @@
 """P1's own tables: steady state, believed against true σ, NEES, radar."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,26 +10,71 @@ from radarsim.kernels.linear import CROSSED
 from radarsim.report import consistency, panels, statistics
 from radarsim.report import tables as common
 from radarsim.studies.range_doppler import exact
+from radarsim.studies.range_doppler.study import RangeDopplerAxes
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PERIODS = 10  # the paper: a manoeuvre variance is good when the error settles in under ten scan periods
 SETTLED = 0.05  # within this share of the steady value, for good; the paper gives no tolerance
-TARGET_SPEED = 300.0  # m/s, the paper's example of an ambiguous Doppler frequency
+
+Result = CaseResult[RangeDopplerAxes]
 
 
-def tables(results: Sequence[CaseResult]) -> dict:
-    """The tables beyond curves and gains: steady, believed, consistency, radar."""
-    return {
+def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
+    """The tables beyond curves: steady, believed, consistency, radar; and gains where plots may be missed."""
+    made = {
         "steady": steady(results),
         "believed": believed(results),
         "consistency": normalised_errors(results),
         "radar": radar(results),
     }
+    return made | ({"gains": gains(results)} if any(own_gains(result) for result in results) else {})
 
 
-def follows_the_model(result: CaseResult) -> bool:
+def follows_the_model(result: Result) -> bool:
     """Whether the target moves as the filters take it to, by no more than a square of the time."""
     target = result.spec.target
     return target.kind == "polynomial" and not any(target.coefficients[3:])
+
+
+def own_gains(result: Result) -> bool:
+    """Whether each realisation had gains of its own, so that the sums tell who had an estimate; see kernels.missed."""
+    return "both" in result.sums
+
+
+def gains(results: Sequence[Result]) -> "pd.DataFrame":
+    """Paired gains over the realisations in which both the filter and the baseline have an estimate."""
+    return common.joined(
+        [_own_gains(result) if own_gains(result) else _gains(result) for result in results], common.GAINS
+    )
+
+
+def _gains(result: Result) -> dict[str, np.ndarray]:
+    table = common.gains([result])
+    return {name: table[name].to_numpy() for name in common.GAINS}
+
+
+def _own_gains(result: Result) -> dict[str, np.ndarray]:
+    axes, b = result.axes, result.axes.baseline
+    both = np.asarray(result.sums["both"])
+    mask = axes.available[b] & (both[..., 0] > 0)
+    mask[b] = False
+    at = f, k, c = common.shown(result, mask)
+    n, own, own_4, base, base_4 = (both[at][:, j] for j in range(5))
+    of = statistics.gain(own, own_4, base, base_4, np.asarray(result.sums["paired"])[at], n)
+    return {
+        "case": np.full(f.size, result.name, dtype=object),
+        "filter": common.names(axes.filters, f),
+        "baseline": np.full(f.size, axes.filters[b], dtype=object),
+        "component": common.names([name for name, _ in axes.components], c),
+        "k": np.asarray(axes.k)[k],
+        "t_s": np.asarray(axes.t_s, dtype=float)[k],
+        "gain_percent": of.value,
+        "gain_lo": of.lo,
+        "gain_hi": of.hi,
+        "exact_percent": axes.exact_gain[at],
+    }
 
 
 STEADY = (
@@ -37,16 +83,17 @@ STEADY = (
 )
 
 
-def steady(results: Sequence[CaseResult]):
+def steady(results: Sequence[Result]) -> "pd.DataFrame":
     """Steady σ (exact) against settling, of every case, filter and component.
 
     Settled is the first scan from which σ(k) stays within 5 % of the exact steady value to the end of the run; the
     interval takes σ at the kind and at the unkind end of its own; infinite where it does not settle within the run.
-    Cases whose target breaks the filters' model have no steady error and no rows.
+    Cases whose target breaks the filters' model have no steady error and no rows; nor have those whose plots may be
+    missed or are biased.
     `best` marks, among the cases of one config that differ in D_M, the least steady σ of those that settle in under
     ten periods.
     """
-    rows = [row for result in results if follows_the_model(result) for row in _steady(result)]
+    rows = [row for result in results if follows_the_model(result) and result.axes.plain for row in _steady(result)]
     if not rows:
         return common.frame({name: [] for name in STEADY})
     table = common.frame({name: [row[i] for row in rows] for i, name in enumerate(STEADY[:-1])})
@@ -59,13 +106,13 @@ def steady(results: Sequence[CaseResult]):
     return table
 
 
-def _steady(result: CaseResult) -> list[tuple]:
+def _steady(result: Result) -> list[tuple]:
     axes = result.axes
     of = statistics.errors(result.sums["error"], common.realisations(result)).sigma
     t, period, rows = np.asarray(axes.t_s, dtype=float), axes.scan_period_s, []
     for f, name in enumerate(axes.filters):
         variance = float(axes.manoeuvre_variance[f])
-        _, true = exact.steady_state(int(axes.observes[f]), variance, axes.sigma, period)
+        _, true = exact.steady_state(int(axes.observes[f]), variance, axes.sigma, period, axes.process_noise[f])
         for c, (component, unit) in enumerate(axes.components):
             at = np.flatnonzero(axes.available[f, :, c])
             if not at.size:
@@ -101,41 +148,53 @@ def _for_good(settled: np.ndarray, t: np.ndarray) -> float:
 CONSISTENCY = ("case", "filter", "k", "t_s", "n", *consistency.columns("nees", exact=True))
 
 
-def believed(results: Sequence[CaseResult]):
+def believed(results: Sequence[Result]) -> "pd.DataFrame":
     """Measured σ beside the σ that a filter believes, by component: `ratio` over 1 is optimistic."""
     return common.joined([_believed(result) for result in results], consistency.BELIEVED)
 
 
-def _believed(result: CaseResult) -> dict[str, np.ndarray]:
-    return consistency.believed(result, np.sqrt(np.diagonal(result.axes.believed, axis1=2, axis2=3)))
+def _believed(result: Result) -> dict[str, np.ndarray]:
+    variance = np.diagonal(result.axes.believed, axis1=2, axis2=3)
+    if own_gains(result):
+        with np.errstate(invalid="ignore"):
+            variance = np.asarray(result.sums["believed"]) / np.asarray(result.sums["estimates"])
+    return consistency.believed(result, np.sqrt(variance))
 
 
-def normalised_errors(results: Sequence[CaseResult]):
+def normalised_errors(results: Sequence[Result]) -> "pd.DataFrame":
     """NEES of each filter's estimate by scan: the mean of eᵀP⁻¹e per estimated component, with bounds and verdict.
 
-    In 95 % of runs of a filter that is right about itself the means of all its scans lie within the bounds.
+    In 95 % of runs of a filter that is right about itself the means of all its scans lie within the bounds. Where plots
+    may be missed, of the realisations in which the filter has started, `n`.
     """
     return common.joined([_normalised_errors(result) for result in results], CONSISTENCY)
 
 
-def _normalised_errors(result: CaseResult) -> dict[str, np.ndarray]:
+def _normalised_errors(result: Result) -> dict[str, np.ndarray]:
     axes = result.axes
-    f, k = at = np.nonzero(axes.available.any(axis=2))
-    size = axes.available.sum(axis=2)[at]
-    looks = axes.available.any(axis=2).sum(axis=1)[f]
-    bounds = statistics.normalised_bounds(size * result.count, looks)
-    mean = statistics.Estimate(*(part[at] for part in nees(result)))
+    there: np.ndarray
+    if own_gains(result):
+        counted = np.asarray(result.sums["nees"])
+        there, size, n = counted[..., 0] > 0, np.full(counted.shape[:2], 3), counted[..., 0].astype(np.int64)
+        mean = statistics.mean_square(counted[..., 1], counted[..., 2], counted[..., 0])
+    else:
+        there, size = np.asarray(axes.available.any(axis=2)), axes.available.sum(axis=2)
+        n, mean = np.full(there.shape, result.count), nees(result)
+    f, k = at = np.nonzero(there)
+    looks = there.sum(axis=1)[f]
+    bounds = statistics.normalised_bounds(size[at] * n[at], looks)
+    mean = statistics.Estimate(*(part[at] for part in mean))
     return {
         "case": np.full(f.size, result.name, dtype=object),
         "filter": common.names(axes.filters, f),
         "k": np.asarray(axes.k)[k],
         "t_s": np.asarray(axes.t_s, dtype=float)[k],
-        "n": np.full(f.size, result.count),
+        "n": n[at],
         **consistency.normalised("nees", mean, bounds, axes.exact_nees[at]),
     }
 
 
-def nees(result: CaseResult) -> statistics.Estimate:
+def nees(result: Result) -> statistics.Estimate:
     """Mean of eᵀP⁻¹e per estimated component (F, K), P the believed covariance, with its interval.
 
     From Σe and the Σ of products of two components. The errors of this study are Gaussian, so that these give the
@@ -153,22 +212,28 @@ def nees(result: CaseResult) -> statistics.Estimate:
     return statistics.Estimate(mean, interval.lo, interval.hi)
 
 
-RADAR = ("case", "C_theta", "doppler_hz", "doppler_per_repetition_rate", "unambiguous_velocity_mps")
+RADAR = ("case", "C_theta", "speed_mps", "doppler_hz", "doppler_per_repetition_rate", "unambiguous_velocity_mps")
 
 
-def radar(results: Sequence[CaseResult]):
-    """C_θ = σ_r²/(Δt²σ_V²) (eq. 11), the Doppler frequency of 300 m/s, and the unambiguous span of velocity λF/2."""
+def radar(results: Sequence[Result]) -> "pd.DataFrame":
+    """C_θ = σ_r²/(Δt²σ_V²) (eq. 11), the target's greatest radial speed at a scan, its Doppler frequency 2V/λ, and the
+    unambiguous span of velocity λF/2."""
     rows = []
     for result in results:
         axes, rate = result.axes, result.axes.repetition_rate_hz
-        doppler = 2 * TARGET_SPEED / axes.wavelength_m
-        rows.append((result.name, axes.C_theta, doppler, doppler / rate, axes.wavelength_m * rate / 2))
+        doppler = 2 * axes.speed_mps / axes.wavelength_m
+        rows.append((result.name, axes.C_theta, axes.speed_mps, doppler, doppler / rate, span_mps(result)))
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(RADAR)})
 
 
-def inputs(results: Sequence[CaseResult]):
+def span_mps(result: Result) -> float:
+    """The span λF/2 of velocities that a radar tells apart, m/s."""
+    return result.axes.wavelength_m * result.axes.repetition_rate_hz / 2
+
+
+def inputs(results: Sequence[Result]) -> "pd.DataFrame":
     """What was put in, for the page: a row for each radar that differs from the others, with the D_M tried on it."""
-    radars: dict[tuple, list[CaseResult]] = {}
+    radars: dict[tuple, list[Result]] = {}
     for members in panels.families(results).values():
         for result in members:
             of, theta = result.spec.radar, result.axes.C_theta
@@ -176,7 +241,7 @@ def inputs(results: Sequence[CaseResult]):
             radars.setdefault((panels.stem(result), panels.plain(panels.device(result)), *given), []).append(result)
     rows = []
     for (_, *radar), members in radars.items():
-        tried = sorted({f.manoeuvre_variance for result in members for f in result.spec.filters})
+        tried = sorted({float(v) for result in members for v in result.axes.manoeuvre_variance})
         scans = sorted({result.spec.scans for result in members})
         rows.append((*radar, ", ".join(panels.number(v, powers=True) for v in tried), ", ".join(map(str, scans))))
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(INPUTS)})

@@ -1,33 +1,36 @@
 """Plots of the range_doppler study: those of one realisation, and the study's filters over recorded ones."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
-from radarsim.kernels import linear as kernels
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.kernels import linear
+from radarsim.physics.motion import transition
 from radarsim.studies.interface import RecordedPlots
-from radarsim.studies.range_doppler.filters import observation
-from radarsim.studies.range_doppler.kernels import rows
+from radarsim.studies.range_doppler.config import Filter, Keys
+from radarsim.studies.range_doppler.filters import noise_by_time, noise_over, observation
+from radarsim.studies.range_doppler.kernels import missed, rows
 from radarsim.studies.range_doppler.kernels.likelihood import log_likelihood
-from radarsim.studies.range_doppler.study import COMPONENTS, prepare
+from radarsim.studies.range_doppler.study import COMPONENTS, designed, prepare
 
 STARTING = 3  # rows of a track from which its state is found, in the likelihood
 LEAST_MANOEUVRE = 1e-6  # of the stated manoeuvre variance, which counts as none
 LONGEST_START = 200  # plots in which a start is looked for; a file of velocities alone never has one
 MEASURED = (("range_m", 1), ("velocity_mps", 1))
-SIGMAS = {"range_m": ("radar.sigma_range_m",), "velocity_mps": ("radar.sigma_velocity_mps",)}
+SIGMAS: dict[str, tuple[str, ...]] = {
+    "range_m": ("radar.sigma_range_m",),
+    "velocity_mps": ("radar.sigma_velocity_mps",),
+}
 
 
-def plot_columns(spec) -> tuple[tuple[str, ...], ...]:
+def plot_columns(spec: Keys) -> tuple[tuple[str, ...], ...]:
     """The columns that `track` reads of a file of recorded plots."""
     return (("t_s", "range_m", "velocity_mps"),)
 
 
-def sigmas(spec) -> dict[str, tuple[str, ...]]:
+def sigmas(spec: Keys) -> dict[str, tuple[str, ...]]:
     """Which of the sensor's standard deviations stand behind each number that is measured."""
     return SIGMAS
 
@@ -35,9 +38,19 @@ def sigmas(spec) -> dict[str, tuple[str, ...]]:
 def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     """The plots of one realisation of the study and the truth, columns (K,)."""
     plan = prepare(case)
-    (plots,) = kernels.simulate_plots(plan.problem, realisation, 1)
+    if isinstance(plan.problem, missed.Problem):
+        plots, truth = missed.simulate_plots(plan.problem, realisation)
+    else:
+        (plots,), truth = linear.simulate_plots(plan.problem, realisation, 1), plan.problem.truth
     measured = {"t_s": plan.axes.t_s, "range_m": plots[:, 0], "velocity_mps": plots[:, 1]}
-    return measured | dict(zip(("true_r_m", "true_Vr_mps", "true_ar_mps2"), plan.problem.truth.T, strict=True))
+    return measured | dict(zip(("true_r_m", "true_Vr_mps", "true_ar_mps2"), truth.T, strict=True))
+
+
+def variances_of(case: Case) -> Sequence[float]:
+    """D_M of each filter, (m/s³)²: as given, or the best on the config's target."""
+    spec: Keys = case.spec
+    given = [f.manoeuvre_variance for f in spec.filters if isinstance(f.manoeuvre_variance, float)]
+    return given if len(given) == len(spec.filters) else designed(case).variances
 
 
 class Tracker:
@@ -45,18 +58,24 @@ class Tracker:
 
     A filter starts by least squares as soon as it has taken as many plots as the config's `initial_scans` says and
     these determine range, velocity and acceleration; before, its estimates are the plots. Then the Kalman filter of the
-    study goes from row to row, its gains reckoned for the interval and for what the row holds.
+    study goes from row to row, its gains computed for the interval and for what the row holds. Where the config leaves
+    the manoeuvre variance to be looked for, it is the best one on the config's target.
     """
 
-    most_rows = None
+    most_rows: int | None = None
     several = False
 
     def __init__(self, case: Case):
-        self.names = tuple(f.name for f in case.spec.filters)
-        self.sigma = np.array([case.spec.radar.sigma_range_m, case.spec.radar.sigma_velocity_mps])
-        self.filters = [_One(f, self.sigma) for f in case.spec.filters]
+        spec: Keys = case.spec
+        self.names = tuple(f.name for f in spec.filters)
+        self.sigma = np.array([spec.radar.sigma_range_m, spec.radar.sigma_velocity_mps])
+        noises = [
+            noise_by_time(f.process_noise, variance, spec.radar.scan_period_s)
+            for f, variance in zip(spec.filters, variances_of(case), strict=True)
+        ]
+        self.filters = [_One(f, noise, self.sigma) for f, noise in zip(spec.filters, noises, strict=True)]
 
-    def feed(self, recorded: dict[str, np.ndarray]) -> Track:
+    def feed(self, recorded: Mapping[str, np.ndarray]) -> Track:
         """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
         t, z = recorded["t_s"], np.stack([recorded["range_m"], recorded["velocity_mps"]], axis=1)
         made = [one.feed(t, z) for one in self.filters]
@@ -69,10 +88,12 @@ class Tracker:
 class _One:
     """One filter: its state, and before the start the plots that it is to be started from."""
 
-    def __init__(self, options, sigma: np.ndarray):
-        self.observes, self.needed = len(options.observes), options.initial_scans
-        self.manoeuvre, self.sigma = options.manoeuvre_variance, sigma
-        self.x = self.P = self.last = None
+    def __init__(self, options: Filter, noise: np.ndarray, sigma: np.ndarray):
+        self.observes, self.needed = len(options.observes), options.plots_to_start
+        self.noise, self.sigma = noise, sigma
+        self.x: np.ndarray | None = None
+        self.P = np.zeros((3, 3))
+        self.last = 0.0
         self.held: list[tuple[float, np.ndarray]] = []
 
     def feed(self, t: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -94,7 +115,7 @@ class _One:
             came = taken[k:].astype(float)
             found = np.full((n - k, 2), np.nan)
             rows.filter_rows(
-                *(self.x, self.P, dt, np.where(taken[k:], z[k:], 0.0), came, self.sigma**2, float(self.manoeuvre)),
+                *(self.x, self.P, dt, np.where(taken[k:], z[k:], 0.0), came, self.sigma**2, self.noise),
                 *(estimate[k:], sigma[k:], found),
             )
             nis[k:] = found
@@ -122,8 +143,8 @@ class _One:
 
 
 class PlotLikelihood:
-    """How likely tracks are under a filter's model: range and velocity of independent errors, acceleration that a
-    random jerk changes. The state before the first plot is taken as unknown, whatever start the config states."""
+    """How likely tracks are under a filter's model: range and velocity of independent errors, acceleration that the
+    filter's process noise changes. The state before the first plot is taken as unknown, whatever start the config states."""
 
     def __init__(self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]):
         most = max(len(f.observes) for f in case.spec.filters)
@@ -131,13 +152,15 @@ class PlotLikelihood:
             f for f in case.spec.filters if len(f.observes) == most
         ][:1]
         self.filter, self.tracks = options.name, len(tracks)
+        variance = variances_of(case)[case.spec.filters.index(options)]
         self.rows = sum(len(columns["t_s"]) for columns in tracks)
         radar, self.observes = case.spec.radar, len(options.observes)
         sigmas = {"radar.sigma_range_m": radar.sigma_range_m, "radar.sigma_velocity_mps": radar.sigma_velocity_mps}
-        stated = dict(list(sigmas.items())[: self.observes]) | {"manoeuvre_variance": options.manoeuvre_variance}
+        stated = dict(list(sigmas.items())[: self.observes]) | {"manoeuvre_variance": variance}
         self.sigma_velocity = radar.sigma_velocity_mps
         self.keys, self.stated = tuple(stated), np.array(list(stated.values()), dtype=float)
         self.least = self.stated * np.array([1e-4] * self.observes + [LEAST_MANOEUVRE])
+        self.noise = noise_by_time(options.process_noise, 1.0, radar.scan_period_s)
         self.problems = [self._problem(columns) for columns in tracks]
 
     def _problem(self, columns: Mapping[str, np.ndarray]) -> tuple[np.ndarray, ...]:
@@ -145,7 +168,7 @@ class PlotLikelihood:
         dt = np.diff(columns["t_s"], prepend=columns["t_s"][0])
         z = np.stack([columns["range_m"], columns["velocity_mps"]], axis=1)
         there = np.isfinite(z) & (np.arange(2) < self.observes)
-        F, Q = (np.stack([of(step) for step in dt]) for of in (transition, partial(manoeuvre_covariance, 1.0)))
+        F, Q = np.stack([transition(step) for step in dt]), np.stack([noise_over(self.noise, step) for step in dt])
         return F, Q, np.where(there, z, 0.0), there
 
     def _scores(self, values: np.ndarray, outliers: float, bias: float) -> np.ndarray:
@@ -175,20 +198,23 @@ class PlotLikelihood:
 class Recorded(RecordedPlots):
     """The study's part in `radarsim track` and `radarsim simulate`."""
 
-    def columns(self, spec):
+    def columns(self, spec: Keys) -> Sequence[Sequence[str]]:
+        """As `RecordedPlots`, and so below."""
         return plot_columns(spec)
 
-    def sigmas(self, spec):
+    def sigmas(self, spec: Keys) -> Mapping[str, Sequence[str]]:
         return sigmas(spec)
 
-    def scan_period_s(self, spec):
+    def scan_period_s(self, spec: Keys) -> float:
         return spec.radar.scan_period_s
 
-    def simulated(self, case, realisation):
+    def simulated(self, case: Case, realisation: int) -> Mapping[str, np.ndarray]:
         return simulated(case, realisation)
 
-    def tracker(self, case):
+    def tracker(self, case: Case) -> Tracker:
         return Tracker(case)
 
-    def likelihood(self, case, filter_name, tracks):
+    def likelihood(
+        self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]
+    ) -> PlotLikelihood:
         return PlotLikelihood(case, filter_name, tracks)

@@ -1,15 +1,25 @@
 """What the report of P1's experiments asks and answers, in words."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from radarsim.engine.results import CaseResult
+import numpy as np
+
+from radarsim.config.experiment import Experiment
 from radarsim.report import panels
 from radarsim.report import tables as common
+from radarsim.studies.range_doppler import tuning
+from radarsim.studies.range_doppler.config import Best
 from radarsim.studies.range_doppler.figures import QUANTITIES
-from radarsim.studies.range_doppler.tables import PERIODS, follows_the_model
+from radarsim.studies.range_doppler.tables import PERIODS, Result, follows_the_model, span_mps
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Made = Mapping[str, "pd.DataFrame"]
 
 
-def question(experiment) -> str:
+def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
     filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
     names = list(dict.fromkeys(getattr(case.spec.radar, "name", None) or case.stem for case in experiment.cases))
@@ -23,24 +33,25 @@ def listed(names: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
-def answer(results: Sequence[CaseResult], made: dict) -> list[str]:
+def answer(results: Sequence[Result], made: Made) -> list[str]:
     """Sentences with numbers and 95 % intervals: the gains at the last scan, component by component.
 
-    Of cases that nothing is swept in, where there are such; the greatest loss of any case at any scan is told with
+    Of cases that nothing is swept in, where there are such; the greatest loss of any case at any scan is given with
     them. Further: the best D_M where several are tried, first where nothing but D_M is asked for, and the worst error
-    where a target breaks the model.
+    where a target breaks the model; the D_M that was looked for; and how the radar's velocities are taken.
     """
-    gains, best = _gain_sentences(results, made), _best_sentences(results, made)
+    gains = _gain_sentences(results, made)
+    best = [*_best_sentences(results, made), *_best_of_broken(results, made)]
     told = [*best, *gains] if _asks_for_variance(results) else [*gains, *best]
-    return [*told, *_broken_sentences(results, made)]
+    return [*told, *_broken_sentences(results, made), *_looked_for(results), *_ambiguity(results)]
 
 
-def _asks_for_variance(results: Sequence[CaseResult]) -> bool:
+def _asks_for_variance(results: Sequence[Result]) -> bool:
     """Whether every case is one of a sweep over the manoeuvre variance."""
     return all("manoeuvre_variance" in dict(result.swept) for result in results)
 
 
-def _gain_sentences(results: Sequence[CaseResult], made: dict) -> list[str]:
+def _gain_sentences(results: Sequence[Result], made: Made) -> list[str]:
     plain = panels.unswept(results)
     rows = made["gains"][made["gains"]["case"].isin([result.name for result in plain])]
     gains, every = common.groups(rows, "component"), common.groups(made["gains"], "component")
@@ -53,25 +64,48 @@ def _gain_sentences(results: Sequence[CaseResult], made: dict) -> list[str]:
     return told or [_sigma_sentence(results[0], made["curves"])]
 
 
-def _gain_sentence(results: Sequence[CaseResult], rows, every, quantity: str, labels: dict[str, str]) -> str:
-    """The gain of one quantity at the last scan.
+class _Moment(NamedTuple):
+    """The rows of a table at which cases are compared: one for each case and filter; and when that is."""
+
+    rows: "pd.DataFrame"
+    when: str
+
+
+def _compared(rows: "pd.DataFrame") -> _Moment:
+    """The last scan, where all cases end together; else the last time that all of them have in common."""
+    last = rows.loc[rows.groupby(["case", "filter"], sort=False)["k"].idxmax()]
+    early, late = last["t_s"].min(), last["t_s"].max()
+    if early == late:
+        return _Moment(last, f"at {early:g} s")
+    times = [set(np.round(own["t_s"], 6)) for own in common.groups(rows, "case", "filter").values()]
+    shared = set.intersection(*times) - {0.0}
+    if not shared:
+        return _Moment(last, f"at the last scan (after {early:g} to {late:g} s)")
+    at = max(shared)
+    return _Moment(rows[np.round(rows["t_s"], 6) == at], f"at {at:g} s, the last time that all have in common,")
+
+
+def _gain_sentence(
+    results: Sequence[Result], rows: "pd.DataFrame", every: "pd.DataFrame", quantity: str, labels: dict[str, str]
+) -> str:
+    """The gain of one quantity at the last scan, or at the last common time.
 
     rows: its gains in the cases told of; every: in all cases, among which the greatest loss is looked for.
     """
-    last = rows.loc[rows.groupby(["case", "filter"], sort=False)["k"].idxmax()]
+    last, when = _compared(rows)
     several = rows["filter"].nunique() > 1
     base = _baseline(results)
     if len(last) > 1:
         early, late = last["t_s"].min(), last["t_s"].max()
         when = f"at {late:g} s" if early == late else f"at the last scan (after {early:g} to {late:g} s)"
-        low, high = (last.loc[last["gain_percent"].agg(pick)] for pick in ("idxmin", "idxmax"))
+        low, high = (last.iloc[int(pick(last["gain_percent"].to_numpy()))] for pick in (np.argmin, np.argmax))
         ends = " to ".join(f"{_gain(row)} ({_who(row, labels, several)})" for row in (low, high))
         loss = _loss(every, low, labels)
         if last["gain_lo"].max() <= last["gain_hi"].min():
             ends += ", which do not differ for certain,"
         return f"{quantity.capitalize()}: {when} σ is {ends} {base}{loss}."
     row = last.iloc[0]
-    best = rows.loc[rows["gain_percent"].idxmax()]
+    best = rows.iloc[int(rows["gain_percent"].to_numpy().argmax())]
     peak = "" if best["k"] == row["k"] else f"; at best {_gain(best)}, at {best['t_s']:g} s"
     loss = _loss(every, row, labels)
     return f"{quantity.capitalize()}: at {row['t_s']:g} s, the last scan, σ is {_gain(row)} {base}{peak}{loss}."
@@ -80,12 +114,12 @@ def _gain_sentence(results: Sequence[CaseResult], rows, every, quantity: str, la
 LOSS = 1.0  # per cent: a gain certainly below minus this, at any scan, is told
 
 
-def _loss(every, told, labels: dict[str, str]) -> str:
+def _loss(every: "pd.DataFrame", told: "pd.Series[Any]", labels: dict[str, str]) -> str:
     """The greatest of the certain losses in words, unless there is none or it is the gain already told."""
     sure = every[every["gain_hi"] < -LOSS]
     if not len(sure):
         return ""
-    worst = sure.loc[sure["gain_percent"].idxmin()]
+    worst = sure.iloc[int(sure["gain_percent"].to_numpy().argmin())]
     if worst.name == told.name:
         return ""
     several = every["filter"].nunique() > 1
@@ -93,19 +127,21 @@ def _loss(every, told, labels: dict[str, str]) -> str:
     return f"; at worst {_gain(worst)}, at {worst['t_s']:g} s{who}"
 
 
-def _baseline(results: Sequence[CaseResult]) -> str:
+def _baseline(results: Sequence[Result]) -> str:
     """Than what a gain is: range alone only where the baseline filter observes no more."""
     bases = [result.spec.filters[result.axes.baseline] for result in results]
-    same = " at the same D_M" if len({base.manoeuvre_variance for base in bases}) > 1 else ""
+    given = {base.manoeuvre_variance for base in bases if isinstance(base.manoeuvre_variance, float)}
+    same = " at the same D_M" if len(given) > 1 else ""
     if all(base.observes == ("range",) for base in bases):
         return f"than with range alone{same}"
     names = {base.name for base in bases}
     return f"than with filter '{bases[0].name}'" if len(names) == 1 else "than with the baseline filter"
 
 
-def _best_sentences(results: Sequence[CaseResult], made: dict) -> list[str]:
+def _best_sentences(results: Sequence[Result], made: Made) -> list[str]:
     """The best manoeuvre variance of each radar and filter, in words, where several were tried."""
-    table, told = made["steady"], []
+    table = made["steady"]
+    told: list[str] = []
     for members in panels.families(results).values():
         rows = table[table["case"].isin([r.name for r in members]) & (table["component"] == "r")]
         if rows.groupby("filter")["manoeuvre_variance"].nunique().max() > 1:
@@ -117,7 +153,7 @@ def _best_sentences(results: Sequence[CaseResult], made: dict) -> list[str]:
     return [f"Best manoeuvre variance D_M, (m/s³)² ({rule}). {'. '.join(told)}."]
 
 
-def _best(rows, name: str) -> str:
+def _best(rows: "pd.DataFrame", name: str) -> str:
     best = rows[rows["best"]]
     if not len(best):
         return f"{name} none of those tried"
@@ -126,12 +162,59 @@ def _best(rows, name: str) -> str:
     return f"{name} {variance} (σ {row['steady_sigma']:.4g} m, settled after {row['settling_s']:g} s)"
 
 
+FIRST = 3  # the scan from which on errors count when a D_M is the best on a manoeuvring target
+
+
+def _tried_on(results: Sequence[Result]) -> dict[str, list[Result]]:
+    """Cases of targets that break the model and differ in the D_M given, by what else they are."""
+    found: dict[str, list[Result]] = {}
+    for result in results:
+        if not follows_the_model(result):
+            others = ", ".join(f"{key} = {panels.number(v)}" for key, v in result.swept if not _is_variance(key))
+            found.setdefault(" ".join(filter(None, (panels.device(result), others))), []).append(result)
+    return {name: members for name, members in found.items() if len(members) > 1 and all(map(_given, members))}
+
+
+def _is_variance(key: str) -> bool:
+    return key.rpartition(".")[2] == "manoeuvre_variance"
+
+
+def _given(result: Result) -> bool:
+    return any(_is_variance(key) for key, _ in result.swept) and not _tuned(result)
+
+
+def _best_of_broken(results: Sequence[Result], made: Made) -> list[str]:
+    """The D_M of those tried with which the worst error on a manoeuvring target is least, by radar and filter."""
+    curves, told = made["curves"], []
+    rows = curves[(curves["component"] == "r") & (curves["k"] >= FIRST)]
+    rows = rows.assign(error=rows["exact_sigma"].fillna(rows["sigma"]))
+    for name, members in _tried_on(results).items():
+        own = rows[rows["case"].isin([member.name for member in members])]
+        words = [_least_worst(own[own["filter"] == one], members, one) for one in members[0].axes.filters]
+        told.append(f"{panels.plain(name)}: {'; '.join(words)}")
+    if not told:
+        return []
+    return [
+        f"Best manoeuvre variance D_M, (m/s³)², on a target that breaks the filters' model (least worst σ of the range "
+        f"from scan {FIRST} on). {'. '.join(told)}."
+    ]
+
+
+def _least_worst(rows: "pd.DataFrame", members: Sequence[Result], name: str) -> str:
+    worst = rows.loc[rows.groupby("case", sort=False)["error"].idxmax()]
+    row = worst.iloc[int(worst["error"].to_numpy().argmin())]
+    result = next(member for member in members if member.name == row["case"])
+    variance = float(result.axes.manoeuvre_variance[result.axes.filters.index(name)])
+    return f"{name} {panels.number(variance, powers=True)} (σ at worst {row['error']:.4g} m, at {row['t_s']:g} s)"
+
+
 MOST_TOLD = 4  # cases with a broken model told in the answer
 
 
-def _broken_sentences(results: Sequence[CaseResult], made: dict) -> list[str]:
+def _broken_sentences(results: Sequence[Result], made: Made) -> list[str]:
     """Where a target breaks the model: the worst σ of the range over the run, and the largest bias, of each filter."""
-    broken = [result for result in results if not follows_the_model(result)]
+    compared = {member.name for members in _tried_on(results).values() for member in members}
+    broken = [result for result in results if not follows_the_model(result) and result.name not in compared]
     rows = common.groups(made["curves"][made["curves"]["component"] == "r"], "case", "filter")
     told = []
     for result in broken[:MOST_TOLD]:
@@ -141,8 +224,52 @@ def _broken_sentences(results: Sequence[CaseResult], made: dict) -> list[str]:
     return told + ([f"{left} further cases break the model: see curves.csv."] if left else [])
 
 
-def _worst(rows) -> str:
-    worst, bias = rows.loc[rows["sigma"].idxmax()], rows.loc[rows["bias"].abs().idxmax()]
+def _tuned(result: Result) -> list[tuple[str, Best, float]]:
+    """The filters whose D_M was looked for: name, what was to be least, what was found."""
+    found = zip(result.spec.filters, result.axes.manoeuvre_variance, strict=True)
+    return [
+        (one.name, one.manoeuvre_variance, float(variance))
+        for one, variance in found
+        if isinstance(one.manoeuvre_variance, Best)
+    ]
+
+
+OVER = {"worst": "is least at its worst from scan {k} on", "mean": "is least on average from scan {k} on"}
+
+
+def _looked_for(results: Sequence[Result]) -> list[str]:
+    """The D_M that were looked for."""
+    told = []
+    for result in [result for result in results if _tuned(result)][:MOST_TOLD]:
+        axes, words = result.axes, []
+        for name, wanted, variance in _tuned(result):
+            rule = OVER.get(wanted.over, "is least at the last scan").format(k=wanted.from_k)
+            bound = tuning.at_a_limit(variance, len(axes.t_s), axes.sigma, axes.scan_period_s)
+            limit = ", the end of what is looked at: there is no best between" if bound else ""
+            words.append(f"{name} {variance:g} ({wanted.minimise} {rule}{limit})")
+        told.append(f"{panels.plain_label(result)}: D_M, (m/s³)², looked for by the exact errors: {'; '.join(words)}.")
+    return told
+
+
+def _ambiguity(results: Sequence[Result]) -> list[str]:
+    """That velocities are not folded, where a config gives the repetition rate."""
+    told: dict[str, str] = {}
+    for result in results:
+        if "repetition_rate_hz" in result.spec.radar.model_fields_set and (result.axes.observes == 2).any():
+            span, speed = span_mps(result), result.axes.speed_mps
+            folds = "" if 2 * speed < span else f", which the target's {speed:.4g} m/s exceed"
+            told.setdefault(panels.plain(panels.device(result)), f"a span of {span:.4g} m/s{folds}")
+    if not told:
+        return []
+    words = "; ".join(f"{name}: {span}" for name, span in told.items())
+    return [f"Velocities are taken as unambiguous; the repetition rate alone tells apart λF/2 ({words})."]
+
+
+def _worst(rows: "pd.DataFrame") -> str:
+    worst, bias = (
+        rows.iloc[int(rows["sigma"].to_numpy().argmax())],
+        rows.iloc[int(np.abs(rows["bias"].to_numpy()).argmax())],
+    )
     text = (
         f"worst σ of the range {worst['sigma']:.4g} m [{worst['sigma_lo']:.4g}, {worst['sigma_hi']:.4g}] "
         f"at {worst['t_s']:g} s, largest bias {bias['bias']:.4g} m at {bias['t_s']:g} s"
@@ -150,7 +277,7 @@ def _worst(rows) -> str:
     return text.replace("-", "−")
 
 
-def _gain(row) -> str:
+def _gain(row: "pd.Series[Any]") -> str:
     """A gain in words: lower, higher, or neither for certain."""
     value, lo, hi = (round(float(row[name]), 1) + 0.0 for name in ("gain_percent", "gain_lo", "gain_hi"))
     if value == lo == hi == 0:
@@ -163,11 +290,11 @@ def _gain(row) -> str:
     return f"{value:.1f} % [{lo:.1f}, {hi:.1f}] lower"
 
 
-def _who(row, labels: dict[str, str], several: bool) -> str:
+def _who(row: "pd.Series[Any]", labels: dict[str, str], several: bool) -> str:
     return labels[row["case"]] + (f", {row['filter']}" if several else "")
 
 
-def _sigma_sentence(result: CaseResult, curves) -> str:
+def _sigma_sentence(result: Result, curves: "pd.DataFrame") -> str:
     """For experiments without a second filter: σ of the range at the end."""
     rows = curves[(curves["case"] == result.name) & (curves["component"] == "r")]
     row = rows.iloc[-1]

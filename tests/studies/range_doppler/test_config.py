@@ -9,6 +9,7 @@ from radarsim.app.configs import load
 from radarsim.errors import ConfigError
 
 NUMBER = "must be a number"
+BANDS = "metre, decimetre, centimetre, HF, VHF, UHF, L, S, C, X, Ku, K, Ka, V, W, mm"
 SIZE = "must be at least 1e-18 in size"
 POSITIVE = [
     (0, "must be > 0, got 0"),
@@ -86,8 +87,8 @@ OBSERVES = "must be [range] or [range, velocity]"
 OTHERS = [
     ("radar", 3, "must be a mapping of keys, got 3"),
     ("radar", [1], "must be a mapping of keys, got [1]"),
-    ("radar.band", "meter", "must be one of metre, decimetre, centimetre, got 'meter'"),
-    ("radar.band", 3, "must be one of metre, decimetre, centimetre, got 3"),
+    ("radar.band", "meter", "must be one of {bands}, got 'meter'"),
+    ("radar.band", 3, "must be one of {bands}, got 3"),
     ("target", 3, "must be a mapping of keys, got 3"),
     ("target", [], "must be a mapping of keys, got []"),
     ("target", "../polynomial", "must be the stem of a scenario, without folder or suffix, got '../polynomial'"),
@@ -98,8 +99,12 @@ OTHERS = [
     ("target", "", "must be the stem of a scenario, without folder or suffix, got ''"),
     ("target", ".hidden", "must be the stem of a scenario, without folder or suffix, got '.hidden'"),
     ("target", "polynomal", "no such scenario; did you mean polynomial?, got 'polynomal'"),
-    ("target.kind", "jerk", "must be one of polynomial, acceleration_start, jerk_pulse, turn, got 'jerk'"),
-    ("target.kind", 3, "must be one of polynomial, acceleration_start, jerk_pulse, turn, got 3"),
+    (
+        "target.kind",
+        "jerk",
+        "must be one of polynomial, acceleration_start, jerk_pulse, turn, fly_by, recorded, got 'jerk'",
+    ),
+    ("target.kind", 3, "must be one of polynomial, acceleration_start, jerk_pulse, turn, fly_by, recorded, got 3"),
     ("target.coefficients", [], "must hold at least 1, got []"),
     ("target.coefficients", [0] * 13, "must hold at most 12, got [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]"),
     ("target.coefficients", 3, "must be a list, got 3"),
@@ -151,10 +156,12 @@ def spoil(config: dict, key: str, value: object) -> dict:
 def test_bad_value(good, said, key, value, message):
     from radarsim.studies import registry
 
-    message = message.replace("{studies}", ", ".join(registry.names()))
+    message = message.replace("{studies}", ", ".join(registry.names())).replace("{bands}", BANDS)
     line = message if message.startswith("config: ") else f"config: {key}: {message}"
     lines = said(spoil(good, key, value))
-    if key == "include":
+    if value == {} and key.endswith("manoeuvre_variance"):  # a mapping says what it is to make least
+        assert lines == [f"config: {key}.{missing}: required key is missing" for missing in ("minimise", "over")]
+    elif key == "include":
         assert line in lines
     else:
         assert lines == [line]
@@ -173,16 +180,21 @@ REQUIRED = [
     "filters.0.name",
     "filters.1.observes",
     "filters.0.manoeuvre_variance",
-    "scans",
     "realisations",
 ]
-RADAR = "name, band, wavelength_m, sigma_range_m, sigma_velocity_mps, scan_period_s, repetition_rate_hz"
-FILTER = "name, observes, manoeuvre_variance, initial_scans"
-TOP = "radar, target, filters, baseline, scans, study, include, sweep, realisations, seed, figures, control_variate"
+RADAR = (
+    "name, band, wavelength_m, sigma_range_m, sigma_velocity_mps, scan_period_s, repetition_rate_hz, "
+    "detection_probability, bias_range_m, bias_velocity_mps, sigma_bias_range_m, sigma_bias_velocity_mps"
+)
+FILTER = "name, observes, manoeuvre_variance, initial_scans, process_noise"
+TOP = (
+    "radar, target, filters, baseline, scans, duration_s, study, include, sweep, realisations, seed, figures, "
+    "control_variate"
+)
 UNKNOWN = [
     ("radar.sigma_rnge_m", f"unknown key; did you mean sigma_range_m? allowed: {RADAR}"),
     ("filters.0.manoeuver_variance", f"unknown key; did you mean manoeuvre_variance? allowed: {FILTER}"),
-    ("target.coeficients", "unknown key; did you mean coefficients? allowed: kind, coefficients"),
+    ("target.coeficients", "unknown key; did you mean coefficients? allowed: kind, coefficients, sigma_coefficients"),
     ("scan", f"unknown key; did you mean scans? allowed: {TOP}"),
     ("realizations", f"unknown key; did you mean realisations? allowed: {TOP}"),
     ("radar.\n\x1b[2J", f"unknown key; allowed: {RADAR}"),
@@ -314,3 +326,66 @@ def test_longest_and_shortest(good):
     assert load(good).cases[0].spec.filters[0].initial_scans == 7
     good["scans"] = 100_000
     assert load(good).cases[0].spec.scans == 100_000
+
+
+# ---- the world beyond the paper -------------------------------------------------------------------------------------
+
+FLY_BY = {"kind": "fly_by", "distance_m": 15e3, "speed_mps": 300, "start_range_m": 40e3}
+BEST = {"minimise": "sigma_r", "over": "worst"}
+BEYOND = [
+    ({"radar.detection_probability": 0}, "radar.detection_probability: must be > 0, got 0"),
+    ({"radar.detection_probability": 1.1}, "radar.detection_probability: must be <= 1, got 1.1"),
+    ({"radar.bias_range_m": "x"}, f"radar.bias_range_m: {NUMBER}, got 'x'"),
+    ({"radar.sigma_bias_velocity_mps": -1}, "radar.sigma_bias_velocity_mps: must be >= 0, got -1"),
+    ({"radar.band": "X"}, "radar.band: X is 0.025 to 0.0375 m, wavelength_m is 0.15, got 'X'"),
+    ({"target": FLY_BY | {"distance_m": 10}}, "target.distance_m: must be >= 100, got 10"),
+    ({"target": FLY_BY | {"start_range_m": 1e4}}, "target.start_range_m: must be >= distance_m, 15000, got 10000"),
+    ({"target": FLY_BY | {"speed_mps": 2e4}}, "target.speed_mps: must be <= 12000, got 20000"),
+    ({"target": {"kind": "recorded", "file": "none.csv"}}, "target.file: no such file: 'none.csv'"),
+    ({"target.sigma_coefficients": [1, 1, 1, 1]}, "target.sigma_coefficients: must hold at most 3, got [1, 1, 1, 1]"),
+    ({"filters.0.process_noise": "jerk"}, "must be one of random_jerk, white_jerk, white_acceleration, got 'jerk'"),
+    ({"filters.0.manoeuvre_variance": BEST | {"over": "most"}}, "over: must be one of worst, mean, last, got 'most'"),
+    ({"filters.0.manoeuvre_variance": BEST | {"from_k": 16}}, "from_k: must be <= the number of scans, 15, got 16"),
+    ({"duration_s": 140}, "duration_s: stands in place of scans: give one of them, got 140"),
+    ({"scans": None, "duration_s": 5}, "duration_s: must be 2 to 100000 scans of radar.scan_period_s, makes 1, got 5"),
+    ({"scans": None, "duration_s": 15}, "must be >= 3 scans of radar.scan_period_s for the initialisation of filter r"),
+    ({"scans": None, "duration_s": 0}, "duration_s: must be > 0, got 0"),
+]
+
+
+@pytest.mark.parametrize(("changes", "message"), BEYOND, ids=lambda v: repr(v)[:50])
+def test_bad_value_of_a_new_key(good, said, changes, message):
+    for key, value in changes.items():
+        if value is None:
+            del good[key]
+        else:
+            spoil(good, key, value)
+    lines = said(good)
+    assert any(message in line for line in lines), lines
+
+
+def test_letter_bands(good):
+    good["radar"] |= {"band": "S", "wavelength_m": 0.1}
+    assert load(good).cases[0].spec.radar.band == "S"
+
+
+def test_either_scans_or_a_duration(good, said):
+    del good["scans"]
+    assert said(good) == ["config: scans: required key is missing, or duration_s in its place"]
+    good["duration_s"] = 100
+    assert load(good).cases[0].spec.scans == 11
+    assert load(good, ["radar.scan_period_s=3"]).cases[0].spec.scans == 34
+    assert load(good, ["scans=20"]).cases[0].spec.scans == 20  # the one that is set stands for both
+    assert load("rls2", ["duration_s=70"]).cases[0].spec.scans == 8
+    periods = load({**good, "sweep": {"radar.scan_period_s": [4, 5, 10]}}).cases
+    assert [case.spec.scans for case in periods] == [26, 21, 11]
+
+
+def test_a_duration_is_the_scans_that_it_makes(good):
+    from radarsim.config.identity import canonical, complete
+
+    given = load(good).cases[0].spec
+    del good["scans"]
+    made = load(good | {"duration_s": 140}).cases[0].spec
+    assert canonical(made) == canonical(given)
+    assert complete(made) == complete(given)

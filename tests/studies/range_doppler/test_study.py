@@ -14,7 +14,6 @@ from radarsim.kernels import linear as kernels
 from radarsim.studies.identity import identity
 from radarsim.studies.noise import noise_key
 from radarsim.studies.range_doppler import filters
-from radarsim.studies.range_doppler import study as range_doppler
 
 RADARS = ("rls1", "rls2", "rls3", "rls4", "rls5")
 N = 100_000
@@ -149,8 +148,3 @@ def test_plan_is_small_when_sent_elsewhere():
     copy = pickle.loads(pickle.dumps(work))
     assert copy.identity == work.identity
     np.testing.assert_array_equal(copy.simulate(5, 100), work.simulate(5, 100))
-
-
-def test_unknown_target_is_refused():
-    with pytest.raises(ValueError, match="no such target"):
-        range_doppler.truth(types.SimpleNamespace(kind="flying saucer"), np.arange(3.0))

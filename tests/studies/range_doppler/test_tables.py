@@ -74,7 +74,8 @@ def test_settling_for_good():
 def test_radar_table(paper):
     table = range_doppler.radar(paper)
     np.testing.assert_allclose(table["C_theta"], [0.25, 25 / 9, 100 / 9, 25, 100])
-    np.testing.assert_allclose(table["doppler_hz"], [1000 / 3, 4000, 4000, 20000, 20000])
+    np.testing.assert_allclose(table["speed_mps"], 310)  # −250 m/s at first, 4 m/s² for 140 s
+    np.testing.assert_allclose(table["doppler_hz"], np.array([1000 / 3, 4000, 4000, 20000, 20000]) * 310 / 300)
     np.testing.assert_allclose(table["unambiguous_velocity_mps"], [900, 75, 75, 15, 15])
 
 

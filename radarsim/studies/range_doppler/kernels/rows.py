@@ -4,18 +4,21 @@ The state is value, rate and second rate. Value and rate are measured independen
 after the other, which needs no inverse; the result is that of the joint update of `filters.linear`.
 """
 
+import numpy as np
+
 from radarsim.kernels.compile import kernel
 
 
 @kernel
-def filter_rows(x, P, dt, z, came, variance, manoeuvre, estimate, spread, nis):
+def filter_rows(x, P, dt, z, came, variance, noise, estimate, spread, nis):
     """Go through n rows, in place: state x (3,), its covariance P (3, 3) before the first of them.
 
     dt (n,) s since the row before; z (n, 2) value and rate, came (n, 2) 1 where the filter takes the number, else 0;
-    variance (2,) of the plots; manoeuvre (m/s³)². Out: estimate (n, 3), spread (n, 3) the believed standard deviations,
-    nis (n, 2) the squared innovation over its variance, where the number came.
+    variance (2,) of the plots; noise (2, 3, 3): a time t adds noise[0, i, j] t^(5 - i - j) + noise[1, i, j]
+    t^(6 - i - j) to P. Out: estimate (n, 3), spread (n, 3) the believed standard deviations, nis (n, 2) the squared
+    innovation over its variance, where the number came.
     """
-    F, M = P.copy(), P.copy()
+    F, M, power = P.copy(), P.copy(), np.ones(7)
     for k in range(dt.size):
         t = dt[k]
         x[0] += t * (x[1] + 0.5 * t * x[2])
@@ -27,12 +30,12 @@ def filter_rows(x, P, dt, z, came, variance, manoeuvre, estimate, spread, nis):
         for i in range(3):
             for j in range(3):
                 M[i, j] = F[i, 0] * P[0, j] + F[i, 1] * P[1, j] + F[i, 2] * P[2, j]
-        g0, g1 = t * t * t / 6.0, 0.5 * t * t
+        for n in range(1, 7):
+            power[n] = power[n - 1] * t
         for i in range(3):
             for j in range(3):
-                a = g0 if i == 0 else (g1 if i == 1 else t)
-                b = g0 if j == 0 else (g1 if j == 1 else t)
-                P[i, j] = M[i, 0] * F[j, 0] + M[i, 1] * F[j, 1] + M[i, 2] * F[j, 2] + manoeuvre * a * b
+                grown = noise[0, i, j] * power[5 - i - j] + noise[1, i, j] * power[6 - i - j]
+                P[i, j] = M[i, 0] * F[j, 0] + M[i, 1] * F[j, 1] + M[i, 2] * F[j, 2] + grown
         for m in range(2):
             if came[k, m] > 0.0:
                 S = P[m, m] + variance[m]

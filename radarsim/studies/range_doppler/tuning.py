@@ -1,0 +1,111 @@
+"""The manoeuvre variance with which a filter's exact error on a target is least, `manoeuvre_variance: {minimise: …}`.
+
+Many variances run through the exact recursion side by side. D_M is looked for in units of σ_r²/Δt⁶, from a memory far
+longer than the run to none at all, first ten to a decade, then ever closer about the best; it is given to four digits,
+which lie within the flat bottom of the curve and are the same on every machine.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from radarsim.physics.motion import process_noise
+from radarsim.studies.range_doppler.config import Best, Filter
+from radarsim.studies.range_doppler.patterns import Design, mixture, predicted
+from radarsim.studies.range_doppler.propagation import Errors, Information, Plots
+
+LEAST, MOST = 1e-12, 1e8  # D_M Δt⁶/σ_r²; the least is lowered for long runs
+TO_VELOCITY = 1e12  # most of D_M Δt⁴/σ_V², as the config's check has it
+A_DECADE, CLOSER, POINTS = 10, 3, 21
+FEW, ABOUT, A_DECADE_FEW = 512, 1.5, 4  # patterns; decades about the best without misses, and variances in each
+ALIKE = 1e-9
+COMPONENTS = {"sigma_r": 0, "sigma_Vr": 1, "sigma_ar": 2}
+
+
+def manoeuvre_variances(filters: tuple[Filter, ...], plots: Plots, x: np.ndarray, dt: float) -> tuple[float, ...]:
+    """D_M of each filter, (m/s³)²: as given, or the best on the truth x (K, 3) at scans dt (s) apart."""
+    return tuple(
+        best(one, one.manoeuvre_variance, plots, x, dt)
+        if isinstance(one.manoeuvre_variance, Best)
+        else one.manoeuvre_variance
+        for one in filters
+    )
+
+
+def best(one: Filter, wanted: Best, plots: Plots, x: np.ndarray, dt: float) -> float:
+    """The manoeuvre variance that a filter's config asks for, (m/s³)²."""
+    low, high = limits(len(x), plots.sigma, dt)
+    whole = plots._replace(detection=1.0)
+
+    def cost(logs: np.ndarray, seen: Plots) -> np.ndarray:
+        return objective(wanted, errors(one, 10.0**logs, seen, x, dt))
+
+    grid = np.linspace(low, high, round((high - low) * A_DECADE) + 1)
+    middle = closer(grid, lambda logs: cost(logs, whole), CLOSER)
+    if plots.detection < 1:
+        near = np.arange(-ABOUT, ABOUT + 1e-9, 1 / A_DECADE_FEW)
+        middle = closer(np.clip(middle + near, low, high), lambda logs: cost(logs, plots), 1)
+    return float(f"{10.0**middle:.4g}")
+
+
+def closer(grid: np.ndarray, cost: Callable[[np.ndarray], np.ndarray], times: int) -> float:
+    """The number of least cost, looked for on a grid (n,) and then `times` closer about the best so far."""
+    for _ in range(times + 1):
+        costs = cost(grid)
+        at = int(np.argmax(costs <= costs.min() * (1 + ALIKE)))  # of what is level, the least D_M
+        middle = float(grid[at])
+        grid = np.linspace(grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)], POINTS)
+    return middle
+
+
+def limits(scans: int, sigma: np.ndarray, dt: float) -> tuple[float, float]:
+    """Logarithms to ten of the least and the greatest D_M that are looked at."""
+    unit = sigma[0] ** 2 / dt**6
+    least = min(LEAST, (3.0 * scans) ** -6)
+    return float(np.log10(least * unit)), float(np.log10(min(MOST * unit, TO_VELOCITY * sigma[1] ** 2 / dt**4)))
+
+
+def at_a_limit(variance: float, scans: int, sigma: np.ndarray, dt: float) -> bool:
+    """Whether a D_M is the least or the greatest that is looked at: then there is no best one between."""
+    low, high = limits(scans, sigma, dt)
+    return not low + 1e-3 < np.log10(variance) < high - 1e-3
+
+
+def objective(wanted: Best, sigma: np.ndarray) -> np.ndarray:
+    """What is to be least (B,), of σ (B, K, 3)."""
+    of = sigma[:, wanted.from_k - 1 :, COMPONENTS[wanted.minimise]]
+    if np.isnan(of).all():
+        raise ValueError("no filter has an estimate there")
+    if wanted.over == "last":
+        return of[:, -1]
+    return np.asarray(np.nanmax(of, axis=1) if wanted.over == "worst" else np.nanmean(of, axis=1))
+
+
+def errors(one: Filter, variances: np.ndarray, plots: Plots, x: np.ndarray, dt: float) -> np.ndarray:
+    """σ (B, K, 3) of a filter with each of the manoeuvre variances (B,); not-a-number where it has no estimate."""
+    observes, start = len(one.observes), one.plots_to_start
+    Q = np.stack([process_noise(one.process_noise, float(v), dt) for v in variances], axis=2)
+    if plots.detection < 1:
+        designs = (Design(observes, start, Q[..., i]) for i in range(len(variances)))
+        return np.stack([np.sqrt(mixture(design, plots, x, dt, FEW).moment) for design in designs])
+    return side_by_side(observes, start, Q, plots, x, dt)
+
+
+def side_by_side(observes: int, start: int, Q: np.ndarray, plots: Plots, x: np.ndarray, dt: float) -> np.ndarray:
+    """σ (B, K, 3) of filters that differ in Q (3, 3, B), on the truth x (K, 3), every scan with its plot."""
+    count, defect = Q.shape[2], predicted(x[:-1], dt) - x[1:]
+    information, sigma = Information(plots.inputs.shape[1]), np.full((count, len(x), 3), np.nan)
+    of_plot = np.sqrt(plots.sigma**2 + plots.bias**2 + plots.sigma_bias**2)
+    for k in range(start):
+        if k > 0:
+            information.predict(dt, defect[k - 1])
+        information.update(plots, observes)
+        sigma[:, k, :observes] = of_plot[:observes]
+    one = information.errors()
+    running = Errors(*(np.repeat(part, count, axis=2) for part in (one.P, one.S, one.E)))
+    sigma[:, start - 1] = np.sqrt(np.einsum("iib->bi", running.second_moments()))
+    for k in range(start, len(x)):
+        running.predict(dt, Q, defect[k - 1])
+        running.update(plots, observes)
+        sigma[:, k] = np.sqrt(np.einsum("iib->bi", running.second_moments()))
+    return sigma

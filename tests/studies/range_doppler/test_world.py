@@ -1,0 +1,357 @@
+"""P1's world beyond the paper: missed plots, biases, drawn starts, other targets and process noises, D_M looked for.
+
+Exact values against textbook filters over every pattern of plots; the kernel against a textbook filter over its own
+plots; then the sums of many realisations against the exact values.
+"""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from radarsim.app.configs import load
+from radarsim.physics.motion import process_noise
+from radarsim.studies.range_doppler import patterns, study, tuning
+from radarsim.studies.range_doppler.kernels import missed
+from radarsim.studies.range_doppler.propagation import Plots
+from tests.studies.range_doppler import naive
+
+SIGMAS = 5.85  # of all looks in this file, one in a million errs
+TURN = {
+    "kind": "turn",
+    "range_m": 6e4,
+    "speed_mps": 250,
+    "aspect_deg": 180,
+    "start_s": 35,
+    "acceleration_g": 1,
+    "duration_s": 20,
+}
+FLY_BY = {"kind": "fly_by", "distance_m": 15e3, "speed_mps": 300, "start_range_m": 40e3}
+SIGMA, DT, VARIANCE = np.array([60.0, 2.0]), 10.0, 0.05
+
+
+def prepared(**changes):
+    """The plan of a case of an S-band radar."""
+    radar = {"wavelength_m": 0.1, "sigma_range_m": SIGMA[0], "sigma_velocity_mps": SIGMA[1], "scan_period_s": DT}
+    filters = [
+        {"name": "r", "observes": ["range"], "manoeuvre_variance": VARIANCE},
+        {"name": "r+Vr", "observes": ["range", "velocity"], "manoeuvre_variance": VARIANCE},
+    ]
+    made = {"study": "range_doppler", "radar": radar, "target": TURN, "filters": filters, "scans": 9}
+    made["realisations"] = 1000
+    for key, value in changes.items():
+        if key == "every_filter":
+            made["filters"] = [one | value for one in filters]
+        else:
+            made[key] = made[key] | value if key == "radar" else value
+    return study.prepare(load(made).cases[0])
+
+
+def sums_of(plan, count, first=0):
+    """Sums of `count` realisations by name."""
+    values = [study.simulate(plan, i, min(plan.block, count - i)) for i in range(0, count, plan.block)]
+    return plan.layout.unpack(np.sum(values, axis=0) if not first else study.simulate(plan, first, count))
+
+
+# ---- one realisation ------------------------------------------------------------------------------------------------
+
+
+def textbook(plots, observes, start, Q, dt=DT, sigma=SIGMA):
+    """A filter over plots (K, 2), not-a-number where missed: estimates (K, 3) and covariances (K, 3, 3)."""
+    B, H, R = naive.transition(dt), np.eye(3)[:observes], np.diag(sigma[:observes] ** 2)
+    x, P, held = None, None, []
+    estimates, covariances = np.full((len(plots), 3), np.nan), np.full((len(plots), 3, 3), np.nan)
+    for k, z in enumerate(plots):
+        came = np.isfinite(z[0])
+        if x is not None:
+            x, P = B @ x, B @ P @ B.T + Q
+            if came:
+                K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
+                x, P = x + K @ (z[:observes] - H @ x), P - K @ H @ P
+        elif came:
+            held.append((k, z[:observes]))
+            estimates[k, :observes] = z[:observes]
+            if len(held) == start:
+                A = np.concatenate([H @ naive.transition((at - k) * dt) for at, _ in held])
+                W = np.kron(np.eye(start), np.linalg.inv(R))
+                P = np.linalg.inv(A.T @ W @ A)
+                x = P @ A.T @ W @ np.concatenate([value for _, value in held])
+        if x is not None:
+            estimates[k], covariances[k] = x, P
+    return estimates, covariances
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"radar": {"detection_probability": 0.7}},
+        {"radar": {"detection_probability": 0.6}, "every_filter": {"initial_scans": 4, "process_noise": "white_jerk"}},
+        {"radar": {"bias_range_m": 100, "sigma_bias_velocity_mps": 3, "sigma_bias_range_m": 50}},
+        {"target": {"kind": "polynomial", "coefficients": [5e4, -200], "sigma_coefficients": [1000, 50, 3]}},
+        {"radar": {"detection_probability": 0.5, "scan_period_s": 0.01}, "scans": 30},
+    ],
+)
+def test_each_realisation_is_that_of_a_textbook_filter(changes):
+    plan = prepared(**changes)
+    problem, dt = plan.problem, plan.problem.dt
+    assert isinstance(problem, missed.Problem)
+    Q = np.zeros((2, 3, 3))
+    Q[:, *np.triu_indices(3)] = problem.Q
+    Q = Q + np.triu(Q[0], 1).T
+    for realisation in (0, 1, 5, 1030):
+        plots, truth = missed.simulate_plots(problem, realisation)
+        sums = sums_of(plan, 1, realisation)
+        for f, observes in enumerate(problem.observes):
+            x, P = textbook(plots, observes, problem.start[f], Q[f], dt)
+            e = x - truth
+            there = np.isfinite(e)
+            np.testing.assert_array_equal(sums["estimates"][f] == 1, there)
+            scale = np.sqrt(np.nanmax(np.diagonal(P, axis1=1, axis2=2), axis=0))
+            found, wanted = sums["error"][f, ..., 0] / scale, np.where(there, e, 0) / scale
+            np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-7)
+            started = np.isfinite(P[:, 0, 0])
+            q = [e[k] @ np.linalg.solve(P[k], e[k]) / 3 for k in np.flatnonzero(started)]
+            np.testing.assert_allclose(sums["nees"][f, started, 1], q, rtol=1e-6)
+            own = np.diagonal(P, axis1=1, axis2=2)[started]
+            np.testing.assert_allclose(sums["believed"][f, started], own, rtol=1e-7)
+
+
+def test_with_every_plot_both_kernels_agree():
+    """What the paper's kernel computes, from the same noise."""
+    plain = prepared()
+    other = missed.Problem(
+        keys=np.stack([plain.problem.key] * 3),
+        truth=plain.problem.truth,
+        sigma=SIGMA,
+        bias=np.zeros(2),
+        sigma_bias=np.zeros(2),
+        sigma_state=np.zeros(3),
+        detection=1.0,
+        dt=DT,
+        observes=plain.problem.observes,
+        start=plain.problem.start,
+        Q=np.stack([process_noise("random_jerk", VARIANCE, DT)[np.triu_indices(3)]] * 2),
+        baseline=0,
+    )
+    sums = missed.Sums(**{name: np.zeros(shape) for name, shape in missed.shapes(2, 9).items()})
+    missed.simulate_block(other, 0, 1500, sums)
+    whole = sums_of(plain, 1500)
+    for name in ("error", "paired", "cross"):
+        size = np.abs(whole[name]).max(axis=(0, 1))
+        np.testing.assert_allclose(getattr(sums, name) / size, whole[name] / size, rtol=1e-9, atol=1e-9)
+    assert (sums.estimates[plain.axes.available] == 1500).all()
+
+
+# ---- exact values ---------------------------------------------------------------------------------------------------
+
+
+def over_all_patterns(truth, observes, start, Q, plots, scans):
+    """Probability of an estimate, means of e, e², e⁴ and of eᵀP⁻¹e/3 by brute force: each pattern's textbook filter.
+
+    The error is linear in the plots' errors, so that its covariance follows from the answers to one error each.
+    """
+    p, sums = plots.detection, [np.zeros((scans, 3)) for _ in range(4)]
+    nees, started = np.zeros(scans), np.zeros(scans)
+    exact_plots = truth[:, :2] + plots.bias
+    for pattern in itertools.product((True, False), repeat=scans):
+        came = np.array(pattern)
+        weight = p ** came.sum() * (1 - p) ** (~came).sum()
+
+        def errors(z, came=came):
+            return textbook(np.where(came[:, None], z, np.nan), observes, start, Q)
+
+        x, P = errors(exact_plots)
+        answers = []
+        for m, k in itertools.product(range(observes), np.flatnonzero(came)):
+            z = exact_plots.copy()
+            z[k, m] += 1000 * plots.sigma[m]
+            answers.append((errors(z)[0] - x) / 1000)
+        for m in np.flatnonzero(plots.sigma_bias):
+            z = exact_plots.copy()
+            z[:, m] += 1000 * plots.sigma_bias[m]
+            answers.append((errors(z)[0] - x) / 1000)
+        b, S = x - truth, np.zeros((scans, 3, 3))
+        for answer in answers:
+            S += answer[:, :, None] * answer[:, None, :]
+        there = np.isfinite(b)
+        b, v = np.where(there, b, 0), np.where(there, np.diagonal(S, axis1=1, axis2=2), 0)
+        for total, value in zip(sums, (1.0, b, v + b**2, 3 * v**2 + 6 * v * b**2 + b**4), strict=True):
+            total += weight * there * value
+        for k in np.flatnonzero(np.isfinite(P[:, 0, 0])):
+            started[k] += weight
+            M = S[k] + np.outer(b[k], b[k])
+            nees[k] += weight * np.trace(np.linalg.solve(P[k], M)) / 3
+    with np.errstate(invalid="ignore"):
+        return sums[0], *(total / sums[0] for total in sums[1:]), nees / started
+
+
+@pytest.fixture(scope="module")
+def seven():
+    """Both filters over every pattern of seven scans, by brute force."""
+    plan = prepared(radar={"detection_probability": 0.75, "bias_velocity_mps": 1, "sigma_bias_range_m": 30}, scans=7)
+    plots = Plots(SIGMA, np.array([0.0, 1.0]), np.array([30.0, 0.0]), 0.75)
+    Q = process_noise("random_jerk", VARIANCE, DT)
+    truth = plan.problem.truth
+    return plan, [over_all_patterns(truth, observes, start, Q, plots, 7) for observes, start in ((1, 3), (2, 2))]
+
+
+def test_exact_values_are_the_means_over_all_patterns(seven):
+    plan, known = seven
+    for f, (available, bias, moment, _, nees) in enumerate(known):
+        there = available > 0
+        np.testing.assert_array_equal(plan.axes.available[f], there)
+        np.testing.assert_allclose(plan.axes.exact_sigma[f][there], np.sqrt(moment[there]), rtol=1e-8)
+        np.testing.assert_allclose(plan.axes.exact_bias[f][there], bias[there], rtol=1e-7, atol=1e-6)
+        np.testing.assert_allclose(plan.axes.exact_nees[f], nees, rtol=1e-7)
+
+
+def test_missed_plots_as_often_as_the_exact_values_say(seven):
+    plan, known = seven
+    count = 60_000
+    sums = sums_of(plan, count)
+    for f, (available, _, moment, fourth, _) in enumerate(known):
+        np.testing.assert_allclose(sums["estimates"][f] / count, available, rtol=0, atol=SIGMAS * 0.5 / np.sqrt(count))
+        there = available > 0
+        n = sums["estimates"][f][there]
+        sigma = np.sqrt(sums["error"][f, ..., 1][there] / n)
+        # Errors of many patterns have heavier tails than a Gaussian's: (m₄/m₂² − 1)/4n in place of 1/2n.
+        spread = np.sqrt((fourth[there] / moment[there] ** 2 - 1) / (4 * n))
+        assert (np.abs(sigma / np.sqrt(moment[there]) - 1) < SIGMAS * spread).all()
+
+
+def test_gain_is_of_those_that_have_both_estimates(seven):
+    """At the second scan: of realisations in which it came, of which some had the first as well."""
+    from types import SimpleNamespace
+
+    from radarsim.engine.results import CaseResult
+    from radarsim.studies.range_doppler import tables
+    from radarsim.studies.range_doppler.filters import least_squares_start
+
+    plan, _ = seven
+    spec = SimpleNamespace(radar=SimpleNamespace(detection_probability=0.75))
+    result = CaseResult("a", "range_doppler", spec, (), 60_000, sums_of(plan, 60_000), plan.axes)
+    rows = tables.gains([result])
+    row = rows[(rows["component"] == "r") & (rows["k"] == 2)].iloc[0]
+    # With one plot both have σ² + 30²; with two the filter with Doppler has its start, which the velocity's bias moves.
+    weights, P = least_squares_start(2, 2, SIGMA, DT)
+    S = P[0, 0] + weights[0, 1].sum() ** 2 + 30.0**2
+    expected = 100 * (1 - np.sqrt((0.75 * S + 0.25 * (SIGMA[0] ** 2 + 30**2)) / (SIGMA[0] ** 2 + 30**2)))
+    assert row["exact_percent"] == pytest.approx(expected, rel=1e-9)
+    assert row["gain_lo"] - 1 < expected < row["gain_hi"] + 1
+
+
+def test_merging_patterns_keeps_the_means():
+    truth = prepared(scans=17).problem.truth
+    plots = Plots(SIGMA, np.zeros(2), np.array([10.0, 1.0]), 0.8)
+    for observes, start in ((1, 3), (2, 2)):
+        design = patterns.Design(observes, start, process_noise("random_jerk", VARIANCE, DT))
+        whole, merged = (patterns.mixture(design, plots, truth, DT, most) for most in (1 << 17, 2048))
+        np.testing.assert_allclose(np.sqrt(merged.moment), np.sqrt(whole.moment), rtol=patterns.CLOSE / 4)
+        assert patterns.close(whole.moment, merged.moment)[start:].all()
+
+
+def test_where_patterns_are_too_many_nothing_is_called_exact(monkeypatch):
+    monkeypatch.setattr(study, "PATTERN_SCANS", 8)
+    assert np.isnan(prepared(radar={"detection_probability": 0.75}).axes.exact_sigma).all()
+
+
+def test_a_biased_range_moves_the_range_alone():
+    """No filter can tell a range that is too long from a target that is farther away."""
+    plain, biased = prepared(), prepared(radar={"bias_range_m": 70})
+    np.testing.assert_allclose(biased.axes.exact_bias[..., 0] - plain.axes.exact_bias[..., 0], 70, rtol=1e-9)
+    for c in (1, 2):
+        there = plain.axes.available[..., c]
+        np.testing.assert_allclose(
+            biased.axes.exact_sigma[..., c][there], plain.axes.exact_sigma[..., c][there], rtol=1e-9
+        )
+
+
+WORLDS = {
+    "biases": {"radar": {"bias_range_m": 40, "bias_velocity_mps": -2}},
+    "drawn biases": {"radar": {"sigma_bias_range_m": 50, "sigma_bias_velocity_mps": 3, "bias_velocity_mps": 1}},
+    "drawn start": {"target": {"kind": "polynomial", "coefficients": [9e4], "sigma_coefficients": [1e3, 200, 5]}},
+    "fly-by": {"target": FLY_BY, "scans": 25},
+    "white jerk": {"every_filter": {"process_noise": "white_jerk"}},
+    "white acceleration": {"every_filter": {"process_noise": "white_acceleration"}},
+    "random jerk": {},
+}
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_sums_agree_with_the_exact_errors(name):
+    plan, count = prepared(**WORLDS[name]), 20_000
+    sums, there = sums_of(plan, count), plan.axes.available
+    sigma = np.sqrt(sums["error"][..., 1] / count)[there]
+    assert np.abs(sigma / plan.axes.exact_sigma[there] - 1).max() < SIGMAS / np.sqrt(2 * count)
+    bias = (sums["error"][..., 0] / count)[there]
+    assert (np.abs(bias - plan.axes.exact_bias[there]) < SIGMAS * sigma / np.sqrt(count)).all()
+
+
+def test_a_drawn_start_changes_no_error():
+    drawn, fixed = prepared(**WORLDS["drawn start"]), prepared(target={"kind": "polynomial", "coefficients": [9e4]})
+    np.testing.assert_array_equal(drawn.axes.exact_sigma, fixed.axes.exact_sigma)
+
+
+def test_a_recorded_flight_is_seen_from_the_origin(tmp_path, monkeypatch):
+    """A straight flight past the radar, recorded without error, is the fly-by."""
+    monkeypatch.chdir(tmp_path)
+    t = np.arange(0, 95.0, 1.0)
+    x = 300 * t - np.sqrt(40e3**2 - 15e3**2)
+    rows = [f"{a},{b},9000,12000" for a, b in zip(t, x, strict=True)]
+    (tmp_path / "flight.csv").write_text("t_s,x_m,y_m,z_m\n" + "\n".join(rows) + "\n")
+    recorded = prepared(target={"kind": "recorded", "file": "flight.csv"}).problem.truth
+    flown = prepared(target=FLY_BY).problem.truth
+    np.testing.assert_allclose(recorded[:, :2], flown[:, :2], rtol=1e-5, atol=0.05)
+
+
+# ---- D_M that is looked for -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("over", ["worst", "mean", "last"])
+@pytest.mark.parametrize("observes", [["range"], ["range", "velocity"]])
+def test_the_best_variance_is_that_of_a_dense_grid(over, observes):
+    wanted = {"minimise": "sigma_r", "over": over, "from_k": 4}
+    one = {"name": "a", "observes": observes, "process_noise": "white_jerk"}
+    plan = prepared(filters=[one | {"manoeuvre_variance": wanted}], target=TURN | {"acceleration_g": 3}, scans=15)
+    found = float(plan.axes.manoeuvre_variance[0])
+
+    def cost(variance):
+        sigma = prepared(
+            filters=[one | {"manoeuvre_variance": float(variance)}], target=TURN | {"acceleration_g": 3}, scans=15
+        ).axes.exact_sigma[0, 3:, 0]
+        return {"worst": sigma.max(), "mean": sigma.mean(), "last": sigma[-1]}[over]
+
+    grid = [cost(10.0**power) for power in np.arange(-6, 4, 0.1)]
+    assert cost(found) <= min(grid) * (1 + 1e-6)
+
+
+def test_the_best_variance_with_missed_plots():
+    wanted = {"minimise": "sigma_r", "over": "mean"}
+    one = {"name": "a", "observes": ["range", "velocity"]}
+    radar = {"detection_probability": 0.8}
+    plan = prepared(filters=[one | {"manoeuvre_variance": wanted}], radar=radar)
+    found = float(plan.axes.manoeuvre_variance[0])
+    cost = [
+        prepared(filters=[one | {"manoeuvre_variance": found * f}], radar=radar).axes.exact_sigma[0, 2:, 0].mean()
+        for f in (1, 0.5, 2)
+    ]
+    assert cost[0] < min(cost[1:])
+
+
+def test_without_a_manoeuvre_the_best_variance_is_the_least():
+    wanted = {"minimise": "sigma_r", "over": "last"}
+    one = {"name": "a", "observes": ["range"], "manoeuvre_variance": wanted}
+    plan = prepared(filters=[one], target={"kind": "polynomial", "coefficients": [9e4, -200, 1]})
+    assert tuning.at_a_limit(float(plan.axes.manoeuvre_variance[0]), 9, SIGMA, DT)
+
+
+def test_the_papers_noise_keeps_its_key():
+    """Keys at their defaults change neither noise nor identity: an older config draws what it drew."""
+    from radarsim.config.identity import canonical, world
+
+    given = load("rls2", ["radar.detection_probability=1", "radar.bias_range_m=0", "target.sigma_coefficients=[]"])
+    plain = load("rls2").cases[0].spec
+    assert world(given.cases[0].spec) == world(plain)
+    assert canonical(given.cases[0].spec) == canonical(plain)
+    assert "detection_probability" not in world(plain)["radar"]
+    assert world(load("rls2", ["radar.detection_probability=0.9"]).cases[0].spec) != world(plain)
