@@ -266,6 +266,6 @@ def _grouped(patterns: _Patterns, cell: np.ndarray) -> _Patterns:
 
 
 def close(fine: np.ndarray, coarse: np.ndarray) -> np.ndarray:
-    """Where means of e² are known: merging to a quarter as many patterns changes σ by less than CLOSE."""
+    """Where means of e² (any shape) are known: merging to a quarter as many patterns changes σ by less than CLOSE."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.abs(np.sqrt(coarse / fine) - 1) < CLOSE

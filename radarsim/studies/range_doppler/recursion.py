@@ -12,7 +12,12 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.physics.motion import (
+    acceleration_step_covariance,
+    manoeuvre_covariance,
+    transition,
+    white_jerk_covariance,
+)
 from radarsim.studies.range_doppler.exact import start_errors
 from radarsim.studies.range_doppler.filters import least_squares_start, observation
 
@@ -46,11 +51,8 @@ def covariance_of(form: Form, variance: float, sigma_range_m: float, dt: float) 
     if form == "normalised":
         return manoeuvre_covariance(variance * sigma_range_m**2, dt)
     if form == "acceleration_step":
-        g = np.array([dt**2 / 2, dt, 1.0])
-        return variance * np.outer(g, g)
-    density = variance * dt if form == "white_jerk_rate" else variance
-    powers = [[dt**5 / 20, dt**4 / 8, dt**3 / 6], [dt**4 / 8, dt**3 / 3, dt**2 / 2], [dt**3 / 6, dt**2 / 2, dt]]
-    return density * np.array(powers)
+        return acceleration_step_covariance(variance / dt**2, dt)
+    return white_jerk_covariance(variance if form == "white_jerk_rate" else variance / dt, dt)
 
 
 def started(start: Start, observes: int, sigma: np.ndarray, dt: float, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -33,7 +33,7 @@ def manoeuvre_variances(filters: tuple[Filter, ...], plots: Plots, x: np.ndarray
 
 
 def best(one: Filter, wanted: Best, plots: Plots, x: np.ndarray, dt: float) -> float:
-    """The manoeuvre variance that a filter's config asks for, (m/s³)²."""
+    """The manoeuvre variance that a filter's config asks for, (m/s³)², on the truth x (K, 3)."""
     low, high = limits(len(x), plots.sigma, dt)
     whole = plots._replace(detection=1.0)
 
@@ -59,14 +59,14 @@ def closer(grid: np.ndarray, cost: Callable[[np.ndarray], np.ndarray], times: in
 
 
 def limits(scans: int, sigma: np.ndarray, dt: float) -> tuple[float, float]:
-    """Logarithms to ten of the least and the greatest D_M that are looked at."""
+    """Logarithms to ten of the least and the greatest D_M that are looked at; sigma (2,) of the plots."""
     unit = sigma[0] ** 2 / dt**6
     least = min(LEAST, (3.0 * scans) ** -6)
     return float(np.log10(least * unit)), float(np.log10(min(MOST * unit, TO_VELOCITY * sigma[1] ** 2 / dt**4)))
 
 
 def at_a_limit(variance: float, scans: int, sigma: np.ndarray, dt: float) -> bool:
-    """Whether a D_M is the least or the greatest that is looked at: then there is no best one between."""
+    """Whether a D_M is the least or the greatest that is looked at: then there is no best one between; sigma (2,)."""
     low, high = limits(scans, sigma, dt)
     return not low + 1e-3 < np.log10(variance) < high - 1e-3
 
