@@ -144,7 +144,8 @@ class _One:
 
 class PlotLikelihood:
     """How likely tracks are under a filter's model: range and velocity of independent errors, acceleration that the
-    filter's process noise changes. The state before the first plot is taken as unknown, whatever start the config states."""
+    filter's process noise changes. The state before the first plot is taken as unknown, whatever start the config
+    states."""
 
     def __init__(self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]):
         most = max(len(f.observes) for f in case.spec.filters)
