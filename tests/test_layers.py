@@ -57,6 +57,7 @@ ROLES = {
     "measures": ((*GROUND, *DATA, "report"), READ),
     "readings": ((*GROUND, *DATA, "report"), READ),  # what the paper leaves open
     "search": ((*GROUND, *DATA, "report"), READ),  # its printed numbers under many readings
+    "chart": ((*GROUND, *DATA, "report"), READ),
     "track": ((*GROUND, *DATA, "studies.noise", "studies.interface"), (*SUMS, "track")),
     "map": ((*GROUND, *DATA), (*SUMS, "track")),  # one realisation followed as recorded plots are, for a figure
     "part": (

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+    from radarsim.app.chart import Drawn
     from radarsim.app.inventory import Inventory
     from radarsim.app.outlook import Outlook
     from radarsim.app.result import Result
@@ -74,6 +75,11 @@ def outlook(experiment: "Experiment", one: "Outlook") -> dict[str, Any]:
 def answer(one: "Answer") -> dict[str, Any]:
     """What was solved for: the value with its interval, or the limit where it is not attainable."""
     return {**asdict(one), "quantity": one.quantity.words}
+
+
+def drawn(one: "Drawn") -> dict[str, Any]:
+    """A chart: the sentences, the rows of chart.csv, and the files."""
+    return {"folder": str(one.folder), "sentences": one.sentences, "cases": one.rows, "files": one.files}
 
 
 def inventory(tables: "Inventory") -> dict[str, list[dict[str, str]]]:

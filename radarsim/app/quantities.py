@@ -156,11 +156,10 @@ def _rows(quantity: Quantity, result: CaseResult) -> "pd.DataFrame":
     """
     study, name = registry.study(result.study), quantity.of.table
     table: Any
-    if name == "curves":
-        table = study.curves([result])
+    if name == "gains":
+        table = common.gains([result])
     else:
-        made = study.tables([result])
-        table = made.get(name) if name in made or name != "gains" else common.gains([result])
+        table = study.curves([result]) if name == "curves" else study.tables([result]).get(name)
     if table is None:
         raise ConfigError(f"{result.name}: study {result.study} knows no {quantity.of.words}: it makes no {name}.csv")
     table = table[table["filter"] == quantity.filter]

@@ -370,6 +370,7 @@ def boundary(asked: Question, curve: Curve, x: float) -> tuple[str, ...]:
 # ---- by sampling ----------------------------------------------------------------------------------------------------
 PILOT_SHARE, PILOT_LEAST = 16, 200  # realisations of the scan: a share of all, but not fewer
 PILOT_POINTS = 13
+MOST_STEPS = 3  # of the scan, by which the pilot's noise may have moved a crossing
 RESIDUE = 0.02  # of its interval: how near a sampled quantity is brought to the target, so that the noise decides
 
 
@@ -385,10 +386,11 @@ def _by_sampling(asked: Question, curve: Curve) -> Answer:
     refuse_without_effect(asked, [y for _, y in known])
     attained_now = curve.simulated(None, count).value
     answer = partial(_answer, asked, attained_now, exact=False)
-    brackets = [pair for pair in map(partial(_bracket, asked, curve, grid), _changes(scanned)) if pair is not None]
+    best, _ = min(known, key=lambda one: abs(one[1]))
+    places = _changes(scanned) or [grid.index(best)]
+    brackets = [pair for pair in map(partial(_bracket, asked, curve, grid), places) if pair is not None]
     found = [_interval(asked, curve, *pair) for pair in dict.fromkeys(brackets)]
     if not found:
-        best = min((x for x, _ in known), key=lambda x: abs(curve.simulated(x, pilot).value - asked.equals))
         limit = curve.simulated(best, count)
         near = limit.lo <= asked.equals <= limit.hi
         doubt = f"its 95 % interval, {limit.lo:.4g} to {limit.hi:.4g} {asked.unit}, holds the target: -n decides"
@@ -414,9 +416,9 @@ def _bracket(
 ) -> tuple[tuple[float, float], tuple[float, float]] | None:
     """Neighbouring places of the grid between which the quantity crosses the target with all realisations.
 
-    About the place i where the pilot saw it cross, which the noise may have moved by a step.
+    About the place i where the pilot saw it cross or come nearest, from which the noise may have moved it by steps.
     """
-    for j in (i, i - 1, i + 1):
+    for j in sorted(range(i - MOST_STEPS, i + MOST_STEPS + 1), key=lambda j: abs(j - i)):
         if not 0 <= j < len(grid) - 1:
             continue
         ends = [(x, curve.simulated(x, curve.realisations).value - asked.equals) for x in grid[j : j + 2]]

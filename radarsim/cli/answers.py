@@ -7,6 +7,7 @@ from radarsim.cli.console import say
 from radarsim.report.text import significant_digits
 
 if TYPE_CHECKING:
+    from radarsim.app.chart import Drawn
     from radarsim.app.solve import Answer
 
 PLAIN = ".6g"
@@ -43,6 +44,17 @@ def unattained(answer: "Answer") -> list[str]:
         f"{_with_unit(at, answer.unit)}"
     ]
     return [*lines, *(f"note: {note}" for note in answer.notes)]
+
+
+def print_drawn(drawn: "Drawn") -> None:
+    """Where each case lies, a line each, and what was written."""
+    for line in drawn.sentences:
+        say(line)
+    kinds = sorted(name for name in drawn.files if name.endswith((".svg", ".png", ".pdf")))
+    if kinds:
+        say(f"figures  {drawn.folder} ({', '.join(kinds)})")
+    say(f"table    {drawn.folder / 'chart.csv'}")
+    say(f"page     {drawn.folder / 'chart.html'}")
 
 
 def slope(answer: "Answer") -> str:

@@ -1,10 +1,21 @@
-"""Commands that put the question the other way round. Heavy imports wait inside the commands."""
+"""Commands for a design: which value attains what is wanted, where a radar lies. Heavy imports wait inside them."""
 
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from radarsim.cli.group import config_argument, json_option, main, realisations_option, seed_option, set_option
+from radarsim.cli.group import (
+    completed,
+    config_argument,
+    figures_option,
+    format_option,
+    json_option,
+    main,
+    out_option,
+    realisations_option,
+    seed_option,
+    set_option,
+)
 
 if TYPE_CHECKING:
     from radarsim.app.quantities import Quantity
@@ -120,3 +131,41 @@ def asked(kinds: "dict[str, str | None]", filter_name: str | None, at_s: float |
         raise click.UsageError(f"--{kind.replace('_', '-')} names the filter itself: leave --filter out")
     component, chosen = (name, filter_name) if of_component else (None, name)
     return Quantity(kind, chosen, component, at_s, at_k)
+
+
+@main.command()
+@click.argument("configs", nargs=-1, metavar="[CONFIG…]", shell_complete=completed)
+@set_option
+@out_option
+@figures_option
+@format_option
+@json_option
+def chart(
+    configs: tuple[str, ...],
+    overrides: tuple[str, ...],
+    out: str,
+    no_figures: bool,
+    formats: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """What Doppler gains for every radar, and yours on it; simulates nothing.
+
+    Gains over time and in the long run against c = (σ_r/σ_V)² (D_M/σ_r²)^(1/3), on which alone they depend as the scan
+    period becomes short, a map with the period in it, and a sentence where each case of CONFIG lies. Also
+    DIR/chart/chart.html, a page of its own with sliders, which computes σ(k) and gains of any radar as they move.
+
+    \b
+    Examples
+      radarsim chart                              the first paper's five radars
+      radarsim chart rls2 --set radar.sigma_velocity_mps=5
+    """
+    from radarsim.app import chart as drawing
+    from radarsim.app import documents
+    from radarsim.cli import answers
+
+    kinds = () if no_figures else formats or ("svg", "png")
+    drawn = drawing.chart(configs, out, overrides=overrides, formats=kinds)
+    if as_json:
+        click.echo(documents.text(documents.drawn(drawn)))
+    else:
+        answers.print_drawn(drawn)

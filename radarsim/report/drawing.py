@@ -3,9 +3,14 @@
 Nothing here knows how it is drawn (report/figures.py does).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 COLUMN_MM = 85.0  # one column of a journal page
 PAGE_MM = 175.0  # two columns
@@ -134,3 +139,16 @@ class Figure:
     width_mm: float = COLUMN_MM
     panel_height_mm: float = 62.0
     share_y: bool = False
+
+
+@dataclass(frozen=True)
+class Chart:
+    """One chart for every device of a study: figures by their name, a table, a sentence for each case, a live page.
+
+    page is the text of one self-contained HTML file.
+    """
+
+    figures: Mapping[str, Figure]
+    table: "pd.DataFrame"
+    sentences: tuple[str, ...]
+    page: str

@@ -195,6 +195,19 @@ def _file(name: str) -> str:
     return resources.files("radarsim.report").joinpath("templates", name).read_text(encoding="utf-8")
 
 
+def live(title: str, body: str, style: str, script: str, data: str) -> str:
+    """A self-contained page that computes: a study's own body, style and script, and its data as JSON.
+
+    Body, style and script are files of the package and stand as they are; the data cannot end its element.
+    """
+    from markupsafe import Markup
+
+    digest = "sha256-" + base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    safe = Markup(data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+    own = {"title": title, "body": Markup(body), "own_style": Markup(style), "own_script": Markup(script)}
+    return whole("live.html.j2", own_script_hash=digest, data=safe, **own)
+
+
 def whole(template: str, **content: object) -> str:
     """A page from a template, with the style and the script that all pages share."""
     from markupsafe import Markup

@@ -23,6 +23,7 @@ A study that follows this declares an object and writes no class:
 | `seconds_per_update`, if offered | the function of `cost` |
 | `readings`, if offered | an object of the class `readings.Readings` |
 | `recorded`, if offered | an object of the class `track.Recorded` |
+| `chart`, if offered | the function of `chart` |
 | `shipped`, if offered | the folder `shipped` |
 
 A file is imported when a part of it is first asked for, so that `radarsim list` loads no kernels.
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
     from radarsim.engine.results import CaseResult
     from radarsim.report.claims import PaperClaims
     from radarsim.report.claims.readings import PaperReadings
-    from radarsim.report.drawing import Figure
+    from radarsim.report.drawing import Chart, Figure
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -133,6 +134,11 @@ class StudyFolder(Study):
     # ---- beside --------------------------------------------------------------------------------------------------
     def recorded(self) -> RecordedPlots | None:
         return self.file("track").Recorded() if "recorded" in self.offers else super().recorded()
+
+    def chart(self, cases: "Sequence[Case]", references: "Sequence[Case]") -> "Chart | None":
+        return (
+            self.file("chart").chart(cases, references) if "chart" in self.offers else super().chart(cases, references)
+        )
 
     def shipped(self) -> Path | None:
         (folder,) = import_module(self.package).__path__

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from radarsim.engine.results import Axes, CaseResult, Track
     from radarsim.report.claims import PaperClaims
     from radarsim.report.claims.readings import PaperReadings
-    from radarsim.report.drawing import Figure
+    from radarsim.report.drawing import Chart, Figure
 
 
 class Plan(Protocol):
@@ -126,7 +126,9 @@ class Paper(NamedTuple):
     may_grow: tuple[str, ...] = ()
 
 
-OptionalPart = Literal["curves", "inputs", "cost", "seconds_per_update", "readings", "recorded", "shipped", "warnings"]
+OptionalPart = Literal[
+    "curves", "inputs", "cost", "seconds_per_update", "readings", "recorded", "shipped", "warnings", "chart"
+]
 
 
 class Study(ABC):
@@ -220,6 +222,10 @@ class Study(ABC):
     # ---- beside --------------------------------------------------------------------------------------------------
     def recorded(self) -> RecordedPlots | None:
         """What it does with recorded plots. Default: nothing; `track` and `simulate` refuse its configs."""
+        return None
+
+    def chart(self, cases: "Sequence[Case]", references: "Sequence[Case]") -> "Chart | None":
+        """One chart for every device, with these cases on it, and others to compare with. Default: none."""
         return None
 
     def shipped(self) -> Path | None:

@@ -12,5 +12,5 @@ STUDY = StudyFolder(
         "observes: [range, velocity]": "the same on range and radial velocity, started on two scans",
     },
     paper=Paper("Gorshkov & Zavizhenets 2017", page="range_doppler"),
-    offers=("inputs", "readings", "recorded"),
+    offers=("inputs", "readings", "recorded", "chart"),
 )

@@ -2,14 +2,17 @@
 
 With τ₁ = σ_r/σ_V and τ₂ = (σ_r²/D_M)^(1/6) a gain depends on k, C_θ = (τ₁/Δt)² and Λ = (Δt/τ₂)³ alone. As Δt → 0 the
 plots become white noise of density σ_r²Δt and σ_V²Δt, the manoeuvre a white jerk of density D_M Δt, and what is left is
-t/τ₂ and c = (τ₁/τ₂)². Derived in docs/range_doppler.md, tested against the recursion.
+t/τ₁ and c = (τ₁/τ₂)². Derived in docs/chart.md, tested against the recursion.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-MOTION = np.diag([1.0, 1.0], 1)  # of (r, V, a) over time
+# Gains with the first order of the period are within ERROR_POINTS of the recursion's where Δt/τ₁ and Δt/τ₂ are at most
+# SMALL and c at most LARGEST: beyond, the fastest root of the error, ~ √2 c^(1/4)/τ₂, is no longer slow against a scan.
+SMALL, LARGEST = 0.05, 1000.0
+ERROR_POINTS = 0.15
 
 
 class Groups(NamedTuple):
@@ -32,50 +35,71 @@ def filter_memory(sigma_range_m: float, manoeuvre_variance: float) -> float:
     return float((sigma_range_m**2 / manoeuvre_variance) ** (1 / 6))
 
 
-def error_polynomial(c: float) -> np.ndarray:
-    """Coefficients (4,), highest power first, of the limit filter's error in units of τ₂: s³ + a₂s² + (a₂²/2)s + 1.
+def damping(c: np.ndarray | float) -> np.ndarray:
+    """A, the greatest root of A⁴ − 8A = 4c for c ≥ 0, of any shape, to rounding (Newton's method from above)."""
+    c = np.asarray(c, dtype=float)
+    A = 2.0 + np.sqrt(2.0) * c**0.25
+    for _ in range(60):
+        A = A - (A**4 - 8 * A - 4 * c) / (4 * A**3 - 8)
+    return A
 
-    Of range and velocity, c > 0, a₂ is the positive root of a₂⁴ − 8a₂ = 4c; of the range alone c = 0 and a₂ = 2.
+
+def error_polynomial(c: float) -> np.ndarray:
+    """Coefficients (4,), highest power first, of the limit filter's error in units of τ₂: s³ + As² + (A²/2)s + 1.
+
+    Of range and velocity, c > 0, A is `damping`; of the range alone c = 0 and A = 2.
     """
-    roots = np.roots([1.0, 0.0, 0.0, -8.0, -4.0 * c])
-    a2 = float(max(root.real for root in roots if abs(root.imag) < 1e-9))
-    return np.array([1.0, a2, a2**2 / 2, 1.0])
+    A = float(damping(c))
+    return np.array([1.0, A, A**2 / 2, 1.0])
+
+
+def believed(c: np.ndarray | float) -> np.ndarray:
+    """Steady covariance (3, 3, …) that the limit filter believes, over σ_r² Δt/τ₂ and powers of τ₂: rational in A.
+
+    The solution of the algebraic Riccati equation; derived in docs/chart.md.
+    """
+    A = damping(c)
+    X = A**3
+    W = X**2 - 8 * X + 8
+    p11, p12, p13, p22 = 2 * A * (X - 4) / W, 4 * A**2 / W, 8 / W, 4 * (X - 2) / W
+    p33 = p12 * p13 + A * (X - 8) / 4 * p22 * p11
+    return np.array([[p11, p12, p13], [p12, p22, p11], [p13, p11, p33]])
 
 
 def steady_gain(c: float) -> np.ndarray:
     """Gain (3, 2) of the limit filter on range and velocity, in units of σ_r and τ₂; c = 0: the second column is zero.
 
-    From the algebraic Riccati equation; the error that it leaves has the characteristic polynomial `error_polynomial`.
+    The error that it leaves has the characteristic polynomial `error_polynomial`.
     """
-    from scipy.linalg import solve_continuous_are
-
-    H = np.eye(3)[:2] * np.array([[1.0], [np.sqrt(c)]])
-    Q = np.diag([0.0, 0.0, 1.0])
-    P = solve_continuous_are(MOTION.T, H.T, Q, np.eye(2))
-    return P[:, :2] * np.array([1.0, c])
+    return believed(c)[:, :2] * np.array([1.0, c])
 
 
-def noise_variances(c: float) -> np.ndarray:
-    """σ_r², σ_V², σ_a² (3,) of the limit filter on a quadratic truth, over σ_r² Δt/τ₂ · (1, τ₂⁻², τ₂⁻⁴).
+def noise_variances(c: np.ndarray | float, step: np.ndarray | float = 0.0) -> np.ndarray:
+    """σ_r², σ_V², σ_a² (3, …) of the limit filter on a quadratic truth, over σ_r² Δt/τ₂ · (1, τ₂⁻², τ₂⁻⁴).
 
-    Of the range alone, c = 0, they are 5/3, 3/2, 1/3. Solved from the Lyapunov equation of the noise that the gain
-    lets through: no manoeuvre is in it.
+    Of the range alone, c = 0, they are 5/3, 3/2, 1/3. They are what the filter believes, less what the manoeuvre would
+    add that such a truth has not. step is Δt/τ₂, of which the first order is kept: half a scan of extrapolation.
     """
-    from scipy.linalg import solve_continuous_lyapunov
+    A, P = damping(c), believed(c)
+    X, p11 = A**3, P[0, 0]
+    b, d = A**2 / 2 - A * (X - 8) / 4 * p11, X - 2
+    of_range = P[0, 0] - P[0, 2] ** 2 * A / d - step * (P[0, 1] - P[0, 2] * p11 * A / d)
+    of_velocity = P[1, 1] - (1 + p11**2 * A) / d - step * (P[1, 2] - (A - p11 + p11 * b * A) / d)
+    return np.array([of_range, of_velocity, P[2, 2] - (1.5 * A**2 - 2 * b + b**2 * A) / d])
 
-    K = steady_gain(c)
-    closed = MOTION - np.column_stack([K, np.zeros(3)])
-    noise = np.diag([1.0, 1 / c if c else 0.0])
-    return np.diag(solve_continuous_lyapunov(closed, -K @ noise @ K.T))
 
+def steady_gains(c: np.ndarray | float, step: np.ndarray | float = 0.0) -> np.ndarray:
+    """Relative gains (3, …) of range, velocity, acceleration by the velocity in the limit, %: functions of c alone.
 
-def steady_gains(c: float) -> np.ndarray:
-    """Relative gains (3,) of range, velocity, acceleration by the velocity in the limit, %: functions of c alone."""
-    return 100 * (1 - np.sqrt(noise_variances(c) / noise_variances(0.0)))
+    With the first order of the period, step = Δt/τ₂, within ERROR_POINTS of the recursion up to SMALL and LARGEST.
+    """
+    with np.errstate(invalid="ignore"):
+        return 100 * (1 - np.sqrt(noise_variances(c, step) / noise_variances(np.zeros_like(c, dtype=float), step)))
 
 
 def no_acceleration_gain() -> float:
-    """The c at which the gain in acceleration changes its sign: below it the velocity costs accuracy. 0.698."""
-    from scipy.optimize import brentq
-
-    return float(brentq(lambda c: steady_gains(c)[2], 0.1, 10.0, xtol=1e-12))
+    """The c at which the gain in acceleration changes its sign, to rounding: below it the velocity costs accuracy."""
+    low, high = 0.5, 1.0
+    while (c := (low + high) / 2) not in (low, high):
+        low, high = (c, high) if steady_gains(c)[2] < 0 else (low, c)
+    return c

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from radarsim.studies.range_doppler import closed_form, exact, recursion
 from radarsim.studies.range_doppler.measures import RADARS
@@ -31,11 +32,34 @@ def test_gains_depend_on_the_scan_and_the_two_groups_alone():
         np.testing.assert_allclose(own, other, atol=1e-6 * (1 + abs(own).max()))
 
 
-@pytest.mark.parametrize("c", [0.1, 0.698, 3.0, 30.0, 300.0])
-def test_the_error_polynomial_is_that_of_the_riccati_gain(c):
-    K = closed_form.steady_gain(c)
-    closed = closed_form.MOTION - np.column_stack([K, np.zeros(3)])
-    np.testing.assert_allclose(np.poly(closed), closed_form.error_polynomial(c), rtol=1e-9)
+MOTION = np.diag([1.0, 1.0], 1)  # of (r, V, a) over time, in units of τ₂
+
+
+def riccati(c):
+    """Covariance that the limit filter believes and its gain on range and velocity, by SciPy."""
+    H, R = np.eye(3)[: 2 if c else 1], np.diag([1.0, 1 / c] if c else [1.0])
+    P = scipy.linalg.solve_continuous_are(MOTION.T, H.T, np.diag([0.0, 0.0, 1.0]), R)
+    return P, P @ H.T @ np.linalg.inv(R), H, R
+
+
+@pytest.mark.parametrize("c", [0.0, 1e-3, 0.1, 0.698, 3.0, 30.0, 300.0, 1e4])
+def test_the_rational_forms_solve_the_riccati_and_the_lyapunov_equation(c):
+    P, K, H, R = riccati(c)
+    np.testing.assert_allclose(closed_form.believed(c), P, rtol=1e-8)
+    np.testing.assert_allclose(closed_form.steady_gain(c)[:, : len(H)], K, rtol=1e-8)
+    closed = MOTION - K @ H
+    np.testing.assert_allclose(np.poly(closed), closed_form.error_polynomial(c), rtol=1e-8)
+    noise = np.diag(scipy.linalg.solve_continuous_lyapunov(closed, -K @ R @ K.T))
+    np.testing.assert_allclose(closed_form.noise_variances(c), noise, rtol=1e-7)
+
+
+def test_the_forms_take_arrays():
+    c = np.array([[0.0, 0.7], [5.0, 1e12]])
+    assert closed_form.steady_gains(c).shape == (3, 2, 2)
+    np.testing.assert_array_equal(closed_form.steady_gains(c)[:, 1, 0], closed_form.steady_gains(5.0))
+    np.testing.assert_array_equal(closed_form.steady_gains(c)[:, 0, 0], 0)
+    # The vast c: gains near 100 %, as A ~ (4c)^(1/4) has them.
+    assert (closed_form.steady_gains(c)[:, 1, 1] > 96).all()
 
 
 def test_without_velocity_the_variances_are_simple_fractions():

@@ -1,0 +1,150 @@
+"""The chart: closed forms against the recursion on random radars, the map, its figures, sentences and files."""
+
+import json
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from radarsim.app.chart import chart
+from radarsim.cli import main
+from radarsim.errors import ConfigError
+from radarsim.studies.range_doppler import chart as drawn
+from radarsim.studies.range_doppler import closed_form, exact, steady
+from tests.studies.range_doppler import impulse
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The chart of a radar of one's own, with the paper's five beside it."""
+    out = tmp_path_factory.mktemp("chart")
+    return chart(["rls2"], out, overrides=["radar.sigma_velocity_mps=5"], formats=["svg"])
+
+
+def random_radars(count, most, seed):
+    """Shares Δt/τ₁ and Δt/τ₂ (count,) up to `most`, over three decades."""
+    return 10 ** np.random.default_rng(seed).uniform(np.log10(most) - 3, np.log10(most), (2, count))
+
+
+def recursion(shares):
+    """Exact steady gains (3, n) of radars with these shares (2, n)."""
+    return steady.exact_gains(shares[0] ** -2, shares[1] ** 3)
+
+
+def test_a_thousand_random_radars_lie_on_the_chart():
+    """Where Δt/τ₁ and Δt/τ₂ are at most 0.05, and c at most 1000, the closed form with its first order is within the
+    stated 0.15 points."""
+    shares = random_radars(2000, closed_form.SMALL, 1)
+    shares = shares[:, (shares[1] / shares[0]) ** 2 <= closed_form.LARGEST][:, :1000]
+    assert shares.shape == (2, 1000)
+    gains = recursion(shares)
+    found = closed_form.steady_gains((shares[1] / shares[0]) ** 2, shares[1])
+    assert np.abs(found - gains).max() < closed_form.ERROR_POINTS
+    # Without the correction: half a point is just exceeded in the range, where Δt/τ₂ is 0.05.
+    limit = closed_form.steady_gains((shares[1] / shares[0]) ** 2)
+    away = np.abs(limit - gains)
+    assert away.max() < 0.6
+    assert away[:, shares[1] < 0.045].max() < 0.5
+
+
+def test_the_correction_is_of_the_first_order():
+    """Halving the period takes the error of the limit down by two, that with the correction by four."""
+    c, steps = np.full(2, 9.6), np.array([0.04, 0.02])
+    gains = recursion(np.array([steps * c**-0.5, steps]))
+    without = closed_form.steady_gains(c) - gains
+    corrected = closed_form.steady_gains(c, steps) - gains
+    assert without[:2, 0] / without[:2, 1] == pytest.approx([2, 2], rel=0.1)
+    assert corrected[:2, 0] / corrected[:2, 1] == pytest.approx([4, 4], rel=0.15)
+
+
+def test_many_radars_at_once_are_as_one_by_one():
+    shares = random_radars(40, 3.0, 2)
+    gains = recursion(shares)
+    for i in range(40):
+        sigma, variance = np.array([1.0, shares[0, i]]), shares[1, i] ** 6
+        both = [np.sqrt(np.diag(exact.steady_state(n, variance, sigma, 1.0)[1])) for n in (1, 2)]
+        assert gains[:, i] == pytest.approx(100 * (1 - both[1] / both[0]), abs=1e-6)
+
+
+@pytest.mark.parametrize("c", [0.3, 3.0, 30.0])
+def test_the_lines_over_time_are_those_of_the_textbook_and_end_in_the_closed_form(c):
+    t, gain = drawn.limit_course(c)
+    tau_2 = c**-0.5
+    dt = min(1.0, tau_2) / drawn.FINE
+    for i in (0, len(t) // 4):
+        scans = round(t[i] / dt) + 1
+        assert gain[i] == pytest.approx(impulse.gains(scans, tau_2**-6, (1.0, 1.0), dt), abs=1e-6)
+    assert gain[-1] == pytest.approx(closed_form.steady_gains(c), abs=0.45)
+
+
+def test_the_papers_radars_lie_where_the_paper_has_them(tmp_path):
+    five = chart([], tmp_path, formats=[])
+    rows = pd.read_csv(tmp_path / "chart" / "chart.csv").set_index(["case", "component"])
+    assert rows["C_theta"].groupby("case", sort=False).first().round(2).tolist() == [0.25, 2.78, 11.11, 25.0, 100.0]
+    assert rows.loc["rls2", "r"]["c"] == pytest.approx(rows.loc["rls3", "r"]["c"], rel=1e-12)
+    assert rows.loc["rls4", "r"]["steady_gain_percent"] == pytest.approx(52.4, abs=0.05)
+    assert [line.split(":")[0] for line in five.sentences] == ["rls1", "rls2", "rls3", "rls4", "rls5"]
+    assert "the acceleration loses 5.8 %" in five.sentences[0]
+    assert (rows["c"] == rows["c"]).all()
+
+
+def test_ones_own_radar_is_named_and_marked(made):
+    (sentence,) = made.sentences
+    assert sentence.startswith("rls2, as set: c = 6.3 (τ₁ = 50 s, τ₂ = 19.9 s): Doppler takes 45.4 % off the range")
+    assert {"chart.csv", "chart.html", "gain_against_time.svg", "map.svg", "steady_gain.svg"} == set(made.files)
+    rows = pd.read_csv(made.folder / "chart.csv")
+    assert rows["case"].unique().tolist() == ["rls2, as set", "rls1", "rls2", "rls3", "rls4", "rls5"]
+    own = rows.iloc[0]
+    twin = exact.steady_state(2, 1e-3, np.array([250.0, 5.0]), 10.0)[1][0, 0]
+    base = exact.steady_state(1, 1e-3, np.array([250.0, 5.0]), 10.0)[1][0, 0]
+    assert own["steady_gain_percent"] == pytest.approx(100 * (1 - np.sqrt(twin / base)), rel=1e-9)
+
+
+def test_the_lines_of_the_map_are_crossed_where_they_say():
+    """Each line of equal gain, read off the map's grid, has that gain by the solver."""
+    for component, level in ((0, 50), (1, 20), (2, 0), (2, 30)):
+        x = np.log(drawn.MAP_C_THETA)
+        for j in (3, 12, 22):
+            place = drawn._last_crossing(x, drawn.map_gains()[component, j], level)
+            if np.isfinite(place):
+                at = steady.exact_gains(np.array([np.exp(place)]), drawn.MAP_LAMBDA[j : j + 1])
+                assert at[component, 0] == pytest.approx(level, abs=0.4)
+
+
+def test_the_page_is_whole_and_fetches_nothing(made):
+    text = (made.folder / "chart.html").read_text(encoding="utf-8")
+    assert "default-src 'none'" in text
+    assert not re.search(r"(src|href)=[\"']?(https?:)?//", text)
+    data = json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL)[1])
+    assert data[0] == {"name": "rls2, as set", "r": 250.0, "v": 5.0, "dt": 10.0, "dm": 1e-3}
+
+
+def test_a_name_cannot_break_out_of_the_page():
+    from radarsim.report import html
+
+    text = html.live("t", "<main></main>", "", "", json.dumps([{"name": "</script><script>alert(1)"}]))
+    assert "</script><script>alert" not in text
+    assert "\\u003c/script\\u003e" in text
+
+
+def test_what_has_no_place_on_it(tmp_path):
+    with pytest.raises(ConfigError, match="has no chart"):
+        chart(["sonar_missed"], tmp_path)
+    with pytest.raises(ConfigError, match="one study a chart"):
+        chart(["rls2", "sonar_missed"], tmp_path)
+    alone = chart(
+        ["rls2"], tmp_path, overrides=["filters=[{name: r, observes: [range], manoeuvre_variance: 1e-3}]"], formats=[]
+    )
+    assert "no place on the chart" in alone.sentences[0]
+
+
+def test_the_command(tmp_path):
+    ended = CliRunner().invoke(main, ["chart", "rls4", "--out", str(tmp_path), "--no-figures", "--json"])
+    document = json.loads(ended.stdout)
+    assert document["sentences"][0].startswith("rls4: c = 18")
+    assert document["cases"][0]["component"] == "r"
+    assert sorted(p.name for p in (tmp_path / "chart").iterdir()) == ["chart.csv", "chart.html"]
+    words = CliRunner().invoke(main, ["chart", "rls4", "--out", str(tmp_path), "--no-figures"]).stdout
+    assert "page     " in words
