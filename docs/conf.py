@@ -9,7 +9,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from making import contents, generated, modules
+from making import chart, contents, generated, modules
 
 import radarsim
 
@@ -59,4 +59,5 @@ def setup(app):
     app.connect("env-get-outdated", generated.outdated)
     app.connect("autodoc-process-docstring", modules.plain)
     app.connect("build-finished", contents.front_page)
+    app.connect("build-finished", chart.drawn)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -12,7 +12,7 @@ import numpy as np
 # Gains with the first order of the period are within ERROR_POINTS of the recursion's where Δt/τ₁ and Δt/τ₂ are at most
 # SMALL and c at most LARGEST: beyond, the fastest root of the error, ~ √2 c^(1/4)/τ₂, is no longer slow against a scan.
 SMALL, LARGEST = 0.05, 1000.0
-ERROR_POINTS = 0.15
+ERROR_POINTS = 0.1
 
 
 class Groups(NamedTuple):

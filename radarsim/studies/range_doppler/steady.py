@@ -4,7 +4,7 @@ import numpy as np
 
 from radarsim.physics.motion import manoeuvre_covariance, transition
 
-DOUBLINGS = 16  # 65 536 scans: over a thousand memories of the slowest filter on the map
+DOUBLINGS = 20  # a million scans: hundreds of memories where a memory has thousands
 
 
 def exact_gains(C_theta: np.ndarray, Lambda: np.ndarray) -> np.ndarray:

@@ -76,7 +76,7 @@ const radar = (() => {
 
   function fromAddress() {
     for (const [name, text] of new URLSearchParams(location.hash.slice(1))) {
-      if (name in ALLOWED && parsed(name, text) !== null) setting[name] = parsed(name, text);
+      if (Object.hasOwn(ALLOWED, name) && parsed(name, text) !== null) setting[name] = parsed(name, text);
     }
   }
 
