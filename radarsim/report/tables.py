@@ -45,6 +45,29 @@ def shown(result: CaseResult, mask: np.ndarray | None = None) -> tuple[np.ndarra
     return f, k, c
 
 
+def leading(
+    result: CaseResult, f: np.ndarray, k: np.ndarray | None = None, **labels: np.ndarray
+) -> dict[str, np.ndarray]:
+    """The first columns of n rows: case, filter, further labels and, for scans k (n,), their number and time."""
+    columns = {"case": np.full(f.size, result.name, dtype=object), "filter": names(result.axes.filters, f)}
+    columns |= labels
+    if k is not None:
+        columns |= {"k": np.asarray(result.axes.k)[k], "t_s": np.asarray(result.axes.t_s, dtype=float)[k]}
+    return columns
+
+
+def interval(name: str, of: statistics.Estimate, ends: str | None = None) -> dict[str, Any]:
+    """An estimate as columns `name`, `…_lo` and `…_hi`; ends: what stands before `_lo`, by default the name."""
+    prefix = f"{name}_" if ends is None else ends and f"{ends}_"
+    return {name: of.value, f"{prefix}lo": of.lo, f"{prefix}hi": of.hi}
+
+
+def components(result: CaseResult, c: np.ndarray) -> dict[str, np.ndarray]:
+    """The labels `component` and `unit` of components c (n,)."""
+    labels, units = zip(*result.axes.components, strict=True)
+    return {"component": names(labels, c), "unit": names(units, c)}
+
+
 def realisations(result: CaseResult) -> np.ndarray:
     """How many realisations stand behind each sum (F, K, C): all, or `estimates` where not all have an estimate."""
     counted = result.sums.get("estimates")
@@ -68,16 +91,9 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
     n = realisations(result)[at]
     of = statistics.errors(np.asarray(result.sums["error"])[at], n)
     return {
-        "case": np.full(f.size, result.name, dtype=object),
-        "filter": names(axes.filters, f),
-        "component": names([name for name, _ in axes.components], c),
-        "unit": names([unit for _, unit in axes.components], c),
-        "k": np.asarray(axes.k)[k],
-        "t_s": np.asarray(axes.t_s, dtype=float)[k],
+        **leading(result, f, k, **components(result, c)),
         "n": n.astype(np.int64),
-        "sigma": of.sigma.value,
-        "sigma_lo": of.sigma.lo,
-        "sigma_hi": of.sigma.hi,
+        **interval("sigma", of.sigma),
         "bias": of.bias,
         "bias_se": of.bias_se,
         "spread": of.spread,
@@ -106,15 +122,8 @@ def _gains(result: CaseResult) -> dict[str, np.ndarray]:
     with np.errstate(divide="ignore", invalid="ignore"):
         exact_percent = 100 * (1 - exact[at] / exact[b, k, c])
     return {
-        "case": np.full(f.size, result.name, dtype=object),
-        "filter": names(axes.filters, f),
-        "baseline": np.full(f.size, axes.filters[b], dtype=object),
-        "component": names([name for name, _ in axes.components], c),
-        "k": np.asarray(axes.k)[k],
-        "t_s": np.asarray(axes.t_s, dtype=float)[k],
-        "gain_percent": of.value,
-        "gain_lo": of.lo,
-        "gain_hi": of.hi,
+        **leading(result, f, k, baseline=np.full(f.size, axes.filters[b], dtype=object), **components(result, c)),
+        **interval("gain_percent", of, "gain"),
         "exact_percent": exact_percent,
     }
 

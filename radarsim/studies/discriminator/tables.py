@@ -51,9 +51,7 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
     return {
         **_labels(result, f, k, c),
         "n": n.astype(np.int64),
-        "sigma": of.sigma.value * bound,
-        "sigma_lo": of.sigma.lo * bound,
-        "sigma_hi": of.sigma.hi * bound,
+        **common.interval("sigma", statistics.Estimate(*(part * bound for part in of.sigma))),
         "bias": of.bias * bound,
         "bias_se": of.bias_se * bound,
         "spread": of.spread * bound,
@@ -64,12 +62,9 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
 
 
 def _labels(result: CaseResult, f: np.ndarray, k: np.ndarray, c: np.ndarray | None = None) -> dict[str, np.ndarray]:
-    axes = result.axes
-    labels = {"case": np.full(f.size, result.name, dtype=object), "filter": common.names(axes.filters, f)}
-    if c is not None:
-        labels["component"] = common.names([name for name, _ in axes.components], c)
-        labels["unit"] = common.names([unit for _, unit in axes.components], c)
-    return labels | {"k": np.asarray(axes.k)[k], "t_s": axes.duration_s[f, k]}
+    """The first columns of rows of windows, of which t_s is the length."""
+    components = {} if c is None else common.components(result, c)
+    return common.leading(result, f, k, **components) | {"t_s": result.axes.duration_s[f, k]}
 
 
 def _at_windows(result: CaseResult) -> tuple[np.ndarray, np.ndarray]:
@@ -95,18 +90,12 @@ def _locks(result: CaseResult) -> dict[str, np.ndarray]:
     return {
         **_labels(result, f, k),
         "n": np.full(f.size, result.count),
-        "lock_rate": lock.value,
-        "lock_lo": lock.lo,
-        "lock_hi": lock.hi,
+        **common.interval("lock_rate", lock, "lock"),
         "lock_rate_3sigma": rates["three"].value,
         "posterior_rate": rates["posterior"].value,
         "posterior_rate_3sigma": rates["posterior_three"].value,
-        "always_rate_3sigma": always.value,
-        "always_lo": always.lo,
-        "always_hi": always.hi,
-        "always_posterior_rate_3sigma": always_posterior.value,
-        "always_posterior_lo": always_posterior.lo,
-        "always_posterior_hi": always_posterior.hi,
+        **common.interval("always_rate_3sigma", always, "always"),
+        **common.interval("always_posterior_rate_3sigma", always_posterior, "always_posterior"),
         "energy_ratio": result.axes.energy_ratio[f, k],
     }
 
@@ -210,10 +199,7 @@ def _passes(result: CaseResult) -> dict[str, np.ndarray]:
     of = statistics.mean(total[:, 0], total[:, 1], n)
     count = len(of.value)
     return {
-        "case": np.full(count, result.name, dtype=object),
-        "filter": np.array(result.axes.filters, dtype=object),
+        **common.leading(result, np.arange(count)),
         "n": np.full(count, n),
-        "passes": of.value,
-        "passes_lo": of.lo,
-        "passes_hi": of.hi,
+        **common.interval("passes", of),
     }

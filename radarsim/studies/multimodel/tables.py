@@ -50,15 +50,9 @@ def _probabilities(result: CaseResult) -> dict[str, np.ndarray]:
     sums = np.asarray(result.sums["probability"])[f, k, m]
     of = statistics.probability(sums[:, 0], sums[:, 1], result.count)
     return {
-        "case": np.full(f.size, result.name, dtype=object),
-        "filter": common.names(axes.filters, f),
-        "model": m + 1,
-        "k": np.asarray(axes.k)[k],
-        "t_s": np.asarray(axes.t_s, dtype=float)[k],
+        **common.leading(result, f, k, model=m + 1),
         "n": np.full(f.size, result.count),
-        "probability": of.value,
-        "probability_lo": of.lo,
-        "probability_hi": of.hi,
+        **common.interval("probability", of),
         "motion": np.array([models[a][b] for a, b in zip(f, m, strict=True)], dtype=object),
     }
 
@@ -140,9 +134,7 @@ def _normalised_errors(result: CaseResult) -> dict[str, np.ndarray]:
         means = [statistics.mean_square(*pair, n) for pair in zip(total, square, strict=True)]
         found |= consistency.normalised(quantity, statistics.Estimate(*np.transpose(means)), bounds)
     return {
-        "case": np.full(len(sums), result.name, dtype=object),
-        "filter": common.names(axes.filters, np.repeat(np.arange(filters), s.size)),
-        "stage": common.names(names, np.tile(s, filters)),
+        **common.leading(result, np.repeat(np.arange(filters), s.size), stage=common.names(names, np.tile(s, filters))),
         "n": np.full(len(sums), n),
         **found,
     }

@@ -4,14 +4,14 @@ The columns of a table have the order of the mapping that is made for one case.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import consistency, statistics
 from radarsim.report import tables as common
-from radarsim.report.statistics import Estimate
+from radarsim.report.tables import interval, leading
 from radarsim.studies.sonar import operations as counted
 from radarsim.studies.sonar.axes import SonarAxes
 
@@ -37,23 +37,6 @@ def stacked(parts: Iterable[Columns]) -> "pd.DataFrame":
     """One table of the columns of several cases, without those that have no rows."""
     filled = [part for part in parts if any(len(values) for values in part.values())]
     return common.joined(filled, tuple(filled[0]) if filled else ())
-
-
-def leading(
-    result: CaseResult[SonarAxes], f: np.ndarray, k: np.ndarray | None = None, **labels: np.ndarray
-) -> dict[str, np.ndarray]:
-    """The first columns of n rows: case, filter, further labels and, for scans k (n,), their number and time."""
-    columns = {"case": np.full(f.size, result.name, dtype=object), "filter": common.names(result.axes.filters, f)}
-    columns |= labels
-    if k is not None:
-        columns |= {"k": np.asarray(result.axes.k)[k], "t_s": np.asarray(result.axes.t_s, dtype=float)[k]}
-    return columns
-
-
-def interval(name: str, of: Estimate, ends: str | None = None) -> dict[str, Any]:
-    """An estimate as columns `name`, `…_lo` and `…_hi`; ends: what stands before `_lo`, by default the name."""
-    prefix = f"{name}_" if ends is None else ends and f"{ends}_"
-    return {name: of.value, f"{prefix}lo": of.lo, f"{prefix}hi": of.hi}
 
 
 def of_coordinates(result: CaseResult[SonarAxes], mask: np.ndarray) -> tuple[Index, dict[str, np.ndarray]]:

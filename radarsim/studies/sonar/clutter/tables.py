@@ -8,9 +8,10 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import statistics
 from radarsim.report.statistics import Z95, Estimate, Values
+from radarsim.report.tables import interval, leading
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.kernels import counts as at
-from radarsim.studies.sonar.tables import Columns, interval, leading, stacked
+from radarsim.studies.sonar.tables import Columns, stacked
 
 if TYPE_CHECKING:
     import pandas as pd

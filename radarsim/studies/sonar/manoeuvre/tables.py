@@ -8,11 +8,12 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import consistency, statistics
 from radarsim.report import tables as common
+from radarsim.report.tables import interval, leading
 from radarsim.studies.sonar.exact import sigma_acceleration
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
 from radarsim.studies.sonar.manoeuvre.uses import QUANTITIES
-from radarsim.studies.sonar.tables import Columns, Index, interval, leading, stacked
+from radarsim.studies.sonar.tables import Columns, Index, stacked
 
 if TYPE_CHECKING:
     import pandas as pd

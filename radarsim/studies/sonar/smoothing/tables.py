@@ -7,9 +7,10 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import statistics
+from radarsim.report.tables import interval, leading
 from radarsim.studies.sonar import exact
 from radarsim.studies.sonar.axes import GivenPlotsAxes
-from radarsim.studies.sonar.tables import Columns, interval, leading, stacked
+from radarsim.studies.sonar.tables import Columns, stacked
 
 if TYPE_CHECKING:
     import pandas as pd
