@@ -48,6 +48,7 @@ reproduce-figures: $(VENV)/installed
 claims-page: $(VENV)/installed
 	$(RADARSIM) claims --out results --markdown > docs/claims.md.new
 	mv docs/claims.md.new docs/claims.md
+	$(RADARSIM) claims --out results --figure docs/claims.svg > /dev/null
 
 bench: $(VENV)/installed
 	$(BIN)/python benchmarks/w1.py

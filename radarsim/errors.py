@@ -36,6 +36,10 @@ class StoreError(RadarsimError):
     exit_code = 4
 
 
+class DisagreementError(StoreError):
+    """An exact value and its simulation differ by more than chance allows: one of the two is computed wrongly."""
+
+
 class NonFiniteError(RadarsimError):
     """A filter gave numbers that are not finite."""
 

@@ -1,7 +1,7 @@
 """From finished cases to files: tables, figures, claims, run.json and report.html of one experiment."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ from radarsim.engine import machine
 from radarsim.engine.results import CaseResult
 from radarsim.report import agreement, claims, controlled, files, notes, provenance, sweeps
 from radarsim.report import tables as common
+from radarsim.report.claims import forest
 from radarsim.report.drawing import Figure
 from radarsim.studies.registry import study
 
@@ -18,17 +19,18 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def tables(results: Sequence[CaseResult], control_variate: bool = False) -> dict:
+def tables(results: Sequence[CaseResult], control_variate: bool = False, stem: str = "") -> dict:
     """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims; if asked for,
     `controlled`.
 
-    A study whose errors are not of all realisations at common scans makes its own curves and gains.
+    A study whose errors are not of all realisations at common scans makes its own curves and gains. stem is the
+    config's: all claims of it are in the table of claims, also those that it cannot judge any more.
     """
     of = study(results[0].study)
     made = measured(results)
     if control_variate and of.exact_errors:
         made["controlled"] = controlled.controlled(results)
-    made["claims"] = claims.judged(of.claims(), results, made, configs.shipped)
+    made["claims"] = claims.judged(of.claims(), results, made, configs.shipped, stem)
     return notes.noted(made, results)
 
 
@@ -44,10 +46,31 @@ def figures(
 ) -> dict[str, Figure]:
     """The figures of an experiment, described, by the stem of their file: the study's own, and of sweeps."""
     own = study(results[0].study)
-    drawn = own.figures(results, made, experiment)
+    drawn = dict(own.figures(results, _banded(made), experiment))
+    if (judged := forest.figure(made["claims"].to_dict("records"))) is not None:
+        drawn["claims"] = judged
+    if any("note" in made[name] and (made[name]["note"] == notes.THIN).any() for name in ("curves", "gains")):
+        drawn = {
+            name: _said(figure) if name.startswith(("sigma", "gain")) else figure for name, figure in drawn.items()
+        }
     if own.draws_sweeps:
         return drawn
     return drawn | sweeps.figures(results, common.groups(made["curves"], "case", "filter", "component"))
+
+
+def _said(figure: Figure) -> Figure:
+    """The figure whose caption says why a band is missing."""
+    return replace(figure, caption=f"{figure.caption} No band where it would rest on {notes.THIN.partition(':')[0]}.")
+
+
+def _banded(made: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:
+    """The tables for figures: σ and gains without an interval where theirs rests on too few effective realisations."""
+    thinned = {}
+    for name, ends in (("curves", ("sigma_lo", "sigma_hi")), ("gains", ("gain_lo", "gain_hi"))):
+        table = made[name]
+        if "note" in table and (thin := table["note"] == notes.THIN).any():
+            thinned[name] = table.assign(**{end: table[end].mask(thin) for end in ends})
+    return {**made, **thinned}
 
 
 @dataclass(frozen=True)
@@ -81,7 +104,7 @@ def write(
     """
     from radarsim.report import html
 
-    made = tables(results) if made is None else made
+    made = tables(results, stem=experiment.stem) if made is None else made
     contents = {f"{name}.csv": common.to_csv(table) for name, table in made.items() if len(table) or name in ALWAYS}
     described = figures(results, made, experiment) if draw else {}
     if draw:
@@ -91,7 +114,8 @@ def write(
             contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.save(figure, formats).items()}
     own = study(experiment.study)
     answer = tuple(own.answer(results, made))
-    record = provenance.record(experiment, results, run, contents, answer, machine.described())
+    described_by = machine.described()
+    record = provenance.record(experiment, results, run, contents, answer, described_by, made["curves"])
     page = html.page(
         experiment,
         made,

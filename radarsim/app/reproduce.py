@@ -12,7 +12,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
@@ -199,17 +198,18 @@ def _run(task: Task, stop: Signals) -> Done:
 def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
     """The closing lines: claims by verdict, time, where the results are."""
     from radarsim.report import index
+    from radarsim.report.claims import page
 
     index.write(Path(out))  # two processes may have written it at once, one without the other's run
     rows = experiment.claims((), out)
-    overall = Counter({(row["paper"], row["claim"]): row["overall"] for row in rows}.values())
+    classes, _ = page.counts(rows)
     longest = max(done, key=lambda one: one.seconds)
     failed = [one.stem for one in done if one.faults]
     guide = Path(out) / "README.md"
     hint = f"; {guide} says what lies where" if guide.is_file() else ""
     return [
         "",
-        f"claims   {sum(overall.values())}: " + ", ".join(f"{count} {verdict}" for verdict, count in overall.items()),
+        f"claims   {sum(classes.values())}: {page.counted(rows)}",
         f"time     {clock(seconds)} for {plural(len(done), 'config')}, "
         f"the longest {longest.stem}, {longest.seconds:.0f} s",
         f"where    {Path(out) / 'index.html'} leads to every report{hint}",

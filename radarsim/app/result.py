@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
+from radarsim.errors import DisagreementError
 from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ class Result:
     def _tables(self) -> dict:
         from radarsim.app import output
 
-        return output.tables(self.cases, self.experiment.control_variate)
+        return output.tables(self.cases, self.experiment.control_variate, self.experiment.stem)
 
     @property
     def curves(self) -> "pd.DataFrame":
@@ -137,12 +138,14 @@ class Result:
     def write(self, out: str | os.PathLike[str], figures: bool | str | Sequence[str] = True) -> "Written":
         """Write tables, figures, claims, run.json and report.html into out/<stem>/, and out/index.html again.
 
-        figures may name the formats of their files: svg, png, pdf. What was written comes back.
+        figures may name the formats of their files: svg, png, pdf. What was written comes back. Raises
+        DisagreementError, with all written, where an exact value of a claim and its simulation differ beyond chance.
         """
         from radarsim.app import arguments, output
-        from radarsim.report import index, provenance
+        from radarsim.report import claims, index, provenance
 
         folder = Path(out) / self.experiment.stem
+        self._join_readings(Path(out))
         formats = arguments.formats(figures)
         self.facts["warnings"] = [*self.facts["warnings"], *provenance.replaced(folder, self.experiment)]
         facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
@@ -150,12 +153,40 @@ class Result:
             self.experiment, self.cases, folder, facts, draw=bool(formats), made=self.tables, formats=formats
         )
         index.write(Path(out))
+        if errors := claims.errors(self._tables["claims"]):
+            raise DisagreementError(*errors)
         return self.written
 
     def verdicts(self) -> dict[str, list[str]]:
         """The claims that came out so, by verdict; empty where this experiment judges none."""
-        judged = self._tables["claims"].drop_duplicates("claim")
-        return {verdict: list(group["claim"]) for verdict, group in judged.groupby("overall", sort=False)}
+        from radarsim.report.claims import page
+
+        found: dict[str, list[str]] = {}
+        for parts in page.grouped(self._tables["claims"].to_dict("records")):
+            said = parts[0]["overall"] + (", extension" if page.extension(parts) else "")
+            found.setdefault(said, []).append(parts[0]["claim"])
+        return found
+
+    def unjudged(self) -> dict[str, list[str]]:
+        """The claims of this config that it cannot judge any more, or not in every part, by the reason."""
+        table = self._tables["claims"]
+        found: dict[str, list[str]] = {}
+        for row in table[table["verdict"] == "not judged here"].to_dict("records"):
+            names = found.setdefault(row["why"], [])
+            if row["claim"] not in names:
+                names.append(row["claim"])
+        return found
+
+    def _join_readings(self, out: Path) -> None:
+        """The classes of claims over all readings, where `radarsim readings` has stored them under out."""
+        from radarsim.app.stored_readings import stored_readings
+        from radarsim.report import tables
+        from radarsim.report.claims.joined import with_readings
+
+        claims = self._tables["claims"]
+        if len(claims) and (readings := stored_readings(out)):
+            rows = with_readings(claims.to_dict("records"), readings)
+            self._tables["claims"] = tables.frame({name: [row[name] for row in rows] for name in claims.columns})
 
     @property
     def unmet(self) -> list[str]:
@@ -167,4 +198,4 @@ class Result:
         """What a reader of the numbers must know: damaged or mixed blocks, too few realisations."""
         from radarsim.report import provenance
 
-        return [*self.facts["warnings"], *provenance.few(self.cases)]
+        return [*self.facts["warnings"], *provenance.few(self.cases, self._tables["curves"])]

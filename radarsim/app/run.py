@@ -13,11 +13,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.app import arguments, simulation, stored_claims
+from radarsim.app import decide as deciding
 from radarsim.app.configs import load
 from radarsim.app.records import made_by_other_code
 from radarsim.app.repeat import RESULTS, command, repeated
 from radarsim.app.result import Result
 from radarsim.app.simulation import Progress, RunOptions, SimulatedCases
+from radarsim.app.stored_readings import stored_readings
 from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Experiment
 from radarsim.engine import stopping
@@ -74,6 +76,7 @@ def run(
     seed: int | None = None,
     overrides: Sequence[str] = (),
     precision: float | None = None,
+    decide: bool = False,
     time_limit: float | Stop | None = None,
     threads: int | None = None,
     workers: int | None = None,
@@ -88,7 +91,8 @@ def run(
 
     config is a path, the name of a shipped config, a dict as YAML would give it, or an Experiment loaded with these
     overrides. overrides are texts `key=value` with dotted keys. With a precision, in per cent, a case ends at the first
-    of 2000, 4000, 8000 … realisations at which the 95 % half-width of every σ is under it. time_limit is in seconds, or
+    of 2000, 4000, 8000 … realisations at which the 95 % half-width of every σ is under it. decide: all cases end at the
+    first of these at which every claim of the config is decided. time_limit is in seconds, or
     a condition that runs already. `result.unmet` says what of the two was not reached. workers are processes of this
     machine, scheduler the address of a Dask scheduler, executor one that is open already.
 
@@ -108,19 +112,27 @@ def run(
     experiment = config if isinstance(config, Experiment) else load(config, overrides)
     if precision is not None:
         simulation.check_precision([experiment], precision)
+    if decide:
+        deciding.check(experiment)
     limit = time_limit if time_limit is None or callable(time_limit) else stopping.time_limit(time_limit)
     started = time.perf_counter()
     renewed = made_by_other_code(experiment, Path(out)) if out is not None else []
     with cluster(workers, scheduler) if executor is None else nullcontext(executor) as pool:
         threads = pool.workers if pool else int(threads or available_cores())
         options = RunOptions(out, threads, stopping.Either(stop, limit), pool)
-        simulated = simulation.simulated(experiment, options, progress=progress, precision=precision)
+        if decide:
+            simulated = deciding.simulated(experiment, options, progress)
+        else:
+            simulated = simulation.simulated(experiment, options, progress=progress, precision=precision)
         if stop is not None:
             stop.raise_if_received()
     if not simulated.cases:
         raise TargetUnmet(f"{experiment.stem}: {simulated.stopped}: nothing was done by then")
     facts = facts_of(simulated, threads, time.perf_counter() - started)
     facts["warnings"] += renewed
+    if decide:
+        left = deciding.undecided(deciding.rows_of(experiment, simulated))
+        facts |= {"unmet": [*facts["unmet"], *left], "stop": "; ".join((*facts["unmet"], *left)) or "done"}
     ended_by = None if simulated.stopped else precision
     result = result_of(experiment, simulated, facts, repeated(experiment, simulated.done, overrides, ended_by))
     if out is not None:
@@ -295,6 +307,20 @@ def finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
+def draw_claims(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str]) -> None:
+    """Write the forest plot of claims; raises ConfigError for a name that says no format, or where none is judged."""
+    from radarsim.report import figures
+    from radarsim.report.claims import forest
+
+    kind = Path(path).suffix[1:].lower()
+    if kind not in arguments.FORMATS:
+        raise ConfigError(f"{path}: must end in {', '.join(f'.{one}' for one in arguments.FORMATS)}")
+    figure = forest.figure(rows)
+    if figure is None:
+        raise ConfigError(f"{path}: no claim is judged here, so there is nothing to draw")
+    files.replace_all(Path(path).parent, {Path(path).name: figures.save(figure, (kind,))[kind]})
+
+
 def papers() -> "list[PaperClaims]":
     """The claims of every paper, in the order of the studies."""
     return [of for of in registry.parts(lambda study: study.claims()).values() if of is not None]
@@ -305,17 +331,19 @@ def claims(configs: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str
 
     Each row has the columns of claims.csv and `config`. Raises ConfigError for a config that does not exist.
     """
-    from radarsim.report.claims import listed
+    from radarsim.report.claims.joined import with_readings
+    from radarsim.report.claims.judge import listed
 
     every = papers()
+    readings = stored_readings(Path(out))
     stems = [one.stem for one in load_all(configs)] or sorted({claim.config for of in every for claim in of.claims})
     held = {stem: rows for stem in stems if (rows := stored_claims.stored(Path(out) / stem / "claims.csv")) is not None}
     if not configs:
-        return listed(every, held)
+        return with_readings(listed(every, held), readings)
     rows = []
     for stem in stems:
         if stem in held:
             rows += [row | {"config": stem} for row in held[stem]]
         else:
             rows += [row for row in listed(every, {}) if row["config"] == stem]
-    return rows
+    return with_readings(rows, readings)

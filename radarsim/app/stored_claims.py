@@ -52,7 +52,7 @@ def _recorded(path: Path) -> str | None:
 
 
 def _rows(path: Path, content: bytes) -> list[dict[str, Any]]:
-    from radarsim.report.claims import NUMBERS
+    from radarsim.report.claims import CLAIMED, NUMBERS
 
     try:
         table = csv.DictReader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
@@ -60,7 +60,7 @@ def _rows(path: Path, content: bytes) -> list[dict[str, Any]]:
     except (ValueError, csv.Error) as error:
         raise StoreError(f"{path}: cannot be read: {error}") from error
     try:
-        if {"claim", "verdict", "overall", *NUMBERS} <= names:
+        if set(CLAIMED) <= names:
             return [row | {name: float(row[name]) if row[name] else "" for name in NUMBERS} for row in rows]
     except (LookupError, TypeError, ValueError):
         pass  # reported like any other damaged table

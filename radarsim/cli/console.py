@@ -4,7 +4,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -166,6 +166,8 @@ def print_result(result: "Result") -> None:
     if verdicts:
         for verdict, names in verdicts.items():
             say(f"claims   {len(names)} {verdict}: {', '.join(names)}")
+        for reason, names in result.unjudged().items():
+            say(f"         not judged: {', '.join(names)}: {reason}")
         say(f"         `radarsim claims {result.experiment.stem}` says what each of them is")
     drawn = [Path(name) for name in written.files if name.startswith("figures/")]
     say(f"tables   {written.folder / 'curves.csv'} and {sum(n.endswith('.csv') for n in written.files) - 1} more there")
@@ -191,7 +193,7 @@ def show_last_scan(last: "pd.DataFrame") -> None:
         (
             *(row.case, row.filter, row.component, f"{row.t_s:g} s"),
             f"{significant_digits(row.sigma)} {row.unit.replace('s2', 's²')}",
-            f"{significant_digits(row.sigma_lo)} … {significant_digits(row.sigma_hi)}",
+            f"{significant_digits(row.sigma_lo)} … {significant_digits(row.sigma_hi)}" + too_narrow(row.n_eff),
             known(row.exact_sigma),
             known(row.gain_percent, ".2f", " %"),
             known(row.gain_lo, ".2f", " … ") + known(row.gain_hi, ".2f"),
@@ -200,6 +202,13 @@ def show_last_scan(last: "pd.DataFrame") -> None:
     ]
     columns = ("case", "filter", "component", "at", "sigma", "95 %", "exact", "gain", "95 % of gain")
     show("", columns, rows, right=columns[3:], spare=("95 % of gain", "exact", "95 %", "gain"))
+
+
+def too_narrow(effective: float) -> str:
+    """A mark behind an interval that rests on too few effective realisations."""
+    from radarsim.report.statistics import FEW_EFFECTIVE
+
+    return f" ({effective:.0f} effective)" if effective < FEW_EFFECTIVE else ""
 
 
 def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
@@ -274,7 +283,7 @@ def print_cleaned(cleaned: "Cleaned", dry_run: bool) -> None:
 
 
 def print_claims(rows: Sequence[dict[str, Any]]) -> None:
-    """Each claim with its verdict, and below it what was measured, or the command that would judge it.
+    """Each claim with its class, and below it what was measured, or the command that would judge it.
 
     On a terminal a table; where it is piped, lines that can be searched.
     """
@@ -282,31 +291,44 @@ def print_claims(rows: Sequence[dict[str, Any]]) -> None:
 
     if sys.stdout.isatty():
         cells = []
-        for paper, claim in dict.fromkeys((row["paper"], row["claim"]) for row in rows):
-            own = [row for row in rows if (row["paper"], row["claim"]) == (paper, claim)]
-            first, done = own[0], own[0]["overall"] != "not run"
-            measured = "\n".join(page.measured(row) for row in own) if done else f"radarsim run {first['config']}"
-            cells.append((claim, first["statement"], first["place"], measured, first["overall"], first["config"]))
-        columns = ("claim", "statement", "place", "measured", "verdict", "config")
+        for own in page.grouped(rows):
+            first, done = own[0], own[0]["class"] != "not run"
+            measured = "\n".join(page.shown(row) for row in own) if done else f"radarsim run {first['config']}"
+            said = first["statement"] + (f"\n«{first['original']}»" if first["original"] else "")
+            cells.append((first["claim"], said, first["place"], measured, page.verdict_of(own), first["config"]))
+        columns = ("claim", "statement", "place", "measured", "class", "config")
         show("", columns, cells, spare=() if console().width >= ROOMY else ("place", "config"))
     else:
-        _print_claim_lines(rows, page.measured)
+        for own in page.grouped(rows):
+            _print_claim(own)
     say(page.counted(rows) or "no claims are judged by this")
-    if rows and all(row["overall"] == "not run" for row in rows):
+    if rows and all(row["class"] == "not run" for row in rows):
         say("nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has the results at full size")
 
 
-def _print_claim_lines(rows: Sequence[dict[str, Any]], measured: Callable[[Mapping[str, Any]], str]) -> None:
-    last = None
-    for row in rows:
-        if (row["paper"], row["claim"]) != last:
-            last = row["paper"], row["claim"]
-            say(f"{row['claim']:<6} {row['overall']:<20} {row['statement']}  [{row['paper']}, {row['place']}]")
-            if row["overall"] == "not run":
-                say(f"       radarsim run {row['config']}")
-        if row["overall"] != "not run":
-            part = f"{row['case']}: {row['what']} {measured(row)}; expected {row['expected']}"
-            say(f"       {row['verdict']:<20} {part}")
+def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
+    """A claim in lines: its class, statement and original sentence, and a line a part."""
+    from radarsim.report.claims import page
+
+    first = parts[0]
+    verdict = page.verdict_of(parts).replace("*", "")
+    say(f"{first['claim']:<6} {verdict:<20} {first['statement']}  [{first['paper']}, {first['place']}]")
+    if first["original"]:
+        say(f"       «{first['original']}»")
+    if first["class"] == "not run":
+        say(f"       radarsim run {first['config']}")
+        return
+    for row in parts:
+        said = [f"{row['case']}: {row['what']}" if row["case"] else str(row["what"])]
+        if page.number(row["measured"]) is not None:
+            said.append(f"{page.measured(row)}; expected {row['expected']}")
+        if (exact := page.number(row["exact"])) is not None:
+            said.append(f"exactly {page.plain(exact)}")
+        if (missed := page.number(row["miss"])) is not None and missed:
+            said.append(f"misses by {missed:.3g} margins")
+        if row["verdict"] == "not judged here":
+            said.append(str(row["why"]))
+        say(f"       {row['verdict']:<20} {'; '.join(said)}")
 
 
 def print_readings(done: "Done", detailed: bool) -> None:

@@ -21,7 +21,7 @@ from radarsim.cli.group import (
     seed_option,
     set_option,
 )
-from radarsim.errors import ClusterError, TargetUnmet
+from radarsim.errors import ClusterError, DisagreementError, TargetUnmet
 
 if TYPE_CHECKING:
     from radarsim.app.result import Result
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 @seed_option
 @set_option
 @precision_option
+@click.option("--decide", is_flag=True, help="Until each claim of the config is decided, at most N realisations.")
 @click.option("--time-limit", type=Positive("SECONDS"), metavar="SECONDS", help="Stop cleanly then, keep what is done.")
 @click.option("--shard", type=Share(), metavar="i/n", help="Compute this share of the blocks only; no tables.")
 @click.option("--threads", type=click.IntRange(1, 1024), metavar="T", help="Threads; default: all cores.")
@@ -51,6 +52,7 @@ def run(
     seed: int | None,
     overrides: tuple[str, ...],
     precision: float | None,
+    decide: bool,
     time_limit: float | None,
     shard: tuple[int, int] | None,
     threads: int | None,
@@ -75,11 +77,14 @@ def run(
       radarsim run rls2 --set radar.sigma_range_m=300 --set filters.0.manoeuvre_variance=1e-4
       radarsim run rls2 -n 1e7 --precision 0.5          until every σ is known to ± 0.5 %
       radarsim run multimodel -n 1e5 --time-limit 600   for ten minutes; the same again continues
+      radarsim run discriminator_paper -n 1e6 --decide  which claims are left, and what N they would take: exit code 3
       radarsim run rls2 -n 1e8 --shard 2/3              on the second of three machines
       radarsim run rls2 -n 1e8 --workers 8              or --scheduler tcp://host:8786
       radarsim run rls2 --json | jq '.[0].last_scan[0].sigma'
     """
     _refuse_together(shard, precision, workers or scheduler, threads)
+    if decide and (shard or precision):
+        raise click.UsageError("--decide goes with neither --shard nor --precision: claims are judged on all blocks")
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler do not go together: give one of them")
     from radarsim.engine import stopping
@@ -89,7 +94,7 @@ def run(
         from radarsim.app import run as experiment
 
         overrides = experiment.merged(overrides, realisations, seed)
-        loaded = _loaded(configs, overrides, precision)
+        loaded = _loaded(configs, overrides, precision, decide)
         if scheduler and not quiet and (line := experiment.trust(scheduler)):
             click.echo(f"note: {line}", err=True)
         with experiment.cluster(workers, scheduler) as pool:
@@ -97,7 +102,7 @@ def run(
             means |= {"time_limit": limit, "stop": stop}
             figures = False if no_figures else formats or True
             compute: Callable[..., Result | Shares]
-            compute = partial(experiment.run, overrides=overrides, precision=precision, figures=figures)
+            compute = partial(experiment.run, overrides=overrides, precision=precision, decide=decide, figures=figures)
             if shard:
                 compute = partial(experiment.share, part=shard)
             _compute_each(loaded, partial(compute, **means), out, quiet, as_json)
@@ -111,13 +116,18 @@ def _refuse_together(shard: object, precision: object, cluster: object, threads:
         raise click.UsageError("--threads and a cluster do not go together: its workers compute, not this process")
 
 
-def _loaded(configs: tuple[str, ...], overrides: tuple[str, ...], precision: float | None) -> "list[Experiment]":
-    """The experiments, all checked, a precision too."""
+def _loaded(
+    configs: tuple[str, ...], overrides: tuple[str, ...], precision: float | None, decide: bool
+) -> "list[Experiment]":
+    """The experiments, all checked, with what their claims and a precision ask for."""
+    from radarsim.app import decide as deciding
     from radarsim.app import run, simulation
 
     loaded = run.load_all(configs, overrides)
     if precision is not None:
         simulation.check_precision(loaded, precision)
+    for one in loaded if decide else ():
+        deciding.check(one)
     return loaded
 
 
@@ -130,6 +140,7 @@ def _compute_each(
 
     made: list[dict[str, Any]] = []
     unmet: list[str] = []
+    wrong: list[str] = []
     for one in loaded:
         try:
             with console.Progress(one.stem, quiet=quiet) as progress:
@@ -138,6 +149,9 @@ def _compute_each(
             raise  # for the other experiments too
         except TargetUnmet as error:
             unmet += error.lines
+            continue
+        except DisagreementError as error:  # all is written, and the other experiments stand by themselves
+            wrong += error.lines
             continue
         unmet += [f"{one.stem}: {reason}" for reason in done.unmet]
         if isinstance(done, simulation.Shares):
@@ -150,6 +164,8 @@ def _compute_each(
                 console.print_result(done)
     if as_json:
         click.echo(documents.text(made))
+    if wrong:
+        raise DisagreementError(*wrong)
     if unmet:
         raise TargetUnmet(*unmet)
 
@@ -242,8 +258,12 @@ def report(
 @out_option
 @json_option
 @click.option("--markdown", is_flag=True, help="The page docs/claims.md on stdout in place of text.")
-def claims(configs: tuple[str, ...], out: str, as_json: bool, markdown: bool) -> None:
-    """The papers' claims: stated, measured with interval, verdict; computes nothing.
+@click.option("--figure", metavar="FILE", help="Also draw them, in margins of what the papers say, to this file.")
+def claims(configs: tuple[str, ...], out: str, as_json: bool, markdown: bool, figure: str | None) -> None:
+    """The papers' claims: stated, measured with interval, exact value, class; computes nothing.
+
+    How they are judged stands in docs/verdicts.md: exact values first, each number with a margin, and over every
+    reading that the paper allows, where `radarsim readings` has judged these.
 
     Without CONFIG all claims of all papers; those without stored results are listed as not run, with the command that
     would judge them.
@@ -252,12 +272,15 @@ def claims(configs: tuple[str, ...], out: str, as_json: bool, markdown: bool) ->
     Examples
       radarsim claims range_doppler
       radarsim claims --json
+      radarsim claims --figure claims.svg
     """
     from radarsim.app import documents
     from radarsim.app import run as experiment
     from radarsim.cli import console
 
     rows = experiment.claims(configs, out)
+    if figure is not None:
+        experiment.draw_claims(rows, figure)
     if as_json:
         click.echo(documents.text(rows))
     elif markdown:

@@ -14,6 +14,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.config.load import as_yaml
 from radarsim.report import asked, chart, provenance
 from radarsim.report.chart_text import spoken
+from radarsim.report.claims import page as claims_page
 from radarsim.report.drawing import Figure, Line
 
 if TYPE_CHECKING:
@@ -47,9 +48,6 @@ def page(
     accuracy) are tables, or None.
     """
     claims = _claims(made["claims"])
-    counts: dict[str, int] = {}
-    for claim in claims:
-        counts[claim["overall"]] = counts.get(claim["overall"], 0) + 1
     return whole(
         "report.html.j2",
         experiment=experiment,
@@ -63,7 +61,7 @@ def page(
         record=record,
         extent=provenance.extent(record),
         claims=claims,
-        verdicts=list(counts.items()),
+        verdicts=claims_page.counted(made["claims"].to_dict("records")),
         figures=_figures(figures),
         tables=_tables({name: table for name, table in made.items() if name != "claims" and len(table)}),
         facts=[(name.replace("_", " "), number(record[name])) for name in SHOWN_FACTS if name in record],
@@ -131,16 +129,20 @@ def _measured(part: Mapping[str, Any]) -> str:
 
 
 def _css(verdict: str) -> str:
-    return verdict if verdict in ("confirmed", "refuted") else "unclear"
+    known = ("confirmed", "refuted")
+    return next((one for one in known if verdict.startswith(one)), "unclear")
 
 
 def _claims(table: "pd.DataFrame") -> list[dict[str, Any]]:
     """Claims with their parts, from claims.csv's rows."""
-    found: dict[str, dict[str, Any]] = {}
-    for row in table.to_dict("records"):
-        same = {key: row[key] for key in ("statement", "paper", "place", "reading", "overall")}
-        found.setdefault(row["claim"], {"id": row["claim"], **same, "parts": []})["parts"].append(row)
-    return list(found.values())
+    found = []
+    for parts in claims_page.grouped(table.to_dict("records")):
+        same = {
+            key: parts[0][key] for key in ("statement", "paper", "place", "reading", "original", "overall", "class")
+        }
+        found.append({"id": parts[0]["claim"], **same, "said": claims_page.verdict_of(parts), "parts": parts})
+        found[-1]["said"] = str(found[-1]["said"]).replace("*", "")
+    return found
 
 
 def _cell(column: str, value: object) -> str:

@@ -3,13 +3,13 @@
 import csv
 import io
 import json
-from collections import Counter
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import quote
 
 from radarsim.report import files, html, provenance
+from radarsim.report.claims import page
 
 NAME = "index.html"
 
@@ -53,10 +53,9 @@ def _finished(record: Mapping, path: Path) -> str:
 
 
 def _claims(path: Path) -> str:
-    """How many claims of a table came out how; nothing where there is none."""
+    """How many claims of a table are of which class; nothing where there is none."""
     try:
         text = files.read(path).decode("utf-8")
-        overall = {row["claim"]: row["overall"] for row in csv.DictReader(io.StringIO(text, newline=""))}
+        return page.counted(list(csv.DictReader(io.StringIO(text, newline=""))))
     except (OSError, ValueError, LookupError, csv.Error):
         return ""
-    return ", ".join(f"{count} {verdict}" for verdict, count in Counter(overall.values()).items())

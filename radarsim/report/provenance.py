@@ -7,12 +7,15 @@ import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.report import files
-from radarsim.report.statistics import FEW, FEW_HEAVY
+from radarsim.report import files, notes
+from radarsim.report.statistics import FEW, FEW_EFFECTIVE, FEW_HEAVY
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MOST_SEEDS, MOST_NAMES = 5, 3  # named in a line
 PACKAGES = ("radarsim", "numpy", "numba", "llvmlite", "scipy", "pandas", "matplotlib", "pydantic", "pyyaml")
@@ -25,6 +28,7 @@ def record(
     contents: Mapping[str, bytes],
     answer: Sequence[str],
     machine: Mapping[str, object],
+    curves: "pd.DataFrame | None" = None,
 ) -> dict[str, Any]:
     """All of run.json but the report's own hash.
 
@@ -34,7 +38,7 @@ def record(
     """
     facts = dict(run)
     stop = facts.pop("stop", "done")
-    warnings = [*facts.pop("warnings", ()), *few(results)]
+    warnings = [*facts.pop("warnings", ()), *few(results, curves)]
     done = {result.name: result.count for result in results}
     return {
         "config": experiment.stem,
@@ -104,20 +108,36 @@ def _asked(resolved: Any) -> object:
     return json.loads(to_json(cases))
 
 
-def few(results: Sequence[CaseResult]) -> list[str]:
-    """Warnings on cases whose intervals rest on too few realisations, a line for each degree of it."""
+def few(results: Sequence[CaseResult], curves: "pd.DataFrame | None" = None) -> list[str]:
+    """Warnings on cases whose intervals rest on too few realisations, a line for each degree of it.
+
+    Where the table of curves is given it says which: those of σ at single scans where a few large errors decide.
+    """
     counts = {result.name: result.count for result in results}
     rough = [name for name, count in counts.items() if count < FEW]
     heavy = [name for name, count in counts.items() if FEW <= count < FEW_HEAVY]
-    degrees = (
-        (rough, f"are rough, use at least {FEW}"),
-        (heavy, f"are too narrow where errors have heavy tails, use at least {FEW_HEAVY} there"),
-    )
-    return [
-        f"{_named(names)}: intervals of {span([counts[name] for name in names])} realisations {words}"
-        for names, words in degrees
-        if names
-    ]
+    said = []
+    if rough:
+        said.append(
+            f"{_named(rough)}: intervals of {span([counts[n] for n in rough])} realisations are rough, "
+            f"use at least {FEW}"
+        )
+    if curves is None or not len(curves):
+        if heavy:
+            said.append(
+                f"{_named(heavy)}: intervals of {span([counts[n] for n in heavy])} realisations are too narrow "
+                f"where errors have heavy tails, use at least {FEW_HEAVY} there"
+            )
+        return said
+    marked = curves[notes.thin(curves) & ~curves["case"].isin(rough).to_numpy()]
+    if len(marked):
+        names = list(dict.fromkeys(marked["case"]))
+        least = marked["n_eff"].min()
+        said.append(
+            f"{_named(names)}: {len(marked):,} of {len(curves):,} rows of curves.csv rest on under {FEW_EFFECTIVE} "
+            f"effective realisations, the least on {least:.0f}; these intervals are too narrow, and marked"
+        )
+    return said
 
 
 def _named(names: Sequence[str]) -> str:

@@ -76,12 +76,12 @@ def realisations(result: CaseResult) -> np.ndarray:
 
 CURVES = (
     *("case", "filter", "component", "unit", "k", "t_s", "n"),
-    *("sigma", "sigma_lo", "sigma_hi", "bias", "bias_se", "spread", "exact_sigma"),
+    *("sigma", "sigma_lo", "sigma_hi", "bias", "bias_se", "spread", "exact_sigma", "n_eff"),
 )
 
 
 def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
-    """σ with its interval, bias, spread and exact σ, by case, filter, component and scan (contract: curves.csv)."""
+    """σ with its interval, bias, spread, exact σ and effective realisations, by case, filter, component and scan."""
     return joined([_curves(result) for result in results], CURVES)
 
 
@@ -89,7 +89,8 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
     axes, at = result.axes, shown(result)
     f, k, c = at
     n = realisations(result)[at]
-    of = statistics.errors(np.asarray(result.sums["error"])[at], n)
+    moments = np.asarray(result.sums["error"])[at]
+    of = statistics.errors(moments, n)
     return {
         **leading(result, f, k, **components(result, c)),
         "n": n.astype(np.int64),
@@ -98,6 +99,7 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
         "bias_se": of.bias_se,
         "spread": of.spread,
         "exact_sigma": np.asarray(axes.exact_sigma, dtype=float)[at],
+        "n_eff": statistics.effective(moments[..., 1], moments[..., 3], n),
     }
 
 

@@ -125,8 +125,7 @@ class StudyFolder(Study):
             return super().claims()
         from radarsim.report.claims import PaperClaims
 
-        paper, page, may_grow = self.paper
-        return PaperClaims(self.file("claims").CLAIMS, self.file("measures").Evidence, paper, page, may_grow)
+        return PaperClaims(self.file("claims").CLAIMS, self.file("measures").Evidence, *self.paper)
 
     def readings(self) -> "PaperReadings | None":
         return self.file("readings").Readings() if "readings" in self.offers else super().readings()

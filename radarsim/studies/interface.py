@@ -124,6 +124,7 @@ class Paper(NamedTuple):
     paper: str
     page: str = ""
     may_grow: tuple[str, ...] = ()
+    may_shorten: tuple[str, ...] = ()
 
 
 OptionalPart = Literal[

@@ -143,3 +143,13 @@ def test_empty_and_degenerate_samples():
     one = statistics.errors(np.array([2.0, 4.0, 8.0, 16.0]), 1)
     assert (one.sigma.lo, one.sigma.value, one.sigma.hi) == (0, 2, np.inf)
     assert np.isnan(one.bias_se)
+
+
+def test_effective_realisations():
+    """n/(κ − 1): half of n for Gaussian errors; endless of equal squares; one large error alone counts as one."""
+    e = np.random.default_rng(1).standard_normal(200_000)
+    found = statistics.effective(np.sum(e**2), np.sum(e**4), e.size)
+    assert found == pytest.approx(e.size / 2, rel=5.85 * math.sqrt(24 / e.size) / 2)  # var κ̂ is 24/n
+    assert statistics.effective(10.0, 10.0, 10) == np.inf
+    assert statistics.effective(1.0, 1.0, 1000) == pytest.approx(1000 / 999)
+    assert np.isnan(statistics.effective(0.0, 0.0, 0))

@@ -7,7 +7,19 @@ rule by which they are judged: docs/verdicts.md and `radarsim.report.claims.rule
 
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
 from radarsim.report.claims.evidence import Evidence, Missing, Series, certain, common_times, minus, ratio
-from radarsim.report.claims.judge import CLAIMED, NOT_RUN, NUMBERS, UNCLEAR, judged, listed, overall, verdict
+from radarsim.report.claims.judge import (
+    CLAIMED,
+    NOT_JUDGED,
+    NOT_RUN,
+    NUMBERS,
+    UNCLEAR,
+    errors,
+    first_rows,
+    judged,
+    listed,
+    overall,
+    verdict,
+)
 from radarsim.report.claims.ranges import (
     Range,
     about,
@@ -17,6 +29,7 @@ from radarsim.report.claims.ranges import (
     below,
     between,
     greater,
+    kept,
     less,
     on_grid,
     printed,
@@ -28,6 +41,7 @@ from radarsim.report.claims.rule import CONFIRMED, REFUTED
 __all__ = [
     "CLAIMED",
     "CONFIRMED",
+    "NOT_JUDGED",
     "NOT_RUN",
     "NUMBERS",
     "REFUTED",
@@ -47,8 +61,11 @@ __all__ = [
     "between",
     "certain",
     "common_times",
+    "errors",
+    "first_rows",
     "greater",
     "judged",
+    "kept",
     "less",
     "listed",
     "minus",

@@ -41,7 +41,8 @@ class Claim:
     """A statement of a paper: where it stands, how it was read, the parts that judge it, the config that holds them.
 
     original is the sentence in the paper's language. An extension is ours, and not counted. unstated says what the
-    paper leaves out without which the statement cannot be judged; joint: one variant has to give every number.
+    paper leaves out without which the statement cannot be judged; joint: one variant has to give every number;
+    internal: both sides are printed, so that what does not agree is the print with itself.
     """
 
     id: str
@@ -54,11 +55,17 @@ class Claim:
     extension: bool = False
     unstated: str = ""
     joint: bool = False
+    internal: bool = False
 
     @property
     def paper(self) -> str:
         """The key of the paper, the part of the id before its first point."""
         return self.id.partition(".")[0]
+
+    @property
+    def how(self) -> dict[str, bool]:
+        """How the rule takes it, as `rule.claim` wants it."""
+        return {"unstated": bool(self.unstated), "joint": self.joint, "internal": self.internal}
 
 
 @dataclass(frozen=True)
@@ -66,6 +73,7 @@ class PaperClaims:
     """The claims of a paper that a study judges, and how its results are read for them.
 
     paper is how tables cite it: authors and year. page is the stem of the study's page in docs/, where there is one.
+    may_shorten names keys that only cut a run short, or let it go on: what does not hang on its end is judged still.
     may_grow names the study's lists to which members may be added without its being another experiment than the
     paper's; every other key must be as in the claim's config, see `radarsim.report.claims.paper`.
     """
@@ -75,3 +83,4 @@ class PaperClaims:
     paper: str
     page: str = ""
     may_grow: tuple[str, ...] = ()
+    may_shorten: tuple[str, ...] = ()

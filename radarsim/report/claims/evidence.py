@@ -1,8 +1,8 @@
 """What an experiment measured, as claims ask for it: curves as series, points of them with their intervals."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+import copy
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,18 +13,49 @@ from radarsim.report.statistics import Estimate, difference
 
 
 class Missing(KeyError):
-    """The experiment does not hold a case that a claim needs; the claim is then not judged by it."""
+    """The experiment does not hold what a part of a claim needs; that part is then not judged by it.
+
+    A text says why; anything else is the key of a case that is not there.
+    """
+
+    @property
+    def why(self) -> str:
+        """The reason, where one was given."""
+        return next((arg for arg in self.args if isinstance(arg, str)), "")
+
+
+class Hidden(Mapping):
+    """In place of sums and tables where none may be looked at: everything is missing."""
+
+    def __getitem__(self, key: str) -> Any:
+        raise Missing(key)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(())
+
+    def __len__(self) -> int:
+        return 0
+
+
+class Certain(Estimate):
+    """A number without noise: algebra, a count."""
+
+    __slots__ = ()
 
 
 @dataclass(frozen=True)
 class Series:
-    """A measured curve: scans k, times t, values and the ends of their intervals, arrays of one length."""
+    """A measured curve: scans k, times t, values and the ends of their intervals, arrays of one length.
+
+    short says why it ends before the paper's does; what hangs on its end is then missing.
+    """
 
     k: np.ndarray
     t: np.ndarray
     value: np.ndarray
     lo: np.ndarray
     hi: np.ndarray
+    short: str = ""
 
     def point(self, i: int) -> Estimate:
         """The i-th point."""
@@ -34,7 +65,17 @@ class Series:
         """The points that a mask or indices pick; raises Missing where there is none."""
         if not np.asarray(self.k)[mask].size:
             raise Missing("no such scans")
-        return Series(*(np.asarray(part)[mask] for part in (self.k, self.t, self.value, self.lo, self.hi)))
+        k, t, value, lo, hi = (np.asarray(part)[mask] for part in (self.k, self.t, self.value, self.lo, self.hi))
+        return Series(k, t, value, lo, hi, self.short)
+
+    def upto(self, k: int) -> "Series":
+        """To scan k; whole if it goes so far."""
+        part = self.where(self.k <= k)
+        return replace(part, short="") if self.k[-1] >= k else part
+
+    def _whole(self) -> None:
+        if self.short:
+            raise Missing(self.short)
 
     def since(self, k: int) -> "Series":
         """From scan k on."""
@@ -50,18 +91,22 @@ class Series:
 
     def last(self) -> Estimate:
         """The last point."""
+        self._whole()
         return self.point(-1)
 
     def largest(self) -> Estimate:
         """The largest value, with the interval of its own scan."""
+        self._whole()
         return self.point(int(np.nanargmax(self.value)))
 
     def least(self) -> Estimate:
         """The least value, with the interval of its own scan."""
+        self._whole()
         return self.point(int(np.nanargmin(self.value)))
 
     def when_largest(self, of: str = "t") -> Estimate:
         """Time (or scan, of="k") of the largest value; the interval spans all that cannot be told from it."""
+        self._whole()
         axis = getattr(self, of)
         top = int(np.nanargmax(self.value))
         near = axis[self.hi >= self.lo[top]]
@@ -77,7 +122,7 @@ def common_times(a: Series, b: Series) -> tuple[Series, Series]:
 def minus(a: Series, b: Series) -> Series:
     """a − b, point by point, of independent noise: half-widths add in squares."""
     of = difference(Estimate(a.value, a.lo, a.hi), Estimate(b.value, b.lo, b.hi))
-    return Series(a.k, a.t, *of)
+    return Series(a.k, a.t, *of, short=a.short or b.short)
 
 
 def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
@@ -88,9 +133,9 @@ def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
     return Estimate(value, value * (1 - down), value * (1 + up))
 
 
-def certain(value: float) -> Estimate:
+def certain(value: float) -> Certain:
     """A number without noise: algebra, a count."""
-    return Estimate(float(value), float(value), float(value))
+    return Certain(float(value), float(value), float(value))
 
 
 class Evidence:
@@ -101,15 +146,34 @@ class Evidence:
 
     def __init__(self, results: Sequence[CaseResult], made: Mapping, places: Mapping[str, Mapping[str, set[int]]]):
         """places: by the name of a case and the key of a list, which of its members are the paper's."""
-        self.results, self.tables, self._places = list(results), made, places
+        self.results: list[CaseResult] = list(results)
+        self.tables, self._places = made, places
+        self._exact, self._factor = False, 1.0
+        self._groups: dict[str, Mapping] = {}
 
-    @cached_property
-    def _curves(self) -> Mapping:
-        return common.groups(self.tables["curves"], "case", "filter", "component")
+    def exactly(self) -> "Evidence":
+        """The same with exact values in place of measured ones; what is not known exactly is missing.
 
-    @cached_property
-    def _gains(self) -> Mapping:
-        return common.groups(self.tables["gains"], "case", "filter", "component")
+        Curves and gains are those of their exact columns; no other table, and no sums, can be seen.
+        """
+        for name in ("curves", "gains"):
+            self._grouped(name)
+        other = copy.copy(self)
+        other._exact, other.tables = True, Hidden()
+        other.results = [replace(result, sums=Hidden()) for result in self.results]
+        return other
+
+    def widened(self, factor: float) -> "Evidence":
+        """The same with the intervals of curves and gains so many times as wide."""
+        other = copy.copy(self)
+        other._factor = factor
+        return other
+
+    def _grouped(self, table: str) -> Mapping:
+        """The rows of curves or gains by case, filter and component."""
+        if table not in self._groups:
+            self._groups[table] = common.groups(self.tables[table], "case", "filter", "component")
+        return self._groups[table]
 
     def members(self, result: CaseResult, key: str = "filters") -> list[tuple[int, Any]]:
         """The members of a list of a case that are the paper's, each with its number; not those that were added."""
@@ -124,17 +188,25 @@ class Evidence:
 
     def curve(self, key: Any, filter_name: str, component: str) -> Series:
         """σ(k) of a filter of a case."""
-        return self._series(self._curves, key, filter_name, component, ("sigma", "sigma_lo", "sigma_hi"))
+        return self._series("curves", key, filter_name, component, ("sigma", "sigma_lo", "sigma_hi", "exact_sigma"))
 
     def gain(self, key: Any, filter_name: str, component: str) -> Series:
         """Relative gain of a filter of a case against its baseline, %."""
-        return self._series(self._gains, key, filter_name, component, ("gain_percent", "gain_lo", "gain_hi"))
+        names = ("gain_percent", "gain_lo", "gain_hi", "exact_percent")
+        return self._series("gains", key, filter_name, component, names)
 
-    def _series(self, groups: Mapping, key: Any, filter_name: str, component: str, values: tuple[str, ...]) -> Series:
-        rows = groups.get((self.case(key).name, filter_name, component))
+    def _series(self, table: str, key: Any, filter_name: str, component: str, names: tuple[str, ...]) -> Series:
+        rows = self._grouped(table).get((self.case(key).name, filter_name, component))
         if rows is None:
             raise Missing(key)
-        return Series(*(rows[name].to_numpy() for name in ("k", "t_s", *values)))
+        value, lo, hi, exact = (rows[name].to_numpy(dtype=float) for name in names)
+        if self._exact:
+            if np.isnan(exact).any():
+                raise Missing("not known exactly")
+            value = lo = hi = exact
+        elif self._factor != 1.0:
+            lo, hi = value - self._factor * (value - lo), value + self._factor * (hi - value)
+        return Series(rows["k"].to_numpy(), rows["t_s"].to_numpy(), value, lo, hi)
 
     def row(self, table: str, **equal: object) -> Mapping[str, Any]:
         """The one row of a table with these values; raises Missing."""

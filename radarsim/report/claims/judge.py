@@ -1,21 +1,23 @@
-"""claims.csv: verdicts on the claims that an experiment can judge."""
+"""claims.csv: verdicts on the claims of an experiment, and why those that it cannot judge are not judged."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import tables as common
-from radarsim.report.claims.declared import Claim, PaperClaims
-from radarsim.report.claims.evidence import Evidence, Missing
-from radarsim.report.claims.paper import Described, Shipped, described, own_members
-from radarsim.report.claims.rule import CONFIRMED, REFUTED
-from radarsim.report.statistics import Estimate
+from radarsim.report.claims import rule
+from radarsim.report.claims.declared import Claim, PaperClaims, Part
+from radarsim.report.claims.evidence import Certain, Evidence, Missing
+from radarsim.report.claims.paper import Described, Shipped, described, differences, own_members
+from radarsim.report.claims.rule import CONFIRMED, REFUTED, Judged, Outcome
+from radarsim.report.statistics import FEW, Estimate
 
 if TYPE_CHECKING:
     import pandas as pd
 
-UNCLEAR, NOT_RUN = "not distinguishable", "not run"
+UNCLEAR, NOT_RUN, NOT_JUDGED = "not distinguishable", "not run", "not judged here"
 
 
 def verdict(of: Estimate, strict: tuple[float, float]) -> str:
@@ -30,7 +32,7 @@ def verdict(of: Estimate, strict: tuple[float, float]) -> str:
 
 
 def overall(verdicts: Sequence[str]) -> str:
-    """Of a claim with several parts: refuted with any of them, confirmed with all."""
+    """Of a claim with several parts, by the rule of version 0.1: refuted with any of them, confirmed with all."""
     if REFUTED in verdicts:
         return REFUTED
     return CONFIRMED if set(verdicts) == {CONFIRMED} else UNCLEAR
@@ -39,24 +41,35 @@ def overall(verdicts: Sequence[str]) -> str:
 CLAIMED = (
     *("claim", "paper", "statement", "case", "measured", "lo", "hi", "expected", "verdict"),
     *("expected_lo", "expected_hi", "what", "unit", "place", "reading", "overall"),
+    *("exact", "margin", "miss", "class", "holds", "of", "depends_on", "old_verdict", "original"),
+    *("margin_kind", "ceiling", "n", "worst_miss", "needed", "extension", "number", "why"),
 )
-NUMBERS = ("measured", "lo", "hi", "expected_lo", "expected_hi")  # of these columns; empty where there is none
+# Of these columns; empty where there is none.
+NUMBERS = (
+    *("measured", "lo", "hi", "expected_lo", "expected_hi", "exact", "margin", "miss", "holds", "of"),
+    *("ceiling", "n", "worst_miss", "needed"),
+)
 
 
 def judged(
-    of: PaperClaims | None, results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", shipped: Shipped
+    of: PaperClaims | None,
+    results: Sequence[CaseResult],
+    made: "Mapping[str, pd.DataFrame]",
+    shipped: Shipped,
+    stem: str = "",
 ) -> "pd.DataFrame":
-    """claims.csv: a row for each part of each claim that these results can judge, those of whole claims only.
+    """claims.csv: a row for each part of each claim that these results can judge.
 
-    A claim sees only the cases that are the paper's: those of its config, which `shipped` gives by its stem.
+    A claim sees only the cases that are the paper's: those of its config, which `shipped` gives by its stem. Claims of
+    the config `stem`, which is the one that was run, are all there: what cannot be judged says why. Of other configs
+    those of which every part can be judged.
     """
-    rows: list[tuple] = []
+    rows: list[dict[str, Any]] = []
     if of is not None:
         papers = _Papers(of, results, made, shipped)
         for claim in of.claims:
-            if (evidence := papers.evidence(claim.config)) is not None:
-                rows += _rows(claim, of.paper, evidence)
-    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(CLAIMED)})
+            rows += _rows(claim, of.paper, papers, own=claim.config == stem)
+    return common.frame({name: [row[name] for row in rows] for name in CLAIMED})
 
 
 class _Papers:
@@ -64,17 +77,19 @@ class _Papers:
 
     def __init__(self, of: PaperClaims, results: Sequence[CaseResult], made: Mapping, shipped: Shipped):
         self._of, self._results, self._made, self._shipped = of, results, made, shipped
-        self._seen: dict[str, Evidence | None] = {}
+        self._seen: dict[str, tuple[Evidence | None, str]] = {}
 
-    def evidence(self, config: str) -> Evidence | None:
-        """The evidence that claims of a config may see; None where no case is the paper's."""
+    def evidence(self, config: str) -> tuple[Evidence | None, str]:
+        """The evidence that claims of a config may see, None where no case is the paper's; what differs in others."""
         if config not in self._seen:
-            specs = self._shipped(config)
-            self._seen[config] = self._evidence([described(spec, self._of.may_grow) for spec in specs or ()])
+            of = self._of
+            specs = [described(spec, of.may_grow, of.may_shorten) for spec in self._shipped(config) or ()]
+            self._seen[config] = self._evidence(specs), self._differences(specs)
         return self._seen[config]
 
     def _evidence(self, shipped: Sequence[Described]) -> Evidence | None:
-        every = {result.name: own_members(result.spec, shipped, self._of.may_grow) for result in self._results}
+        grow = self._of.may_grow
+        every = {result.name: own_members(self._described(result), shipped, grow) for result in self._results}
         places = {name: own for name, own in every.items() if own is not None}
         if not places:
             return None
@@ -83,31 +98,177 @@ class _Papers:
             made = {name: _of_cases(table, set(places)) for name, table in made.items()}
         return self._of.evidence([result for result in self._results if result.name in places], made, places)
 
+    def _described(self, result: CaseResult) -> Described:
+        return described(result.spec, self._of.may_grow, self._of.may_shorten)
+
+    def _differences(self, shipped: Sequence[Described]) -> str:
+        """In which keys cases that are not the paper's differ from the nearest of these."""
+        said = []
+        for result in self._results:
+            found = differences(self._described(result), shipped, self._of.may_grow)
+            if found:
+                said.append(f"{result.name}: {', '.join(found[:MOST_SAID])}" + (" …" if len(found) > MOST_SAID else ""))
+        return "; ".join(said[:MOST_SAID]) + (f"; and {len(said) - MOST_SAID} more" if len(said) > MOST_SAID else "")
+
+
+MOST_SAID = 3  # keys and cases that a reason names
+
 
 def _of_cases(table: "pd.DataFrame", names: set[str]) -> "pd.DataFrame":
     """The rows of a table that belong to cases of these names, or to none."""
     return table[table["case"].isin(names)] if "case" in table else table
 
 
-def _rows(claim: Claim, paper: str, evidence: Evidence) -> list[tuple]:
-    try:
-        measured = [part.measure(evidence) for part in claim.parts]
-        cases = [", ".join(evidence.case(key).name for key in part.cases) for part in claim.parts]
-    except Missing:
+@dataclass(frozen=True)
+class _Tried:
+    """A part with what became of it: the judged numbers, or why there are none."""
+
+    part: Part
+    cases: str = ""
+    judged: Judged | None = None
+    old: str = ""
+    why: str = ""
+
+
+def _rows(claim: Claim, paper: str, papers: _Papers, own: bool) -> list[dict[str, Any]]:
+    seen, changed = papers.evidence(claim.config)
+    if seen is None and not (own and changed):
         return []
-    verdicts = [verdict(of, part.expected.strict) for of, part in zip(measured, claim.parts, strict=True)]
-    return [
-        (
-            *(claim.id, paper, claim.statement, case, float(of.value), float(of.lo), float(of.hi)),
-            *(part.expected.words, said, _end(part.expected.lo), _end(part.expected.hi)),
-            *(part.what, part.unit, claim.place, claim.reading, overall(verdicts)),
-        )
-        for part, case, of, said in zip(claim.parts, cases, measured, verdicts, strict=True)
-    ]
+    tried = [_tried(part, seen, changed) for part in claim.parts]
+    if not own and any(one.judged is None for one in tried):
+        return []
+    here = [(one, one.judged) for one in tried if one.judged is not None]
+    outcome = rule.claim([of for _, of in here], **claim.how) if here else None
+    many = sum(of.sampled and not of.void and of.asserted for _, of in here)
+    whole = len(here) == len(tried) or (outcome is not None and outcome.kind == REFUTED)
+    return [_row(claim, paper, one, outcome if whole else None, many) for one in tried]
+
+
+def _tried(part: Part, seen: Evidence | None, changed: str) -> _Tried:
+    """Measure a part; say why where it cannot be."""
+    if seen is None:
+        return _Tried(part, why=f"not the paper's experiment: {changed}")
+    try:
+        measured = part.measure(seen)
+        cases = [seen.case(key) for key in part.cases]
+        scale = part.scale(seen) if part.scale else 1.0
+        ceiling = part.ceiling(seen) if part.ceiling else math.nan
+    except Missing as missing:
+        other = f"not the paper's experiment: {changed}" if changed else "a case that it needs is not there"
+        reason = missing.why or other
+        return _Tried(part, why=reason)
+    value, lo, hi = (float(one) for one in measured)
+    of = Judged(
+        value,
+        lo,
+        hi,
+        expected_lo=part.expected.lo,
+        expected_hi=part.expected.hi,
+        margin=part.expected.margin * scale,
+        kind=part.expected.kind,
+        exact=exact(part, seen, measured),
+        ceiling=ceiling,
+        n=min((case.count for case in cases), default=0),
+        statement=part.statement,
+        number=part.number,
+        variant=part.variant,
+        against_print=part.against_print,
+        asserted=part.asserted,
+    )
+    names = ", ".join(dict.fromkeys(case.name for case in cases))
+    return _Tried(part, names, of, verdict(measured, part.expected.strict), disagreement(part, seen, of))
+
+
+def exact(part: Part, seen: Evidence, measured: Estimate) -> float:
+    """The exact value of a part, not-a-number where it is not known."""
+    try:
+        if part.exact:
+            return float(part.exact(seen))
+        return float(part.measure(seen.exactly()).value)
+    except Missing:
+        return float(measured.value) if isinstance(measured, Certain) else math.nan
+
+
+def disagreement(part: Part, seen: Evidence, of: Judged) -> str:
+    """What to say where exact value and Monte-Carlo lie further apart than chance puts them; else nothing.
+
+    The part is measured again with the curves' intervals at 5.85 standard errors, so that what jumps from scan to scan
+    is judged as what moves evenly is. Of few realisations nothing is said: their intervals are no multiple of 95 %.
+    """
+    if not of.known or of.n < FEW or of.lo == of.hi == of.exact:
+        return ""
+    factor = rule.ERROR_OF_PROGRAM / rule.Z95
+    wide = part.measure(seen.widened(factor))
+    lo, hi = rule.widened(of.lo, of.measured, of.hi, factor)
+    slack = max(1e-9 * abs(of.exact), ROUNDING * of.margin)
+    low, high = min(lo, float(wide.lo)) - slack, max(hi, float(wide.hi)) + slack
+    if low <= of.exact <= high or math.isinf(of.exact) or not math.isfinite(of.measured):
+        return ""
+    return f"{ERROR}: exact {of.exact:.6g}, simulated {of.measured:.6g} [{of.lo:.6g}, {of.hi:.6g}]"
+
+
+ROUNDING = 1e-3  # of a margin, in values that have no width: identities hold to the last bits
+ERROR = f"exact value and simulation differ by more than {rule.ERROR_OF_PROGRAM} standard errors"
+
+
+def errors(rows: "pd.DataFrame") -> list[str]:
+    """A line for each part whose exact value and simulation disagree: errors of the program."""
+    own = rows[rows["why"].astype(str).str.startswith(ERROR)]
+    return [f"{row['claim']}: {row['what']} ({row['case']}): {row['why']}" for _, row in own.iterrows()]
+
+
+def _row(claim: Claim, paper: str, one: _Tried, outcome: Outcome | None, many: int) -> dict[str, Any]:
+    part, of = one.part, one.judged
+    row = blank(claim, paper) | {
+        "case": one.cases,
+        "expected": part.expected.words,
+        "expected_lo": _end(part.expected.lo),
+        "expected_hi": _end(part.expected.hi),
+        "what": part.what,
+        "unit": part.unit,
+        "margin_kind": part.expected.kind,
+        "number": f"{part.statement}{part.number}" if part.number else "",
+        "extension": claim.extension or not part.asserted,
+        "overall": outcome.words if outcome else NOT_JUDGED,
+        "class": outcome.kind if outcome else NOT_JUDGED,
+        "worst_miss": _end(outcome.miss) if outcome else math.nan,
+        "needed": outcome.needed if outcome and outcome.needed else math.nan,
+        "verdict": NOT_JUDGED,
+        "why": one.why,
+    }
+    if of is None:
+        return row
+    return row | {
+        "measured": of.measured,
+        "lo": of.lo,
+        "hi": of.hi,
+        "verdict": rule.verdict(of, many),
+        "exact": of.exact,
+        "margin": _end(of.margin),
+        "miss": _end(rule.miss(of)),
+        "old_verdict": one.old,
+        "ceiling": of.ceiling,
+        "n": of.n,
+    }
+
+
+def blank(claim: Claim, paper: str) -> dict[str, Any]:
+    """The columns of a claim that do not hang on a measurement; the others empty."""
+    empty: dict[str, Any] = dict.fromkeys(CLAIMED, "") | dict.fromkeys(NUMBERS, math.nan)
+    return empty | {
+        "claim": claim.id,
+        "paper": paper,
+        "statement": claim.statement,
+        "place": claim.place,
+        "reading": claim.reading,
+        "original": claim.original,
+        "extension": claim.extension,
+        "why": claim.unstated,
+    }
 
 
 def _end(value: float) -> float:
-    """An end of a range as a table holds it: at twelve digits, not-a-number where there is none."""
+    """A number as a table holds it: at twelve digits, not-a-number where it is infinite."""
     return float(f"{value:.12g}") if math.isfinite(value) else math.nan
 
 
@@ -116,12 +277,16 @@ def listed(papers: Sequence[PaperClaims], stored: Mapping[str, Sequence[Mapping]
 
     stored: config stem → the rows of its claims.csv.
     """
-    rows = []
+    rows: list[dict] = []
     for paper, claim in ((of.paper, claim) for of in papers for claim in of.claims):
         own = [dict(row) for row in stored.get(claim.config, ()) if row["claim"] == claim.id]
-        blank = dict.fromkeys(CLAIMED, "") | {"claim": claim.id, "paper": paper}
-        blank |= {"place": claim.place, "reading": claim.reading}
-        rows += own or [blank | {"statement": claim.statement, "verdict": NOT_RUN, "overall": NOT_RUN}]
-        for row in rows[-max(1, len(own)) :]:
-            row["config"] = claim.config
+        if not own:
+            own = [blank(claim, paper) | {"verdict": NOT_RUN, "overall": NOT_RUN, "class": NOT_RUN}]
+            own[0] |= dict.fromkeys(NUMBERS, "")
+        rows += [row | {"config": claim.config} for row in own]
     return rows
+
+
+def first_rows(rows: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """One row of each claim, the first."""
+    return list({(row["paper"], row["claim"]): row for row in reversed(list(rows))}.values())[::-1]

@@ -51,7 +51,7 @@ def under(of: PaperReadings, claim: Claim, reading: Reading, evidence: Evidence)
         parts = tuple((part, _judged(part, evidence, of.exact(claim))) for part in of.parts(claim))
     except Missing as missing:
         return Under(claim, reading, name, kind, why=_why(missing))
-    outcome = rule.claim([judged for _, judged in parts], unstated=bool(claim.unstated), joint=claim.joint)
+    outcome = rule.claim([judged for _, judged in parts], **claim.how)
     return Under(claim, reading, name, kind, parts, outcome)
 
 
@@ -70,6 +70,8 @@ def _judged(part: Part, seen: Evidence, exact: bool) -> Judged:
         ceiling=part.ceiling(seen) if part.ceiling else nothing,
         statement=part.statement,
         number=part.number,
+        variant=part.variant,
+        against_print=part.against_print,
         asserted=part.asserted,
     )
 

@@ -29,9 +29,9 @@ class Described:
     named: dict[str, object]
 
 
-def described(spec: Model, may_grow: Sequence[str]) -> Described:
-    """The keys of a case that are compared."""
-    plain = canonical(spec)
+def described(spec: Model, may_grow: Sequence[str], may_shorten: Sequence[str] = ()) -> Described:
+    """The keys of a case that are compared: all but may_shorten."""
+    plain = {key: value for key, value in canonical(spec).items() if key not in may_shorten}
     members = {key: plain.pop(key) for key in may_grow}
     named = {}
     for field, info in type(spec).model_fields.items():
@@ -41,12 +41,11 @@ def described(spec: Model, may_grow: Sequence[str]) -> Described:
     return Described(plain, members, named)
 
 
-def own_members(spec: Model, shipped: Iterable[Described], may_grow: Sequence[str]) -> dict[str, set[int]] | None:
+def own_members(mine: Described, shipped: Iterable[Described], may_grow: Sequence[str]) -> dict[str, set[int]] | None:
     """Of a case that is the paper's: which members of its lists, by number, are the paper's; None for any other case.
 
     shipped are the cases of the claim's config.
     """
-    mine = described(spec, may_grow)
     found: dict[str, set[int]] | None = None
     for papers in shipped:
         if not (equal(mine.fixed, papers.fixed) and equal(mine.named, papers.named)):
@@ -55,6 +54,47 @@ def own_members(spec: Model, shipped: Iterable[Described], may_grow: Sequence[st
         if all(len(places[key]) == len(papers.members[key]) for key in may_grow):
             found = {key: places[key] | (found or {}).get(key, set()) for key in may_grow}
     return found
+
+
+def differences(mine: Described, shipped: Iterable[Described], may_grow: Sequence[str]) -> list[str]:
+    """The keys in which a case differs from the nearest of these, "key is x, the paper's y"; empty where in none."""
+    shipped = list(shipped)
+    if own_members(mine, shipped, may_grow) is not None:
+        return []
+    every = [_differing(mine.fixed, papers.fixed) + _lacking(mine, papers, may_grow) for papers in shipped]
+    return min(every, key=len, default=["no such experiment is shipped"])
+
+
+def _lacking(mine: Described, papers: Described, may_grow: Sequence[str]) -> list[str]:
+    said = []
+    for key in may_grow:
+        missing = len(papers.members[key]) - len(_places(papers.members[key], mine.members[key]))
+        if missing:
+            said.append(f"{missing} of the paper's {len(papers.members[key])} {key} changed or not there")
+    if not equal(mine.named, papers.named):
+        said.append(f"{', '.join(papers.named)} another one than the paper's")
+    return said
+
+
+def _differing(mine: object, papers: object, path: str = "") -> list[str]:
+    """The keys of plain data in which two differ, by dotted path."""
+    if equal(mine, papers):
+        return []
+    if isinstance(mine, dict) and isinstance(papers, dict):
+        keys = dict.fromkeys((*mine, *papers))
+        return [line for key in keys for line in _differing(mine.get(key), papers.get(key), f"{path}.{key}".strip("."))]
+    if isinstance(mine, list) and isinstance(papers, list) and len(mine) == len(papers):
+        pairs = enumerate(zip(mine, papers, strict=True))
+        return [line for i, (own, other) in pairs for line in _differing(own, other, f"{path}.{i}")]
+    return [f"{path} is {_short(mine)}, the paper's {_short(papers)}"]
+
+
+def _short(value: object) -> str:
+    text = f"{value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
+    return text if len(text) <= LONGEST else text[:LONGEST] + "…"
+
+
+LONGEST = 40  # characters of a value that a reason quotes
 
 
 def _places(wanted: Sequence, given: Sequence) -> set[int]:

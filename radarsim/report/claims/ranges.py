@@ -110,6 +110,11 @@ def same(value: float = 0.0, margin: float = 1.0, strict: float | None = None) -
     return Range(value, value, f"{value:g} ± {margin:g}", margin, SAME, (value - old, value + old))
 
 
+def kept(margin: float = 1.0, strict: float = 0.5) -> Range:
+    """No loss, in % of σ: a gain, or a loss within the margin."""
+    return Range(0.0, math.inf, f"≥ 0 ± {margin:g}", margin, SAME, (-strict, math.inf))
+
+
 def on_grid(low: float, high: float, step: float, strict: tuple[float, float]) -> Range:
     """A time, or a ratio of times, no finer than the grid on which it is read."""
     words = f"{low:g}" if low == high else f"{low:g} to {high:g}"

@@ -25,6 +25,7 @@ INCLUSIVE = (PRINT, ABOUT, GRID, SAME)
 
 EQUIVALENT, UNSTATED, AGAINST = "E", "U", "N"  # kinds of readings; the last contradicts the print
 Z95 = NormalDist().inv_cdf(0.975)
+ROUNDING = 1e-12  # of a margin
 ERROR_OF_PROGRAM = 5.85  # standard errors between exact value and Monte-Carlo: by chance once in 2·10⁸
 
 
@@ -130,7 +131,7 @@ def miss(part: Judged) -> float:
 
 def _miss(value: float, part: Judged) -> float:
     outside = max(part.expected_lo - value, value - part.expected_hi, 0.0)
-    return outside / part.margin if outside else 0.0
+    return outside / part.margin if outside > ROUNDING * part.margin else 0.0
 
 
 def verdict(part: Judged, parts: int = 1) -> str:
@@ -220,11 +221,12 @@ BEST = (CONFIRMED, IMMATERIAL, UNDECIDED, CONTRADICTORY, REFUTED)
 WORST = (REFUTED, CONTRADICTORY, UNDECIDED, UNJUDGEABLE, IMMATERIAL, CONFIRMED)
 
 
-def claim(parts: Sequence[Judged], *, unstated: bool = False, joint: bool = False) -> Outcome:
+def claim(parts: Sequence[Judged], *, unstated: bool = False, joint: bool = False, internal: bool = False) -> Outcome:
     """The outcome of a claim of these parts; of an extension none of which is asserted, as if all were.
 
     unstated: the paper leaves out what the statement is about, so that it cannot be judged. joint: one variant has to
     give every number; where each comes out in some variant and no variant gives all, the print contradicts itself.
+    internal: what is compared is printed on both sides; where it differs, the print contradicts itself.
     """
     asserted = [part for part in parts if part.asserted] or list(parts)
     many = sum(part.sampled and not part.void for part in asserted)
@@ -233,6 +235,8 @@ def claim(parts: Sequence[Judged], *, unstated: bool = False, joint: bool = Fals
     numbers = _numbers(asserted)
     said = {name: _best(own, many) for name, own in numbers.items()}
     kind = UNJUDGEABLE if unstated else _kind(numbers, said, many)
+    if internal and kind == REFUTED:
+        kind = CONTRADICTORY
     misses = [min(miss(part) for part in own) for name, own in numbers.items() if said[name] != VOID]
     open_ = [part for name, own in numbers.items() if said[name] == UNDECIDED for part in own]
     return Outcome(

@@ -5,13 +5,18 @@ one it states, and then its threshold c is the 1 of (14); its first window follo
 0.5 of (11). Both readings are judged: "computed" and "printed".
 """
 
+from functools import partial
+from itertools import pairwise
+
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import claims
 from radarsim.report.claims import Missing, certain
 from radarsim.report.statistics import Estimate, difference, root_mean_square
+from radarsim.studies.discriminator import ceiling, exact, schedule, study
 from radarsim.studies.discriminator.kernels.sums import LOCKS
+from radarsim.studies.discriminator.world import LIGHT_MPS
 
 COMPUTED, PRINTED = "computed", "printed"
 READINGS = {COMPUTED: (2.25, 1.0), PRINTED: (9.0, 0.5)}  # noise variance, threshold c
@@ -94,8 +99,30 @@ class Evidence(claims.Evidence):
         return Estimate(*(scale * part for part in root_mean_square(moments[1], moments[3], result.count)))
 
     def potential(self, key, component: str) -> Estimate:
-        """Potential spread of the whole burst, computed."""
-        return certain(self.case(key).axes.potential_closed_form[COMPONENTS.index(component)])
+        """Potential spread by the discrete sum over the pulses l = 0 … n − 2, of which the paper's digits are."""
+        burst = study.burst_of(self.case(key).spec)
+        found = exact.spreads(exact.fisher_sums(burst, len(COMPONENTS), [burst.pulses - 1])[0])
+        return certain(found[COMPONENTS.index(component)])
+
+    def efficient(self, key) -> float:
+        """What an efficient estimator would score in `always`, over the windows of the sequence."""
+        result, i = self.case(key), self.estimator(key, "sequence")
+        forecast = tuple(map(float, result.axes.prior_sigma))
+        return ceiling.always_within(study.burst_of(result.spec), tuple(result.axes.pulses[i]), forecast)
+
+    def worst_handover(self, key) -> Estimate:
+        """The largest probability over the hand-overs that Z passes c: of the form's own law, not of a Gaussian."""
+        result, i = self.case(key), self.estimator(key, "sequence")
+        burst, threshold = study.burst_of(result.spec), READINGS[key][1]
+        fisher = partial(exact.fisher, burst, len(COMPONENTS))
+        designer = schedule.Designer(burst, result.axes.prior_sigma, fisher, schedule.Condition(threshold=threshold))
+        times = burst.pulse_period_s * np.array(result.axes.pulses[i])
+        forms = [designer.handover(before)(after) for before, after in pairwise(times[:-1])]  # the last is cut short
+        return certain(max(schedule.tail_probability(form.values, threshold) for form in forms))
+
+    def spare_window(self, key, amplitude: float) -> Estimate:
+        """First window less the shortest allowed at an amplitude, ms."""
+        return certain(1e3 * self.windows(key)[0] - self.shortest_window(key, amplitude).value)
 
     def shortest_window(self, key, amplitude: float) -> Estimate:
         """T_min (17) in ms at an amplitude."""
@@ -120,3 +147,27 @@ def kind_of(estimator, threshold: float) -> str:
     if e.first_windows == 1:
         return "wide"
     return "other" if e.first_windows else "cured" if e.search_points else "sequence"
+
+
+CARRIER_HZ = 10e9
+SPEEDS = {0.0: 0.0, 0.1: 350.0, 0.2: 450.0, 0.3: 475.0}  # s: m/s, as the paper states the motion
+
+
+def doppler_of_speed(t: float) -> float:
+    """Doppler frequency of the stated radial speed at a time, kHz: 2v/λ."""
+    return 2e-3 * SPEEDS[t] * CARRIER_HZ / LIGHT_MPS
+
+
+def doppler_of_polynomial(t: float) -> Estimate:
+    """Doppler frequency of the printed derivatives at a time, kHz."""
+    f0, f1, f2, f3 = DOPPLER
+    return certain(1e-3 * (f0 + f1 * t + f2 * t**2 / 2 + f3 * t**3 / 6))
+
+
+SPREADS = {"phi0": 0.061, "f0": 0.45, "f1": 12.2, "f2": 183.38, "f3": 1213.04}  # as printed
+FACTORS = {"phi0": 100, "f0": 150, "f1": 500, "f2": 1000, "f3": 2000}
+
+
+def forecast_spread(component: str) -> Estimate:
+    """Printed potential spread times the printed factor."""
+    return certain(SPREADS[component] * FACTORS[component])

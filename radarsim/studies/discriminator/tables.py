@@ -46,7 +46,8 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
     axes, at = result.axes, common.shown(result)
     f, k, c = at
     n, bound = result.sums["locks"][f, k, COUNTED.index("lock")], axes.exact_sigma[at]
-    of = statistics.errors(result.sums["error"][at], n)
+    moments = result.sums["error"][at]
+    of = statistics.errors(moments, n)
     every = statistics.errors(result.sums["error_all"][at], result.count)
     return {
         **_labels(result, f, k, c),
@@ -56,6 +57,7 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
         "bias_se": of.bias_se * bound,
         "spread": of.spread * bound,
         "exact_sigma": bound,
+        "n_eff": statistics.effective(moments[..., 1], moments[..., 3], n),
         "sigma_all": every.sigma.value * bound,
         "posterior_sigma": axes.posterior_sigma[at],
     }

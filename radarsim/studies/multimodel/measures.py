@@ -126,6 +126,19 @@ class Evidence(claims.Evidence):
         return float(self.row("operations", case=of.name, filter=name, stage="whole")["operations"])
 
 
+def growth_of_change(seen: Evidence, key: tuple) -> float:
+    """The probability to leave a model, the largest of a filter's, within 20 intervals over that within one; the least
+    of a case's filters of several models.
+    """
+    growths = []
+    for options in seen.case(key).spec.filters:
+        T = filters.transition_matrix(options.transition)
+        if len(T) > 1:
+            later = filters.transition_powers(T, np.array([20.0]))[0]
+            growths.append(np.max(1 - np.diag(later)) / np.max(1 - np.diag(T)))
+    return float(min(growths))
+
+
 def largest_fault_of_powers(seen: Evidence, key: tuple, tenfold: bool) -> float:
     """The largest element, over a case's filters, of T(Δt/10⁶) − I, or of T(10 Δt) − T(Δt)¹⁰ where tenfold."""
     faults = []

@@ -11,6 +11,6 @@ STUDY = StudyFolder(
         "observes: [range]": "Kalman filter of the second order on range, started by least squares on three scans",
         "observes: [range, velocity]": "the same on range and radial velocity, started on two scans",
     },
-    paper=Paper("Gorshkov & Zavizhenets 2017", page="range_doppler"),
+    paper=Paper("Gorshkov & Zavizhenets 2017", page="range_doppler", may_shorten=("scans",)),
     offers=("inputs", "readings", "recorded", "chart"),
 )

@@ -5,6 +5,7 @@ variance are the paper's, whatever its name.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import claims
 from radarsim.report.claims import Part, Range, Series, certain, common_times, minus, ratio
 from radarsim.report.statistics import Estimate, difference
+from radarsim.studies.range_doppler import exact, tables
 
 RADARS = {1: (25, 5, 10), 2: (250, 15, 10), 3: (250, 15, 5), 4: (50, 1, 10), 5: (50, 1, 5)}  # σ_r, σ_V, Δt
 VARIANCE = 1e-3  # the paper's D_M, (m/s³)²
@@ -34,14 +36,13 @@ class Evidence(claims.Evidence):
 
     @staticmethod
     def _radar(result: CaseResult) -> int | None:
-        """The number of the paper's radar that a case is; None for any other, or another target, or a shorter run."""
+        """The number of the paper's radar that a case is; None for any other, or another target."""
         radar, target = result.spec.radar, result.spec.target
         own = (radar.sigma_range_m, radar.sigma_velocity_mps, radar.scan_period_s)
         fits = target.kind == "polynomial" and not any(target.coefficients[3:]) and not any(target.sigma_coefficients)
         fits = fits and radar.as_the_papers
-        long_enough = result.axes.t_s[-1] >= DURATION - 1e-6
         found = [number for number, row in RADARS.items() if all(map(math.isclose, own, row))]
-        return found[0] if found and fits and long_enough else None
+        return found[0] if found and fits else None
 
     @staticmethod
     def _variance(result: CaseResult) -> float:
@@ -56,7 +57,7 @@ class Evidence(claims.Evidence):
 
     def whole_sigma(self, key, observes: tuple[str, ...], component: str) -> Series:
         """σ(k) of the filter that observes these, to the end of the run."""
-        return self.curve(key, self.filter(key, observes), component)
+        return self.marked(self.curve(key, self.filter(key, observes), component), key)
 
     def sigma(self, key, observes: tuple[str, ...], component: str) -> Series:
         """σ(k) of the filter that observes these, over the paper's fifteen points."""
@@ -71,13 +72,26 @@ class Evidence(claims.Evidence):
 
         At k = 1 both filters give the same measured range, and no gain is spoken of.
         """
-        return _as_long_as_the_papers(self.gain(radar, self.filter(radar, RV), component).since(2))
+        gain = self.marked(self.gain(radar, self.filter(radar, RV), component), radar)
+        return _as_long_as_the_papers(gain.since(2))
 
     def settling(self, key, observes: tuple[str, ...], component: str = "r") -> Estimate:
         """Scan periods from the first plot to settling (5 % of the steady value, for good)."""
-        row = self.row("steady", case=self.case(key).name, filter=self.filter(key, observes), component=component)
-        period = self.case(key).axes.scan_period_s
-        return Estimate(*(row[name] / period for name in ("settling_s", "settling_lo_s", "settling_hi_s")))
+        sigma = self.whole_sigma(key, observes, component)
+        sigma.last()  # missing where the run is too short to settle in
+        axes, c = self.case(key).axes, list(COMPONENTS).index(component)
+        f = axes.filters.index(self.filter(key, observes))
+        variance = float(axes.manoeuvre_variance[f])
+        _, steady = exact.steady_state(int(axes.observes[f]), variance, axes.sigma, axes.scan_period_s)
+        when = tables.settling(Estimate(sigma.value, sigma.lo, sigma.hi), sigma.t, float(np.sqrt(steady[c, c])))
+        return Estimate(*(part / axes.scan_period_s for part in when))
+
+    def marked(self, series: Series, key) -> Series:
+        """A curve of a case, marked where its run ends before the paper's 140 s."""
+        result = self.case(key)
+        end = float(result.axes.t_s[-1])
+        short = f"{result.name} ends at {end:g} s, the paper's run at {DURATION:g} s" if end < DURATION - 1e-6 else ""
+        return replace(series, short=short)
 
     def variances(self, radar: int) -> list[float]:
         """The manoeuvre variances at hand for a radar; raises Missing where there are fewer than two."""
@@ -103,9 +117,9 @@ def gain_part(radar: int, component: str, pick: str, what: str, expected: Range,
     )
 
 
-def faster_part(slow: int, fast: int, what: str, unit: str, measure, expected: Range) -> Part:
+def faster_part(slow: int, fast: int, what: str, unit: str, measure, expected: Range, scale=None) -> Part:
     """A part that compares two radars differing only in their period: measure(evidence, slow, fast)."""
-    return Part((slow, fast), what, unit, lambda seen: measure(seen, slow, fast), expected)
+    return Part((slow, fast), what, unit, lambda seen: measure(seen, slow, fast), expected, scale)
 
 
 def gain_raised(seen: Evidence, slow: int, fast: int) -> Estimate:
@@ -113,10 +127,27 @@ def gain_raised(seen: Evidence, slow: int, fast: int) -> Estimate:
     return minus(*common_times(seen.k_gain(fast, "r"), seen.k_gain(slow, "r"))).least()
 
 
-def peak_times(seen: Evidence, slow: int, fast: int) -> Estimate:
-    """Time of the largest range gain, fast : slow; the interval spans all times not distinguishable from it."""
-    a, b = seen.k_gain(fast, "r").when_largest(), seen.k_gain(slow, "r").when_largest()
-    return Estimate(a.value / b.value, a.lo / b.hi, a.hi / b.lo)
+EXTREMUM = 1.0  # point of gain: what differs by less is no material difference, of two times either
+
+
+def extrema_apart(seen: Evidence, slow: int, fast: int) -> Estimate:
+    """Time from one radar's largest range gain to the other's, s; each is all times within a point of the largest."""
+    return apart_in_time(*(_extremum(seen.k_gain(radar, "r")) for radar in (fast, slow)))
+
+
+def _extremum(gain: Series) -> tuple[Estimate, Estimate]:
+    """First and last time at which a gain is within a point of its largest; with intervals, at which it may be."""
+    top = gain.largest()
+    sure = gain.t[gain.value >= top.value - EXTREMUM]
+    likely = gain.t[gain.hi >= top.lo - EXTREMUM]
+    return Estimate(sure[0], likely[0], sure[0]), Estimate(sure[-1], sure[-1], likely[-1])
+
+
+def apart_in_time(one: tuple[Estimate, Estimate], other: tuple[Estimate, Estimate]) -> Estimate:
+    """The gap between two spans of time, 0 where they meet; at least, that of the widest they may be."""
+    gap = max(one[0].value - other[1].value, other[0].value - one[1].value, 0.0)
+    least = max(one[0].lo - other[1].hi, other[0].lo - one[1].hi, 0.0)
+    return Estimate(float(gap), float(least), float(gap))
 
 
 def apart(component: str):
@@ -126,10 +157,11 @@ def apart(component: str):
         a, b = common_times(seen.k_gain(fast, component), seen.k_gain(slow, component))
         gap = minus(a, b)
         sign = np.sign(gap.value)
-        size = Series(
-            gap.k, gap.t, abs(gap.value), np.where(sign < 0, -gap.hi, gap.lo), np.where(sign < 0, -gap.lo, gap.hi)
-        )
+        ends = np.where(sign < 0, -gap.hi, gap.lo), np.where(sign < 0, -gap.lo, gap.hi)
+        size = Series(gap.k, gap.t, abs(gap.value), *ends, short=gap.short)
         height = max(a.largest().value, b.largest().value)
+        if height <= 0:
+            raise claims.Missing("there is no gain")
         worst = size.largest()
         return Estimate(*(100 * max(part, 0.0) / height for part in worst))
 
@@ -146,11 +178,62 @@ def sigma_change(observes: tuple[str, ...], component: str, pick: str):
     return measure
 
 
+def sigma_of(radar: int, observes: tuple[str, ...], component: str, pick: str):
+    """σ of a radar, first or last, as what a margin is a share of."""
+    return lambda seen: getattr(seen.sigma(radar, observes, component), pick)().value
+
+
+def largest_rise(radar: int, observes: tuple[str, ...], component: str, since: int):
+    """The largest rise of σ over an earlier scan's from scan `since` on, in % of that; 0 where it never rises."""
+
+    def measure(seen: Evidence) -> Estimate:
+        sigma = seen.sigma(radar, observes, component).since(since)
+        sigma.last()
+        rises = [ratio(sigma.point(j), sigma.where(slice(0, j)).least(), 100) for j in range(1, len(sigma.k))]
+        worst = max(rises)
+        return Estimate(*(max(part - 100, 0.0) for part in worst))
+
+    return measure
+
+
+def likeness(radar: int, one: str, other: str):
+    """Correlation over the scans of two components' gains of a radar; half-widths of all points add in squares."""
+
+    def measure(seen: Evidence) -> Estimate:
+        a, b = common_times(seen.k_gain(radar, one), seen.k_gain(radar, other))
+        a.last()
+        value = float(np.corrcoef(a.value, b.value)[0, 1])
+        steps = np.diag((a.hi - a.lo) / 2), np.diag((b.hi - b.lo) / 2)
+        moved = [np.corrcoef(a.value + step, b.value)[0, 1] for step in steps[0]]
+        moved += [np.corrcoef(a.value, b.value + step)[0, 1] for step in steps[1]]
+        half = float(np.sqrt(np.sum((np.array(moved) - value) ** 2)))
+        return Estimate(value, value - half, value + half)
+
+    return measure
+
+
+def gain_by_variance(radar: int):
+    """Final range gain at the greatest D_M at hand less that at the least, points; without its sign."""
+
+    def measure(seen: Evidence) -> Estimate:
+        found = seen.variances(radar)
+        ends = [_as_long_as_the_papers(_gain_at(seen, (radar, v))).last() for v in (found[0], found[-1])]
+        of = difference(*ends)
+        return of if of.value >= 0 else Estimate(-of.value, -of.hi, -of.lo)
+
+    return measure
+
+
+def _gain_at(seen: Evidence, key: tuple[int, float]) -> Series:
+    return seen.marked(seen.gain(key, seen.filter(key, RV), "r"), key)
+
+
 def ineffective_from(radar: int):
     """The first time at which the acceleration gain is gone (zero or a loss)."""
 
     def measure(seen: Evidence) -> Estimate:
         gain = seen.k_gain(radar, "ar")
+        gain.last()
         times = []
         for part in (gain.value, gain.lo, gain.hi):
             gone = np.flatnonzero(part <= 0)
@@ -208,6 +291,7 @@ def by_variance(radar: int, measure):
 def loss_scans(seen: Evidence) -> Estimate:
     """Scans at which RLS 2 loses in acceleration; the interval counts the sure ones, and the possible ones."""
     gain = seen.k_gain(2, "ar")
+    gain.last()
     return Estimate(*(float(np.sum(part < 0)) for part in (gain.value, gain.hi, gain.lo)))
 
 
@@ -218,11 +302,17 @@ def after_loss(seen: Evidence) -> Estimate:
     return gain.where(slice(int(lost[0]) + 1 if lost.size else len(gain.k) - 1, None)).largest()
 
 
+def after_peak(radar: int):
+    """The largest range gain less the last one."""
+    return lambda seen: difference((gain := seen.k_gain(radar, "r")).largest(), gain.last())
+
+
 def rise(radar: int):
     """The largest rise of the velocity gain over an earlier scan's."""
 
     def measure(seen: Evidence) -> Estimate:
         gain = seen.k_gain(radar, "Vr")
+        gain.last()
         later = [difference(gain.point(j), gain.where(slice(0, j)).least()) for j in range(1, len(gain.k))]
         return max(later)
 
@@ -257,3 +347,8 @@ def doppler(radar: int):
         return certain(2 * SPEED_MPS / axes.wavelength_m / axes.repetition_rate_hz)
 
     return measure
+
+
+def c_theta(radar: int):
+    """C_θ (11) of a radar: algebra."""
+    return lambda seen: certain(seen.case(radar).axes.C_theta)

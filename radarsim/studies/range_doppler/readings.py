@@ -17,8 +17,11 @@ from radarsim.report.statistics import Estimate
 from radarsim.studies.range_doppler import measures, recursion
 from radarsim.studies.range_doppler.measures import RADARS
 
-NUMBERS = tuple(f"P1.{n}" for n in range(1, 26) if n != 16)  # P1.16 is algebra of the radars alone
-FAST = ("P1.4", "P1.5", "P1.6", "P1.7", "P1.11", "P1.12", "P1.14", "P1.15", "P1.19", "P1.20", "P1.22", "P1.24")
+NUMBERS = tuple(f"P1.{n}" for n in range(1, 33) if n not in (16, 31))  # these are algebra of the radars alone
+FAST = (
+    *("P1.4", "P1.5", "P1.6", "P1.7", "P1.11", "P1.12", "P1.14", "P1.15", "P1.19", "P1.20", "P1.22", "P1.24"),
+    *("P1.26", "P1.27", "P1.30", "P1.32"),
+)
 FALLS = ("P1.5", "P1.6")
 SETTLES = ("P1.14", "P1.15")
 SWEPT = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # D_M of the config manoeuvre_variance
@@ -180,11 +183,12 @@ class _Sigmas(NamedTuple):
 
 @dataclass(frozen=True)
 class _Axes:
-    """Scans and times of a radar's run."""
+    """Scans and times of a radar's run, and C_θ (11)."""
 
     k: np.ndarray
     t_s: np.ndarray
     scan_period_s: float
+    C_theta: float
 
 
 @dataclass(frozen=True)
@@ -212,7 +216,13 @@ class ExactEvidence(measures.Evidence):
         period = PERIOD[number]
         scans = 15 if period == 10 or self._reading["points"] == "fifteen each" else 29
         k = np.arange(1, scans + 1)
-        return _Radar(f"rls{number}", number, variance, _Axes(k, (k - 1.0) * period, period))
+        sigma_r, sigma_v, _ = RADARS[number]
+        theta = (sigma_r / (period * sigma_v)) ** 2
+        return _Radar(f"rls{number}", number, variance, _Axes(k, (k - 1.0) * period, period, theta))
+
+    def marked(self, series: Series, key: Any) -> Series:
+        """As it is: where a run ends is a choice of the reading."""
+        return series
 
     def filter(self, key: Any, observes: tuple[str, ...]) -> str:
         """r or r+Vr."""

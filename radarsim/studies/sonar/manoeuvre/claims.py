@@ -4,7 +4,7 @@ He prints an inequality of two known variances and no experiment. Read as the ru
 where the squared acceleration of a parabola through n plots exceeds k times its own variance.
 """
 
-from radarsim.report.claims import Claim, Part, about, above, at_most, below
+from radarsim.report.claims import Claim, Part, about, at_most, greater, kept, less
 from radarsim.studies.sonar.manoeuvre import measures as measured
 
 CONFIG = "sonar_manoeuvre"
@@ -14,8 +14,8 @@ CLAIMS = (
     Claim(
         "P3.8",
         "principle of optimal construction, after (3)",
-        "With more plots n the threshold falls and the detector grows more sensitive, but the time to detect grows "
-        "too; n above 4–5 is not worth while",
+        "With more plots n the threshold falls and the detector grows more sensitive, but the time to see a "
+        "manoeuvre's beginning and end grows too; n above 4–5 is not worth while",
         (
             *(
                 Part(
@@ -23,34 +23,53 @@ CLAIMS = (
                     f"acceleration at the threshold, {more} plots over {few}, at 0.01 false alarms a test",
                     "",
                     measured.thresholds_ratio(more, few),
-                    below(1),
+                    less(),
+                    statement="threshold",
                 )
                 for few, more in ((4, 5), (5, 8))
             ),
             *(
                 Part(
                     (case,),
-                    f"mean time to an alarm in the {case}, 8 plots over 5",
+                    f"mean time to see beginning and end of the {case} at k = 1, 8 plots over 5",
                     "",
-                    measured.delays_ratio(case, 8, 5),
-                    above(1),
+                    measured.delays_ratio(case, 8, 5, measured.both_ends, measured.AT_ONE),
+                    greater(),
+                    statement="time",
                 )
                 for case in EXTREMES
             ),
             *(
                 Part(
                     (case,),
-                    f"plots of the least mean time to an alarm in the {case}",
-                    "plots",
-                    measured.fastest(case),
-                    at_most(5),
+                    f"mean time to see beginning and end of the {case} at k = 1, best of over 5 plots against 5",
+                    "%",
+                    measured.further(case, 5, measured.both_ends, measured.AT_ONE),
+                    kept(),
+                    statement="not worth while",
                 )
                 for case in EXTREMES
             ),
+            *(
+                Part(
+                    (case,),
+                    f"plots of the least mean time to see {words} of the {case}, at 0.01 false alarms a test",
+                    "plots",
+                    measured.fastest(case, delay, measured.USUAL),
+                    at_most(5),
+                    asserted=False,
+                )
+                for delay, words in ((measured.mean_delay, "the beginning"), (measured.both_ends, "beginning and end"))
+                for case in EXTREMES
+            ),
         ),
-        "at one rate of false alarms, 0.01 a test; a time is counted at the end of the manoeuvre where no alarm came; "
-        "the weakest and the strongest shipped manoeuvre",
+        "the sentence before asks for beginning and end, and its 0.68 belongs to k = 1; a time is counted at the end "
+        "of the manoeuvre, or of the run, where no alarm came, or no all-clear; the weakest and the strongest shipped "
+        "manoeuvre. The beginning alone, and at a fixed rate of false alarms, is shown and not counted",
         CONFIG,
+        original="В процессе сопровождения реальной цели необходимо иметь возможность обнаруживать начало и конец "
+        "маневра … С увеличением n порог уменьшается, что способствует повышению чувствительности алгоритма (3). "
+        "Однако одновременно увеличивается время выявления маневра. Поэтому брать n больше 4-5 нецелесообразно.",
     ),
     Claim(
         "P3.9",
@@ -63,11 +82,15 @@ CLAIMS = (
                 "",
                 measured.detected_at_one,
                 about("0.68"),
+                exact=measured.exactly_detected_at_one,
             ),
         ),
-        "the paper names no manoeuvre; taken: k = 1 and an acceleration of one σ_a, which is where its threshold then "
-        "lies. 0.683 is the probability of no alarm without a manoeuvre; as often are 1.456 σ_a detected",
+        "shown: k = 1 and an acceleration of one σ_a, which is where its threshold then lies. 0.683 is the probability "
+        "of no alarm without a manoeuvre; as often are 1.456 σ_a detected",
         CONFIG,
+        original="С вероятностью, примерно равной 0,68, маневр по координате может быть обнаружен путем сравнения "
+        "дисперсии оценки ускорения по данной координате с дисперсией оценки координаты.",
+        unstated="the paper names no manoeuvre, and the probability may be any from 0.32 to 1 with its strength",
     ),
     Claim(
         "P3.10",
@@ -79,7 +102,7 @@ CLAIMS = (
                 f"σ of the range over the run in the {case}, degree {degree} held over degree switched by five plots",
                 "",
                 measured.degrees_ratio(case, degree),
-                above(1),
+                greater(),
             )
             for case in EXTREMES
             for degree in (1, 2)
@@ -87,5 +110,7 @@ CLAIMS = (
         "growing memory; σ is the root of its mean square over all scans from the detector's first test on; 0.01 false "
         "alarms a test; the weakest and the strongest shipped manoeuvre",
         CONFIG,
+        original="В процессе сопровождения реальной цели необходимо иметь возможность обнаруживать начало и конец "
+        "маневра, с тем, чтобы правильно выбрать количество уравнений в системе (2).",
     ),
 )

@@ -1,6 +1,7 @@
 """How P3's claims on manoeuvres are measured: the cases they mean, and the numbers taken from tables."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from radarsim.studies.sonar.manoeuvre.config import Filter
 from radarsim.studies.sonar.measures import CaseKey, Evidence, Measure
 
 USUAL = 0.01  # false alarms a test
+AT_ONE = 0.31731050786291415  # false alarms a test at k = 1: a Gaussian outside one σ
 
 
 # ---- the cases ----------------------------------------------------------------------------------------------------
@@ -83,35 +85,67 @@ def thresholds_ratio(more: int, few: int) -> Measure:
     return measure
 
 
-def mean_delay(result: CaseResult[ManoeuvreAxes], plots: int) -> Estimate:
+def mean_delay(result: CaseResult[ManoeuvreAxes], plots: int, rate: float = USUAL) -> Estimate:
     """Mean time from the beginning to the first alarm in the range, s; where there is none, to the manoeuvre's end."""
-    d, t = _detector(result, plots, "false_alarm_probability", USUAL)
-    scans = np.flatnonzero(result.axes.phase == 1)
+    return _mean_time(result, plots, rate, 1)
+
+
+def both_ends(result: CaseResult[ManoeuvreAxes], plots: int, rate: float = USUAL) -> Estimate:
+    """`mean_delay`, and from the end to the first test without an alarm: their sum, taken as independent."""
+    one, other = (_mean_time(result, plots, rate, phase) for phase in (1, 2))
+    half = float(np.hypot(one.hi - one.value, other.hi - other.value))
+    value = one.value + other.value
+    return Estimate(value, value - half, value + half)
+
+
+def _mean_time(result: CaseResult[ManoeuvreAxes], plots: int, rate: float, phase: int) -> Estimate:
+    """Mean time from the beginning of a phase (1, 2) to its first event; where there is none, to its last scan."""
+    d, t = _detector(result, plots, "false_alarm_probability", rate)
+    scans = np.flatnonzero(result.axes.phase == phase)
+    if not scans.size:
+        raise Missing("the run ends before the manoeuvre does")
     share = np.asarray(result.sums["first"])[d, 0, t, scans] / result.count
     share[-1] += 1 - share.sum()
-    start, _ = result.axes.manoeuvre_s or (np.nan, np.nan)
-    delay = result.axes.t_s[scans] - start
+    since_s = (result.axes.manoeuvre_s or (np.nan, np.nan))[phase - 1]
+    delay = result.axes.t_s[scans] - since_s
     mean = share @ delay
-    half = Z95 * np.sqrt((share @ delay**2 - mean**2) / result.count)
+    half = Z95 * np.sqrt(max(share @ delay**2 - mean**2, 0.0) / result.count)
     return Estimate(float(mean), float(mean - half), float(mean + half))
 
 
-def delays_ratio(key: CaseKey, more: int, few: int) -> Measure:
+Delay = Callable[[CaseResult[ManoeuvreAxes], int, float], Estimate]
+
+
+def delays_ratio(key: CaseKey, more: int, few: int, delay: Delay, rate: float) -> Measure:
     """Mean delays of two detectors, taken as independent."""
-    return lambda seen: ratio(mean_delay(seen.case(key), more), mean_delay(seen.case(key), few))
+    return lambda seen: ratio(delay(seen.case(key), more, rate), delay(seen.case(key), few, rate))
 
 
-def fastest(key: CaseKey) -> Measure:
+def further(key: CaseKey, plots: int, delay: Delay, rate: float) -> Measure:
+    """Least mean delay of detectors of more plots over that of so many, less 1, in %; taken as independent."""
+
+    def measure(seen: Evidence) -> Estimate:
+        result = seen.case(key)
+        more = [delay(result, n, rate) for n in _plots_at(result, rate) if n > plots]
+        of = ratio(min(more, key=lambda one: one.value), delay(result, plots, rate), 100)
+        return Estimate(*(part - 100 for part in of))
+
+    return measure
+
+
+def _plots_at(result: CaseResult[ManoeuvreAxes], rate: float) -> list[int]:
+    """Plots of the detectors that test at every scan at a rate of false alarms."""
+    tested = (one for one in result.spec.detectors if one.test_every == 1)
+    return [one.plots for one in tested if rate in (one.false_alarm_probability or ())]
+
+
+def fastest(key: CaseKey, delay: Delay, rate: float) -> Measure:
     """Plots of the detector with the least mean delay; the interval spans all that cannot be distinguished from it."""
 
     def measure(seen: Evidence) -> Estimate:
         result = seen.case(key)
-        every = [
-            one.plots
-            for one in result.spec.detectors
-            if USUAL in (one.false_alarm_probability or ()) and one.test_every == 1
-        ]
-        of = {plots: mean_delay(result, plots) for plots in every}
+        every = _plots_at(result, rate)
+        of = {plots: delay(result, plots, rate) for plots in every}
         best = min(of, key=lambda plots: of[plots].value)
         near = [plots for plots in every if of[plots].lo <= of[best].hi]
         return Estimate(float(best), float(min(near)), float(max(near)))
@@ -119,13 +153,22 @@ def fastest(key: CaseKey) -> Measure:
     return measure
 
 
+def exactly_detected_at_one(seen: Evidence) -> float:
+    """`detected_at_one` of the exact law."""
+    return float(_at_one(seen)["exact"])
+
+
 def detected_at_one(seen: Evidence) -> Estimate:
     """Share of alarms of five plots at k = 1 at the last scan of the manoeuvre of one σ_a."""
+    row = _at_one(seen)
+    return Estimate(*(float(row[part]) for part in ("probability", "lo", "hi")))
+
+
+def _at_one(seen: Evidence) -> Mapping[str, Any]:
     result = seen.case(EQUAL)
     d, _ = _detector(result, 5, "threshold_k", 1.0)
     name, k = result.spec.detectors[d].name, int(result.axes.k[_last(result)])
-    row = seen.row("detections", case=result.name, filter=name, component="r", threshold_k=1.0, k=k)
-    return Estimate(*(float(row[part]) for part in ("probability", "lo", "hi")))
+    return seen.row("detections", case=result.name, filter=name, component="r", threshold_k=1.0, k=k)
 
 
 def degrees_ratio(key: CaseKey, degree: int) -> Measure:

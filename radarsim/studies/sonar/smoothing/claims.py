@@ -5,7 +5,7 @@ measured is within 1 % of it in σ, within 2 % in a variance or covariance; an i
 paper's sections.
 """
 
-from radarsim.report.claims import Claim, Part, above, at_most, below, same, within
+from radarsim.report.claims import Claim, Part, above, at_most, greater, less, same, within
 from radarsim.studies.sonar.smoothing import measures as measured
 from radarsim.studies.sonar.smoothing.measures import ASYNCHRONOUS, FLUCTUATING, GAP, TEXTBOOK, correlated
 
@@ -15,9 +15,15 @@ SAME = same(1, 1e-9)
 
 
 def _claim(
-    number: int, place: str, statement: str, *parts: Part, reading: str = "", config: str = "sonar_smoothing"
+    number: int,
+    place: str,
+    statement: str,
+    *parts: Part,
+    original: str,
+    reading: str = "",
+    config: str = "sonar_smoothing",
 ) -> Claim:
-    return Claim(f"P3.{number}", place, statement, parts, reading, config)
+    return Claim(f"P3.{number}", place, statement, parts, reading, config, original)
 
 
 def _formula(what: str, n: int) -> Part:
@@ -45,12 +51,15 @@ CLAIMS = (
         "σ of a straight line through n plots: σ√(2(2n−1)/(n(n+1))) at the last, σ√(2(2n+1)/(n(n−1))) a scan ahead",
         *(_formula("smoothed", n) for n in (2, 3, 5, 8, 20)),
         *(_formula("extrapolated", n) for n in (2, 3, 5, 8, 20)),
+        original="Среднеквадратическая ошибка сглаженной и экстраполированной на один обзор координаты таким образом "
+        "определяются выражениями: σ_x̄n = σ_x √(2(2n−1)/(n(n+1))), σ_x̄n+1 = σ √(2(2n+1)/(n(n−1))).",
     ),
     _claim(
         2,
         "equation (3)",
         "The acceleration of a parabola through n plots has variance 720 σ²/(T₀⁴ n(n²−1)(n²−4))",
         *(_formula("acceleration", n) for n in (3, 5, 8, 20)),
+        original="… где σ²_ax = 720σ²_x / (T⁴_0 [n(n²−1)(n²−4)]). (3)",
     ),
     _claim(
         3,
@@ -63,6 +72,9 @@ CLAIMS = (
             measured.enough,
             within(5, 6),
         ),
+        original="Анализ показывает, что при оптимальной фильтрации и экстраполяции по методу максимального "
+        "правдоподобия для получения высокой точности оценки координат необходим одновременный учет "
+        "большого числа (5-6) предыдущих наблюдений.",
         reading="the paper does not say what high accuracy is; taken: the position foretold is as good as one measured",
     ),
     _claim(
@@ -77,6 +89,8 @@ CLAIMS = (
             measured.alike,
             at_most(1e-9),
         ),
+        original="При равнодискретных и равноточных (без пропусков) измерениях координаты имеем … Подставляя эти "
+        "значения в выражение (14), получаем: A_n = 2(2n−1)/(n(n+1)), B_n = 6/(n(n+1)).",
         reading="var r / σ² is A_n and T₀ cov(r, v) / σ² is B_n",
     ),
     _claim(
@@ -85,6 +99,9 @@ CLAIMS = (
         "At a missed plot the estimate is the extrapolated one",
         Part((GAP,), "σ at the missed scan over σ extrapolated to it", "", measured.at_a_miss("growing_memory"), SAME),
         Part((GAP,), "the same of the Kalman filter", "", measured.at_a_miss("kalman"), SAME),
+        original="Если в очередном (n-м) обзоре имеет место пропуск отметки, то w_rn = 0 … и A_n = B_n = 0. В "
+        "качестве сглаженного значения координаты и скорости в этом случае принимаются их "
+        "экстраполированные значения.",
         config="sonar_missed",
     ),
     _claim(
@@ -102,6 +119,9 @@ CLAIMS = (
             for rho in (-0.5, 0.6, 0.9)
         ),
         *(_optimal(rho) for rho in (-0.5, 0.6, 0.9)),
+        original="… применяется прием, суть которого состоит в расширении вектора оцениваемых параметров за счет "
+        "включения в него вектора ошибок измерения. / Возможен другой подход к решению поставленной задачи, "
+        "позволяющий обойтись без расширения вектора оцениваемых параметров.",
         reading="optimal both: equal to generalised least squares",
         config="sonar_correlated",
     ),
@@ -109,14 +129,14 @@ CLAIMS = (
         7,
         "step 5, last sentences",
         "With growing n new plots count less and less; the filter stops following a real, fluctuating target",
-        Part((TEXTBOOK,), "A_40 over A_5, measured", "", measured.gain_falls("A", 5, 40), below(1)),
-        Part((TEXTBOOK,), "B_40 over B_5, measured", "", measured.gain_falls("B", 5, 40), below(1)),
+        Part((TEXTBOOK,), "A_40 over A_5, measured", "", measured.gain_falls("A", 5, 40), less()),
+        Part((TEXTBOOK,), "B_40 over B_5, measured", "", measured.gain_falls("B", 5, 40), less()),
         Part(
             (FLUCTUATING,),
             "σ of the range at the end over its own least, growing memory",
             "",
             measured.rises,
-            above(1),
+            greater(),
         ),
         Part(
             (FLUCTUATING,),
@@ -125,6 +145,10 @@ CLAIMS = (
             measured.bounded,
             above(0),
         ),
+        original="Из последних выражений следует, что с увеличением n результаты последних наблюдений при "
+        "сглаживании координаты и скорости учитываются – все с меньшим весом и алгоритм перестает "
+        "реагировать на изменение входного сигнала. В этом существенный недостаток …, если иметь в виду, "
+        "что для реальных целей траектория движения подвержена случайным флуктуациям.",
         reading="on the shipped course, whose velocity changes by 0.25 m/s at random between plots, after 40 plots",
         config="sonar_fluctuating",
     ),
@@ -139,10 +163,13 @@ CLAIMS = (
                 f"operations of the recursion over those of least squares on {n} plots",
                 "",
                 measured.cost("recursion (12)-(14)", f"least squares (2) on {n} plots"),
-                below(1),
+                less(),
             )
             for n in (2, 6)
         ),
+        original="Независимо от числа наблюдений при оценке координат и параметров используются лишь два числа: "
+        "предыдущее усреднение и новое измеренное значение. / Уменьшить требования к емкостным и "
+        "вычислительным затратам …",
         reading="r and v are kept; the weights' own f, g, h, K depend on no measurement. Operations are counted",
     ),
     _claim(
@@ -154,8 +181,10 @@ CLAIMS = (
             "operations of the augmented filter over those of the differenced one",
             "",
             measured.cost("augmented", "differenced"),
-            above(1),
+            greater(),
         ),
+        original="Недостатком рассмотренного метода является усложнение расчетов из-за увеличения размерности "
+        "вектора оцениваемых параметров …",
         reading="a scan of one coordinate, degree 1; operations are counted, in matrices as printed",
         config="sonar_correlated",
     ),
@@ -173,6 +202,51 @@ CLAIMS = (
             )
             for component, name in (("r", "range"), ("b", "bearing"))
         ),
+        original="В процессе решения задачи обеспечивается возможность задания различной информации о цели, "
+        "поступающей в любые моменты времени в произвольном сочетании и с разной точностью.",
         config="sonar_asynchronous",
+    ),
+    _claim(
+        14,
+        "principle of optimal construction, sequential smoothing",
+        "Sequential smoothing raises the accuracy of what is put out, at a lower cost than least squares anew",
+        Part(
+            (TEXTBOOK,),
+            "σ of the recursion after 20 plots over that of least squares on 6",
+            "",
+            measured.bought(20, 6),
+            less(),
+            statement="accuracy",
+        ),
+        Part(
+            (TEXTBOOK,),
+            "operations of the recursion over those of least squares on 6 plots",
+            "",
+            measured.cost("recursion (12)-(14)", "least squares (2) on 6 plots"),
+            less(),
+            statement="cost",
+        ),
+        original="Уменьшить требования к емкостным и вычислительным затратам специализированной ЭВМ вторичной "
+        "обработки при одновременном повышении точности выходных данных можно путем применения принципа "
+        "последовательного сглаживания координат и параметров.",
+        reading="against the 5–6 plots that the paper recommends; of a target that moves as the filter takes it to",
+    ),
+    _claim(
+        15,
+        "conclusions, 1",
+        "A Kalman-Bucy filter looks at two neighbouring moments only and demands less of the target's uniform motion",
+        Part(
+            (FLUCTUATING,),
+            "σ of the range at the end of the filter with manoeuvre variance over that of growing memory",
+            "",
+            measured.with_manoeuvres,
+            less(),
+        ),
+        original="В расчетах непосредственно используется информация только о двух соседних моментах времени, что "
+        "позволяет оценивать изменяющийся во времени вектор неизвестных параметров и снижает жесткость требований к "
+        "прямолинейному и равномерному движению цели в течение всего времени определения КПДЦ.",
+        reading="on the shipped course whose velocity walks at random: the Kalman-Bucy filter (11) with process noise "
+        "against the recursion without it",
+        config="sonar_fluctuating",
     ),
 )

@@ -79,6 +79,31 @@ def over_formula(what: str, n: int) -> Measure:
     return measure
 
 
+def bought(more: int, few: int) -> Measure:
+    """Smoothed σ of growing memory after more plots over that after few; of the same realisations, taken as "
+    "independent."""
+
+    def measure(seen: Evidence) -> Estimate:
+        name = seen.case(TEXTBOOK).name
+        found = []
+        for n in (more, few):
+            row = seen.row("plots", case=name, component="r", what="smoothed", plots=n, degree=1)
+            found.append(Estimate(*(row[key] for key in ("ratio", "ratio_lo", "ratio_hi"))))
+        return ratio(found[0], found[1])
+
+    return measure
+
+
+def with_manoeuvres(seen: Evidence) -> Estimate:
+    """σ of the range at the end, of the Kalman filter with manoeuvre variance over that of growing memory."""
+    case = seen.case(FLUCTUATING)
+    own = next((f.name for _, f in seen.members(case) if f.kind == "kalman" and f.manoeuvre_variance), None)
+    if own is None:
+        raise Missing("no Kalman filter with manoeuvre variance")
+    other = seen.filter(FLUCTUATING, "growing_memory")
+    return ratio(seen.curve(FLUCTUATING, own, "r").last(), seen.curve(FLUCTUATING, other, "r").last())
+
+
 def enough(seen: Evidence) -> Estimate:
     """Fewest plots from which the extrapolated σ is no more than a plot's; the ends take σ at those of its interval."""
     name = seen.case(TEXTBOOK).name

@@ -1,0 +1,96 @@
+"""The forest plot of claims: of each the worst part, its interval and exact value, in margins of what the words say."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from radarsim.report.claims import page
+from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
+from radarsim.report.claims.rule import CLASSES, VOID
+from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
+
+FURTHEST = 4.0  # margins: what lies further is drawn there
+COLOURS = (3, 2, 1, 7, 4, 5, 6)  # of the classes in their order: green, red, blue, grey, …
+STYLES = {
+    kind: Style(colour=colour, dash=None, marker=i, size_pt=4.0)
+    for i, (kind, colour) in enumerate(zip(CLASSES, COLOURS, strict=True))
+}
+
+
+def depth(value: float, row: Mapping) -> float:
+    """Distance of a value from what the words say, in margins: 0 at an end of the range, negative inside, cut at 4."""
+    lo, hi = page.number(row["expected_lo"]), page.number(row["expected_hi"])
+    below = -math.inf if lo is None else lo - value
+    above = -math.inf if hi is None else value - hi
+    outside = max(below, above)
+    return float(np.clip(outside / (page.number(row["margin"]) or 1.0), -FURTHEST, FURTHEST))
+
+
+def worst(parts: Sequence[Mapping]) -> Mapping | None:
+    """The part that is furthest from its words, of variants of a number the nearest; None where none was measured."""
+    counted = page.extension(parts)
+    best: dict[str, Mapping] = {}
+    for i, row in enumerate(parts):
+        ours = str(row["extension"]).lower() == "true"
+        if page.number(row["measured"]) is None or row["verdict"] == VOID or (ours and not counted):
+            continue
+        key = str(row["number"]) or f"#{i}"
+        if key not in best or depth(_value(row), row) < depth(_value(best[key]), best[key]):
+            best[key] = row
+    return max(best.values(), key=lambda row: depth(_value(row), row), default=None)
+
+
+def _value(row: Mapping) -> float:
+    exact = page.number(row["exact"])
+    return float(row["measured"]) if exact is None else exact
+
+
+def figure(rows: Sequence[Mapping]) -> Figure | None:
+    """All claims of these rows that were judged, a panel a paper; None where there are none."""
+    judged = [own for own in page.grouped(rows) if own[0]["class"] not in (NOT_RUN, NOT_JUDGED)]
+    found = [(own, row) for own in judged if (row := worst(own)) is not None]
+    papers = list(dict.fromkeys(own[0]["paper"] for own, _ in found))
+    panels = [_panel(paper, [(own, row) for own, row in found if own[0]["paper"] == paper]) for paper in papers]
+    if not panels:
+        return None
+    return Figure(
+        name="claims",
+        title="Claims, in margins of what their papers say",
+        caption="Of each claim the part that lies furthest from the paper's words: measured, with its 95 % interval, "
+        f"and exactly (crosses), in margins of that part, cut at ± {FURTHEST:g}. Under 0 it is as the words say, up to "
+        "1 within their margin. The mark is the class of the claim, over all readings where these are known.",
+        panels=tuple(panels),
+        width_mm=PAGE_MM,
+        panel_height_mm=58.0,
+    )
+
+
+def _panel(paper: str, found: Sequence[tuple[Sequence[Mapping], Mapping]]) -> Panel:
+    ticks, marks = [], []
+    for x, (own, _) in enumerate(found, 1):
+        key, _, number = own[0]["claim"].partition(".")
+        ticks.append((float(x), number))
+    for kind, style in STYLES.items():
+        of = [(x, row) for x, (own, row) in enumerate(found, 1) if own[0]["class"] == kind]
+        if of:
+            marks.append(_line(kind, style, of))
+    return Panel(
+        Axis(f"claim of {key}", limits=(0, len(found) + 1), ticks=tuple(ticks)),
+        Axis("distance from the words, margins", limits=(-FURTHEST - 0.3, FURTHEST + 0.3)),
+        (*marks, Reference(0.0), Reference(1.0, label="beyond the margin")),
+        title=f"{key} {paper}",
+        direct=False,
+        legend="right",
+    )
+
+
+def _line(kind: str, style: Style, of: Sequence[tuple[int, Mapping]]) -> Line:
+    """The marks of one class: where a value is known exactly, this is what the mark stands at."""
+    rows = [row for _, row in of]
+    ends = np.array([sorted((depth(float(row["lo"]), row), depth(float(row["hi"]), row))) for row in rows])
+    value = np.array([depth(float(row["measured"]), row) for row in rows])
+    exact = [page.number(row["exact"]) for row in rows]
+    crosses = np.array([math.nan if one is None else depth(one, row) for one, row in zip(exact, rows, strict=True)])
+    lo, hi = np.minimum(ends[:, 0], value), np.maximum(ends[:, 1], value)
+    return Line(np.array([float(x) for x, _ in of]), value, kind, style, lo, hi, crosses)
