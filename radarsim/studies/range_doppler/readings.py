@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from radarsim.report.claims import Missing, Series
+from radarsim.report.claims import Series
 from radarsim.report.claims.declared import Claim, PaperClaims
 from radarsim.report.claims.readings import Alternative, Choice, PaperReadings, Reading, Seen
 from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED
@@ -28,9 +28,8 @@ SWEPT = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # D_M of the config manoeuvre_variance
 LONG = 250  # scans after which a filter is taken as steady
 FILTERS = ("r", "r+Vr")
 PERIOD = {n: radar[2] for n, radar in RADARS.items()}
-DOPPLER = {
-    n: 2 * 300 / wavelength_m / 1e3 for n, wavelength_m in ((1, 1.8), (2, 0.15), (3, 0.15), (4, 0.03), (5, 0.03))
-}
+WAVELENGTH_M = {1: 1.8, 2: 0.15, 3: 0.15, 4: 0.03, 5: 0.03}
+REPETITION_HZ = 1e3
 
 CHOICES = (
     Choice(
@@ -183,12 +182,14 @@ class _Sigmas(NamedTuple):
 
 @dataclass(frozen=True)
 class _Axes:
-    """Scans and times of a radar's run, and C_θ (11)."""
+    """Scans and times of a radar's run, C_θ (11), and what its Doppler frequencies follow from."""
 
     k: np.ndarray
     t_s: np.ndarray
     scan_period_s: float
     C_theta: float
+    wavelength_m: float
+    repetition_rate_hz: float = REPETITION_HZ
 
 
 @dataclass(frozen=True)
@@ -218,7 +219,9 @@ class ExactEvidence(measures.Evidence):
         k = np.arange(1, scans + 1)
         sigma_r, sigma_v, _ = RADARS[number]
         theta = (sigma_r / (period * sigma_v)) ** 2
-        return _Radar(f"rls{number}", number, variance, _Axes(k, (k - 1.0) * period, period, theta))
+        return _Radar(
+            f"rls{number}", number, variance, _Axes(k, (k - 1.0) * period, period, theta, WAVELENGTH_M[number])
+        )
 
     def marked(self, series: Series, key: Any) -> Series:
         """As it is: where a run ends is a choice of the reading."""
@@ -253,13 +256,6 @@ class ExactEvidence(measures.Evidence):
     def variances(self, radar: int) -> list[float]:
         """Those of the shipped sweep."""
         return list(SWEPT)
-
-    def row(self, table: str, **equal: object) -> Mapping[str, Any]:
-        """The Doppler frequency of 300 m/s at 1 kHz in repetition rates: no reading changes it."""
-        if table != "radar":
-            raise Missing(table)
-        number = int(str(equal["case"])[3:])
-        return {"doppler_per_repetition_rate": DOPPLER[number]}
 
     @property
     def _start(self) -> recursion.Start:
