@@ -149,6 +149,14 @@ def sampled(quantity: Quantity, result: CaseResult) -> tuple[Estimate, float]:
     )
 
 
+def of_table(quantity: Quantity, table: "pd.DataFrame") -> float:
+    """The value alone from a table of the quantity's kind that is at hand; not-a-number where it has none."""
+    rows = table[(table["filter"] == quantity.filter) & (table["component"] == quantity.component)]
+    value = rows[quantity.of.columns[0]].to_numpy(dtype=float)
+    k, t_s = rows["k"].to_numpy(), rows["t_s"].to_numpy(dtype=float)
+    return float(at(quantity, Series(k, t_s, Estimate(value, value, value))).value)
+
+
 def _rows(quantity: Quantity, result: CaseResult) -> "pd.DataFrame":
     """The rows of the quantity's table that are of its filter and component; of a table without scans one row.
 

@@ -1,13 +1,15 @@
 """What the terminal says of an answer: the value that was solved for, what it attains, its slope, the check."""
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Hashable, Sequence
+from typing import TYPE_CHECKING, Any
 
-from radarsim.cli.console import say
+from radarsim.cli.console import say, show
 from radarsim.report.text import significant_digits
 
 if TYPE_CHECKING:
     from radarsim.app.chart import Drawn
+    from radarsim.app.sensitivity import Sensitivity
     from radarsim.app.solve import Answer
 
 PLAIN = ".6g"
@@ -55,6 +57,39 @@ def print_drawn(drawn: "Drawn") -> None:
         say(f"figures  {drawn.folder} ({', '.join(kinds)})")
     say(f"table    {drawn.folder / 'chart.csv'}")
     say(f"page     {drawn.folder / 'chart.html'}")
+
+
+def print_sensitivity(found: "Sensitivity", written: "Sequence[str]") -> None:
+    """A table of the leading component: key, its values, and the change of σ and gain of each filter."""
+    rows = [row for row in found.rows if row["component"] == found.leading]
+    filters = list(dict.fromkeys(row["filter"] for row in rows))
+    gaining = [
+        one for one in filters if any(not math.isnan(row["gain_percent"]) for row in rows if row["filter"] == one)
+    ]
+    cells = []
+    for key in dict.fromkeys(row["key"] for row in rows):
+        own = {row["filter"]: row for row in rows if row["key"] == key}
+        first = next(iter(own.values()))
+        line = [key, f"{_number(first['value'])} → {_number(first['changed_value'])}"]
+        line += [_change(own.get(one), "sigma_change", "percent", "%") for one in filters]
+        line += [_change(own.get(one), "gain_change", "points", "") for one in gaining]
+        cells.append(line)
+    columns = ["key", "value", *(f"σ of {one}" for one in filters), *(f"gain of {one}, points" for one in gaining)]
+    show(f"{found.stem}: change of {found.leading} {found.at} for +10 %", columns, cells, right=columns[1:])
+    if found.without_effect:
+        say(f"no effect  {', '.join(found.without_effect)}")
+    for key, reason in found.left_out.items():
+        say(f"left out   {key}: {reason}")
+    say(f"files      {', '.join(written)}")
+
+
+def _change(row: "dict[Hashable, Any] | None", name: str, ending: str, unit: str) -> str:
+    """A change with its sign, and with its interval where it has one."""
+    if row is None:
+        return ""
+    value, lo, hi = (row[f"{name}_{end}"] for end in (ending, "lo", "hi"))
+    text = f"{_number(value, '+.3g')} {unit}".strip()
+    return text if row["exact"] else f"{text} [{_number(lo, '+.2g')}, {_number(hi, '+.2g')}]"
 
 
 def slope(answer: "Answer") -> str:

@@ -169,3 +169,66 @@ def chart(
         click.echo(documents.text(documents.drawn(drawn)))
     else:
         answers.print_drawn(drawn)
+
+
+@main.command()
+@config_argument
+@at_options[0]
+@at_options[1]
+@click.option("--component", metavar="COMPONENT", help="The component that is shown and leads; default: the first.")
+@click.option("--case", metavar="CASE", help="The case, of a config that has several.")
+@set_option
+@realisations_option
+@seed_option
+@out_option
+@figures_option
+@format_option
+@json_option
+def sensitivity(
+    config: str,
+    at_s: float | None,
+    at_k: int | None,
+    component: str | None,
+    case: str | None,
+    overrides: tuple[str, ...],
+    realisations: int | None,
+    seed: int | None,
+    out: str,
+    no_figures: bool,
+    formats: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """What +10 % of each key changes: σ and gain, the largest effect first.
+
+    Every key that holds a number is raised by a tenth, one at a time; whole numbers by at least one. Exact where σ is;
+    else paired, with the same noise, and with 95 % intervals. All filters and components are in
+    DIR/sensitivity/CONFIG/sensitivity.csv, the leading component is drawn beside it as tornado.svg.
+
+    \b
+    Examples
+      radarsim sensitivity rls2
+      radarsim sensitivity rls2 --at 60 --component Vr
+    """
+    from radarsim.app import documents
+    from radarsim.app import run as experiment
+    from radarsim.app import sensitivity as finding
+    from radarsim.cli import answers, console
+
+    if at_s is not None and at_k is not None:
+        raise click.UsageError("--at and --at-k do not go together: a time or a scan")
+    asked_for: dict[str, Any] = {
+        "at_s": at_s,
+        "at_k": at_k,
+        "component": component,
+        "case": case,
+        "realisations": realisations,
+    }
+    with console.Progress(config, quiet=as_json, what="keys") as progress:
+        found = finding.sensitivity(
+            config, overrides=experiment.merged(overrides, None, seed), progress=progress.update, **asked_for
+        )
+    written = finding.write(found, out, () if no_figures else formats or ("svg", "png"))
+    if as_json:
+        click.echo(documents.text(documents.fields(found) | {"files": written}))
+    else:
+        answers.print_sensitivity(found, written)

@@ -31,7 +31,7 @@ class Style:
     """How a mark is distinguished, in grey too: each number picks from a list of its own.
 
     colour: an int picks a distinct colour, a float from 0 to 1 a shade of an ordered scale. dash and marker: ints,
-    None for no line or no marker.
+    None for no line or no marker. flat: a line ends where its data end, as a bar does, however wide it is.
     """
 
     colour: int | float = 0
@@ -39,6 +39,7 @@ class Style:
     marker: int | None = None
     width_pt: float = 1.1
     size_pt: float = 3.2
+    flat: bool = False
 
 
 @dataclass(frozen=True)

@@ -182,7 +182,9 @@ def _look(style: Style) -> dict[str, Any]:
     marker = None if style.marker is None else MARKERS[style.marker % len(MARKERS)]
     dash = "none" if style.dash is None else DASHES[style.dash % len(DASHES)]
     colour = _colour(style)
+    ends = {"solid_capstyle": "butt"} if style.flat else {}
     return {
+        **ends,
         **{"color": colour, "linestyle": dash, "linewidth": style.width_pt},
         **{"marker": marker, "markersize": style.size_pt, "mfc": colour if style.dash is None else "white"},
     }

@@ -88,7 +88,8 @@ def fly(
         if not path.success:
             raise Unflyable(f"the flight cannot be integrated beyond {path.t[-1]:.6g} s")
         assert path.sol is not None  # asked for by dense_output
-        states, state = path.sol(t[inside]).T, path.y[:, -1]
+        states = path.sol(t[inside]).T if inside.any() else ()  # a phase may pass between two plots
+        state = path.y[:, -1]
         parts += [_kinematics(at, s, arguments) for at, s in zip(t[inside], states, strict=True)]
         if last:
             break

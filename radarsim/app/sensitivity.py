@@ -1,0 +1,243 @@
+"""`radarsim sensitivity`: by how much σ and gains change for a tenth more of each key.
+
+Exact where the case's σ are. Else both cases are simulated with the same noise, batch by batch, and the interval of a
+change is that of its mean over the batches.
+"""
+
+import math
+import os
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from radarsim.app import arguments, quantities
+from radarsim.app.quantities import Quantity
+from radarsim.app.solve import Cases, Config
+from radarsim.app.work import CaseWork
+from radarsim.config import numeric
+from radarsim.config.experiment import Case
+from radarsim.config.lookup import did_you_mean
+from radarsim.engine.results import Axes, CaseResult
+from radarsim.errors import ConfigError
+from radarsim.report import files, panels, statistics
+from radarsim.report import tables as common
+from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.studies import registry
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MORE = 0.1
+BATCHES = 20  # of one case: their spread has 19 degrees of freedom
+MOST_BARS = 16
+NOTHING = 1e-9  # per cent: what rounding may make of no change
+FOLDER = "sensitivity"
+COLUMNS = (
+    *("case", "filter", "component", "unit", "key", "value", "changed_value"),
+    *("sigma", "sigma_change_percent", "sigma_change_lo", "sigma_change_hi"),
+    *("gain_percent", "gain_change_points", "gain_change_lo", "gain_change_hi", "exact"),
+)
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What was found: one row a key, filter and component, by falling effect of the key on the component that leads.
+
+    at says when; without_effect are keys that change nothing, left_out those that cannot be raised, with the reason.
+    """
+
+    stem: str
+    leading: str
+    at: str
+    rows: tuple[dict[Hashable, Any], ...]
+    without_effect: tuple[str, ...]
+    left_out: dict[str, str]
+
+
+def sensitivity(
+    config: Config,
+    *,
+    overrides: Sequence[str] = (),
+    at_s: float | None = None,
+    at_k: int | None = None,
+    component: str | None = None,
+    case: str | None = None,
+    realisations: int | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
+) -> Sensitivity:
+    """The changes of σ and gain at a time, at a scan, or at the time of the last scan, for +10 % of each numeric key.
+
+    Whole numbers grow by at least one. component leads the order: by default the first. Raises ConfigError.
+    """
+    cases = Cases(config, tuple(overrides), case)
+    axes = registry.study(cases.base.study).prepare(cases.base).axes
+    names = [name for name, _ in axes.components]
+    leading = names[0] if component is None else component
+    if leading not in names:
+        raise ConfigError(f"no component {leading!r}{did_you_mean(leading, names) or f'; there are: {names}'}")
+    timed = registry.study(cases.base.study).exact_errors and at_s is None and at_k is None
+    asked = Quantity("sigma", at_s=float(axes.t_s[-1]) if timed else at_s, at_k=at_k)
+    look = Look(asked, axes, realisations or cases.base.realisations)
+    base = look.of(cases.base)
+    if not np.isfinite(base).any():
+        raise ConfigError("there is no estimate there")
+    keys = [key for key in numeric.keys(cases.base.spec) if key.value and not ("." not in key.path and key.whole)]
+    rows, left_out = [], {}
+    for n, key in enumerate(keys):
+        try:
+            raised = cases.at(key.path, more(key))
+            rows += look.rows(cases.base, key, base, look.of(raised))
+        except ConfigError as error:
+            left_out[key.path] = error.lines[0]
+        if progress is not None:
+            progress(n + 1, len(keys), 0)
+    effect = {key.path: size(rows, key.path, leading) for key in keys}
+    idle = [path for path, (own, every) in effect.items() if every < NOTHING and path not in left_out]
+    shown = [row for row in rows if row["key"] not in idle]
+    shown.sort(key=lambda row: effect[row["key"]], reverse=True)
+    return Sensitivity(cases.base.stem, leading, when(asked), tuple(shown), tuple(idle), left_out)
+
+
+def more(key: numeric.NumericKey) -> float:
+    """A tenth more of a key's value, in size; of whole numbers at least one more."""
+    assert key.value is not None
+    return key.value + max(1, round(MORE * key.value)) if key.whole else key.value * (1 + MORE)
+
+
+def when(asked: Quantity) -> str:
+    """At which time or scan, in words."""
+    if asked.at_k is not None:
+        return f"at k = {asked.at_k}"
+    return "at the last scan" if asked.at_s is None else f"at {asked.at_s:g} s"
+
+
+def size(rows: Sequence[dict[Hashable, Any]], path: str, leading: str) -> tuple[float, float]:
+    """The greatest change of σ that a key makes: of the leading component, and of any, per cent."""
+    own = [row for row in rows if row["key"] == path]
+    parts = [[row for row in own if row["component"] == leading], own]
+    first, every = (max((abs(row["sigma_change_percent"]) for row in part), default=0.0) for part in parts)
+    return first, every
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a case is looked at: σ of every filter and component at one time, exactly or in batches of realisations."""
+
+    asked: Quantity
+    axes: Axes
+    realisations: int
+
+    @property
+    def cells(self) -> list[tuple[int, int]]:
+        """Filters and components, by their places."""
+        return [(f, c) for f in range(len(self.axes.filters)) for c in range(len(self.axes.components))]
+
+    def quantity(self, f: int, c: int) -> Quantity:
+        """σ of one filter and component."""
+        return replace(self.asked, filter=self.axes.filters[f], component=self.axes.components[c][0])
+
+    def of(self, case: Case) -> np.ndarray:
+        """σ (batches, F, C) of a case; one batch where exact, not-a-number where there is no estimate."""
+        axes = registry.study(case.study).prepare(case).axes
+        known = np.array([[quantities.exact(self.quantity(f, c), case, axes) for f, c in self.cells]])
+        if not np.isfinite(known).any():
+            known = np.array(list(self._sampled(case)))
+        return known.reshape(len(known), len(self.axes.filters), len(self.axes.components))
+
+    def _sampled(self, case: Case) -> "list[list[float]]":
+        work, each = CaseWork(case), max(2, self.realisations // BATCHES)
+        found = []
+        for batch in range(BATCHES):
+            sums = work.plan.layout.unpack(work.simulate(batch * each, each))
+            result = CaseResult(case.name, case.study, case.spec, case.swept, each, sums, work.plan.axes)
+            curves = registry.study(case.study).curves([result])
+            found.append([quantities.of_table(self.quantity(f, c), curves) for f, c in self.cells])
+        return found
+
+    def rows(
+        self, case: Case, key: numeric.NumericKey, base: np.ndarray, raised: np.ndarray
+    ) -> list[dict[Hashable, Any]]:
+        """A row for each filter and component that has an estimate, with the changes from base to raised."""
+        made: list[dict[Hashable, Any]] = []
+        b = self.axes.baseline
+        whole, changed = root_mean_square(base), root_mean_square(raised)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = np.log(raised / base)
+            gains = [100 * (1 - part / part[:, b : b + 1]) for part in (base, raised)]
+        for f, c in self.cells:
+            if not np.isfinite(whole[f, c]) or not np.isfinite(changed[f, c]):
+                continue
+            grown = interval(ratios[:, f, c], math.log(changed[f, c] / whole[f, c]))
+            gain, gained = (100 * (1 - part[f, c] / part[b, c]) for part in (whole, changed))
+            own = math.nan if f == b else gain
+            points = interval((gains[1] - gains[0])[:, f, c], gained - gain)
+            name, unit = self.axes.components[c]
+            values = [case.name, self.axes.filters[f], name, unit, key.path, key.value, more(key), whole[f, c]]
+            values += [100 * math.expm1(end) for end in grown]
+            values += [own, *(points if f != b else [math.nan] * 3), len(base) == 1]
+            made.append(dict(zip(COLUMNS, values, strict=True)))
+        return made
+
+
+def root_mean_square(batches: np.ndarray) -> np.ndarray:
+    """σ of all batches together."""
+    return np.sqrt(np.mean(batches**2, axis=0))
+
+
+def interval(batches: np.ndarray, value: float) -> tuple[float, float, float]:
+    """A value with its 95 % interval from the same number of each batch; one batch alone is exact."""
+    n = len(batches)
+    half = 0.0 if n == 1 else float(statistics.student(n - 1)) * float(np.std(batches, ddof=1)) / math.sqrt(n)
+    return value, value - half, value + half
+
+
+def table(found: Sensitivity) -> "pd.DataFrame":
+    """sensitivity.csv."""
+    return common.frame({name: [row[name] for row in found.rows] for name in COLUMNS})
+
+
+def tornado(found: Sensitivity) -> Figure:
+    """Bars of the changes of the leading component by key: σ of each filter, and gains."""
+    rows = [row for row in found.rows if row["component"] == found.leading]
+    keys = list(dict.fromkeys(row["key"] for row in rows))[:MOST_BARS][::-1]
+    filters = list(dict.fromkeys(row["filter"] for row in rows))
+    gaining = any(math.isfinite(row["gain_change_points"]) for row in rows)
+    kinds = [("sigma_change", "percent", "change of $\\sigma$, %")]
+    kinds += [("gain_change", "points", "change of gain, points")] if gaining else []
+    made = []
+    for n, (name, ending, words) in enumerate(kinds):
+        marks: list[Mark] = [Reference(0.0, "x")]
+        for i, one in enumerate(filters):
+            own = {row["key"]: row for row in rows if row["filter"] == one}
+            for j, key in enumerate(keys):
+                value = own[key][f"{name}_{ending}"] if key in own else math.nan
+                at = j - 0.7 * ((i + 0.5) / len(filters) - 0.5)
+                if math.isfinite(value):
+                    x, y = np.array([0.0, value]), np.array([at, at])
+                    marks.append(
+                        Line(x, y, "", Style(i, 0, width_pt=9.0 / len(filters), flat=True), name=f"{one}, {key}")
+                    )
+        ticks = tuple((float(j), panels.literal(key) if n == 0 else "") for j, key in enumerate(keys))
+        y_axis = Axis("", limits=(-0.6, len(keys) - 0.4), ticks=ticks)
+        names = [(panels.literal(one), Style(i, 0, width_pt=4.0, flat=True)) for i, one in enumerate(filters)]
+        styles = tuple(names) if n == len(kinds) - 1 else ()
+        made.append(Panel(Axis(words), y_axis, tuple(marks), keys=styles, direct=False, legend="right"))
+    caption = f"Change of σ and gain of {found.leading} {found.at} for a tenth more of each key, the largest first."
+    title, height = f"What a tenth more of each key changes, {found.stem}", 24 + 6.5 * max(3, len(keys))
+    return Figure("tornado", title, caption, tuple(made), len(made), PAGE_MM, height)
+
+
+def write(found: Sensitivity, out: str | os.PathLike[str], formats: Sequence[str]) -> tuple[str, ...]:
+    """sensitivity.csv and the tornado figure, into `out`/sensitivity/CONFIG; their paths."""
+    arguments.directory(out)
+    contents = {"sensitivity.csv": common.to_csv(table(found))}
+    if formats and found.rows:
+        from radarsim.report import figures as drawing  # Matplotlib
+
+        contents |= {f"tornado.{kind}": data for kind, data in drawing.save(tornado(found), formats).items()}
+    folder = Path(out) / FOLDER / found.stem
+    files.replace_all(folder, contents)
+    return tuple(str(folder / name) for name in contents)

@@ -1,0 +1,125 @@
+"""What a tenth more of each key changes: against the textbook, sampled against exact, order, files, faults."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from radarsim.app import sensitivity as finding
+from radarsim.app.sensitivity import sensitivity
+from radarsim.cli import main
+from radarsim.errors import ConfigError
+from tests.studies.range_doppler import impulse
+
+RLS2 = {"variance": 1e-3, "sigma": (250.0, 15.0), "dt": 10.0}
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """RLS 2 at 60 s."""
+    return sensitivity("rls2", at_s=60.0)
+
+
+def row(found, key, name="r+Vr", component="r"):
+    """The one row of a key, a filter and a component."""
+    (one,) = [r for r in found.rows if (r["key"], r["filter"], r["component"]) == (key, name, component)]
+    return one
+
+
+@pytest.mark.parametrize(
+    ("key", "changed"),
+    [
+        ("radar.sigma_range_m", {"sigma": (275.0, 15.0)}),
+        ("radar.sigma_velocity_mps", {"sigma": (250.0, 16.5)}),
+        ("filters.1.manoeuvre_variance", {"variance": 1.1e-3}),
+    ],
+)
+def test_changes_are_those_of_the_textbook(exact, key, changed):
+    before, after = impulse.sigmas(2, 7, **RLS2), impulse.sigmas(2, 7, **(RLS2 | changed))
+    base = impulse.sigmas(1, 7, **RLS2)
+    raised = impulse.sigmas(1, 7, **(RLS2 | ({} if "filters" in key else changed)))
+    for i, component in enumerate(("r", "Vr", "ar")):
+        one = row(exact, key, component=component)
+        assert one["exact"]
+        assert one["sigma"] == pytest.approx(before[i], rel=1e-9)
+        assert one["sigma_change_percent"] == pytest.approx(100 * (after[i] / before[i] - 1), abs=1e-7)
+        assert one["sigma_change_lo"] == one["sigma_change_hi"] == one["sigma_change_percent"]
+        points = 100 * (before[i] / base[i] - after[i] / raised[i])
+        assert one["gain_change_points"] == pytest.approx(points, abs=1e-7)
+
+
+def test_the_largest_effect_on_the_leading_component_comes_first(exact):
+    keys = list(dict.fromkeys(r["key"] for r in exact.rows))
+    effect = [max(abs(row(exact, key, name)["sigma_change_percent"]) for name in ("r", "r+Vr")) for key in keys]
+    assert effect == sorted(effect, reverse=True)
+    assert keys[0] == "radar.sigma_range_m"
+    assert "radar.wavelength_m" in exact.without_effect
+    assert not set(exact.without_effect) & set(keys)
+    assert all("detection_probability" in key or "coefficients" in key for key in exact.left_out)
+
+
+def test_whole_numbers_grow_by_one(exact):
+    one = row(exact, "filters.0.initial_scans", "r")
+    assert (one["value"], one["changed_value"]) == (3, 4)
+
+
+def test_the_last_scans_time_is_kept_when_the_period_grows():
+    found = sensitivity("rls2", overrides=["scans=7"])
+    assert found.at == "at 60 s"
+    ends = [impulse.sigmas(2, n, 1e-3, (250.0, 15.0), 11.0)[0] for n in (6, 7)]
+    at = ends[0] + (60 / 11 - 5) * (ends[1] - ends[0])
+    one = row(found, "radar.scan_period_s")
+    assert one["sigma_change_percent"] == pytest.approx(100 * (at / one["sigma"] - 1), abs=1e-7)
+
+
+def test_sampled_changes_are_paired_and_near_the_exact_ones(exact, monkeypatch):
+    """With exact values withheld: within four standard errors, and far narrower than two runs of their own."""
+    monkeypatch.setattr(finding.quantities, "exact", lambda *_: np.nan)
+    found = sensitivity("rls2", at_s=60.0, realisations=4000)
+    for key in ("radar.sigma_range_m", "radar.sigma_velocity_mps"):
+        one, known = row(found, key), row(exact, key)
+        assert not one["exact"]
+        assert one["sigma_change_lo"] < one["sigma_change_percent"] < one["sigma_change_hi"]
+        half = (one["sigma_change_hi"] - one["sigma_change_lo"]) / 2
+        assert abs(one["sigma_change_percent"] - known["sigma_change_percent"]) < 2 * half
+        assert half < 100 * 1.96 * np.sqrt(2) / np.sqrt(2 * 4000) / 2
+        assert abs(one["gain_change_points"] - known["gain_change_points"]) < (
+            one["gain_change_hi"] - one["gain_change_lo"]
+        )
+    assert {*exact.without_effect} <= {*found.without_effect}
+
+
+def test_the_command_writes_table_and_figure(tmp_path):
+    ended = CliRunner().invoke(main, ["sensitivity", "rls2", "--at", "60", "--out", str(tmp_path), "--format", "svg"])
+    assert ended.exit_code == 0, ended.output
+    folder = tmp_path / "sensitivity" / "rls2"
+    assert sorted(path.name for path in folder.iterdir()) == ["sensitivity.csv", "tornado.svg"]
+    rows = pd.read_csv(folder / "sensitivity.csv")
+    assert tuple(rows.columns) == finding.COLUMNS
+    assert rows["exact"].all()
+    lines = ended.stdout.splitlines()
+    assert lines[0] == "rls2: change of r at 60 s for +10 %"
+    assert lines[2].startswith("radar.sigma_range_m")
+
+
+def test_the_command_gives_one_json_document(tmp_path):
+    words = ["sensitivity", "rls2", "--component", "Vr", "--no-figures", "--out", str(tmp_path), "--json"]
+    document = json.loads(CliRunner().invoke(main, words).stdout)
+    assert document["leading"] == "Vr"
+    assert {"key", "filter", "sigma_change_percent", "gain_change_points"} <= set(document["rows"][0])
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"component": "q"}, "no component 'q'"),
+        ({"at_s": 1e4}, "must be from 0 to 140 s"),
+        ({"at_k": 99}, "must be from 1 to 15"),
+        ({"case": "rls3"}, "no case 'rls3'"),
+    ],
+)
+def test_faults(given, words):
+    with pytest.raises(ConfigError, match=words):
+        sensitivity("rls2", **given)
