@@ -1,14 +1,14 @@
-"""Detectors of manoeuvres (P3 eq. 3) on each realisation's last plots, and the filters that respond to them.
+"""Manoeuvre detectors (P3 eq. 3) on the last plots of each realisation, and the filters that respond to them.
 
-A detector's statistic is â²/σ_a², the acceleration of a parabola through the last plots against its own variance; of
-all coordinates jointly it is the sum. Letters as in `sonar.kernels.steps`, and
+The statistic of a detector is â²/σ_a²: the squared acceleration of a parabola through the last plots over its variance.
+For all coordinates jointly it is the sum. Letters as in `sonar.kernels.steps`, and
 
     Y x = b    normal equations of a parabola: Y (6), b (3)
     T          statistic, UNTESTED where there was no test
     mode       1 in a manoeuvre, else 0
     quiet      tests without an alarm in a row
 
-recent (3, L, CHUNK) are the last L plots of a coordinate: plot, age, weight, the newest first.
+recent (3, L, CHUNK) holds the last L plots of a coordinate: plot, age, weight, the newest first.
 """
 
 from typing import NamedTuple
@@ -21,6 +21,7 @@ from radarsim.kernels.linear import extrapolated
 from radarsim.studies.sonar.kernels.steps import (
     GROUPS,
     inverse,
+    normal_equations,
     predicted_information,
     put_six,
     put_three,
@@ -31,14 +32,14 @@ from radarsim.studies.sonar.kernels.steps import (
 )
 
 UNTESTED = -1.0  # the statistic where there was no test: it exceeds no threshold
-MODE, QUIET, PLOTS = range(3)  # further rows of an adaptive filter's memory; PLOTS: number of plots that it rests on
+MODE, QUIET, PLOTS = range(3)  # further rows of an adaptive filter's memory; PLOTS: number of plots that it uses
 
 
 class Detectors(NamedTuple):
-    """D detectors on C coordinates, and their groups G: each coordinate, then all jointly.
+    """D detectors, each for G groups of coordinates: each of C coordinates, then all jointly.
 
-    plots (D,) of the parabola, every (D,) scans from one test to the next; threshold (D, G, T), of which a detector has
-    the first thresholds (D,); phase (K,) 0 before the manoeuvre, 1 while it lasts, 2 after it.
+    plots (D,) of the parabola, every (D,) scans from one test to the next; threshold (D, G, T), of which the first
+    thresholds (D,) are used; phase (K,) is 0 before the manoeuvre, 1 during it, 2 after it.
     """
 
     plots: np.ndarray
@@ -49,10 +50,10 @@ class Detectors(NamedTuple):
 
 
 class AdaptiveRules(NamedTuple):
-    """How F filters respond to a manoeuvre; read of adaptive ones alone.
+    """How F filters respond to a manoeuvre; read only for adaptive ones.
 
-    detector (F,) and group (F, C) whose statistic is compared with threshold (F, C); raises (F,) the degree, else the
-    memory is held short; quiet (F,) tests without an alarm end the manoeuvre.
+    detector (F,) and group (F, C) whose statistic is compared with threshold (F, C); raises (F,): an alarm raises the
+    degree, else it keeps the memory short; quiet (F,) tests without an alarm end the manoeuvre.
     """
 
     detector: np.ndarray
@@ -65,8 +66,8 @@ class AdaptiveRules(NamedTuple):
 class AdaptiveRule(NamedTuple):
     """The rule of one adaptive filter in one coordinate: size of the state, plots of the short memory `length`.
 
-    raises: in a manoeuvre the degree is 2, else the memory is held short. threshold of the statistic, and patience: how
-    many tests without an alarm in a row end the manoeuvre.
+    raises: in a manoeuvre the degree is 2, else the memory is kept short. threshold of the statistic; patience: number
+    of tests without an alarm in a row that ends the manoeuvre.
     """
 
     size: int
@@ -77,9 +78,9 @@ class AdaptiveRule(NamedTuple):
 
 
 class Alarms(NamedTuple):
-    """Sums over realisations: tested (D, G, K) at a scan, alarms (D, G, T, K), and first (D, G, T, K) of a phase.
+    """Numbers of realisations by scan: tested (D, G, K), with an alarm (D, G, T, K), with the first event (D, G, T, K).
 
-    The first event of a phase is the first alarm before the manoeuvre, the first while it lasts, and after it the
+    The first event of a phase is the first alarm before the manoeuvre, the first alarm during it, and after it the
     first test without an alarm.
     """
 
@@ -90,24 +91,14 @@ class Alarms(NamedTuple):
 
 # ---- tests --------------------------------------------------------------------------------------------------------
 @inline
-def normal_equations(a, length, longest, i):
-    """Normal equations of a parabola through the last `length` plots of group i, at the present: Y (6), b (3).
+def parabola(recent, length, longest, i):
+    """Normal equations of a parabola: Y (6), b (3) relative to the newest plot, and the newest plot.
 
-    a is the address of recent plots, of which there are `longest`. Plots are taken relative to the newest one, which
-    comes third, so that no digits are lost in the sums.
+    Without the newest plot's value the sums lose no digits.
     """
-    zero = full(0.0)
-    y0, y1, y2, y3, y4, y5, b0, b1, b2 = zero, zero, zero, zero, zero, zero, zero, zero, zero
-    newest = get(a, i)
-    for j in range(length):
-        here = j * GROUPS + i
-        z = get(a, here) - newest
-        age, w = get(a, longest * GROUPS + here), get(a, 2 * longest * GROUPS + here)
-        h1, h2 = zero - age, 0.5 * age * age
-        w1, w2 = w * h1, w * h2
-        y0, y1, y2, y3, y4, y5 = y0 + w, y1 + w1, y2 + w2, y3 + w1 * h1, y4 + w1 * h2, y5 + w2 * h2
-        b0, b1, b2 = b0 + w * z, b1 + w1 * z, b2 + w2 * z
-    return (y0, y1, y2, y3, y4, y5), (b0, b1, b2), newest
+    newest = get(recent, i)
+    Y, b = normal_equations(recent, length, longest, i, newest, 0.5)
+    return Y, b, newest
 
 
 @part
@@ -117,7 +108,7 @@ def curvature(recent, length, sigma, n, weight, T):
     zero, enough, most, none = full(0.0), full(length - 0.5), full(3.0), full(UNTESTED)
     per = 1.0 / (sigma * sigma)
     for i in range(GROUPS):
-        Y, b, _ = normal_equations(a, length, recent.shape[1], i)
+        Y, b, _ = parabola(a, length, recent.shape[1], i)
         tested = where_greater(get(aw, i), zero, get(an, i), zero)
         P = inverse(Y, where_greater(tested, enough, most, zero))
         acceleration = P[2] * b[0] + P[4] * b[1] + P[5] * b[2]
@@ -151,7 +142,7 @@ def detector_statistics(detectors, k, recent, sigma, n, weight, T):
 
 @part
 def count_alarms(T, threshold, ended, used, passed):
-    """How many of a chunk give an alarm, and how many their first event of a phase; passed (CHUNK,) is 1 after it."""
+    """Numbers of alarms and of first events of a phase in a chunk; passed (CHUNK,) is 1 after the first event."""
     at, au, ap, zero = address(T), address(used), address(passed), full(0.0)
     level, least, alarms, first = full(threshold), full(0.5 * UNTESTED), zero, zero
     for i in range(GROUPS):
@@ -166,7 +157,7 @@ def count_alarms(T, threshold, ended, used, passed):
 
 @part
 def count_tested(T, used):
-    """How many of a chunk were tested."""
+    """The number of realisations of a chunk that were tested."""
     at, au, zero, least = address(T), address(used), full(0.0), full(0.5 * UNTESTED)
     tested = zero
     for i in range(GROUPS):
@@ -199,7 +190,7 @@ def grown_information(Y, w, tau):
 
 @inline
 def next_mode(T, threshold, mode, quiet, patience):
-    """Mode and number of quiet tests in a row after a statistic T."""
+    """Mode and number of successive quiet tests after a statistic T."""
     zero, one = full(0.0), full(1.0)
     quiet = where_greater(T, full(0.5 * UNTESTED), quiet + one, quiet)
     quiet = where_greater(T, threshold, zero, quiet)
@@ -209,10 +200,11 @@ def next_mode(T, threshold, mode, quiet, patience):
 
 @part
 def adapt(rule, dt, period, memory, plot, recent, T, P):
-    """One scan, in place: growing memory of degree size - 1, begun anew with the last plots at every change of mode.
+    """Update an adaptive filter with one scan, in place, and write P (6, CHUNK).
 
-    An alarm sets the mode, `patience` tests without one in a row take it back; see AdaptiveRule. memory: x, Y and the
-    further rows MODE, QUIET, PLOTS; T (CHUNK,) statistics of this scan; leaves P (6, CHUNK).
+    It is growing memory of degree size - 1, restarted with the last plots at every change of mode. An alarm sets the
+    mode, and `patience` successive tests without one reset it; see AdaptiveRule. memory: x, Y and the further rows
+    MODE, QUIET, PLOTS; T (CHUNK,) statistics of this scan.
     """
     ax, ay, am, ar, az = address(memory.x), address(memory.Y), address(memory.further), address(recent), address(plot.z)
     aw, an, at, ap = address(plot.w), address(plot.n), address(T), address(P)
@@ -231,15 +223,15 @@ def adapt(rule, dt, period, memory, plot, recent, T, P):
         x = (r + P_now[0] * innovation, v + per * P_now[1] * innovation, a + twice * P_now[2] * innovation)
         mode_now, quiet = next_mode(get(at, i), threshold, mode, get(am, QUIET * GROUPS + i), patience)
         plots = get(am, PLOTS * GROUPS + i) + detected
-        begun = (mode_now - mode) * (mode_now - mode) + (zero if rule.raises else mode_now)
-        if any_greater(begun, half):
-            Y_recent, b, newest = normal_equations(ar, rule.length, recent.shape[1], i)
+        restarted = (mode_now - mode) * (mode_now - mode) + (zero if rule.raises else mode_now)
+        if any_greater(restarted, half):
+            Y_recent, b, newest = parabola(ar, rule.length, recent.shape[1], i)
             P_recent = inverse(Y_recent, where_greater(mode_now, half, size_raised, size))
             r, v, a = times(P_recent, b)
-            x = three_where_greater(begun, half, (newest + r, per * v, twice * a), x)
-            plots = where_greater(begun, half, length, plots)
-            P_now = six_where_greater(begun, half, P_recent, P_now)
-            Y = six_where_greater(begun, half, Y_recent, Y)
+            x = three_where_greater(restarted, half, (newest + r, per * v, twice * a), x)
+            plots = where_greater(restarted, half, length, plots)
+            P_now = six_where_greater(restarted, half, P_recent, P_now)
+            Y = six_where_greater(restarted, half, Y_recent, Y)
         put_six(ay, i, Y)
         put_six(ap, i, P_now)
         put_three(ax, i, x)

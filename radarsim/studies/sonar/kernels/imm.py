@@ -1,14 +1,14 @@
-"""Two Kalman filters of one coordinate that interact (IMM: Blom & Bar-Shalom 1988), eight realisations at a time.
+"""Two interacting Kalman filters of one coordinate (IMM: Blom & Bar-Shalom 1988), eight realisations at a time.
 
-Both have the same state and differ in their manoeuvre variance. Letters as in `sonar.kernels.steps`, of each model
+Both have the same state and differ in their manoeuvre variance. Letters as in `sonar.kernels.steps`; for each model
 
     x, P    (3), (6)   state and covariance, in units of the nominal σ and of the period
     Q       (6)        covariance that a manoeuvre adds
-    mu                 probability of the model, after this scan's plot
+    mu                 probability of the model after this scan's plot
     c                  probability of the model before it (Blom and Bar-Shalom's c bar)
-    nis                normalised innovation squared, and S its variance over that of the plot
+    nis                normalised innovation squared; S: variance of the innovation over that of the plot
 
-and of the chain between them p_ij, the probability to go from model i to model j from scan to scan.
+and p_ij, the probability of a transition from model i to model j from scan to scan.
 """
 
 from typing import NamedTuple
@@ -31,14 +31,14 @@ from radarsim.studies.sonar.kernels.steps import (
     three_where_greater,
 )
 
-# Further rows of its memory: states of both models, covariances of both, probabilities of both.
+# Further rows of the filter's memory: states of both models, covariances of both, probabilities of both.
 STATE, COVARIANCE, PROBABILITY, ROWS = 0, 6, 18, 20
 
 
 class ModelPairs(NamedTuple):
-    """Models of F filters; read of interacting ones alone.
+    """The models of F filters; read only for interacting ones.
 
-    manoeuvre (F, C, 2) variances in nominal plots and periods; stay (F, 2) the probability that each model lasts from
+    manoeuvre (F, C, 2) variances in nominal plots and periods; stay (F, 2) probabilities that each model lasts from
     scan to scan.
     """
 
@@ -71,10 +71,10 @@ def merged(mu1, x1, P1, mu2, x2, P2):
 
 @inline
 def mixed(c, from_first, first, second):
-    """State and covariance of a model before the scan, of both models' (x, P) before it.
+    """State and covariance of a model before the scan, mixed from (x, P) of both models.
 
-    c is the model's probability and from_first the part of it that comes from the first model. A model that has lost
-    all probability takes the second one's state.
+    c is the model's probability and from_first the part of it that comes from the first model. A model without any
+    probability takes the state of the second model.
     """
     zero, one = full(0.0), full(1.0)
     mu = from_first / where_greater(c, zero, c, one)
@@ -106,8 +106,8 @@ def filtered(x, P, tau, Q, z, w):
 def imm_step(first, second, mu, chain, tau, Q, z, w):
     """Mix, predict and update: both models' (x, P), and the probability of the first.
 
-    first, second, mu (2) are the models' (x, P) and probabilities after the scan before; chain (p11, p12, p21, p22); Q
-    (2) of each model; z in units of the nominal σ.
+    first, second, mu (2) are the models' (x, P) and probabilities after the previous scan; chain (p11, p12, p21, p22);
+    Q (2) of each model; z in units of the nominal σ.
     """
     (mu1, mu2), (p11, p12, p21, p22), one, zero = mu, chain, full(1.0), full(0.0)
     c1, c2 = p11 * mu1 + p21 * mu2, p12 * mu1 + p22 * mu2
@@ -122,9 +122,10 @@ def imm_step(first, second, mu, chain, tau, Q, z, w):
 
 @part
 def interact(models, dt, period, sigma, memory, plot, P):
-    """One scan, in place. memory: x, Y and further rows STATE, COVARIANCE and PROBABILITY; leaves P (6, CHUNK).
+    """Update an IMM with one scan, in place, and write P (6, CHUNK).
 
-    The first `size` plots go into both models by least squares, at the long-run probabilities of their chain.
+    memory: x, Y and further rows STATE, COVARIANCE and PROBABILITY. Both models start by least squares on the first
+    `size` plots, with the stationary probabilities of their Markov chain.
     """
     ax, ay, am, ap = address(memory.x), address(memory.Y), address(memory.further), address(P)
     az, aw, an = address(plot.z), address(plot.w), address(plot.n)
@@ -133,7 +134,7 @@ def interact(models, dt, period, sigma, memory, plot, P):
     Q = (manoeuvre_covariance(models.q[0], tau, size), manoeuvre_covariance(models.q[1], tau, size))
     p11, p22 = models.stay[0], models.stay[1]
     p12, p21 = 1.0 - p11, 1.0 - p22
-    long_run = full(p21 / (p12 + p21))
+    stationary = full(p21 / (p12 + p21))
     for i in range(GROUPS):
         z, w, n = get(az, i), get(aw, i), get(an, i)
         Y, K, P_start = least_squares(eight(ay, i), n, w, tau, 0.0, size)
@@ -150,7 +151,7 @@ def interact(models, dt, period, sigma, memory, plot, P):
         second = (x[3:], six(am, (COVARIANCE + 6) * GROUPS + i))
         first, second, mu1 = imm_step(first, second, mu, (p11, p12, p21, p22), tau, Q, unit * z, w)
         early = where_greater(n, first_scans, zero, one)
-        mu1 = where_greater(early, zero, long_run, mu1)
+        mu1 = where_greater(early, zero, stationary, mu1)
         x1, P1 = three_where_greater(early, half, x_start, first[0]), six_where_greater(early, half, P_start, first[1])
         x2, P2 = (
             three_where_greater(early, half, x_start, second[0]),
@@ -169,9 +170,9 @@ def interact(models, dt, period, sigma, memory, plot, P):
 
 @part
 def mode_sums(further, row, row_plots, used, out):
-    """Σp, Σp² of the probability in a row of a filter's further rows, and Σ of its plots in memory: out (3,).
+    """Write Σp and Σp² of the probability in one of a filter's further rows, and Σ of its plots in memory, to out (3,).
 
-    row_plots is the row of that number, negative where there is none.
+    row_plots is the row with the number of plots, negative where there is none.
     """
     a, au, zero = address(further), address(used), full(0.0)
     s1, s2, s3 = zero, zero, zero

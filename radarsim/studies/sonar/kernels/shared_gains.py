@@ -1,9 +1,9 @@
-"""Sonar filters whose gains all realisations share (P3, fixed pattern of plots), and the world that they look at.
+"""Sonar filters whose gains all realisations share (P3, fixed pattern of plots), and the world that they observe.
 
-As in `linear`: chunks that stay in cache, scans outermost, one plain loop per formula. A state has four rows, value,
-rate, acceleration and the carried error of the last plot; coordinates (range, bearing, depth) are filtered apart,
-each by its own schedule of gains. A window is weights on a ring of the last plots instead. Where the pattern of plots
-differs between realisations, `patterns` takes the place of the filters here.
+As in `linear`, chunks stay in cache, scans are outermost, and each formula is one plain loop. A state has four rows:
+value, rate, acceleration and the carried error of the last plot. Coordinates (range, bearing, depth) are filtered
+separately, each with its own schedule of gains. A window applies weights to a ring of the last plots. Where the pattern
+of plots differs between realisations, the filters of `patterns` are used instead.
 """
 
 from typing import NamedTuple
@@ -20,10 +20,9 @@ CHUNK = 512
 class World(NamedTuple):
     """Targets and plots of K scans in C coordinates.
 
-    plots and motion (2,) are the keys of two noise streams; dt (K,) the interval before a scan; truth (K, C, 3);
-    steps (K, C) the correlation of an error with that of the scan
-    before, fresh (K, C) the standard deviation of what is new in it; walk (C,) that of a random acceleration,
-    constant over each interval. C is even: an unused coordinate is all zeros.
+    plots and motion (2,) are the keys of two noise streams; dt (K,) the interval before a scan; truth (K, C, 3); steps
+    (K, C) the correlation of an error with that of the previous scan, fresh (K, C) the standard deviation of its new
+    part; walk (C,) that of a random acceleration, constant over each interval. C is even: an unused coordinate is zero.
     """
 
     plots: np.ndarray
@@ -38,10 +37,10 @@ class World(NamedTuple):
 class SharedBank(NamedTuple):
     """Schedules of F filters, the same for all realisations.
 
-    gain (F, K, C, 4), carry (F, K, C), and whether it carries at all (F,); length (F,) plots of a window, 0 for a
-    recursive filter, whose weights (F, K, C, 3, L) belong to the places of a ring that plot number n enters at n
-    modulo L, slot (K, C), -1 where there is none; known (F, K, C) components that are estimated; size (F,) of the
-    state; inverse (F, K, C, 6) of the believed covariance.
+    gain (F, K, C, 4) and carry (F, K, C) of a recursive filter; carries (F,): whether it carries an error; length (F,)
+    plots of a window, 0 for a recursive filter; weights (F, K, C, 3, L) of a window for the slots of a ring, which plot
+    number n enters at slot n modulo L; slot (K, C) of a scan's plot, -1 where there is none; known (F, K, C) estimated
+    components; size (F,) of the state; inverse (F, K, C, 6) of the believed covariance.
     """
 
     gain: np.ndarray
@@ -56,7 +55,7 @@ class SharedBank(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """What is added up, over realisations; see `studies.sonar` for the meaning.
+    """Sums over realisations; `sonar.study` describes them.
 
     error (F, K, C, 3, 4), paired (F, K, C, 3), joint (F, K, C, 4), ahead (F, K, C, 4), believed and estimates (F, K,
     C, 3).
@@ -73,9 +72,7 @@ class Sums(NamedTuple):
 # ---- the world ----------------------------------------------------------------------------------------------------
 @kernel
 def push(key, first, pair, dt, walk, one, two):
-    """Deviations one and two (2, n) of value and rate from the course, over an interval of random acceleration walk
-    (2,).
-    """
+    """Move the deviations of value and rate from the course, one and two (2, n), by random accelerations walk (2,)."""
     k0, k1, start, walk_one, walk_two = key[0], key[1], U(first), walk[0], walk[1]
     for i in range(one.shape[1]):
         a, b = normals(k0, k1, start + U(i), pair)
@@ -88,10 +85,10 @@ def push(key, first, pair, dt, walk, one, two):
 
 @kernel
 def measure(key, first, pair, step, fresh, mean, one, two):
-    """Plots of two coordinates: rows 0 of one and two (3, n) from rows 1, their errors, and rows 2, the deviations.
+    """Plots of two coordinates, rows 0 of one and two (3, n), from their errors, rows 1, and the deviations, rows 2.
 
-    An error goes to step · error + fresh · normal (P3 eq. 15), stationary from the first plot on; step, fresh and
-    mean (2,).
+    An error becomes step · error + fresh · normal (P3 eq. 15), stationary from the first plot on; step, fresh and mean
+    (2,).
     """
     k0, k1, start = key[0], key[1], U(first)
     step_one, step_two, fresh_one, fresh_two = step[0], step[1], fresh[0], fresh[1]
@@ -106,7 +103,7 @@ def measure(key, first, pair, step, fresh, mean, one, two):
 
 @kernel
 def move_and_measure(world, first, k, plots):
-    """Scan k of all coordinates in place: plots (C, 4, n) holds plot, error, and deviation of value and rate.
+    """Compute scan k of all coordinates in place: plots (C, 4, n) holds plot, error, and deviation of value and rate.
 
     C is even.
     """
@@ -122,7 +119,7 @@ def move_and_measure(world, first, k, plots):
 # ---- one scan of a filter -----------------------------------------------------------------------------------------
 @kernel
 def scan_value(x, z, dt, gain):
-    """One scan, in place, of a filter that takes errors as white: x (>= 3, n), plots z (n,), gain (>= 3,)."""
+    """Update a filter that assumes white errors with one scan, in place: x (>= 3, n), plots z (n,), gain (>= 3,)."""
     r, v, a = x[0], x[1], x[2]
     g0, g1, g2 = gain[0], gain[1], gain[2]
     for i in range(z.size):
@@ -133,15 +130,15 @@ def scan_value(x, z, dt, gain):
 
 @kernel
 def scan_carried(x, z, dt, carry, gain):
-    """One scan, in place, of a filter that takes errors as correlated: x (4, n), its last row the carried error."""
+    """Update a filter that assumes correlated errors with one scan, in place: x (4, n), the last row is the error."""
     r, v, a, e = x[0], x[1], x[2], x[3]
     g0, g1, g2, g3 = gain[0], gain[1], gain[2], gain[3]
     for i in range(z.size):
         p, q, s = extrapolated(r[i], v[i], a[i], dt)
-        foreseen = carry * e[i]
-        residual = z[i] - p - foreseen
+        predicted = carry * e[i]
+        residual = z[i] - p - predicted
         r[i], v[i], a[i] = p + g0 * residual, q + g1 * residual, s + g2 * residual
-        e[i] = foreseen + g3 * residual
+        e[i] = predicted + g3 * residual
 
 
 @kernel
@@ -158,8 +155,9 @@ def window(x, ring, weights):
 
 @kernel
 def advance(bank, x, ring, plots, k, dt):
-    """Scan k of all filters and coordinates in place: x (F, C, 4, n) zero before scan 0, ring (C, L, n), plots (C, 4,
-    n).
+    """Update all filters in all coordinates with scan k, in place.
+
+    x (F, C, 4, n), zero before scan 0; ring (C, L, n), plots (C, 4, n).
     """
     for c in range(x.shape[1]):
         if bank.slot[k, c] >= 0 and ring.shape[1] > 0:
@@ -184,11 +182,11 @@ def powers(e):
 
 @summing
 def error_sums(x, y, shift, truth, inverse, n):
-    """Sums over the first n of the errors of a state x (>= 3, n): of value, rate and acceleration, and all together.
+    """Sums over the first n realisations of the errors of a state x (>= 3, n).
 
-    e, e², e³, e⁴ of each; e² f² of each, f the error of the filter y beside it; q, q², p, p² of q = eᵀ P⁻¹ e, with
-    the inverse (6,) packed by rows, and p the product of the errors in value and rate. shift (2, n) is the deviation of
-    value and rate from the truth (3,).
+    For value, rate and acceleration: e, e², e³, e⁴, and e² f² with the error f of filter y; then q, q², p, p² of
+    q = eᵀ P⁻¹ e, with the inverse (6,) packed by rows, and of p, the product of the errors in value and rate. shift
+    (2, n) is the deviation of value and rate from the truth (3,).
     """
     t0, t1, t2 = truth[0], truth[1], truth[2]
     y00, y01, y02, y11, y12, y22 = inverse[0], inverse[1], inverse[2], inverse[3], inverse[4], inverse[5]
@@ -213,7 +211,7 @@ def error_sums(x, y, shift, truth, inverse, n):
 
 @summing
 def ahead_sums(x, shift, truth, dt, n):
-    """Sums of e, e², e³, e⁴ over the first n of the value extrapolated by dt, against the truth then."""
+    """Sums over the first n realisations of e, e², e³, e⁴ of the value extrapolated by dt, against the truth then."""
     half = 0.5 * dt * dt
     s1 = s2 = s3 = s4 = 0.0
     for i in range(n):
@@ -241,7 +239,7 @@ def add_sums(bank, x, plots, truth, k, n, baseline, sums):
 
 @kernel
 def add_ahead(bank, x, plots, truth, k, dt, n, sums):
-    """Add the errors at scan k of what was extrapolated from scan k - 1, where the state was complete."""
+    """Add the errors at scan k of values extrapolated from scan k - 1, where the state was complete."""
     for f in range(x.shape[0]):
         for c in range(x.shape[1]):
             if bank.known[f, k - 1, c] == bank.size[f]:
@@ -252,9 +250,9 @@ def add_ahead(bank, x, plots, truth, k, dt, n, sums):
 
 @kernel
 def simulate_block(world, bank, first, count, baseline, sums):
-    """Add the sums of realisations first … first + count - 1.
+    """Add the sums of realisations first … first + count - 1; gains refer to filter `baseline`.
 
-    A partial chunk is computed in full and summed in part.
+    The last chunk is always computed in full, and only the realisations asked for are summed.
     """
     filters, scans, coordinates = bank.gain.shape[:3]
     x = np.empty((filters, coordinates, 4, CHUNK))

@@ -1,23 +1,23 @@
-"""One scan of the sonar filters whose gains are each realisation's own, eight realisations at a time.
+"""One scan of the sonar filters whose gains differ between realisations, eight realisations at a time.
 
-The letters of this file and of those built on it (tuples of lanes; a lane is one number of eight realisations):
+The letters of this file and of those that use it (tuples of lanes; a lane is one number of eight realisations):
 
     x    (4)   state: value, rate, acceleration, and the error e carried over from the last plot
     P    (6)   covariance of value, rate and acceleration, packed by rows: 00, 01, 02, 11, 12, 22
     J    (10)  joint covariance of x: P, then the covariances of the three with e, then the variance of e
-    Y    (6)   information, the inverse of P, packed likewise; with age and correlation of the last plot's error (8)
-    H    (3)   row of an observation
+    Y    (6)   information, the inverse of P, packed likewise; (8) with age and correlation of the last plot's error
+    H    (3)   observation row
     K    (4)   gain
     S          variance of the innovation
     z, w       plot, and its weight 1 / R, zero where it is missed
     n          number of plots before this scan
     rank       number of components that the plots determine: the size of the state, or fewer at the start
-    tau        interval since the scan before, in periods (dt: in s)
-    c          correlation of the error with that of the scan before
+    tau        interval since the previous scan, in periods (dt: in s)
+    c          correlation of the error with that of the previous scan
     q          manoeuvre variance: of the derivative of order `size`, constant over an interval
 
-P, J, Y, R, S and q are in units of a nominal plot's σ and of the period; x is in m or rad, and s. Arrays hold a chunk:
-`get(address(a), j * GROUPS + i)` is group i of row j.
+P, J, Y, R, S and q are in units of a nominal plot's σ and of the period; x is in m or rad, and s. An array contains one
+chunk of realisations: `get(address(a), j * GROUPS + i)` is group i of row j.
 """
 
 from typing import NamedTuple
@@ -30,14 +30,14 @@ from radarsim.kernels.linear import extrapolated
 
 CHUNK = 512  # realisations, as in `shared_gains`
 GROUPS = CHUNK // WIDTH
-KALMAN_GAIN = (0.0, 0.0, 0.0)  # in place of a fixed gain
+KALMAN_GAIN = (0.0, 0.0, 0.0)  # instead of a fixed gain
 
 
 class Model(NamedTuple):
-    """What a recursive filter assumes of one coordinate and scan.
+    """The model of a recursive filter for one coordinate and scan.
 
-    size of the state, 2 or 3; start: plots up to which it is least squares; correlation c and manoeuvre variance q;
-    gain (3,) of a filter of fixed gain, else KALMAN_GAIN.
+    size of the state, 2 or 3; start: number of plots up to which the filter is least squares; correlation c and
+    manoeuvre variance q; gain (3,) of a filter of fixed gain, else KALMAN_GAIN.
     """
 
     size: int
@@ -48,10 +48,10 @@ class Model(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What a filter keeps of one coordinate from scan to scan.
+    """What a filter stores for one coordinate from scan to scan.
 
-    x (4, CHUNK) state, Y (8, CHUNK) information, and further rows (>= 10, CHUNK) that depend on the filter's kind: the
-    joint covariance J here, see `detector.adapt` and `imm.interact` for theirs.
+    x (4, CHUNK) state, Y (8, CHUNK) information, and further rows (>= 10, CHUNK) whose meaning depends on the kind of
+    filter: here the joint covariance J; for others see `detector.adapt` and `imm.interact`.
     """
 
     x: np.ndarray
@@ -77,7 +77,7 @@ def inverse(Y, rank):
     c0, c1, c2 = y11 * y22 - y12 * y12, y02 * y12 - y01 * y22, y01 * y12 - y02 * y11  # cofactors of the first row
     minor = y00 * y11 - y01 * y01
     determinant = where_greater(rank, half, minor, where_greater(rank, least, y00, one))
-    scale = 1.0 / where_greater(rank, most, y00 * c0 + y01 * c1 + y02 * c2, determinant)  # divisions are what costs
+    scale = 1.0 / where_greater(rank, most, y00 * c0 + y01 * c1 + y02 * c2, determinant)  # divisions are expensive
     p00 = where_greater(rank, half, y11, where_greater(rank, least, one, zero))
     return (
         scale * where_greater(rank, most, c0, p00),
@@ -97,6 +97,26 @@ def times(P, h):
         P[1] * h[0] + P[3] * h[1] + P[4] * h[2],
         P[2] * h[0] + P[4] * h[1] + P[5] * h[2],
     )
+
+
+@inline
+def normal_equations(recent, length, longest, i, origin, half):
+    """Normal equations Y x = b of a polynomial through the last `length` plots of group i: Y (6), b (3), at the present.
+
+    recent is the address of the recent plots, of which `longest` are kept; they are taken relative to origin. half is
+    0.5 for a parabola and 0 for a straight line.
+    """
+    zero = full(0.0)
+    y0, y1, y2, y3, y4, y5, b0, b1, b2 = zero, zero, zero, zero, zero, zero, zero, zero, zero
+    for j in range(length):
+        here = j * GROUPS + i
+        z = get(recent, here) - origin
+        age, w = get(recent, longest * GROUPS + here), get(recent, 2 * longest * GROUPS + here)
+        h1, h2 = zero - age, half * age * age
+        w1, w2 = w * h1, w * h2
+        y0, y1, y2, y3, y4, y5 = y0 + w, y1 + w1, y2 + w2, y3 + w1 * h1, y4 + w1 * h2, y5 + w2 * h2
+        b0, b1, b2 = b0 + w * z, b1 + w1 * z, b2 + w2 * z
+    return (y0, y1, y2, y3, y4, y5), (b0, b1, b2)
 
 
 @inline
@@ -195,9 +215,9 @@ def with_observation(Y, H, w):
 
 @inline
 def least_squares(Y, n, w, tau, c, size):
-    """One scan of `filters.differenced`: information Y (8), gain K (4) and covariance P (6) after it.
+    """Update with one scan of `filters.differenced`: information Y (8), gain K (4) and covariance P (6).
 
-    The observation is the difference of the plot and c times the last one, with H = H₀ - c H₀ F(-age) and R = 1 - c².
+    The observation is the plot less c times the last one, with H = H₀ - c H₀ F(-age) and R = 1 - c².
     """
     one, zero = full(1.0), full(0.0)
     age, c_last = Y[6] + tau, Y[7] * c
@@ -217,7 +237,7 @@ def least_squares(Y, n, w, tau, c, size):
 # ---- Kalman filter of state and carried error ---------------------------------------------------------------------
 @inline
 def predicted_joint(J, w, tau, model):
-    """F J Fᵀ + Q; the error's variance stays what it is in a stationary process, 1 / w."""
+    """F J Fᵀ + Q; the variance of the error remains that of a stationary process, 1 / w."""
     one, zero, c, q = full(1.0), full(0.0), model.c, model.q
     half = 0.5 * tau * tau
     g0, g1, g2 = (half, tau, 0.0) if model.size == 2 else (tau * half / 3.0, half, tau)
@@ -256,7 +276,7 @@ def joint_gain(J, w, fixed):
 
 @inline
 def updated_joint(J, K, h, S):
-    """J - h Kᵀ - K hᵀ + K S Kᵀ with h = J Hᵀ: the form that holds for any gain."""
+    """J - h Kᵀ - K hᵀ + K S Kᵀ with h = J Hᵀ, which is valid for any gain."""
     r0, r1, r2, r3 = K[0] * S - h[0], K[1] * S - h[1], K[2] * S - h[2], K[3] * S - h[3]
     return (
         J[0] + K[0] * r0 - h[0] * K[0],
@@ -274,10 +294,10 @@ def updated_joint(J, K, h, S):
 
 @inline
 def kalman(J, start, n, w, tau, model):
-    """One scan of the Kalman filter: joint covariance J (10), gain K (4) and covariance P (6) after it.
+    """Update the Kalman filter with one scan: joint covariance J (10), gain K (4) and covariance P (6).
 
-    start (K (4), P (6)) are those of least squares, which hold up to the model's start. Right after a plot its value
-    plus error is known exactly, so that there the error's covariances are those of the state, negative.
+    start (K (4), P (6)) are those of least squares, which apply up to the model's start. Just after a plot its value
+    plus error is known exactly, so the covariances of the error are those of the state with opposite sign.
     """
     zero, first, carried = full(0.0), full(float(model.start)), 1.0 if model.c != 0.0 else 0.0
     K_start, P_start = start
@@ -308,9 +328,9 @@ def updated_state(x, z, K, dt, period, c):
 
 @kernel
 def recur(by_covariance, model, dt, period, memory, plot, P):
-    """One scan of a recursive filter: its memory goes on in place; leaves P (6, CHUNK).
+    """Update the memory of a recursive filter with one scan, in place, and write P (6, CHUNK).
 
-    by_covariance: after the model's start the filter goes over from information to the joint covariance.
+    by_covariance: after the model's start the filter switches from information to the joint covariance.
     """
     ax, ay, aj, ap = address(memory.x), address(memory.Y), address(memory.further), address(P)
     az, aw, an = address(plot.z), address(plot.w), address(plot.n)
@@ -331,7 +351,7 @@ def recur(by_covariance, model, dt, period, memory, plot, P):
 # ---- windows ------------------------------------------------------------------------------------------------------
 @kernel
 def remember(recent, z, weight, tau):
-    """Enter the plots of a scan into recent (3, L, CHUNK), the last L plots: plot, age, weight, the newest first."""
+    """Add the plots of a scan to recent (3, L, CHUNK), the last L plots: plot, age, weight, the newest first."""
     a, az, aw, length = address(recent), address(z), address(weight), recent.shape[1]
     zero, ages, weights = full(0.0), length * GROUPS, 2 * length * GROUPS
     for i in range(GROUPS):
@@ -348,25 +368,14 @@ def remember(recent, z, weight, tau):
 
 @kernel
 def fit(x, recent, length, size, period, n, P):
-    """Least squares on the last `length` of recent plots: x (4, CHUNK), P (6, CHUNK); n (CHUNK,) of plots so far.
-
-    The normal equations Y x = b of a polynomial at the present.
-    """
+    """Least squares on the last `length` of recent plots: x (4, CHUNK), P (6, CHUNK); n (CHUNK,) of plots so far."""
     ax, a, an, ap = address(x), address(recent), address(n), address(P)
-    ages, weights = recent.shape[1] * GROUPS, 2 * recent.shape[1] * GROUPS
-    per, twice, second, zero = 1.0 / period, 1.0 / (period * period), 0.5 if size == 3 else 0.0, full(0.0)
+    per, twice, half, zero = 1.0 / period, 1.0 / (period * period), 0.5 if size == 3 else 0.0, full(0.0)
     most = full(float(size))
     for i in range(GROUPS):
-        y0, y1, y2, y3, y4, y5, b0, b1, b2 = zero, zero, zero, zero, zero, zero, zero, zero, zero
-        for j in range(length):
-            here = j * GROUPS + i
-            z, age, w = get(a, here), get(a, ages + here), get(a, weights + here)
-            h1, h2 = zero - age, second * age * age
-            w1, w2 = w * h1, w * h2
-            y0, y1, y2, y3, y4, y5 = y0 + w, y1 + w1, y2 + w2, y3 + w1 * h1, y4 + w1 * h2, y5 + w2 * h2
-            b0, b1, b2 = b0 + w * z, b1 + w1 * z, b2 + w2 * z
+        Y, b = normal_equations(a, length, recent.shape[1], i, zero, half)
         rank = get(an, i)
-        P_now = inverse((y0, y1, y2, y3, y4, y5), where_greater(rank, most, most, rank))
-        r, v, acceleration = times(P_now, (b0, b1, b2))
+        P_now = inverse(Y, where_greater(rank, most, most, rank))
+        r, v, acceleration = times(P_now, b)
         put_three(ax, i, (r, per * v, twice * acceleration))
         put_six(ap, i, P_now)

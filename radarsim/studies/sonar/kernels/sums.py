@@ -1,11 +1,11 @@
-"""Sums of errors where each realisation has its own plots: over those that have an estimate, eight at a time.
+"""Sums of errors over the realisations that have an estimate, where plots differ between them; eight at a time.
 
 Letters as in `steps`, and
 
     e    error of the estimate, x - truth
     f    error of the filter that gains are against (its baseline)
     n    number of plots up to this scan
-    s…   sums over realisations, a lane each until `total` adds the lanes, always in the same order
+    s…   sums over realisations, in lanes until `total` adds the lanes, always in the same order
 
 Arrays hold a chunk, as in `steps`.
 """
@@ -22,7 +22,7 @@ from radarsim.studies.sonar.kernels.steps import GROUPS, inverse, six
 class Estimate(NamedTuple):
     """A filter's estimate in one coordinate: x (4, CHUNK), covariance P (6, CHUNK), size of the state.
 
-    x_base (4, CHUNK) is the baseline's estimate and size_base its size, 0 where no gain is wanted.
+    x_base (4, CHUNK) is the baseline's estimate and size_base its size, 0 where no gain is needed.
     """
 
     x: np.ndarray
@@ -33,7 +33,7 @@ class Estimate(NamedTuple):
 
 
 class Course(NamedTuple):
-    """Where the targets are, of one coordinate or (C, …) all: truth (3,) and each one's shift (3, CHUNK) from it."""
+    """The targets' states in one coordinate, or (C, …) in all: truth (3,) and the shift (3, CHUNK) of each from it."""
 
     truth: np.ndarray
     shift: np.ndarray
@@ -41,7 +41,7 @@ class Course(NamedTuple):
 
 class Counted(NamedTuple):
     """Which realisations count: n (CHUNK,) plots of each so far, or (C, CHUNK) of all coordinates; used (CHUNK,) is 1
-    for a realisation of the block and 0 for one that only fills a partial chunk up.
+    for a realisation of the block and 0 for one that only fills up the last chunk.
     """
 
     n: np.ndarray
@@ -50,7 +50,7 @@ class Counted(NamedTuple):
 
 @kernel
 def component_sums(j, x, x_base, course, counted, out):
-    """Of component j: number of estimates, Σe, Σe², Σe³, Σe⁴ and Σe²f², into out (6,); x and x_base (4, CHUNK)."""
+    """Write the number of estimates, Σe, Σe², Σe³, Σe⁴ and Σe²f² of component j to out (6,); x, x_base (4, CHUNK)."""
     ax, ab, moved, zero = address(x), address(x_base), address(course.shift[j]), full(0.0)
     an, au, truth = address(counted.n), address(counted.used), course.truth[j]
     need, s0, s1, s2, s3, s4, s5 = full(j + 0.5), zero, zero, zero, zero, zero, zero
@@ -87,10 +87,10 @@ def quadratic_form(Y, e):
 
 @kernel
 def joint_sums(x, P, size, course, counted, units, out):
-    """Σ of the diagonal of P where there are plots for it, and Σq, Σq², Σp, Σp² where the state is complete: out (7,).
+    """Write Σ of the diagonal of P, where estimated, and Σq, Σq², Σp, Σp², where the state is complete, to out (7,).
 
-    q = eᵀ P⁻¹ e and p the product of the errors in value and rate. x (4, CHUNK); P (6, CHUNK) in nominal units, as the
-    first three sums; units (σ, period).
+    q = eᵀ P⁻¹ e and p is the product of the errors in value and rate. x (4, CHUNK); P (6, CHUNK) and the first three
+    sums are in nominal units; units (σ, period).
     """
     ax, ap, moved, truth = address(x), address(P), address(course.shift), course.truth
     an, au, (sigma, period) = address(counted.n), address(counted.used), units
@@ -114,7 +114,7 @@ def joint_sums(x, P, size, course, counted, units, out):
 
 @kernel
 def ahead_sums(x, size, course, counted, dt, out):
-    """Σe, Σe², Σe³, Σe⁴ of the value extrapolated by dt, where the state was complete, into out (4,)."""
+    """Write Σe, Σe², Σe³, Σe⁴ of the value extrapolated by dt, where the state was complete, to out (4,)."""
     ax, moved, truth = address(x), address(course.shift), course.truth[0]
     an, au, zero = address(counted.n), address(counted.used), full(0.0)
     half, need, s1, s2, s3, s4 = 0.5 * dt * dt, full(size - 0.5), zero, zero, zero, zero
@@ -147,7 +147,7 @@ def add_sums(estimate, course, counted, units, at, out, sums):
 
 @kernel
 def add_ahead(sizes, x, course, counted, k, dt, out, sums):
-    """Add the errors at scan k of what was extrapolated from scan k - 1, of all filters and coordinates.
+    """Add the errors at scan k of values extrapolated from scan k - 1, for all filters and coordinates.
 
     x (F, C, 4, CHUNK); course and counted of all coordinates, n of plots before scan k.
     """

@@ -43,7 +43,7 @@ def add_errors(trackers, tracks, f, k, course, counted, out, sums):
 
 @part
 def add_ahead(tracks, f, k, dt, course, counted, out, sums):
-    """Add the errors of tracker f at scan k of what was extrapolated from scan k - 1."""
+    """Add the errors of tracker f at scan k of values extrapolated from scan k - 1."""
     size = tracks.x.shape[0]
     for c in range(size):
         ahead_sums(tracks.x[c], size, Course(course.truth[c], course.shift[c]), counted, dt, out)

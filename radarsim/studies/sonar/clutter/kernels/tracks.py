@@ -1,19 +1,20 @@
 """Tracks of range and bearing, eight at a time: prediction with the innovation's covariance, and the update.
 
-The state is that of two lines, (r, vr) and (b, vb), each with the recursion of the plain Kalman filter of this study
-(`steps.least_squares` up to two plots, then `steps.kalman`). Probabilistic association ties them by a covariance
-between them, four numbers which are zero, and change no bit, as long as every plot taken is certain. Plots are taken in
-one coordinate after the other, which their independent errors allow. Letters as in `sonar.kernels.steps`, and
+The state is that of two lines, (r, vr) and (b, vb), each with the recursion of this study's plain Kalman filter
+(`steps.least_squares` up to two plots, then `steps.kalman`). Probabilistic association causes a covariance between
+them: four numbers, which are exactly zero as long as every plot taken is certain. The coordinates of a plot are
+processed one after the other, which is possible because their errors are independent. Letters as in
+`sonar.kernels.steps`, and
 
     P_r, P_b    (6)   covariances of the two lines; their third component is zero
     C           (4)   covariance between them, (r, vr) by (b, vb), packed by rows
     nu_r, nu_b        innovations in range and bearing, in m and rad
     S           (3)   covariance of the innovations: rr, rb, bb
-    V           (3)   further covariance of innovations that are not certain to be the target's: rr, rb, bb
+    V           (3)   additional covariance of innovations that may not be the target's: rr, rb, bb
     K_rb        (2)   gain of the line in range for the innovation in bearing; likewise K_rr, K_br, K_bb
     n, w              plots of a track before this scan; 1 where it takes a plot, else 0
 
-P, C and K are in nominal plots and periods. Arrays hold a chunk, as in `steps`.
+P, C and K are in nominal plots and periods. Arrays contain a chunk, as in `steps`.
 """
 
 from typing import NamedTuple
@@ -62,7 +63,7 @@ def no_tracks() -> Tracks:
 
 @kernel
 def clear(tracks, i):
-    """Empty the place of track i."""
+    """Clear the place of track i."""
     tracks.x[:, :, i], tracks.Y[:, :, i], tracks.P[:, :, i] = 0.0, 0.0, 0.0
     tracks.C[:, i], tracks.plots[i] = 0.0, 0.0
 
@@ -77,7 +78,7 @@ def joint_of(P):
 
 @inline
 def predicted_line(P, n, tau, q):
-    """Covariance (6) of a line after tau periods: the plain filter's step without a plot."""
+    """Covariance (6) of a line after tau periods: the step of the plain filter without a plot."""
     zero = full(0.0)
     start = ((zero, zero, zero, zero), P)
     _, _, P = kalman(joint_of(P), start, n, zero, tau, Model(2, 2, 0.0, q, KALMAN_GAIN))
@@ -93,7 +94,7 @@ def predicted_between(C, tau):
 
 @kernel
 def predict(tracks, dt, period, sigma, manoeuvre, predicted):
-    """Places and innovation covariances after dt into predicted (5, CHUNK): r, b, S (rr, rb, bb); in m and rad.
+    """Write positions and innovation covariances after dt to predicted (5, CHUNK): r, b, S (rr, rb, bb); in m, rad.
 
     sigma (2,) of a nominal plot; manoeuvre (2,) variances q of the lines.
     """
@@ -140,7 +141,7 @@ def updated_pair(P, P_other, C, start, n, w):
 
     P is of the line that has the plot, start (K, P) its least squares; C is that line by the other.
     """
-    h = (C[0], C[1])  # covariance of what is measured with the other line
+    h = (C[0], C[1])  # covariance of the measured value with the other line
     scale = w / (P[0] + 1.0)
     K, P = updated_line(P, start, n, w)
     K_other = (h[0] * scale, h[1] * scale)
@@ -182,12 +183,12 @@ def between_with_scatter(C, K_r, K_b, V):
 def jointly_updated(P, C, starts, n, w, V):
     """Both lines after a plot that may not be the target's: gains (K_rr, K_br, K_rb, K_bb), P (P_r, P_b), and C.
 
-    The plot's range is taken first, then its bearing: K_rb and K_bb are gains for the innovation in bearing less what
-    that in range has explained of it. starts are the least squares (K, P) of both lines.
+    The range of the plot is processed first, then its bearing: K_rb and K_bb are gains for the part of the innovation
+    in bearing that the innovation in range does not explain. starts are the least squares (K, P) of both lines.
     """
     K_rr, K_br, P_r, P_b, C = updated_pair(P[0], P[1], C, starts[0], n, w)
     K_bb, K_rb, P_b, P_r, C = updated_pair(P_b, P_r, transposed(C), starts[1], n, w)
-    # Gains for the two innovations as they are, both at once.
+    # Gains for the two innovations, both processed at once.
     K_r = ((K_rr[0] - K_rb[0] * K_br[0], K_rr[1] - K_rb[1] * K_br[0]), K_rb)
     K_b = ((K_br[0] - K_bb[0] * K_br[0], K_br[1] - K_bb[1] * K_br[0]), K_bb)
     P_r, P_b = with_scatter(P_r, K_r[0], K_r[1], V), with_scatter(P_b, K_b[0], K_b[1], V)
@@ -196,10 +197,10 @@ def jointly_updated(P, C, starts, n, w, V):
 
 @kernel
 def update(tracks, dt, period, sigma, manoeuvre, joint, association):
-    """One scan of all tracks, in place; association (6, CHUNK) as `tracker.associate` leaves it.
+    """Update all tracks with one scan, in place; association (6, CHUNK) is what `tracker.associate` writes.
 
-    Its rows: whether a plot is taken (1 or 0), innovations in range and bearing, and V (rr, rb, bb), in m and rad.
-    joint: V may be other than zero.
+    Its rows: 1 if a plot is taken, else 0; innovations in range and bearing; V (rr, rb, bb), in m and rad. joint: V may
+    differ from zero.
     """
     ar, ab, pr, pb = address(tracks.x[0]), address(tracks.x[1]), address(tracks.P[0]), address(tracks.P[1])
     yr, yb, ac, an = address(tracks.Y[0]), address(tracks.Y[1]), address(tracks.C), address(tracks.plots)
