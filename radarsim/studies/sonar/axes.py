@@ -1,4 +1,4 @@
-"""What the sums of a sonar case are of: the labels of all cases, and of those whose filters are given their plots."""
+"""Labels and exact values of the sums of a sonar case; and those of cases whose filters know their plots."""
 
 from dataclasses import dataclass
 
@@ -15,8 +15,8 @@ class SonarAxes(Axes):
         coordinates: name and unit of each coordinate that the filters work in.
         sizes: (F,) components of each filter's state in one coordinate, 2 or 3.
         exact_ahead: (F, K, C) exact σ of the value extrapolated by one scan, in the row of the scan that it was
-            extrapolated from, in the coordinate's unit; not-a-number where it is not known.
-        exact_nees: (F, K, C) expected eᵀP⁻¹e of a coordinate's whole state, likewise.
+            extrapolated from, in the coordinate's unit; NaN where it is not known.
+        exact_nees: (F, K, C) expected eᵀP⁻¹e of the complete state in a coordinate; NaN likewise.
         scan_period_s: period of the first sonar, s.
         sigma: (C,) nominal standard deviation of a plot in each coordinate, in its unit.
     """
@@ -31,13 +31,13 @@ class SonarAxes(Axes):
 
 @dataclass(frozen=True, kw_only=True)
 class GivenPlotsAxes(SonarAxes):
-    """Of cases whose filters are given the target's plots: smoothing, and manoeuvres.
+    """Labels of cases whose filters know the target's plots: smoothing, and manoeuvres.
 
     Attributes:
         rho: (C,) correlation of the errors of neighbouring plots.
-        sigma_of_plots: (K, C) standard deviation of each plot, infinite where there is never one.
-        conversion_bias: mean error, along the line of sight, of the first plot converted to x and y, m; zero where it
-            is not converted, or without bias.
+        sigma_of_plots: (K, C) standard deviation of each plot, infinite where there never is a plot.
+        conversion_bias: mean error along the line of sight of the first plot converted to x and y, m; zero where it is
+            not converted, or converted without bias.
         polar: (K, C, 3) the target's range, bearing (and depth or elevation) with first and second rates.
     """
 

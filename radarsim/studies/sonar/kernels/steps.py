@@ -101,7 +101,7 @@ def times(P, h):
 
 @inline
 def normal_equations(recent, length, longest, i, origin, half):
-    """Normal equations Y x = b of a polynomial through the last `length` plots of group i: Y (6), b (3), at the present.
+    """Normal equations Y x = b of a polynomial through the last `length` plots of group i, at present: Y (6), b (3).
 
     recent is the address of the recent plots, of which `longest` are kept; they are taken relative to origin. half is
     0.5 for a parabola and 0 for a straight line.

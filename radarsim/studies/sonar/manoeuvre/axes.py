@@ -1,4 +1,4 @@
-"""What the sums of a case with detectors of manoeuvres, filters that respond to them, or uses of a track are of."""
+"""Labels and exact laws of the sums of a case about manoeuvres: detectors, responding filters, uses of a track."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from radarsim.studies.sonar.axes import GivenPlotsAxes
 
 @dataclass(frozen=True, kw_only=True)
 class UsesAxes:
-    """Of what a track is used for, at A moments.
+    """True values of the quantities derived from a track, at A times.
 
     Attributes:
         at: (A,) scans, counted from 0.
@@ -27,13 +27,13 @@ class ManoeuvreAxes(GivenPlotsAxes):
     """Labels and exact laws of D measured detectors, on G groups: each coordinate, then all of them jointly.
 
     Attributes:
-        exact_alarms: (D, G, T, K) probability of an alarm at a test; not-a-number where no law is known.
-        shifts: (D, G, K) mean of the estimated acceleration in units of its σ, likewise.
+        exact_alarms: (D, G, T, K) probability of an alarm at a test; NaN where no law is known.
+        shifts: (D, G, K) mean of the estimated acceleration in units of its σ; NaN likewise.
         thresholds: (G, T) thresholds of each detector.
         independent: whether each detector's tests are independent of one another.
-        phase: (K,) 0 before the manoeuvre, 1 while it lasts, 2 after it.
-        manoeuvre_s: when the manoeuvre begins and ends, s from the first plot; None without one.
-        uses: of what the track is used for; None where that is not asked.
+        phase: (K,) 0 before the manoeuvre, 1 during it, 2 after it.
+        manoeuvre_s: start and end of the manoeuvre, s from the first plot; None without one.
+        uses: the quantities derived from a track; None where the config does not ask for them.
     """
 
     exact_alarms: np.ndarray
