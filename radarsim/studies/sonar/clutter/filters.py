@@ -86,7 +86,7 @@ def poisson_share(mean: float) -> np.ndarray:
 
 
 def field(key: np.ndarray, sector: Sector, given: Conditions) -> Field:
-    """The field of false plots of a sector.
+    """The field of false plots of a sector; key (2,) of its noise.
 
     Cells have the size of the plots' σ at the mean range of the sector, times CELL, and contain fewer false plots than
     MOST_IN_CELL in the mean.
