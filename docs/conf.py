@@ -36,7 +36,8 @@ nitpick_ignore_regex = [
         r"|click|pydantic|markupsafe)\..*",
     ),
     ("py:class", r"Canvas|DataclassInstance"),
-    ("py:class", r"radarsim\.config\.(fields|schema)\..*|(radarsim\.studies\..*\.)?Keys"),  # their keys have a page of their own
+    # Keys have a page of their own.
+    ("py:class", r"radarsim\.config\.(fields|schema)\..*|(radarsim\.studies\..*\.)?Keys"),
     ("py:class", r"radarsim\..*\.(A_co|M|Part|Asked)|Inventory"),  # type variables and names of types
     ("py:class", r"(dict|list)\[.*"),  # a subscript that autodoc takes for a name
 ]
