@@ -115,8 +115,8 @@ LAWS_EXACT = (
         "radarsim/studies/sonar/clutter/exact.py",
         ("(n - age - 1) >= m", "(n - age) >= m", f"{INITIATION}::test_m_of_n_is_the_sum_over_all_patterns"),
         (
-            "gate * (2 * sigma[0] ** 2 + reach",
-            "gate * (sigma[0] ** 2 + reach",
+            "variance_r, variance_b = 2 * given.sigma**2",
+            "variance_r, variance_b = given.sigma**2",
             f"{INITIATION}::test_pairs_of_false_plots_far_from_any_edge",
         ),
     ),
