@@ -99,19 +99,19 @@ def demodulate(physics, edges, samples, x, first, last, sums):
             place, count = j * physics.pulses + edges[i], edges[i + 1] - edges[i]
             time = edges[i] * physics.step + j * physics.offset
             if physics.complex_samples:
-                demodulate_complex(samples, place, count, time, physics.step, centre, x, sums, i)
+                demodulate_complex(samples, place, count, time, physics.step, x, sums, i)
             else:
-                demodulate_real(samples, place, count, time, physics.step, centre, x, sums, i)
+                demodulate_real(samples, place, count, time, physics.step, x, sums, i)
                 if physics.image:
-                    reference_image(count, time, physics.step, centre, x, sums, i)
+                    reference_image(count, time, physics.step, x, sums, i)
 
 
 @summing
-def demodulate_real(samples, place, count, time, step, centre, x, sums, i):
+def demodulate_real(samples, place, count, time, step, x, sums, i):
     """Adds the samples from column `place`, the first at `time`, to Z₀, Z₁, Z₂ of block i."""
     x0, x1, x2, x3, x4, x5 = x[0], x[1], x[2], x[3], x[4], x[5]
     row = samples[0, place : place + count]  # an index that may be negative is not vectorised
-    a = b = p = q = v = w = 0.0
+    centre, a, b, p, q, v, w = sums[CENTRE, i], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for m in range(count):
         t = time + number(m) * step
         s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))
@@ -133,11 +133,11 @@ def demodulate_real(samples, place, count, time, step, centre, x, sums, i):
 
 
 @summing
-def demodulate_complex(samples, place, count, time, step, centre, x, sums, i):
+def demodulate_complex(samples, place, count, time, step, x, sums, i):
     """As `demodulate_real` for complex samples."""
     x0, x1, x2, x3, x4, x5 = x[0], x[1], x[2], x[3], x[4], x[5]
     real, imaginary = samples[0, place : place + count], samples[1, place : place + count]
-    a = b = p = q = v = w = 0.0
+    centre, a, b, p, q, v, w = sums[CENTRE, i], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for m in range(count):
         t = time + number(m) * step
         s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))
@@ -159,10 +159,10 @@ def demodulate_complex(samples, place, count, time, step, centre, x, sums, i):
 
 
 @summing
-def reference_image(count, time, step, centre, x, sums, i):
+def reference_image(count, time, step, x, sums, i):
     """Adds Σ e^{-2jψ_ref} sⁱ to W₀, W₁, W₂ of block i."""
     x0, x1, x2, x3, x4, x5 = 2.0 * x[0], 2.0 * x[1], 2.0 * x[2], 2.0 * x[3], 2.0 * x[4], 2.0 * x[5]
-    a = b = p = q = v = w = 0.0
+    centre, a, b, p, q, v, w = sums[CENTRE, i], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for m in range(count):
         t = time + number(m) * step
         s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))

@@ -43,8 +43,13 @@ def sine_cosine(turns):
 
 
 @inline
-def expanded(c, s, slope, zr, zi, z1r, z1i, z2r, z2i):
-    """Σ u e^{-j(d + Ds)} and its derivatives by d and D, up to the factor −j: real and imaginary part, slope's part."""
+def expanded(c, s, slope, z, z2):
+    """Σ u e^{-j(d + Ds)} and its derivatives by d and D, up to the factor −j: real and imaginary part, slope's part.
+
+    z holds the real and imaginary parts of Z₀ and Z₁, z2 those of Z₂.
+    """
+    zr, zi, z1r, z1i = z
+    z2r, z2i = z2
     zr, zi = zr + slope * (z1i - 0.5 * slope * z2r), zi - slope * (z1r + 0.5 * slope * z2i)
     return c * zr + s * zi, c * zi - s * zr, (c * z1i - s * z1r) - slope * (c * z2r + s * z2i)
 
@@ -64,15 +69,14 @@ def score(work, sums, table, first, blocks, image, amplitude):
         s, c = sine_cosine(b0 + m1 * b1 + m2 * b2 + m3 * b3 + m4 * b4 + m5 * b5)
         D = TURN * (s1 * b1 + s2 * b2 + s3 * b3 + s4 * b4 + s5 * b5)
         D = where_greater(D, one, one, where_greater(full(-1.0), D, full(-1.0), D))
-        re, e, h = expanded(
-            *(c, s, D, get(sums, z), get(sums, z + 1), get(sums, z + 2), get(sums, z + 3)),
-            *(full(table[k + Z2]), full(table[k + Z2 + 1])),
-        )
+        drawn = get(sums, z), get(sums, z + 1), get(sums, z + 2), get(sums, z + 3)
+        re, e, h = expanded(c, s, D, drawn, (full(table[k + Z2]), full(table[k + Z2 + 1])))
         value, coherent = value + re, coherent + re
         if image:
             w = k + W0
             twice = full(table[w]), full(table[w + 1]), full(table[w + 2]), full(table[w + 3])
-            re, e2, h2 = expanded(c * c - s * s, 2.0 * (s * c), 2.0 * D, *twice, full(table[w + 4]), full(table[w + 5]))
+            last = full(table[w + 4]), full(table[w + 5])
+            re, e2, h2 = expanded(c * c - s * s, 2.0 * (s * c), 2.0 * D, twice, last)
             value, coherent = value - 0.5 * level * re, coherent - level * re
             e, h = e - level * e2, h - level * h2
         g0, g1, g2 = g0 + e, g1 + m1 * e + s1 * h, g2 + m2 * e + s2 * h
