@@ -14,10 +14,17 @@ from radarsim.report.claims.paper import described, own_members
 from radarsim.studies import registry
 
 CONFIGS = sorted({claim.config for of in papers() for claim in of.claims})
-MAY_GROW = {"range_doppler": (), "multimodel": ("filters",), "sonar": ("filters",), "discriminator": ("estimators",)}
+MAY_GROW = {
+    "range_doppler": (),
+    "multimodel": ("filters",),
+    "sonar": ("filters",),
+    "discriminator": ("estimators",),
+    "ambiguous_doppler": (),
+}
 # The only keys that may have another value than in the paper's experiment: names that are displayed.
 MAY_DIFFER = {
     "range_doppler": {"radar.name", "radar.band", "filters.name", "scans"},
+    "ambiguous_doppler": {"radar.name", "radar.band", "filters.name"},
     "multimodel": {"sensor.name", "filters.name"},
     "sonar": {"sensor.name", "filters.name", "detectors.name"},
     "discriminator": {"estimators.name"},

@@ -1,6 +1,7 @@
 """Folded Doppler velocity: filters that unfold it by hypotheses, with memory and without (the wish that ends P1)."""
 
 from radarsim.studies.folder import StudyFolder
+from radarsim.studies.interface import Paper
 
 STUDY = StudyFolder(
     package=__name__,
@@ -12,5 +13,6 @@ STUDY = StudyFolder(
         "doppler: folded": "the same, unfolded by up to `hypotheses` sequences of folds; 1: the nearest fold",
         "merge: each_scan": "the same, hypotheses merged into one each scan (GPB1): no memory",
     },
+    paper=Paper("Gorshkov & Zavizhenets 2017, conclusion", page="ambiguous_doppler"),
     offers=("inputs", "recorded", "warnings"),
 )

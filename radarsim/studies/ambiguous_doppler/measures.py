@@ -1,0 +1,53 @@
+"""What is measured for the claims on folded velocity, from the tables."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from radarsim.report import claims
+from radarsim.report.claims import Series, ratio
+from radarsim.report.statistics import Estimate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+AT = 8  # scan at which gains are compared: the folds of the paper's centimetre radars are long decided
+
+
+class Evidence(claims.Evidence):
+    """Finds the shipped experiments' cases by their names."""
+
+    def folds(self, key: str, name: str) -> Series:
+        """Share of realisations in which a filter has all folds right, by scan."""
+        return self._of(self.tables["folds"], key, name, ("right", "right_lo", "right_hi"))
+
+    def above_oracle(self, key: str, name: str) -> Series:
+        """By how much σ of the velocity is above that of unfolded velocity, %, by scan."""
+        gains = self.tables["gains"]
+        columns = ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")
+        return self._of(gains[gains["component"] == "Vr"], key, name, columns)
+
+    def _of(self, table: "pd.DataFrame", key: str, name: str, columns: tuple[str, ...]) -> Series:
+        rows = table[(table["case"] == self.case(key).name) & (table["filter"] == name)]
+        if not len(rows):
+            raise claims.Missing(key)
+        return Series(*(rows[column].to_numpy() for column in ("k", "t_s", *columns)))
+
+
+def gain(key: str, name: str) -> Callable[[Evidence], Estimate]:
+    """Gain of a filter in σ of the velocity against range alone at scan 8, %."""
+    return lambda seen: seen.gain(key, name, "Vr").at(AT)
+
+
+def right_at_the_end(key: str, name: str) -> Callable[[Evidence], Estimate]:
+    """Share of realisations in which a filter has all folds right at the last scan."""
+    return lambda seen: seen.folds(key, name).last()
+
+
+def above_at_the_end(key: str, name: str) -> Callable[[Evidence], Estimate]:
+    """σ of the velocity above that of unfolded velocity at the last scan, %."""
+    return lambda seen: seen.above_oracle(key, name).last()
+
+
+def worst_to_worst(key: str, name: str, single: str) -> Callable[[Evidence], Estimate]:
+    """The largest σ of range over the scans, of a combination over that of a single order."""
+    return lambda seen: ratio(seen.curve(key, name, "r").largest(), seen.curve(key, single, "r").largest())
