@@ -30,7 +30,8 @@ class Evidence(claims.Evidence):
         rows = table[(table["case"] == self.case(key).name) & (table["filter"] == name)]
         if not len(rows):
             raise claims.Missing(key)
-        return Series(*(rows[column].to_numpy() for column in ("k", "t_s", *columns)))
+        k, t, value, lo, hi = (rows[column].to_numpy() for column in ("k", "t_s", *columns))
+        return Series(k, t, value, lo, hi)
 
 
 def gain(key: str, name: str) -> Callable[[Evidence], Estimate]:
