@@ -1,0 +1,61 @@
+"""`--decide`: as many realisations as decide, no more; what is left, and what it would take. Disagreement: exit 4."""
+
+import math
+
+import pytest
+from click.testing import CliRunner
+
+import radarsim
+from radarsim.app import decide
+from radarsim.cli import main
+from radarsim.report import claims
+from radarsim.report.claims.rule import CONFIRMED, UNDECIDED
+
+
+def test_what_is_known_exactly_is_decided_at_the_first_look(tmp_path):
+    result = radarsim.run("range_doppler", realisations=8000, decide=True, out=tmp_path, figures=False)
+    assert {case.count for case in result.cases} == {2000}
+    assert result.unmet == []
+    assert result.facts["stop"] == "done"
+    assert result.facts["command"] == "radarsim run range_doppler -n 2000"
+
+
+def test_what_is_left_says_what_it_would_take():
+    row = {"paper": "p", "claim": "P9.1", "class": UNDECIDED, "extension": False, "n": 4000, "needed": 12345.0}
+    assert decide.undecided([row]) == ["P9.1 not yet decided at 4,000 realisations; about 12,345 would"]
+    assert "no number would" in decide.undecided([row | {"needed": math.nan}])[0]
+    assert decide.undecided([row | {"class": CONFIRMED}]) == []
+    assert decide.undecided([row | {"extension": True}]) == []
+
+
+def test_undecided_at_the_most_is_exit_code_3(tmp_path):
+    """Eight bursts leave P4.4 open; a look at the most is made though it is no 2000·2^m."""
+    command = ["run", "discriminator_paper", "-n", "60", "--decide", "--out", str(tmp_path), "--no-figures", "-q"]
+    done = CliRunner().invoke(main, command)
+    assert done.exit_code == 3
+    assert "P4.4 not yet decided at 60 realisations; " in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["rls2", "--decide"], "no claim is judged by this config; of this study: range_doppler"),
+        (["range_doppler", "--decide", "--precision", "1"], "--decide goes with neither --shard nor --precision"),
+        (["range_doppler", "--decide", "--shard", "1/2"], "--decide goes with neither --shard nor --precision"),
+    ],
+)
+def test_bad_input(words, said, tmp_path):
+    done = CliRunner().invoke(main, ["run", *words, "--out", str(tmp_path)])
+    assert done.exit_code == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_an_exact_value_that_simulation_denies_is_exit_code_4_with_all_written(tmp_path, monkeypatch):
+    monkeypatch.setattr(claims, "errors", lambda table: ["P1.1: exact 1, simulated 2"])
+    done = CliRunner().invoke(main, ["run", "rls1", "rls2", "-n", "500", "--out", str(tmp_path), "--no-figures", "-q"])
+    assert done.exit_code == 4
+    assert done.stderr == "P1.1: exact 1, simulated 2\n"
+    for stem in ("rls1", "rls2"):
+        assert (tmp_path / stem / "claims.csv").is_file()
+        assert (tmp_path / stem / "report.html").is_file()

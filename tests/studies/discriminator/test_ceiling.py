@@ -1,0 +1,29 @@
+"""What an efficient estimator would score, against a Gaussian drawn another way."""
+
+import math
+
+import numpy as np
+import pytest
+
+from radarsim.studies.discriminator import ceiling, exact
+from radarsim.studies.discriminator.world import Burst, balanced_inverse
+
+BURST = Burst(10e9, 1e-5, 1e-6, 1e-6, 3000, 1.0, 2.25)
+SIGMA = (6.1, 67.5, 6.1e3, 183.38e3, 2.426e6)
+SLACK = 5.85 * math.sqrt(2 * 0.02 / ceiling.DRAWS)
+
+
+def test_of_one_window():
+    whole = exact.fisher_sums(BURST, 5, [3000])[0] + np.diag(np.array(SIGMA) ** -2.0)
+    covariance = balanced_inverse(whole)
+    scale = np.sqrt(np.diag(covariance))
+    root = np.linalg.cholesky(covariance / np.outer(scale, scale))
+    drawn = np.random.default_rng(7).standard_normal((ceiling.DRAWS, 5)) @ root.T
+    twin = (np.abs(drawn) < 3).all(axis=1).mean()
+    assert ceiling.always_within(BURST, (3000,), SIGMA) == pytest.approx(twin, abs=SLACK)
+
+
+def test_windows_only_take_away():
+    one, two = (ceiling.always_within(BURST, windows, SIGMA) for windows in ((3000,), (300, 3000)))
+    assert two < one < math.erf(3 / math.sqrt(2))
+    assert ceiling.always_within(BURST, (300, 3000), SIGMA, 40.0) == 1.0
