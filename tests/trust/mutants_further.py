@@ -13,8 +13,11 @@ DETECTOR, INITIATION = "studies/sonar/manoeuvre/test_exact.py", "studies/sonar/c
 
 MANOEUVRES = (
     *mutants(
+        "radarsim/studies/sonar/kernels/steps.py",
+        ("h1, h2 = zero - age, half * age * age", "h1, h2 = zero - age, age * age", ANSWERS),
+    ),
+    *mutants(
         "radarsim/studies/sonar/kernels/detector.py",
-        ("h1, h2 = zero - age, 0.5 * age * age", "h1, h2 = zero - age, age * age", ANSWERS),
         ("first = alarms + alarm, first + new", "first = alarms + alarm, first + event", ALARMS),
         (
             "where_greater(quiet, patience - 0.5, zero, mode)",
