@@ -242,3 +242,14 @@ def test_options_that_do_not_go_together(words):
     ended = command("rls2", "radar.sigma_range_m", *words)
     assert ended.exit_code == 2
     assert "Error" in ended.stderr
+
+
+def test_rates_of_other_studies_are_read_by_the_names_of_their_tables():
+    """Folds unfolded rightly: sampled with an interval that holds the config's own rate when that is the target."""
+    quantity = Quantity("right", "memory", at_k=4)
+    given = {"between": (5, 45), "realisations": 300}
+    first = solve("ambiguous_rls2", "radar.sigma_velocity_mps", quantity, 85.0, **given)
+    assert not first.exact
+    assert first.lo < first.value < first.hi
+    assert first.slope < 0
+    assert first.attained == pytest.approx(85.0, abs=1.0)

@@ -60,7 +60,7 @@ def chart(cases: Sequence[Case], references: Sequence[Case]) -> Chart:
     known = [place for place in known if all(place.of != one.of for one in own)]
     drawn = [over_time(own or known), in_the_long_run(own, known), over_groups(own, known)]
     without = "no place on the chart without a filter of the range and one of range and velocity"
-    sentences = [f"{case.name}: {without}" if place is None else sentence(place) for case, place in found]
+    sentences = [f"{case.name}: {without}" if place is None else sentence(place) + aside(case) for case, place in found]
     sentences = sentences or [sentence(place) for place in known]
     return Chart({figure.name: figure for figure in drawn}, table([*own, *known]), tuple(sentences), page(own, known))
 
@@ -101,6 +101,14 @@ def sentence(place: Place) -> str:
         f"{place.name}: c = {c} ({times}): Doppler {' and '.join(verbs)} in the long run; {acceleration}. "
         f"At its last scan, {place.t_s[-1]:g} s: {', '.join(significant_digits(float(g), '.3g') for g in last)} %."
     )
+
+
+def aside(case: Case) -> str:
+    """What of a case the chart leaves out of account, as a further sentence; nothing where there is nothing."""
+    left = [] if case.spec.radar.as_the_papers else ["missed plots and biases"]
+    left += [] if case.spec.target.kind == "polynomial" else ["the target's manoeuvre"]
+    left += [] if all(one.process_noise == "random_jerk" for one in case.spec.filters) else ["another process noise"]
+    return f" Left out of account in the long run: {', '.join(left)}." if left else ""
 
 
 def table(places: Sequence[Place]) -> "pd.DataFrame":

@@ -141,6 +141,15 @@ def test_what_has_no_place_on_it(tmp_path):
     assert "no place on the chart" in alone.sentences[0]
 
 
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [("radar.detection_probability=0.9", "missed plots and biases"), ("target=turn", "the target's manoeuvre")],
+)
+def test_what_the_chart_leaves_out_of_account_is_named(tmp_path, setting, words):
+    (sentence,) = chart(["rls2"], tmp_path, overrides=[setting], formats=[]).sentences
+    assert sentence.endswith(f"Left out of account in the long run: {words}.")
+
+
 def test_the_table_on_the_wall_is_the_closed_form():
     text = (Path(__file__).parents[3] / "docs" / "chart.md").read_text(encoding="utf-8").replace("−", "-")
     rows = re.findall(r"^\| ([\d.]+) \| ([-\d.]+) \| ([-\d.]+) \| ([-\d.]+) \|$", text, re.MULTILINE)
