@@ -24,6 +24,7 @@ from radarsim.config.fields import (
     of_each,
     unique_names,
 )
+from radarsim.physics.bands import Band
 
 MOST_SCANS = 10_000  # plots and estimates of eight realisations are held for the whole run
 MOST_HYPOTHESES = 100_000
@@ -46,8 +47,8 @@ class Radar(Model):
     """A coherent surveillance radar: accuracies of one plot, period of its scans, pulse repetition rates."""
 
     name: Annotated[Name | None, Display()] = Field(None, description="display name")
-    band: Annotated[Literal["metre", "decimetre", "centimetre"] | None, Display()] = Field(
-        None, description="wave band, for display"
+    band: Annotated[Band | None, Display()] = Field(
+        None, description="wave band, for display: by its wavelength, or by its letter (IEEE Std 521)"
     )
     wavelength_m: Positive = Field(description="wavelength, m: the span of velocity is half of it times the rate")
     sigma_range_m: Positive = Field(description="standard deviation of a measured range, m")

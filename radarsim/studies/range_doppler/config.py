@@ -30,6 +30,7 @@ from radarsim.config.fields import (
     readable,
     unique_names,
 )
+from radarsim.physics.bands import Band, outside_band
 from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
 
 MOST_SCANS = 100_000
@@ -39,28 +40,6 @@ NEAREST_M = 100.0  # a target that flies over the radar has no radial motion tha
 FASTEST_MPS = 12_000.0  # escape from the Earth
 HARDEST_MPS2 = 1000.0  # about 100 g, more than any missile's
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
-
-
-LIGHT_MPS = 299_792_458.0
-LETTERS_HZ = {  # IEEE Std 521-2019, radar-frequency letter bands: from, to
-    "HF": (3e6, 30e6),
-    "VHF": (30e6, 300e6),
-    "UHF": (300e6, 1e9),
-    "L": (1e9, 2e9),
-    "S": (2e9, 4e9),
-    "C": (4e9, 8e9),
-    "X": (8e9, 12e9),
-    "Ku": (12e9, 18e9),
-    "K": (18e9, 27e9),
-    "Ka": (27e9, 40e9),
-    "V": (40e9, 75e9),
-    "W": (75e9, 110e9),
-    "mm": (110e9, 300e9),
-}
-EDGE = 0.02  # by how much a rounded wavelength may lie beyond the edge of its band
-Band = Literal[
-    "metre", "decimetre", "centimetre", "HF", "VHF", "UHF", "L", "S", "C", "X", "Ku", "K", "Ka", "V", "W", "mm"
-]
 
 
 class Radar(Model):
@@ -91,11 +70,9 @@ class Radar(Model):
 
     @cross_check
     def _in_its_band(self) -> Iterator[At]:
-        if self.band is not None and self.band in LETTERS_HZ:
-            longest, shortest = (LIGHT_MPS / f for f in LETTERS_HZ[self.band])
-            if not shortest * (1 - EDGE) <= self.wavelength_m <= longest * (1 + EDGE):
-                limits = f"{short(float(f'{shortest:.3g}'))} to {short(float(f'{longest:.3g}'))} m"
-                yield at("band", f"{self.band} is {limits}, wavelength_m is {short(self.wavelength_m)}")
+        limits = outside_band(self.band, self.wavelength_m)
+        if limits is not None:
+            yield at("band", f"{self.band} is {' to '.join(map(short, limits))} m, not {short(self.wavelength_m)}")
 
     @property
     def as_the_papers(self) -> bool:

@@ -96,8 +96,6 @@ def _gain_sentence(
     several = rows["filter"].nunique() > 1
     base = _baseline(results)
     if len(last) > 1:
-        early, late = last["t_s"].min(), last["t_s"].max()
-        when = f"at {late:g} s" if early == late else f"at the last scan (after {early:g} to {late:g} s)"
         low, high = (last.iloc[int(pick(last["gain_percent"].to_numpy()))] for pick in (np.argmin, np.argmax))
         ends = " to ".join(f"{_gain(row)} ({_who(row, labels, several)})" for row in (low, high))
         loss = _loss(every, low, labels)

@@ -337,7 +337,7 @@ BEYOND = [
     ({"radar.detection_probability": 1.1}, "radar.detection_probability: must be <= 1, got 1.1"),
     ({"radar.bias_range_m": "x"}, f"radar.bias_range_m: {NUMBER}, got 'x'"),
     ({"radar.sigma_bias_velocity_mps": -1}, "radar.sigma_bias_velocity_mps: must be >= 0, got -1"),
-    ({"radar.band": "X"}, "radar.band: X is 0.025 to 0.0375 m, wavelength_m is 0.15, got 'X'"),
+    ({"radar.band": "X"}, "radar.band: X is 0.025 to 0.0375 m, not 0.15, got 'X'"),
     ({"target": FLY_BY | {"distance_m": 10}}, "target.distance_m: must be >= 100, got 10"),
     ({"target": FLY_BY | {"start_range_m": 1e4}}, "target.start_range_m: must be >= distance_m, 15000, got 10000"),
     ({"target": FLY_BY | {"speed_mps": 2e4}}, "target.speed_mps: must be <= 12000, got 20000"),

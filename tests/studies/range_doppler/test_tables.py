@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarsim.report import statistics, tables
+from radarsim.report import panels, statistics, tables
 from radarsim.report.drawing import Line, Style
 from radarsim.studies.range_doppler import figures as range_doppler_figures
 from radarsim.studies.range_doppler import tables as range_doppler
@@ -275,3 +275,86 @@ def test_answer_of_a_single_filter(expected_radar):
     results = [expected_radar("rls2", filters=[one])]
     (sentence,) = range_doppler_words.answer(results, made_of(results))
     assert "only: σ of the range at 140 s is 189.3 m" in sentence
+
+
+# ---- a world less tidy ----------------------------------------------------------------------------------------------
+
+
+def told_of(results):
+    return range_doppler_words.answer(results, made_of(results))
+
+
+def test_answer_compares_at_a_common_time(expected_radar):
+    """Twenty scans each: the slow radar ends later."""
+    results = [
+        expected_radar("rls2", name=f"rls2 radar.scan_period_s={dt}", radar={"scan_period_s": dt}, scans=20)
+        for dt in (4, 6, 12)
+    ]
+    made, told = made_of(results), told_of(results)[0]
+    rows = made["gains"][(made["gains"]["component"] == "r") & (made["gains"]["t_s"] == 72)]
+    assert "at 72 s, the last time that all have in common, σ is " in told  # 76 s is the end of the shortest
+    for gain in (rows["gain_percent"].min(), rows["gain_percent"].max()):
+        assert f"{gain:.1f} % [" in told
+
+
+def test_answer_names_the_best_variance_on_a_manoeuvring_target(expected_case, radar_config):
+    from radarsim.app.configs import load
+
+    values = [1e-4, 1e-2, 1.0, 100.0]
+    source = {**radar_config("rls2", target=BRAKING), "sweep": {"manoeuvre_variance": values}}
+    results = [expected_case(case) for case in load(source).cases]
+    worst = np.array([result.axes.exact_sigma[:, 2:, 0].max(axis=1) for result in results])
+    told = next(one for one in told_of(results) if one.startswith("Best manoeuvre variance"))
+    for f, name in enumerate(("r", "r+Vr")):
+        best = values[int(worst[:, f].argmin())]
+        text = panels.number(best, powers=True)
+        assert f"{name} {text} (σ at worst {worst[:, f].min():.4g} m, at " in told
+    assert not any("further cases break the model" in one for one in told_of(results))
+
+
+def test_answer_says_that_velocities_are_not_folded(expected_radar):
+    plain, rated = expected_radar("rls2"), expected_radar("rls2", radar={"repetition_rate_hz": 1000})
+    assert not any("unambiguous" in one for one in told_of([plain]))
+    (said,) = [one for one in told_of([rated]) if "unambiguous" in one]
+    assert "a span of 75 m/s, which the target's 310 m/s exceed" in said
+    fast = expected_radar("rls2", radar={"repetition_rate_hz": 1e5})
+    assert "a span of 7500 m/s)" in told_of([fast])[-1]
+
+
+def test_answer_gives_the_variance_that_was_looked_for(expected_radar):
+    filters = [
+        {"name": "r", "observes": ["range"], "manoeuvre_variance": {"minimise": "sigma_r", "over": over}}
+        for over in ("worst",)
+    ]
+    turning = expected_radar("rls2", target=BRAKING, filters=filters)
+    found = float(turning.axes.manoeuvre_variance[0])
+    said = told_of([turning])[-1]
+    assert f"r {found:g} (sigma_r is least at its worst from scan 3 on)" in said
+    calm = expected_radar("rls2", filters=filters)
+    assert "there is no best between" in told_of([calm])[-1]
+
+
+def test_new_keys_are_outside_the_papers_experiment(expected_radar):
+    from radarsim.studies.range_doppler.measures import Evidence
+
+    changes = (
+        {"radar": {"bias_velocity_mps": 1}},
+        {"radar": {"sigma_bias_range_m": 1}},
+        {"target": {"kind": "polynomial", "coefficients": [100e3, -250, 4], "sigma_coefficients": [1]}},
+    )
+    filters = [
+        {"name": "r", "observes": ["range"], "manoeuvre_variance": 1e-3, "process_noise": "white_jerk"},
+        {"name": "r+Vr", "observes": ["range", "velocity"], "manoeuvre_variance": 1e-3},
+    ]
+    result = expected_radar("rls2")
+    assert (Evidence._radar(result), Evidence._variance(result)) == (2, 1e-3)
+    assert np.isnan(Evidence._variance(expected_radar("rls2", filters=filters)))
+    from radarsim.app.configs import load
+    from radarsim.engine.results import CaseResult
+    from radarsim.studies.range_doppler import study
+    from tests.report.conftest import config
+
+    for change in changes:
+        case = load(config("rls2", **change)).cases[0]
+        made = CaseResult("rls2", case.study, case.spec, (), 10, result.sums, study.prepare(case).axes)
+        assert Evidence._radar(made) is None
