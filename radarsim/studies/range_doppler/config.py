@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validator
 
 from radarsim.config.faults import short
 from radarsim.config.fields import (
@@ -306,6 +306,12 @@ class Keys(Study):
     duration_s: Annotated[Positive | None, Design(), Added()] = Field(
         None, description="time from the first scan to the last, s, in place of scans: to the last scan within it"
     )
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        schema = super().__get_pydantic_json_schema__(core_schema, handler)
+        length = {"oneOf": [{"required": ["scans"]}, {"required": ["duration_s"]}]}
+        return schema | {"allOf": [*schema.get("allOf", []), length]}
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
