@@ -38,7 +38,7 @@ ABOUT = {
     "kernels": "compiled, shared",
     "physics": "motion, targets, frames",
 }
-WIDTH, ROOM, HEIGHT, GAP, MARGIN = 980, 216, 44, 62, 12  # px
+WIDTH, ROOM, HEIGHT, GAP, MARGIN = 1220, 216, 44, 62, 12  # px
 
 
 def room_of(module: str) -> str | None:
