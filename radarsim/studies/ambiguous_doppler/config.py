@@ -30,6 +30,7 @@ MOST_SCANS = 10_000  # plots and estimates of eight realisations are held for th
 MOST_HYPOTHESES = 100_000
 MOST_RATES = 16
 PROPORTION = 1e6  # largest ratio of what the prior leaves open to what a plot tells: beyond, rounding shows
+MOST_FOLDS = 1e4  # spans in a standard deviation of the prior: the first scan has so many folds to look at
 DISTINCT = 1e-9  # relative difference from which two spans are two
 UNFOLDING = {"hypotheses": 300, "prune_below": 1e-6, "merge": "never", "estimate": "mean"}  # and its defaults
 
@@ -272,9 +273,11 @@ class Keys(Study):
     def _prior_in_proportion(self) -> Iterator[At]:
         """Refuse a prior beside which a plot's accuracy drowns in rounding, or a start that has too many folds."""
         radar, prior = self.radar, self.prior
-        if prior.sigma_velocity_mps > PROPORTION * min(radar.sigma_velocity_mps, min(radar.spans_mps)):
-            few = f"{PROPORTION:g} times the velocity's accuracy and the span"
-            yield at("prior.sigma_velocity_mps", f"must be at most {few}")
+        if prior.sigma_velocity_mps > PROPORTION * radar.sigma_velocity_mps:
+            yield at("prior.sigma_velocity_mps", f"must be at most {PROPORTION:g} times the velocity's accuracy")
+        elif prior.sigma_velocity_mps > MOST_FOLDS * min(radar.spans_mps):
+            least = f"{prior.sigma_velocity_mps / MOST_FOLDS:g} m/s, prior.sigma_velocity_mps over {MOST_FOLDS:g}"
+            yield at("radar.repetition_rate_hz", f"its span must be at least {least}")
 
     @cross_check
     def _range_resolved(self) -> Iterator[At]:

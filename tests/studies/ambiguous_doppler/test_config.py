@@ -30,6 +30,7 @@ def refused(stem, **keys):
         ("filters.5.orders", "[1, 2]", "filters.5.manoeuvre_variance: must be a list of 2, one for each order"),
         ("filters.5.combine", "likelihood", "filters.5.combine: has no effect on one order; leave it out"),
         ("filters.5.stay_probability", "0.9", "filters.5.stay_probability: has no effect without combine: likelihood"),
+        ("radar.repetition_rate_hz", "1", "radar.repetition_rate_hz: its span must be at least 0.03 m/s"),
         ("radar.repetition_rate_hz", "0", "radar.repetition_rate_hz: must be > 0, got 0"),
         ("radar.repetition_rate_hz", "[1000, 1200, 1000]", "radar.repetition_rate_hz: must differ from rate to rate: "),
         ("radar.repetition_rate_hz", "[]", "radar.repetition_rate_hz: must hold at least 1"),
