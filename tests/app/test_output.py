@@ -17,7 +17,7 @@ from radarsim.report import files, html, provenance
 TABLES = {"curves.csv", "gains.csv", "steady.csv", "believed.csv", "consistency.csv", "radar.csv"}
 TABLES |= {"claims.csv"}
 FIGURES = {f"figures/{k}_{c}.{f}" for k in ("sigma", "gain") for c in ("r", "Vr", "ar") for f in ("svg", "png")}
-FIGURES |= {"figures/consistency.svg", "figures/consistency.png"}
+FIGURES |= {f"figures/{name}.{kind}" for name in ("consistency", "claims") for kind in ("svg", "png")}
 RUN = {"stop": "done", "threads": 2, "seconds": 1.5, "warnings": ["watch out"], "identities": {"rls2": "ab"}}
 
 
@@ -125,11 +125,11 @@ def test_page_is_whole_and_leads_nowhere(written):
     page = Page(text)
     assert all(address.startswith("#") or address == "data:," for address in page.addresses)
     assert "http://" not in re.sub(r'xmlns(:\w+)?="[^"]*"', "", text)
-    assert page.tags.count("script") == 7 + 1  # the numbers of each figure, and the page's own
+    assert page.tags.count("script") == 8 + 1  # the numbers of each figure, and the page's own
     assert "Content-Security-Policy" in text
     ids = re.findall(r'\bid="([^"]+)"', text)
     assert len(ids) == len(set(ids))
-    assert text.count('class="chart"') == 8  # two panels in the last
+    assert text.count('class="chart"') == 9  # two panels in that of consistency
     assert str(escape(written.answer[0])).replace(" %", "\u00a0%") in text
     assert "C_θ" in text[text.index('id="asked"') : text.index('id="figures"')]
     assert "(1 rows)" not in text

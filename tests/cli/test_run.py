@@ -230,7 +230,7 @@ def test_config_outside_a_checkout_runs_by_path(tmp_path):
 
 def test_claims_of_a_config_not_yet_run_are_listed_as_such(tmp_path):
     result = radarsim("claims", "range_doppler", "--out", tmp_path)
-    assert "25 not run" in result.stdout
+    assert "32 not run" in result.stdout
     radarsim("run", "rls2", "-n", 3000, "--no-figures", "--out", tmp_path)
     assert "P1.18" in radarsim("claims", "rls2", "--out", tmp_path).stdout
 
