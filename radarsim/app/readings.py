@@ -87,6 +87,7 @@ def asked(names: Sequence[str] = (), only: Sequence[str] = ()) -> list[Asked]:
     every = papers()
     owner = {claim.id: key for key, paper in every.items() for claim in paper.claims.claims}
     faults = [_unknown(name, every, owner) for name in names if name not in every and name not in owner]
+    faults += [fault for paper in every.values() for fault in _closed(paper, names)]
     if faults:
         raise ConfigError(*faults)
     kept = _only(
@@ -95,10 +96,25 @@ def asked(names: Sequence[str] = (), only: Sequence[str] = ()) -> list[Asked]:
     found = []
     for key, paper in every.items():
         whole = not names or key in names
-        claims = [one for one in paper.claims.claims if (whole or one.id in names) and not one.extension]
+        claims = [one for one in paper.claims.claims if (whole or one.id in names) and _open(paper, one)]
         if claims:
             found.append(Asked(paper, claims, whole, kept))
     return found
+
+
+def _closed(paper: Paper, names: Sequence[str]) -> list[str]:
+    """Faults of claims that are asked for by name, and on which nothing bears that the paper leaves open."""
+    kept = [one.id for one in paper.claims.claims if _open(paper, one)]
+    return [
+        f"readings: {one.id} hangs on nothing that its paper leaves open; claims that do: {', '.join(kept)}"
+        for one in paper.claims.claims
+        if one.id in names and one.id not in kept
+    ]
+
+
+def _open(paper: Paper, claim: Claim) -> bool:
+    """Whether the paper leaves anything open on which a claim of its own may hang."""
+    return not claim.extension and any(choice.bears_on(claim.id) for choice in paper.readings.choices)
 
 
 def _unknown(name: str, every: Mapping[str, Paper], owner: Mapping[str, str]) -> str:
@@ -168,8 +184,8 @@ class Plan:
         self._impossible: dict[tuple[str, Reading], str] = {}
         self._seen: dict[tuple[str, ...], Seen] = {}
         for claim in wanted.claims:
-            if not self._paper.readings.exact(claim):
-                for reading in wanted.readings(claim):
+            for reading in wanted.readings(claim):
+                if not self._paper.readings.exact(claim, reading):
                     self._add(claim, reading)
 
     def _add(self, claim: Claim, reading: Reading) -> None:
@@ -240,7 +256,7 @@ class Plan:
         why = self._impossible.get((claim.id, reading))
         if why is None:
             try:
-                seen = None if of.exact(claim) else self._seen[self._key[claim.id, reading]]
+                seen = None if of.exact(claim, reading) else self._seen[self._key[claim.id, reading]]
                 return under(of, claim, reading, of.evidence(claim, reading, seen, self._paper.claims))
             except Unreadable as error:
                 why = str(error)

@@ -48,7 +48,7 @@ def under(of: PaperReadings, claim: Claim, reading: Reading, evidence: Evidence)
     """Judge a claim by the evidence of a reading."""
     name, kind = of.name(reading), of.kind(reading)
     try:
-        parts = tuple((part, _judged(part, evidence, of.exact(claim))) for part in of.parts(claim))
+        parts = tuple((part, _judged(part, evidence, of.exact(claim, reading))) for part in of.parts(claim, reading))
     except Missing as missing:
         return Under(claim, reading, name, kind, why=_why(missing))
     outcome = rule.claim([judged for _, judged in parts], **claim.how)

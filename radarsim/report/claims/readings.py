@@ -131,7 +131,7 @@ class PaperReadings(ABC):
         return [choice for choice in self.choices if reading[choice.key] != choice.default]
 
     # ---- a claim under a reading -----------------------------------------------------------------------------------
-    def parts(self, claim: Claim) -> Sequence[Part]:
+    def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
         """The parts of a claim that a reading is asked for. Default: all."""
         return claim.parts
 
@@ -150,8 +150,8 @@ class PaperReadings(ABC):
         assert seen is not None  # a paper whose values are exact gives evidence of its own
         return of.evidence(seen.results, seen.tables, seen.places)
 
-    def exact(self, claim: Claim) -> bool:
-        """Whether the evidence of a claim is exact, so that nothing is run. Default: no."""
+    def exact(self, claim: Claim, reading: Reading) -> bool:
+        """Whether the evidence of a claim is exact under a reading, so that nothing is run. Default: no."""
         return False
 
     def search(self) -> "Search | None":

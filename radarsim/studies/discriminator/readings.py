@@ -160,7 +160,7 @@ class Readings(PaperReadings):
     choices = CHOICES
     realisations = 500
 
-    def exact(self, claim: Claim) -> bool:
+    def exact(self, claim: Claim, reading: Reading) -> bool:
         return claim.id in EXACT
 
     def of_claim(self, claim: str) -> list[Reading]:
@@ -174,7 +174,7 @@ class Readings(PaperReadings):
         ]
         return list(dict.fromkeys([*self.combined(own), *singly]))
 
-    def parts(self, claim: Claim) -> Sequence[Part]:
+    def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
         """Of parts that stand there in both shipped readings, those of one: the reading takes its place."""
         of_both = [part for part in claim.parts if part.cases[0] in measures.READINGS]
         return [part for part in claim.parts if part not in of_both or part.cases[0] == COMPUTED]

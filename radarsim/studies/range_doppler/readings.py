@@ -136,7 +136,7 @@ class Readings(PaperReadings):
     paper = "P1"
     choices = CHOICES
 
-    def exact(self, claim: Claim) -> bool:
+    def exact(self, claim: Claim, reading: Reading) -> bool:
         return True
 
     def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> "ExactEvidence":

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import CaseResult
     from radarsim.report.claims import PaperClaims
+    from radarsim.report.claims.readings import PaperReadings
     from radarsim.report.drawing import Figure
     from radarsim.studies.sonar.clutter.study import Plan as ClutterPlan
     from radarsim.studies.sonar.config import Keys
@@ -102,6 +103,11 @@ class Sonar(Study):
         claims = [claim for part in parts().values() for claim in part.claims()]
         claims.sort(key=lambda claim: int(claim.id.partition(".")[2]))
         return PaperClaims(claims, Evidence, paper="Butyrskiy", page="sonar", may_grow=("filters",))
+
+    def readings(self) -> "PaperReadings":
+        from radarsim.studies.sonar.manoeuvre.readings import Readings
+
+        return Readings()
 
     def recorded(self) -> "Recorded":
         return Recorded()
