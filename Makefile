@@ -8,7 +8,7 @@ SMOKE := $(VENV)/smoke
 # Drawing takes twice as long as all the rest: `make smoke SMOKE_FLAGS=` draws too.
 SMOKE_FLAGS ?= --no-figures
 
-.PHONY: run test slow machines mutants lint smoke reproduce-figures claims-page bench schema known docs docs-numbers docs-examples docs-house clean
+.PHONY: run test slow machines mutants lint smoke reproduce-figures claims-page readings-pages bench schema known docs docs-numbers docs-examples docs-house clean
 
 run: $(VENV)/installed
 	$(RADARSIM) run configs/rls2.yaml
@@ -43,6 +43,11 @@ smoke: $(VENV)/installed
 # All the papers at their full size; what was finished before is taken from results/.blocks.
 reproduce-figures: $(VENV)/installed
 	$(BIN)/python -m radarsim.cli.reproduce results
+
+# docs/readings_p1.md …, every claim under every reading: from stored blocks where they are there, else run.
+readings-pages: $(VENV)/installed
+	for p in 1 2 3 4; do $(RADARSIM) readings P$$p --out results --markdown > docs/readings_p$$p.md.new \
+	&& mv docs/readings_p$$p.md.new docs/readings_p$$p.md || exit 1; done
 
 # docs/claims.md, from what reproduce-figures left.
 claims-page: $(VENV)/installed

@@ -225,8 +225,9 @@ class Plan:
                     stop.raise_if_received()
                 raise
             done += len(pairs) * self._n
+        contradicting = frozenset(choice.key for choice in self._paper.readings.choices if choice.contradicts)
         return [
-            Over(claim, tuple(self._under(claim, one) for one in self._wanted.readings(claim)))
+            Over(claim, tuple(self._under(claim, one) for one in self._wanted.readings(claim)), contradicting)
             for claim in self._wanted.claims
         ]
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from radarsim.report.claims import rule
@@ -82,12 +82,26 @@ class Over:
 
     claim: Claim
     under: tuple[Under, ...]
+    contradicting: frozenset[str] = frozenset()  # the choices of which the print has several alternatives
 
     @property
     def outcome(self) -> Outcome | None:
         """What the rule says of it; None where the default reading was not judged."""
         own = self.under[0].outcome
-        return own and rule.over_readings(own, [one.as_rule() for one in self.under])
+        if own is None:
+            return None
+        found = rule.over_readings(own, [one.as_rule() for one in self.under])
+        printed_twice = any(part.against_print for part in self.claim.parts)
+        torn = printed_twice and self.contradicting.intersection(found.depends_on)
+        torn = torn or (self.claim.joint and self._each_somewhere())
+        return replace(found, kind=rule.CONTRADICTORY) if torn else found
+
+    def _each_somewhere(self) -> bool:
+        """Whether every number of a joint claim comes out under some reading, though no reading gives all."""
+        counted = [one for one in self.under if one.counted]
+        held = {part.number for one in counted for part, judged in one.parts if rule.verdict(judged) == rule.CONFIRMED}
+        every = {part.number for one in counted for part, _ in one.parts}
+        return held == every and not any(one.outcome.kind == rule.CONFIRMED for one in counted if one.outcome)
 
     @property
     def against_print(self) -> list[Under]:
@@ -115,6 +129,36 @@ class Over:
         if self.impossible:
             words.append(f"{len(self.impossible)} not possible")
         return "; ".join(words)
+
+
+@dataclass(frozen=True)
+class Together:
+    """A reading with the claims that hold under it, and those that were judged under it."""
+
+    reading: Reading
+    name: str
+    kind: str
+    held: tuple[str, ...]
+    judged: tuple[str, ...]
+
+
+def together(of: PaperReadings, over: Sequence[Over]) -> list[Together]:
+    """The joint search over the declared readings: which makes most claims true, the best first.
+
+    Under a reading a claim is judged as under the one that takes what bears on it, where that is declared.
+    """
+    found = []
+    for reading in dict.fromkeys(one.reading for claim in over for one in claim.under):
+        held, judged = [], []
+        for claim in over:
+            own = of.bearing(reading, claim.claim.id)
+            for one in claim.under:
+                if one.reading == own and one.outcome is not None:
+                    judged.append(claim.claim.id)
+                    if one.outcome.kind == rule.CONFIRMED:
+                        held.append(claim.claim.id)
+        found.append(Together(reading, of.name(reading), of.kind(reading), tuple(held), tuple(judged)))
+    return sorted(found, key=lambda one: (-len(one.held), -len(one.judged)))
 
 
 def columns(every: Iterable[PaperReadings]) -> tuple[str, ...]:

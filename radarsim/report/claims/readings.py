@@ -42,7 +42,8 @@ class Choice:
     """Something that a paper leaves open: the column of the table, what is open, and the paper's sentence on it.
 
     original is the sentence in the paper's language, english in English; both say "nothing" where it is silent. The
-    first alternative is the default. claims: the ids of those on which it bears; empty: all of the paper.
+    first alternative is the default. claims: the ids of those on which it bears; empty: all of the paper. contradicts:
+    the print has more than one of the alternatives.
     """
 
     key: str
@@ -51,6 +52,7 @@ class Choice:
     english: str
     alternatives: tuple[Alternative, ...]
     claims: tuple[str, ...] = ()
+    contradicts: bool = False
 
     @property
     def default(self) -> str:
@@ -111,11 +113,11 @@ class PaperReadings(ABC):
 
     def of_claim(self, claim: str) -> list[Reading]:
         """The declared readings that differ for a claim: what does not bear on it is left at its default."""
-        found = (
-            self.reading(**{choice.key: one[choice.key] for choice in self.choices if choice.bears_on(claim)})
-            for one in self.declared()
-        )
-        return list(dict.fromkeys(found))
+        return list(dict.fromkeys(self.bearing(one, claim) for one in self.declared()))
+
+    def bearing(self, reading: Reading, claim: str) -> Reading:
+        """A reading with what does not bear on a claim left at its default."""
+        return self.reading(**{one.key: reading[one.key] for one in self.choices if one.bears_on(claim)})
 
     def kind(self, reading: Reading) -> str:
         """E, U or N: the last of the kinds of its alternatives that are not the default; E of the default itself."""

@@ -5,10 +5,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from radarsim.report.claims.over import Over
+from radarsim.report.claims.over import Over, together
 from radarsim.report.claims.readings import PaperReadings
+from radarsim.report.claims.rule import AGAINST
 from radarsim.report.claims.search import Search
 
+SHOWN = 12  # readings of the table of claims by reading
 KINDS = "E: equivalent in every respect; U: the paper does not say; N: against its print."
 INTRODUCTION = (
     "Written by `radarsim readings {paper} --markdown`; every number by reading stands in "
@@ -30,7 +32,9 @@ def page(of: PaperReadings, cited: str, over: Sequence[Over], search: Search | N
     impossible = _impossible(over)
     if impossible:
         parts += ["Readings that cannot be flown, designed or measured:", impossible]
-    if search is not None:
+    if search is None:
+        parts += ["## Claims by reading", _together(of, over)]
+    else:
         parts += ["## Printed numbers by reading", _numbers(search), "## Where each number comes out", _windows(search)]
     parts += ["## What the paper leaves open", KINDS, *(_choice(of, number) for number in range(len(of.choices)))]
     return "\n\n".join(parts) + "\n"
@@ -71,6 +75,23 @@ def _impossible(over: Sequence[Over]) -> str:
             reasons.setdefault((one.claim.id, reading.why), []).append(reading.name)
     rows = [(claim, str(len(names)), names[0], why) for (claim, why), names in reasons.items()]
     return _table(("claim", "readings", "such as", "why not"), rows) if rows else ""
+
+
+def _together(of: PaperReadings, over: Sequence[Over]) -> str:
+    """The readings that make most claims true, and the shipped one."""
+    every = together(of, over)
+    shipped = next(one for one in every if one.reading == of.reading())
+    most = max(len(one.held) for one in every if one.kind != AGAINST)
+    sentence = (
+        f"{len(every)} readings: as shipped {len(shipped.held)} of {len(shipped.judged)} claims hold; of those that "
+        f"the paper allows the best makes {most} hold."
+    )
+    best = every[:SHOWN]
+    rows = [
+        (one.name, one.kind, f"{len(one.held)} of {len(one.judged)}", ", ".join(one.held))
+        for one in [*best, *([] if shipped in best else [shipped])]
+    ]
+    return f"{sentence}\n\n{_table(('reading', 'kind', 'claims that hold', 'which'), rows)}"
 
 
 def _numbers(search: Search) -> str:

@@ -20,15 +20,16 @@ from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED
 from radarsim.report.claims.search import Search
 from radarsim.report.statistics import Estimate
 from radarsim.studies.discriminator import measures, versions
-from radarsim.studies.discriminator.measures import COMPONENTS, COMPUTED
+from radarsim.studies.discriminator.measures import COMPONENTS, COMPUTED, PRINTED
 from radarsim.studies.discriminator.versions import Burst, Version
 
 BURST = Burst(1e-5, (100.0, 150.0, 500.0, 1000.0, 2000.0))
 PRINTED_PRIOR = (6.1, 67.5, 6.1e3, 183.38e3, 2.426e6)  # rad, Hz, Hz/s, Hz/s², Hz/s³
 SHIPPED_NOISE = measures.READINGS[COMPUTED][0]
+ITERATIONS = "12"  # the number of the part that counts windows
 LEAST_RATIO = 5.0  # μ_min
-EXACT = ("P4.1", "P4.2", "P4.3", "P4.8")
-WINDOWS = ("P4.2", "P4.3", "P4.8")
+EXACT = ("P4.1", "P4.2", "P4.3", "P4.8", "P4.11", "P4.13")
+WINDOWS = ("P4.2", "P4.3", "P4.8", "P4.11", "P4.13")
 RUN = ("P4.4", "P4.5", "P4.6", "P4.7", "P4.9", "P4.10")
 NO_ROOT = "(15) has no root: with the phase in it, its left side is over c at every length"
 
@@ -44,6 +45,8 @@ CHOICES = (
             Alternative("9", UNSTATED, "as printed among the parameters"),
             Alternative("2.25", UNSTATED, "as the printed spreads have it: the print contradicts itself"),
         ),
+        (*EXACT, *RUN),
+        contradicts=True,
     ),
     Choice(
         "threshold",
@@ -55,6 +58,7 @@ CHOICES = (
             Alternative("1", UNSTATED, "as in (10) and (14) to (16)"),
         ),
         (*WINDOWS, *RUN),
+        contradicts=True,
     ),
     Choice(
         "forecast",
@@ -148,7 +152,7 @@ CHOICES = (
             Alternative("after the first", UNSTATED, "T₁ … T₁₂"),
             Alternative("in all", UNSTATED, "T₀ … T₁₁"),
         ),
-        ("P4.3",),
+        ("P4.3", "P4.11"),
     ),
 )
 
@@ -176,8 +180,9 @@ class Readings(PaperReadings):
 
     def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
         """Of parts that stand there in both shipped readings, those of one: the reading takes its place."""
-        of_both = [part for part in claim.parts if part.cases[0] in measures.READINGS]
-        return [part for part in claim.parts if part not in of_both or part.cases[0] == COMPUTED]
+        asserted = [part for part in claim.parts if part.asserted]
+        both = {COMPUTED, PRINTED} <= {part.cases[0] for part in asserted}
+        return [_counted(part, reading) for part in asserted if not both or part.cases[0] != PRINTED]
 
     def changed(self, claim: Claim, case: Case, reading: Reading) -> Case | None:
         """The case with the noise and forecast of a reading, and its windows in place of those of its estimators.
@@ -229,6 +234,13 @@ def _changed(estimator: Any, own: Version) -> Any:
         lengths = tuple(n * BURST.period_s for n in windows(own))
         changes |= {"schedule": lengths[: estimator.first_windows], "first_windows": None}
     return estimator.model_copy(update=changes)
+
+
+def _counted(part: Part, reading: Reading) -> Part:
+    """A part that counts windows, of all of them where a reading counts the first too."""
+    if part.number != ITERATIONS or reading["counted"] != "in all":
+        return part
+    return replace(part, measure=lambda seen: certain(len(seen.windows(COMPUTED))))
 
 
 def version(reading: Reading) -> Version:
@@ -285,7 +297,7 @@ class ExactEvidence(measures.Evidence):
 
     def __init__(self, reading: Reading):
         super().__init__((), {}, {})
-        self._reading, self._version = reading, version(reading)
+        self._version = version(reading)
 
     def windows(self, key: Any, kind: str = "sequence") -> np.ndarray:
         """Window lengths in s; of a forecast with the scale that a key of a sweep names, the first alone."""
@@ -294,10 +306,7 @@ class ExactEvidence(measures.Evidence):
             if first is None:
                 raise Unreadable(NO_ROOT)
             return np.array([first * BURST.period_s])
-        found = windows(self._version)
-        # Parts count the windows after the first; where all count, the first is one of them.
-        counted = [0, *found] if self._reading["counted"] == "in all" else found
-        return np.array(counted) * BURST.period_s
+        return np.array(windows(self._version)) * BURST.period_s
 
     def potential(self, key: Any, component: str) -> Estimate:
         return certain(_designed()[self._version][0][COMPONENTS.index(component)])

@@ -15,16 +15,22 @@ from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED
 from radarsim.report.claims.search import Search
 from radarsim.report.statistics import Estimate
 from radarsim.studies.range_doppler import measures, recursion
+from radarsim.studies.range_doppler.claims import CLAIMS
 from radarsim.studies.range_doppler.measures import RADARS
 
-NUMBERS = tuple(f"P1.{n}" for n in range(1, 33) if n not in (16, 31))  # these are algebra of the radars alone
-FAST = (
-    *("P1.4", "P1.5", "P1.6", "P1.7", "P1.11", "P1.12", "P1.14", "P1.15", "P1.19", "P1.20", "P1.22", "P1.24"),
-    *("P1.26", "P1.27", "P1.30", "P1.32"),
+ALGEBRA = ("P1.16", "P1.31")  # of the table of radars alone
+NUMBERS = tuple(claim.id for claim in CLAIMS if claim.id not in ALGEBRA)
+FAST = tuple(  # those that look at a radar of Δt = 5 s
+    claim.id
+    for claim in CLAIMS
+    if claim.id in NUMBERS
+    for keys in [{key[0] if isinstance(key, tuple) else key for part in claim.parts for key in part.cases}]
+    if keys & {3, 5}
 )
 FALLS = ("P1.5", "P1.6")
 SETTLES = ("P1.14", "P1.15")
 SWEPT = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # D_M of the config manoeuvre_variance
+FIFTEEN = 15  # points, as printed
 LONG = 250  # scans after which a filter is taken as steady
 FILTERS = ("r", "r+Vr")
 PERIOD = {n: radar[2] for n, radar in RADARS.items()}
@@ -215,8 +221,7 @@ class ExactEvidence(measures.Evidence):
         """key: the number of a radar (at the reading's D_M), or (number, D_M)."""
         number, variance = key if isinstance(key, tuple) else (key, self._own)
         period = PERIOD[number]
-        scans = 15 if period == 10 or self._reading["points"] == "fifteen each" else 29
-        k = np.arange(1, scans + 1)
+        k = np.arange(1, round(measures.DURATION / period) + 2)
         sigma_r, sigma_v, _ = RADARS[number]
         theta = (sigma_r / (period * sigma_v)) ** 2
         return _Radar(
@@ -226,6 +231,10 @@ class ExactEvidence(measures.Evidence):
     def marked(self, series: Series, key: Any) -> Series:
         """As it is: where a run ends is a choice of the reading."""
         return series
+
+    def exactly(self) -> "ExactEvidence":
+        """All is exact already."""
+        return self
 
     def filter(self, key: Any, observes: tuple[str, ...]) -> str:
         """r or r+Vr."""
@@ -274,6 +283,7 @@ class ExactEvidence(measures.Evidence):
 
     def _cut(self, key: Any, values: np.ndarray) -> Series:
         axes = self.case(key).axes
+        scans = FIFTEEN if self._reading["points"] == "fifteen each" else len(axes.k)
         values = values[: len(axes.k)]
-        kept = np.isfinite(values) & (axes.t_s <= self._limit_s + 1e-6)
+        kept = np.isfinite(values) & (axes.t_s <= self._limit_s + 1e-6) & (axes.k <= scans)
         return Series(axes.k[kept], axes.t_s[kept], *(values[kept],) * 3)

@@ -121,7 +121,7 @@ class Readings(PaperReadings):
 
     paper = "P3"
     choices = CHOICES
-    realisations = 20_000
+    realisations = 5000
 
     def exact(self, claim: Claim, reading: Reading) -> bool:
         return claim.id == SINGLE or reading["memory"] in MEMORIES

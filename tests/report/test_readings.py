@@ -1,0 +1,161 @@
+"""Readings as data, the rule over them, the joint search and the page, on a small paper of our own."""
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+
+from radarsim.report.claims import Claim, Part, certain, printed
+from radarsim.report.claims import readings as data
+from radarsim.report.claims.evidence import Missing
+from radarsim.report.claims.over import Over, columns, depth, rows, together, under
+from radarsim.report.claims.readings import Alternative, Choice, PaperReadings
+from radarsim.report.claims.readings_page import page
+from radarsim.report.claims.rule import AGAINST, CONFIRMED, DEPENDS, EQUIVALENT, REFUTED, UNSTATED
+from radarsim.report.claims.search import Fine, Printed, Search
+
+
+class Small(PaperReadings):
+    """Two numbers that hang on two choices, of which one bears on the first claim alone."""
+
+    paper = "P9"
+    choices = (
+        Choice(
+            *("scale", "How large", "nichts", "nothing"),
+            (
+                Alternative("one", UNSTATED, "plain"),
+                Alternative("two", UNSTATED, "double"),
+                Alternative("ten", AGAINST, "not as printed"),
+            ),
+        ),
+        Choice(
+            *("form", "In which form", "nichts", "nothing"),
+            (Alternative("round", EQUIVALENT, "plain"), Alternative("square", EQUIVALENT, "alike")),
+            ("P9.1",),
+        ),
+    )
+
+    def exact(self, claim, reading):
+        return True
+
+    def evidence(self, claim, reading, seen, of):
+        if reading["form"] == "square" and reading["scale"] == "two":
+            raise Missing("no square is so large")
+        return {"one": 1.0, "two": 2.0, "ten": 10.0}[reading["scale"]]
+
+
+def claim(number, *values):
+    parts = tuple(Part((), f"number {text}", "m", lambda seen: certain(seen), printed(text)) for text in values)
+    return Claim(f"P9.{number}", "somewhere", f"It is {' and '.join(values)}", parts)
+
+
+def over(of, one):
+    every = []
+    for reading in of.of_claim(one.id):
+        try:
+            every.append(under(of, one, reading, of.evidence(one, reading, None, None)))
+        except Missing as missing:
+            every.append(under(of, dataclasses.replace(one, parts=()), reading, None))
+            every[-1] = dataclasses.replace(every[-1], claim=one, outcome=None, why=missing.args[0])
+    return Over(one, tuple(every))
+
+
+def test_readings_of_a_claim_leave_out_what_does_not_bear_on_it():
+    of = Small()
+    assert len(of.declared()) == 5  # two by two of E and U, and one against the print
+    assert len(of.of_claim("P9.1")) == 5
+    assert len(of.of_claim("P9.2")) == 3
+    assert all(one["form"] == "round" for one in of.of_claim("P9.2"))
+
+
+def test_names_and_kinds():
+    of = Small()
+    assert of.name(of.reading()) == data.DEFAULT
+    assert of.name(of.reading(scale="two", form="square")) == "scale: two; form: square"
+    assert [of.kind(of.reading(**taken)) for taken in ({}, {"form": "square"}, {"scale": "two"}, {"scale": "ten"})] == [
+        *(EQUIVALENT, EQUIVALENT, UNSTATED, AGAINST)
+    ]
+    assert of.kind(of.reading(scale="ten", form="square")) == AGAINST
+
+
+def test_a_claim_over_its_readings():
+    of = Small()
+    one = over(of, claim(2, "1"))
+    assert [each.outcome.kind for each in one.under] == [CONFIRMED, REFUTED, REFUTED]
+    assert one.outcome.kind == DEPENDS
+    assert (one.outcome.holds_in, one.outcome.readings, one.outcome.depends_on) == (1, 2, ("scale",))
+    assert one.sentence() == "holds in 1 of 2 readings; depends on: scale"
+    never = over(of, claim(2, "10"))
+    assert never.outcome.kind == REFUTED
+    assert "against the print it holds with scale: ten" in never.sentence()
+
+
+def test_a_reading_that_cannot_be_done_is_listed():
+    one = over(Small(), claim(1, "1"))
+    (impossible,) = one.impossible
+    assert impossible.why == "no square is so large"
+    assert "1 not possible" in one.sentence()
+    assert one.outcome.readings == 3  # of four that the paper allows
+    names = columns([Small()])
+    (row,) = rows(impossible, names)
+    assert (row["verdict"], row["reason"], row["scale"]) == ("not possible", "no square is so large", "two")
+
+
+def test_depth_is_in_margins_with_its_sign():
+    of = Small()
+    one = over(of, claim(2, "1", "1.6"))
+    assert depth(one.under[0])[0] == pytest.approx((1.6 - 1.0) / 0.05)  # of the worst part
+    assert depth(over(of, claim(2, "1")).under[0])[0] == 0
+
+
+def test_claims_together():
+    of = Small()
+    every = together(of, [over(of, claim(1, "1")), over(of, claim(2, "2"))])
+    best = every[0]
+    assert len(best.held) == 1
+    by_name = {one.name: one for one in every}
+    assert by_name["as shipped"].held == ("P9.1",)
+    assert by_name["scale: two"].held == ("P9.2",)
+    assert by_name["scale: two; form: square"].held == ("P9.2",)  # the form does not bear on it
+    assert by_name["scale: two; form: square"].judged == ("P9.2",)
+
+
+@pytest.fixture
+def search():
+    """Two numbers over a grid of 3 by 2: what comes out is written down."""
+    strict = np.array([[[1, 0], [0, 1], [0, 1]], [[0, 0], [1, 1], [0, 1]]], dtype=bool)
+    granular = strict | np.array([[[0, 0], [0, 0], [0, 0]], [[1, 0], [0, 0], [0, 0]]], dtype=bool)
+    numbers = [Printed("P9.1", f"number {i}", "m", str(i), (i, i), (i, i)) for i in range(2)]
+    axes = {"scale": ("1", "2", "3"), "form": ("round", "square")}
+    fine = {"scale": Fine([1.0, 1.5, 2.0, 2.5], np.array([[1, 1, 0, 0], [0, 1, 0, 1]], dtype=bool))}
+    values = np.arange(12.0).reshape(2, 3, 2)
+    return Search("P9", numbers, axes, {"scale": "1", "form": "round"}, strict, granular, values, fine)
+
+
+def test_the_best_combination(search):
+    assert search.readings == 6
+    assert search.place == (0, 0)
+    assert search.count(granular=False).tolist() == [[1, 0], [1, 2], [0, 2]]
+    assert search.best(granular=False) == (1, 1)  # of two with two, none nearer the shipped: the first
+    assert search.words((1, 1)) == "scale: 2; form: square"
+    assert "6 readings" in search.sentence()
+    assert "1 of 2 come out as shipped, 2 with scale: 2; form: square" in search.sentence()
+
+
+def test_windows(search):
+    assert search.windows("scale") == ["1 … 1.5", "1.5, 2.5"]
+    assert search.windows("form") == ["round", "none"]
+
+
+def test_the_page_holds_it_all(search):
+    of = Small()
+    text = page(of, "Nobody 1900", [over(of, claim(1, "1")), over(of, claim(2, "10"))], search)
+    assert "| P9.1 |" in text
+    assert "no square is so large" in text
+    assert "> nichts" in text
+    assert "| ten | N | not as printed |" in text
+    table = re.findall(r"^\| P9.1 \| number 0 \|.*$", text, flags=re.MULTILINE)
+    assert table
+    without = page(of, "Nobody 1900", [over(of, claim(2, "1"))], None)
+    assert "3 readings: as shipped 1 of 1 claims hold" in without

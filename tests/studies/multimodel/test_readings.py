@@ -1,0 +1,98 @@
+"""P2's readings: which cases they change, and how; what is flown is looked up by what the shipped case is."""
+
+from pathlib import Path
+
+import pytest
+
+from radarsim.app.configs import load
+from radarsim.studies import registry
+from radarsim.studies.multimodel.flights import FLIGHTS
+from radarsim.studies.multimodel.readings import Readings
+
+OF = Readings()
+CLAIMS = {one.id: one for one in registry.study("multimodel").claims().claims}
+
+
+@pytest.fixture(scope="module")
+def case():
+    return load("multimodel").cases[0]
+
+
+def sigmas(spec):
+    return {f.name: [(m.motion, m.sigma_acceleration_mps2) for m in f.models] for f in spec.filters}
+
+
+def test_the_default_reading_changes_nothing(case):
+    assert OF.changed(CLAIMS["P2.1"], case, OF.reading()).spec == case.spec
+
+
+def test_there_are_two_dozen_readings_of_the_main_claim():
+    every = OF.of_claim("P2.1")
+    assert every[0] == OF.reading()
+    assert len(every) >= 24
+    assert {one["flight"] for one in every} == {"aeroballistic", *FLIGHTS}
+    assert {OF.kind(one) for one in every} == {"E", "U", "N"}
+
+
+def test_a_flight_takes_the_place_of_the_lost_one_alone(case):
+    changed = OF.changed(CLAIMS["P2.1"], case, OF.reading(flight="pull-up 250"))
+    assert changed.spec.target == FLIGHTS["pull-up 250"]
+    assert changed.spec.filters == case.spec.filters
+    others = load("multimodel_trajectories").cases
+    kept = [OF.changed(CLAIMS["P2.4"], one, OF.reading()) for one in others]
+    assert [one.name for one in kept if one is not None] == [one.name for one in others if "airliner" in one.name]
+
+
+def test_sigma_per_second_is_a_twentieth_at_20_hz(case):
+    shipped = sigmas(case.spec)
+    second = sigmas(OF.changed(CLAIMS["P2.1"], case, OF.reading(sigma_acceleration="per second")).spec)
+    for name, models in shipped.items():
+        for (motion, own), (_, other) in zip(models, second[name], strict=True):
+            assert other == pytest.approx(own * (0.05 if motion == "accelerated" else 1))
+    both = sigmas(OF.changed(CLAIMS["P2.1"], case, OF.reading(sigma_acceleration="per second, both motions")).spec)
+    assert both["Kalman-1 20"] == [("uniform", pytest.approx(1.0))]
+
+
+def test_the_output_start_and_bank(case):
+    moment = OF.changed(CLAIMS["P2.1"], case, OF.reading(output="moment")).spec
+    assert {f.name: f.output for f in moment.filters if f.family == "imm"} == {
+        "MMA2-122": "moment",
+        "MMA2-11": "moment",
+    }
+    assert OF.changed(CLAIMS["P2.1"], case, OF.reading(start_acceleration="3")).spec.start_acceleration_mps2 == 3
+    banks = load("multimodel_banks").cases[0]
+    changed = OF.changed(CLAIMS["P2.13"], banks, OF.reading(bank="accelerated")).spec
+    pairs = [own for own in sigmas(changed).values() if len(own) == 2]
+    assert [("accelerated", 0.025), ("accelerated", 0.05)] in pairs
+    assert [("accelerated", 15.0), ("accelerated", 30.0)] in pairs
+
+
+@pytest.mark.slow
+def test_a_flown_reading_is_measured_over_its_own_stages(tmp_path):
+    from radarsim.app import readings as app
+
+    of = next(one for one in app.asked(["P2.3"]))
+    wanted = app.Asked(of.paper, of.claims, whole=False, only={"flight": "pull-up 250"})
+    done = app.readings([wanted], out=tmp_path, realisations=16, figures=False)
+    flown = [one for one in done.read[0].over[0].under if one.reading["flight"] == "pull-up 250"]
+    assert flown
+    assert all(one.outcome is not None for one in flown)
+    # Over the stages of what was flown, 125 to 129 s, and not over the shipped flight's, which end at 170 s.
+    import radarsim
+
+    config = load("multimodel")
+    document = radarsim.run(
+        {**_document(config), "target": FLIGHTS["pull-up 250"].model_dump(exclude_none=True)}, realisations=16
+    )
+    rows = document.tables["probabilities"]
+    own = rows[(rows["filter"] == "MMA2-122") & (rows["t_s"] >= 125) & (rows["t_s"] < 129)]
+    mean = own.groupby("model")["probability"].mean()
+    expected = mean[3] - max(mean[1], mean[2])
+    shipped = next(one for one in flown if one.reading["sigma_acceleration"] == "per step")
+    assert shipped.parts[0][1].measured == pytest.approx(expected, rel=1e-9)
+
+
+def _document(experiment):
+    import yaml
+
+    return yaml.safe_load(Path(experiment.path).read_text(encoding="utf-8"))

@@ -1,0 +1,51 @@
+"""P3's readings about manoeuvres: single tests and short memories exactly, the rest by changed cases."""
+
+import pytest
+
+from radarsim.app.configs import load
+from radarsim.studies import registry
+from radarsim.studies.sonar.manoeuvre.readings import Readings
+
+OF = Readings()
+STUDY = registry.study("sonar")
+CLAIMS = {one.id: one for one in STUDY.claims().claims}
+
+
+def values(claim, **taken):
+    reading = OF.reading(**taken)
+    assert OF.exact(CLAIMS[claim], reading)
+    seen = OF.evidence(CLAIMS[claim], reading, None, STUDY.claims())
+    return [part.measure(seen).value for part in OF.parts(CLAIMS[claim], reading)]
+
+
+def test_the_probability_of_a_single_test_hangs_on_the_manoeuvre():
+    assert values("P3.9") == [pytest.approx(0.523, abs=5e-4)]
+    assert values("P3.9", strength="1.456 σ_a") == [pytest.approx(0.683, abs=5e-4)]
+    assert values("P3.9", strength="two σ_a") == [pytest.approx(0.8427, abs=5e-4)]
+
+
+def test_switching_within_the_papers_own_six_plots():
+    found = values("P3.10", memory="six plots")
+    assert found == pytest.approx([0.975, 1.188, 1.867, 1.101], abs=2e-3)
+
+
+def test_cases_are_changed_as_a_reading_says():
+    cases = load("sonar_manoeuvre").cases
+    assert not OF.exact(CLAIMS["P3.8"], OF.reading())
+    taken = OF.reading(tests="batches", manoeuvre="80 s")
+    changed = [one for one in (OF.changed(CLAIMS["P3.8"], case, taken) for case in cases) if one is not None]
+    assert sorted(abs(one.spec.target.acceleration_mps2) for one in changed) == [0.1, 0.8]
+    for one in changed:
+        assert one.spec.target.end_s - one.spec.target.start_s == 80
+        own = [d for d in one.spec.detectors if d.name == f"{d.plots} plots"]
+        assert own
+        assert all(d.test_every == d.plots for d in own)
+    faster = OF.changed(CLAIMS["P3.10"], cases[-1], OF.reading(switching_false_alarms="0.1"))
+    rates = {f.name: f.detector.false_alarm_probability for f in faster.spec.filters if f.detector}
+    assert set(rates.values()) == {0.1}
+
+
+def test_a_part_on_delays_asks_for_the_readings_rate():
+    parts = OF.parts(CLAIMS["P3.8"], OF.reading(false_alarms="0.01", seen="beginning"))
+    assert all(part.asserted for part in parts)
+    assert {part.statement for part in parts} == {"threshold", "time", "not worth while"}
