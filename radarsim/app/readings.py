@@ -11,9 +11,10 @@ from typing import Any
 
 from radarsim.app import configs, output, simulation
 from radarsim.app.simulation import RunOptions
+from radarsim.app.stored_readings import PLACE, stored_readings
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.stopping import Signals
-from radarsim.errors import ConfigError, StoreError, TargetUnmet
+from radarsim.errors import ConfigError, TargetUnmet
 from radarsim.report import files
 from radarsim.report.claims import PaperClaims
 from radarsim.report.claims.declared import Claim
@@ -23,7 +24,7 @@ from radarsim.report.claims.search import Search
 from radarsim.studies import registry
 
 Progress = Callable[[int, int, int], None]
-FOLDER, TABLE, DRAWN = "readings", "readings.csv", "drawn.json"
+FOLDER, TABLE, DRAWN = *PLACE.parts, "drawn.json"
 
 
 @dataclass(frozen=True)
@@ -311,7 +312,7 @@ def _drawn(folder: Path) -> dict[str, str]:
 def _table(done: Done) -> str:
     names = columns(paper.readings for paper in papers().values())
     own = {over.claim.id for read in done.read for over in read.over}
-    kept = [row for row in stored(done.folder.parent) if row["claim"] not in own]
+    kept = [row for row in stored_readings(done.folder.parent) if row["claim"] not in own]
     new = [row for read in done.read for over in read.over for one in over.under for row in rows(one, names)]
     text = io.StringIO(newline="")
     table = csv.DictWriter(text, names, restval="", extrasaction="ignore", lineterminator="\n")
@@ -325,22 +326,6 @@ def _order(claim: str) -> tuple[str, float, str]:
     paper, _, number = claim.partition(".")
     digits = number.rstrip("abcdefghijklmnopqrstuvwxyz")
     return paper, float(digits) if digits.isdigit() else 0.0, number
-
-
-def stored(out: str | Path) -> list[dict[str, Any]]:
-    """The rows of readings.csv under `out`; none where there is no such file. Raises StoreError for a damaged one."""
-    path = Path(out) / FOLDER / TABLE
-    try:
-        text = files.read(path).decode("utf-8")
-    except FileNotFoundError:
-        return []
-    except (OSError, ValueError) as error:
-        raise StoreError(f"{path}: cannot be read: {error}") from error
-    table = csv.DictReader(io.StringIO(text, newline=""))
-    found = list(table)
-    if not {"claim", "reading", "kind", "outcome"} <= set(table.fieldnames or ()):
-        raise StoreError(f"{path}: is no table of readings; remove it, `radarsim readings` makes it again")
-    return found
 
 
 def pages(done: Done) -> str:

@@ -39,7 +39,9 @@ def test_the_table_has_a_column_a_choice_and_a_row_a_part(first):
     assert set(dict.fromkeys(c.key for p in app.papers().values() for c in p.readings.choices)) < set(header.split(","))
     rows = table(out)
     paper = app.papers()["P1"]
-    for claim in paper.claims.claims:
+    open_claims = [one for one in paper.claims.claims if any(c.bears_on(one.id) for c in paper.readings.choices)]
+    assert {row["claim"] for row in rows} == {one.id for one in open_claims}
+    for claim in open_claims:
         own = [row for row in rows if row["claim"] == claim.id]
         readings = paper.readings.of_claim(claim.id)
         assert {row["reading"] for row in own} == {paper.readings.name(one) for one in readings}

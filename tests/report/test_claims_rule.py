@@ -179,6 +179,9 @@ def test_over_readings():
     assert (mixed.holds_in, mixed.readings) == (1, 3)
     assert rule.over_readings(own, [reading(CONFIRMED, a="1"), reading("", a="2")]).kind == CONFIRMED
     assert rule.over_readings(own, [reading(CONFIRMED, a="1"), reading(UNDECIDED, a="2")]).kind == UNDECIDED
+    assert rule.over_readings(own, [reading(REFUTED, a="1"), reading(UNDECIDED, a="2")]).kind == UNDECIDED
+    never = rule.over_readings(own, [reading(REFUTED, a="1"), reading(IMMATERIAL, a="2")])
+    assert (never.kind, never.depends_on, never.holds_in) == (DEPENDS, ("a",), 0)
     assert rule.over_readings(own, [*false, reading(CONFIRMED, "N", a="4")]).kind == REFUTED
 
 

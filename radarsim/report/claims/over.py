@@ -11,6 +11,7 @@ from radarsim.report.claims.evidence import Evidence, Missing
 from radarsim.report.claims.readings import PaperReadings, Reading
 from radarsim.report.claims.rule import Judged, Outcome
 
+NOTHING = "there is nothing to measure it by"
 FIRST = ("claim", "part", "reading", "kind")
 LAST = (
     *("measured", "lo", "hi", "exact", "expected_lo", "expected_hi", "margin", "verdict"),
@@ -50,7 +51,7 @@ def under(of: PaperReadings, claim: Claim, reading: Reading, evidence: Evidence)
     try:
         parts = tuple((part, _judged(part, evidence, of.exact(claim, reading))) for part in of.parts(claim, reading))
     except Missing as missing:
-        return Under(claim, reading, name, kind, why=_why(missing))
+        return Under(claim, reading, name, kind, why=missing.why or NOTHING)
     outcome = rule.claim([judged for _, judged in parts], **claim.how)
     return Under(claim, reading, name, kind, parts, outcome)
 
@@ -92,7 +93,7 @@ class Over:
             return None
         found = rule.over_readings(own, [one.as_rule() for one in self.under])
         printed_twice = any(part.against_print for part in self.claim.parts)
-        torn = printed_twice and self.contradicting.intersection(found.depends_on)
+        torn = printed_twice and not self.contradicting.isdisjoint(found.depends_on)
         torn = torn or (self.claim.joint and self._each_somewhere())
         return replace(found, kind=rule.CONTRADICTORY) if torn else found
 
@@ -210,8 +211,3 @@ def _depth(judged: Judged) -> tuple[float, float, float]:
     ends = rule.ends(judged)
     every = [of(value) for value in (*ends, judged.value)]
     return of(judged.value), min(every), max(every)
-
-
-def _why(missing: Missing) -> str:
-    given = next((one for one in missing.args if isinstance(one, str)), "")
-    return given or "there is nothing to measure it by"

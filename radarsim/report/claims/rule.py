@@ -346,7 +346,7 @@ def over_readings(own: Outcome, readings: Sequence[Reading]) -> Outcome:
             (kind,) = said
         elif set(said) == {CONFIRMED, IMMATERIAL}:
             kind = own.kind
-        elif set(said) <= {CONFIRMED, IMMATERIAL, UNDECIDED}:
+        elif set(said) <= {CONFIRMED, IMMATERIAL, UNDECIDED} or set(said) == {REFUTED, UNDECIDED}:
             kind = UNDECIDED
         else:
             kind, on = DEPENDS, flips(counted)
@@ -357,8 +357,10 @@ def flips(readings: Sequence[Reading]) -> tuple[str, ...]:
     """The choices on which the outcome hangs, the strongest first.
 
     A choice is one of them if two readings that differ in it alone come out differently. Where no two readings differ
-    in one choice alone, those by whose values the readings differ most in the share that holds.
+    in one choice alone, those by whose values the readings differ most in the share that holds; where none holds, in
+    the share that is refuted.
     """
+    asked = CONFIRMED if any(one.outcome == CONFIRMED for one in readings) else REFUTED
     found: Counter[str] = Counter()
     alone = False
     for i, one in enumerate(readings):
@@ -366,19 +368,21 @@ def flips(readings: Sequence[Reading]) -> tuple[str, ...]:
             keys = dict.fromkeys((*one.choices, *other.choices))
             differ = [key for key in keys if one.choices.get(key) != other.choices.get(key)]
             alone = alone or len(differ) == 1
-            if len(differ) == 1 and (one.outcome == CONFIRMED) != (other.outcome == CONFIRMED):
+            if len(differ) == 1 and (one.outcome == asked) != (other.outcome == asked):
                 found[differ[0]] += 1
     if alone and found:
         return tuple(name for name, _ in found.most_common())
-    spread = {name: _spread(name, readings) for name in dict.fromkeys(key for one in readings for key in one.choices)}
+    spread = {
+        name: _spread(name, readings, asked) for name in dict.fromkeys(key for one in readings for key in one.choices)
+    }
     most = max(spread.values(), default=0.0)
     return tuple(name for name, one in spread.items() if one and math.isclose(one, most))
 
 
-def _spread(choice: str, readings: Sequence[Reading]) -> float:
-    """Largest less least share of readings that hold, over the values of a choice."""
+def _spread(choice: str, readings: Sequence[Reading], asked: str) -> float:
+    """Largest less least share of readings that come out so, over the values of a choice."""
     shares: dict[str, list[bool]] = {}
     for one in readings:
-        shares.setdefault(one.choices.get(choice, ""), []).append(one.outcome == CONFIRMED)
+        shares.setdefault(one.choices.get(choice, ""), []).append(one.outcome == asked)
     held = [sum(own) / len(own) for own in shares.values()]
     return max(held) - min(held)
