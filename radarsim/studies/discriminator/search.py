@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.report.claims.search import Printed, Search
 from radarsim.studies.discriminator import versions
-from radarsim.studies.discriminator.claims import PRINTED_SPREADS
+from radarsim.studies.discriminator.claims import SPREADS
 from radarsim.studies.discriminator.measures import ESTIMATE
 from radarsim.studies.discriminator.readings import BURST, LEAST_RATIO, PRINTED_PRIOR
 from radarsim.studies.discriminator.versions import Version
@@ -32,7 +32,7 @@ def _printed(claim: str, what: str, unit: str, text: str) -> Printed:
 
 
 PRINTED = (
-    *(_printed("P4.1", f"potential spread of {name}", unit, text) for name, (text, unit) in PRINTED_SPREADS.items()),
+    *(_printed("P4.1", f"potential spread of {name}", unit, text) for name, (text, unit) in SPREADS.items()),
     _printed("P4.2", "first window", "ms", "1.79"),
     _printed("P4.2", "shortest window", "ms", "1.31"),
     _printed("P4.3", "iterations", "", "12"),
