@@ -57,6 +57,7 @@ def under(of: PaperReadings, claim: Claim, reading: Reading, evidence: Evidence)
 
 
 def _judged(part: Part, seen: Evidence, exact: bool) -> Judged:
+    """A part with its numbers; which variant it is of, and whether that is against the print, the reading says."""
     found, nothing = part.measure(seen), math.nan
     measured, lo, hi = (nothing,) * 3 if exact else (float(found.value), float(found.lo), float(found.hi))
     return Judged(
@@ -71,8 +72,6 @@ def _judged(part: Part, seen: Evidence, exact: bool) -> Judged:
         ceiling=part.ceiling(seen) if part.ceiling else nothing,
         statement=part.statement,
         number=part.number,
-        variant=part.variant,
-        against_print=part.against_print,
         asserted=part.asserted,
     )
 
