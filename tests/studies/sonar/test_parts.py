@@ -123,7 +123,7 @@ def test_every_figure_of_the_study_has_its_name(tmp_path):
     drawn = set()
     for stem in ("sonar_smoothing", "sonar_conversion", "sonar_manoeuvre_turning", "sonar_clutter"):
         result = radarsim.run(load(stem, ["realisations=64"]))
-        drawn |= {name for name in result.figures if not name.startswith("sweep_")}
+        drawn |= {name for name in result.figures if not name.startswith("sweep_") and name != "claims"}
     known = STUDY.keys().figure_names
     assert drawn <= set(known)
     assert len(known) == len(set(known))
