@@ -8,22 +8,36 @@
 <Figure size ...>
 
 In a notebook a result shows its answer and the last scan; `radarsim.load("rls2")` gives one that was run before.
+`radarsim.simulate`, `read_plots`, `track` and `fit` are for recorded plots.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from radarsim.app.own_data import fit, read_plots, simulate, track
     from radarsim.app.result import Result
     from radarsim.app.run import load_result as load
     from radarsim.app.run import run
     from radarsim.errors import ConfigError, RadarsimError
 
 __version__ = "0.1.0"
-__all__ = ["ConfigError", "RadarsimError", "Result", "__version__", "load", "run"]
+__all__ = [
+    "ConfigError",
+    "RadarsimError",
+    "Result",
+    "__version__",
+    "fit",
+    "load",
+    "read_plots",
+    "run",
+    "simulate",
+    "track",
+]
 
 _HOMES = {
     **{"run": "app.run:run", "load": "app.run:load_result", "Result": "app.result:Result"},
+    **{name: f"app.own_data:{name}" for name in ("fit", "read_plots", "simulate", "track")},
     **{"ConfigError": "errors:ConfigError", "RadarsimError": "errors:RadarsimError"},
 }
 

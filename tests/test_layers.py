@@ -30,9 +30,9 @@ ROOMS = {
     "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "studies.interface"),
     "studies.registry": ("errors", "config", "studies.interface"),
     "studies.identity": ("errors", "config", "kernels", "studies.interface", "studies.registry"),
-    "track": ("errors", "config", "engine", "kernels", "physics", "report", "studies", "app"),
-    "app": ("errors", "config", "engine", "kernels", "physics", "report", "studies", "track"),
-    "cli": ("errors", "config", "engine", "kernels", "physics", "report", "studies", "track", "app", "__init__"),
+    "recorded": ("errors", "config", "engine", "kernels", "physics", "report", "studies"),
+    "app": ("errors", "config", "engine", "kernels", "physics", "report", "studies", "recorded"),
+    "cli": ("errors", "config", "engine", "kernels", "physics", "report", "studies", "recorded", "app", "__init__"),
     "__init__": ("errors", "app"),
     "__main__": ("cli",),
 }
@@ -83,7 +83,7 @@ LIBRARIES = {  # library: the files and rooms that may import it
     "llvmlite": {"kernels/cache.py", "kernels/compile.py", "kernels/lanes.py"},
     "pydantic": {"config", "studies/*/config.py", "studies/*/*/config.py", "studies/*/schema.py"},
     "pydantic_core": {"config/check.py", "config/fields.py", "config/starter.py"},
-    "pandas": {"report/tables.py", "report/precision.py"},
+    "pandas": {"report/tables.py", "report/precision.py", "app/own_data.py"},
 }
 
 
@@ -223,8 +223,8 @@ PLANTED = [
     ("studies.registry", "radarsim.studies.sonar"),
     ("app.run", "radarsim.cli.console"),
     ("app.outlook", "radarsim.studies.multimodel.study"),
-    ("track.follow", "radarsim.cli.console"),
-    ("track.follow", "radarsim.studies.sonar.track"),
+    ("recorded.follow", "radarsim.cli.console"),
+    ("recorded.follow", "radarsim.studies.sonar.track"),
     ("cli.maintenance", "radarsim.studies.sonar.config"),
     ("studies.range_doppler.kernels.rows", "radarsim.studies.range_doppler.filters"),
     ("studies.range_doppler.kernels.rows", "radarsim.physics.motion"),

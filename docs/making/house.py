@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).parents[2] / "radarsim"
 # `errors`, which is left out.
 ROWS = (
     ("cli",),
-    ("app", "track"),
+    ("app", "recorded"),
     ("registry",),
     ("range_doppler", "multimodel", "sonar", "discriminator", "ambiguous_doppler"),
     ("interface", "report"),
@@ -24,7 +24,7 @@ STUDIES = 3  # the row of the papers, which the registry knows by their names
 ABOUT = {
     "cli": "parse, call, print",
     "app": "run, result, claims …",
-    "track": "recorded plots",
+    "recorded": "recorded plots",
     "registry": "which there are; identity",
     "interface": "what a study is; noise",
     "report": "statistics, charts, page",

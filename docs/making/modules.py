@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 import radarsim
 
-FLOORS = ("physics", "kernels", "studies", "engine", "report", "config", "track", "app")
+FLOORS = ("physics", "kernels", "studies", "engine", "report", "config", "recorded", "app")
 
 
 def markdown() -> str:

@@ -3,11 +3,11 @@
 import sys
 from collections.abc import Iterable, Sequence
 
+from radarsim.recorded import accuracy, advice, fit
+from radarsim.recorded.advice import Advice, Finding
+from radarsim.recorded.fit import Fit
+from radarsim.recorded.follow import Followed
 from radarsim.report.text import plural, printable, significant_digits
-from radarsim.track import accuracy, advice, fit
-from radarsim.track.advice import Advice, Finding
-from radarsim.track.fit import Fit
-from radarsim.track.follow import Followed
 
 CLEAR = 3.0  # of the logarithm of a likelihood, twenty times: from there on one filter is clearly the best
 

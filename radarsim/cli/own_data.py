@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from radarsim.engine.results import Track
-    from radarsim.track.formats.importing import Format
+    from radarsim.recorded.formats.importing import Format
 
 
 @main.command()
@@ -80,8 +80,8 @@ def simulate(config: str, output: str, realisation: int, overrides: tuple[str, .
     """
     from radarsim.app import run as experiment
     from radarsim.cli import console
-    from radarsim.track import follow as recorded
-    from radarsim.track import plots
+    from radarsim.recorded import follow as recorded
+    from radarsim.recorded import plots
 
     (loaded,) = experiment.load_all([config], overrides)
     columns = recorded.simulated(loaded, realisation)
@@ -142,8 +142,8 @@ def import_(
       radarsim track range_doppler_own plots.csv -o track.csv
     """
     from radarsim.cli import console
+    from radarsim.recorded.formats import importing, site
     from radarsim.report.text import plural
-    from radarsim.track.formats import importing, site
 
     options = importing.Options(
         kind,
@@ -197,10 +197,10 @@ def track(
 
     from radarsim.app import run as experiment
     from radarsim.cli import console, findings
+    from radarsim.recorded import accuracy, advice
+    from radarsim.recorded import follow as recorded
+    from radarsim.recorded import plots as files
     from radarsim.report.files import Writer
-    from radarsim.track import accuracy, advice
-    from radarsim.track import follow as recorded
-    from radarsim.track import plots as files
 
     (loaded,) = experiment.load_all([config], overrides)
     read = {"the plots": plots, "the config": loaded.path}
@@ -252,7 +252,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     from radarsim.app import configs
     from radarsim.app import run as experiment
     from radarsim.cli import findings
-    from radarsim.track import fit as fitting
+    from radarsim.recorded import fit as fitting
 
     (loaded,) = experiment.load_all([config], overrides)
     found = fitting.fit(loaded, plots, options["filter_name"], options["robust"])

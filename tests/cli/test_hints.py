@@ -6,7 +6,7 @@ from click.testing import CliRunner
 from radarsim.app import configs
 from radarsim.cli import main
 from radarsim.errors import ConfigError
-from tests.track.test_plots import faults
+from tests.recorded.test_plots import faults
 
 COLUMNS = "plots.csv:1: must have the columns t_s, range_m, bearing_rad or t_s, x_m, y_m; got "
 

@@ -20,9 +20,9 @@ from radarsim.cli import group, main
 from radarsim.config import lookup
 from radarsim.config.identity import canonical
 from radarsim.errors import ConfigError
+from radarsim.recorded import accuracy, plots
+from radarsim.recorded import follow as recorded
 from radarsim.studies.range_doppler import track as range_doppler_plots
-from radarsim.track import accuracy, plots
-from radarsim.track import follow as recorded
 
 RUNS = {  # config, overrides, filters' tolerance in their own σ: rules that choose among models amplify a rounding
     "rls2": ((), 1e-10),

@@ -190,7 +190,7 @@ def test_sentences_move_nothing(folder, moved):
         ("report/tables.py", NONE),
         ("app/run.py", NONE),
         ("cli/console.py", NONE),
-        ("track/follow.py", NONE),
+        ("recorded/follow.py", NONE),
         ("studies/registry.py", NONE),
         ("studies/interface.py", NONE),
         ("studies/folder.py", NONE),

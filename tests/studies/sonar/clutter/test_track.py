@@ -7,8 +7,8 @@ import pytest
 
 from radarsim.app import run as experiment
 from radarsim.errors import ConfigError
-from radarsim.track import follow as recorded
-from radarsim.track import plots
+from radarsim.recorded import follow as recorded
+from radarsim.recorded import plots
 
 EXAMPLE = Path(__file__).parents[4] / "docs/examples/sonar_clutter.csv"
 ONE = ("sweep.sensor.false_plots_per_km2=[0.03]",)

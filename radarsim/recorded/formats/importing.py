@@ -16,13 +16,13 @@ from typing import Literal
 import numpy as np
 
 from radarsim.errors import ConfigError
+from radarsim.recorded.formats import ais, asterix
+from radarsim.recorded.formats.ais import Ais
+from radarsim.recorded.formats.asterix import Asterix
+from radarsim.recorded.formats.records import DAY_S, PLOTS, POSITIONS, Batch, Reader, counted
+from radarsim.recorded.formats.site import Antenna, Site, biconical, described
+from radarsim.recorded.formats.text import Table
 from radarsim.report.files import Writer
-from radarsim.track.formats import ais, asterix
-from radarsim.track.formats.ais import Ais
-from radarsim.track.formats.asterix import Asterix
-from radarsim.track.formats.records import DAY_S, PLOTS, POSITIONS, Batch, Reader, counted
-from radarsim.track.formats.site import Antenna, Site, biconical, described
-from radarsim.track.formats.text import Table
 
 Format = Literal["asterix", "opensky", "ais", "csv"]
 FORMATS: tuple[Format, ...] = ("asterix", "opensky", "ais", "csv")

@@ -15,7 +15,7 @@ from types import ModuleType
 from typing import Any, BinaryIO, NamedTuple
 
 from radarsim.errors import ConfigError
-from radarsim.track.formats.records import (
+from radarsim.recorded.formats.records import (
     BATCH,
     DAY_S,
     PLOT_COLUMNS,

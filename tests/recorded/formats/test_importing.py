@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from radarsim.errors import ConfigError
-from radarsim.track.formats.importing import Options, import_recording
-from radarsim.track.formats.records import Unrolled
-from radarsim.track.formats.site import Antenna, Site, biconical, described
-from radarsim.track.formats.text import split
+from radarsim.recorded.formats.importing import Options, import_recording
+from radarsim.recorded.formats.records import Unrolled
+from radarsim.recorded.formats.site import Antenna, Site, biconical, described
+from radarsim.recorded.formats.text import split
 
 pytest.importorskip("asterix.base", reason="libasterix is not installed")
 NM, STEP = 1852.0, 2 * math.pi / 65536

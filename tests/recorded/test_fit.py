@@ -8,8 +8,8 @@ import pytest
 from radarsim.app.run import load_all
 from radarsim.errors import ConfigError
 from radarsim.physics.motion import transition
+from radarsim.recorded import advice, fit, follow, plots
 from radarsim.studies.range_doppler.track import PlotLikelihood
-from radarsim.track import advice, fit, follow, plots
 
 T, SCANS = 10.0, 60
 STATED = {"radar.sigma_range_m": 250.0, "radar.sigma_velocity_mps": 15.0, "manoeuvre_variance": 1e-3}

@@ -17,10 +17,10 @@ from radarsim.config.experiment import Case, Experiment, in_name
 from radarsim.config.schema import LARGEST_REALISATIONS
 from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
+from radarsim.recorded import plots
+from radarsim.recorded.rounding import Twin
 from radarsim.studies.interface import RecordedPlots
 from radarsim.studies.registry import study
-from radarsim.track import plots
-from radarsim.track.rounding import Twin
 
 MOST_DRAWN = 2000  # rows kept for figures; of more, every second is dropped again and again
 GAP = 3.0  # intervals' median lengths that make a gap
@@ -370,8 +370,8 @@ def draw(followed: Followed, folder: str | os.PathLike, sources: Iterable[str | 
 
     ConfigError, and nothing drawn, where a figure would take the place of one of the sources.
     """
+    from radarsim.recorded import figures as described
     from radarsim.report import figures, files
-    from radarsim.track import figures as described
 
     made = described.figures(followed.track())
     contents = {f"{name}.{kind}": data for name, one in made.items() for kind, data in figures.save(one).items()}

@@ -11,7 +11,7 @@ import numpy as np
 
 from radarsim.errors import ConfigError
 from radarsim.physics import frames
-from radarsim.track.formats.records import needs
+from radarsim.recorded.formats.records import needs
 
 try:
     import pymap3d

@@ -15,9 +15,9 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError
+from radarsim.recorded import plots
+from radarsim.recorded.follow import one_case, recorded_of
 from radarsim.studies.interface import Likelihood
-from radarsim.track import plots
-from radarsim.track.follow import one_case, recorded_of
 
 HALF_CHI2_95 = 1.9207294103470  # half the 95 % point of chi-square with one degree of freedom
 LEAST_ROWS = 10  # of a track; shorter ones say next to nothing

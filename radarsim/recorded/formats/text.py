@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TextIO
 
 from radarsim.errors import ConfigError
-from radarsim.track.formats.records import (
+from radarsim.recorded.formats.records import (
     BATCH,
     PLOT_COLUMNS,
     PLOTS,

@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import Any, BinaryIO
 
 from radarsim.errors import ConfigError
-from radarsim.track.formats.records import BATCH, POSITION_COLUMNS, POSITIONS, Batch, Gathered, Unrolled, needs
+from radarsim.recorded.formats.records import BATCH, POSITION_COLUMNS, POSITIONS, Batch, Gathered, Unrolled, needs
 
 pyais: ModuleType | None
 try:

@@ -13,7 +13,7 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.config.fields import Model
-from radarsim.track.follow import Followed, Tally, recorded_of
+from radarsim.recorded.follow import Followed, Tally, recorded_of
 
 LEAST_TESTS = 10  # below which there is no verdict
 CLOSE = 0.005  # of one, to which the mean is brought

@@ -7,9 +7,9 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.errors import ConfigError
-from radarsim.track import follow as recorded
-from radarsim.track import plots
-from radarsim.track.rounding import Twin, unlike
+from radarsim.recorded import follow as recorded
+from radarsim.recorded import plots
+from radarsim.recorded.rounding import Twin, unlike
 
 SCANS = 14
 RANGE, VELOCITY, JERK = Fraction(250) ** 2, Fraction(15) ** 2, Fraction(1, 1000)  # variances of rls2

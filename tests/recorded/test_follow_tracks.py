@@ -7,7 +7,7 @@ import pytest
 
 from radarsim.app.run import load_all
 from radarsim.errors import ConfigError
-from radarsim.track import follow
+from radarsim.recorded import follow
 
 
 def loaded(config="rls2"):

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from radarsim.recorded.fit import LEAST_ROWS
+from radarsim.recorded.follow import Followed, recorded_of
 from radarsim.studies.interface import Likelihood
-from radarsim.track.fit import LEAST_ROWS
-from radarsim.track.follow import Followed, recorded_of
 
 OUTLIERS, BIAS = "outliers", "bias"
 LEVEL = 0.05  # of finding something where nothing is wrong

@@ -8,8 +8,8 @@ import pytest
 
 from radarsim.engine.results import Track
 from radarsim.errors import ConfigError, StoreError
+from radarsim.recorded import plots
 from radarsim.report.files import Writer
-from radarsim.track import plots
 
 CHOICES = (("t_s", "range_m", "bearing_rad"), ("t_s", "x_m", "y_m"))
 
@@ -110,7 +110,7 @@ def test_an_unwritable_place(tmp_path):
 
 def test_intervals_that_no_filter_can_take_are_a_fault_of_the_file(tmp_path):
     from radarsim.app import run as experiment
-    from radarsim.track import follow as recorded
+    from radarsim.recorded import follow as recorded
 
     path = tmp_path / "plots.csv"
     path.write_text("t_s,range_m,bearing_rad\n0,9000,1\n1e-6,9000,1\n1e7,9000,1\n")

@@ -1,0 +1,112 @@
+"""Recorded plots from Python: simulate, read, track, fit, with pandas in and out."""
+
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from radarsim.app.configs import load
+from radarsim.recorded import fit as fitting
+from radarsim.recorded import follow, plots
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Config = str | os.PathLike[str] | Mapping[str, Any]
+Found = TypeVar("Found")
+
+
+def simulate(config: Config, realisation: int = 0, overrides: Iterable[str] = ()) -> "pd.DataFrame":
+    """One realisation's plots and the truth in columns true_…, number for number those of a run.
+
+    Raises ConfigError for a wrong config, for one of several cases, and for a study without recorded plots.
+
+    >>> import radarsim
+    >>> radarsim.simulate("rls2").columns.tolist()[:3]
+    ['t_s', 'range_m', 'velocity_mps']
+    """
+    import pandas as pd
+
+    return pd.DataFrame(follow.simulated(load(config, overrides), realisation))
+
+
+def read_plots(path: str | os.PathLike[str]) -> "pd.DataFrame":
+    """A file of plots as `radarsim import` and `radarsim simulate` write it: numbers, and the column `track` as text.
+
+    Raises ConfigError where it cannot be read.
+    """
+    import pandas as pd
+
+    from radarsim.errors import ConfigError
+
+    try:
+        texts = pd.read_csv(path, comment="#", dtype=str, keep_default_na=False)
+        # By Python's own reading of numbers, which loses no digit.
+        measured = [str(name) for name in texts if name != plots.TRACK]
+        numbers = {name: texts[name].replace("", "nan").astype(float) for name in measured}
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"{os.fspath(path)}: cannot be read: {error}") from error
+    return texts.assign(**numbers)
+
+
+def track(
+    config: Config, recorded: "str | os.PathLike[str] | pd.DataFrame", overrides: Iterable[str] = ()
+) -> "pd.DataFrame":
+    """The config's filters over recorded plots (a file or a table): the columns of `radarsim track`.
+
+    Raises ConfigError with all faults of config and plots.
+
+    >>> import radarsim
+    >>> found = radarsim.track("rls2", radarsim.simulate("rls2"))
+    >>> found[found["component"] == "r"].groupby("filter").size().to_dict()
+    {'r': 15, 'r+Vr': 15}
+    """
+    import pandas as pd
+
+    rows: list[tuple[str, ...]] = []
+    header: list[str] = []
+
+    def sink(piece: Any, name: str | None) -> None:
+        header[:] = plots.header_of(piece, name is not None)
+        rows.extend(plots.rows_of(piece, name))
+
+    experiment = load(config, overrides)
+    _with_file(recorded, lambda path: follow.follow(experiment, path, sink))
+    table = pd.DataFrame(rows, columns=header)
+    text = ("recorded_track", "filter", "component", "unit")
+    return table.assign(**{name: pd.to_numeric(table[name]) for name in header if name not in text})
+
+
+def fit(
+    config: Config,
+    recorded: "str | os.PathLike[str] | pd.DataFrame",
+    overrides: Iterable[str] = (),
+    filter_name: str | None = None,
+    robust: bool = False,
+) -> "pd.DataFrame":
+    """What recorded plots (a file or a table) say of σ and of the manoeuvre variance, with 95 % intervals.
+
+    Columns: key, stated, value, lo, hi, identifiable. robust: allowing for outliers. Raises ConfigError.
+
+    >>> import radarsim
+    >>> plots = radarsim.simulate("rls2", overrides=["scans=60"])
+    >>> radarsim.fit("rls2", plots)["key"].tolist()
+    ['radar.sigma_range_m', 'radar.sigma_velocity_mps', 'manoeuvre_variance']
+    """
+    import pandas as pd
+
+    experiment = load(config, overrides)
+    found = _with_file(recorded, lambda path: fitting.fit(experiment, path, filter_name, robust))
+    names = ("key", "stated", "value", "lo", "hi", "identifiable")
+    return pd.DataFrame([{name: getattr(one, name) for name in names} for one in found.keys], columns=names)
+
+
+def _with_file(recorded: "str | os.PathLike[str] | pd.DataFrame", act: Callable[[str], Found]) -> Found:
+    """What is done with the file of recorded plots; a table is written into one of its own first."""
+    if isinstance(recorded, str | os.PathLike):
+        return act(os.fspath(recorded))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "plots.csv"
+        recorded.to_csv(path, index=False)
+        return act(str(path))
