@@ -37,9 +37,13 @@ nitpick_ignore_regex = [
     ),
     ("py:class", r"Canvas|DataclassInstance"),
     # Keys have a page of their own.
-    ("py:class", r"radarsim\.config\.(fields|schema)\..*|(radarsim\.studies\..*\.)?Keys"),
-    ("py:class", r"radarsim\..*\.(A_co|M|Part|Asked)|Inventory"),  # type variables and names of types
-    ("py:class", r"(dict|list)\[.*"),  # a subscript that autodoc takes for a name
+    (
+        "py:class",
+        r"radarsim\.config\.(fields|schema)\..*|radarsim\.studies\..*\.(config|schema)\..*|(radarsim\..*\.)?(All)?Keys",
+    ),
+    ("py:class", r"FieldInfo|NoneType"),  # of pydantic's unions
+    ("py:class", r"(radarsim\..*\.)?(A_co|M|Part|Asked|CaseOrResult|ClutterPlan)|Inventory"),  # names of types
+    ("py:(class|obj)", r"(dict|list|tuple|typing\.Literal)\[.*"),  # a subscript that autodoc takes for a name
 ]
 # Several studies have a class of one name, each documented in its own module; a type of that name may be any of them.
 suppress_warnings = ["ref.python"]
