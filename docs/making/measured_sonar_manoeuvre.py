@@ -158,8 +158,9 @@ def switched(case: str, degree: int) -> Callable[[Results], str]:
 
 
 def delay_ratio(case: str) -> Callable[[Results], str]:
-    """Mean time to an alarm of eight plots over that of five (P3.8)."""
-    return part(STEM, "P3.8", f"mean time to an alarm in the {case} manoeuvre, 8 plots over 5", "")
+    """Mean time to see beginning and end of a manoeuvre, eight plots over five (P3.8)."""
+    what = f"mean time to see beginning and end of the {case} manoeuvre at k = 1, 8 plots over 5"
+    return part(STEM, "P3.8", what, "")
 
 
 USES = {

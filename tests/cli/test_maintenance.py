@@ -75,7 +75,9 @@ def test_a_hundred_of_a_hundred_damaged_files_are_named_and_come_again(out):
         assert [fault.split(":")[0] for fault in faults] == [str(path)], (kind, path, faults)
         path.write_bytes(good[path])
     for path in files:
-        damage(path, draw)
+        # That a block is gone shows by the others, of which none is whole here: blocks are left in their places.
+        while damage(path, draw) == "deleted" and path.suffix == ".sums":
+            path.write_bytes(good[path])
     result = command("doctor", out / "rls2", code=4)
     assert {line.split(":")[0] for line in result.stderr.splitlines()} == set(map(str, files))
     command("run", "rls2", "-n", 50_001, "--no-figures", "--quiet", "--out", out)

@@ -73,30 +73,46 @@ ROW = {
     **{"reading": ""},
     **{"overall": "confirmed", "verdict": "confirmed", "what": "gain", "measured": -1.23456, "lo": -1.3, "hi": -1.2},
     **{"unit": "%", "config": "rls2", "case": "rls2", "expected": "< 0"},
+    **{"class": "confirmed", "original": "а", "extension": False, "exact": -1.25, "miss": 0.0, "worst_miss": 0.0},
+    **{"needed": "", "why": "", "holds": "", "of": "", "old_verdict": "confirmed", "ceiling": ""},
 }
 
 
 def test_the_page_of_claims():
-    counted = {**ROW, "claim": "P1.2", "what": "operations", "measured": 7.0, "lo": 7.0, "hi": 7.0, "unit": ""}
-    never = {**ROW, "claim": "P1.3", "overall": "not run", "measured": "", "reading": "so"}
+    counted = {
+        **ROW,
+        "claim": "P1.2",
+        "what": "operations",
+        "measured": 7.0,
+        "lo": 7.0,
+        "hi": 7.0,
+        "unit": "",
+        "exact": "",
+    }
+    never = {**ROW, "claim": "P1.3", "overall": "not run", "class": "not run", "measured": "", "reading": "so"}
     verdicts = ("refuted", *["confirmed"] * 3)
+    false = {"claim": "P1.4", "overall": "refuted", "class": "refuted", "worst_miss": 2.5}
     parts = [
-        {**ROW, "claim": "P1.4", "overall": "refuted", "verdict": v, "case": f"rls{i}"} for i, v in enumerate(verdicts)
+        {**ROW, **false, "verdict": v, "case": f"rls{i}", "miss": 2.5 if v == "refuted" else 0.0}
+        for i, v in enumerate(verdicts)
     ]
     text = page.page([ROW, counted, never, *parts], {ROW["paper"]: "range_doppler"})
     lines = [line for line in text.split("\n") if line.startswith("| P1")]
+    words = "a \\| b &lt; c «а»"
+    gain = "gain: −1.25 % exactly"
+    measured = "gain | −1.235 [−1.300, −1.200] % | −1.25 | &lt; 0 %"
     assert lines == [
-        "| P1.1 | a \\| b &lt; c | table | gain: −1.235 [−1.300, −1.200] % | **confirmed** | `rls2` |",
-        "| P1.2 | a \\| b &lt; c | table | operations: 7 | **confirmed** | `rls2` |",
-        "| P1.3 | a \\| b &lt; c *Read as: so.* | table |  | not run | `rls2` |",
-        "| P1.4 | a \\| b &lt; c | table | `rls0`: gain: −1.235 [−1.300, −1.200] %<br>(1 of 4 parts refuted) "
-        "| **refuted** | `rls2` |",
-        "| P1.1 | gain | −1.235 [−1.300, −1.200] % | &lt; 0 % | **confirmed** |",
-        "| P1.2 | operations | 7 | &lt; 0 | **confirmed** |",
-        "| P1.4 | `rls0`: gain | −1.235 [−1.300, −1.200] % | &lt; 0 % | **refuted** |",
-        *(f"| P1.4 | `rls{i}`: gain | −1.235 [−1.300, −1.200] % | &lt; 0 % | **confirmed** |" for i in (1, 2, 3)),
+        f"| P1.1 | {words} | table | {gain} (confirmed) | **confirmed** | `rls2` |",
+        f"| P1.2 | {words} | table | operations: 7 (confirmed) | **confirmed** | `rls2` |",
+        f"| P1.3 | {words} *Read as: so.* | table |  | not run | `rls2` |",
+        f"| P1.4 | {words} | table | `rls0`: {gain} (refuted)<br>`rls1`: {gain} (confirmed)<br>"
+        f"`rls2`: {gain} (confirmed)<br>(3 confirmed, 1 refuted of 4 parts) | **refuted** (by 2.5 margins) | `rls2` |",
+        f"| P1.1 | {measured} | 0 | **confirmed** | confirmed |",
+        "| P1.2 | operations | 7 |  | &lt; 0 | 0 | **confirmed** | confirmed |",
+        f"| P1.4 | `rls0`: {measured} | 2.5 | **refuted** | confirmed |",
+        *(f"| P1.4 | `rls{i}`: {measured} | 0 | **confirmed** | confirmed |" for i in (1, 2, 3)),
     ]
-    assert "In all: 2 confirmed, 1 not run, 1 refuted." in text
+    assert "* 2 confirmed: true as stated\n* 1 refuted" in text
 
 
 def test_measured_values_are_written_to_two_figures_of_their_half_width():

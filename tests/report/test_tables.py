@@ -67,7 +67,10 @@ def test_csv_reads_back_the_same(paper):
     table = tables.curves(paper[:1])
     table.loc[3, "exact_sigma"] = np.nan
     text = tables.to_csv(table).decode()
-    again = pd.read_csv(io.StringIO(text), float_precision="round_trip")
+    again = pd.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
+    for name in table:  # by Python's own reading of numbers, which is exact
+        if pd.api.types.is_numeric_dtype(table[name]):
+            again[name] = again[name].replace("", "nan").astype(float)
     pd.testing.assert_frame_equal(again, table, check_exact=True, check_dtype=False)
     assert ",,50000.0" in text.splitlines()[4]
     assert text.endswith("\n")

@@ -16,7 +16,11 @@ from radarsim.kernels import compile as compiling
 
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 WIDTH = 8
-SIZES = {"CHUNK": WIDTH, "GROUPS": 1}  # short chunks: a partial one is calculated whole, which takes its time here
+SIZES = {
+    "CHUNK": WIDTH,
+    "GROUPS": 1,
+    "EIGHTS": 1,
+}  # short chunks: a partial one is calculated whole, which takes its time here
 ran: set[str] = set()
 there: set[str] = set()
 
@@ -145,9 +149,16 @@ NEAR = "target={kind: polynomial, frame: polar, range_m: [900, -4], bearing_deg:
 DETECTORS = "{name: a, plots: 4, false_alarm_probability: [0.1]}, {name: b, plots: 4, test_every: 4, threshold_k: [2]}"
 HELD = ["scans=9", "target.x_m=900", "uses.at_s=[35]"]  # near: ranges beside their σ
 MANOEUVRE = [*HELD, "sweep.target.acceleration_mps2=[0.2]", f"detectors=[{DETECTORS}]"]
+DRAWN = "target={kind: polynomial, coefficients: [1e5, -250, 4], sigma_coefficients: [10, 1, 0.1]}"
+MISSES = ["scans=9", "radar.detection_probability=0.7", "radar.sigma_bias_range_m=20", DRAWN]
+FEW = "filters=[{name: H 3, doppler: folded, manoeuvre_variance: 1e-3, hypotheses: 3}]"
 # What is run: name → config, overrides, realisations; of several cases the last.
 RUNS = {
     "linear": ("rls2", ["scans=9"], 11),
+    "linear with misses": ("rls2", MISSES, 11),
+    "folds": ("ambiguous_depth", ["scans=4", FEW], 8),
+    "folds missed": ("ambiguous_missed", ["scans=5"], 8),
+    "orders": ("orders", ["scans=6"], 8),
     "sonar alike": ("sonar_smoothing", ["scans=9"], 9),
     "sonar correlated": ("sonar_correlated", ["scans=9"], 9),
     "sonar missed": ("sonar_missed", ["scans=12", "sweep.sensor.detection_probability=[0.7]", NEAR], 9),
@@ -219,6 +230,7 @@ def bursts(config, overrides, count):
 def tracks():
     """Plots that are drawn by themselves, and estimates over recorded ones."""
     from radarsim.kernels import linear
+    from radarsim.studies.ambiguous_doppler import track as ambiguous_plots
     from radarsim.studies.multimodel import study as multimodel
     from radarsim.studies.multimodel import track as multimodel_plots
     from radarsim.studies.range_doppler import track as range_doppler_plots
@@ -233,6 +245,10 @@ def tracks():
     tracker = range_doppler_plots.Tracker(one.case)
     recorded = range_doppler_plots.simulated(one.case, 3)
     made["linear track"] = np.nan_to_num(tracker.feed(recorded).estimate)
+    missed = range_doppler_plots.simulated(work(*RUNS["linear with misses"][:2]).case, 3)
+    made["plots with misses"] = np.nan_to_num(np.stack([missed["range_m"], missed["true_r_m"]]))
+    folded = ambiguous_plots.simulated(work(*RUNS["folds missed"][:2]).case, 3)
+    made["folded plots"] = np.nan_to_num(folded["velocity_mps"])
     likelihood = range_doppler_plots.PlotLikelihood(one.case, None, [recorded])
     made["linear likelihood"] = np.array([likelihood(likelihood.stated), likelihood(likelihood.stated, 0.1, 0.5)])
     one = work(*RUNS["multimodel families"][:2])

@@ -11,6 +11,10 @@ import pytest
 from tests.trust import plain
 
 AGREED = 1e-12
+# Runs that multiply rounding more. Covariances of each realisation's own, from a start of κ near 10⁴, so κε = 2·10⁻¹²;
+# weights of hypotheses are exponentials of up to −50, which multiplies a relative error by 50. A likelihood begins
+# with variances of 10⁹ beside plots of 1 … 10⁴.
+OWN = {"linear with misses": 1e-10, "folds": 1e-10, "folds missed": 1e-10, "orders": 1e-10, "tracks": 1e-10}
 ROOT = Path(__file__).parents[2]
 MOMENTS = ("error", "error_all", "ahead")  # Σe, Σe², Σe³, Σe⁴ in the last axis
 
@@ -53,7 +57,7 @@ def assert_agree(one, other):
     processor. So: five of six to 10⁻¹², and none elsewhere by a thousandth of a potential spread, or of its error.
     """
     wide = {name: apart(name, one[name], array) for name, array in other.items() if name not in (LOST, "bursts/each")}
-    assert {name: size for name, size in wide.items() if not size <= AGREED} == {}
+    assert {name: size for name, size in wide.items() if not size <= OWN.get(name.partition("/")[0], AGREED)} == {}
     found, expected = one["bursts/each"], other["bursts/each"]
     off = (np.abs(found - expected) / np.maximum(np.abs(expected), 1.0)).max(axis=-1)
     assert np.mean(off <= AGREED) >= 5 / 6
