@@ -16,7 +16,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError
 from radarsim.recorded import plots
-from radarsim.recorded.follow import one_case, recorded_of
+from radarsim.recorded.follow import by_track, one_case, recorded_of
 from radarsim.studies.interface import Likelihood
 
 HALF_CHI2_95 = 1.9207294103470  # half the 95 % point of chi-square with one degree of freedom
@@ -73,12 +73,11 @@ def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name
 
 def _tracks(source: str | os.PathLike, choices: Sequence[Sequence[str]]) -> list[dict[str, np.ndarray]]:
     """The columns (n,) of each track of a file of plots."""
-    parts: dict[str, list[dict[str, np.ndarray]]] = {}
+    parts: dict[str | None, list[dict[str, np.ndarray]]] = {}
     for piece in plots.pieces(source, choices):
-        names = piece.tracks or ["all"] * len(piece.columns["t_s"])
-        for name, rows in plots.grouped(names).items():
-            if name:
-                parts.setdefault(name, []).append({key: column[rows] for key, column in piece.columns.items()})
+        for name, columns, _ in by_track(piece):
+            if name != "":
+                parts.setdefault(name, []).append(columns)
     return [{key: np.concatenate([part[key] for part in own]) for key in own[0]} for own in parts.values()]
 
 

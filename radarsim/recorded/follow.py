@@ -300,7 +300,7 @@ def follow(
     for piece in plots.pieces(source, of.columns(case.spec), size, tracker.several):
         if followers and tracker.most_rows:
             raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
-        for name, columns, truth in _by_track(piece):
+        for name, columns, truth in by_track(piece):
             if name == "":
                 passed_over += len(columns["t_s"])
                 continue
@@ -316,7 +316,7 @@ def follow(
 Columns = dict[str, np.ndarray]
 
 
-def _by_track(piece: plots.Piece) -> Iterator[tuple[str | None, Columns, Columns]]:
+def by_track(piece: plots.Piece) -> Iterator[tuple[str | None, Columns, Columns]]:
     """Measured and true columns of each track by its name, or of all rows where tracks are not distinguished."""
     if piece.tracks is None:
         yield None, piece.columns, piece.truth

@@ -4,15 +4,24 @@ A message gives only the second of its minute. The time is that of the tag block
 a number or ISO time before the sentence; where there is neither, the seconds are made to run on from minute to minute.
 """
 
-import datetime
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator
 from types import ModuleType
 from typing import Any, BinaryIO
 
 from radarsim.errors import ConfigError
-from radarsim.recorded.formats.records import BATCH, POSITION_COLUMNS, POSITIONS, Batch, Gathered, Unrolled, needs
+from radarsim.recorded.formats.records import (
+    BATCH,
+    POSITION_COLUMNS,
+    POSITIONS,
+    Batch,
+    Gathered,
+    Unrolled,
+    needs,
+    utc_s,
+)
 
 pyais: ModuleType | None
 try:
@@ -49,7 +58,7 @@ class Ais:
             raise needs("pyais", "ais")
         self.path, self.file = path, file
         self.records = 0
-        self.skipped: dict[str, int] = {}
+        self.skipped: Counter[str] = Counter()
         self.open: dict[bytes, list[bytes]] = {}
         self.minute = Unrolled(60.0)
 
@@ -112,30 +121,26 @@ class Ais:
         except ValueError:
             pass
         try:
-            moment = datetime.datetime.fromisoformat(text)
+            return utc_s(text)
         except ValueError:
             must = "before the sentence must stand a time in s from 1970 or ISO 8601, or a tag block"
             read = f"{self.records} messages were read"
             raise ConfigError(f"{self.path}:{number}: {must}; got {text[:60]!r}; {read}") from None
-        return (moment if moment.tzinfo else moment.replace(tzinfo=datetime.UTC)).timestamp()
 
     def _take(self, message: Any, stated: float, gathered: Gathered) -> None:
         latitude, longitude = getattr(message, "lat", None), getattr(message, "lon", None)
         if latitude is None or longitude is None or message.msg_type not in (1, 2, 3, 18, 19):
-            self._skip("messages that are no ship's position")
+            self.skipped["messages that are no ship's position"] += 1
             return
         if None in (message.second, message.speed, message.course):
-            self._skip("messages cut short")
+            self.skipped["messages cut short"] += 1
             return
         second = int(message.second)
         if abs(latitude) > 90 or abs(longitude) > 180 or (math.isnan(stated) and second >= NO_SECOND):
-            self._skip("reports without position or time")
+            self.skipped["reports without position or time"] += 1
             return
         t = self.minute(second) if math.isnan(stated) else stated
         speed, course = float(message.speed), math.radians(float(message.course))
         known = speed <= NO_SPEED and float(message.course) < NO_COURSE
         east, north = (speed * KNOT_MPS * part(course) if known else math.nan for part in (math.sin, math.cos))
         gathered.add(str(message.mmsi), str(message.mmsi), (t, latitude, longitude, 0.0, east, north, 0.0))
-
-    def _skip(self, what: str) -> None:
-        self.skipped[what] = self.skipped.get(what, 0) + 1

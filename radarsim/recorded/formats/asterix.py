@@ -9,6 +9,7 @@ specification (7 bits a byte, the eighth says that another byte follows) and the
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import cache
 from types import ModuleType
@@ -184,7 +185,8 @@ def _compound(variation: Any) -> Skip:
     parts = [one and skip(variation_of(one.cv_rule)) for one in variation.cv_items_list]
 
     def end(data: bytes, at: int) -> int:
-        numbers, begin, at = _named(data, at)
+        begin = at
+        numbers, at = _named(data, at)
         for number in numbers:
             part = parts[number] if number < len(parts) else None
             if part is None:
@@ -195,8 +197,8 @@ def _compound(variation: Any) -> Skip:
     return end
 
 
-def _named(data: bytes, at: int) -> tuple[list[int], int, int]:
-    """The numbers, from 0, that a field specification names; where it begins and where it ends."""
+def _named(data: bytes, at: int) -> tuple[list[int], int]:
+    """The numbers, from 0, that a field specification names, and where it ends."""
     begin, numbers = at, []
     while True:
         if at >= len(data):
@@ -205,7 +207,14 @@ def _named(data: bytes, at: int) -> tuple[list[int], int, int]:
         numbers += [7 * (at - begin) + bit for bit in range(7) if byte >> (7 - bit) & 1]
         at += 1
         if not byte & 1:
-            return numbers, begin, at
+            return numbers, at
+
+
+def _after_specification(data: bytes, at: int) -> int:
+    """Where a field specification ends, whatever it names; beyond the data if it does not end."""
+    while at < len(data) and data[at] & 1:
+        at += 1
+    return at + 1
 
 
 class _Profile:
@@ -225,10 +234,7 @@ class _Profile:
 
     def places(self, data: bytes, at: int) -> tuple[list[int], int]:
         """Where each wanted item begins, -1 where it is not there, and where the record ends."""
-        begin = at
-        while at < len(data) and data[at] & 1:
-            at += 1
-        at += 1
+        begin, at = at, _after_specification(data, at)
         plan = self.plans.get(data[begin:at])
         if plan is None:
             plan = self._plan(data, begin)
@@ -242,7 +248,7 @@ class _Profile:
         return places, at
 
     def _plan(self, data: bytes, begin: int) -> list[tuple[int, str, Skip]]:
-        numbers, _, at = _named(data, begin)
+        numbers, at = _named(data, begin)
         plan = []
         for number in numbers:
             item = self.items[number] if number < len(self.items) else None
@@ -321,10 +327,7 @@ class _Plots001:
 
     def row(self, data: bytes, at: int) -> tuple[str, str, tuple[float, ...] | None, int]:
         """As of category 048; the profile hangs on the first bit of item 020, the second item of both."""
-        kind = at
-        while kind < len(data) and data[kind] & 1:
-            kind += 1
-        kind += 3  # after the field specification and the two bytes of item 010
+        kind = _after_specification(data, at) + 2  # item 010 has two bytes
         tracked = kind < len(data) and bool(data[kind] & 0x80)
         places, end = (self.tracked if tracked else self.plot).places(data, at)
         time, place, level, doppler, *number = places
@@ -379,7 +382,7 @@ class _Tracks062:
         )
         named = ""
         if derived >= 0 and data[derived] & 0x80:  # the address is the first part of the item
-            _, _, begin = _named(data, derived)
+            _, begin = _named(data, derived)
             named = data[begin : begin + 3].hex()
         return str(int(self.number.of(data, number))) if number >= 0 else named, named, row, end
 
@@ -392,7 +395,7 @@ class Asterix:
     def __init__(self, path: str, file: BinaryIO):
         self.path, self.file = path, file
         self.records = 0
-        self.skipped: dict[str, int] = {}
+        self.skipped: Counter[str] = Counter()
         self.decoders: dict[int, Any] = {48: _Plots048(), 1: _Plots001(), 62: _Tracks062()}
         self.sectors = _Profile(2, ("030",))
         self.sector_time = field(self.sectors.spec, "030")
@@ -439,13 +442,13 @@ class Asterix:
             return
         decoder, at = self.decoders.get(category), 3
         if decoder is None:
-            self._skip(f"data blocks of category {category:03d}")
+            self.skipped[f"data blocks of category {category:03d}"] += 1
             return
         while at < len(data):
             track, address, row, at = decoder.row(data, at)
             self.records += 1
             if row is None:
-                self._skip("records without time or position")
+                self.skipped["records without time or position"] += 1
             else:
                 gathered.add(track, address, (self.clock(row[0]), *row[1:]))
 
@@ -456,9 +459,6 @@ class Asterix:
             (place,), at = self.sectors.places(data, at)
             if place >= 0:
                 self.decoders[1].full = self.sector_time.of(data, place)
-
-    def _skip(self, what: str) -> None:
-        self.skipped[what] = self.skipped.get(what, 0) + 1
 
 
 def looks_like(head: bytes) -> bool:

@@ -19,7 +19,7 @@ from radarsim.errors import ConfigError
 from radarsim.recorded.formats import ais, asterix
 from radarsim.recorded.formats.ais import Ais
 from radarsim.recorded.formats.asterix import Asterix
-from radarsim.recorded.formats.records import DAY_S, PLOTS, POSITIONS, Batch, Reader, counted
+from radarsim.recorded.formats.records import DAY_S, PLOTS, POSITIONS, Batch, Reader, counted, utc_s
 from radarsim.recorded.formats.site import Antenna, Site, biconical, described
 from radarsim.recorded.formats.text import Table
 from radarsim.report.files import Writer
@@ -436,10 +436,9 @@ def zero_of(text: str) -> str | float:
     if text in ("first", "midnight"):
         return text
     try:
-        moment = datetime.datetime.fromisoformat(text)
+        return utc_s(text)
     except ValueError:
         raise ConfigError(f"time-from: must be first, midnight or a date and time (ISO 8601), got {text!r}") from None
-    return (moment if moment.tzinfo else moment.replace(tzinfo=datetime.UTC)).timestamp()
 
 
 def columns_of(texts: Sequence[str]) -> dict[str, str]:

@@ -1,5 +1,7 @@
 """What every reader of a recording gives: some records at a time, as columns."""
 
+import datetime
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
@@ -39,7 +41,7 @@ class Reader(Protocol):
 
     of_day: bool
     records: int
-    skipped: dict[str, int]
+    skipped: Counter[str]
 
     def batches(self) -> Iterator[Batch]:
         """The records, some at a time; raises ConfigError with file, place, what was expected and read."""
@@ -94,6 +96,12 @@ class Unrolled:
                 return t + (self.turns - 1) * self.period_s
         self.last = t
         return t + self.turns * self.period_s
+
+
+def utc_s(text: str) -> float:
+    """Seconds from 1970 of a date and time in ISO 8601, in UTC where it names no zone; raises ValueError."""
+    moment = datetime.datetime.fromisoformat(text)
+    return (moment if moment.tzinfo else moment.replace(tzinfo=datetime.UTC)).timestamp()
 
 
 def needs(module: str, extra: str) -> ConfigError:

@@ -5,9 +5,9 @@ Columns are found by their names, whatever the case and the spaces; a unit may s
 """
 
 import csv
-import datetime
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from typing import TextIO
 
@@ -20,6 +20,7 @@ from radarsim.recorded.formats.records import (
     POSITIONS,
     Batch,
     Gathered,
+    utc_s,
 )
 
 MOST_FAULTS = 20
@@ -75,7 +76,7 @@ class Table:
         self.path = path
         self.rows = csv.reader(file, strict=True)
         self.records = 0
-        self.skipped: dict[str, int] = {}
+        self.skipped: Counter[str] = Counter()
         self.faults: list[str] = []
         try:
             header = next((row for row in self.rows if row and not row[0].startswith("#")), [])
@@ -149,9 +150,7 @@ class Table:
             return
         row = row_of(cells)
         if any(math.isnan(row[i]) for i in ((0, 1, 2) if self.kind == POSITIONS else (0, 1))):
-            self.skipped["records without time or position"] = (
-                self.skipped.get("records without time or position", 0) + 1
-            )
+            self.skipped["records without time or position"] += 1
             return
         name = cells[self.columns["track"].place].strip() if "track" in self.columns else "1"
         gathered.add(name, name.lower(), row)
@@ -179,11 +178,10 @@ class Table:
         except ValueError:
             pass
         try:
-            moment = datetime.datetime.fromisoformat(text)
+            return utc_s(text)
         except ValueError:
             self._fault("t_s", f"must be a time in s or ISO 8601, got {text[:60]!r}")
             return math.nan
-        return (moment if moment.tzinfo else moment.replace(tzinfo=datetime.UTC)).timestamp()
 
     def _number(self, cells: list[str], name: str) -> float:
         column = self.columns.get(name)
