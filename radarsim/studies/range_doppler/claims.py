@@ -43,6 +43,21 @@ def _claim(number: int, place: str, statement: str, *parts: Part, original: str,
     return Claim(f"P1.{number}", place, statement, parts, reading, "range_doppler", original)
 
 
+def _falls(component: str, words: str, first_k: int) -> list[Part]:
+    """A part for each radar and filter: how far σ of a component rises again over an earlier scan, from first_k on."""
+    return [
+        Part(
+            (n,),
+            f"largest rise of σ of {words} over an earlier scan, {of}",
+            "%",
+            measured.largest_rise(n, observes, component, first_k),
+            same(0, 100 * SETTLED),
+        )
+        for n in RADARS
+        for observes, of in BOTH
+    ]
+
+
 CLAIMS = (
     _claim(
         1,
@@ -479,17 +494,7 @@ CLAIMS = (
         26,
         "figures, after figure 2",
         "From the 2nd scan on all errors of the velocity fall to a steady value",
-        *(
-            Part(
-                (n,),
-                f"largest rise of σ of velocity over an earlier scan, {words}",
-                "%",
-                measured.largest_rise(n, observes, "Vr", 2),
-                same(0, 100 * SETTLED),
-            )
-            for n in RADARS
-            for observes, words in BOTH
-        ),
+        *_falls("Vr", "velocity", 2),
         original="Начиная со 2-го шага, все ошибки фильтрации убывают до установившегося значения, определенного "
         "дисперсией маневра.",
         reading="falls to: no scan from the 2nd on is more above an earlier one than the 5 % within which P1.14 "
@@ -499,17 +504,7 @@ CLAIMS = (
         27,
         "figures, before figure 3",
         "All errors of the acceleration fall to a limit",
-        *(
-            Part(
-                (n,),
-                f"largest rise of σ of acceleration over an earlier scan, {words}",
-                "%",
-                measured.largest_rise(n, observes, "ar", 1),
-                same(0, 100 * SETTLED),
-            )
-            for n in RADARS
-            for observes, words in BOTH
-        ),
+        *_falls("ar", "acceleration", 1),
         original="Все зависимости СКО ошибок фильтрации радиального ускорения убывают до предела, который определяется "
         "параметрами станции и дисперсией случайного маневра.",
         reading="falls to: no scan is more above an earlier one than the 5 % within which P1.14 calls a curve settled",

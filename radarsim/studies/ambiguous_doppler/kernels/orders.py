@@ -37,6 +37,7 @@ from radarsim.studies.ambiguous_doppler.kernels.steps import (
     three,
     velocity_taken,
     whether_right,
+    widened,
 )
 
 # Rows of one order in memory: state, covariance, probability after the scan, and before it, distance of its plot.
@@ -129,14 +130,7 @@ def taken(own, design, sigma, plot, D, unfolding, moves):
         distance = distance + came * (e * e) / S
         factor = factor * where_greater(came, zero, total / root(S), one)
         x = moved(x, g, mean)
-        P = (
-            P[0] + g[0] * g[0] * variance,
-            P[1] + g[0] * g[1] * variance,
-            P[2] + g[0] * g[2] * variance,
-            P[3] + g[1] * g[1] * variance,
-            P[4] + g[1] * g[2] * variance,
-            P[5] + g[2] * g[2] * variance,
-        )
+        P = widened(P, g, variance)
     put_three(own, STATE, x)
     put_six(own, COVARIANCE, P)
     put(own, PROBABILITY, factor)

@@ -72,6 +72,19 @@ def moved(x, g, e):
 
 
 @inline
+def widened(P, g, variance):
+    """P + variance g g', P packed: what is not known of an innovation that was taken with the gain g."""
+    return (
+        P[0] + g[0] * g[0] * variance,
+        P[1] + g[0] * g[1] * variance,
+        P[2] + g[0] * g[2] * variance,
+        P[3] + g[1] * g[1] * variance,
+        P[4] + g[1] * g[2] * variance,
+        P[5] + g[2] * g[2] * variance,
+    )
+
+
+@inline
 def range_taken(P, first, taken, variance):
     """Covariance after a range of that variance, 1/(2S) and gains; `first` (0 or 1) is a track's first, which sets it.
 
@@ -216,12 +229,5 @@ def run_merged(design, sigma, spans, plots, out):
         P, S, g = velocity_taken(P, came, sigma[1] * sigma[1])
         mean, variance, _ = folds_merged(e, S, D)
         x = moved(x, g, mean)
-        P = (
-            P[0] + g[0] * g[0] * variance,
-            P[1] + g[0] * g[1] * variance,
-            P[2] + g[0] * g[2] * variance,
-            P[3] + g[1] * g[1] * variance,
-            P[4] + g[1] * g[2] * variance,
-            P[5] + g[2] * g[2] * variance,
-        )
+        P = widened(P, g, variance)
         put_single(row(out, k * OUTPUT), x, right)
