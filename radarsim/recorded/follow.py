@@ -19,14 +19,13 @@ from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
 from radarsim.recorded import plots
 from radarsim.recorded.rounding import Twin
-from radarsim.studies.interface import RecordedPlots
+from radarsim.studies.interface import RecordedPlots, true_column
 from radarsim.studies.registry import study
 
 MOST_DRAWN = 2000  # rows kept for figures; of more, every second is dropped again and again
 GAP = 3.0  # intervals' median lengths that make a gap
 MOST_NAMED = 12  # configs or values listed where one must be chosen
 BEFORE = 10  # estimates of a filter's start that do not count against the truth
-UNITS = {"m/s": "mps", "m/s2": "mps2", "rad/s": "radps", "rad/s2": "radps2"}  # as in the names of columns
 HEAD = 5000  # rows that a better σ is looked for on
 
 
@@ -187,7 +186,7 @@ class Followed:
         """Count the errors of a piece of the track; truth: columns (n,) `true_COMPONENT_UNIT` at times t_s (n,)."""
         rows = np.searchsorted(t_s, track.t_s)  # of several plots of a time the track has one row
         for c, (component, unit) in enumerate(track.components):
-            column = truth.get(f"{plots.TRUE}{component}_{UNITS.get(unit, unit)}")
+            column = truth.get(true_column(component, unit))
             if column is None:
                 continue
             error = track.estimate[:, :, c] - column[rows]

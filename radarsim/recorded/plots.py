@@ -17,6 +17,7 @@ import numpy as np
 from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
 from radarsim.report.files import Writer
+from radarsim.studies.interface import TRUE
 
 if TYPE_CHECKING:
     import _csv
@@ -25,7 +26,6 @@ MOST_FAULTS = 20  # reported at once; a file of the wrong kind would have one in
 LARGEST = 1e18  # of any number, as in configs
 SEPARATORS = {";": "semicolons", "\t": "tabulators"}  # of other programs
 DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
-TRUE = "true_"  # what the names of the truth's columns begin with
 TRACK = "track"  # the column that tells several tracks of a file apart
 CHUNK = 20_000  # rows read, filtered and written at a time
 

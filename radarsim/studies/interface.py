@@ -61,6 +61,15 @@ class Tracker(Protocol):
         """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
 
 
+TRUE = "true_"  # what the names of columns that hold the truth begin with
+IN_NAMES = {"m/s": "mps", "m/s2": "mps2", "rad/s": "radps", "rad/s2": "radps2"}  # units; others stand as they are
+
+
+def true_column(component: str, unit: str) -> str:
+    """The column of plots that holds the truth of a component of the state: `true_Vr_mps`."""
+    return f"{TRUE}{component}_{IN_NAMES.get(unit, unit)}"
+
+
 class Likelihood(Protocol):
     """How likely recorded plots are under a filter, by the keys of the config that it was designed with.
 

@@ -12,7 +12,7 @@ from radarsim.kernels.lanes import WIDTH
 from radarsim.studies.ambiguous_doppler import filters
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
 from radarsim.studies.ambiguous_doppler.study import COMPONENTS, prepare
-from radarsim.studies.interface import RecordedPlots
+from radarsim.studies.interface import RecordedPlots, true_column
 
 COLUMNS = ("t_s", "range_m", "velocity_mps")
 FARTHEST = 9.0  # standard deviations of the velocity's innovation up to which folds are looked at
@@ -31,7 +31,7 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
         "velocity_mps": np.where(came, own[:, records.VELOCITY], np.nan),
     }
     truth = own[:, records.TRUTH : records.TRUTH + 3]
-    return measured | dict(zip(("true_r_m", "true_Vr_mps", "true_ar_mps2"), truth.T, strict=True))
+    return measured | dict(zip((true_column(*one) for one in COMPONENTS), truth.T, strict=True))
 
 
 class Tracker:

@@ -9,7 +9,7 @@ from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.kernels import random
 from radarsim.kernels.lanes import WIDTH, rows
-from radarsim.studies.interface import RecordedPlots
+from radarsim.studies.interface import RecordedPlots, true_column
 from radarsim.studies.multimodel import filters
 from radarsim.studies.multimodel.config import Filter, Keys
 from radarsim.studies.multimodel.kernels import strip as strips
@@ -70,8 +70,7 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     columns = {t: scan_times(case)[0]} | dict(zip(names, found.T, strict=True))
     if case.spec.sensor.sigma_range_m is not None:
         columns |= {f"true_{name}": exact[:, i] for i, name in enumerate(names)}
-    units = {"m": "m", "m/s": "mps", "m/s2": "mps2"}
-    return columns | {f"true_{name}_{units[unit]}": plan.world.truth[:, i] for i, (name, unit) in enumerate(COMPONENTS)}
+    return columns | {true_column(*component): plan.world.truth[:, i] for i, component in enumerate(COMPONENTS)}
 
 
 def normals(key: np.ndarray, realisation: int, count: int) -> np.ndarray:

@@ -8,7 +8,7 @@ from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.kernels import linear
 from radarsim.physics.motion import transition
-from radarsim.studies.interface import RecordedPlots
+from radarsim.studies.interface import RecordedPlots, true_column
 from radarsim.studies.range_doppler.config import Filter, Keys
 from radarsim.studies.range_doppler.filters import noise_by_time, noise_over, observation
 from radarsim.studies.range_doppler.kernels import missed, rows
@@ -43,7 +43,7 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     else:
         (plots,), truth = linear.simulate_plots(plan.problem, realisation, 1), plan.problem.truth
     measured = {"t_s": plan.axes.t_s, "range_m": plots[:, 0], "velocity_mps": plots[:, 1]}
-    return measured | dict(zip(("true_r_m", "true_Vr_mps", "true_ar_mps2"), truth.T, strict=True))
+    return measured | dict(zip((true_column(*one) for one in COMPONENTS), truth.T, strict=True))
 
 
 def variances_of(case: Case) -> Sequence[float]:

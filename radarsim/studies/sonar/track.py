@@ -7,6 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
+from radarsim.studies.interface import true_column
 from radarsim.studies.sonar import banks, filters, world
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.config import Keys
@@ -16,7 +17,6 @@ from radarsim.studies.sonar.responding import estimate_recorded
 from radarsim.studies.sonar.scene import build_scene, filter_specs, third_coordinate
 
 MOST_ROWS = 200_000  # of a file: designs of all rows are kept in memory
-UNITS = {"m": "m", "m/s": "mps", "m/s2": "mps2", "rad": "rad", "rad/s": "radps", "rad/s2": "radps2"}
 RANGE, BEARING = "sensor.sigma_range_m", "sensor.sigma_bearing_rad"
 THIRD = {"depth": ("depth_m", "sensor.sigma_depth_m"), "elevation": ("elevation_rad", "sensor.sigma_elevation_rad")}
 OPTIMAL = ("growing_memory", "window", "kalman")  # kinds whose residuals have a known variance if errors are white
@@ -63,7 +63,7 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     columns = {t: scene.t} | dict(zip(names, np.where(measured_there, values, np.nan).T, strict=True))
     columns |= {f"true_{name}": exact[:, c] for c, name in enumerate(names)}
     components = zip(base.labels(spec, 3), truth.reshape(K, -1).T, strict=True)
-    return columns | {f"true_{name}_{UNITS[unit]}": state for (name, unit), state in components}
+    return columns | {true_column(name, unit): state for (name, unit), state in components}
 
 
 class Derived(NamedTuple):
