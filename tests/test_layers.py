@@ -20,12 +20,13 @@ DATA = ("engine.moments", "engine.results")  # the engine's plain data, which st
 CASE = ("config.experiment", "config.fields", "config.identity")
 ROOMS = {
     "errors": (),
-    "config": ("errors",),
+    "config": ("errors", "physics"),
     "engine": ("errors",),
     "kernels": (),
     "physics": (),
     "report": ("errors", "config", *DATA),
     "studies.noise": (*CASE, "kernels.random"),
+    "studies.radial": ("errors", "physics"),
     "studies.interface": (*CASE, *DATA, "report"),
     "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "studies.interface"),
     "studies.registry": ("errors", "config", "studies.interface"),
@@ -39,7 +40,7 @@ ROOMS = {
 
 # Inside a study: what of the shared rooms a role stands on, and on which roles of its own study.
 GROUND = ("errors", "kernels", "physics", *CASE)
-KEYS = ("errors", "config.faults", "config.fields", "physics")
+KEYS = ("errors", "config.faults", "config.fields", "config.radial", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
 SHOWN = (*SUMS, "cost", "tables", "figures", "map")
@@ -47,7 +48,10 @@ READ = (*SHOWN, "words", "claims", "measures", "readings", "search")
 ROLES = {
     "kernels": (("kernels",), ("kernels",)),
     "config": (KEYS, ("config",)),
-    "design": ((*GROUND, *DATA, "studies.noise"), DESIGN),  # world, filters, exact, and whatever else prepares numbers
+    "design": (
+        (*GROUND, *DATA, "studies.noise", "studies.radial"),
+        DESIGN,
+    ),  # world, filters, exact, and whatever else prepares numbers
     "study": ((*GROUND, *DATA, "studies.noise"), SUMS),
     "cost": ((*GROUND, *DATA), (*SUMS, "cost")),
     "tables": ((*GROUND, *DATA, "report"), SHOWN),

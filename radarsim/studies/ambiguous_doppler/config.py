@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from radarsim.config import radial
 from radarsim.config.fields import (
     At,
     Design,
@@ -16,6 +17,7 @@ from radarsim.config.fields import (
     NonNegative,
     Number,
     Positive,
+    Probability,
     Scenario,
     Study,
     Whole,
@@ -24,7 +26,18 @@ from radarsim.config.fields import (
     of_each,
     unique_names,
 )
-from radarsim.physics.bands import Band
+from radarsim.config.radial import (
+    COEFFICIENTS,
+    AccelerationStart,
+    Coefficients,
+    FlyBy,
+    Polynomial,
+    Recorded,
+    Starting,
+    Turn,
+    polynomial_reach_m,
+)
+from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
 
 MOST_SCANS = 10_000  # plots and estimates of eight realisations are held for the whole run
 MOST_HYPOTHESES = 100_000
@@ -41,24 +54,16 @@ COMBINING = {  # keys of a combination: of which, and the default
 }
 
 Order = Annotated[int, Whole(0, 2)]
-Coefficients = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
 
 
-class Radar(Model):
+class Radar(radial.Radar):
     """A coherent surveillance radar: accuracies of one plot, period of its scans, pulse repetition rates."""
 
-    name: Annotated[Name | None, Display()] = Field(None, description="display name")
-    band: Annotated[Band | None, Display()] = Field(
-        None, description="wave band, for display: by its wavelength, or by its letter (IEEE Std 521)"
-    )
-    wavelength_m: Positive = Field(description="wavelength, m: the span of velocity is half of it times the rate")
-    sigma_range_m: Positive = Field(description="standard deviation of a measured range, m")
-    sigma_velocity_mps: Positive = Field(description="standard deviation of a measured radial velocity, m/s")
-    scan_period_s: Positive = Field(description="time between two plots, s")
     repetition_rate_hz: Positive | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_RATES)] = Field(
-        description="pulse repetition rate, Hz; a list is used in turn, scan by scan (stagger)"
+        description="pulse repetition rate, Hz; velocity folds into half the wavelength times it; a list is used in "
+        "turn, scan by scan (stagger)"
     )
-    detection_probability: Annotated[float, Field(gt=0, le=1)] = Field(
+    detection_probability: Annotated[Probability, Field(gt=0)] = Field(
         1.0, description="probability that a scan gives a plot"
     )
 
@@ -89,15 +94,6 @@ class Prior(Model):
     sigma_acceleration_mps2: Positive = Field(10.0, description="of the radial acceleration, m/s²")
 
 
-class Polynomial(Model):
-    """A range that is a polynomial of time; up to the second degree it fits the filters' model exactly."""
-
-    kind: Literal["polynomial"] = Field(description="a polynomial of any degree up to 11")
-    coefficients: Coefficients = Field(
-        description="derivatives of range at the first plot: m, m/s, m/s², … (the sum of c_i t^i / i!)"
-    )
-
-
 class RandomPolynomial(Model):
     """A polynomial of the second degree that each realisation draws: velocity and acceleration at the first scan.
 
@@ -118,17 +114,23 @@ class AccelerationPulse(Model):
     """A polynomial with a constant acceleration for a while; the velocity it has built up stays."""
 
     kind: Literal["acceleration_pulse"] = Field(description="a constant acceleration for a while")
-    coefficients: Coefficients = Field(
-        description="derivatives of range at the first plot: m, m/s, m/s², … (the sum of c_i t^i / i!)"
-    )
+    coefficients: Coefficients = Field(description=COEFFICIENTS)
     acceleration_g: Annotated[Number, Field(ge=-100, le=100)] = Field(
         description="radial acceleration added, standard gravities"
     )
     start_s: NonNegative = Field(description="time from the first scan at which it begins, s")
     duration_s: Positive = Field(description="how long it lasts, s")
 
+    def reach_m(self, t: float) -> float:
+        """A bound on the range up to a time t (s)."""
+        added = abs(self.acceleration_g) * STANDARD_GRAVITY_MPS2 * t**2 / 2
+        return polynomial_reach_m(self.coefficients, t) + added
 
-Target = Annotated[Polynomial | RandomPolynomial | AccelerationPulse, Field(discriminator="kind")]
+
+Target = Annotated[
+    Polynomial | RandomPolynomial | AccelerationStart | AccelerationPulse | Turn | FlyBy | Recorded,
+    Field(discriminator="kind"),
+]
 
 
 class Manoeuvres(Model):
@@ -259,7 +261,9 @@ class Keys(Study):
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
-        """The target with its spreads written out."""
+        """The target with its start in seconds, or its spreads written out."""
+        if isinstance(self.target, Starting):
+            return self.model_copy(update={"target": self.target.timed(self.radar.scan_period_s)})
         if not isinstance(self.target, RandomPolynomial):
             return self
         own = {
@@ -285,12 +289,8 @@ class Keys(Study):
         if prior.sigma_acceleration_mps2 * radar.scan_period_s > PROPORTION * radar.sigma_velocity_mps:
             few = f"{PROPORTION:g} times the velocity's accuracy a scan period"
             yield at("prior.sigma_acceleration_mps2", f"must be at most {few}")
-        if isinstance(self.target, Polynomial | AccelerationPulse):
-            reach = sum(abs(c) * last**i / math.factorial(i) for i, c in enumerate(self.target.coefficients))
-            if reach > radar.sigma_range_m * 1e11:
-                yield at(
-                    "target", f"must stay within {radar.sigma_range_m * 1e11:g} m of the radar up to the last plot"
-                )
+        if not isinstance(self.target, RandomPolynomial):
+            yield from radial.within_reach(self.target, radar, last)
 
     @cross_check
     def _every_plot(self) -> Iterator[At]:

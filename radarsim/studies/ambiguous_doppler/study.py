@@ -35,7 +35,7 @@ def prepare(case: Case) -> Plan:
     t = np.arange(spec.scans) * radar.scan_period_s
     observed = records.World(
         keys=plain([noise_key(case, what) for what in ("plots", "detections", "target")], 3, 2, dtype=np.uint64),
-        truth=plain(world.truth(spec.target, t), spec.scans, 3),
+        truth=plain(world.truth(spec.target, t, case.name), spec.scans, 3),
         t=t,
         spread=world.spread(spec.target),
         sigma=np.array([radar.sigma_range_m, radar.sigma_velocity_mps]),

@@ -5,25 +5,17 @@ from typing import Any
 import numpy as np
 
 from radarsim.physics import targets
-from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
+from radarsim.studies import radial
 
 
-def truth(target: Any, t: np.ndarray) -> np.ndarray:
-    """Mean range, radial velocity and acceleration (K, 3) of a configured target at times t (K,), in m, m/s, m/s²."""
-    match target.kind:
-        case "polynomial":
-            return targets.polynomial(target.coefficients, t)
-        case "acceleration_pulse":
-            return targets.acceleration_pulse(
-                target.coefficients,
-                target.acceleration_g * STANDARD_GRAVITY_MPS2,
-                target.start_s,
-                target.duration_s,
-                t,
-            )
-        case "random_polynomial":
-            return targets.polynomial((target.range_m,), t)
-    raise ValueError(f"no such target: {target}")
+def truth(target: Any, t: np.ndarray, case: str) -> np.ndarray:
+    """Mean range, radial velocity and acceleration (K, 3) of a configured target at times t (K,), in m, m/s, m/s².
+
+    Raises ConfigError, with the name of the case, for a target that cannot be.
+    """
+    if target.kind == "random_polynomial":
+        return targets.polynomial((target.range_m,), t)
+    return radial.checked_truth(target, t, case)
 
 
 def spread(target: Any) -> np.ndarray:

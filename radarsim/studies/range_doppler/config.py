@@ -1,16 +1,14 @@
 """Keys of the range_doppler study (P1): a radar, a target in range, linear filters with and without the velocity."""
 
-import math
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validator
 
-from radarsim.config.faults import short
+from radarsim.config import radial
 from radarsim.config.fields import (
     Added,
     At,
-    DataFile,
     Design,
     Display,
     Model,
@@ -30,29 +28,24 @@ from radarsim.config.fields import (
     readable,
     unique_names,
 )
-from radarsim.physics.bands import Band, outside_band
-from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
+from radarsim.config.radial import (
+    COEFFICIENTS,
+    HARDEST_MPS2,
+    MOST_SCANS,
+    Coefficients,
+    FlyBy,
+    Recorded,
+    Starting,
+    Turn,
+    polynomial_reach_m,
+)
 
-MOST_SCANS = 100_000
-FARTHEST_M = 1e15  # a range that still resolves a metre in double precision
-RESOLVED = 1e-4 * 2.0**52  # range over accuracy at which rounding reaches a ten-thousandth of the accuracy
-NEAREST_M = 100.0  # a target that flies over the radar has no radial motion that a filter could follow
-FASTEST_MPS = 12_000.0  # escape from the Earth
-HARDEST_MPS2 = 1000.0  # about 100 g, more than any missile's
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
 
 
-class Radar(Model):
+class Radar(radial.Radar):
     """A surveillance radar: accuracies of one plot, the period of its scans, and what is wrong with its plots."""
 
-    name: Annotated[Name | None, Display()] = Field(None, description="display name")
-    band: Annotated[Band | None, Display()] = Field(
-        None, description="wave band, for display: by its wavelength, or by its letter (IEEE Std 521)"
-    )
-    wavelength_m: Positive = Field(description="wavelength, m: gives the Doppler frequency of a velocity")
-    sigma_range_m: Positive = Field(description="standard deviation of a measured range, m")
-    sigma_velocity_mps: Positive = Field(description="standard deviation of a measured radial velocity, m/s")
-    scan_period_s: Positive = Field(description="time between two plots, s")
     repetition_rate_hz: Positive = Field(
         1000.0, description="pulse repetition rate, Hz: gives the unambiguous velocity; nothing is folded by it"
     )
@@ -68,12 +61,6 @@ class Radar(Model):
         0.0, description="standard deviation of a further error of velocity, drawn once a realisation, m/s"
     )
 
-    @cross_check
-    def _in_its_band(self) -> Iterator[At]:
-        limits = outside_band(self.band, self.wavelength_m)
-        if limits is not None:
-            yield at("band", f"{self.band} is {' to '.join(map(short, limits))} m, not {short(self.wavelength_m)}")
-
     @property
     def as_the_papers(self) -> bool:
         """Whether every scan gives a plot, and plots err by noise alone."""
@@ -81,64 +68,20 @@ class Radar(Model):
         return self.detection_probability == 1 and not any(errors)
 
 
-Coefficients = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
-COEFFICIENTS = "derivatives of range at the first plot: m, m/s, m/s², … (the sum of c_i t^i / i!)"
 Spread = Annotated[tuple[NonNegative, ...], Field(max_length=3), Added()]
-
-
 DRAWN = "standard deviations with which the first three coefficients are drawn for each realisation"
 
 
-class Polynomial(Model):
+class Polynomial(radial.Polynomial):
     """A range that is a polynomial of time; up to the second degree it fits the filters' model exactly."""
 
-    kind: Literal["polynomial"] = Field(description="a polynomial of any degree up to 11")
-    coefficients: Coefficients = Field(description=COEFFICIENTS)
     sigma_coefficients: Spread = Field((), description=DRAWN)
 
-    def reach_m(self, t: float) -> float:
-        """A bound on the range up to a time t (s)."""
-        return polynomial_reach_m(self.coefficients, t)
 
-
-def polynomial_reach_m(coefficients: tuple[float, ...], t: float) -> float:
-    """A bound on the size of a polynomial up to a time t (s)."""
-    return sum(abs(c) * t**i / math.factorial(i) for i, c in enumerate(coefficients))
-
-
-class Starting(Model):
-    """What targets that break the model share: a moment, in seconds or as a scan, at which they do."""
-
-    start_s: NonNegative | None = Field(None, description="time from the first plot at which it begins, s")
-    start_scan: Annotated[int, Whole(1, MOST_SCANS)] | None = Field(
-        None, description="scan, counted from 1, at which it begins; in place of start_s"
-    )
-
-    @cross_check
-    def _one_start(self) -> Iterator[At]:
-        if (self.start_s is None) == (self.start_scan is None):
-            yield at("start_s", "give either start_s or start_scan")
-
-    def timed(self, period: float) -> Self:
-        """The same target with its start in seconds."""
-        if self.start_scan is None:
-            return self
-        return self.model_copy(update={"start_s": (self.start_scan - 1) * period, "start_scan": None})
-
-
-class AccelerationStart(Starting):
+class AccelerationStart(radial.AccelerationStart):
     """A polynomial that begins to accelerate (or brake) at a moment."""
 
-    kind: Literal["acceleration_start"] = Field(description="a constant acceleration that sets in at a moment")
-    coefficients: Coefficients = Field(description=COEFFICIENTS)
     sigma_coefficients: Spread = Field((), description=DRAWN)
-    acceleration_mps2: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = Field(
-        description="radial acceleration added from then on, m/s²"
-    )
-
-    def reach_m(self, t: float) -> float:
-        """A bound on the range up to a time t (s)."""
-        return polynomial_reach_m(self.coefficients, t) + abs(self.acceleration_mps2) * t**2 / 2
 
 
 class JerkPulse(Starting):
@@ -155,80 +98,6 @@ class JerkPulse(Starting):
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
         return polynomial_reach_m(self.coefficients, t) + abs(self.jerk_mps3) * t**3 / 6
-
-
-class Turn(Starting):
-    """Straight flight in a plane through the radar, a turn of constant load, straight flight again."""
-
-    kind: Literal["turn"] = Field(description="a turn of given g between two straight legs")
-    range_m: Positive = Field(description="range at the first plot, m")
-    speed_mps: Annotated[Positive, Field(le=FASTEST_MPS)] = Field(description="speed, constant, m/s")
-    aspect_rad: Number = Field(description="direction of flight from the line of sight outwards, rad (pi: straight in)")
-    acceleration_g: Annotated[Number, Field(ge=-100, le=100)] = Field(
-        description="lateral acceleration of the turn, standard gravities; positive: to the left"
-    )
-    duration_s: Positive = Field(description="length of the turn, s")
-
-    def reach_m(self, t: float) -> float:
-        """A bound on the range up to a time t (s)."""
-        return self.range_m + self.speed_mps * t
-
-    def closest_m(self, t: float) -> float:
-        """The least distance from the radar up to a time t (s): of two straight legs and of the arc between them."""
-        assert self.start_s is not None  # timed
-        begin, end = min(self.start_s, t), min(self.start_s + self.duration_s, t)
-        rate = self.acceleration_g * STANDARD_GRAVITY_MPS2 / self.speed_mps
-        x, y, heading = self.range_m, 0.0, self.aspect_rad
-        nearest, x, y = straight_leg(x, y, heading, self.speed_mps * begin)
-        if rate == 0:
-            return min(nearest, straight_leg(x, y, heading, self.speed_mps * (t - begin))[0])
-        radius = self.speed_mps / rate
-        centre = (x - radius * math.sin(heading), y + radius * math.cos(heading))
-        towards = math.atan2(-centre[1] / radius, -centre[0] / radius)  # of the point of the circle nearest the radar
-        turned = (math.copysign(1.0, rate) * (towards + math.pi / 2 - heading)) % (2 * math.pi)
-        if turned <= abs(rate) * (end - begin):
-            nearest = min(nearest, abs(math.hypot(*centre) - abs(radius)))
-        heading += rate * (end - begin)
-        x, y = centre[0] + radius * math.sin(heading), centre[1] - radius * math.cos(heading)
-        return min(nearest, straight_leg(x, y, heading, self.speed_mps * (t - end))[0])
-
-
-def straight_leg(x: float, y: float, heading: float, length: float) -> tuple[float, float, float]:
-    """The least distance from the origin along a straight leg from (x, y), and the point where it ends."""
-    along = min(max(-(x * math.cos(heading) + y * math.sin(heading)), 0.0), length)
-    nearest = math.hypot(x + along * math.cos(heading), y + along * math.sin(heading))
-    return nearest, x + length * math.cos(heading), y + length * math.sin(heading)
-
-
-class FlyBy(Model):
-    """Straight flight at a constant speed past the radar, at a distance."""
-
-    kind: Literal["fly_by"] = Field(description="straight flight past the radar")
-    distance_m: Annotated[Positive, Field(ge=NEAREST_M)] = Field(description="distance of closest approach, m")
-    speed_mps: Annotated[Positive, Field(le=FASTEST_MPS)] = Field(description="speed, constant, m/s")
-    start_range_m: Positive = Field(description="range at the first plot, before closest approach, m")
-
-    @cross_check
-    def _begins_outside(self) -> Iterator[At]:
-        if self.start_range_m < self.distance_m:
-            yield at("start_range_m", f"must be >= distance_m, {short(self.distance_m)}")
-
-    def reach_m(self, t: float) -> float:
-        """A bound on the range up to a time t (s)."""
-        return self.start_range_m + self.speed_mps * t
-
-
-class Recorded(Model):
-    """A flight recorded in a file, smoothed by a spline whose derivatives are the true velocity and acceleration."""
-
-    kind: Literal["recorded"] = Field(
-        description="a flight from a CSV file with columns t_s, x_m, y_m, z_m, the radar at the origin"
-    )
-    file: Annotated[str, DataFile()] = Field(description="the file, from the folder of this one")
-
-    def reach_m(self, t: float) -> float:
-        """A bound on the range up to a time t (s): of what is in the file none is known here."""
-        return 0.0
 
 
 Target = Annotated[Polynomial | AccelerationStart | JerkPulse | Turn | FlyBy | Recorded, Field(discriminator="kind")]
@@ -315,12 +184,8 @@ class Keys(Study):
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
-        target = self._flown() if isinstance(self.target, Starting) else self.target
+        target = self.target.timed(self.radar.scan_period_s) if isinstance(self.target, Starting) else self.target
         return self.model_copy(update={"target": target, "scans": self.plots, "duration_s": None})
-
-    def _flown(self) -> Starting:
-        assert isinstance(self.target, Starting)
-        return self.target.timed(self.radar.scan_period_s)
 
     @property
     def plots(self) -> int:
@@ -386,17 +251,5 @@ class Keys(Study):
 
     @cross_check
     def _within_reach(self) -> Iterator[At]:
-        radar = self.radar
-        last = (self.plots - 1) * radar.scan_period_s
-        finest = min(radar.sigma_range_m, radar.sigma_velocity_mps * radar.scan_period_s)
-        farthest = min(FARTHEST_M, finest * RESOLVED)
-        if self.target.reach_m(last) > farthest:
-            so_far = f"must stay within {short(float(f'{farthest:.2g}'))} m of the radar up to the last plot"
-            yield at(
-                "target", f"{so_far}, at {short(last)} s: beyond, double precision does not resolve its accuracies"
-            )
-        elif isinstance(self.target, Turn):
-            flown = self._flown()
-            assert isinstance(flown, Turn)
-            if flown.closest_m(last) < NEAREST_M:
-                yield at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")
+        last = (self.plots - 1) * self.radar.scan_period_s
+        yield from radial.within_reach(self.target, self.radar, last)

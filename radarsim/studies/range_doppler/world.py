@@ -3,53 +3,13 @@
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.errors import ConfigError
-from radarsim.physics import recorded, targets
+from radarsim.studies.radial import checked_truth
 from radarsim.studies.range_doppler.config import Keys, Target
 
 
 def scan_times(spec: Keys) -> np.ndarray:
     """Times (K,) of the scans, s from the first."""
     return np.arange(spec.plots) * spec.radar.scan_period_s
-
-
-def truth(target: Target, t: np.ndarray) -> np.ndarray:
-    """Range, radial velocity and acceleration (K, 3) of a configured target at times t (K,).
-
-    Of a target whose coefficients are drawn, with those of the middle. Raises ValueError for a target that is none.
-    """
-    match target.kind:
-        case "polynomial":
-            return targets.polynomial(target.coefficients, t)
-        case "acceleration_start":
-            return targets.acceleration_start(target.coefficients, target.acceleration_mps2, begun(target.start_s), t)
-        case "jerk_pulse":
-            start = begun(target.start_s)
-            return targets.jerk_pulse(target.coefficients, target.jerk_mps3, start, target.duration_s, t)
-        case "turn":
-            leg = target.range_m, target.speed_mps, target.aspect_rad
-            return targets.turn(*leg, target.acceleration_g, begun(target.start_s), target.duration_s, t)
-        case "fly_by":
-            return targets.fly_by(target.distance_m, target.speed_mps, target.start_range_m, t)
-        case "recorded":
-            return recorded_flight(target.file, t)
-
-
-def begun(start_s: float | None) -> float:
-    """The start of a manoeuvre that a checked config has in seconds, s."""
-    if start_s is None:
-        raise ValueError("its start is no time yet")
-    return start_s
-
-
-def recorded_flight(file: str, t: np.ndarray) -> np.ndarray:
-    """The radial motion (K, 3) of a recorded flight at times t (K,); raises ValueError where it is too short."""
-    times, positions = recorded.points(file)
-    lasts = float(times[-1] - times[0])
-    if t[-1] > lasts:
-        enough = int(np.searchsorted(t, lasts, side="right"))
-        raise ValueError(f"the flight lasts {lasts:g} s, the last of {len(t)} scans is at {t[-1]:g} s; {enough} fit in")
-    return recorded.radial(recorded.smoothed(times, positions, t))
 
 
 def sigma_state(target: Target) -> np.ndarray:
@@ -61,14 +21,4 @@ def sigma_state(target: Target) -> np.ndarray:
 def true_motion(case: Case) -> tuple[np.ndarray, np.ndarray]:
     """Times (K,) of the scans and the truth (K, 3) of a case; raises ConfigError for a target that cannot be."""
     t = scan_times(case.spec)
-    try:
-        x = truth(case.spec.target, t)
-    except recorded.Unreadable as error:
-        raise ConfigError(*error.faults) from None
-    except ValueError as error:
-        raise ConfigError(f"{case.name}: target: {error}") from None
-    if not (x[:, 0] > 0).all():
-        k = int(np.flatnonzero(x[:, 0] <= 0)[0])
-        fault = f"its range must stay > 0, is {x[k, 0]:g} m at {t[k]:g} s, scan {k + 1} of {len(t)}"
-        raise ConfigError(f"{case.name}: target: {fault}")
-    return t, x
+    return t, checked_truth(case.spec.target, t, case.name)

@@ -5,6 +5,7 @@ import pytest
 from radarsim.app.configs import load
 from radarsim.errors import ConfigError
 from radarsim.studies import registry
+from radarsim.studies.ambiguous_doppler import study
 
 
 def refused(stem, **keys):
@@ -54,6 +55,29 @@ def test_orders_need_to_be_combined():
     assert "filters.5.manoeuvres: is needed by combine: expected_error" in refused_without("manoeuvres")
 
 
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [
+        ("{kind: turn, range_m: 5e3, speed_mps: 250, aspect_deg: 180, start_s: 500, duration_s: 1, acceleration_g: 1}",
+         "target: must not fly over the radar: it comes within 100 m of it"),
+        ("{kind: fly_by, distance_m: 8e3, speed_mps: 300, start_range_m: 7e3}",
+         "target.start_range_m: must be >= distance_m, 8000"),
+        ("{kind: acceleration_start, coefficients: [1e5], acceleration_mps2: 5}",
+         "target.start_s: give either start_s or start_scan"),
+        ("{kind: polynomial, coefficients: [1e5, 1e12]}", "target: must stay within 45e11 m of the radar"),
+        ("{kind: hovering}", "target.kind: must be one of polynomial, random_polynomial, acceleration_start, "
+         "acceleration_pulse, turn, fly_by, recorded"),
+    ],
+)  # fmt: skip
+def test_targets(target, words):
+    assert words in refused("ambiguous_rls4", target=target)
+
+
+def test_a_target_that_reaches_the_radar_is_refused():
+    with pytest.raises(ConfigError, match=r"target: its range must stay > 0, is 0 m at 40 s, scan 5 of 15"):
+        study.prepare(load("ambiguous_rls4", ["target={kind: polynomial, coefficients: [10e3, -250]}"]).cases[0])
+
+
 def refused_without(key):
     case = load("orders").cases[0]
     document = {"study": "ambiguous_doppler", **case.resolved()}
@@ -80,13 +104,13 @@ def test_defaults_are_written_out():
 
 
 def test_a_span_too_short_is_warned_of_and_runs():
-    study = registry.study("ambiguous_doppler")
-    assert study.warnings(load("ambiguous_rls4")) == []
-    (line,) = study.warnings(load("ambiguous_rls4", ["radar.repetition_rate_hz=120"]))
+    one = registry.study("ambiguous_doppler")
+    assert one.warnings(load("ambiguous_rls4")) == []
+    (line,) = one.warnings(load("ambiguous_rls4", ["radar.repetition_rate_hz=120"]))
     assert line.startswith("ambiguous_rls4: radar.repetition_rate_hz: its span of 1.8 m/s is under 2 σ_V, 2 m/s")
-    (line,) = study.warnings(load("ambiguous_rls4", ["radar.repetition_rate_hz=[120, 1000]"]))
+    (line,) = one.warnings(load("ambiguous_rls4", ["radar.repetition_rate_hz=[120, 1000]"]))
     assert "1.8 m/s" in line
-    assert study.warnings(load("orders", ["radar.repetition_rate_hz=1"])) == []  # nothing there is folded
+    assert one.warnings(load("orders", ["radar.repetition_rate_hz=1"])) == []  # nothing there is folded
 
 
 def test_cases_that_differ_in_what_filters_know_share_their_noise():

@@ -1,5 +1,7 @@
 """Exact σ, exact probabilities, calibration: against simulation, within statistical error at every scan."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -26,6 +28,31 @@ def test_range_only_and_oracle_are_exact(radar, target):
     random = spread > 1e-6 * plan.axes.exact_sigma  # at the first scan a fixed velocity is missed by itself
     assert np.abs((mean - plan.axes.exact_bias) / np.where(random, spread, 1) * np.sqrt(N))[random].max() < LIMIT
     assert np.allclose(mean[~random], plan.axes.exact_bias[~random], rtol=1e-6)
+
+
+TURN = {"kind": "turn", "range_m": 60e3, "speed_mps": 250.0, "aspect_deg": 180.0, "start_s": 40.0}
+TARGETS = {
+    "turn": TURN | {"acceleration_g": 3.0, "duration_s": 20.0},
+    "brake": {"kind": "acceleration_start", "coefficients": [100e3, -250.0], "start_scan": 5, "acceleration_mps2": 5.0},
+    "fly-by": {"kind": "fly_by", "distance_m": 8e3, "speed_mps": 300.0, "start_range_m": 25e3},
+    "recorded": {"kind": "recorded", "file": str(Path(__file__).parents[3] / "scenarios" / "recorded.csv")},
+}
+
+
+@pytest.mark.parametrize("kind", TARGETS)
+def test_targets_that_break_the_model(kind):
+    """σ of the oracle and its bias are exact: whatever moved the target is in the truth."""
+    n = 20_000
+    plan, sums = summed(made("RLS 2", [RANGE_ONLY, ORACLE], 12, TARGETS[kind]), n)
+    exact_sigma, exact_bias = plan.axes.exact_sigma, plan.axes.exact_bias
+    errs = exact_sigma > 0  # who flies straight in has no acceleration to miss at the first scan
+    z = (sigma(sums) - exact_sigma)[errs] / exact_sigma[errs] * np.sqrt(2 * n)
+    assert np.abs(z).max() < LIMIT
+    mean = sums.error[..., 0] / n
+    spread = np.sqrt(np.maximum(exact_sigma**2 - exact_bias**2, 0))
+    random = spread > 1e-6 * exact_sigma
+    assert np.abs((mean - exact_bias)[random] / spread[random] * np.sqrt(n)).max() < LIMIT
+    assert np.abs(exact_bias[1, 3:, 1]).max() > 1  # it does break the model
 
 
 @pytest.mark.parametrize("order", [0, 1])
