@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.app import arguments, simulation, stored_claims
-from radarsim.app import decide as deciding
 from radarsim.app.configs import load
 from radarsim.app.records import made_by_other_code
 from radarsim.app.repeat import RESULTS, command, repeated
@@ -104,6 +103,8 @@ def run(
     >>> len(result.curves) > 50
     True
     """
+    from radarsim.app import decide as deciding  # with it the parts that judge and draw, which `check` does without
+
     arguments.check(
         **{"threads": threads, "workers": workers, "precision": precision, "time_limit": time_limit},
         **{"executor": executor, "out": out, "overrides": overrides, "figures": figures},

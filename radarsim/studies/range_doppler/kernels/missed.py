@@ -276,10 +276,11 @@ def gather(normal, plots, came, k, first_plot, weights, observes):
 
 
 @part
-def begin(x, p, normal, count, came, k, first_plot, start, dt):
-    """Start the filter where the last plot of its start has come at scan k, in place."""
-    for i in range(came.size):
-        if came[i] == 1.0 and count[i] == start:
+def begin(made, f, k, start, dt):
+    """Start filter f where the last plot of its start has come at scan k, in place."""
+    x, p, normal, first_plot = made.x[f], made.p[f], made.normal[f], made.first
+    for i in range(CHUNK):
+        if made.came[i] == 1.0 and made.count[i] == start:
             of = inverted((normal[0, i], normal[1, i], normal[2, i], normal[3, i], normal[4, i], normal[5, i]))
             y0, y1, y2 = normal[6, i], normal[7, i], normal[8, i]
             r = of[0] * y0 + of[1] * y1 + of[2] * y2
@@ -294,11 +295,11 @@ def begin(x, p, normal, count, came, k, first_plot, start, dt):
 
 
 @part
-def compare(x, p, e, has, v, plots, came, count, start, observes, state, truth, R):
-    """Errors e (3, n), zero where there is no estimate; where there is, has (3, n); its believed variance v (3, n).
-
-    Arrays by their addresses, but truth (3,) and R (2,).
-    """
+def compare(made, f, start, observes, truth, R):
+    """Filter f: its errors, zero where there is no estimate, where there is one, and its believed variance; R (2,)."""
+    x, p, e, has = address(made.x[f]), address(made.p[f]), address(made.e[f]), address(made.has[f])
+    v, plots, came, count = address(made.v[f]), address(made.plots), address(made.came), address(made.count)
+    state = address(made.state)
     for c in range(3):
         of_plot = 1.0 if c < observes else 0.0
         variance, measured, R_c = (0, 3, 5)[c], min(c, 1), R[min(c, 1)]
@@ -449,7 +450,7 @@ def advance(made, f, k, dt, observes, start, Q, R):
     weights = 1.0 / R[0], 1.0 / (R[1] * dt * dt), dt
     sums_at, plots_at, came_at = address(made.normal[f]), address(made.plots), address(made.came)
     gather(sums_at, plots_at, came_at, k, address(made.first), weights, observes)
-    begin(made.x[f], made.p[f], made.normal[f], made.count, made.came, k, made.first, start, dt)
+    begin(made, f, k, start, dt)
     return False
 
 
@@ -491,11 +492,7 @@ def add_block(made, first, count, problem, sums):
                 if whole:
                     compare_whole(made.x[f], made.e[f], made.state, truth[k])
                 else:
-                    compare(
-                        *(address(made.x[f]), address(made.p[f]), address(made.e[f]), address(made.has[f])),
-                        *(address(made.v[f]), address(made.plots), address(made.came), address(made.count)),
-                        *(start[f], observes[f], address(made.state), truth[k], R),
-                    )
+                    compare(made, f, start[f], observes[f], truth[k], R)
             add_sums(made, n, k, start, baseline, whole, sums)
 
 
