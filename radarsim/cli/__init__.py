@@ -4,10 +4,10 @@ import gc
 import os
 import sys
 
-from radarsim.cli import design, experiments, maintenance, own_data, readings
+from radarsim.cli import comparisons, design, experiments, maintenance, own_data, readings
 from radarsim.cli.group import main
 
-__all__ = ["design", "entry", "experiments", "main", "maintenance", "own_data", "readings"]
+__all__ = ["comparisons", "design", "entry", "experiments", "main", "maintenance", "own_data", "readings"]
 
 
 def entry() -> None:

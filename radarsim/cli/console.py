@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rich.status import Status
 
     from radarsim.app.clean import Cleaned
+    from radarsim.app.compare import Compared
     from radarsim.app.doctor import Inspection
     from radarsim.app.inventory import Inventory
     from radarsim.app.outlook import Outlook
@@ -202,6 +203,35 @@ def show_last_scan(last: "pd.DataFrame") -> None:
     ]
     columns = ("case", "filter", "component", "at", "sigma", "95 %", "exact", "gain", "95 % of gain")
     show("", columns, rows, right=columns[3:], spare=("95 % of gain", "exact", "95 %", "gain"))
+
+
+def print_comparison(compared: "Compared") -> None:
+    """What stored results differ by at the last common time, and where the files are."""
+    from radarsim.report.compare import words
+
+    rows = [
+        (
+            f"{row['label']}, {row['filter']}",
+            *(row["component"] or str(row["model"]), f"{row['t_s']:g} s"),
+            *(f"{words.value(row[key])} {row['unit'].replace('s2', 's²')}" for key in ("value", "against")),
+            words.change(row),
+        )
+        for row in compared.last
+        if row["quantity"] == compared.last[0]["quantity"]
+    ]
+    if len(rows) <= MOST_ROWS:
+        against = {row["against_label"] for row in compared.last}
+        columns = ("", "of", "at", "σ", f"σ of {against.pop()}" if len(against) == 1 else "σ against", "change")
+        show("", columns, rows, right=columns[2:5], spare=("at",))
+    for line in compared.sentences if len(rows) > MOST_ROWS else ():
+        say(line)
+    for line in compared.notes:
+        say(f"note     {line}")
+    say(f"table    {compared.folder / 'comparison.csv'}")
+    if drawn := {Path(name).stem for name in compared.files if name.startswith("figures/")}:
+        say(f"figures  {compared.folder / 'figures'} ({len(drawn)})")
+    say(f"page     {compared.folder / 'compare.html'}")
+    print_warnings(compared.warnings)
 
 
 def too_narrow(effective: float) -> str:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 SECTIONS = {
     "Run": ("run", "check"),
-    "Read": ("report", "claims", "readings", "chart"),
+    "Read": ("report", "compare", "claims", "readings", "chart"),
     "Design": ("solve", "sensitivity"),
     "Own data": ("new", "import", "simulate", "track", "fit", "new-study"),
     "Maintenance": ("list", "schema", "doctor", "clean"),

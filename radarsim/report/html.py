@@ -69,6 +69,32 @@ def page(
     )
 
 
+def comparison(
+    labels: Sequence[str],
+    sentences: Sequence[str],
+    notes: Sequence[str],
+    warnings: Sequence[str],
+    figures: Sequence[Figure],
+    made: "pd.DataFrame",
+    differing: "Mapping[str, pd.DataFrame]",
+) -> str:
+    """The page of a comparison: sentences, figures, in what the configs differ, the table.
+
+    differing are tables of keys by their title, empty where the configs are of several studies.
+    """
+    return whole(
+        "compare.html.j2",
+        labels=labels,
+        sentences=sentences,
+        notes=notes,
+        warnings=warnings,
+        figures=_figures(figures),
+        asked=[_table(title, table) for title, table in differing.items()],
+        table=_table("comparison", made.drop(columns=["label", "against_label"])),
+        version=provenance.versions()["radarsim"],
+    )
+
+
 def yaml_of(resolved: Mapping[str, Any]) -> str:
     """The resolved experiment as YAML; of very many cases the first."""
     cases = resolved["cases"]

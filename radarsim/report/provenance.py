@@ -68,10 +68,10 @@ def with_output(made: dict, path: str, data: bytes) -> dict:
     return {**made, "outputs": {**made["outputs"], path: hashlib.sha256(data).hexdigest()}}
 
 
-def earlier(folder: Path) -> dict:
-    """The run.json of an earlier run in a folder; an empty one where there is none that can be read."""
+def earlier(folder: Path, name: str = "run.json") -> dict:
+    """The record of an earlier run in a folder; an empty one where there is none that can be read."""
     try:
-        record = json.loads(files.read(folder / "run.json"))
+        record = json.loads(files.read(folder / name))
     except (OSError, ValueError, RecursionError):
         return {}
     return record if isinstance(record, dict) else {}

@@ -4,6 +4,8 @@ Rows stand in the order case, filter, component, k, and only where the filter ha
 when the first table is made.
 """
 
+import csv
+import io
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +16,8 @@ from radarsim.report import statistics
 
 if TYPE_CHECKING:
     import pandas as pd
+
+LABELS = ("case", "filter", "component", "unit", "baseline", "model", "note")  # columns of text, whatever they hold
 
 
 def frame(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> "pd.DataFrame":
@@ -138,6 +142,26 @@ def to_csv(table: "pd.DataFrame") -> bytes:
     columns = [_cells(table[name]) for name in table.columns]
     lines = [",".join(map(_quoted, table.columns)), *map(",".join, zip(*columns, strict=True))]
     return ("\n".join(lines) + "\n").encode()
+
+
+def from_csv(content: bytes) -> "pd.DataFrame":
+    """A table from `to_csv`'s bytes: labels as text, all else as the very numbers that were written.
+
+    Raises ValueError where a row is of another length.
+    """
+    names, *rows = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
+    columns = zip(*rows, strict=True) if rows else ([] for _ in names)
+    return frame({name: _read(name, column) for name, column in zip(names, columns, strict=True)})
+
+
+def _read(name: str, column: Sequence[str]) -> Sequence[str] | np.ndarray:
+    """A column of text as what it was: numbers, but for labels and for words."""
+    if name in LABELS:
+        return list(column)
+    try:
+        return np.array([float(text) if text else np.nan for text in column])
+    except ValueError:
+        return list(column)
 
 
 def _cells(column: "pd.Series") -> list[str]:

@@ -1,0 +1,230 @@
+"""`radarsim compare`: stored results side by side on common axes, with their differences. Computes nothing."""
+
+import os
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from radarsim.app import arguments, stored_tables
+from radarsim.app.configs import load
+from radarsim.app.records import recorded_case
+from radarsim.app.repeat import command
+from radarsim.config.experiment import Case, Experiment
+from radarsim.config.identity import canonical, digest, world
+from radarsim.errors import ConfigError
+from radarsim.report import asked, files, provenance
+from radarsim.report import tables as common
+from radarsim.report.compare import figures, sides, table, words
+from radarsim.report.compare.sides import SERIES, Side
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FOLDER = "compare"
+
+
+@dataclass(frozen=True)
+class Run:
+    """A stored result: what it is called, its folder and its run.json; the config that asked for it, if one did."""
+
+    label: str
+    folder: Path
+    record: dict[str, Any]
+    experiment: Experiment | None = None
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What was written: the folder and its files; the sentences, what to know beside them, and comparison.csv's rows.
+
+    last are the rows at the last common time.
+    """
+
+    folder: Path
+    files: tuple[str, ...]
+    sentences: tuple[str, ...]
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+    rows: tuple[dict[Hashable, Any], ...]
+    last: tuple[dict[Hashable, Any], ...]
+
+
+def compare(
+    sources: Sequence[str | os.PathLike[str]],
+    out: str | os.PathLike[str] = "results",
+    *,
+    formats: Sequence[str] = ("svg", "png"),
+) -> Compared:
+    """Put stored results side by side: tables, figures and one page in `out`/compare; nothing is simulated.
+
+    A source is a config (path, or name of a shipped one), whose results are looked for under `out`, or the folder of a
+    result. The first is what the others are compared with. Raises ConfigError where one is missing, with the command
+    that computes it, or where they share nothing; StoreError where a stored table is damaged.
+    """
+    arguments.directory(out)
+    if len(sources) < 2:
+        raise ConfigError(f"compare: takes two results or more, got {len(sources)}")
+    runs = _named(_found(sources, Path(out)))
+    every = [_sides(run) for run in runs]
+    pairs, alone = sides.pairs(_labelled(every))
+    made = table.compared(pairs)
+    if not len(made):
+        raise ConfigError(f"{' and '.join(run.label for run in runs)} share no filter and component to compare")
+    folder = Path(out) / FOLDER
+    told, notes = words.sentences(made), [*words.pairings(made), *alone]
+    warnings = [line for run in runs for line in _stale(run)] + _replaced(folder, runs)
+    described = figures.figures([side for run in _labelled(every) for side in run], made)
+    contents = {"comparison.csv": common.to_csv(made)}
+    if formats:
+        from radarsim.report import figures as drawing  # Matplotlib
+
+        for name, figure in described.items():
+            contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.save(figure, formats).items()}
+    contents["compare.html"] = _page(runs, told, notes, warnings, list(described.values()), made).encode()
+    contents["compare.json"] = provenance.to_json(_record(runs, contents))
+    files.replace_all(folder, contents, stale=_earlier)
+    last = words.at_the_end(made)
+    kept = (tuple(rows.to_dict("records")) for rows in (made, last))
+    return Compared(folder, tuple(sorted(contents)), tuple(told), tuple(notes), tuple(warnings), *kept)
+
+
+def _found(sources: Sequence[str | os.PathLike[str]], out: Path) -> list[Run]:
+    """The stored results, or one ConfigError with what is missing of all."""
+    found: list[Run] = []
+    faults: list[str] = []
+    for source in sources:
+        try:
+            found.append(_folder(Path(source)) or _stored(source, out))
+        except ConfigError as error:
+            faults += error.lines
+    if faults:
+        raise ConfigError(*faults)
+    return found
+
+
+def _folder(path: Path) -> Run | None:
+    """The result in a folder; None where the path is no folder. Raises ConfigError for one that holds no result."""
+    record = stored_tables.record(path)
+    if record is None:
+        if path.is_dir() and path.name != str(path):
+            raise ConfigError(f"{path}: must be a config or the folder of a result: there is no run.json in it")
+        return None
+    return Run(str(record.get("config", path.name)), path, record)
+
+
+def _stored(source: str | os.PathLike[str], out: Path) -> Run:
+    experiment = load(source)
+    folder = out / experiment.stem
+    record = stored_tables.record(folder)
+    if record is None:
+        raise ConfigError(f"{experiment.stem}: no result in {folder}; `{command(experiment, (), out)}` computes it")
+    return Run(experiment.stem, folder, record, experiment)
+
+
+def _named(runs: Sequence[Run]) -> list[Run]:
+    """The runs with names of their own: of one config's twice the folder too."""
+    names = [run.label for run in runs]
+    return [
+        replace(run, label=f"{run.label} in {run.folder.parent}") if names.count(run.label) > 1 else run for run in runs
+    ]
+
+
+def _sides(run: Run) -> list[Side]:
+    """The cases of a result that are there, with their rows."""
+    wanted = {one.table for one in SERIES}
+    outputs = run.record["outputs"]
+    tables = {
+        name: rows for name in sorted(wanted) if (rows := stored_tables.table(run.folder, name, outputs)) is not None
+    }
+    made = []
+    for name, counts in run.record["cases"].items():
+        own = {key: rows[rows["case"] == name] for key, rows in tables.items()}
+        if len(own.get("curves", ())):
+            made.append(Side(run.label, name, name, _noise(run, name), int(counts["done"]), own))
+    return made
+
+
+def _noise(run: Run, name: str) -> str | None:
+    """A hash of what a case's measurements depend on: study, seed, world; None where the record no longer reads."""
+    case = recorded_case(run.record, name)
+    return None if case is None else digest([case.study, case.seed, world(case.spec)])
+
+
+def _labelled(every: Sequence[Sequence[Side]]) -> list[list[Side]]:
+    """The sides with names of their own: a lone case its run's, others the case's, and the run's where two share it."""
+    first = [[replace(side, label=side.run if len(run) == 1 else side.case) for side in run] for run in every]
+    names = [side.label for run in first for side in run]
+    return [
+        [
+            replace(side, label=f"{side.label} ({side.run})") if len(run) > 1 < names.count(side.label) else side
+            for side in run
+        ]
+        for run in first
+    ]
+
+
+def _stale(run: Run) -> list[str]:
+    """A warning where a config asks for something else by now than its stored result holds."""
+    if run.experiment is None:
+        return []
+    held = {name: recorded_case(run.record, name) for name in run.record["cases"]}
+    now = {case.name: case for case in run.experiment.cases}
+    same = held.keys() == now.keys() and all(
+        one is not None and canonical(one.spec) == canonical(now[name].spec) for name, one in held.items()
+    )
+    again = command(run.experiment, (), run.folder.parent)
+    return [] if same else [f"{run.folder}: of an earlier state of {run.label}; `{again}` brings it up to date"]
+
+
+def _earlier(folder: Path) -> list[str]:
+    """The files of an earlier comparison in a folder."""
+    outputs = provenance.earlier(folder, "compare.json").get("outputs")
+    return [path for path in outputs if isinstance(path, str)] if isinstance(outputs, dict) else []
+
+
+def _replaced(folder: Path, runs: Sequence[Run]) -> list[str]:
+    """A note where a folder held another comparison, which is lost."""
+    before = provenance.earlier(folder, "compare.json").get("compared")
+    now = [str(run.folder) for run in runs]
+    if not isinstance(before, list) or before == now:
+        return []
+    return [f"{folder}: held the comparison of {', '.join(map(str, before))}; it is replaced"]
+
+
+def _record(runs: Sequence[Run], contents: "dict[str, bytes]") -> dict[str, Any]:
+    """compare.json: what was compared, with what."""
+    held = {
+        str(run.folder): {key: run.record.get(key) for key in ("config", "resolved_sha256", "identities", "versions")}
+        for run in runs
+    }
+    empty: dict[str, Any] = {"outputs": {}}
+    for path, data in sorted(contents.items()):
+        empty = provenance.with_output(empty, path, data)
+    return {"compared": [str(run.folder) for run in runs], "runs": held, "versions": provenance.versions(), **empty}
+
+
+def _page(
+    runs: Sequence[Run],
+    told: Sequence[str],
+    notes: Sequence[str],
+    warnings: Sequence[str],
+    described: "Sequence[Any]",
+    made: "pd.DataFrame",
+) -> str:
+    """compare.html."""
+    from radarsim.report import html
+
+    cases = [case for run in runs for case in _cases(run)]
+    names = [case.name for case in cases]
+    unique = len(set(names)) == len(names) and len({case.study for case in cases}) == 1
+    return html.comparison(
+        [run.label for run in runs], told, notes, warnings, described, made, asked.asked(cases) if unique else {}
+    )
+
+
+def _cases(run: Run) -> list[Case]:
+    """The cases of a result as recorded, those that still read."""
+    found = ((name, recorded_case(run.record, name)) for name in run.record["cases"])
+    label = run.label if len(run.record["cases"]) == 1 else ""
+    return [replace(case, name=label or name) for name, case in found if case is not None]

@@ -1,0 +1,1 @@
+"""Stored results side by side: the cases that answer to one another, their differences, figures, sentences."""

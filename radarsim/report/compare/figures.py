@@ -1,0 +1,102 @@
+"""Figures of a comparison: each quantity of all sides on common axes, and beside it the differences."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from radarsim.report.compare.sides import SERIES, Series, Side
+from radarsim.report.compare.table import filters_of
+from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.report.panels import MOST, TIME, letter, literal, with_unit
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+HEIGHT_MM = 70.0
+
+
+def figures(sides: Sequence[Side], made: "pd.DataFrame") -> dict[str, Figure]:
+    """A figure for each quantity and component that two sides share: values on the left, differences on the right.
+
+    made is table.compared's. Of more than eight sides the first eight are drawn, and the caption says so.
+    """
+    drawn = {}
+    for (quantity, component, model), rows in made.groupby(["quantity", "component", "model"], sort=False):
+        series = next(one for one in SERIES if one.value == quantity)
+        component, model = str(component), str(model)
+        if rows["t_s"].nunique() < 2:
+            continue
+        parts = [series.value.removesuffix("_percent"), component, f"model{model}" if model else ""]
+        name = "_".join(filter(None, parts))
+        drawn[name] = _figure(name, series, sides, rows, component, model)
+    return drawn
+
+
+def _figure(
+    name: str, series: Series, sides: Sequence[Side], rows: "pd.DataFrame", component: str, model: str
+) -> Figure:
+    taking_part = {*rows["label"], *rows["against_label"]}
+    every = [side for side in sides if side.label in taking_part]
+    some, left = every[:MOST], len(every) - MOST
+    filters = list(dict.fromkeys(f for side in some for f in filters_of(side)))
+    unit = rows["unit"].iloc[0]
+    what = {"sigma": "$\\sigma$ of ", "gain_percent": "gain in $\\sigma$ of "}.get(series.value, f"{series.words} ")
+    what = f"{what}{letter(component) if component else model}".strip()
+    values = [line for n, side in enumerate(some) for line in _values(series, side, n, filters, component, model)]
+    apart = _apart(series, some, rows, filters)
+    keys = [(literal(side.label), Style(n, 0)) for n, side in enumerate(some)]
+    keys += [(literal(f), Style(0, n, n)) for n, f in enumerate(filters)] if len(filters) > 1 else []
+    low = None if series.value == "gain_percent" else 0.0
+    y = Axis(with_unit(what, unit), limits=(low, None))
+    of = "change" if series.ratio else "difference"
+    against = rows["against_label"].iloc[0] if rows["against_label"].nunique() == 1 else "the first"
+    difference = Axis(with_unit(f"{of} against {literal(against)}", "%" if series.ratio else unit))
+    panels = (
+        Panel(Axis(TIME, limits=(0, None)), y, tuple(values), direct=False, legend="none"),
+        Panel(Axis(TIME, limits=(0, None)), difference, (Reference(0), *apart), keys=tuple(keys), legend="right"),
+    )
+    caption = (
+        f"Left: {series.words} of {', '.join(side.label for side in some)} on common axes. Right: the {of} against "
+        f"{against} at common times. Bands: 95 % intervals. Crosses: exact values, where known."
+    ) + (f" {left} further cases are in comparison.csv alone." if left > 0 else "")
+    return Figure(name, f"{what} side by side", caption, panels, 2, PAGE_MM, HEIGHT_MM)
+
+
+def _values(series: Series, side: Side, n: int, filters: Sequence[str], component: str, model: str) -> list[Mark]:
+    """A line for each filter of a side."""
+    table, marks = side.tables.get(series.table), list[Mark]()
+    if table is None:
+        return marks
+    for i, f in enumerate(filters):
+        own = table[table["filter"] == f]
+        own = own[own["component"] == component] if component else own
+        own = own[own["model"] == model] if "model" in own and model else own
+        if len(own):
+            y, lo, hi = (own[key].to_numpy(dtype=float) for key in (series.value, series.lo, series.hi))
+            exact = own[series.exact].to_numpy(dtype=float) if series.exact else None
+            t, name = own["t_s"].to_numpy(dtype=float), f"{literal(side.label)}, {literal(f)}"
+            marks.append(Line(t, y, "", Style(n, i, i), lo, hi, _known(exact), name))
+    return marks
+
+
+def _apart(series: Series, sides: Sequence[Side], rows: "pd.DataFrame", filters: Sequence[str]) -> list[Mark]:
+    """A line for each filter of each side that is compared with another."""
+    value, exact = ("percent", "exact_percent") if series.ratio else ("difference", "")
+    numbers, marks = {side.label: n for n, side in enumerate(sides)}, list[Mark]()
+    several = rows["against_label"].nunique() > 1
+    for key, own in rows.groupby(["label", "against_label", "filter"], sort=False):
+        label, against, f = map(str, key)
+        if label not in numbers or against not in numbers:
+            continue
+        columns = (own[key].to_numpy(dtype=float) for key in ("t_s", value, f"{value}_lo", f"{value}_hi"))
+        t, y, lo, hi = columns
+        name = f"{literal(label)}, {literal(f)}" + (f" against {literal(against)}" if several else "")
+        i = filters.index(f)
+        known = _known(own[exact].to_numpy(dtype=float)) if exact else None
+        marks.append(Line(t, y, "", Style(numbers[label], i, i), lo, hi, known, name))
+    return marks
+
+
+def _known(exact: np.ndarray | None) -> np.ndarray | None:
+    return exact if exact is not None and np.isfinite(exact).any() else None

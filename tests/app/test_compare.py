@@ -1,0 +1,79 @@
+"""`radarsim compare`: what it reads, what it writes, how it fails."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from radarsim.app import run as experiment
+from radarsim.cli import main
+from radarsim.report import tables
+
+
+def radarsim(*arguments, code=0):
+    """Run the command in this process; its result, after checking the exit code."""
+    result = CliRunner().invoke(main, [str(a) for a in arguments], catch_exceptions=False)
+    assert result.exit_code == code, result.output
+    return result
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    """A folder with two radars."""
+    made = tmp_path_factory.mktemp("results")
+    for name in ("rls2", "rls4"):
+        experiment.run(name, realisations=4000, out=made, figures=False)
+    return made
+
+
+def test_two_radars_side_by_side(out):
+    said = radarsim("compare", "rls2", "rls4", "--out", out).output
+    exact = -76.9  # per cent: the exact σ_r of RLS 4 at 140 s against that of RLS 2
+    assert f"exactly −{-exact:g} %" in said
+    made = tables.from_csv((out / "compare" / "comparison.csv").read_bytes())
+    last = made[(made["quantity"] == "sigma") & (made["component"] == "r") & (made["t_s"] == 140)]
+    assert last["exact_percent"].round(1).tolist()[0] == exact
+    assert (last["percent_lo"] < last["exact_percent"]).all()
+    assert (last["exact_percent"] < last["percent_hi"]).all()
+    curves = tables.from_csv((out / "rls4" / "curves.csv").read_bytes())
+    assert set(made.loc[made["quantity"] == "sigma", "value"]) == set(curves["sigma"])
+    page = (out / "compare" / "compare.html").read_text()
+    assert "rls4 against rls2" in page
+    assert "radar.sigma_range_m" in page
+    drawn = {path.name for path in (out / "compare" / "figures").iterdir()}
+    assert {"sigma_r.svg", "sigma_r.png", "gain_r.svg"} <= drawn
+
+
+def test_two_versions_of_one_differ_by_nothing(out, tmp_path):
+    experiment.run("rls2", realisations=4000, out=tmp_path, figures=False)
+    done = radarsim("compare", out / "rls2", tmp_path / "rls2", "--out", tmp_path, "--no-figures", "--json")
+    found = json.loads(done.stdout)
+    assert {row["difference"] for row in found["rows"]} == {0.0}
+    assert {row["pairing"] for row in found["rows"]} == {"same numbers"}
+
+
+def test_what_is_missing_is_said_with_the_command_for_it(out, tmp_path):
+    said = radarsim("compare", "rls2", "rls5", "nosuch", "--out", out, code=2).stderr.splitlines()
+    assert said[0].endswith(f"`radarsim run rls5 --out {out}` computes it")
+    assert said[1].startswith("nosuch: no such config")
+    assert "two results or more" in radarsim("compare", "rls2", "--out", out, code=2).stderr
+    (tmp_path / "empty").mkdir()
+    assert "no run.json" in radarsim("compare", "rls2", tmp_path / "empty", "--out", out, code=2).stderr
+
+
+def test_a_table_that_was_altered_is_no_result(out, tmp_path):
+    experiment.run("rls2", realisations=4000, out=tmp_path, figures=False)
+    with (tmp_path / "rls2" / "curves.csv").open("a") as file:
+        file.write("\n")
+    assert "altered" in radarsim("compare", "rls4", tmp_path / "rls2", "--out", out, code=4).stderr
+
+
+def test_a_result_of_an_earlier_config_is_marked(out):
+    text = (out / "rls2" / "run.json").read_text()
+    assert "earlier state" not in radarsim("compare", "rls2", "rls4", "--out", out, "--no-figures").stderr
+    (out / "rls2" / "run.json").write_text(text.replace('"sigma_range_m": 250', '"sigma_range_m": 251'))
+    try:
+        said = radarsim("compare", "rls2", "rls4", "--out", out, "--no-figures").stderr
+    finally:
+        (out / "rls2" / "run.json").write_text(text)
+    assert "earlier state of rls2; `radarsim run rls2" in said
