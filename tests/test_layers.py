@@ -24,6 +24,7 @@ ROOMS = {
     "engine": ("errors",),
     "kernels": (),
     "physics": (),
+    "bursts": ("kernels", "physics"),
     "report": ("errors", "config", *DATA),
     "studies.noise": (*CASE, "kernels.random"),
     "studies.radial": ("errors", "physics"),
@@ -39,14 +40,14 @@ ROOMS = {
 }
 
 # Inside a study: what of the shared rooms a role stands on, and on which roles of its own study.
-GROUND = ("errors", "kernels", "physics", *CASE)
+GROUND = ("errors", "kernels", "physics", "bursts", *CASE)
 KEYS = ("errors", "config.faults", "config.fields", "config.radial", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
 SHOWN = (*SUMS, "cost", "tables", "figures", "map")
 READ = (*SHOWN, "words", "claims", "measures", "readings", "search")
 ROLES = {
-    "kernels": (("kernels",), ("kernels",)),
+    "kernels": (("kernels", "bursts.kernels"), ("kernels",)),
     "config": (KEYS, ("config",)),
     "design": (
         (*GROUND, *DATA, "studies.noise", "studies.radial"),
@@ -220,6 +221,9 @@ PLANTED = [
     ("kernels.linear", "radarsim.physics.motion"),
     ("kernels.linear", "radarsim.studies.range_doppler.kernels.rows"),
     ("physics.motion", "radarsim.errors"),
+    ("bursts.fisher", "radarsim.errors"),
+    ("bursts.kernels.strip", "radarsim.studies.discriminator.kernels.sums"),
+    ("studies.discriminator.kernels.sums", "radarsim.bursts.fisher"),
     ("report.tables", "radarsim.engine.run"),
     ("report.panels", "radarsim.studies.sonar.study"),
     ("report.claims", "radarsim.studies.registry"),

@@ -18,7 +18,8 @@ ROWS = (
     ("registry",),
     ("range_doppler", "multimodel", "sonar", "discriminator", "ambiguous_doppler"),
     ("interface", "report"),
-    ("config", "engine", "kernels", "physics"),
+    ("config", "engine", "bursts"),
+    ("kernels", "physics"),
 )
 STUDIES = 3  # the row of the papers, which the registry knows by their names
 ABOUT = {
@@ -37,6 +38,7 @@ ABOUT = {
     "engine": "blocks, sums, store",
     "kernels": "compiled, shared",
     "physics": "motion, targets, frames",
+    "bursts": "a burst and its estimator",
 }
 WIDTH, ROOM, HEIGHT, GAP, MARGIN = 1220, 216, 44, 62, 12  # px
 

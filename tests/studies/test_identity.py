@@ -173,6 +173,8 @@ def test_sentences_move_nothing(folder, moved):
         ("kernels/compile.py", ALL),
         ("physics/motion.py", {"rls2", "ambiguous_rls4"} | SONAR),
         ("physics/frames.py", {"multimodel"}),
+        ("bursts/fisher.py", {"discriminator"}),
+        ("bursts/kernels/scoring.py", {"discriminator"}),
         ("studies/noise.py", ALL),
         ("studies/radial.py", {"rls2", "ambiguous_rls4"}),
         ("config/fields.py", ALL),

@@ -70,7 +70,7 @@ KERNELS = (
         ),
     ),
     *mutants(
-        "radarsim/studies/discriminator/kernels/lanes.py",
+        "radarsim/bursts/kernels/lanes.py",
         (
             "g0 + e, g1 + m1 * e + s1 * h",
             "g0 + e, g1 + m1 * e - s1 * h",
@@ -132,7 +132,7 @@ FILTERS = (
         ),
     ),
     *mutants(
-        "radarsim/studies/discriminator/schedule.py",
+        "radarsim/bursts/schedule.py",
         (
             "-0.5 * np.log(1.0 - 2.0 * weights",
             "-np.log(1.0 - 2.0 * weights",
@@ -196,7 +196,7 @@ FRAMES_AND_MODELS = (
         ),
     ),
     *mutants(
-        "radarsim/studies/discriminator/world.py",
+        "radarsim/bursts/burst.py",
         (
             "path[i] + s * (v[i] + 0.5 * s *",
             "path[i] + s * (v[i] + s *",
@@ -233,7 +233,7 @@ EXACT_VALUES = (
         ),
     ),
     *mutants(
-        "radarsim/studies/discriminator/exact.py",
+        "radarsim/bursts/fisher.py",
         (
             "(order[:, None] + order + 1.0)",
             "(order[:, None] + order + 2.0)",

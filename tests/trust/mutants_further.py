@@ -86,7 +86,7 @@ FALSE_PLOTS = (
 )
 SCORES = (
     *mutants(
-        "radarsim/studies/discriminator/kernels/scoring.py",
+        "radarsim/bursts/kernels/scoring.py",
         ("image = amplitude * (cc - 0.5 * pulses)", "image = amplitude * (cc - pulses)", CLEAN),
         ("e = y * c - x * s", "e = y * c + x * s", SCORE),
     ),

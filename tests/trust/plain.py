@@ -117,7 +117,7 @@ def uncompiled():
         module = importlib.import_module(name)
         if hasattr(module, "np"):
             module.np = Records()
-        if "discriminator" not in file.parts:
+        if not {"discriminator", "bursts"} & set(file.parts):
             for constant, size in SIZES.items():
                 if hasattr(module, constant):
                     setattr(module, constant, size)

@@ -9,8 +9,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from radarsim.studies.discriminator.exact import sensitivities
-from radarsim.studies.discriminator.world import Burst, balanced_inverse, sample_times
+from radarsim.bursts.burst import Burst, balanced_inverse, sample_times
+from radarsim.bursts.fisher import sensitivities
 
 DRAWS = 1 << 18
 SEED = 2010

@@ -10,13 +10,15 @@ from itertools import pairwise
 
 import numpy as np
 
+from radarsim.bursts import fisher as exact
+from radarsim.bursts import schedule
+from radarsim.bursts.burst import LIGHT_MPS
 from radarsim.engine.results import CaseResult
 from radarsim.report import claims
 from radarsim.report.claims import Missing, certain
 from radarsim.report.statistics import Estimate, difference, root_mean_square
-from radarsim.studies.discriminator import ceiling, exact, schedule, study
+from radarsim.studies.discriminator import ceiling, study
 from radarsim.studies.discriminator.kernels.sums import LOCKS
-from radarsim.studies.discriminator.world import LIGHT_MPS
 
 COMPUTED, PRINTED = "computed", "printed"
 READINGS = {COMPUTED: (2.25, 1.0), PRINTED: (9.0, 0.5)}  # noise variance, threshold c

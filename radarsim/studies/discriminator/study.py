@@ -5,21 +5,21 @@ from functools import cache, partial
 
 import numpy as np
 
+from radarsim.bursts import blocks as cuts
+from radarsim.bursts import burst as model
+from radarsim.bursts import estimators as plans
+from radarsim.bursts import fisher as exact
+from radarsim.bursts import schedule as schedules
+from radarsim.bursts.kernels import sequence as kernels
+from radarsim.bursts.kernels import strip as strips
+from radarsim.bursts.kernels.data import BLOCK_SUMS, DEMODULATED, SAMPLES
+from radarsim.bursts.kernels.scoring import SIZE
 from radarsim.config.experiment import Case
 from radarsim.engine.moments import Layout
 from radarsim.engine.results import Axes
 from radarsim.errors import ConfigError
-from radarsim.studies.discriminator import blocks as cuts
-from radarsim.studies.discriminator import exact
-from radarsim.studies.discriminator import filters as plans
-from radarsim.studies.discriminator import schedule as schedules
-from radarsim.studies.discriminator import world as model
 from radarsim.studies.discriminator.config import Estimator, Keys
-from radarsim.studies.discriminator.kernels import sequence as kernels
-from radarsim.studies.discriminator.kernels import strip as strips
 from radarsim.studies.discriminator.kernels import sums as sums_of
-from radarsim.studies.discriminator.kernels.data import BLOCK_SUMS, DEMODULATED, SAMPLES
-from radarsim.studies.discriminator.kernels.scoring import SIZE
 from radarsim.studies.noise import noise_key
 
 COMPONENTS = (("phi0", "rad"), ("f0", "Hz"), ("f1", "Hz/s"), ("f2", "Hz/s2"), ("f3", "Hz/s3"), ("f4", "Hz/s4"))
@@ -59,7 +59,7 @@ class DiscriminatorAxes(Axes):
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a block needs; arrays as in `kernels.discriminator.estimate_block` and `accumulate`."""
+    """All that a block needs; arrays as in `bursts.kernels.sequence.estimate_block` and `accumulate`."""
 
     layout: Layout
     axes: DiscriminatorAxes

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from radarsim.bursts import fisher as exact
 from radarsim.engine.results import CaseResult
 from radarsim.report import statistics
 from radarsim.report import tables as common
-from radarsim.studies.discriminator import exact
 from radarsim.studies.discriminator.kernels.sums import LOCKS as COUNTED
 from radarsim.studies.discriminator.kernels.sums import bin_edges
 

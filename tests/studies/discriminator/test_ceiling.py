@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from radarsim.studies.discriminator import ceiling, exact
-from radarsim.studies.discriminator.world import Burst, balanced_inverse
+from radarsim.bursts import fisher as exact
+from radarsim.bursts.burst import Burst, balanced_inverse
+from radarsim.studies.discriminator import ceiling
 
 BURST = Burst(10e9, 1e-5, 1e-6, 1e-6, 3000, 1.0, 2.25)
 SIGMA = (6.1, 67.5, 6.1e3, 183.38e3, 2.426e6)

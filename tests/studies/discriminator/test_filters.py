@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from radarsim.studies.discriminator import blocks as cuts
-from radarsim.studies.discriminator import exact
-from radarsim.studies.discriminator import filters as plans
-from radarsim.studies.discriminator import schedule as filters
-from radarsim.studies.discriminator.world import Burst
+from radarsim.bursts import blocks as cuts
+from radarsim.bursts import estimators as plans
+from radarsim.bursts import fisher as exact
+from radarsim.bursts import schedule as filters
+from radarsim.bursts.burst import Burst
 from tests.studies.discriminator import naive as naive
 
 COMPUTED = Burst(10e9, 1e-5, 1e-6, 1e-6, 30000, 1.0, 2.25)

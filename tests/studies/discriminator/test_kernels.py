@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
+from radarsim.bursts import blocks as cuts
+from radarsim.bursts import burst as model
+from radarsim.bursts.kernels import data, scoring
+from radarsim.bursts.kernels import lanes as laned
+from radarsim.bursts.kernels import sequence as kernels
+from radarsim.bursts.kernels import strip as strips
 from radarsim.kernels import lanes
 from radarsim.kernels.compile import kernel
 from radarsim.kernels.random import stream
-from radarsim.studies.discriminator import blocks as cuts
-from radarsim.studies.discriminator import world as model
-from radarsim.studies.discriminator.kernels import data, scoring
-from radarsim.studies.discriminator.kernels import lanes as laned
-from radarsim.studies.discriminator.kernels import sequence as kernels
-from radarsim.studies.discriminator.kernels import strip as strips
 from radarsim.studies.discriminator.kernels import sums as added
 from tests.studies.discriminator import naive as naive
 

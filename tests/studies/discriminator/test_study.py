@@ -8,12 +8,12 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.app.work import CaseWork
+from radarsim.bursts import burst as model
+from radarsim.bursts.kernels import data, scoring
+from radarsim.bursts.kernels import sequence as kernels
+from radarsim.bursts.kernels import strip as strips
 from radarsim.errors import ConfigError
 from radarsim.studies.discriminator import study
-from radarsim.studies.discriminator import world as model
-from radarsim.studies.discriminator.kernels import data, scoring
-from radarsim.studies.discriminator.kernels import sequence as kernels
-from radarsim.studies.discriminator.kernels import strip as strips
 from tests.studies.discriminator import naive as naive
 
 BASE = {

@@ -5,9 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from radarsim.studies.discriminator import exact, versions, world
+from radarsim.bursts import burst as world
+from radarsim.bursts import fisher as exact
+from radarsim.bursts.schedule import Condition, Designer
+from radarsim.studies.discriminator import versions
 from radarsim.studies.discriminator.readings import BURST, PRINTED_PRIOR
-from radarsim.studies.discriminator.schedule import Condition, Designer
 from radarsim.studies.discriminator.versions import Version
 
 SHIPPED = Version(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from radarsim.studies.discriminator import world as model
+from radarsim.bursts import burst as model
 
 PAPER = model.Burst(10e9, 1e-5, 1e-6, 1e-6, 30000, 1.0, 2.25)
 

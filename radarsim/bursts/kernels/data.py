@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from radarsim.kernels.compile import kernel, summing
-from radarsim.kernels.random import U, normal_pair, threefry
-from radarsim.studies.discriminator.kernels.scoring import (
+from radarsim.bursts.kernels.scoring import (
     CENTRE,
     HALF,
     LIMIT,
@@ -24,6 +22,8 @@ from radarsim.studies.discriminator.kernels.scoring import (
     second_derivative,
     sincos_turns,
 )
+from radarsim.kernels.compile import kernel, summing
+from radarsim.kernels.random import U, normal_pair, threefry
 
 PHYSICS = np.dtype(
     [

@@ -2,17 +2,15 @@
 
 An estimate x (6,) is the phase's coefficients in turns over the whole burst; a window that is the share r of it sees
 b_j = x_j r^j. The step of (6) is (Φ_θ + R_pr⁻¹)⁻¹ ∂P/∂θ; it ends a window when it is shorter than ε, measured in that
-matrix. Block sums drawn by their own law have kernels of their own, `discriminator_strip`.
+matrix. Block sums drawn by their own law have kernels of their own, `strip`.
 """
 
 import math
 
 import numpy as np
 
-from radarsim.kernels.compile import inline, kernel
-from radarsim.kernels.random import U, normal_pair, threefry
-from radarsim.studies.discriminator.kernels.data import DEMODULATED, SAMPLES, demodulate, draw_samples
-from radarsim.studies.discriminator.kernels.scoring import (
+from radarsim.bursts.kernels.data import DEMODULATED, SAMPLES, demodulate, draw_samples
+from radarsim.bursts.kernels.scoring import (
     SIZE,
     STATE,
     TURN,
@@ -21,6 +19,8 @@ from radarsim.studies.discriminator.kernels.scoring import (
     score_image,
     score_samples,
 )
+from radarsim.kernels.compile import inline, kernel
+from radarsim.kernels.random import U, normal_pair, threefry
 
 LEAST_COHERENCE = 0.25  # taken into account; below it the main lobe is lost
 

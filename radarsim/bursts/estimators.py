@@ -1,4 +1,4 @@
-"""Arrays for the discriminator's kernels: the burst cut into blocks, each estimator's windows and step matrices."""
+"""Arrays for the estimator's kernels: the burst cut into blocks, each estimator's windows and step matrices."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from radarsim.studies.discriminator.kernels.data import PHYSICS, block_table
-from radarsim.studies.discriminator.kernels.scoring import SIZE, Z0
-from radarsim.studies.discriminator.kernels.sequence import OPTIONS, WINDOW
-from radarsim.studies.discriminator.schedule import Designer, handover_directions
-from radarsim.studies.discriminator.world import Burst, signal, turns_per_parameter
+from radarsim.bursts.burst import Burst, signal, turns_per_parameter
+from radarsim.bursts.kernels.data import PHYSICS, block_table
+from radarsim.bursts.kernels.scoring import SIZE, Z0
+from radarsim.bursts.kernels.sequence import OPTIONS, WINDOW
+from radarsim.bursts.schedule import Designer, handover_directions
 
 Blocks = Callable[[int], tuple[int, int, int]]
 IMAGE_SHARE = 0.02  # of a window's samples: below it the sum at twice the frequency is left out of the likelihood
@@ -35,7 +35,7 @@ class Design:
 
 @dataclass(frozen=True)
 class World:
-    """The burst for the kernels, see `kernels.discriminator.estimate_block`."""
+    """The burst for the kernels, see `kernels.sequence.estimate_block`."""
 
     physics: np.void
     edges: np.ndarray

@@ -1,4 +1,4 @@
-"""The log posterior over block sums of eight bursts at a time, and a step on it: `discriminator_scoring` in lanes.
+"""The log posterior over block sums of eight bursts at a time, and a step on it: `scoring` in lanes.
 
 The true phase is the reference, so an estimate is its deviation from the truth. A window has blocks of its own, each of
 a whole number of those drawn. Of a block all but its sums Z₀ and Z₁ is the same for all bursts and tabled, times s from
@@ -7,10 +7,10 @@ its centre in units of their own rms: then the phase difference is d + D s, with
 
 import math
 
+from radarsim.bursts.kernels.scoring import SIZE, TURN
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import WIDTH, full, get, nearest, put, where_greater
 from radarsim.kernels.random import sine_cosine_polynomial
-from radarsim.studies.discriminator.kernels.scoring import SIZE, TURN
 
 # Columns of a window's block in the table: M₁ … M₅; S₁ … S₅; real and imaginary parts of Z₂ without noise, W₀, W₁, W₂;
 # how many blocks drawn are in it and all before it.

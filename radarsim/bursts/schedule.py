@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from radarsim.studies.discriminator.world import Burst, balanced_inverse
+from radarsim.bursts.burst import Burst, balanced_inverse
 
 Tail = Literal["gaussian", "exact"]
 PAPER_PROBABILITY, PAPER_FACTOR = 0.99, 3.0

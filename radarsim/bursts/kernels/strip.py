@@ -1,4 +1,4 @@
-"""The sequence of discriminators over block sums, eight bursts side by side: `discriminator`, for the fast engine.
+"""The sequence of discriminators over block sums, eight bursts side by side: `sequence`, for the fast engine.
 
 A window goes on until all eight bursts are done with it; those that are done earlier stay where they are, so that no
 burst's estimate depends on its neighbours.
@@ -8,10 +8,7 @@ import math
 
 import numpy as np
 
-from radarsim.kernels.compile import kernel, part
-from radarsim.kernels.lanes import WIDTH, address, any_greater, full, get, put, rows, where_greater
-from radarsim.kernels.random import fill_normal_strip
-from radarsim.studies.discriminator.kernels.lanes import (
+from radarsim.bursts.kernels.lanes import (
     BEGUN,
     BEST,
     CHOSEN,
@@ -33,8 +30,11 @@ from radarsim.studies.discriminator.kernels.lanes import (
     score,
     step,
 )
-from radarsim.studies.discriminator.kernels.scoring import SIZE, TURN
-from radarsim.studies.discriminator.kernels.sequence import LEAST_COHERENCE
+from radarsim.bursts.kernels.scoring import SIZE, TURN
+from radarsim.bursts.kernels.sequence import LEAST_COHERENCE
+from radarsim.kernels.compile import kernel, part
+from radarsim.kernels.lanes import WIDTH, address, any_greater, full, get, put, rows, where_greater
+from radarsim.kernels.random import fill_normal_strip
 
 
 @part
@@ -125,6 +125,22 @@ def best_of_phases(physics, work, sums, table, window, options):
     copy(work, KEPT, X)
 
 
+@part
+def take_window(physics, drawn, table, weights, window, options, first, work, sums):
+    """One window of an estimator on eight bursts, the first or a later one: the estimate in work moves.
+
+    drawn are rows of the blocks' sums, table and weights those of `blocks.Tables`.
+    """
+    merge(drawn, table, weights, window.table, window.weights, window.blocks, sums)
+    starts = first and not options.from_truth
+    if starts and options.phases > 0:
+        best_of_phases(physics, work, sums, table, window, options)
+    else:
+        if starts:
+            first_phase(physics, work, sums, table, window)
+        scored(physics, work, sums, table, window, options, not first and options.search > 0)
+
+
 @kernel
 def run_strip(physics, drawn, tables, windows, options, work, sums, errors):
     """All windows (K,) of an estimator on eight bursts; writes errors (up to 8, K, 6), in turns over the burst.
@@ -137,14 +153,7 @@ def run_strip(physics, drawn, tables, windows, options, work, sums, errors):
         put(work, X + j, full(0.0) if options.from_truth else get(work, PRIOR + j))
     put(work, PASSES, full(0.0))
     for k in range(options.windows):
-        window = windows[k]
-        merge(drawn, table, weights, window.table, window.weights, window.blocks, sums)
-        if k == 0 and not options.from_truth and options.phases > 0:
-            best_of_phases(physics, work, sums, table, window, options)
-        else:
-            if k == 0 and not options.from_truth:
-                first_phase(physics, work, sums, table, window)
-            scored(physics, work, sums, table, window, options, k > 0 and options.search > 0)
+        take_window(physics, drawn, table, weights, windows[k], options, k == 0, work, sums)
         for j in range(SIZE):
             error = get(work, X + j)
             put(work, BEGUN + j, fraction(error) if j == 0 else error)
@@ -198,7 +207,7 @@ def room_for(blocks: int) -> tuple[np.ndarray, ...]:
 
 
 def estimate_strips(physics, mean, factor, tables, windows, options, keys, first, sigma, errors, passes) -> None:
-    """As `discriminator.estimate_block`, with block sums: errors (n, F, K, 6) and passes (n, F) are written.
+    """As `sequence.estimate_block`, with block sums: errors (n, F, K, 6) and passes (n, F) are written.
 
     mean (blocks, 4) and factor (blocks, 10) are the law of the sums drawn, sigma (6,) that of the forecast's errors,
     tables those of `blocks.Tables`. All is relative to the truth.

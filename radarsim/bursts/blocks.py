@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from radarsim.studies.discriminator.kernels.lanes import COLUMNS, END, RATIO, SHIFT, W0, W1, W2, WEIGHTS, Z2, M, S
-from radarsim.studies.discriminator.kernels.scoring import CENTRE, HALF, SIZE
-from radarsim.studies.discriminator.kernels.scoring import W0 as SUM_W
-from radarsim.studies.discriminator.kernels.scoring import Z0 as SUM_Z
+from radarsim.bursts.kernels.lanes import COLUMNS, END, RATIO, SHIFT, W0, W1, W2, WEIGHTS, Z2, M, S
+from radarsim.bursts.kernels.scoring import CENTRE, HALF, SIZE
+from radarsim.bursts.kernels.scoring import W0 as SUM_W
+from radarsim.bursts.kernels.scoring import Z0 as SUM_Z
 
 
 def block_edges(windows: list[int], per_window: int, whole: int = 1) -> np.ndarray:
@@ -51,7 +51,7 @@ def moments(sums: np.ndarray, row: int, shift: np.ndarray, starts: np.ndarray) -
 
 
 class Tables:
-    """Tables of the windows' blocks for `kernels.discriminator_lanes`: flat arrays `table` and `weights`."""
+    """Tables of the windows' blocks for `kernels.lanes`: flat arrays `table` and `weights`."""
 
     def __init__(self, edges: np.ndarray, sums: np.ndarray, per_window: int):
         self.edges, self.sums, self.per_window = edges, sums, per_window

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from radarsim.studies.discriminator.world import Burst, balanced_inverse, phase_turns, sample_times
+from radarsim.bursts.burst import Burst, balanced_inverse, phase_turns, sample_times
 
 
 def energy_ratio(burst: Burst, duration_s: float) -> float:

@@ -1,0 +1,1 @@
+"""Compiled: bursts, their block sums, scoring, sequences of discriminators."""
