@@ -20,21 +20,25 @@ DATA = ("engine.moments", "engine.results")  # the engine's plain data, which st
 CASE = ("config.experiment", "config.fields", "config.identity")
 ROOMS = {
     "errors": (),
+    "language": ("errors",),
     "config": ("errors", "physics"),
     "engine": ("errors",),
     "kernels": (),
     "physics": (),
     "bursts": ("kernels", "physics"),
-    "report": ("errors", "config", *DATA),
+    "report": ("errors", "config", "language", *DATA),
     "studies.noise": (*CASE, "kernels.random"),
     "studies.radial": ("errors", "physics"),
     "studies.interface": (*CASE, *DATA, "report"),
     "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "studies.interface"),
     "studies.registry": ("errors", "config", "studies.interface"),
     "studies.identity": ("errors", "config", "kernels", "studies.interface", "studies.registry"),
-    "recorded": ("errors", "config", "engine", "kernels", "physics", "report", "studies"),
-    "app": ("errors", "config", "engine", "kernels", "physics", "report", "studies", "recorded"),
-    "cli": ("errors", "config", "engine", "kernels", "physics", "report", "studies", "recorded", "app", "__init__"),
+    "recorded": ("errors", "config", "language", "engine", "kernels", "physics", "report", "studies"),
+    "app": ("errors", "config", "language", "engine", "kernels", "physics", "report", "studies", "recorded"),
+    "cli": (
+        *("errors", "config", "language", "engine", "kernels", "physics", "report", "studies", "recorded", "app"),
+        "__init__",
+    ),
     "__init__": ("errors", "app"),
     "__main__": ("cli",),
 }
@@ -56,13 +60,13 @@ ROLES = {
     "study": ((*GROUND, *DATA, "studies.noise"), SUMS),
     "cost": ((*GROUND, *DATA), (*SUMS, "cost")),
     "tables": ((*GROUND, *DATA, "report"), SHOWN),
-    "figures": ((*GROUND, *DATA, "report"), SHOWN),
-    "words": ((*GROUND, *DATA, "report"), READ),
+    "figures": ((*GROUND, *DATA, "report", "language"), SHOWN),
+    "words": ((*GROUND, *DATA, "report", "language"), READ),
     "claims": ((*GROUND, *DATA, "report"), READ),
     "measures": ((*GROUND, *DATA, "report"), READ),
     "readings": ((*GROUND, *DATA, "report"), READ),  # what the paper leaves open
     "search": ((*GROUND, *DATA, "report"), READ),  # its printed numbers under many readings
-    "chart": ((*GROUND, *DATA, "report"), READ),
+    "chart": ((*GROUND, *DATA, "report", "language"), READ),
     "track": ((*GROUND, *DATA, "studies.noise", "studies.interface"), (*SUMS, "track")),
     "map": ((*GROUND, *DATA), (*SUMS, "track")),  # one realisation followed as recorded plots are, for a figure
     "part": (

@@ -109,12 +109,9 @@ def resolved(quantity: Quantity, axes: Axes) -> Quantity:
 
 def unit(quantity: Quantity, axes: Axes) -> str:
     """The unit in which a quantity is given."""
-    from radarsim.report.panels import UNITS
+    from radarsim.report import text
 
-    if quantity.of.unit:
-        return quantity.of.unit
-    own = dict(axes.components)[str(quantity.component)]
-    return UNITS.get(own, own)
+    return quantity.of.unit or text.unit(dict(axes.components)[str(quantity.component)])
 
 
 def exact(quantity: Quantity, case: Case, axes: Axes) -> float:

@@ -4,7 +4,7 @@ import json
 from typing import Any, Literal
 
 from pydantic import BaseModel
-from pydantic.json_schema import models_json_schema
+from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 
 from radarsim.config.fields import Scenario, Study
 from radarsim.config.schema import Common, Studies
@@ -13,12 +13,19 @@ TITLE = "radarsim experiment"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
+class OwnTitles(GenerateJsonSchema):
+    """A key is called what its schema calls it: no title is made of its name."""
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
+
+
 def schema(studies: Studies) -> dict[str, Any]:
     """JSON Schema of a config, of one of the studies or an `include` of others, and of a scenario."""
     models = {name: studies.keys(name) for name in studies.usable()}
     described: tuple[type[BaseModel], ...] = (Common, *models.values())
     wanted: list[tuple[type[BaseModel], Literal["validation"]]] = [(model, "validation") for model in described]
-    references, whole = models_json_schema(wanted, ref_template="#/$defs/{model}")
+    references, whole = models_json_schema(wanted, ref_template="#/$defs/{model}", schema_generator=OwnTitles)
     definitions = tidy(whole["$defs"])
 
     def popped(model: type[BaseModel]) -> Any:
@@ -74,12 +81,12 @@ def _scenario(models: dict[str, type[Study]], kinds: dict[str, dict[str, Any]]) 
 
 
 def tidy(part: Any) -> Any:
-    """A schema without what carries no information: generated titles, and null, which stands for an absent key."""
+    """A schema without what carries no information: names of classes, and null, which stands for an absent key."""
     if isinstance(part, list):
         return [tidy(item) for item in part]
     if not isinstance(part, dict):
         return part
-    kept = {key: tidy(value) for key, value in part.items() if not _idle(key, value)}
+    kept = {key: tidy(value) for key, value in part.items() if not _idle(key, value, part)}
     choices = [choice for choice in kept.get("anyOf", ()) if choice != {"type": "null"}]
     if len(choices) == 1:
         del kept["anyOf"]
@@ -89,10 +96,10 @@ def tidy(part: Any) -> Any:
     return kept
 
 
-def _idle(key: str, value: object) -> bool:
+def _idle(key: str, value: object, part: dict[str, Any]) -> bool:
     """Whether a keyword (and no property that happens to have its name) carries no information."""
     if key == "title":
-        return isinstance(value, str)
+        return isinstance(value, str) and "properties" in part
     return key == "discriminator" or (key == "default" and value in (None, {}))
 
 

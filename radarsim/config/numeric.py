@@ -30,6 +30,7 @@ class NumericKey:
 UNITS = {
     **{"m": "m", "s": "s", "mps": "m/s", "mps2": "m/s²", "mps3": "m/s³", "rad": "rad", "deg": "°", "hz": "Hz"},
     **{"radps": "rad/s", "degps": "°/s", "radps2": "rad/s²", "degps2": "°/s²", "g": "g", "db": "dB"},
+    **{"kgpm2": "kg/m²"},
 }
 
 

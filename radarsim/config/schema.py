@@ -13,22 +13,31 @@ LARGEST_SEED = 2**64 - 1
 class Common(Model):
     """Keys that every config may have, whatever its study."""
 
-    study: Stem | None = Field(None, description="the study, which decides the other keys")
+    study: Stem | None = Field(None, title="study", description="the study, which decides the other keys")
     include: Annotated[tuple[Stem, ...], Field(min_length=1)] | None = Field(
-        None, description="stems of other configs, to be run together in place of an experiment of one's own"
+        None,
+        title="included configs",
+        description="stems of other configs, to be run together in place of an experiment of one's own",
     )
     sweep: Annotated[dict[str, Annotated[tuple[Anything, ...], Field(min_length=1)]], Field(min_length=1)] | None = (
-        Field(None, description="a case for each combination of values: key or dotted path, and its list of values")
+        Field(
+            None,
+            title="swept keys",
+            description="a case for each combination of values: key or dotted path, and its list of values",
+        )
     )
     realisations: Annotated[int, Whole(1, LARGEST_REALISATIONS)] | None = Field(
-        None, description="how often the experiment is repeated"
+        None, title="realisations", description="how often the experiment is repeated"
     )
-    seed: Annotated[int, Whole(0, LARGEST_SEED)] | None = Field(None, description="seed of the noise; default 1")
+    seed: Annotated[int, Whole(0, LARGEST_SEED)] | None = Field(
+        None, title="seed", description="seed of the noise; default 1"
+    )
     figures: dict[Name, Annotated[tuple[Name, ...], Field(min_length=1)]] = Field(
-        {}, description="for a figure the cases it shows: names, or patterns with * and ?"
+        {}, title="cases in figures", description="for a figure the cases it shows: names, or patterns with * and ?"
     )
     control_variate: Flag = Field(
         False,
+        title="table with a control variate",
         description="a further table, controlled.csv: σ of each filter with the baseline, exactly known, as control",
     )
 

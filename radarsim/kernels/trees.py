@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 COMPUTED = "?"  # stands among imports for a module whose name is computed
-WORDS = "description"  # argument of a configuration key that only tells what it is
-KEYS = ("Field",)  # the calls whose description is meant
+WORDS = {"description", "title", "json_schema_extra"}  # of a configuration key: they only tell what it is
+KEYS = ("Field",)  # the calls whose words are meant
 IMPORTERS = ("import_module", "__import__")
 FILE_NAME = re.compile(r"[\w ./-]*[\w-]\.[A-Za-z]\w{0,9}")
 OPAQUE = sys.stdlib_module_names | {"numpy", "scipy", "numba"}  # attributes of these are no modules of ours
@@ -160,13 +160,13 @@ def _texts(statements: Sequence[ast.stmt]) -> Iterator[str]:
 
 def _tokens(node: object) -> Iterable[bytes]:
     """The syntax tree as text, equal in every version of Python: fields that are empty or new ones' defaults are left
-    out, type comments, statements that are mere texts (docstrings), and descriptions of configuration keys too."""
+    out, type comments, statements that are mere texts (docstrings), and the words of configuration keys too."""
     if isinstance(node, ast.AST):
         yield f"({type(node).__name__}".encode()
         for name in node._fields:
             value = getattr(node, name, None)
             if name == "keywords" and _is_key(node):
-                value = [one for one in value if one.arg != WORDS]
+                value = [one for one in value if one.arg not in WORDS]
             elif name in ("kind", "type_comment", "ctx", "type_params"):
                 continue
             if value is not None and value != []:

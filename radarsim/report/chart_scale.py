@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from radarsim.report.drawing import Axis
+from radarsim.report.text import number, power_of_ten
 
 MARGIN = {"x": 0.02, "y": 0.06}  # of the span of the data, on either side
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+TICK_DIGITS = 6
 MOST_DECADES = 7  # labelled on a logarithmic axis
 
 
@@ -83,17 +85,9 @@ def decades(low: float, high: float) -> list[tuple[float, str]]:
 
 def power(n: int) -> str:
     """10ⁿ in figures where short."""
-    if -3 <= n <= 4:
-        return tick_text(10.0**n)
-    return "10" + str(n).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return tick_text(10.0**n) if -3 <= n <= 4 else power_of_ten(n)
 
 
 def tick_text(value: float) -> str:
     """A tick's number: at most six digits, a true minus, powers of ten raised."""
-    text = f"{value:.6g}"
-    text = "0" if float(text) == 0 else text
-    mantissa, e, exponent = text.partition("e")
-    if e:
-        raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-        text = f"{mantissa}·10{raised}" if mantissa not in ("1", "-1") else mantissa.replace("1", "10") + raised
-    return text.replace("-", "−")
+    return number(value, TICK_DIGITS)

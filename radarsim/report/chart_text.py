@@ -10,7 +10,7 @@ LETTERS = {
     **{"Delta": "Δ", "times": "×", "cdot": "·", "mu": "μ", "chi": "χ", "nu": "ν"},
 }
 DOT_ABOVE, HAT_ABOVE = "\u0307", "\u0302"
-PARTS = re.compile(r"\\(dot|hat)\s*(\w)|\\([A-Za-z]+)\s?|([_^])(\{[^}]*\}|\\[A-Za-z]+|.)|([A-Za-z]+)|(.)", re.DOTALL)
+PARTS = re.compile(r"\\(dot|hat)\s*(\w)|\\([A-Za-z]+)\s?|([_^])(\{[^}]*\}|\\[A-Za-z]+|.)|([^\W\d_]+)|(.)", re.DOTALL)
 RISE = {"sub": (0.25, 0.75), "sup": (-0.4, 0.75)}  # of the size: how far down, how large
 
 

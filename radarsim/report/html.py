@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.config.experiment import Experiment
 from radarsim.config.load import as_yaml
-from radarsim.report import asked, chart, provenance
+from radarsim.language import numeral
+from radarsim.report import asked, chart, provenance, text
 from radarsim.report.chart_text import spoken
 from radarsim.report.claims import page as claims_page
 from radarsim.report.drawing import Figure, Line
@@ -98,9 +99,9 @@ def comparison(
 def yaml_of(resolved: Mapping[str, Any]) -> str:
     """The resolved experiment as YAML; of very many cases the first."""
     cases = resolved["cases"]
-    text = as_yaml({**resolved, "cases": cases[:MOST_CASES]})
+    written = as_yaml({**resolved, "cases": cases[:MOST_CASES]})
     left = len(cases) - MOST_CASES
-    return text + (f"# {left} further cases stand in run.json\n" if left > 0 else "")
+    return written + (f"# {left} further cases stand in run.json\n" if left > 0 else "")
 
 
 def command(experiment: Experiment, record: Mapping[str, Any]) -> str:
@@ -115,14 +116,10 @@ def command(experiment: Experiment, record: Mapping[str, Any]) -> str:
 
 
 def number(value: object) -> str:
-    """A number for people, at four digits; text as it is, nothing for not-a-number."""
+    """A number for people, whole ones in full, others at four digits; text as it is, nothing for not-a-number."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value)
-    if isinstance(value, int) or math.isinf(value):
-        return str(value).replace("inf", "∞").replace("-", "−")
-    if math.isnan(value):
-        return ""
-    return f"{value:.4g}".replace("-", "−")
+    return numeral(str(value)) if isinstance(value, int) else text.number(value)
 
 
 @cache
@@ -142,9 +139,9 @@ def _template(name: str) -> "Template":
     return environment.get_template(name)
 
 
-def kept(text: object) -> str:
+def kept(words: object) -> str:
     """Text in which a per cent sign stays with its number."""
-    return str(text).replace(" %", "\u00a0%")
+    return str(words).replace(" %", "\u00a0%")
 
 
 def _measured(part: Mapping[str, Any]) -> str:
@@ -214,8 +211,8 @@ def _figures(figures: Sequence[Figure]) -> list[dict[str, Any]]:
 @cache
 def script() -> tuple[str, str]:
     """The page's script, and its hash as the page's policy names it: no other script runs."""
-    text = _file("script.js")
-    return text, "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+    code = _file("script.js")
+    return code, "sha256-" + base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()
 
 
 @cache
@@ -240,7 +237,7 @@ def whole(template: str, **content: object) -> str:
     """A page from a template, with the style and the script that all pages share."""
     from markupsafe import Markup
 
-    text, digest = script()
+    code, digest = script()
     return _template(template).render(
-        style=Markup(_file("style.css")), script=Markup(text), script_hash=digest, **content
+        style=Markup(_file("style.css")), script=Markup(code), script_hash=digest, **content
     )

@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from radarsim.config.labels import Label
+from radarsim.config.labels import label as label_of
 from radarsim.engine.results import CaseResult
+from radarsim.language import plural, tr
+from radarsim.report import text
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
-from radarsim.report.provenance import span
 from radarsim.report.statistics import Z95
 
 if TYPE_CHECKING:
@@ -19,12 +22,8 @@ WIDE_MM = 120.0  # one panel of many lines
 MOST_AT_ENDS = 6  # lines of one panel named at their ends; more by colour and dash
 MOST = 8  # cases a figure shows; more are named in its caption
 LONGEST_INSIDE = 28  # letters of a name that may stand in a legend inside a panel of many lines
-TIME = "time from the first plot, s"
-SYMBOLS = {"manoeuvre_variance": "$D_M$"}
 GREEK = {"b": "\\beta", "e": "\\varepsilon"}  # bearing and elevation, as the components' names begin or end
 POWERS = ("manoeuvre_variance",)  # swept keys that are read as powers of ten
-KEY_UNITS = {"manoeuvre_variance": "(m/s³)²"}
-UNITS = {"m/s2": "m/s²", "rad/s2": "rad/s²", "m/s3": "m/s³", "hz": "Hz"}
 
 
 class Quantity(NamedTuple):
@@ -45,13 +44,13 @@ def number(value: object, powers: bool = False) -> str:
         return literal(str(value))
     power = f"{value:.0e}".partition("e")[2]
     if value != 0 and float(f"1e{power}") == value and (abs(int(power)) > 1 or (powers and int(power) < 0)):
-        return "10" + str(int(power)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"{value:.4g}".replace("-", "−")
+        return text.power_of_ten(int(power))
+    return text.number(value)
 
 
-def literal(text: str) -> str:
+def literal(name: str) -> str:
     """Text of a user's for a figure: a dollar is a dollar."""
-    return text.replace("$", r"\$")
+    return name.replace("$", r"\$")
 
 
 def stem(result: CaseResult) -> str:
@@ -65,8 +64,48 @@ def device(result: CaseResult) -> str:
 
 
 def swept(result: CaseResult) -> str:
-    """The swept keys of a case in short: "D_M = 10⁻³"."""
-    return ", ".join(f"{symbol_of(key)} = {number(value, key in POWERS)}" for key, value in result.swept)
+    """The swept keys of a case in short: "D_M = 10⁻³", "σ_V = 5 m/s"."""
+    return ", ".join(f"{symbol_of(result, key)} = {with_its_unit(result, key, value)}" for key, value in result.swept)
+
+
+def with_its_unit(result: CaseResult, key: str, value: object) -> str:
+    """A value of a key with the key's unit, but for one that would have to stand in brackets."""
+    own = key_label(result, key).unit if isinstance(value, int | float) and not isinstance(value, bool) else ""
+    return " ".join(filter(None, (number(value, is_power(key)), own if not own.startswith("(") else "")))
+
+
+def key_label(result: CaseResult, key: str) -> Label:
+    """What people call a key of a case, in the language spoken."""
+    found = label_of(result.spec, key)
+    return found._replace(text=tr(found.text), unit=unit_of(found.unit))
+
+
+def unit_of(name: str) -> str:
+    """A unit as people write it, in the language spoken."""
+    return tr(text.unit(name))
+
+
+def is_power(key: str) -> bool:
+    """Whether values of a key are read as powers of ten."""
+    return key.rpartition(".")[2] in POWERS
+
+
+def symbol_of(result: CaseResult, key: str) -> str:
+    """A key of a case as a figure names it in short: its letter where it has one (mathematical text), else its name."""
+    found = key_label(result, key)
+    return mathematical(found.symbol) if found.symbol else found.text
+
+
+def axis_of(result: CaseResult, key: str) -> str:
+    """A key of a case as an axis names it: name, letter, unit."""
+    found = key_label(result, key)
+    return with_unit(" ".join(filter(None, (found.text, mathematical(found.symbol)))), found.unit)
+
+
+def mathematical(symbol: str) -> str:
+    """A symbol as mathematical text: $D_M$ of D_M."""
+    base, _bar, below = symbol.partition("_")
+    return f"${base}_{{{below}}}$" if len(below) > 1 else f"${symbol}$" if symbol else ""
 
 
 def letter(component: str) -> str:
@@ -80,12 +119,7 @@ def letter(component: str) -> str:
 
 def with_unit(words: str, unit: str) -> str:
     """An axis' words with their unit, where there is one."""
-    return ", ".join(filter(None, (words, UNITS.get(unit, unit))))
-
-
-def symbol_of(key: str) -> str:
-    """A swept key as a figure names it: its letter where it has one."""
-    return SYMBOLS.get(key, key)
+    return ", ".join(filter(None, (words, unit_of(unit))))
 
 
 def label(result: CaseResult) -> str:
@@ -108,6 +142,11 @@ def in_legend(drawn: Sequence[Panel]) -> list[Panel]:
     return [*blank, Panel(drawn[0].x, drawn[0].y, (), keys=tuple(keys.items()))]
 
 
+def time_axis() -> Axis:
+    """The axis of time that figures of all studies share."""
+    return Axis(tr("time from the first plot, s"), limits=(0, None))
+
+
 def counts(label: str, highest: float) -> Axis:
     """An axis of whole numbers from zero, with ticks at whole numbers only."""
     step = next(s * 10**p for p in range(9) for s in (1, 2, 5) if highest / (s * 10**p) <= 8)
@@ -123,14 +162,18 @@ def told(results: Sequence[CaseResult], most: int = 3) -> tuple[list[CaseResult]
     """The cases that an answer tells: all, or of more than so many the first and the last; and words on the others."""
     if len(results) <= most:
         return list(results), []
-    between = len(results) - 2
-    words = f"The {between} cases" if between > 1 else "The case"
-    return [results[0], results[-1]], [f"{words} between: in the report and its tables."]
+    left = plural(
+        "The case between: in the report's tables.",
+        "The {count} cases between: in the report's tables.",
+        len(results) - 2,
+    )
+    return [results[0], results[-1]], [left]
 
 
-def plain(text: str) -> str:
+def plain(words: str) -> str:
     """A figure's text without the marks of mathematical text."""
-    return text.replace(r"\$", "\0").replace("$", "").replace("\0", "$")
+    bare = re.sub(r"_\{([^}]*)\}", r"_\1", words.replace(r"\$", "\0"))
+    return bare.replace("$", "").replace("\0", "$")
 
 
 def families(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
@@ -143,7 +186,23 @@ def families(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
 
 def realisations(results: Sequence[CaseResult]) -> str:
     """How many realisations stand behind a figure: "100,000 to 200,000 realisations" where its cases differ."""
-    return f"{span([result.count for result in results])} realisations"
+    return _of_realisations([result.count for result in results])
+
+
+def _of_realisations(counts: Sequence[int]) -> str:
+    least, most = min(counts), max(counts)
+    if least == most:
+        return plural("{count:,} realisation", "{count:,} realisations", most)
+    return plural("{least:,} to {count:,} realisations", "{least:,} to {count:,} realisations", most, least=least)
+
+
+def left_out(count: int) -> str:
+    """Words on cases that a figure does not show, to follow its caption."""
+    if count <= 0:
+        return ""
+    return " " + plural(
+        "One further case is in the tables alone.", "{count} further cases are in the tables alone.", count
+    )
 
 
 def unswept(results: Sequence[CaseResult]) -> list[CaseResult]:
@@ -155,7 +214,7 @@ def shown(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[Cas
     """The results that a figure shows, of the cases named, at most eight; and words on those left out."""
     wanted = [result for result in results if result.name in set(names)]
     left = len(wanted) - MOST
-    return wanted[:MOST], f" {left} further cases are in the tables alone." if left > 0 else ""
+    return wanted[:MOST], left_out(left)
 
 
 def shown_families(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
@@ -163,7 +222,7 @@ def shown_families(results: Sequence[CaseResult], names: Sequence[str]) -> tuple
     wanted = [result for result in results if result.name in set(names)]
     some = [result for members in list(families(wanted).values())[:MOST] for result in members[:MOST]]
     left = len(wanted) - len(some)
-    return some, f" {left} further cases are in the tables alone." if left > 0 else ""
+    return some, left_out(left)
 
 
 def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity) -> Figure:
@@ -179,11 +238,13 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
             own = Panel(panels[0].x, panels[0].y, (), keys=panels[0].keys, key_title=panels[0].key_title)
             panels = [replace(panel, keys=(), key_title="", legend="none") for panel in panels] + [own]
         panels[1:] = [replace(panel, keys=()) if panel.marks else panel for panel in panels[1:]]
-    caption = (
-        f"Root-mean-square error of the {of.name} about the truth against time, of {realisations(results)}. "
-        "Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact values."
+    caption = tr(
+        "Root-mean-square error of the {quantity} about the truth against time, of {realisations}. "
+        "Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact values.",
+        quantity=of.name,
+        realisations=realisations(results),
     )
-    title = f"σ of the {of.name}"
+    title = tr("σ of the {quantity}", quantity=of.name)
     beside = single and panels[0].legend == "right"
     if not single:
         panels = [replace(panel, legend="none" if panel.legend == "none" else "best") for panel in panels]
@@ -206,26 +267,31 @@ def _sigma_panel(members: Sequence[CaseResult], curves: Mapping, component: str,
                 continue
             unit = rows["unit"].iloc[0]
             style = look(filters.index(f), i, len(members))
-            words = number(result.swept[0][1], result.swept[0][0] in POWERS) if one_key else swept(result)
+            words = number(result.swept[0][1], is_power(result.swept[0][0])) if one_key else swept(result)
             name = literal(f) if len(members) == 1 else f"{literal(f)}, {swept(result)}"
             marks.append(_sigma_line(rows, literal(f) if len(members) == 1 else words, style, name))
-    y = Axis(with_unit(f"$\\sigma$ of {of.symbol}", unit), limits=(0, None))
-    panel = Panel(Axis(TIME, limits=(0, None)), y, tuple(marks), device(members[0]))
+    y = Axis(with_unit(tr("$\\sigma$ of {symbol}", symbol=of.symbol), unit), limits=(0, None))
+    panel = Panel(time_axis(), y, tuple(marks), device(members[0]))
     if len(members) == 1:
         return panel
     dashes = tuple((literal(f), Style(0, n, n)) for n, f in enumerate(filters))
     if len(marks) > MOST_AT_ENDS and len(filters) > 1:
-        return _by_colour(panel, dashes, members[0].swept[0][0] if one_key else "")
-    title = f"at the lines: {symbol_of(members[0].swept[0][0])}" if one_key else ""
+        return _by_colour(panel, dashes, key_title(members[0]) if one_key else "")
+    title = tr("at the lines: {key}", key=key_title(members[0])) if one_key else ""
     return replace(panel, keys=dashes, key_title=title)
 
 
-def _by_colour(panel: Panel, dashes: tuple, key: str) -> Panel:
+def key_title(result: CaseResult) -> str:
+    """What a legend of values of a case's one swept key is headed: its letter or name, and its unit."""
+    key = result.swept[0][0]
+    return with_unit(symbol_of(result, key), key_label(result, key).unit)
+
+
+def _by_colour(panel: Panel, dashes: tuple, title: str) -> Panel:
     """A panel of many lines: names not at the lines but in a legend beside it, one of each colour and each dash."""
     lines = [mark for mark in panel.marks if isinstance(mark, Line)]
     shades = {line.label: Style(line.style.colour, 0) for line in lines}
     marks = tuple(replace(line, label="") for line in lines)
-    title = ", ".join(filter(None, (symbol_of(key), KEY_UNITS.get(key, "")))) if key else ""
     return replace(panel, marks=marks, keys=(*shades.items(), *dashes), key_title=title, legend="right")
 
 
@@ -267,16 +333,19 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
             style = Style(i / (len(results) - 1) if family else i, n if several else i, n if several else i)
             marks.append(Line(t, value, words, style, lo, hi, exact if np.isfinite(exact).any() else None))
     base = results[0].axes.filters[results[0].axes.baseline]
-    caption = (
-        f"Relative gain in σ of the {of.name} against filter {base}, paired on common noise, of "
-        f"{realisations(results)}. Bands: 95 % intervals. Crosses: exact values. Below zero: a loss."
+    caption = tr(
+        "Relative gain in σ of the {quantity} against filter {base}, paired on common noise, of {realisations}. "
+        "Bands: 95 % intervals. Crosses: exact values. Below zero: a loss.",
+        quantity=of.name,
+        base=base,
+        realisations=realisations(results),
     )
     # Many long names would cover the lines: they stand beside the panel.
     long = len(marks) > 4 and any(isinstance(mark, Line) and len(mark.label) > LONGEST_INSIDE for mark in marks)
-    y = Axis(f"gain in $\\sigma$ of {of.symbol}, %")
-    panel = Panel(Axis(TIME, limits=(0, None)), y, tuple(marks), direct=not long, legend="right" if long else "best")
+    y = Axis(tr("gain in $\\sigma$ of {symbol}, %", symbol=of.symbol))
+    panel = Panel(time_axis(), y, tuple(marks), direct=not long, legend="right" if long else "best")
     width = PAGE_MM if long else COLUMN_MM if len(results) < 3 else 120.0
-    return Figure(name, f"Gain in σ of the {of.name}", caption, (panel,), width_mm=width)
+    return Figure(name, tr("Gain in σ of the {quantity}", quantity=of.name), caption, (panel,), width_mm=width)
 
 
 def per_component(
@@ -324,13 +393,16 @@ def dynamic_figure(
             drawn.append(replace(panel, keys=()) if drawn else panel)
     if not drawn:
         return None
-    caption = (
-        f"Errors of the {of.name} where the target leaves the filters' model: mean error (dynamic, bias) and standard "
-        f"deviation (fluctuation, spread) of {realisations(results)}; σ² is the sum of their squares."
+    caption = tr(
+        "Errors of the {quantity} where the target leaves the filters' model: mean error (dynamic, bias) and standard "
+        "deviation (fluctuation, spread) of {realisations}; σ² is the sum of their squares.",
+        quantity=of.name,
+        realisations=realisations(results),
     )
     columns = min(3, len(drawn))
     width = COLUMN_MM if columns == 1 else PAGE_MM
-    return Figure(name, f"Dynamic and fluctuation error of the {of.name}", caption, tuple(drawn), columns, width, 56)
+    title = tr("Dynamic and fluctuation error of the {quantity}", quantity=of.name)
+    return Figure(name, title, caption, tuple(drawn), columns, width, 56)
 
 
 def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Quantity) -> Panel:
@@ -339,10 +411,10 @@ def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Quantity) -> 
         t, unit = rows["t_s"].to_numpy(), rows["unit"].iloc[0]
         bias, half = rows["bias"].to_numpy(), Z95 * rows["bias_se"].to_numpy()
         name = literal(f)
-        marks.append(Line(t, bias, "", Style(n, 0, n), bias - half, bias + half, name=f"{name}: bias"))
-        marks.append(Line(t, rows["spread"].to_numpy(), "", Style(n, 1, n), name=f"{name}: spread"))
+        marks.append(Line(t, bias, "", Style(n, 0, n), bias - half, bias + half, name=tr("{name}: bias", name=name)))
+        marks.append(Line(t, rows["spread"].to_numpy(), "", Style(n, 1, n), name=tr("{name}: spread", name=name)))
     keys = [(literal(f), Style(n, None, n)) for n, (f, _) in enumerate(found)]
-    keys += [("bias", Style(0, 0)), ("spread", Style(0, 1))]
-    title = ", ".join(number(value, key in POWERS) for key, value in result.swept) or device(result)
-    y = Axis(with_unit(f"error of {of.symbol}", unit))
-    return Panel(Axis(TIME, limits=(0, None)), y, tuple(marks), title, tuple(keys))
+    keys += [(tr("bias"), Style(0, 0)), (tr("spread"), Style(0, 1))]
+    title = ", ".join(number(value, is_power(key)) for key, value in result.swept) or device(result)
+    y = Axis(with_unit(tr("error of {symbol}", symbol=of.symbol), unit))
+    return Panel(time_axis(), y, tuple(marks), title, tuple(keys))

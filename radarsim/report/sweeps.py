@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from radarsim.engine.results import CaseResult
+from radarsim.language import tr
 from radarsim.report import panels
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Heat, Line, Panel, Style
 
@@ -44,10 +45,12 @@ def components(result: CaseResult) -> list[tuple[str, str]]:
     return (values if len(values) > 1 else list(result.axes.components))[:MOST_PANELS]
 
 
-def places(key: str, values: Sequence) -> tuple[np.ndarray, Axis]:
-    """Where swept values stand on an axis: numbers where they are, anything else one after the other."""
-    words, unit = panels.symbol_of(key), panels.KEY_UNITS.get(key, "")
-    label = panels.with_unit(words, unit)
+def places(result: CaseResult, key: str, values: Sequence) -> tuple[np.ndarray, Axis]:
+    """Where values of a key that is swept stand on an axis: numbers where they are, anything else one after the other.
+
+    result is one of the swept cases.
+    """
+    label = panels.axis_of(result, key)
     if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
         x = np.array(values, dtype=float)
         return x, Axis(label, "log" if x.min() > 0 and x.max() / x.min() > WIDE else "linear")
@@ -66,7 +69,7 @@ def last(result: CaseResult, filter_name: str, component: str, curves: Mapping) 
 
 def line_figure(name: str, key: str, members: Sequence[CaseResult], curves: Mapping) -> Figure | None:
     """σ at the last scan against one key: a panel for each component, a line for each filter."""
-    x, axis = places(key, [dict(result.swept)[key] for result in members])
+    x, axis = places(members[0], key, [dict(result.swept)[key] for result in members])
     order, made = np.argsort(x), []
     filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
     for n, (component, unit) in enumerate(components(members[0])):
@@ -79,24 +82,30 @@ def line_figure(name: str, key: str, members: Sequence[CaseResult], curves: Mapp
                 label = words if n == 0 else ""
                 marks.append(Line(x[order], found[:, 0], label, style, found[:, 1], found[:, 2], exact, words))
         if marks:
-            y = Axis(panels.with_unit(f"$\\sigma$ of {panels.letter(component)} at the end", unit), limits=(0, None))
+            y = Axis(
+                panels.with_unit(tr("$\\sigma$ of {symbol} at the end", symbol=panels.letter(component)), unit),
+                limits=(0, None),
+            )
             made.append(Panel(axis, y, tuple(marks), direct=False))
     if not made:
         return None
-    caption = (
-        f"σ at the last scan against {panels.plain(panels.symbol_of(key))}, of {panels.realisations(members)} each. "
-        "Bands: 95 % intervals. Crosses: exact values, where known."
+    caption = tr(
+        "σ at the last scan against the {key}, of {realisations} each. "
+        "Bands: 95 % intervals. Crosses: exact values, where known.",
+        key=panels.key_label(members[0], key).text,
+        realisations=panels.realisations(members),
     )
     columns = min(3 if len(made) != 4 else 2, len(made))
     width = COLUMN_MM if columns == 1 else PAGE_MM
-    return Figure(name, f"σ over {panels.plain(panels.symbol_of(key))}", caption, tuple(made), columns, width, 60)
+    title = tr("σ over the {key}", key=panels.key_label(members[0], key).text)
+    return Figure(name, title, caption, tuple(made), columns, width, 60)
 
 
 def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], curves: Mapping) -> Figure | None:
     """σ of the first component at the last scan over two keys: a map for each filter."""
     values = [list(dict.fromkeys(_hashable(dict(r.swept)[key]) for r in members)) for key in keys]
     ranked = [sorted(v, key=lambda one: (isinstance(one, str), one)) for v in values]
-    (x, x_axis), (y, y_axis) = (places(key, v) for key, v in zip(keys, ranked, strict=True))
+    (x, x_axis), (y, y_axis) = (places(members[0], key, v) for key, v in zip(keys, ranked, strict=True))
     component, unit = members[0].axes.components[0]
     made = []
     for f in list(dict.fromkeys(f for result in members for f in result.axes.filters))[:MOST_PANELS]:
@@ -105,18 +114,25 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
             column, row = (ranked[i].index(_hashable(dict(result.swept)[key])) for i, key in enumerate(keys))
             grid[row, column] = last(result, f, component, curves)[0]
         if np.isfinite(grid).any():
-            heat = Heat(x, y, grid, panels.with_unit(f"$\\sigma$ of {panels.letter(component)}", unit))
+            heat = Heat(
+                x, y, grid, panels.with_unit(tr("$\\sigma$ of {symbol}", symbol=panels.letter(component)), unit)
+            )
             ticks = [tuple((float(i), panels.number(v)) for i, v in enumerate(values)) for values in ranked]
             columns_axis, rows_axis = (Axis(one.label, ticks=t) for one, t in zip((x_axis, y_axis), ticks, strict=True))
             made.append(Panel(columns_axis, rows_axis, (heat,), panels.literal(f)))
     if not made:
         return None
-    over = " and ".join(panels.plain(panels.symbol_of(key)) for key in keys)
-    caption = f"σ of {component} at the last scan over {over}, of {panels.realisations(members)} in each cell."
-    columns = min(2, len(made))
-    return Figure(
-        name, f"σ over {over}", caption, tuple(made), columns, panels.WIDE_MM if columns == 1 else PAGE_MM, 62
+    first, second = (panels.key_label(members[0], key).text for key in keys)
+    caption = tr(
+        "σ of {component} at the last scan over the {first} and the {second}, of {realisations} in each cell.",
+        component=component,
+        first=first,
+        second=second,
+        realisations=panels.realisations(members),
     )
+    title = tr("σ over the {first} and the {second}", first=first, second=second)
+    columns = min(2, len(made))
+    return Figure(name, title, caption, tuple(made), columns, panels.WIDE_MM if columns == 1 else PAGE_MM, 62)
 
 
 def _hashable(value: object) -> int | float | str:

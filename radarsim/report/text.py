@@ -1,4 +1,12 @@
-"""Numbers and counts as they stand in sentences, and text that is safe to print."""
+"""Numbers, units and counts as they stand in sentences, and text that is safe to print."""
+
+import math
+
+from radarsim.language import numeral
+
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+UNITS = {"m/s2": "m/s²", "rad/s2": "rad/s²", "m/s3": "m/s³", "hz": "Hz"}  # of tables, as people write them
+PLAIN = 6  # digits before the point that are still written out
 
 
 def clock(seconds: float) -> str:
@@ -12,6 +20,34 @@ def plural(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
+def power_of_ten(exponent: int) -> str:
+    """10⁻³ of −3."""
+    return f"10{str(exponent).translate(SUPERSCRIPT)}"
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number for people at so many digits: 25600, 0.00012, 1.2·10⁻⁷, ∞; nothing for not-a-number.
+
+    >>> [number(one) for one in (25600.0, 1e10, 2.56e7, -0.00005, 0.25)]
+    ['25600', '10¹⁰', '2.56·10⁷', '−5·10⁻⁵', '0.25']
+    """
+    if math.isnan(value):
+        return ""
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    if value == 0 or -4 <= int(exponent) < PLAIN:
+        return numeral(f"{float(f'{value:.{digits}g}') + 0.0:.10g}")
+    short = f"{float(mantissa):g}"
+    raised = power_of_ten(int(exponent))
+    return raised if short == "1" else f"−{raised}" if short == "-1" else f"{numeral(short)}·{raised}"
+
+
+def unit(name: str) -> str:
+    """A unit of a table as people write it: m/s² of m/s2."""
+    return UNITS.get(name, name)
+
+
 def printable(text: str) -> str:
     """Text without control characters: what a config names must not steer the terminal."""
     return "".join(c if c.isprintable() else "�" for c in text)
@@ -20,7 +56,7 @@ def printable(text: str) -> str:
 def significant_digits(value: float, form: str = "#.4g") -> str:
     """A number in a form, of four figures, as sentences have it: no point at its end, no zero below zero, a minus."""
     text = format(value, form).removesuffix(".")
-    return (text if float(text) else text.removeprefix("-")).replace("-", "−")
+    return numeral(text if float(text) else text.removeprefix("-"))
 
 
 def known(value: float, form: str = "#.4g", after: str = "") -> str:

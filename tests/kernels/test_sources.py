@@ -163,6 +163,8 @@ def tree(text):
     [
         ("def f():\n    'a'\n    return 1\n", "def f():\n    'b'  # c\n\n    return (1)\n", True),
         ("x = Field(1, description='a')\n", "x = Field(1, description='b' 'c')\n", True),
+        ("x = Field(1)\n", "x = Field(1, title='a', json_schema_extra={'symbol': 'b'})\n", True),
+        ("x = Field(1, gt=0)\n", "x = Field(1, gt=1)\n", False),
         ("x = f(1, description='a')\n", "x = f(1, description='b')\n", False),
         ("x: int = 1\n'of x'\n", "x: int = 1\n", True),
         ("x = 1\n", "x = 1.0\n", False),

@@ -127,7 +127,7 @@ def test_measured_values_are_written_to_two_figures_of_their_half_width():
 
 
 def test_long_names_of_two_keys_stand_beside_the_lines():
-    keys = ("sweep.radar.sigma_velocity_mps=[4, 16]", "sweep.manoeuvre_variance=[1e-4, 1e-2]")
+    keys = ("sweep.radar.bias_velocity_mps=[4, 16]", "sweep.manoeuvre_variance=[1e-4, 1e-2]")
     _, described = swept({"include": ["rls2", "rls5"]}, *keys, n=50)
     gain, sigma = described["gain_r"], described["sigma_r"]
     assert gain.panels[0].legend == "right"
@@ -135,7 +135,7 @@ def test_long_names_of_two_keys_stand_beside_the_lines():
     assert [panel.legend for panel in drawn] == ["none", "none"]
     assert not legend.marks
     assert [words for words, _ in legend.keys] == [
-        *(f"radar.sigma_velocity_mps = {v}, $D_M$ = {d}" for v in (4, 16) for d in ("10⁻⁴", "10⁻²")),
+        *(f"bias of the measured radial velocity = {v} m/s, $D_M$ = {d}" for v in (4, 16) for d in ("10⁻⁴", "10⁻²")),
         *("r", "r+Vr"),
     ]
     assert sigma.columns == 2

@@ -217,6 +217,9 @@ def test_the_shared_rooms(path, expected, moved):
         ("studies/sonar/clutter/track.py", '"""', '"""Here: ', NONE),
         ("studies/sonar/clutter/config.py", 'description="', 'description="that is ', NONE),
         ("studies/range_doppler/config.py", 'description="', 'description="that is ', NONE),
+        ("studies/range_doppler/config.py", 'title="', 'title="another ', NONE),
+        ("studies/range_doppler/config.py", '{"symbol": "', '{"symbol": "Q', NONE),
+        ("studies/range_doppler/config.py", "Field(gt=0), Added()", "Field(gt=0.5), Added()", {"rls2"}),
         ("studies/registry.py", '"multimodel": ', '"another": "elsewhere.study",\n    "multimodel": ', NONE),
         # The declared study: what it is called and shows, and how it computes.
         ("studies/range_doppler/__init__.py", 'about="', 'about="Indeed: ', NONE),

@@ -2,11 +2,13 @@
 // What a reader does with the page: switch curves, read values off them, sort and copy tables, light and dark.
 const REACH = 14; // units of a panel within which a point belongs to the pointer's place
 const MOST = 9; // curves told at once
+const COMMA = document.documentElement.lang !== "en"; // in place of the point
 
 function words(value) {
   if (value === null || value === undefined) return "";
   if (typeof value === "string") return value;
-  return String(Number(value.toPrecision(5))).replace("-", "−");
+  const text = String(Number(value.toPrecision(5))).replace("-", "−");
+  return COMMA ? text.replace(".", ",") : text;
 }
 
 function make(tag, text, parent, css) {
@@ -195,8 +197,15 @@ function figure(node) {
   }
 }
 
+const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+
+// The number that a cell's text says: 1,234.5, or 1 234,5 where the page says so, and 1.2·10⁻⁷.
 function number(text) {
-  const plain = text.replaceAll("−", "-").replace("∞", "Infinity").replaceAll(",", "");
+  let plain = text.replaceAll("−", "-").replace("∞", "Infinity").replace(/[\u00a0\u202f]/g, "");
+  plain = COMMA ? plain.replaceAll(",", ".") : plain.replaceAll(",", "");
+  const power = (all, before, sign, digits) =>
+    `${before ? "" : "1"}e${sign ? "-" : ""}${[...digits].map((one) => RAISED.indexOf(one)).join("")}`;
+  plain = plain.replace(/(·)?10(⁻)?([⁰¹²³⁴⁵⁶⁷⁸⁹]+)$/, power);
   return plain.trim() === "" ? NaN : Number(plain);
 }
 

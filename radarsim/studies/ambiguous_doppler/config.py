@@ -60,11 +60,16 @@ class Radar(radial.Radar):
     """A coherent surveillance radar: accuracies of one plot, period of its scans, pulse repetition rates."""
 
     repetition_rate_hz: Positive | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_RATES)] = Field(
+        title="pulse repetition rate",
+        json_schema_extra={"symbol": "F_r"},
         description="pulse repetition rate, Hz; velocity folds into half the wavelength times it; a list is used in "
-        "turn, scan by scan (stagger)"
+        "turn, scan by scan (stagger)",
     )
     detection_probability: Annotated[Probability, Field(gt=0)] = Field(
-        1.0, description="probability that a scan gives a plot"
+        1.0,
+        title="detection probability",
+        json_schema_extra={"symbol": "P_D"},
+        description="probability that a scan gives a plot",
     )
 
     @property
@@ -90,8 +95,18 @@ class Radar(radial.Radar):
 class Prior(Model):
     """What the filters know before the first plot: mean zero, and these standard deviations. The range is not known."""
 
-    sigma_velocity_mps: Positive = Field(300.0, description="of the radial velocity, m/s")
-    sigma_acceleration_mps2: Positive = Field(10.0, description="of the radial acceleration, m/s²")
+    sigma_velocity_mps: Positive = Field(
+        300.0,
+        title="prior σ of the radial velocity",
+        json_schema_extra={"symbol": "σ_V0"},
+        description="of the radial velocity, m/s",
+    )
+    sigma_acceleration_mps2: Positive = Field(
+        10.0,
+        title="prior σ of the radial acceleration",
+        json_schema_extra={"symbol": "σ_a0"},
+        description="of the radial acceleration, m/s²",
+    )
 
 
 class RandomPolynomial(Model):
@@ -100,26 +115,34 @@ class RandomPolynomial(Model):
     Both are normal with mean zero. Range counts from any origin, so that it may become negative.
     """
 
-    kind: Literal["random_polynomial"] = Field(description="a polynomial of the second degree, drawn each realisation")
-    range_m: Positive = Field(100e3, description="range at the first scan, m")
+    kind: Literal["random_polynomial"] = Field(
+        title="kind", description="a polynomial of the second degree, drawn each realisation"
+    )
+    range_m: Positive = Field(100e3, title="range", description="range at the first scan, m")
     sigma_velocity_mps: NonNegative | None = Field(
-        None, description="standard deviation of the radial velocity, m/s; default: that of `prior`"
+        None,
+        title="σ of the target's radial velocity",
+        description="standard deviation of the radial velocity, m/s; default: that of `prior`",
     )
     sigma_acceleration_mps2: NonNegative | None = Field(
-        None, description="standard deviation of the radial acceleration, m/s²; default: that of `prior`"
+        None,
+        title="σ of the target's radial acceleration",
+        description="standard deviation of the radial acceleration, m/s²; default: that of `prior`",
     )
 
 
 class AccelerationPulse(Model):
     """A polynomial with a constant acceleration for a while; the velocity it has built up stays."""
 
-    kind: Literal["acceleration_pulse"] = Field(description="a constant acceleration for a while")
-    coefficients: Coefficients = Field(description=COEFFICIENTS)
+    kind: Literal["acceleration_pulse"] = Field(title="kind", description="a constant acceleration for a while")
+    coefficients: Coefficients = Field(title="derivatives of the range at the first plot", description=COEFFICIENTS)
     acceleration_g: Annotated[Number, Field(ge=-100, le=100)] = Field(
-        description="radial acceleration added, standard gravities"
+        title="acceleration",
+        json_schema_extra={"symbol": "a", "unit": "g"},
+        description="radial acceleration added, standard gravities",
     )
-    start_s: NonNegative = Field(description="time from the first scan at which it begins, s")
-    duration_s: Positive = Field(description="how long it lasts, s")
+    start_s: NonNegative = Field(title="start time", description="time from the first scan at which it begins, s")
+    duration_s: Positive = Field(title="duration", description="how long it lasts, s")
 
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
@@ -136,49 +159,71 @@ Target = Annotated[
 class Manoeuvres(Model):
     """A class of manoeuvres: a constant radial acceleration for a while, that begins at any scan, each as likely."""
 
-    acceleration_mps2: Positive = Field(description="size of the acceleration, m/s²")
-    duration_s: Positive = Field(description="how long it lasts, s")
+    acceleration_mps2: Positive = Field(
+        title="acceleration", json_schema_extra={"symbol": "a"}, description="size of the acceleration, m/s²"
+    )
+    duration_s: Positive = Field(title="duration", description="how long it lasts, s")
 
 
 class Filter(Model):
     """A Kalman filter of range, or several of different order, with the velocity or without."""
 
-    name: Annotated[Name, Display()] = Field(description="label; every filter has its own")
+    name: Annotated[Name, Display()] = Field(title="name", description="label; every filter has its own")
     doppler: Literal["none", "unfolded", "folded"] = Field(
-        description="none: range alone; unfolded: the velocity with its true fold, a bound; folded: as measured"
+        title="use of Doppler",
+        description="none: range alone; unfolded: the velocity with its true fold, a bound; folded: as measured",
     )
     orders: Annotated[tuple[Order, ...], Field(min_length=1, max_length=3)] = Field(
-        (2,), description="orders of its models: 2 has an acceleration, 1 a velocity, 0 a range that moves at random"
+        (2,),
+        title="orders of the models",
+        description="orders of its models: 2 has an acceleration, 1 a velocity, 0 a range that moves at random",
     )
     manoeuvre_variance: NonNegative | tuple[NonNegative, ...] = Field(
+        title="manoeuvre variance",
+        json_schema_extra={"symbol": "D_M", "unit": ""},
         description="variance of the random derivative that a model allows for: jerk (m/s³)² of order 2, acceleration "
-        "(m/s²)² of order 1, velocity (m/s)² of order 0; a list for several orders, in their order"
+        "(m/s²)² of order 1, velocity (m/s)² of order 0; a list for several orders, in their order",
     )
     hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = Field(
-        None, description="folded: most sequences of folds that it keeps; 1: the nearest fold; default: 300"
+        None,
+        title="hypotheses kept",
+        description="folded: most sequences of folds that it keeps; 1: the nearest fold; default: 300",
     )
     prune_below: Annotated[float, Field(ge=0, lt=1)] | None = Field(
         None,
+        title="ratio under which a hypothesis is dropped",
         description="folded: ratio to the probability of the best, under which a hypothesis is dropped; 0: none is; "
         "default: 1e-6",
     )
     merge: Literal["never", "each_scan"] | None = Field(
-        None, description="folded: keep hypotheses over scans, or merge them into one at each scan; default: never"
+        None,
+        title="merging of hypotheses",
+        description="folded: keep hypotheses over scans, or merge them into one at each scan; default: never",
     )
     estimate: Literal["best", "mean"] | None = Field(
-        None, description="folded: the best hypothesis, or the mean of all by their probabilities; default: mean"
+        None,
+        title="estimate",
+        description="folded: the best hypothesis, or the mean of all by their probabilities; default: mean",
     )
     combine: Literal["likelihood", "expected_error", "intersection"] | None = Field(
         None,
+        title="combination of orders",
         description="several orders: likelihood (IMM, with transitions between orders), expected_error (the linear "
         "combination of least error over `manoeuvres`), intersection (the smoothest whose interval meets all rougher)",
     )
     stay_probability: Annotated[float, Field(gt=0, lt=1)] | None = Field(
-        None, description="likelihood: probability that an order lasts from scan to scan; default: 0.95"
+        None,
+        title="probability that an order lasts",
+        description="likelihood: probability that an order lasts from scan to scan; default: 0.95",
     )
-    manoeuvres: Manoeuvres | None = Field(None, description="expected_error: the manoeuvres that are expected")
+    manoeuvres: Manoeuvres | None = Field(
+        None, title="expected manoeuvres", description="expected_error: the manoeuvres that are expected"
+    )
     interval_sigmas: Positive | None = Field(
-        None, description="intersection: half width of an interval, in standard deviations (no unit); default: 2"
+        None,
+        title="half width of an interval",
+        json_schema_extra={"unit": "σ"},
+        description="intersection: half width of an interval, in standard deviations (no unit); default: 2",
     )
 
     @property
@@ -246,18 +291,22 @@ class Keys(Study):
         "orders",
     )
 
-    radar: Radar = Field(description="the radar")
-    target: Annotated[Target, Scenario()] = Field(description="the target: a scenario's stem, or inline")
+    radar: Radar = Field(title="radar", description="the radar")
+    target: Annotated[Target, Scenario()] = Field(
+        title="target", description="the target: a scenario's stem, or inline"
+    )
     prior: Annotated[Prior, Design()] = Field(
-        Prior.model_validate({}), description="what the filters know before the first plot"
+        Prior.model_validate({}), title="prior", description="what the filters know before the first plot"
     )
     filters: Annotated[
         tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = Field(description="the filters; all see the same plots")
+    ] = Field(title="filters", description="the filters; all see the same plots")
     baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
-        None, description="name of the filter that gains are against; default: the first"
+        None, title="baseline filter", description="name of the filter that gains are against; default: the first"
     )
-    scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = Field(description="number of scans")
+    scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = Field(
+        title="number of scans", description="number of scans"
+    )
 
     @model_validator(mode="after")
     def _completed(self) -> Self:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.config.experiment import Case, Experiment
+from radarsim.language import term
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
@@ -17,9 +18,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 QUANTITIES = {
-    "r": panels.Quantity("$r$", "range"),
-    "Vr": panels.Quantity("$V_r$", "radial velocity"),
-    "ar": panels.Quantity("$a_r$", "radial acceleration"),
+    "r": panels.Quantity("$r$", term("range")),
+    "Vr": panels.Quantity("$V_r$", term("radial velocity")),
+    "ar": panels.Quantity("$a_r$", term("radial acceleration")),
 }
 
 
@@ -101,7 +102,7 @@ def _share_panel(members: Sequence[Result], rows: Mapping, of: tuple[str, str]) 
         style = panels.look(names.index(f), i, len(members))
         marks.append(Line(x, y, words or panels.literal(f), style, lo, hi, exact if np.isfinite(exact).any() else None))
     y_axis = Axis(of[1], limits=(0, 1.05))
-    return Panel(Axis(panels.TIME, limits=(0, None)), y_axis, tuple(marks), panels.device(members[0]))
+    return Panel(panels.time_axis(), y_axis, tuple(marks), panels.device(members[0]))
 
 
 def hypotheses_figure(cases: Sequence[Case]) -> dict[str, Figure]:
@@ -142,7 +143,8 @@ def _fan_panel(case: Case, of: Fan, number: int) -> Panel:
     title = f"{panels.literal(case.spec.device or case.stem)}, {panels.literal(case.spec.filters[number].name)}"
     low, high = of.truth.min() - FAN_SPANS * case.spec.radar.spans_mps[0], of.truth.max()
     limits = (low, high + FAN_SPANS * case.spec.radar.spans_mps[0])
-    return Panel(Axis(panels.TIME), Axis("radial velocity, m/s", limits=limits), tuple(marks), title, direct=False)
+    x, y = replace(panels.time_axis(), limits=(None, None)), Axis("radial velocity, m/s", limits=limits)
+    return Panel(x, y, tuple(marks), title, direct=False)
 
 
 FAN_SPANS = 8  # spans shown to either side of the true velocities
@@ -161,7 +163,7 @@ def orders_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: st
             if len(rows)
         )
         words = panels.literal(name) if len(results) == 1 else f"{panels.label(result)}, {panels.literal(name)}"
-        drawn.append(Panel(Axis(panels.TIME, limits=(0, None)), Axis("mean weight in the range"), marks, words))
+        drawn.append(Panel(panels.time_axis(), Axis("mean weight in the range"), marks, words))
     if not drawn:
         return {}
     caption = (

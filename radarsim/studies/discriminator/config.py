@@ -35,16 +35,25 @@ Share = Annotated[float, Field(gt=0.5, lt=1)]
 class Burst(Model):
     """A coherent burst, sampled inside its pulses."""
 
-    carrier_hz: Positive = Field(description="carrier frequency, Hz")
-    pulse_period_s: Positive = Field(description="time from pulse to pulse, s")
-    pulse_length_s: Positive = Field(description="length of a pulse, s")
-    sampling_period_s: Positive = Field(description="time from sample to sample inside a pulse, s")
-    pulses: Annotated[int, Whole(FEWEST_PULSES, MOST_SAMPLES)] = Field(description="number of pulses")
-    amplitude: Positive = Field(description="amplitude of the echo, in the samples' unit")
-    noise_variance: Positive = Field(
-        description="variance of the white noise in each real number sampled, in the samples' unit squared"
+    carrier_hz: Positive = Field(
+        title="carrier frequency", json_schema_extra={"symbol": "f_0"}, description="carrier frequency, Hz"
     )
-    samples: Literal["real", "complex"] = Field("real", description="what the receiver gives")
+    pulse_period_s: Positive = Field(title="pulse repetition period", description="time from pulse to pulse, s")
+    pulse_length_s: Positive = Field(title="pulse length", description="length of a pulse, s")
+    sampling_period_s: Positive = Field(
+        title="sampling period", description="time from sample to sample inside a pulse, s"
+    )
+    pulses: Annotated[int, Whole(FEWEST_PULSES, MOST_SAMPLES)] = Field(
+        title="number of pulses", description="number of pulses"
+    )
+    amplitude: Positive = Field(
+        title="amplitude of the echo", description="amplitude of the echo, in the samples' unit"
+    )
+    noise_variance: Positive = Field(
+        title="noise variance of a sample",
+        description="variance of the white noise in each real number sampled, in the samples' unit squared",
+    )
+    samples: Literal["real", "complex"] = Field("real", title="samples", description="what the receiver gives")
 
     @cross_check
     def _pulses_fit(self) -> Iterator[At]:
@@ -65,18 +74,33 @@ class Burst(Model):
 class Truth(Model):
     """The echo's phase: from its derivatives, or from a radial velocity that is straight between given instants."""
 
-    phase_rad: Number = Field(0.0, description="phase at the start of the burst, rad")
+    phase_rad: Number = Field(
+        0.0,
+        title="initial phase",
+        json_schema_extra={"symbol": "φ_0"},
+        description="phase at the start of the burst, rad",
+    )
     doppler_derivatives: Annotated[tuple[Number, ...], Field(min_length=1, max_length=MOST_DERIVATIVES + 1)] | None = (
-        Field(None, description="Doppler frequency and its derivatives at the start: Hz, Hz/s, Hz/s², …")
+        Field(
+            None,
+            title="Doppler frequency and its derivatives",
+            description="Doppler frequency and its derivatives at the start: Hz, Hz/s, Hz/s², …",
+        )
     )
     times_s: Annotated[tuple[NonNegative, ...], Field(min_length=2, max_length=100)] | None = Field(
-        None, description="instants of the velocity profile from the start of the burst, s; the first is 0"
+        None,
+        title="times of the velocity profile",
+        description="instants of the velocity profile from the start of the burst, s; the first is 0",
     )
     velocities_mps: Annotated[tuple[Number, ...], Field(min_length=2, max_length=100)] | None = Field(
-        None, description="radial velocity at these instants, towards the radar positive, m/s"
+        None,
+        title="radial velocities of the profile",
+        description="radial velocity at these instants, towards the radar positive, m/s",
     )
     derivatives: Annotated[int, Whole(0, MOST_DERIVATIVES)] = Field(
-        3, description="with a velocity profile: derivatives of the Doppler frequency that are estimated"
+        3,
+        title="estimated derivatives of the Doppler frequency",
+        description="with a velocity profile: derivatives of the Doppler frequency that are estimated",
     )
 
     @cross_check
@@ -105,12 +129,18 @@ class Prior(Model):
     """The forecast: independent Gaussian errors about the truth."""
 
     spread_over_potential: Spreads | None = Field(
-        None, description="standard deviations over the potential ones of the whole burst: phase, frequency, …"
+        None,
+        title="prior σ over the potential σ",
+        description="standard deviations over the potential ones of the whole burst: phase, frequency, …",
     )
-    sigma: Spreads | None = Field(None, description="standard deviations: rad, Hz, Hz/s, …; in place of the former")
-    scale: Positive = Field(1.0, description="factor on all standard deviations")
+    sigma: Spreads | None = Field(
+        None, title="prior σ", description="standard deviations: rad, Hz, Hz/s, …; in place of the former"
+    )
+    scale: Positive = Field(1.0, title="scale of the prior σ", description="factor on all standard deviations")
     error_scale: Positive = Field(
-        1.0, description="factor between the forecast's true errors and those that the estimators believe in"
+        1.0,
+        title="true prior errors over the assumed ones",
+        description="factor between the forecast's true errors and those that the estimators believe in",
     )
 
     @cross_check
@@ -127,45 +157,87 @@ class Prior(Model):
 class Estimator(Model):
     """A sequence of windows that grow to the whole burst, Fisher scoring in each; or the classical rival."""
 
-    name: Annotated[Name, Display()] = Field(description="label; every estimator has its own")
+    name: Annotated[Name, Display()] = Field(title="name", description="label; every estimator has its own")
     method: Literal["sequence", "ridge"] = Field(
-        "sequence", description="sequence of discriminators, or short-time spectrum, robust fit, unwrapping, scoring"
+        "sequence",
+        title="method",
+        description="sequence of discriminators, or short-time spectrum, robust fit, unwrapping, scoring",
     )
     schedule: Literal["designed"] | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_WINDOWS)] = (
-        Field("designed", description="designed by (14)–(16), or a list of rising window lengths, s")
+        Field(
+            "designed",
+            title="window lengths",
+            description="designed by (14)–(16), or a list of rising window lengths, s",
+        )
     )
-    lock_probability: Share = Field(0.99, description="probability P_Δ of a hand-over")
-    main_lobe_threshold: Positive = Field(1.0, description="c, no unit: 1 as in (10) and (14), 0.5 as in (11)")
+    lock_probability: Share = Field(
+        0.99,
+        title="probability of a hand-over",
+        json_schema_extra={"symbol": "P_Δ"},
+        description="probability P_Δ of a hand-over",
+    )
+    main_lobe_threshold: Positive = Field(
+        1.0,
+        title="main-lobe threshold",
+        json_schema_extra={"symbol": "c"},
+        description="c, no unit: 1 as in (10) and (14), 0.5 as in (11)",
+    )
     tail: Literal["gaussian", "exact"] = Field(
-        "gaussian", description="law of the quadratic form: the paper's Gaussian, or the weighted sum of χ² itself"
+        "gaussian",
+        title="law of the quadratic form",
+        description="law of the quadratic form: the paper's Gaussian, or the weighted sum of χ² itself",
     )
     minimum_energy_ratio: NonNegative = Field(
-        0.0, description="energy ratio μ_min of (17), below which no window begins; 0: none"
+        0.0,
+        title="minimum energy ratio",
+        json_schema_extra={"symbol": "μ_min"},
+        description="energy ratio μ_min of (17), below which no window begins; 0: none",
     )
     density: Annotated[int, Whole(1, 10)] = Field(
-        1, description="windows for each designed one; 2: one at each geometric mean between"
+        1,
+        title="windows for each designed one",
+        description="windows for each designed one; 2: one at each geometric mean between",
     )
     first_windows: Annotated[int, Whole(1, MOST_WINDOWS)] | None = Field(
-        None, description="stop after so many windows; default: all"
+        None, title="windows used", description="stop after so many windows; default: all"
     )
-    start: Literal["prior", "truth"] = Field("prior", description="where the first window starts")
+    start: Literal["prior", "truth"] = Field("prior", title="first window", description="where the first window starts")
     phases: Annotated[int, Whole(0, 64)] = Field(
-        0, description="phases tried in the first window; 0: the phase in closed form"
+        0,
+        title="phases tried in the first window",
+        description="phases tried in the first window; 0: the phase in closed form",
     )
-    steps: Annotated[int, Whole(1, 1000)] = Field(40, description="scoring steps in a window, at most")
-    tolerance: Positive = Field(1e-3, description="ε: step, in standard deviations, that ends a window")
+    steps: Annotated[int, Whole(1, 1000)] = Field(
+        40, title="scoring steps per window", description="scoring steps in a window, at most"
+    )
+    tolerance: Positive = Field(
+        1e-3,
+        title="step that ends a window",
+        json_schema_extra={"symbol": "ε", "unit": "standard deviations"},
+        description="ε: step, in standard deviations, that ends a window",
+    )
     coherence_step: Flag = Field(
-        False, description="let steps heed the coherence: far from the maximum the curvature is less than Fisher's"
+        False,
+        title="steps that heed the coherence",
+        description="let steps heed the coherence: far from the maximum the curvature is less than Fisher's",
     )
     search_points: Annotated[int, Whole(0, 10)] = Field(
-        0, description="cure at a hand-over: points on each side along the leading direction of R_Δ; 0: none"
+        0,
+        title="points of the search on each side",
+        description="cure at a hand-over: points on each side along the leading direction of R_Δ; 0: none",
     )
-    search_spacing_rad: Positive = Field(0.8, description="distance of these points, rms over the window, rad")
+    search_spacing_rad: Positive = Field(
+        0.8, title="spacing of the search points", description="distance of these points, rms over the window, rad"
+    )
     search_margin: Number = Field(
-        2.0, description="standard errors by which the coherence must be short of 1 for a search"
+        2.0,
+        title="margin of the search",
+        description="standard errors by which the coherence must be short of 1 for a search",
     )
     amplitude: Literal["known", "estimated", "as_printed"] = Field(
-        "known", description="given, or estimated from the energy by (7) corrected, or as printed (its square)"
+        "known",
+        title="amplitude",
+        description="given, or estimated from the energy by (7) corrected, or as printed (its square)",
     )
 
     @cross_check
@@ -180,19 +252,23 @@ class Keys(Study):
     bare_keys = "estimators"
     figure_names = ("residuals", "locks", "accuracy", "lock_*")  # the last: of what a sweep varies
 
-    burst: Burst = Field(description="the burst")
-    truth: Annotated[Truth, Scenario()] = Field(description="the echo's phase: a scenario's stem, or inline")
-    prior: Prior = Field(description="the forecast")
+    burst: Burst = Field(title="burst", description="the burst")
+    truth: Annotated[Truth, Scenario()] = Field(
+        title="true phase", description="the echo's phase: a scenario's stem, or inline"
+    )
+    prior: Prior = Field(title="prior", description="the forecast")
     estimators: Annotated[
         tuple[Estimator, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = Field(description="the estimators; all see the same bursts")
+    ] = Field(title="estimators", description="the estimators; all see the same bursts")
     engine: Annotated[Literal["auto", "block_sums", "samples", "demodulated"], Design()] = Field(
         "auto",
+        title="way of simulation",
         description="block_sums: exact sums over short blocks are drawn; samples: every step over every sample; "
         "demodulated: samples drawn and demodulated once; auto: block_sums where it is valid, else samples",
     )
     blocks_per_window: Annotated[int | None, Whole(4, 1000), Design()] = Field(
         None,
+        title="blocks per window",
         description="a block is a window over this; default: 20, or 24 where the Doppler frequency is near zero; "
         "32 for demodulated",
     )

@@ -8,6 +8,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
+from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
 
@@ -23,14 +24,6 @@ SYMBOLS = {
     "f4": ("$|\\Delta f_4|$, Hz/s⁴", "fourth derivative"),
 }
 NAMES = {"phi0": "$\\varphi_0$"} | {f"f{n}": f"$f_{n}$" for n in range(5)}
-KEYS = {
-    "burst.noise_variance": "noise variance $\\sigma^2$",
-    "prior.scale": "prior spread over the paper's",
-    "prior.error_scale": "true over believed prior error",
-    "lock_probability": "$1 - P_\\Delta$",
-    "density": "density of windows",
-    "steps": "scoring steps a window",
-}
 WHOLE = ("density", "steps")  # keys that take whole numbers
 WINDOW = "window length, s"
 MOST_LINES = 9
@@ -191,18 +184,31 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
         value, lo, hi = (np.array([row[c] for row in ends], float) for c in ("lock_rate", "lock_lo", "lock_hi"))
         marks.append(Line(x[order], value, estimator, Style(n, n % 4, n), lo, hi))
     scale = "log" if x.min() > 0 and x.max() / x.min() > 20 else "linear"
+    called = panels.key_label(members[0], key).text
     caption = (
-        f"Share of bursts locked at the end of the burst against {key}, of {members[0].count:,} each. "
+        f"Share of bursts locked at the end of the burst against the {called}, of {members[0].count:,} each. "
         f"Bands: 95 % intervals; dotted: {SURE:g}."
     )
     ticks = numbers(x[order]) if key in WHOLE else ()
     panel = Panel(
-        Axis(KEYS.get(key, key), scale, ticks=ticks),
+        Axis(_called(key, members[0]), scale, ticks=ticks),
         Axis("share locked", limits=(None, 1.02)),
         tuple(marks),
         direct=False,
     )
-    return Figure(name, f"Lock against {key}", caption, (panel,), width_mm=110.0, panel_height_mm=70.0)
+    return Figure(
+        name,
+        f"Lock against the {called}",
+        caption,
+        (panel,),
+        width_mm=110.0,
+        panel_height_mm=70.0,
+    )
+
+
+def _called(key: str, result: CaseResult) -> str:
+    """A swept key as an axis names it."""
+    return "$1 - P_\\Delta$" if key == "lock_probability" else panels.axis_of(result, key)
 
 
 def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], made: Mapping) -> Figure:
@@ -215,12 +221,14 @@ def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], ma
             column, row = (np.searchsorted(a, float(member.swept[i][1])) for i, a in ((0, x), (1, y)))
             values[row, column] = final(made, member, estimator)["lock_rate"]
         marks = (Heat(x, y, values, "share locked"),)
-        drawn.append(Panel(Axis(KEYS.get(keys[0], keys[0])), Axis(KEYS.get(keys[1], keys[1])), marks, estimator))
+        across, up = (Axis(_called(key, members[0])) for key in keys)
+        drawn.append(Panel(across, up, marks, estimator))
     drawn.append(region(keys, members, made, x, y))
+    first, second = (panels.key_label(members[0], key).text for key in keys)
     caption = (
-        f"Share of bursts locked at the end, over {keys[0]} and {keys[1]}, of {members[0].count:,} in each cell. Last: "
-        f"the largest {keys[1]} at which the whole 95 % interval of that share, here and below, lies above {SURE:g}; "
-        "an estimator without a line is nowhere so sure."
+        f"Share of bursts locked at the end, over the {first} and the {second}, of {members[0].count:,} in each cell. "
+        f"Last: the largest {second} at which the whole 95 % interval of that share, here and below, lies above "
+        f"{SURE:g}; an estimator without a line is nowhere so sure."
     )
     columns = min(2, len(drawn))
     return Figure(name, "Where the sequence locks", caption, tuple(drawn), columns, PAGE_MM, 70.0)
@@ -238,6 +246,6 @@ def region(keys: tuple[str, ...], members: Sequence[CaseResult], made: Mapping, 
         border = np.where(reach > 0, y[np.maximum(reach, 1) - 1], np.nan)
         marks.append(Line(x, border, estimator, Style(n, n % 4, n)))
     across, up = (
-        Axis(KEYS.get(key, key), "log" if a.min() > 0 else "linear") for key, a in zip(keys, (x, y), strict=True)
+        Axis(_called(key, members[0]), "log" if a.min() > 0 else "linear") for key, a in zip(keys, (x, y), strict=True)
     )
     return Panel(across, up, tuple(marks), f"locked in over {SURE:g}", direct=False)

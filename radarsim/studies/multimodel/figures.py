@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from radarsim.studies.multimodel.study import FlightAxes
 
-TIME = Axis(panels.TIME, limits=(0, None))
 SIGMAS = {"y": ("height $y$", "m"), "vy": ("rate of climb $\\dot y$", "m/s")}
 RULES = ("moment", "best", "combined", "modified_combined")
 FAMILIES = {"gpb1": "MMA1", "imm": "MMA2", "gpb2": "MMA3"}
@@ -112,9 +111,9 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
     ends = _stage_lines(list(flights.values()))
     axes = (
         (Axis("east $z$, km"), Axis("north $x$, km", limits=(0, None)), "1  ground track", ()),
-        (TIME, Axis("height $y$, km", limits=(0, None)), "2  height", ends),
-        (TIME, Axis("speed, m/s", limits=(0, None)), "3  speed", ends),
-        (TIME, Axis("acceleration, m/s²", limits=(0, None)), "4  acceleration", ends),
+        (panels.time_axis(), Axis("height $y$, km", limits=(0, None)), "2  height", ends),
+        (panels.time_axis(), Axis("speed, m/s", limits=(0, None)), "3  speed", ends),
+        (panels.time_axis(), Axis("acceleration, m/s²", limits=(0, None)), "4  acceleration", ends),
     )
     lines[1:] = [_unnamed(own) for own in lines[1:]]
     drawn = [
@@ -145,7 +144,7 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
                 t, value, lo, hi = (own[key].to_numpy(float) for key in ("t_s", "sigma", "sigma_lo", "sigma_hi"))
                 marks.append(Line(t, value, panels.literal(f), replace(style, marker=None), lo, hi))
         y = Axis(f"$\\sigma$ of {words}, {unit}", "log")
-        drawn.append(Panel(TIME, y, tuple(marks), _title(result, results), direct=len(results) == 1))
+        drawn.append(Panel(panels.time_axis(), y, tuple(marks), _title(result, results), direct=len(results) == 1))
     if len(drawn) > 1:
         drawn = _beside(drawn, results[0], marker=None)
     elif drawn and _many(results[0]):
@@ -176,7 +175,9 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
                 )
                 marks.append(Line(t, value, f"{m + 1} {motion}", Style(m, m), lo, hi))
             title = panels.literal(name) if len(results) == 1 else f"{_title(result, results)}: {panels.literal(name)}"
-            drawn.append(Panel(TIME, Axis("mean probability", limits=(0, 1)), tuple(marks), title, direct=False))
+            drawn.append(
+                Panel(panels.time_axis(), Axis("mean probability", limits=(0, 1)), tuple(marks), title, direct=False)
+            )
     banks = {tuple(mark.label for mark in panel.marks if isinstance(mark, Line)) for panel in drawn}
     if len(drawn) > 2 and len(banks) == 1:
         drawn = panels.in_legend(drawn)

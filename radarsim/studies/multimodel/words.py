@@ -32,7 +32,5 @@ def _least(result: CaseResult, made: Mapping, component: str, quantity: str) -> 
     for stage, own in rows.groupby("stage", sort=False):
         best = own.loc[own["sigma"].idxmin()]
         value, low, high = (f"{float(f'{best[name]:.3g}'):,.10g}" for name in ("sigma", "sigma_lo", "sigma_hi"))
-        parts.append(
-            f"{stage} {best['filter']}, {value} {panels.UNITS.get(best['unit'], best['unit'])} [{low}, {high}]"
-        )
+        parts.append(f"{stage} {best['filter']}, {value} {panels.unit_of(best['unit'])} [{low}, {high}]")
     return f"least σ of {quantity} by stage: {'; '.join(parts)}."

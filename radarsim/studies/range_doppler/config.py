@@ -47,18 +47,32 @@ class Radar(radial.Radar):
     """A surveillance radar: accuracies of one plot, the period of its scans, and what is wrong with its plots."""
 
     repetition_rate_hz: Positive = Field(
-        1000.0, description="pulse repetition rate, Hz: gives the unambiguous velocity; nothing is folded by it"
+        1000.0,
+        title="pulse repetition rate",
+        json_schema_extra={"symbol": "F_r"},
+        description="pulse repetition rate, Hz: gives the unambiguous velocity; nothing is folded by it",
     )
     detection_probability: Annotated[Probability, Field(gt=0), Added()] = Field(
-        1.0, description="probability that a scan gives its plot, range and velocity together"
+        1.0,
+        title="detection probability",
+        json_schema_extra={"symbol": "P_D"},
+        description="probability that a scan gives its plot, range and velocity together",
     )
-    bias_range_m: Annotated[Number, Added()] = Field(0.0, description="mean error of a measured range, m")
-    bias_velocity_mps: Annotated[Number, Added()] = Field(0.0, description="mean error of a measured velocity, m/s")
+    bias_range_m: Annotated[Number, Added()] = Field(
+        0.0, title="bias of the measured range", description="mean error of a measured range, m"
+    )
+    bias_velocity_mps: Annotated[Number, Added()] = Field(
+        0.0, title="bias of the measured radial velocity", description="mean error of a measured velocity, m/s"
+    )
     sigma_bias_range_m: Annotated[NonNegative, Added()] = Field(
-        0.0, description="standard deviation of a further error of range, drawn once a realisation, m"
+        0.0,
+        title="σ of the random bias in range",
+        description="standard deviation of a further error of range, drawn once a realisation, m",
     )
     sigma_bias_velocity_mps: Annotated[NonNegative, Added()] = Field(
-        0.0, description="standard deviation of a further error of velocity, drawn once a realisation, m/s"
+        0.0,
+        title="σ of the random bias in radial velocity",
+        description="standard deviation of a further error of velocity, drawn once a realisation, m/s",
     )
 
     @property
@@ -75,25 +89,25 @@ DRAWN = "standard deviations with which the first three coefficients are drawn f
 class Polynomial(radial.Polynomial):
     """A range that is a polynomial of time; up to the second degree it fits the filters' model exactly."""
 
-    sigma_coefficients: Spread = Field((), description=DRAWN)
+    sigma_coefficients: Spread = Field((), title="σ of these derivatives", description=DRAWN)
 
 
 class AccelerationStart(radial.AccelerationStart):
     """A polynomial that begins to accelerate (or brake) at a moment."""
 
-    sigma_coefficients: Spread = Field((), description=DRAWN)
+    sigma_coefficients: Spread = Field((), title="σ of these derivatives", description=DRAWN)
 
 
 class JerkPulse(Starting):
     """A polynomial with a jerk for a while; the acceleration it has built up stays."""
 
-    kind: Literal["jerk_pulse"] = Field(description="a constant jerk for a while")
-    coefficients: Coefficients = Field(description=COEFFICIENTS)
-    sigma_coefficients: Spread = Field((), description=DRAWN)
+    kind: Literal["jerk_pulse"] = Field(title="kind", description="a constant jerk for a while")
+    coefficients: Coefficients = Field(title="derivatives of the range at the first plot", description=COEFFICIENTS)
+    sigma_coefficients: Spread = Field((), title="σ of these derivatives", description=DRAWN)
     jerk_mps3: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = Field(
-        description="radial jerk added during the pulse, m/s³"
+        title="jerk", description="radial jerk added during the pulse, m/s³"
     )
-    duration_s: Positive = Field(description="length of the pulse, s")
+    duration_s: Positive = Field(title="duration", description="length of the pulse, s")
 
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
@@ -107,28 +121,38 @@ Noise = Literal["random_jerk", "white_jerk", "white_acceleration"]
 class Best(Model):
     """A manoeuvre variance that is looked for: the one with which this filter's exact error on this target is least."""
 
-    minimise: Literal["sigma_r", "sigma_Vr", "sigma_ar"] = Field(description="the error that is to be least")
-    over: Literal["worst", "mean", "last"] = Field(
-        description="of its values from scan from_k on: the greatest, their mean, or the last"
+    minimise: Literal["sigma_r", "sigma_Vr", "sigma_ar"] = Field(
+        title="error to minimise", description="the error that is to be least"
     )
-    from_k: Annotated[int, Whole(1, MOST_SCANS)] = Field(3, description="first scan that counts")
+    over: Literal["worst", "mean", "last"] = Field(
+        title="taken over scans as",
+        description="of its values from scan from_k on: the greatest, their mean, or the last",
+    )
+    from_k: Annotated[int, Whole(1, MOST_SCANS)] = Field(
+        3, title="first scan that counts", description="first scan that counts"
+    )
 
 
 class Filter(Model):
     """A second-order Kalman filter started by least squares."""
 
-    name: Annotated[Name, Display()] = Field(description="label; every filter has its own")
+    name: Annotated[Name, Display()] = Field(title="name", description="label; every filter has its own")
     observes: tuple[Literal["range", "velocity"], ...] = Field(
-        description="what it measures: [range] or [range, velocity]"
+        title="observed quantities", description="what it measures: [range] or [range, velocity]"
     )
     manoeuvre_variance: Positive | Best = Field(
-        description="variance of the random jerk it allows for, (m/s³)²: D_M; or what it is to make least"
+        title="manoeuvre variance",
+        json_schema_extra={"symbol": "D_M", "unit": "(m/s³)²"},
+        description="variance of the random jerk it allows for, (m/s³)²: D_M; or what it is to make least",
     )
     initial_scans: Annotated[int, Whole(2, MOST_SCANS)] | None = Field(
-        None, description="plots in its least-squares start; default and least: 3 for range, 2 with velocity"
+        None,
+        title="plots in the initialisation",
+        description="plots in its least-squares start; default and least: 3 for range, 2 with velocity",
     )
     process_noise: Noise = Field(
         "random_jerk",
+        title="process noise",
         description="how the allowed manoeuvre lies within a scan: a constant jerk (the paper's), white jerk, or a "
         "step of the acceleration; each lets its variance grow by D_M times the period squared a scan",
     )
@@ -161,19 +185,23 @@ class Keys(Study):
     )
     in_place_of: ClassVar = {"scans": "duration_s", "duration_s": "scans"}
 
-    radar: Radar = Field(description="the radar")
-    target: Annotated[Target, Scenario()] = Field(description="the target: a scenario's stem, or inline")
+    radar: Radar = Field(title="radar", description="the radar")
+    target: Annotated[Target, Scenario()] = Field(
+        title="target", description="the target: a scenario's stem, or inline"
+    )
     filters: Annotated[
         tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = Field(description="the filters; all see the same plots")
+    ] = Field(title="filters", description="the filters; all see the same plots")
     baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
-        None, description="name of the filter that gains are against; default: the first"
+        None, title="baseline filter", description="name of the filter that gains are against; default: the first"
     )
     scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = Field(
-        None, description="number of scans; or give duration_s"
+        None, title="number of scans", description="number of scans; or give duration_s"
     )
     duration_s: Annotated[Positive | None, Design(), Added()] = Field(
-        None, description="time from the first scan to the last, s, in place of scans: to the last scan within it"
+        None,
+        title="duration",
+        description="time from the first scan to the last, s, in place of scans: to the last scan within it",
     )
 
     @classmethod

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.config.experiment import Experiment
+from radarsim.language import term
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
@@ -16,9 +17,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 QUANTITIES = {
-    "r": panels.Quantity("$r$", "range"),
-    "Vr": panels.Quantity("$V_r$", "radial velocity"),
-    "ar": panels.Quantity("$a_r$", "radial acceleration"),
+    "r": panels.Quantity("$r$", term("range")),
+    "Vr": panels.Quantity("$V_r$", term("radial velocity")),
+    "ar": panels.Quantity("$a_r$", term("radial acceleration")),
 }
 
 
@@ -71,7 +72,7 @@ def _consistency_panel(results: Sequence[Result], rows: dict[Any, Any], name: st
     wide = values.min() > 0 and values.max() > WIDE * values.min()
     words = "NEES per component\n(1 = consistent, below = pessimistic)"
     y = Axis(words, "log") if wide else Axis(words, limits=(0, None))
-    return Panel(Axis(panels.TIME, limits=(0, None)), y, tuple(marks), panels.literal(name))
+    return Panel(panels.time_axis(), y, tuple(marks), panels.literal(name))
 
 
 def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure | None:

@@ -168,7 +168,11 @@ def _tried_on(results: Sequence[Result]) -> dict[str, list[Result]]:
     found: dict[str, list[Result]] = {}
     for result in results:
         if not follows_the_model(result):
-            others = ", ".join(f"{key} = {panels.number(v)}" for key, v in result.swept if not _is_variance(key))
+            others = ", ".join(
+                f"{panels.symbol_of(result, key)} = {panels.with_its_unit(result, key, v)}"
+                for key, v in result.swept
+                if not _is_variance(key)
+            )
             found.setdefault(" ".join(filter(None, (panels.device(result), others))), []).append(result)
     return {name: members for name, members in found.items() if len(members) > 1 and all(map(_given, members))}
 

@@ -35,9 +35,17 @@ Derivatives = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
 class Correlations(Model):
     """A correlation for each coordinate; zero where none is given."""
 
-    range: Correlation = Field(0.0, description="correlation of the errors in range")
-    bearing: Correlation = Field(0.0, description="correlation of the errors in bearing")
-    third: Correlation = Field(0.0, description="correlation of the errors in depth or elevation")
+    range: Correlation = Field(
+        0.0, title="correlation of errors in range", description="correlation of the errors in range"
+    )
+    bearing: Correlation = Field(
+        0.0, title="correlation of errors in bearing", description="correlation of the errors in bearing"
+    )
+    third: Correlation = Field(
+        0.0,
+        title="correlation of errors in depth or elevation",
+        description="correlation of the errors in depth or elevation",
+    )
 
     def of(self, index: int) -> float:
         """The correlation of one coordinate, by its number."""
@@ -53,38 +61,75 @@ class FurtherSensor(Model):
     """A further sonar that observes the same target at its own times and may measure the bearing only."""
 
     sigma_range_m: Positive | None = Field(
-        None, description="standard deviation of a measured range, m; none: not measured"
+        None,
+        title="σ of the measured range",
+        json_schema_extra={"symbol": "σ_r"},
+        description="standard deviation of a measured range, m; none: not measured",
     )
-    sigma_bearing_rad: AngleSigma | None = Field(None, description="standard deviation of a measured bearing, rad")
-    scan_period_s: Positive = Field(description="time between two of its plots, s")
-    first_s: NonNegative = Field(description="time of its first plot, s after the first plot of the first sonar")
+    sigma_bearing_rad: AngleSigma | None = Field(
+        None,
+        title="σ of the measured bearing",
+        json_schema_extra={"symbol": "σ_β"},
+        description="standard deviation of a measured bearing, rad",
+    )
+    scan_period_s: Positive = Field(
+        title="scan period", json_schema_extra={"symbol": "Δt"}, description="time between two of its plots, s"
+    )
+    first_s: NonNegative = Field(
+        title="time of the first plot", description="time of its first plot, s after the first plot of the first sonar"
+    )
 
 
 class Sensor(Model):
     """A sonar: accuracy of its plots, scan period, and how plots are missed."""
 
-    name: Annotated[Name | None, Display()] = Field(None, description="display name")
-    sigma_range_m: Positive = Field(description="standard deviation of a measured range, m")
-    sigma_bearing_rad: AngleSigma = Field(description="standard deviation of a measured bearing, rad")
+    name: Annotated[Name | None, Display()] = Field(None, title="name", description="display name")
+    sigma_range_m: Positive = Field(
+        title="σ of the measured range",
+        json_schema_extra={"symbol": "σ_r"},
+        description="standard deviation of a measured range, m",
+    )
+    sigma_bearing_rad: AngleSigma = Field(
+        title="σ of the measured bearing",
+        json_schema_extra={"symbol": "σ_β"},
+        description="standard deviation of a measured bearing, rad",
+    )
     sigma_depth_m: Positive | None = Field(
-        None, description="standard deviation of a measured depth, m; none: not measured"
+        None,
+        title="σ of the measured depth",
+        json_schema_extra={"symbol": "σ_h"},
+        description="standard deviation of a measured depth, m; none: not measured",
     )
     sigma_elevation_rad: AngleSigma | None = Field(
-        None, description="standard deviation of a measured elevation, rad; replaces the depth"
+        None,
+        title="σ of the measured elevation",
+        json_schema_extra={"symbol": "σ_ε"},
+        description="standard deviation of a measured elevation, rad; replaces the depth",
     )
-    scan_period_s: Positive = Field(description="time between two plots, s: T0 of the paper")
+    scan_period_s: Positive = Field(
+        title="scan period",
+        json_schema_extra={"symbol": "Δt"},
+        description="time between two plots, s: T0 of the paper",
+    )
     error_correlation: Correlation | Correlations = Field(
-        0.0, description="correlation ρ of the errors of neighbouring plots, eq. (15); one number, or by coordinate"
+        0.0,
+        title="correlation of neighbouring errors",
+        json_schema_extra={"symbol": "ρ"},
+        description="correlation ρ of the errors of neighbouring plots, eq. (15); one number, or by coordinate",
     )
     detection_probability: Annotated[Probability, Field(gt=0)] = Field(
         1.0,
+        title="detection probability",
+        json_schema_extra={"symbol": "P_D"},
         description="probability that a scan gives a plot; the first scan always does, except for filters with an "
         "association",
     )
     missed_scans: tuple[Annotated[int, Whole(2, MOST_SCANS)], ...] = Field(
-        (), description="scans, counted from 1, that never give a plot"
+        (), title="missed scans", description="scans, counted from 1, that never give a plot"
     )
-    further: tuple[FurtherSensor, ...] = Field((), max_length=4, description="further sonars on the same target")
+    further: tuple[FurtherSensor, ...] = Field(
+        (), max_length=4, title="further sonars", description="further sonars on the same target"
+    )
 
     @cross_check
     def _consistent(self) -> Iterator[At]:
@@ -105,18 +150,33 @@ class Sensor(Model):
 class Polynomial(Model):
     """A target whose polar or cartesian coordinates are polynomials of time (eq. 1)."""
 
-    kind: Literal["polynomial"] = Field(description="each coordinate is a polynomial of time")
-    frame: Literal["polar", "cartesian"] = Field(description="which coordinates are polynomials")
-    range_m: Derivatives | None = Field(
-        None, description="range and its derivatives at the first plot: m, m/s, m/s², …"
+    kind: Literal["polynomial"] = Field(title="kind", description="each coordinate is a polynomial of time")
+    frame: Literal["polar", "cartesian"] = Field(
+        title="frame of coordinates", description="which coordinates are polynomials"
     )
-    bearing_rad: Derivatives | None = Field(None, description="bearing and its derivatives, from north to east: rad, …")
-    x_m: Derivatives | None = Field(None, description="distance north and its derivatives: m, m/s, m/s², …")
-    y_m: Derivatives | None = Field(None, description="distance east and its derivatives: m, m/s, m/s², …")
-    depth_m: Derivatives | None = Field(None, description="depth and its derivatives: m, m/s, …")
-    elevation_rad: Derivatives | None = Field(None, description="elevation and its derivatives: rad, rad/s, …")
+    range_m: Derivatives | None = Field(
+        None,
+        title="range and its derivatives",
+        description="range and its derivatives at the first plot: m, m/s, m/s², …",
+    )
+    bearing_rad: Derivatives | None = Field(
+        None, title="bearing and its derivatives", description="bearing and its derivatives, from north to east: rad, …"
+    )
+    x_m: Derivatives | None = Field(
+        None, title="distance north", description="distance north and its derivatives: m, m/s, m/s², …"
+    )
+    y_m: Derivatives | None = Field(
+        None, title="distance east", description="distance east and its derivatives: m, m/s, m/s², …"
+    )
+    depth_m: Derivatives | None = Field(
+        None, title="depth and its derivatives", description="depth and its derivatives: m, m/s, …"
+    )
+    elevation_rad: Derivatives | None = Field(
+        None, title="elevation and its derivatives", description="elevation and its derivatives: rad, rad/s, …"
+    )
     fluctuation_mps2: NonNegative = Field(
         0.0,
+        title="σ of the random acceleration of the target",
         description="standard deviation, m/s², of a random acceleration that is new at every scan, so that the "
         "velocity is a random walk",
     )
@@ -158,11 +218,11 @@ def _from_origin(*coordinates: float) -> float:
 class Vessel(Model):
     """A vessel that starts at a given position, with a given speed and course."""
 
-    kind: Literal["accelerating", "turning"] = Field(description="how the vessel manoeuvres")
-    x_m: Number = Field(description="distance north of the sonar at the first plot, m")
-    y_m: Number = Field(description="distance east of the sonar at the first plot, m")
-    speed_mps: NonNegative = Field(description="initial speed, m/s")
-    course_rad: Number = Field(description="initial course, from north to east, rad")
+    kind: Literal["accelerating", "turning"] = Field(title="kind", description="how the vessel manoeuvres")
+    x_m: Number = Field(title="distance north", description="distance north of the sonar at the first plot, m")
+    y_m: Number = Field(title="distance east", description="distance east of the sonar at the first plot, m")
+    speed_mps: NonNegative = Field(title="speed", description="initial speed, m/s")
+    course_rad: Number = Field(title="course", description="initial course, from north to east, rad")
     fluctuation_mps2: ClassVar[float] = 0.0
 
     @property
@@ -174,10 +234,18 @@ class Vessel(Model):
 class Accelerating(Vessel):
     """A vessel on a straight course whose speed changes at a constant rate between two times."""
 
-    kind: Literal["accelerating"] = Field(description="straight course with a step of acceleration along it")
-    acceleration_mps2: Number = Field(description="acceleration along the course, m/s²; 0: no manoeuvre")
-    start_s: NonNegative = Field(description="start of the acceleration, s from the first plot")
-    end_s: Positive | None = Field(None, description="end of the acceleration, s; none: it never ends")
+    kind: Literal["accelerating"] = Field(
+        title="kind", description="straight course with a step of acceleration along it"
+    )
+    acceleration_mps2: Number = Field(
+        title="acceleration",
+        json_schema_extra={"symbol": "a"},
+        description="acceleration along the course, m/s²; 0: no manoeuvre",
+    )
+    start_s: NonNegative = Field(title="start time", description="start of the acceleration, s from the first plot")
+    end_s: Positive | None = Field(
+        None, title="end time", description="end of the acceleration, s; none: it never ends"
+    )
 
     @cross_check
     def _order(self) -> Iterator[At]:
@@ -188,9 +256,9 @@ class Accelerating(Vessel):
 class TimedTurn(Model):
     """A turn between two times."""
 
-    start_s: NonNegative = Field(description="start of the turn, s from the first plot")
-    end_s: Positive = Field(description="end of the turn, s")
-    rate_radps: Number = Field(description="turn rate, rad/s, positive to starboard")
+    start_s: NonNegative = Field(title="start time", description="start of the turn, s from the first plot")
+    end_s: Positive = Field(title="end time", description="end of the turn, s")
+    rate_radps: Number = Field(title="turn rate", description="turn rate, rad/s, positive to starboard")
 
     @cross_check
     def _order(self) -> Iterator[At]:
@@ -201,10 +269,10 @@ class TimedTurn(Model):
 class Turning(Vessel):
     """A vessel at constant speed on straight legs and turns."""
 
-    kind: Literal["turning"] = Field(description="straight legs and turns at constant speed")
-    speed_mps: Positive = Field(description="speed, m/s")
+    kind: Literal["turning"] = Field(title="kind", description="straight legs and turns at constant speed")
+    speed_mps: Positive = Field(title="speed", description="speed, m/s")
     turns: Annotated[tuple[TimedTurn, ...], Field(min_length=1, max_length=16)] = Field(
-        description="the turns, in order of time"
+        title="turns", description="the turns, in order of time"
     )
 
     @cross_check
@@ -220,7 +288,9 @@ CORRELATED = ("kalman_augmented", "kalman_differenced")
 class Filter(Model):
     """A filter that processes each coordinate separately: the keys that all kinds share."""
 
-    name: Annotated[Name, Display()] = Field(description="label; must differ from those of the other filters")
+    name: Annotated[Name, Display()] = Field(
+        title="name", description="label; must differ from those of the other filters"
+    )
     kind: Literal[
         "growing_memory",
         "window",
@@ -231,20 +301,30 @@ class Filter(Model):
         "adaptive",
         "imm",
     ] = Field(
+        title="kind",
         description="least squares on all plots or on the last few; Kalman; fixed gains; two that model correlated "
-        "errors; one that responds to a manoeuvre detector; or two interacting Kalman filters"
+        "errors; one that responds to a manoeuvre detector; or two interacting Kalman filters",
     )
-    degree: Literal[1, 2] = Field(1, description="degree of the polynomial: 1 a straight line, 2 a parabola")
+    degree: Literal[1, 2] = Field(
+        1, title="degree of the polynomial", description="degree of the polynomial: 1 a straight line, 2 a parabola"
+    )
     plots: Annotated[int, Whole(2, 1000)] | None = Field(
-        None, description="length of a window; or of the least-squares start of fixed_gain, by default degree + 1"
+        None,
+        title="number of plots",
+        description="length of a window; or of the least-squares start of fixed_gain, by default degree + 1",
     )
     manoeuvre_variance: NonNegative | None = Field(
         None,
+        title="manoeuvre variance",
+        json_schema_extra={"symbol": "D_M", "unit": ""},
         description="variance of a random acceleration, (m/s²)², for degree 2 of a random jerk, (m/s³)²; "
         "for angles it is divided by the square of the initial range",
     )
     error_correlation: Correlation | Correlations | None = Field(
-        None, description="correlation that the filter assumes; default: that of the sonar"
+        None,
+        title="correlation of neighbouring errors",
+        json_schema_extra={"symbol": "ρ"},
+        description="correlation that the filter assumes; default: that of the sonar",
     )
 
     @cross_check
@@ -272,19 +352,26 @@ class Filter(Model):
 class Keys(Study):
     """The keys that all cases have."""
 
-    sensor: Sensor = Field(description="the sonar")
-    target: Annotated[Target, Scenario()] = Field(description="the target: the stem of a scenario, or inline")
+    sensor: Sensor = Field(title="sensor", description="the sonar")
+    target: Annotated[Target, Scenario()] = Field(
+        title="target", description="the target: the stem of a scenario, or inline"
+    )
     frame: Annotated[Literal["polar", "cartesian", "cartesian_unbiased"], Design()] = Field(
         "polar",
+        title="frame of coordinates",
         description="coordinates in which the filters work; plots are converted to x, y plainly, or without bias",
     )
     filters: Annotated[tuple[Filter, ...], Field(min_length=1, max_length=16), Design()] = Field(
-        description="the filters; all of them process the same plots"
+        title="filters", description="the filters; all of them process the same plots"
     )
     baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
-        None, description="name of the filter that gains are measured against; default: the first"
+        None,
+        title="baseline filter",
+        description="name of the filter that gains are measured against; default: the first",
     )
-    scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = Field(description="number of scans of the first sonar")
+    scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = Field(
+        title="number of scans", description="number of scans of the first sonar"
+    )
 
     @cross_check
     def _long_enough(self) -> Iterator[At]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
+from radarsim.language import term
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Style
@@ -16,28 +17,27 @@ if TYPE_CHECKING:
     import pandas as pd
 
 QUANTITIES = {
-    "r": panels.Quantity("$r$", "range"),
-    "vr": panels.Quantity("$v_r$", "radial velocity"),
-    "ar": panels.Quantity("$a_r$", "radial acceleration"),
-    "b": panels.Quantity("$\\beta$", "bearing"),
-    "vb": panels.Quantity("$v_\\beta$", "bearing rate"),
-    "ab": panels.Quantity("$a_\\beta$", "second rate of the bearing"),
-    "x": panels.Quantity("$x$", "distance north"),
-    "vx": panels.Quantity("$v_x$", "velocity north"),
-    "ax": panels.Quantity("$a_x$", "acceleration north"),
-    "y": panels.Quantity("$y$", "distance east"),
-    "vy": panels.Quantity("$v_y$", "velocity east"),
-    "ay": panels.Quantity("$a_y$", "acceleration east"),
-    "d": panels.Quantity("$d$", "depth"),
-    "vd": panels.Quantity("$v_d$", "rate of depth"),
-    "ad": panels.Quantity("$a_d$", "second rate of depth"),
-    "e": panels.Quantity("$\\varepsilon$", "elevation"),
-    "ve": panels.Quantity("$v_\\varepsilon$", "rate of elevation"),
-    "ae": panels.Quantity("$a_\\varepsilon$", "second rate of elevation"),
+    "r": panels.Quantity("$r$", term("range")),
+    "vr": panels.Quantity("$v_r$", term("radial velocity")),
+    "ar": panels.Quantity("$a_r$", term("radial acceleration")),
+    "b": panels.Quantity("$\\beta$", term("bearing")),
+    "vb": panels.Quantity("$v_\\beta$", term("bearing rate")),
+    "ab": panels.Quantity("$a_\\beta$", term("second rate of the bearing")),
+    "x": panels.Quantity("$x$", term("distance north")),
+    "vx": panels.Quantity("$v_x$", term("velocity north")),
+    "ax": panels.Quantity("$a_x$", term("acceleration north")),
+    "y": panels.Quantity("$y$", term("distance east")),
+    "vy": panels.Quantity("$v_y$", term("velocity east")),
+    "ay": panels.Quantity("$a_y$", term("acceleration east")),
+    "d": panels.Quantity("$d$", term("depth")),
+    "vd": panels.Quantity("$v_d$", term("rate of depth")),
+    "ad": panels.Quantity("$a_d$", term("second rate of depth")),
+    "e": panels.Quantity("$\\varepsilon$", term("elevation")),
+    "ve": panels.Quantity("$v_\\varepsilon$", term("rate of elevation")),
+    "ae": panels.Quantity("$a_\\varepsilon$", term("second rate of elevation")),
 }
 MOST_IN_PANEL = 5  # filters whose legend leaves room for the curves
 SIGMA = ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")  # columns of a line of σ against time
-TIME = Axis(panels.TIME, limits=(0, None))
 
 
 def figures(
@@ -88,7 +88,7 @@ def sigma_figure(
         if marks:
             unit = dict(result.axes.components)[component]
             y = Axis(panels.with_unit(f"$\\sigma$ of {quantity.symbol}", unit), limits=(0, None))
-            drawn.append(Panel(TIME, y, tuple(marks), panels.swept(result), direct=False))
+            drawn.append(Panel(panels.time_axis(), y, tuple(marks), panels.swept(result), direct=False))
     if not drawn:
         return None
     caption = (

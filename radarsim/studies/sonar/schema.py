@@ -29,7 +29,7 @@ class Sonar(clutter.Keys, manoeuvre.Keys):
 
     filters: Annotated[
         tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = Field(description="the filters; all of them process the same plots")
+    ] = Field(title="filters", description="the filters; all of them process the same plots")
 
     @property
     def parts(self) -> tuple[Literal["smoothing", "manoeuvre", "clutter"], ...]:

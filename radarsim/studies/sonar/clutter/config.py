@@ -33,8 +33,10 @@ DEFAULTS = {
 class Sector(Model):
     """The surveyed sector, which contains all false plots; a target outside it is not detected."""
 
-    range_m: tuple[NonNegative, Positive] = Field(description="smallest and largest range, m")
-    bearing_rad: tuple[Number, Number] = Field(description="first and last bearing, from north to east, rad")
+    range_m: tuple[NonNegative, Positive] = Field(title="limits of range", description="smallest and largest range, m")
+    bearing_rad: tuple[Number, Number] = Field(
+        title="limits of bearing", description="first and last bearing, from north to east, rad"
+    )
 
     @cross_check
     def _order(self) -> Iterator[At]:
@@ -52,19 +54,27 @@ class Sensor(config.Sensor):
     """A sonar among false plots: how many there are, and where."""
 
     false_plots_per_km2: Annotated[NonNegative, Field(le=1e4), Design()] = Field(
-        0.0, description="mean number of false plots a scan, per km² of the surveyed sector"
+        0.0,
+        title="false plots per scan",
+        json_schema_extra={"symbol": "λ", "unit": "km⁻²"},
+        description="mean number of false plots a scan, per km² of the surveyed sector",
     )
     sector: Annotated[Sector | None, Design()] = Field(
-        None, description="the surveyed sector of filters with an association; there are no plots outside it"
+        None,
+        title="surveyed sector",
+        description="the surveyed sector of filters with an association; there are no plots outside it",
     )
 
 
 class Initiation(Model):
     """A track is confirmed once m of its first n scans gave it a plot; the scan of its first plot counts."""
 
-    m: Annotated[int, Whole(2, 20)] = Field(description="number of plots that confirms a track")
+    m: Annotated[int, Whole(2, 20)] = Field(
+        title="plots that confirm a track", description="number of plots that confirms a track"
+    )
     n: Annotated[int, Whole(2, 20)] = Field(
-        description="number of scans, from that of the first plot on, within which they must come"
+        title="scans of the confirmation rule",
+        description="number of scans, from that of the first plot on, within which they must come",
     )
 
     @cross_check
@@ -78,22 +88,33 @@ class Filter(config.Filter):
 
     association: Literal["nearest", "pda", "known"] | None = Field(
         None,
+        title="association",
         description="how plots are chosen: the nearest in the gate, probabilistic data association, or the target's "
         "own plots, as a reference",
     )
     gate_probability: Annotated[Probability, Field(gt=0)] | None = Field(
-        None, description="probability that the gate contains the target's plot; 1: an open gate; default 0.99"
+        None,
+        title="gate probability",
+        json_schema_extra={"symbol": "P_G"},
+        description="probability that the gate contains the target's plot; 1: an open gate; default 0.99",
     )
-    initiation: Initiation | None = Field(None, description="the m of n rule of confirmation; default 3 of 4")
+    initiation: Initiation | None = Field(
+        None, title="rule of confirmation", description="the m of n rule of confirmation; default 3 of 4"
+    )
     drop_after_misses: Annotated[int, Whole(1, 1000)] | None = Field(
-        None, description="scans in a row without a plot after which a confirmed track is dropped; default 3"
+        None,
+        title="misses that drop a track",
+        description="scans in a row without a plot after which a confirmed track is dropped; default 3",
     )
     speed_mps: Positive | None = Field(
         None,
+        title="σ of a target's speed",
         description="standard deviation of a target's speed in each direction, m/s, for the second gate; default 10",
     )
     lost_beyond_sigmas: Positive | None = Field(
         None,
+        title="error of a lost track",
+        json_schema_extra={"unit": "σ of a plot"},
         description="error, in standard deviations of a plot, beyond which a track has lost its target; default 10",
     )
 
@@ -121,7 +142,7 @@ class Filter(config.Filter):
 class Keys(config.Keys):
     """The keys of a case whose filters may be trackers."""
 
-    sensor: Sensor = Field(description="the sonar")
+    sensor: Sensor = Field(title="sensor", description="the sonar")
     filters: tuple[Filter, ...]
 
     @cross_check

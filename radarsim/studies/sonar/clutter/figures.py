@@ -11,15 +11,15 @@ from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.map import realisation_map
-from radarsim.studies.sonar.figures import TIME, line
+from radarsim.studies.sonar.figures import line
 
 if TYPE_CHECKING:
     import pandas as pd
 
-KEYS = {
-    "false_plots_per_km2": ("sensor.false_plots_per_km2", "false plots per km² and scan"),
-    "detection_probability": ("sensor.detection_probability", "detection probability"),
-    "gate_probability": ("gate_probability", "gate probability"),
+KEYS = {  # columns of the table of tracking, and the keys that they hold
+    "false_plots_per_km2": "sensor.false_plots_per_km2",
+    "detection_probability": "sensor.detection_probability",
+    "gate_probability": "gate_probability",
 }
 WIDE = 150.0
 Results = Sequence[CaseResult[ClutterAxes]]
@@ -43,10 +43,10 @@ def middle(results: Results) -> CaseResult[ClutterAxes]:
     return results[(len(results) - 1) // 2]
 
 
-def axis_over(label: str, values: "pd.Series") -> Axis:
-    """An axis of swept values, logarithmic if they span more than a factor of twenty."""
+def axis_over(result: CaseResult[ClutterAxes], column: str, values: "pd.Series") -> Axis:
+    """An axis of swept values of a column of KEYS, logarithmic if they span more than a factor of twenty."""
     least, most = float(np.min(values)), float(np.max(values))
-    return Axis(label, "log" if least > 0 and most / least > 20 else "linear")
+    return Axis(panels.axis_of(result, KEYS[column]), "log" if least > 0 and most / least > 20 else "linear")
 
 
 def swept_column(tracking: "pd.DataFrame") -> str | None:
@@ -56,12 +56,16 @@ def swept_column(tracking: "pd.DataFrame") -> str | None:
     return column if counts[column] > 1 else None
 
 
-def by_line(tracking: "pd.DataFrame", column: str) -> "pd.DataFrame":
-    """The rows with the name of their line, over column, in place of the filter: the tracker and what else is swept."""
+def by_line(tracking: "pd.DataFrame", column: str, result: CaseResult[ClutterAxes]) -> "pd.DataFrame":
+    """The rows with the name of their line, over column, in place of the filter: the tracker and what else is swept.
+
+    result is one of the cases.
+    """
     others = [other for other in KEYS if other != column and tracking[other].nunique() > 1]
     names = tracking["filter"].astype(object)
     for other in others:
-        names = names + [f", {KEYS[other][1]} {value:g}" for value in tracking[other]]
+        symbol = panels.symbol_of(result, KEYS[other])
+        names = names + [f", {symbol} = {panels.with_its_unit(result, KEYS[other], v)}" for v in tracking[other]]
     return tracking.assign(filter=names)
 
 
@@ -80,7 +84,7 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
         if marks:
             keys = (("thin: kept at that time", Style(0, 0, None, 0.7)),) if not drawn else ()
             y = Axis("probability", limits=(0, 1.02))
-            drawn.append(Panel(TIME, y, tuple(marks), _swept(result), keys, direct=False))
+            drawn.append(Panel(panels.time_axis(), y, tuple(marks), _swept(result), keys, direct=False))
     if not drawn:
         return None
     left = len(results) - panels.MOST
@@ -93,10 +97,9 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
 
 
 def _swept(result: CaseResult[ClutterAxes]) -> str:
-    """The swept keys of a case and their values."""
-    names = dict(KEYS.values())
-    parts = [f"{names.get(key, panels.symbol_of(key))}: {panels.number(value)}" for key, value in result.swept]
-    return ", ".join(parts)
+    """The swept keys of a case and their values, at length."""
+    pairs = ((panels.key_label(result, key).text, panels.with_its_unit(result, key, v)) for key, v in result.swept)
+    return ", ".join(f"{name}: {value}" for name, value in pairs)
 
 
 def life_figure(results: Results, made: "Mapping[str, pd.DataFrame]") -> Figure | None:
@@ -105,7 +108,7 @@ def life_figure(results: Results, made: "Mapping[str, pd.DataFrame]") -> Figure 
     column = swept_column(tracking)
     if column is None:
         return None
-    rows, x = by_line(tracking, column), axis_over(KEYS[column][1], tracking[column])
+    rows, x = by_line(tracking, column, results[0]), axis_over(results[0], column, tracking[column])
     shown = {
         "life": ("life_s", Axis("track life, s", "log")),
         "time": ("time_to_confirm_s", Axis("time to confirmation, s", limits=(0, None))),
@@ -116,7 +119,9 @@ def life_figure(results: Results, made: "Mapping[str, pd.DataFrame]") -> Figure 
     at_end = curves[(curves["component"] == "r") & (curves["k"] == results[0].axes.k[-1])]
     at_end = at_end.merge(tracking[["case", *KEYS]].drop_duplicates("case"), on="case", how="left")
     y = Axis("$\\sigma$ of $r$ of kept tracks, m", limits=(0, None))
-    drawn.append(Panel(x, y, tuple(_lines(by_line(at_end, column), column, "sigma", "sigma")), direct=False))
+    drawn.append(
+        Panel(x, y, tuple(_lines(by_line(at_end, column, results[0]), column, "sigma", "sigma")), direct=False)
+    )
     caption = (
         "Mean time between ends of a confirmed track (no point: no end was seen), mean time to its confirmation, "
         "weight of false plots among those taken, and root-mean-square error of the range of the tracks kept at the "
@@ -141,7 +146,7 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
     rate = "false_tracks_per_hour"
     if column is None or not (tracking[rate] > 0).any():
         return None
-    rows = by_line(tracking, column)
+    rows = by_line(tracking, column, results[0])
     rows = rows[rows[rate] > 0]
     rules = {row["filter"]: f"{row['m']:.0f} of {row['of']:.0f}" for _, row in rows.iterrows()}
     rows = rows.assign(
@@ -152,7 +157,7 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
         "False tracks confirmed in an hour in the whole sector, every false plot beginning a tentative track, of "
         f"{panels.realisations(results)} such plots a case. Bands: 95 % intervals."
     )
-    x, y = axis_over(KEYS[column][1], rows[column]), Axis("false tracks per hour", "log")
+    x, y = axis_over(results[0], column, rows[column]), Axis("false tracks per hour", "log")
     panel = Panel(x, y, tuple(_lines(rows, column, rate, "false")), direct=False)
     return Figure("false_tracks", "False tracks", caption, (panel,), width_mm=WIDE)
 

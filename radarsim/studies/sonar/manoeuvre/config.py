@@ -43,17 +43,25 @@ def either_threshold(detector: "OwnDetector | Detector") -> Iterator[At]:
 class OwnDetector(Model):
     """The detector of an adaptive filter: it tests the acceleration of a parabola through the last plots."""
 
-    plots: WindowPlots = Field(description="plots n of the parabola")
+    plots: WindowPlots = Field(title="plots of the parabola", description="plots n of the parabola")
     threshold_k: Positive | None = Field(
-        None, description="threshold k: a manoeuvre is declared where the squared acceleration exceeds k σ_a²"
+        None,
+        title="threshold",
+        json_schema_extra={"symbol": "k"},
+        description="threshold k: a manoeuvre is declared where the squared acceleration exceeds k σ_a²",
     )
     false_alarm_probability: Rate | None = Field(
-        None, description="replaces threshold_k: probability of an alarm in a test without a manoeuvre"
+        None,
+        title="false-alarm probability",
+        json_schema_extra={"symbol": "P_F"},
+        description="replaces threshold_k: probability of an alarm in a test without a manoeuvre",
     )
     coordinates: Literal["each", "joint"] = Field(
-        "each", description="each: a test of each coordinate, as in the paper; joint: one test of the sum over all"
+        "each",
+        title="tested coordinates",
+        description="each: a test of each coordinate, as in the paper; joint: one test of the sum over all",
     )
-    test_every: TestPeriod = Field(1, description="scans from one test to the next")
+    test_every: TestPeriod = Field(1, title="scans between tests", description="scans from one test to the next")
 
     @cross_check
     def _either_threshold(self) -> Iterator[At]:
@@ -63,16 +71,25 @@ class OwnDetector(Model):
 class Detector(Model):
     """A manoeuvre detector that is measured at one or several thresholds."""
 
-    name: Annotated[Name, Display()] = Field(description="label; must differ from those of the other detectors")
-    plots: WindowPlots = Field(description="plots n of the parabola")
+    name: Annotated[Name, Display()] = Field(
+        title="name", description="label; must differ from those of the other detectors"
+    )
+    plots: WindowPlots = Field(title="plots of the parabola", description="plots n of the parabola")
     threshold_k: Thresholds | None = Field(
-        None, description="thresholds k: a manoeuvre is declared where the squared acceleration exceeds k σ_a²"
+        None,
+        title="threshold",
+        json_schema_extra={"symbol": "k"},
+        description="thresholds k: a manoeuvre is declared where the squared acceleration exceeds k σ_a²",
     )
     false_alarm_probability: Rates | None = Field(
-        None, description="replaces threshold_k: probabilities of an alarm in a test without a manoeuvre"
+        None,
+        title="false-alarm probability",
+        json_schema_extra={"symbol": "P_F"},
+        description="replaces threshold_k: probabilities of an alarm in a test without a manoeuvre",
     )
     test_every: TestPeriod = Field(
         1,
+        title="scans between tests",
         description="scans from one test to the next; from `plots` on the tests are independent and the delay is exact",
     )
 
@@ -88,39 +105,52 @@ class Detector(Model):
 class OwnShip(Model):
     """The vessel that carries the sonar, or another to be kept clear of; its course and speed are constant."""
 
-    x_m: Number = Field(default=0.0, description="distance north of the sonar's origin at the first plot, m")
-    y_m: Number = Field(default=0.0, description="distance east of the sonar's origin at the first plot, m")
-    speed_mps: NonNegative = Field(default=0.0, description="speed, m/s")
-    course_rad: Number = Field(default=0.0, description="course, from north to east, rad")
+    x_m: Number = Field(
+        default=0.0, title="distance north", description="distance north of the sonar's origin at the first plot, m"
+    )
+    y_m: Number = Field(
+        default=0.0, title="distance east", description="distance east of the sonar's origin at the first plot, m"
+    )
+    speed_mps: NonNegative = Field(default=0.0, title="speed", description="speed, m/s")
+    course_rad: Number = Field(default=0.0, title="course", description="course, from north to east, rad")
 
 
 class Uses(Model):
     """Quantities derived from a track: course, speed, predicted position, closest point of approach."""
 
-    horizon_s: Positive = Field(description="how far ahead the position is predicted, s")
+    horizon_s: Positive = Field(title="prediction horizon", description="how far ahead the position is predicted, s")
     at_s: Annotated[tuple[NonNegative, ...], Field(min_length=1, max_length=16)] | None = Field(
-        None, description="times, s from the first plot: the scan then or the next one; default: the last scan"
+        None,
+        title="times",
+        description="times, s from the first plot: the scan then or the next one; default: the last scan",
     )
-    own_ship: OwnShip = Field(OwnShip(), description="the vessel that the closest approach refers to")
+    own_ship: OwnShip = Field(OwnShip(), title="own ship", description="the vessel that the closest approach refers to")
 
 
 class Filter(config.Filter):
     """A filter that may respond to manoeuvres: kinds `adaptive` and `imm`."""
 
-    detector: OwnDetector | None = Field(None, description="manoeuvre detector of an adaptive filter")
+    detector: OwnDetector | None = Field(None, title="detector", description="manoeuvre detector of an adaptive filter")
     response: Literal["raise_degree", "shorten_memory"] | None = Field(
         None,
+        title="response to a manoeuvre",
         description="response of an adaptive filter to a manoeuvre: a parabola that starts with the detector's plots "
         "(default), or a window of these plots while the manoeuvre lasts",
     )
     end_after: Annotated[int, Whole(1, 100)] | None = Field(
-        None, description="number of successive tests without an alarm that ends a manoeuvre; default 1"
+        None,
+        title="quiet tests that end a manoeuvre",
+        description="number of successive tests without an alarm that ends a manoeuvre; default 1",
     )
     manoeuvre_variances: tuple[NonNegative, NonNegative] | None = Field(
-        None, description="of the two models of an imm, steady and manoeuvring, (m/s²)², as manoeuvre_variance"
+        None,
+        title="manoeuvre variances of the models",
+        description="of the two models of an imm, steady and manoeuvring, (m/s²)², as manoeuvre_variance",
     )
     stay_probabilities: tuple[Rate, Rate] | None = Field(
-        None, description="of an imm: probabilities that the steady and the manoeuvring model last from scan to scan"
+        None,
+        title="probabilities that a model lasts",
+        description="of an imm: probabilities that the steady and the manoeuvring model last from scan to scan",
     )
 
     @cross_check
@@ -155,10 +185,12 @@ class Keys(config.Keys):
 
     filters: tuple[Filter, ...]
     detectors: Annotated[tuple[Detector, ...], Field(max_length=8), AfterValidator(unique_names), Design()] = Field(
-        (), description="manoeuvre detectors that are measured on the plots"
+        (), title="detectors", description="manoeuvre detectors that are measured on the plots"
     )
     uses: Annotated[Uses | None, Design()] = Field(
-        None, description="course, speed, predicted position and closest approach, with their σ; none: left out"
+        None,
+        title="uses of the track",
+        description="course, speed, predicted position and closest approach, with their σ; none: left out",
     )
 
     def about_manoeuvres(self) -> Iterator[str]:

@@ -9,7 +9,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
-from radarsim.studies.sonar.figures import QUANTITIES, SIGMA, TIME, case_lines, line
+from radarsim.studies.sonar.figures import QUANTITIES, SIGMA, case_lines, line
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
 
@@ -22,7 +22,7 @@ BESIDE_LEGEND = 3  # panels of a figure whose legend takes the place of one
 SYMBOLS = {"course": "course", "speed": "speed", "x_ahead": "$x$ ahead", "y_ahead": "$y$ ahead"}
 SYMBOLS |= {"cpa": "CPA", "t_cpa": "$t$ to CPA"}
 RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # ticks of a measured over a believed σ
-STRENGTHS = {"acceleration_mps2": "acceleration, m/s²", "rate_radps": "turn rate, rad/s"}
+STRENGTHS = ("acceleration_mps2", "rate_radps")  # keys that say how strong a manoeuvre is
 Results = Sequence[CaseResult[ManoeuvreAxes]]
 
 
@@ -130,8 +130,8 @@ def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | N
             v = {part: np.array([point[part] for point in points]) for part in ("probability", "lo", "hi", "exact")}
             known = v["exact"] if np.isfinite(v["exact"]).all() else None
             marks.append(Line(strength, v["probability"], name, Style(n, n, n), v["lo"], v["hi"], known))
-        title = ", ".join(f"{panels.symbol_of(k)} = {panels.number(v)}" for k, v in others)
-        x, y = Axis(STRENGTHS[key.rpartition(".")[2]]), Axis("detection probability", limits=(0, 1.02))
+        title = ", ".join(panels.with_its_unit(members[0], k, v) for k, v in others)
+        x, y = Axis(panels.axis_of(members[0], key)), Axis("detection probability", limits=(0, 1.02))
         drawn.append(Panel(x, y, tuple(marks), title, direct=False, legend="right"))
     caption = (
         f"Probability of an alarm of detectors in the range at about {USUAL:g} false alarms a test, at the last scan "
@@ -178,7 +178,7 @@ def response_figure(results: Results, curves: "pd.DataFrame") -> Figure | None:
         component, unit = result.axes.components[0]
         marks: tuple[Mark, ...] = (*_ends(result), *case_lines(result, groups, component, SIGMA))
         y = Axis(f"$\\sigma$ of {QUANTITIES[component].symbol}, {unit}", "log")
-        drawn.append(Panel(TIME, y, marks, _title(result), direct=False))
+        drawn.append(Panel(panels.time_axis(), y, marks, _title(result), direct=False))
     caption = (
         f"Root-mean-square error of the first coordinate about the truth on the same plots, of "
         f"{results[0].count:,} realisations. Dashed: the manoeuvre begins and ends. Crosses: exact values."
@@ -193,7 +193,7 @@ def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
     for result in results:
         lines = case_lines(result, groups, result.axes.components[0][0], ("t_s", "probability", "lo", "hi"))
         y = Axis("probability of a manoeuvre", limits=(0, 1.02))
-        drawn.append(Panel(TIME, y, (*_ends(result), *lines), _title(result), direct=False))
+        drawn.append(Panel(panels.time_axis(), y, (*_ends(result), *lines), _title(result), direct=False))
     caption = (
         "Share of realisations in which an adaptive filter is in its manoeuvring mode, and mean probability of the "
         "manoeuvring model of an imm, first coordinate. Dashed: the manoeuvre begins and ends."
@@ -234,8 +234,7 @@ def _ends(result: CaseResult[ManoeuvreAxes]) -> list[Reference]:
 
 def _title(result: CaseResult[ManoeuvreAxes]) -> str:
     """The swept values, a strength with its unit."""
-    units = {key: label.rpartition(", ")[2] for key, label in STRENGTHS.items()}
-    return ", ".join(f"{panels.number(v)} {units.get(key.rpartition('.')[2], '')}".rstrip() for key, v in result.swept)
+    return ", ".join(panels.with_its_unit(result, key, value) for key, value in result.swept)
 
 
 def _first_legend(drawn: Sequence[Panel]) -> str:

@@ -10,7 +10,7 @@ from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.studies.sonar.axes import GivenPlotsAxes
-from radarsim.studies.sonar.figures import QUANTITIES, SIGMA, TIME, line
+from radarsim.studies.sonar.figures import QUANTITIES, SIGMA, line
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -131,7 +131,7 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
                 probability = f"{result.spec.sensor.detection_probability:g}"
                 style = Style(n / max(1, len(cases) - 1), n, n)
                 marks.append(line(groups[result.name, f], SIGMA, probability, style, f"$P_D$ = {probability}"))
-        drawn.append(Panel(TIME, y, tuple(marks), f, key_title="$P_D$", direct=False))
+        drawn.append(Panel(panels.time_axis(), y, tuple(marks), f, key_title="$P_D$", direct=False))
     gap = cases[0].spec.sensor.missed_scans
     caption = (
         f"σ of the {QUANTITIES[component].name} for several detection probabilities (legend), one panel a filter, of "

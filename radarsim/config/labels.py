@@ -1,0 +1,86 @@
+"""What people call a key: one text, symbol and unit for each, from the schema of the study that has it.
+
+A field says it itself: `Field(title="scan period", json_schema_extra={"symbol": "Δt"})`. The unit is the one that the
+end of the key names; a key that names none, or none that people write, gives it beside the symbol, as `unit`.
+"""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from pydantic.fields import FieldInfo
+
+from radarsim.config import numeric
+from radarsim.config.check import models_in
+from radarsim.config.fields import Model, Study, in_radians
+from radarsim.config.schema import Common
+
+
+class Label(NamedTuple):
+    """A key in words: "scan period", its symbol in the papers ("Δt", "σ_r": a subscript after _) and its unit.
+
+    Symbol and unit are empty where there is none.
+    """
+
+    text: str
+    symbol: str
+    unit: str
+
+
+def label(keys: Study | type[Study] | None, key: str) -> Label:
+    """The label of a key, dotted or bare, as `sweep` and `--set` name it; keys are a study's, checked or not.
+
+    >>> from radarsim.studies import registry
+    >>> label(registry.keys("range_doppler"), "radar.sigma_velocity_mps")
+    Label(text='σ of the measured radial velocity', symbol='σ_V', unit='m/s')
+
+    A key that no schema tells of is called by its own words:
+
+    >>> label(None, "echo.rise_time_s")
+    Label(text='rise time', symbol='', unit='s')
+    """
+    steps = [step for step in key.split(".") if not step.isdecimal()]
+    unit = numeric.unit(key)
+    found = _field(keys, steps) if keys is not None else None
+    found = found or _field(Common, steps)
+    if found is None:
+        name = steps[-1].rpartition("_")[0] if unit else steps[-1]
+        return Label(name.replace("_", " "), "", unit)
+    extra = found.json_schema_extra if isinstance(found.json_schema_extra, dict) else {}
+    text = found.title or (steps[-1].rpartition("_")[0] if unit else steps[-1]).replace("_", " ")
+    return Label(text, str(extra.get("symbol", "")), str(extra.get("unit", unit)))
+
+
+def _field(keys: Model | type[Model], steps: list[str]) -> FieldInfo | None:
+    """The field that dotted steps lead to, from the top or, for a bare key, from the members of the study's list."""
+    model = keys if isinstance(keys, type) else type(keys)
+    if steps and _named(steps[0]).isdisjoint(model.model_fields) and issubclass(model, Study):
+        steps = [model.bare_keys, *steps]
+    holders: list[Any] = [keys]
+    found: FieldInfo | None = None
+    for step in steps:
+        at = next(((one, name) for one in holders for name in _named(step) if name in _fields(one)), None)
+        if at is None:
+            return None
+        holder, name = at
+        found = _fields(holder)[name]
+        given = [] if isinstance(holder, type) else list(_models(getattr(holder, name)))
+        holders = [*given, *models_in(found.annotation)]
+    return found
+
+
+def _named(step: str) -> set[str]:
+    """A key, and its twin in radians where it is one in degrees."""
+    return {step, in_radians(step) or step}
+
+
+def _fields(model: Model | type[Model]) -> dict[str, FieldInfo]:
+    return (model if isinstance(model, type) else type(model)).model_fields
+
+
+def _models(value: object) -> Iterator[Model]:
+    """The mappings that a value is or holds: of a choice, the kind that was chosen."""
+    if isinstance(value, Model):
+        yield value
+    elif isinstance(value, tuple | list):
+        for one in value:
+            yield from _models(one)

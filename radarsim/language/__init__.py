@@ -1,0 +1,137 @@
+"""The language in which figures, reports, answers and claims speak: English, or another that has a catalogue here.
+
+`tr("…")` gives a sentence in the language chosen, `plural` one that counts, `term` marks a word that is said later. A
+sentence is translated whole, with named places for what varies:
+
+>>> tr("σ of the {quantity} is {value:.4g} m", quantity=term("range"), value=1234.5)
+'σ of the range is 1234 m'
+
+A catalogue is one file, `<code>.po`, in gettext's format. Numbers that are put into a sentence are written as its
+language writes them: the catalogue says how under the context "number". A word (`term`) may have several forms: where a
+translation says `{quantity:genitive}`, the word is looked up under the context "genitive".
+
+Tables are the same in every language, and so are messages on faults of a config: neither may import this room.
+"""
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from gettext import GNUTranslations, NullTranslations
+from importlib import resources
+from numbers import Real
+from string import Formatter
+from typing import Any
+
+from radarsim.errors import ConfigError
+from radarsim.language import catalogue
+
+ENGLISH = "en"
+VARIABLE = "RADARSIM_LANGUAGE"
+NUMBER = "number"  # context of the point and of the separator of thousands
+
+
+class Term(str):
+    """A word or sentence that stands in the catalogues; put into another sentence it is translated."""
+
+    __slots__ = ()
+
+
+_chosen: list[str] = []  # the last one counts
+
+
+def known() -> tuple[str, ...]:
+    """The codes of the languages: English, and those with a catalogue."""
+    files = resources.files(__name__).iterdir()
+    return (ENGLISH, *sorted(file.name.removesuffix(".po") for file in files if file.name.endswith(".po")))
+
+
+def current() -> str:
+    """The language spoken: the one chosen, else by RADARSIM_LANGUAGE, else English. Raises ConfigError."""
+    return _chosen[-1] if _chosen else checked(os.environ.get(VARIABLE) or ENGLISH, VARIABLE)
+
+
+def checked(code: str, by: str) -> str:
+    """A language's code that was given by an option or a variable. Raises ConfigError where there is none such."""
+    if code not in known():
+        raise ConfigError(f"{by}: must be one of {', '.join(known())}, got {code!r}")
+    return code
+
+
+@contextmanager
+def speaking(code: str) -> Iterator[None]:
+    """Speak a language for a while. Raises ConfigError where it is not known."""
+    _chosen.append(checked(code, "language"))
+    try:
+        yield
+    finally:
+        _chosen.pop()
+
+
+@cache
+def messages(code: str) -> tuple[catalogue.Entry, ...]:
+    """The catalogue of a language; English needs none."""
+    if code == ENGLISH:
+        return ()
+    text = resources.files(__name__).joinpath(f"{code}.po").read_text(encoding="utf-8")
+    return tuple(catalogue.entries(text))
+
+
+@cache
+def translations(code: str) -> NullTranslations:
+    """The catalogue of a language, as the standard library reads it."""
+    return GNUTranslations(catalogue.compiled(messages(code))) if messages(code) else NullTranslations()
+
+
+def term(message: str) -> Term:
+    """Mark a message that is said later."""
+    return Term(message)
+
+
+def tr(message: str, /, **values: Any) -> str:
+    """A message in the language spoken, with its places filled."""
+    said = translations(current()).gettext(message) if message else ""  # an empty one is the catalogue's header
+    return _Filled().vformat(said, (), values) if values else said
+
+
+def plural(one: str, many: str, count: int, /, **values: Any) -> str:
+    """A message that counts, in the form that the language has for this count, which is `{count}` in it."""
+    said = translations(current()).ngettext(one, many, count)
+    return _Filled().vformat(said, (), {"count": count, **values})
+
+
+def in_form(word: str, context: str) -> str:
+    """A word in one of its forms; without it as it stands."""
+    return translations(current()).pgettext(context, word) if (context, word) in _forms(current()) else tr(word)
+
+
+@cache
+def _forms(code: str) -> frozenset[tuple[str, str]]:
+    return frozenset(one.key for one in messages(code) if one.context)
+
+
+def numeral(text: str) -> str:
+    """A number as English writes it (1,234.5), as the language spoken does; with a true minus."""
+    if current() == ENGLISH:
+        return text.replace("-", "−")
+    said = translations(current())
+    return text.translate({ord(mark): said.pgettext(NUMBER, mark) for mark in ".,"} | {ord("-"): "−"})
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a sentence: a, b and c."""
+    if len(names) < 2:
+        return "".join(names)
+    return tr("{first} and {last}", first=", ".join(names[:-1]), last=names[-1])
+
+
+class _Filled(Formatter):
+    """Fills places: numbers in the way of the language, words translated, in the form that the place asks for."""
+
+    def format_field(self, value: Any, spec: str) -> str:
+        if isinstance(value, Term):
+            return in_form(value, spec)
+        if isinstance(value, str):
+            return value  # a name of the user's has no forms
+        text = format(value, spec)
+        return numeral(text) if isinstance(value, Real) and not isinstance(value, bool) else text

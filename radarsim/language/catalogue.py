@@ -1,0 +1,112 @@
+"""Reads a catalogue of gettext, `<code>.po`, and compiles it in memory to what the standard library reads."""
+
+import ast
+import io
+import re
+import struct
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+MAGIC = 0x950412DE  # of a compiled catalogue
+CONTEXT_ENDS, NEXT_FORM = "\x04", "\x00"
+LINE = re.compile(r'(?:(msgctxt|msgid|msgid_plural|msgstr|msgstr\[(\d)\])\s+)?(".*")')
+
+
+@dataclass
+class Entry:
+    """A message: its context, its text, its plural, and their translations, one for each form of the plural."""
+
+    id: str = ""
+    context: str = ""
+    plural: str = ""
+    said: dict[int, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """What tells it from all others."""
+        return self.context, self.id
+
+    @property
+    def done(self) -> bool:
+        """Whether it is translated, in every form that is there."""
+        return bool(self.said) and all(self.said.values())
+
+
+def entries(text: str) -> list[Entry]:
+    """The entries of a catalogue, the header among them. Raises ValueError, with the line, where it is none."""
+    found: list[Entry] = []
+    for block in re.split(r"\n[ \t]*\n", text.strip()):
+        entry = _entry(block)
+        if entry is not None:
+            found.append(entry)
+    return found
+
+
+def _entry(block: str) -> Entry | None:
+    made, last, empty = Entry(), "", True
+    for line in block.splitlines():
+        if line.startswith("#"):
+            made.notes.append(line)
+            continue
+        found = LINE.fullmatch(line.strip())
+        if found is None:
+            raise ValueError(f"no line of a catalogue: {line}")
+        last, empty = found[1] or last, False
+        piece = ast.literal_eval(found[3])
+        if last == "msgctxt":
+            made.context += piece
+        elif last == "msgid":
+            made.id += piece
+        elif last == "msgid_plural":
+            made.plural += piece
+        else:
+            form = int(last[7:-1]) if "[" in last else 0
+            made.said[form] = made.said.get(form, "") + piece
+    return None if empty else made
+
+
+def compiled(found: Iterable[Entry]) -> io.BytesIO:
+    """The translated entries as a compiled catalogue (GNU gettext manual, "The Format of GNU MO Files")."""
+    pairs = sorted(_pair(entry) for entry in found if entry.done)
+    ids, said = [one for one, _ in pairs], [other for _, other in pairs]
+    tables, content = b"", b""
+    start = 28 + 16 * len(pairs)
+    for text in (*ids, *said):
+        tables += struct.pack("<II", len(text), start + len(content))
+        content += text + b"\x00"
+    head = struct.pack("<7I", MAGIC, 0, len(pairs), 28, 28 + 8 * len(pairs), 0, start)
+    return io.BytesIO(head + tables + content)
+
+
+def _pair(entry: Entry) -> tuple[bytes, bytes]:
+    name = f"{entry.context}{CONTEXT_ENDS}{entry.id}" if entry.context else entry.id
+    if entry.plural:
+        name += NEXT_FORM + entry.plural
+    return name.encode(), NEXT_FORM.join(text for _, text in sorted(entry.said.items())).encode()
+
+
+def written(found: Iterable[Entry]) -> str:
+    """Entries as the text of a catalogue."""
+    return "\n".join("\n".join(_lines(entry)) + "\n" for entry in found)
+
+
+def _lines(entry: Entry) -> Iterator[str]:
+    yield from entry.notes
+    if entry.context:
+        yield f"msgctxt {_quoted(entry.context)}"
+    yield f"msgid {_quoted(entry.id)}"
+    if entry.plural:
+        yield f"msgid_plural {_quoted(entry.plural)}"
+        yield from (f"msgstr[{form}] {_quoted(text)}" for form, text in sorted(entry.said.items()))
+    else:
+        yield f"msgstr {_quoted(entry.said.get(0, ''))}"
+
+
+def _quoted(text: str) -> str:
+    """A text in quotes; one of several lines as several."""
+    marks = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\t": "\\t"})
+    lines = text.splitlines(keepends=True)
+    if len(lines) < 2:
+        return f'"{text.translate(marks)}"'
+    return "\n".join(['""', *(f'"{line.translate(marks)}"' for line in lines)])
