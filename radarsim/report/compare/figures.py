@@ -8,7 +8,7 @@ import numpy as np
 from radarsim.report.compare.sides import SERIES, Series, Side
 from radarsim.report.compare.table import filters_of
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
-from radarsim.report.panels import MOST, TIME, letter, literal, with_unit
+from radarsim.report.panels import MOST, letter, literal, time_axis, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,8 +53,8 @@ def _figure(
     against = rows["against_label"].iloc[0] if rows["against_label"].nunique() == 1 else "the first"
     difference = Axis(with_unit(f"{of} against {literal(against)}", "%" if series.ratio else unit))
     panels = (
-        Panel(Axis(TIME, limits=(0, None)), y, tuple(values), direct=False, legend="none"),
-        Panel(Axis(TIME, limits=(0, None)), difference, (Reference(0), *apart), keys=tuple(keys), legend="right"),
+        Panel(time_axis(), y, tuple(values), direct=False, legend="none"),
+        Panel(time_axis(), difference, (Reference(0), *apart), keys=tuple(keys), legend="right"),
     )
     caption = (
         f"Left: {series.words} of {', '.join(side.label for side in some)} on common axes. Right: the {of} against "

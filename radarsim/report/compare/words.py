@@ -4,8 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.report.compare.sides import SERIES
 from radarsim.report.compare.table import MEANING
-from radarsim.report.panels import UNITS
-from radarsim.report.text import significant_digits
+from radarsim.report.text import UNITS, significant_digits
 
 if TYPE_CHECKING:
     import pandas as pd
