@@ -43,10 +43,13 @@ def new(
 
 
 def _put(data: dict[str, Any], key: str, value: float) -> None:
-    """Put a number in the place of a dotted key, or of a bare one in every filter."""
+    """Put a number in the place of a dotted key, or of a bare one in every filter; of an angle, in rad, also in the
+    place of its twin in degrees."""
     *path, last = key.split(".")
-    places = data.get("filters", []) if not path else [data]
+    places: list[Any] = data.get("filters", []) if not path else [data]
     for place in places:
         for step in path:
-            place = place.setdefault(step, {})
+            place = place[int(step)] if isinstance(place, list) else place.setdefault(step, {})
+        if last.endswith("_rad"):
+            place.pop(f"{last.removesuffix('rad')}deg", None)
         place[last] = value

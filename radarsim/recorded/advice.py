@@ -5,20 +5,19 @@ that raises the likelihood most is named, if it raises it more than chance does 
 explanations together; then the search goes on beside it. What a recording with sound numbers says is: nothing wrong.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from radarsim.recorded.fit import LEAST_ROWS
+from radarsim.recorded.fit import LEAST_ROWS, units
 from radarsim.recorded.follow import Followed, recorded_of
-from radarsim.studies.interface import Likelihood
+from radarsim.studies.interface import BIAS, OUTLIERS, Likelihood
 
-OUTLIERS, BIAS = "outliers", "bias"
 LEVEL = 0.05  # of finding something where nothing is wrong
 MOST_FOUND = 3
-MOST_TRACKS = 50  # asked
+CLOSE = 0.01  # to which values are looked for, in the logarithm of a key and of the likelihood
 LOWEST, HIGHEST = np.log(1e-4), np.log(1e4)  # of a key's factor
 MOST_BIAS = 50.0  # in σ of the velocity
 SHARES = (1e-3, 0.4)  # of outliers
@@ -60,7 +59,8 @@ def advised(followed: Followed) -> Advice | None:
     long = [head for head in heads if len(head["t_s"]) >= LEAST_ROWS]
     if not long:
         return None
-    found = [of.likelihood(case, member.name, long[:MOST_TRACKS]) for member in case.spec.members]
+    asked = some(long, of.rows_asked)
+    found = [of.likelihood(case, member.name, asked) for member in case.spec.members]
     known = [one for one in found if one is not None]
     if not known:
         return None
@@ -69,11 +69,18 @@ def advised(followed: Followed) -> Advice | None:
     return Advice(best, findings(chosen), chosen.rows)
 
 
+def some(heads: Sequence[Mapping[str, np.ndarray]], most: int) -> list[Mapping[str, np.ndarray]]:
+    """The beginnings of tracks, columns (n,) each, up to `most` rows altogether; as many tracks as possible."""
+    share = max(most // len(heads), LEAST_ROWS)
+    chosen = heads[: max(most // share, 1)]
+    return [{name: column[:share] for name, column in head.items()} for head in chosen]
+
+
 def findings(likelihood: Likelihood) -> list[Finding]:
     """What is wrong with the stated numbers, the weightiest first; empty where nothing is."""
     from scipy.stats import chi2
 
-    whats = [*likelihood.keys, OUTLIERS, *([BIAS] if len(likelihood.keys) > 2 else [])]
+    whats = [*likelihood.keys, *likelihood.explains]
     needed = 0.5 * float(chi2.ppf(1 - LEVEL / len(whats), 1))
     chosen: list[str] = []
     start: dict[str, float] = {}
@@ -111,8 +118,8 @@ def _best(likelihood: Likelihood, whats: list[str], start: dict[str, float]) -> 
     """Where the likelihood is largest along some explanations, and its logarithm there."""
     from scipy.optimize import minimize
 
-    stated = dict(zip(likelihood.keys, likelihood.stated.tolist(), strict=True))
-    scales = [_scale(what, stated) for what in whats]
+    unit = dict(zip(likelihood.keys, units(likelihood).tolist(), strict=True))
+    scales = [_scale(what, unit) for what in whats]
 
     def cost(at: np.ndarray) -> float:
         return -_value(likelihood, {what: of(x) for what, (of, _), x in zip(whats, scales, at, strict=True)})
@@ -122,15 +129,15 @@ def _best(likelihood: Likelihood, whats: list[str], start: dict[str, float]) -> 
     for first in (-2.0, 0.0, 2.0):
         at = np.array([scales[i][1](start[what]) if what != new else first for i, what in enumerate(whats)])
         simplex = np.concatenate([at[None], at + 0.5 * np.eye(len(at))])
-        options: Any = {"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-3, "maxfev": 400}
+        options: Any = {"initial_simplex": simplex, "xatol": CLOSE, "fatol": CLOSE, "maxfev": 400}
         found = minimize(cost, at, method="Nelder-Mead", options=options)
         if -found.fun > best[1]:
             best = {what: of(x) for what, (of, _), x in zip(whats, scales, found.x, strict=True)}, -float(found.fun)
     return best
 
 
-def _scale(what: str, stated: dict[str, float]) -> tuple[Callable[[float], float], Callable[[float], float]]:
-    """From what is searched to the value of an explanation, and back."""
+def _scale(what: str, unit: dict[str, float]) -> tuple[Callable[[float], float], Callable[[float], float]]:
+    """From what is searched to the value of an explanation, and back; unit: of each key."""
     if what == BIAS:
         return lambda x: float(np.clip(x, -MOST_BIAS, MOST_BIAS)), lambda value: value
     if what == OUTLIERS:
@@ -139,6 +146,6 @@ def _scale(what: str, stated: dict[str, float]) -> tuple[Callable[[float], float
             lambda value: 3 - float(np.log(1 / value - 1)),
         )
     return (
-        lambda x: stated[what] * float(np.exp(np.clip(x, LOWEST, HIGHEST))),
-        lambda value: float(np.log(value / stated[what])),
+        lambda x: unit[what] * float(np.exp(np.clip(x, LOWEST, HIGHEST))),
+        lambda value: float(np.log(value / unit[what])),
     )

@@ -17,12 +17,14 @@ from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError
 from radarsim.recorded import plots
 from radarsim.recorded.follow import by_track, one_case, recorded_of
-from radarsim.studies.interface import Likelihood
+from radarsim.studies.interface import OUTLIERS, Likelihood
 
 HALF_CHI2_95 = 1.9207294103470  # half the 95 % point of chi-square with one degree of freedom
 LEAST_ROWS = 10  # of a track; shorter ones say next to nothing
 REACH = 1e4  # how many times larger or smaller than the estimate an end of an interval is looked for
 EVALUATIONS = 2000
+CLOSE = 1e-3  # to which an end of an interval is found, of the logarithm of a key and of the likelihood
+FAR_FROM_ZERO = 1e4  # times what counts as zero of a key
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,11 @@ def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name
         raise ConfigError(f"{source}: must have a track of at least {LEAST_ROWS} rows")
     found = of.likelihood(case, filter_name, long)
     if found is None:
-        raise ConfigError(f"{case.study}: has no likelihood of recorded plots to fit by")
+        asked = f"filter {filter_name}" if filter_name else f"no filter of {case.name}"
+        raise ConfigError(
+            f"{asked}: {'has' if filter_name is None else 'has no'} likelihood of recorded plots to fit by: "
+            "its kind has no model of the target's motion"
+        )
     return found
 
 
@@ -87,12 +93,21 @@ def fit(experiment: Experiment, source: str | os.PathLike, filter_name: str | No
 
 
 def fitted(likelihood: Likelihood, robust: bool = False) -> Fit:
-    """The keys of a likelihood where it is largest, with profile intervals."""
+    """The keys of a likelihood where it is largest, with profile intervals. Raises ConfigError where it is asked to
+    allow for outliers and cannot."""
+    if robust and OUTLIERS not in likelihood.explains:
+        raise ConfigError(f"robust: the likelihood of filter {likelihood.filter} cannot allow for outliers")
     search = _Search(likelihood, robust)
     keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
     share = float(search.natural(search.best)[-1]) if robust else None
     stated = likelihood(np.array(likelihood.stated), 0.0)
     return Fit(likelihood.filter, likelihood.tracks, likelihood.rows, keys, share, search.top - stated)
+
+
+def units(likelihood: Likelihood) -> np.ndarray:
+    """From where each key is searched: as the config states it; one that it states as zero, far from what counts so."""
+    near_zero = np.asarray(likelihood.stated) <= likelihood.least
+    return np.where(near_zero, FAR_FROM_ZERO * np.asarray(likelihood.least), likelihood.stated)
 
 
 class _Search:
@@ -101,7 +116,7 @@ class _Search:
 
     def __init__(self, likelihood: Likelihood, robust: bool):
         self.likelihood, self.robust = likelihood, robust
-        start = np.log(np.maximum(likelihood.stated, likelihood.least))
+        start = np.log(units(likelihood))
         if robust:
             start = np.append(start, _logit(0.05))
         self.best, self.top = self._climbed(start, None)
@@ -129,6 +144,7 @@ class _Search:
 
     def _climbed(self, start: np.ndarray, held: int | None) -> tuple[np.ndarray, float]:
         """The top reached from a start, one coordinate held or none, and the logarithm of the likelihood there."""
+        near, top = (1e-4, 1e-5) if held is None else (3 * CLOSE, CLOSE)
         from scipy.optimize import minimize
 
         free = np.array([i for i in range(len(start)) if i != held])
@@ -141,7 +157,7 @@ class _Search:
         if not free.size:
             return start, self._value(start)
         simplex = np.concatenate([start[free][None], start[free] + 0.3 * np.eye(free.size)])
-        options: Any = {"initial_simplex": simplex, "xatol": 1e-4, "fatol": 1e-5, "maxfev": EVALUATIONS}
+        options: Any = {"initial_simplex": simplex, "xatol": near, "fatol": top, "maxfev": EVALUATIONS}
         found = minimize(cost, start[free], method="Nelder-Mead", options=options)
         whole[free] = found.x
         return whole, -float(found.fun)
@@ -179,7 +195,7 @@ class _Search:
                 def above(at: float, start: np.ndarray = start) -> float:
                     return self._profile(i, at, start)[0] - limit
 
-                return float(brentq(above, min(inside, outside), max(inside, outside), xtol=1e-4))
+                return float(brentq(above, min(inside, outside), max(inside, outside), xtol=CLOSE))
             if outside < least:
                 return None
             near, inside, step = found, outside, 2 * step

@@ -70,11 +70,14 @@ def true_column(component: str, unit: str) -> str:
     return f"{TRUE}{component}_{IN_NAMES.get(unit, unit)}"
 
 
+OUTLIERS, BIAS = EXPLANATIONS = ("outliers", "bias")
+
+
 class Likelihood(Protocol):
     """How likely recorded plots are under a filter, by the keys of the config that it was designed with.
 
     filter: its name; tracks and rows: how many there are; keys: dotted names; stated (n,): their values in the config;
-    least (n,): what counts as zero of them.
+    least (n,): what counts as zero of them; explains: by what else it can explain plots, of EXPLANATIONS.
     """
 
     filter: str
@@ -83,6 +86,7 @@ class Likelihood(Protocol):
     keys: tuple[str, ...]
     stated: "np.ndarray"
     least: "np.ndarray"
+    explains: tuple[str, ...]
 
     def __call__(self, values: "np.ndarray", outliers: float = 0.0, bias: float = 0.0) -> float:
         """The logarithm of the likelihood of values (n,) of the keys.
@@ -91,11 +95,17 @@ class Likelihood(Protocol):
         """
 
     def by_number(self, values: "np.ndarray") -> Mapping[str, float]:
-        """The same with the keys alone, summed for each number that a plot holds, by its column."""
+        """The same with the keys alone, summed for each number that a plot holds, by its column; not-a-number where it
+        cannot be told."""
 
 
 class RecordedPlots(ABC):
-    """What a study does with recorded plots: `radarsim track` and `radarsim simulate`."""
+    """What a study does with recorded plots: `radarsim track` and `radarsim simulate`.
+
+    rows_asked: of how many rows `radarsim track` asks the likelihood for its advice, so that it takes some seconds.
+    """
+
+    rows_asked: int = 3000
 
     @abstractmethod
     def columns(self, spec: Any) -> Sequence[Sequence[str]]:

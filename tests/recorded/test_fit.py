@@ -227,12 +227,12 @@ def test_what_cannot_be_fitted_is_refused(source, arguments, expected):
     assert expected in command("fit", config, source, *more, code=2).stderr
 
 
-def test_a_study_without_a_likelihood_says_so(tmp_path):
+def test_a_filter_without_a_likelihood_says_so(tmp_path):
     path = tmp_path / "plots.csv"
     (sonar,) = load_all(["sonar_smoothing"], ())
     plots.write_columns(follow.simulated(sonar), path)
-    with pytest.raises(ConfigError, match="sonar: has no likelihood of recorded plots to fit by"):
-        fit.fit(sonar, path)
+    with pytest.raises(ConfigError, match="filter window 5: has no likelihood of recorded plots to fit by: its kind"):
+        fit.fit(sonar, path, "window 5")
 
 
 def test_too_short_a_track_is_refused(tmp_path):

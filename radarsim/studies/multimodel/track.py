@@ -1,6 +1,7 @@
-"""Recorded plots: the study's filters over them, and the plots of one simulated realisation as such a record."""
+"""Recorded plots: the study's filters over them, how likely they are under a filter, and the plots of one simulated
+realisation as such a record."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,9 +10,10 @@ from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.kernels import random
 from radarsim.kernels.lanes import WIDTH, rows
-from radarsim.studies.interface import RecordedPlots, true_column
+from radarsim.studies.interface import OUTLIERS, RecordedPlots, true_column
 from radarsim.studies.multimodel import filters
-from radarsim.studies.multimodel.config import Filter, Keys
+from radarsim.studies.multimodel.config import Filter, Keys, Sensor
+from radarsim.studies.multimodel.kernels import likelihood as kernel
 from radarsim.studies.multimodel.kernels import strip as strips
 from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
 from radarsim.studies.multimodel.kernels.plots import NORMALS, STRIP
@@ -39,6 +41,7 @@ from radarsim.studies.multimodel.world import truth as scan_times
 
 CHUNK = 4096  # recorded plots filtered at a time
 TESTED = (("plot", 3),)
+LEAST = 1e-4  # of a key's stated value, which counts as zero
 
 
 def plot_columns(spec: Keys) -> tuple[tuple[str, ...], ...]:
@@ -207,8 +210,70 @@ def _lanes(plots: np.ndarray) -> np.ndarray:
     return found
 
 
+class PlotLikelihood:
+    """How likely tracks are under a filter: the density that its bank of models gives each plot. The first three whole
+    plots start the track. Its keys are the sensor's σ and the acceleration of the hardest manoeuvring model."""
+
+    def __init__(self, case: Case, number: int, tracks: Sequence[Mapping[str, np.ndarray]]):
+        self.spec: Keys = case.spec
+        self.options = self.spec.filters[number]
+        self.filter, self.tracks = self.options.name, len(tracks)
+        self.rows = sum(len(columns["t_s"]) for columns in tracks)
+        # Where the plot's covariance is made by the filter, outliers cannot be given a wider one.
+        self.explains: tuple[str, ...] = (OUTLIERS,) if self.options.covariance_at == "plot" else ()
+        spreads = [model.sigma_acceleration_mps2 for model in self.options.models]
+        self.hardest = int(np.argmax(spreads))
+        names = sigmas(self.spec)["plot"]
+        self.keys = (*names, f"filters.{number}.models.{self.hardest}.sigma_acceleration_mps2")
+        self.stated = np.array([*self.spec.sensor.sigma, spreads[self.hardest]])
+        self.least = np.append(LEAST * self.stated[:3], LEAST * (self.stated[3] or 1.0))
+        self.recorded = [(columns["t_s"], np.stack(list(columns.values())[1:], axis=1)) for columns in tracks]
+
+    def _changed(self, values: np.ndarray) -> tuple[Sensor, Filter]:
+        """Sensor and filter with other values of the keys."""
+        names = [key.partition(".")[2] for key in self.keys[:3]]
+        sensor = self.spec.sensor.model_copy(update=dict(zip(names, values[:3].tolist(), strict=True)))
+        models = list(self.options.models)
+        hardest = {"sigma_acceleration_mps2": float(values[3])}
+        models[self.hardest] = models[self.hardest].model_copy(update=hardest)
+        return sensor, self.options.model_copy(update={"models": tuple(models)})
+
+    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0) -> float:
+        """The logarithm of the likelihood; a bias is not looked for."""
+        sensor, options = self._changed(values)
+        spec = self.spec.model_copy(update={"sensor": sensor, "filters": (options,)})
+        return sum(_score(spec, t, *local_plots(sensor, seen), outliers) for t, seen in self.recorded)
+
+    def by_number(self, values: np.ndarray) -> dict[str, float]:
+        """Of the plot as a whole."""
+        return {"plot": self(values)}
+
+
+def _score(spec: Keys, t: np.ndarray, z: np.ndarray, R: np.ndarray, whole: np.ndarray, outliers: float) -> float:
+    """The logarithm of the likelihood of one track under the one filter of a config; 0 where it never starts."""
+    began = np.flatnonzero(whole)[:START]
+    if len(began) < START or began[-1] + 1 == len(t):
+        return 0.0
+    first, (options,) = int(began[-1]), spec.filters
+    plots = np.concatenate([z, R, whole[:, None]], axis=1)
+    weights = filters.start_weights(t[began], spec.start_acceleration_mps2)
+    chances = filters.stationary(filters.transition_matrix(options.transition))
+    work, numbers = work_arrays()
+    strips.start_strip(work, numbers, _lanes(plots[began]), weights, chances)
+    index, times = intervals(t[first:])
+    own = banks(spec, times)
+    size, score = own.numbers[0, SIZE], np.empty(len(t) - first - 1)
+    design = own.models[0, : MODEL_NUMBERS * size], own.transitions[0], index[1:].copy(), times, own.numbers[0]
+    kernel.log_likelihood(
+        work, numbers, _lanes(plots[first + 1 :]), *design, sensor_frame(spec.sensor), outliers, score
+    )
+    return float(score.sum())
+
+
 class Recorded(RecordedPlots):
     """The study's part in `radarsim track` and `radarsim simulate`."""
+
+    rows_asked = 600
 
     def columns(self, spec: Keys) -> tuple[tuple[str, ...], ...]:
         return plot_columns(spec)
@@ -224,3 +289,9 @@ class Recorded(RecordedPlots):
 
     def tracker(self, case: Case) -> Tracker:
         return Tracker(case)
+
+    def likelihood(
+        self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]
+    ) -> PlotLikelihood:
+        names = [member.name for member in case.spec.filters]
+        return PlotLikelihood(case, 0 if filter_name is None else names.index(filter_name), tracks)

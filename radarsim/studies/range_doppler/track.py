@@ -1,22 +1,24 @@
 """Plots of the range_doppler study: those of one realisation, and the study's filters over recorded ones."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.kernels import linear
+from radarsim.kernels.innovations import log_likelihood
 from radarsim.physics.motion import transition
-from radarsim.studies.interface import RecordedPlots, true_column
+from radarsim.studies.interface import EXPLANATIONS, RecordedPlots, true_column
 from radarsim.studies.range_doppler.config import Filter, Keys
 from radarsim.studies.range_doppler.filters import noise_by_time, noise_over, observation
 from radarsim.studies.range_doppler.kernels import missed, rows
-from radarsim.studies.range_doppler.kernels.likelihood import log_likelihood
 from radarsim.studies.range_doppler.study import COMPONENTS, designed, prepare
 
-STARTING = 3  # rows of a track from which its state is found, in the likelihood
+STARTING = 3  # ranges of a track from which its state is found, in the likelihood
 LEAST_MANOEUVRE = 1e-6  # of the stated manoeuvre variance, which counts as none
+WIDE_VELOCITY_MPS, WIDE_ACCELERATION_MPS2 = 3e4, 3e3  # standard deviations before the first plot: nothing is known
 LONGEST_START = 200  # plots in which a start is looked for; a file of velocities alone never has one
 MEASURED = (("range_m", 1), ("velocity_mps", 1))
 SIGMAS: dict[str, tuple[str, ...]] = {
@@ -147,6 +149,8 @@ class PlotLikelihood:
     filter's process noise changes. The state before the first plot is taken as unknown, whatever start the config
     states."""
 
+    explains: tuple[str, ...] = EXPLANATIONS
+
     def __init__(self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]):
         most = max(len(f.observes) for f in case.spec.filters)
         (options,) = [f for f in case.spec.filters if f.name == filter_name] or [
@@ -158,32 +162,39 @@ class PlotLikelihood:
         radar, self.observes = case.spec.radar, len(options.observes)
         sigmas = {"radar.sigma_range_m": radar.sigma_range_m, "radar.sigma_velocity_mps": radar.sigma_velocity_mps}
         stated = dict(list(sigmas.items())[: self.observes]) | {"manoeuvre_variance": variance}
-        self.sigma_velocity = radar.sigma_velocity_mps
         self.keys, self.stated = tuple(stated), np.array(list(stated.values()), dtype=float)
         self.least = self.stated * np.array([1e-4] * self.observes + [LEAST_MANOEUVRE])
         self.noise = noise_by_time(options.process_noise, 1.0, radar.scan_period_s)
-        self.problems = [self._problem(columns) for columns in tracks]
+        self.problems = [problem for columns in tracks if (problem := self._problem(columns)) is not None]
 
-    def _problem(self, columns: Mapping[str, np.ndarray]) -> tuple[np.ndarray, ...]:
-        """Transitions, process noises of unit variance, plots and what counts of them, of a track."""
-        dt = np.diff(columns["t_s"], prepend=columns["t_s"][0])
-        z = np.stack([columns["range_m"], columns["velocity_mps"]], axis=1)
-        there = np.isfinite(z) & (np.arange(2) < self.observes)
+    def _problem(self, columns: Mapping[str, np.ndarray]) -> "_Problem | None":
+        """A track from its first range on; None where it has none."""
+        ranged = np.isfinite(columns["range_m"])
+        if not ranged.any():
+            return None
+        first = int(ranged.argmax())
+        t = columns["t_s"][first:]
+        dt = np.diff(t, prepend=t[0])
+        z = np.stack([columns["range_m"], columns["velocity_mps"]], axis=1)[first:, : self.observes]
+        there = np.isfinite(z)
+        there[0, 0] = False  # it starts the track
         F, Q = np.stack([transition(step) for step in dt]), np.stack([noise_over(self.noise, step) for step in dt])
-        return F, Q, np.where(there, z, 0.0), there
+        H = np.tile(observation(self.observes), (len(t), 1, 1))
+        settled = int(np.searchsorted(np.cumsum(ranged[first:]), STARTING, side="right"))
+        return _Problem(F, Q, H, np.where(np.isfinite(z), z, 0.0), there, settled)
 
     def _scores(self, values: np.ndarray, outliers: float, bias: float) -> np.ndarray:
-        """Sums over all tracks for range and velocity (2,); the first rows, which find the state, are left out."""
-        numbers = np.zeros(5)
-        numbers[: self.observes] = np.square(values[: self.observes])
-        if self.observes == 1:
-            numbers[1] = self.sigma_velocity**2  # of what does not count
-        numbers[2:] = values[self.observes], bias * np.sqrt(numbers[1]), outliers
-        total = np.zeros(2)
-        for F, Q, z, there in self.problems:
-            score = np.empty(z.shape)
-            log_likelihood(F, Q, z, there, numbers, score)
-            total += score[STARTING:].sum(axis=0)
+        """Sums over all tracks for each number that counts; the first plots, which find the state, are left out."""
+        variances, total = np.square(values[: self.observes]), np.zeros(self.observes)
+        offset = np.zeros(self.observes)
+        offset[1:] = bias * values[1 : self.observes]
+        for one in self.problems:
+            x, P = np.zeros(3), np.diag([variances[0], WIDE_VELOCITY_MPS**2, WIDE_ACCELERATION_MPS2**2])
+            x[0] = one.z[0, 0]
+            score, spread = np.empty(one.z.shape), np.tile(variances, (len(one.z), 1))
+            z = one.z - offset if bias else one.z
+            log_likelihood(x, P, one.F, one.Q, one.H, z, spread, one.there, values[self.observes], outliers, score)
+            total += score[one.settled :].sum(axis=0)
         return total
 
     def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0) -> float:
@@ -194,6 +205,18 @@ class PlotLikelihood:
         """The sums of range and velocity."""
         total = self._scores(values, 0.0, 0.0)
         return {name: float(part) for (name, _), part in zip(MEASURED[: self.observes], total, strict=False)}
+
+
+class _Problem(NamedTuple):
+    """A track for the kernel: transitions and process noises of unit variance (n, 3, 3), the rows (n, m, 3) of its
+    numbers (n, m), which of these count, and the row from which the state is known."""
+
+    F: np.ndarray
+    Q: np.ndarray
+    H: np.ndarray
+    z: np.ndarray
+    there: np.ndarray
+    settled: int
 
 
 class Recorded(RecordedPlots):

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from radarsim.studies.sonar.schema import Sonar as AllKeys
     from radarsim.studies.sonar.smoothing.study import SharedPlan
     from radarsim.studies.sonar.study import RealisationPlan
+    from radarsim.studies.sonar.track import PlotLikelihood
 
 CaseOrResult = TypeVar("CaseOrResult", "Case", "CaseResult")
 
@@ -116,6 +117,8 @@ class Sonar(Study):
 class Recorded(RecordedPlots):
     """Recorded plots of all parts, for `radarsim track` and `radarsim simulate`."""
 
+    rows_asked = 1000
+
     def columns(self, spec: "Keys") -> tuple[tuple[str, ...], ...]:
         from radarsim.studies.sonar import track
 
@@ -134,6 +137,13 @@ class Recorded(RecordedPlots):
 
     def tracker(self, case: "Case") -> Tracker:
         return part_of(case.spec).tracker(case)
+
+    def likelihood(
+        self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
+    ) -> "PlotLikelihood | None":
+        from radarsim.studies.sonar import track
+
+        return track.likelihood(case, filter_name, tracks)
 
 
 # ---- which part -----------------------------------------------------------------------------------------------------

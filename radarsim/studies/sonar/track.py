@@ -1,4 +1,5 @@
-"""Sonar plots of one realisation, and filters over recorded plots that are known to be the target's."""
+"""Sonar plots of one realisation, and filters over recorded plots that are known to be the target's; how likely these
+are under a filter."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -7,19 +8,25 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
-from radarsim.studies.interface import true_column
+from radarsim.kernels.innovations import log_likelihood
+from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.studies.interface import OUTLIERS, true_column
 from radarsim.studies.sonar import banks, filters, world
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.config import Keys
 from radarsim.studies.sonar.kernels import patterns as pattern_kernels
 from radarsim.studies.sonar.kernels import shared_gains as kernels
 from radarsim.studies.sonar.responding import estimate_recorded
-from radarsim.studies.sonar.scene import build_scene, filter_specs, third_coordinate
+from radarsim.studies.sonar.scene import build_scene, filter_specs, lateral_scale, third_coordinate
 
 MOST_ROWS = 200_000  # of a file: designs of all rows are kept in memory
 RANGE, BEARING = "sensor.sigma_range_m", "sensor.sigma_bearing_rad"
 THIRD = {"depth": ("depth_m", "sensor.sigma_depth_m"), "elevation": ("elevation_rad", "sensor.sigma_elevation_rad")}
 OPTIMAL = ("growing_memory", "window", "kalman")  # kinds whose residuals have a known variance if errors are white
+MODELLED = ("growing_memory", "kalman")  # kinds that say how the target moves and that errors are white
+STARTING = 3  # whole plots of a track from which its state is found, in the likelihood
+WIDE = 1e3  # standard deviations of a plot by which a rate may differ, in an interval, from that of the first two plots
+LEAST_SIGMA, LEAST_MANOEUVRE = 1e-4, 1e-8  # what counts as zero: of a stated σ, of the variance that moves by a σ
 LEAST_FREEDOM = 1e-6  # of a plot's variance; with less the estimate passes through the plot
 
 
@@ -192,3 +199,131 @@ def continuous(bearing: np.ndarray) -> np.ndarray:
     out = bearing.copy()
     out[there] = np.unwrap(bearing[there])
     return out
+
+
+class PlotLikelihood:
+    """How likely tracks are under a filter's model: a polynomial of its degree in each coordinate, whose next
+    derivative is random; errors of range, bearing and a third coordinate that are independent. The state before the
+    first whole plot is taken as unknown."""
+
+    explains: tuple[str, ...] = (OUTLIERS,)
+
+    def __init__(self, case: Case, number: int, tracks: Sequence[Mapping[str, np.ndarray]]):
+        self.spec: Any = case.spec
+        member, scale = self.spec.filters[number], lateral_scale(self.spec, 2)
+        self.filter, self.tracks, self.size = member.name, len(tracks), member.degree + 1
+        self.rows = sum(len(columns["t_s"]) for columns in tracks)
+        sensor = self.spec.sensor
+        third, third_sigma = third_coordinate(sensor)
+        sigma = {RANGE: sensor.sigma_range_m, BEARING: sensor.sigma_bearing_rad}
+        sigma |= {THIRD[third][1]: third_sigma} if third else {}
+        self.coordinates = len(sigma)
+        stated, least = list(sigma.values()), [LEAST_SIGMA * one for one in sigma.values()]
+        names = list(sigma)
+        if member.kind == "kalman":
+            names.append(f"filters.{number}.manoeuvre_variance")
+            stated.append(member.manoeuvre_variance or 0.0)
+            least.append(LEAST_MANOEUVRE * (sensor.sigma_range_m / sensor.scan_period_s**self.size) ** 2)
+        self.keys, self.stated, self.least = tuple(names), np.array(stated), np.array(least)
+        found = (self._problem(list(columns.values()), scale) for columns in tracks)
+        self.problems = [one for one in found if one is not None]
+
+    def _problem(self, columns: Sequence[np.ndarray], scale: np.ndarray) -> "_Problem | None":
+        """A track from its first whole plot on; None where it has none."""
+        t, *values = columns
+        whole = np.isfinite(np.stack(values)).all(axis=0)
+        if not whole.any():
+            return None
+        first, C, size = int(whole.argmax()), self.coordinates, self.size
+        t, z = t[first:], np.stack(values)[:, first:]
+        z[1] = continuous(z[1])
+        there = np.isfinite(z).T.copy()
+        if self.spec.frame != "polar":
+            there[:, :2] = there[:, :2].all(axis=1, keepdims=True)
+        steps = np.diff(t, prepend=t[0])
+        eye = np.eye(C)
+        F = np.stack([np.kron(eye, transition(step, size)) for step in steps])
+        Q = np.stack([np.kron(np.diag(scale), manoeuvre_covariance(1.0, step, size)) for step in steps])
+        settled = int(np.searchsorted(np.cumsum(whole[first:]), STARTING, side="right"))
+        usual = float(np.median(steps[1:])) if len(steps) > 1 else self.spec.sensor.scan_period_s
+        rates = WIDE * usual ** -np.arange(1.0, size)
+        there[0] = False  # it starts the track
+        following = int(whole[first + 1 :].argmax()) + 1 if whole[first + 1 :].any() else 0
+        return _Problem(F, Q, np.where(np.isfinite(z), z, 0.0), there, t - t[0], rates, following, settled)
+
+    def _numbers(self, one: "_Problem", sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What is measured along independent directions: positions (n, C) in the frame of the filters, the directions
+        (n, C, C) by rows, and the variances (n, C) along them."""
+        n, C = one.there.shape
+        along, variance = np.tile(np.eye(C), (n, 1, 1)), np.tile(sigma**2, (n, 1))
+        place = one.z.T.copy()
+        if self.spec.frame != "polar":
+            convert = world.converted if self.spec.frame == "cartesian" else world.converted_unbiased
+            x, y, _ = convert(*one.z[:2], *sigma[:2])
+            xx, xy, yy = convert(*(one.z[:2] if self.spec.frame == "cartesian" else world.places(*one.z[:2])),
+                                 *sigma[:2])[2]  # fmt: skip
+            values, vectors = np.linalg.eigh(np.stack([xx, xy, xy, yy], axis=1).reshape(n, 2, 2))
+            place[:, 0], place[:, 1] = x, y
+            variance[:, :2], along[:, :2, :2] = np.maximum(values, 0.0), np.swapaxes(vectors, 1, 2)
+        return place, along, variance
+
+    def _score(self, values: np.ndarray, outliers: float) -> float:
+        sigma, C, size = values[: self.coordinates], self.coordinates, self.size
+        manoeuvre, total = float(values[C]) if len(values) > C else 0.0, 0.0
+        stated = self.stated[:C]
+        for one in self.problems:
+            place, along, variance = self._numbers(one, sigma)
+            H = np.zeros((*along.shape[:2], C * size))
+            H[:, :, ::size] = along
+            z = np.einsum("nij,nj->ni", along, place)
+            x, P = np.zeros(C * size), np.zeros((C * size, C * size))
+            x[::size] = place[0]
+            if one.following:
+                x[1::size] = (place[one.following] - place[0]) / one.t[one.following]
+            start = along[0].T @ np.diag(variance[0]) @ along[0]
+            P[::size, ::size] = start
+            wide = np.sqrt(np.diag(start) * (stated / sigma) ** 2)  # of the stated errors, whatever is tried
+            for i, rate in enumerate(one.rates, start=1):
+                P[np.arange(C) * size + i, np.arange(C) * size + i] = (wide * rate) ** 2
+            score = np.empty(z.shape)
+            log_likelihood(x, P, one.F, one.Q, H, z, variance, one.there, manoeuvre, outliers, score)
+            total += float(score[one.settled :].sum())
+        return total
+
+    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0) -> float:
+        """The logarithm of the likelihood; a bias is not looked for."""
+        return self._score(values, outliers)
+
+    def by_number(self, values: np.ndarray) -> dict[str, float]:
+        """Of the plot as a whole: its numbers are not apart in every frame."""
+        return {"plot": self._score(values, 0.0)}
+
+
+class _Problem(NamedTuple):
+    """A track for the kernel: transitions and process noises of unit variance (n, d, d), values (C, n) as measured,
+    which of them count (n, C), times (n,) from the first, the widths of the rates in standard deviations of a plot, the
+    row of the second whole plot (0: none), the row from which the state is known."""
+
+    F: np.ndarray
+    Q: np.ndarray
+    z: np.ndarray
+    there: np.ndarray
+    t: np.ndarray
+    rates: np.ndarray
+    following: int
+    settled: int
+
+
+def likelihood(
+    case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]
+) -> PlotLikelihood | None:
+    """How likely tracks are under a filter, or where None is named under the first Kalman filter, else the first that
+    models the target; None where it does not."""
+    members = case.spec.filters
+    known = [i for i, one in enumerate(members) if one.kind in MODELLED and one.association is None]
+    if filter_name is None:
+        kalman = [i for i in known if members[i].kind == "kalman" and members[i].manoeuvre_variance]
+        known = [*kalman, *known][:1]
+    else:
+        known = [i for i in known if members[i].name == filter_name]
+    return PlotLikelihood(case, known[0], tracks) if known else None

@@ -1,0 +1,300 @@
+"""How likely recorded plots are under the filters of each study, against textbook twins; and what is fitted by it."""
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal as normal
+
+from radarsim.app.run import load_all
+from radarsim.kernels.innovations import FACTOR, log_likelihood
+from radarsim.physics import frames
+from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.recorded import advice, fit, follow
+from radarsim.recorded.follow import recorded_of
+from radarsim.studies.multimodel.filters import start_weights
+from radarsim.studies.sonar import world
+
+
+def loaded(config, *overrides):
+    (one,) = load_all([config], overrides)
+    return one.cases[0]
+
+
+def recording(config, *overrides, number=0):
+    """The measured columns of a realisation."""
+    (one,) = load_all([config], overrides)
+    columns = follow.simulated(one, number)
+    return {name: column for name, column in columns.items() if not name.startswith("true_")}
+
+
+def likelihood(case, name, *tracks):
+    return recorded_of(case).likelihood(case, name, list(tracks))
+
+
+# ---- the kernel ------------------------------------------------------------------------------------------------------
+
+
+def test_the_kernel_is_the_density_of_all_numbers_together():
+    """By the joint normal density of everything that is measured, without a filter."""
+    rng, n = np.random.default_rng(1), 6
+    F, q = np.tile(transition(2.0, 2), (n, 1, 1)), 0.3
+    Q = np.tile(manoeuvre_covariance(1.0, 2.0, 2), (n, 1, 1))
+    H, variance = rng.normal(size=(n, 2, 2)), rng.uniform(0.5, 2, (n, 2))
+    z, there = rng.normal(size=(n, 2)), rng.random((n, 2)) < 0.7
+    x, P = rng.normal(size=2), np.diag([2.0, 0.5])
+    means, states = [x], [[P]]  # states[j][i]: covariance of the states at rows i and j
+    for k in range(1, n):
+        means.append(F[k] @ means[-1])
+        states.append([states[-1][i] @ F[k].T for i in range(k)])
+        states[-1].append(F[k] @ states[k - 1][k - 1] @ F[k].T + q * Q[k])
+    whole = np.block([[states[max(i, j)][min(i, j)] if i <= j else states[i][j].T for j in range(n)] for i in range(n)])
+    rows = np.zeros((2 * n, 2 * n))
+    for k in range(n):
+        rows[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = H[k]
+    chosen = there.ravel()
+    spread = (rows @ whole @ rows.T + np.diag(variance.ravel()))[np.ix_(chosen, chosen)]
+    expected = normal.logpdf(z.ravel()[chosen], (rows @ np.concatenate(means))[chosen], spread)
+    score = np.empty((n, 2))
+    log_likelihood(x.copy(), P.copy(), F, Q, H, z, variance, there, q, 0.0, score)
+    assert score.sum() == pytest.approx(expected, rel=1e-12)
+    assert np.all(score[~there] == 0)
+
+
+def test_an_outlier_leaves_the_moments_of_both_explanations():
+    """Of the second number, after a first that is a mixture: Bayes' rule by hand."""
+    P, variance, share, z = 4.0, 1.0, 0.2, np.array([[7.0], [1.0]])
+    spreads, chances = P + variance * np.array([1, FACTOR**2]), np.array([1 - share, share])
+    first = chances * np.exp(-0.5 * z[0] ** 2 / spreads) / np.sqrt(2 * np.pi * spreads)
+    w = first / first.sum()
+    means, variances = P / spreads * z[0], P - P**2 / spreads
+    mean = w @ means
+    merged = w @ (variances + (means - mean) ** 2)
+    spreads = merged + variance * np.array([1, FACTOR**2])
+    second = chances * np.exp(-0.5 * (z[1] - mean) ** 2 / spreads) / np.sqrt(2 * np.pi * spreads)
+    one, score = np.ones((2, 1, 1)), np.empty((2, 1))
+    there = np.ones((2, 1), dtype=bool)
+    log_likelihood(np.zeros(1), np.array([[P]]), one, 0 * one, one, z, np.ones((2, 1)), there, 0.0, share, score)
+    np.testing.assert_allclose(score[:, 0], np.log([first.sum(), second.sum()]), rtol=1e-12)
+
+
+# ---- sonar -----------------------------------------------------------------------------------------------------------
+
+
+def textbook(case, number, columns):
+    """The density of a track's plots after the third, by a Kalman filter on both coordinates together, started from the
+    first two plots with a wide covariance."""
+    spec, member = case.spec, case.spec.filters[number]
+    r, b, T, size = columns["range_m"], columns["bearing_rad"], np.diff(columns["t_s"]), member.degree + 1
+    sigma = np.array([spec.sensor.sigma_range_m, spec.sensor.sigma_bearing_rad])
+    if spec.frame == "polar":
+        z, R = np.stack([r, b], axis=1), np.tile(np.diag(sigma**2), (len(r), 1, 1))
+        scale = np.array([1, spec.target.initial_range_m**-2.0])
+    else:
+        x, y, (xx, xy, yy) = world.converted(r, b, *sigma)
+        z, R = np.stack([x, y], axis=1), np.array([[xx, xy], [xy, yy]]).transpose(2, 0, 1)
+        scale = np.ones(2)
+    H = np.kron(np.eye(2), np.eye(size)[:1])
+    state = np.zeros(2 * size)
+    state[::size], state[1::size] = z[0], (z[1] - z[0]) / T[0]
+    P = np.kron(np.diag(np.diag(R[0])), np.diag([0.0, *(1e3 * T[0] ** -np.arange(1.0, size)) ** 2]))
+    P += H.T @ R[0] @ H
+    densities = []
+    for k in range(1, len(r)):
+        F = np.kron(np.eye(2), transition(T[k - 1], size))
+        D = member.manoeuvre_variance or 0.0
+        P = F @ P @ F.T + np.kron(np.diag(scale), manoeuvre_covariance(D, T[k - 1], size))
+        state, S = F @ state, H @ P @ H.T + R[k]
+        densities.append(normal.logpdf(z[k], H @ state, S))
+        K = P @ H.T @ np.linalg.inv(S)
+        state, P = state + K @ (z[k] - H @ state), P - K @ S @ K.T
+    return sum(densities[2:])
+
+
+@pytest.mark.parametrize("frame", ["polar", "cartesian"])
+@pytest.mark.parametrize("name", ["growing", "kalman q", "growing 2"])
+def test_the_sonar_likelihood_is_that_of_a_textbook_filter(frame, name):
+    case = loaded("sonar_smoothing", f"frame={frame}")
+    columns = recording("sonar_smoothing")
+    (number,) = (i for i, one in enumerate(case.spec.filters) if one.name == name)
+    assert float(likelihood(case, name, columns)(likelihood(case, name, columns).stated)) == pytest.approx(
+        textbook(case, number, columns), rel=1e-6
+    )
+
+
+@pytest.mark.parametrize(
+    ("key", "true"), [("sensor.sigma_range_m", 75.0), ("sensor.sigma_bearing_rad", 0.04), (None, None)]
+)
+def test_a_wrong_error_of_the_sonar_is_named_and_fitted(key, true):
+    case = loaded("sonar_smoothing", "frame=cartesian", "scans=80")
+    wrong = [f"{key}={true}"] if key else []
+    columns = recording("sonar_smoothing", "frame=cartesian", "scans=80", *wrong)
+    one = likelihood(case, "growing", columns)
+    found = advice.findings(one)
+    assert [finding.what for finding in found] == ([key] if key else [])
+    if key:
+        (fitted,) = (each for each in fit.fitted(one).keys if each.key == key)
+        assert fitted.lo < true < fitted.hi
+        assert fitted.hi / fitted.lo < 1.6
+
+
+def test_a_course_without_manoeuvres_does_not_tell_their_variance():
+    case = loaded("sonar_smoothing")
+    *_, manoeuvre = fit.fitted(likelihood(case, "kalman q", recording("sonar_smoothing"))).keys
+    assert (manoeuvre.key, manoeuvre.lo, manoeuvre.identifiable) == ("filters.4.manoeuvre_variance", 0.0, False)
+
+
+# ---- multimodel ------------------------------------------------------------------------------------------------------
+
+
+def models_over(options, dt):
+    """F and Q (9, 9) of each model over an interval."""
+    found = []
+    for model in options.models:
+        moves, accelerates = {"still": (0, 0), "uniform": (1, 0), "accelerated": (1, 1)}[model.motion]
+        F = np.array([[1, moves * dt, accelerates * dt**2 / 2], [0, moves, accelerates * dt], [0, 0, accelerates]])
+        G = np.array([dt**2 / 2, moves * dt, accelerates]) * model.sigma_acceleration_mps2
+        found.append((np.kron(np.eye(3), F), np.kron(np.eye(3), np.outer(G, G))))
+    return found
+
+
+def interacting(case, options, columns, T, share=0.0):
+    """IMM of the book over a track (one model: a Kalman filter), with outliers merged by moments; T: over the scan."""
+    spec, t = case.spec, columns["t_s"]
+    seen = np.stack([columns[name] for name in ("range_m", "elevation_rad", "azimuth_rad")], axis=1)
+    turn = frames.rotation(spec.sensor.antenna_azimuth_rad, spec.sensor.antenna_elevation_rad)
+    z = frames.to_local(frames.from_biconical(seen), turn, spec.sensor.antenna_height_m)
+    R = frames.plot_covariance(seen, np.array(spec.sensor.sigma), turn)
+    a, b, g = start_weights(t[:3], spec.start_acceleration_mps2).reshape(3, 3)
+    x = np.concatenate([[a @ z[:3, i], b @ z[:3, i], 0.0] for i in range(3)])
+    lifts = [np.kron(np.eye(3), np.array([[a[k]], [b[k]], [0.0]])) for k in range(3)]
+    P = sum(lift @ R[k] @ lift.T for k, lift in enumerate(lifts)) + np.kron(np.eye(3), np.outer(g, g))
+    M, H = len(options.models), np.kron(np.eye(3), np.array([[1.0, 0, 0]]))
+    bank, p, total = [(x, P)] * M, np.full(M, 1 / M), 0.0
+    for k in range(3, len(t)):
+        c = T @ p
+        scores, parts = np.zeros((M, 2)), []
+        for i, (F, Q) in enumerate(models_over(options, t[k] - t[k - 1])):
+            mean, P = merged(T[i] * p / c[i], bank)
+            mean, P = F @ mean, F @ P @ F.T + Q
+            parts.append([])
+            for wild, noise in enumerate((R[k], FACTOR**2 * R[k])):
+                S = H @ P @ H.T + noise
+                scores[i, wild] = normal.logpdf(z[k], H @ mean, S) + np.log((1 - share, share or 1e-300)[wild])
+                K = P @ H.T @ np.linalg.inv(S)
+                parts[-1].append((mean + K @ (z[k] - H @ mean), P - K @ S @ K.T))
+        scores += np.log(c)[:, None]
+        density = logsumexp(scores)
+        total += density
+        p = np.exp(logsumexp(scores, axis=1) - density)
+        bank = [merged(np.exp(scores[i] - logsumexp(scores[i])), parts[i]) for i in range(M)]
+    return total
+
+
+def merged(weights, hypotheses):
+    mean = sum(w * x for w, (x, _) in zip(weights, hypotheses, strict=True))
+    return mean, sum(w * (P + np.outer(x - mean, x - mean)) for w, (x, P) in zip(weights, hypotheses, strict=True))
+
+
+PAIR = (
+    "filters=[{name: two, family: imm, merge: moment, models: [{motion: uniform, sigma_acceleration_mps2: 5}, "
+    "{motion: accelerated, sigma_acceleration_mps2: 30}], transition: [[0.9, 0.1], [0.1, 0.9]], "
+    "transition_interval_s: 1}, {name: one, family: kalman, models: [{motion: uniform, sigma_acceleration_mps2: 20}]}, "
+    "{name: pairs, family: gpb2, merge: moment, models: [{motion: uniform, sigma_acceleration_mps2: 20}, "
+    "{motion: uniform, sigma_acceleration_mps2: 20}], transition: [[0.9, 0.1], [0.1, 0.9]], transition_interval_s: 1}]"
+)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1])
+def test_the_multimodel_likelihood_is_that_of_a_textbook_filter(share):
+    case, columns = loaded("multimodel_1hz", "scans=30", PAIR), recording("multimodel_1hz", "scans=30")
+    for name, T in (("two", np.array([[0.9, 0.1], [0.1, 0.9]])), ("one", np.ones((1, 1)))):
+        one = likelihood(case, name, columns)
+        (options,) = (each for each in case.spec.filters if each.name == name)
+        assert one(one.stated, share) == pytest.approx(interacting(case, options, columns, T, share), rel=1e-7)
+
+
+def test_pairs_of_equal_models_are_one():
+    """GPB2, whose density is found in another way, of two models alike: the Kalman filter."""
+    case, columns = loaded("multimodel_1hz", "scans=30", PAIR), recording("multimodel_1hz", "scans=30")
+    one, pairs = (likelihood(case, name, columns) for name in ("one", "pairs"))
+    assert pairs(pairs.stated) == pytest.approx(one(one.stated), rel=1e-9)
+
+
+def test_the_multimodel_advice_names_the_filter_that_fits_and_the_error_that_does_not():
+    """The case that misled: the advice named the second best filter."""
+    case, columns = loaded("multimodel_1hz"), recording("multimodel_1hz", "sensor.sigma_azimuth_deg=0.3")
+    known = [likelihood(case, member.name, columns) for member in case.spec.filters]
+    assert advice.compared(known).best == "MMA2-122"
+    assert advice.findings(known[0])[0].what == "sensor.sigma_azimuth_rad"
+
+
+# ---- ambiguous Doppler -----------------------------------------------------------------------------------------------
+
+
+def test_the_density_of_a_folded_velocity_sums_over_the_folds():
+    """Two plots by hand: the second range, then the second velocity under the fold that each hypothesis takes."""
+    case = loaded("ambiguous_rls4", "radar.repetition_rate_hz=20000")  # a span of 300 m/s: few folds
+    sigma_r, sigma_v, T, D = 50.0, 1.0, 10.0, 300.0
+    prior, q = case.spec.prior, 1e-3
+    columns = {"t_s": np.array([0, T]), "range_m": np.array([1e5, 1.02e5]), "velocity_mps": np.array([120.0, 130.0])}
+    folds = 120.0 + D * np.arange(-20, 21)
+    weights = np.exp(-0.5 * folds**2 / (S := prior.sigma_velocity_mps**2 + sigma_v**2)) / np.sqrt(2 * np.pi * S)
+    F, P = transition(T), np.diag([sigma_r**2, prior.sigma_velocity_mps**2, prior.sigma_acceleration_mps2**2])
+    gain = P[:, 1] / S
+    P = P - np.outer(gain, gain) * S
+    states = [F @ (np.array([1e5, 0, 0]) + gain * v) for v in folds]
+    P = F @ P @ F.T + manoeuvre_covariance(q, T)
+    ranges = np.array([normal.pdf(1.02e5, x[0], P[0, 0] + sigma_r**2) for x in states])
+    K = P[:, 0] / (P[0, 0] + sigma_r**2)
+    states, P = [x + K * (1.02e5 - x[0]) for x in states], P - np.outer(K, P[0])
+    velocities = [
+        sum(normal.pdf(130 + D * n, x[1], P[1, 1] + sigma_v**2) for n in np.arange(-20, 21)) for x in states
+    ]  # fmt: skip
+    one = likelihood(case, "memory", columns)
+    found = one.by_number(one.stated)
+    assert found["range_m"] == pytest.approx(np.log(weights @ ranges / weights.sum()), rel=1e-6)
+    expected = np.log(weights.sum()) + np.log((weights * ranges) @ velocities / (weights @ ranges))
+    assert found["velocity_mps"] == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_span_beside_a_velocity_counts_before_that_of_the_config():
+    case, columns = loaded("ambiguous_rls4"), recording("ambiguous_rls4")
+    other = loaded("ambiguous_rls4", "radar.repetition_rate_hz=2000")
+    told = columns | {"span_mps": np.full(len(columns["t_s"]), 15.0)}
+    for filter_name in ("memory", "no memory"):
+        plain, with_span = likelihood(case, filter_name, columns), likelihood(other, filter_name, told)
+        assert with_span(with_span.stated) == pytest.approx(plain(plain.stated), rel=1e-12)
+        assert likelihood(other, filter_name, columns)(plain.stated) != pytest.approx(plain(plain.stated), rel=1e-3)
+
+
+def test_a_wrong_velocity_error_is_named_though_velocities_fold():
+    case = loaded("ambiguous_rls4", "filters=[{name: memory, doppler: folded, manoeuvre_variance: 1.0e-7}]")
+    wrong = recording("ambiguous_rls4", "radar.sigma_velocity_mps=4")
+    assert advice.findings(likelihood(case, None, wrong))[0].what == "radar.sigma_velocity_mps"
+    assert advice.findings(likelihood(case, None, recording("ambiguous_rls4"))) == []
+
+
+def test_innovations_of_a_right_filter_over_folded_velocities():
+    """NIS of range and velocity over 20 realisations: 1 within 5.85 standard errors."""
+    case = loaded("ambiguous_rls4", "filters=[{name: memory, doppler: folded, manoeuvre_variance: 0.0}]")
+    nis = []
+    for i in range(20):
+        made = recorded_of(case).tracker(case).feed(recording("ambiguous_rls4", "scans=25", number=i))
+        nis.append(made.nis[0, 5:])
+        assert np.nanmax(np.abs(made.residual[0, 5:, 1])) <= 7.5
+    nis = np.concatenate(nis)
+    for number in range(2):
+        values = nis[np.isfinite(nis[:, number]), number]
+        assert len(values) > 300
+        assert abs(values.mean() - 1) < 5.85 * np.sqrt(2 / len(values))
+
+
+def test_an_angle_fitted_takes_the_place_of_the_one_in_degrees(tmp_path, monkeypatch):
+    """And a key of one filter among several that of this filter alone."""
+    from radarsim.app import configs
+
+    monkeypatch.chdir(tmp_path)
+    values = {"sensor.sigma_bearing_rad": 0.05, "filters.4.manoeuvre_variance": 0.25}
+    spec = configs.load(configs.new("mine", "sonar_smoothing", values=values)).cases[0].spec
+    assert (spec.sensor.sigma_bearing_rad, spec.sensor.sigma_range_m) == (0.05, 30)
+    assert [one.manoeuvre_variance for one in spec.filters[3:6]] == [None, 0.25, 0.0025]
