@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from fractions import Fraction
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -42,6 +43,7 @@ from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
 MOST_SCANS = 10_000  # plots and estimates of eight realisations are held for the whole run
 MOST_HYPOTHESES = 100_000
 MOST_RATES = 16
+MOST_RATIO = 1000  # whole numbers that two repetition rates must be to each other, to have a common remainder
 PROPORTION = 1e6  # largest ratio of what the prior leaves open to what a plot tells: beyond, rounding shows
 MOST_FOLDS = 1e4  # spans in a standard deviation of the prior: the first scan has so many folds to look at
 DISTINCT = 1e-9  # relative difference from which two spans are two
@@ -83,6 +85,11 @@ class Radar(radial.Radar):
         """The spans of velocity D = λF/2 of the repetition rates, m/s."""
         return tuple(self.wavelength_m * rate / 2 for rate in self.rates_hz)
 
+    @property
+    def joint_spans_mps(self) -> tuple[tuple[float, ...], ...]:
+        """The span in which each two of the rates together are unambiguous, m/s; zero where they have none."""
+        return tuple(tuple(joint_span(one, other) for other in self.spans_mps) for one in self.spans_mps)
+
     @cross_check
     def _spans_differ(self) -> Iterator[At]:
         spans = self.spans_mps
@@ -90,6 +97,14 @@ class Radar(radial.Radar):
             if any(math.isclose(one, other, rel_tol=DISTINCT) for other in spans[:i]):
                 yield at("repetition_rate_hz", f"must differ from rate to rate: two spans are {one:g} m/s")
                 return
+
+
+def joint_span(one: float, other: float) -> float:
+    """The least common multiple of two spans whose ratio is of whole numbers up to MOST_RATIO; else zero."""
+    ratio = Fraction(one / other).limit_denominator(MOST_RATIO)
+    if one == other or ratio.numerator > MOST_RATIO or not math.isclose(ratio, one / other, rel_tol=DISTINCT):
+        return 0.0
+    return one * ratio.denominator
 
 
 class Prior(Model):
@@ -169,9 +184,10 @@ class Filter(Model):
     """A Kalman filter of range, or several of different order, with the velocity or without."""
 
     name: Annotated[Name, Display()] = Field(title="name", description="label; every filter has its own")
-    doppler: Literal["none", "unfolded", "folded"] = Field(
+    doppler: Literal["none", "unfolded", "folded", "remainder"] = Field(
         title="use of Doppler",
-        description="none: range alone; unfolded: the velocity with its true fold, a bound; folded: as measured",
+        description="none: range alone; unfolded: the velocity with its true fold, a bound; folded: as measured, by "
+        "hypotheses; remainder: as measured, by the Chinese remainder of two scans of different repetition rates",
     )
     orders: Annotated[tuple[Order, ...], Field(min_length=1, max_length=3)] = Field(
         (2,),
@@ -232,6 +248,11 @@ class Filter(Model):
         given = self.manoeuvre_variance
         return given if isinstance(given, tuple) else (given,)
 
+    @property
+    def folds(self) -> bool:
+        """Whether it takes the velocity as it is measured."""
+        return self.doppler in ("folded", "remainder")
+
     @cross_check
     def _orders_and_variances(self) -> Iterator[At]:
         if len(self.variances) != len(self.orders):
@@ -251,6 +272,8 @@ class Filter(Model):
             yield at("combine", "is needed by several orders: likelihood, expected_error or intersection")
         elif len(self.orders) == 1 and self.combine is not None:
             yield at("combine", "has no effect on one order; leave it out")
+        elif self.combine is not None and self.doppler == "remainder":
+            yield at("combine", "has no doppler: remainder, which unfolds for one order")
         elif self.combine == "expected_error" and self.manoeuvres is None:
             yield at("manoeuvres", "is needed by combine: expected_error")
         for key, (of, _) in COMBINING.items():
@@ -266,16 +289,13 @@ class Filter(Model):
                 yield at(key, f"has no effect with doppler: {self.doppler}; leave it out")
             elif self.merge == "each_scan" and key != "merge":
                 yield at(key, "has no effect with merge: each_scan, which leaves one hypothesis; leave it out")
-            elif self.combine == "likelihood" and (key, self.merge) != ("merge", "each_scan"):
-                yield at(key, "has no effect with combine: likelihood, which needs merge: each_scan; leave it out")
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
         """The same with the defaults of what has an effect written out."""
         defaults: dict[str, Any] = {key: value for key, (of, value) in COMBINING.items() if of == self.combine}
         if self.doppler == "folded":
-            merged = self.combine == "likelihood" or self.merge == "each_scan"
-            defaults |= {"merge": "each_scan"} if merged else UNFOLDING
+            defaults |= {"merge": "each_scan"} if self.merge == "each_scan" else UNFOLDING
         missing = {key: value for key, value in defaults.items() if getattr(self, key) is None}
         return self.model_copy(update=missing) if missing else self
 
@@ -340,6 +360,20 @@ class Keys(Study):
             yield at("prior.sigma_acceleration_mps2", f"must be at most {few}")
         if not isinstance(self.target, RandomPolynomial):
             yield from radial.within_reach(self.target, radar, last)
+
+    @cross_check
+    def _remainders_exist(self) -> Iterator[At]:
+        yield from of_each(self.filters, self._remainder_exists)
+
+    def _remainder_exists(self, i: int, one: Filter) -> Iterator[At]:
+        if one.doppler != "remainder":
+            return
+        joint = self.radar.joint_spans_mps
+        if len(joint) == 1:
+            yield at(f"filters.{i}.doppler", "remainder needs several rates in radar.repetition_rate_hz")
+        elif not all(joint[j][k] for j in range(len(joint)) for k in range(j)):
+            few = f"in ratios of whole numbers up to {MOST_RATIO}"
+            yield at(f"filters.{i}.doppler", f"remainder needs rates in radar.repetition_rate_hz that are {few}")
 
     @cross_check
     def _every_plot(self) -> Iterator[At]:

@@ -73,14 +73,14 @@ def design_row(member: Member, prior: Any, dt: float) -> np.ndarray:
     row[records.MOTION : records.MOTION + 5] = F[0, 1], F[0, 2], F[1, 1], F[1, 2], F[2, 2]
     row[records.NOISE : records.NOISE + 6] = Q[np.triu_indices(3)]
     row[records.PRIOR : records.PRIOR + 2] = prior_variances(member.order, prior)
-    row[records.TAKES_VELOCITY] = member.doppler != "none"
+    row[records.TAKES_VELOCITY] = {"none": 0, "remainder": 2}.get(member.doppler, 1)
     return row
 
 
 def kind(one: Any, doppler: str) -> int:
     """What the bank of a member of a filter does about the folds."""
     if doppler != "folded":
-        return records.NONE if doppler == "none" else records.UNFOLDS
+        return {"none": records.NONE, "unfolded": records.UNFOLDS, "remainder": records.REMAINDER}[doppler]
     if one.merge == "each_scan":
         return records.MERGES
     return records.NEAREST if one.hypotheses == 1 else records.REMEMBERS
@@ -94,6 +94,7 @@ class Bank(NamedTuple):
     orders: tuple[int, ...] = ()
     most: int = 1
     deepest: float = BOTTOMLESS
+    reads: int = records.MEAN
     stay: float = 1.0
     unfolding: int = records.NONE
     shares: bytes = b""
@@ -133,7 +134,7 @@ def banks(spec: Any, shares: Callable[[Any], np.ndarray]) -> records.Banks:
     for b, one in enumerate(made):
         parts[b, : len(one.parts)], orders[b, : len(one.orders)] = one.parts, one.orders
     whole = {"dtype": np.int64}
-    place = [records.BEST if one.estimate == "best" and one.combine is None else records.MEAN for one in spec.filters]
+    place = [records.MEAN if one.combine in COMBINATIONS else _read(one) for one in spec.filters]
     return records.Banks(
         designs=plain(list(gathered.designs.values()), len(gathered.designs), records.DESIGN),
         kind=plain([one.kind for one in made], count, **whole),
@@ -142,6 +143,7 @@ def banks(spec: Any, shares: Callable[[Any], np.ndarray]) -> records.Banks:
         size=plain([len(one.parts) for one in made], count, **whole),
         most=plain([one.most for one in made], count, **whole),
         deepest=plain([one.deepest for one in made], count),
+        reads=plain([one.reads for one in made], count, **whole),
         stay=plain([one.stay for one in made], count),
         unfolding=plain([one.unfolding for one in made], count, **whole),
         shares=held,
@@ -158,14 +160,17 @@ def _bank(gathered: Gathered, one: Any, spec: Any, shares: Callable[[Any], np.nd
     designs = [gathered.design(design_row(member, spec.prior, dt)) for member in every]
     orders = tuple(member.order for member in every)
     if one.combine == "likelihood":
-        unfolding = kind(one, one.doppler)
+        # A list of one hypothesis is the nearest fold.
+        unfolding = {records.NEAREST: records.REMEMBERS}.get(kind(one, one.doppler), kind(one, one.doppler))
+        kept = _kept(one) if unfolding == records.REMEMBERS else {}
         return gathered.bank(
-            Bank(records.INTERACTS, tuple(designs), orders, stay=one.stay_probability, unfolding=unfolding)
+            Bank(records.INTERACTS, tuple(designs), orders, stay=one.stay_probability, unfolding=unfolding, **kept)
         )
     parts = [gathered.bank(_single(one, design, member.doppler)) for design, member in zip(designs, every, strict=True)]
     if one.combine is None:
         return parts[0]
-    return gathered.bank(Bank(COMBINATIONS[one.combine], tuple(parts), orders, shares=shares(one).tobytes()))
+    held = shares(one).tobytes()
+    return gathered.bank(Bank(COMBINATIONS[one.combine], tuple(parts), orders, reads=_read(one), shares=held))
 
 
 def _single(one: Any, design: int, doppler: str) -> Bank:
@@ -173,5 +178,14 @@ def _single(one: Any, design: int, doppler: str) -> Bank:
     what = kind(one, doppler)
     if what != records.REMEMBERS:
         return Bank(what, (design,))
-    deepest = -math.log(one.prune_below) if one.prune_below > 0 else BOTTOMLESS
-    return Bank(what, (design,), most=one.hypotheses, deepest=deepest)
+    return Bank(what, (design,), **_kept(one))
+
+
+def _kept(one: Any) -> dict[str, Any]:
+    """How many hypotheses a filter keeps, and how deep below the best."""
+    return {"most": one.hypotheses, "deepest": -math.log(one.prune_below) if one.prune_below > 0 else BOTTOMLESS}
+
+
+def _read(one: Any) -> int:
+    """Which of its hypotheses' outputs a filter's estimate is."""
+    return records.BEST if one.estimate == "best" else records.MEAN

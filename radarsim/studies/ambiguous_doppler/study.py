@@ -33,6 +33,7 @@ def prepare(case: Case) -> Plan:
     """Design the filters of a case, its truth, and the exact values of its errors."""
     spec, radar = case.spec, case.spec.radar
     t = np.arange(spec.scans) * radar.scan_period_s
+    solves, rates = any(one.doppler == "remainder" for one in spec.filters), len(radar.spans_mps)
     observed = records.World(
         keys=plain([noise_key(case, what) for what in ("plots", "detections", "target")], 3, 2, dtype=np.uint64),
         truth=plain(world.truth(spec.target, t, case.name), spec.scans, 3),
@@ -40,6 +41,8 @@ def prepare(case: Case) -> Plan:
         spread=world.spread(spec.target),
         sigma=np.array([radar.sigma_range_m, radar.sigma_velocity_mps]),
         spans=np.resize(np.array(radar.spans_mps), spec.scans),
+        turn=np.resize(np.arange(len(radar.spans_mps)), spec.scans),
+        joint=plain(radar.joint_spans_mps if solves else 0.0, rates, rates),
         detection=float(radar.detection_probability),
     )
     banks = filters.banks(spec, lambda one: shares(spec, one, observed))
@@ -51,21 +54,16 @@ def shares(spec: Any, one: Any, observed: records.World) -> np.ndarray:
     members = filters.members(one)
     of = [exact.gains(member, spec.prior, observed.sigma, spec.radar.scan_period_s, spec.scans) for member in members]
     drawn = world.drawn_motions(observed.t)
-    known = np.array([member.components for member in members])
-    bias, noise = exact.errors(of, drawn, observed.sigma)
-    prior = spec.prior.sigma_velocity_mps**2, spec.prior.sigma_acceleration_mps2**2
     made = np.zeros((spec.scans, records.MEMBERS, 3))
     if one.combine == "intersection":
-        # What is drawn from the prior is no manoeuvre: a velocity, and an acceleration to a model that has one.
-        models = np.array([member.order > 1 for member in members])[:, None, None]
-        variance = np.einsum("kixix->ikx", noise) + bias[0] ** 2 * prior[0] + bias[1] ** 2 * prior[1] * models
-        made[:, : len(members)] = one.interval_sigmas * np.sqrt(variance).swapaxes(0, 1) * known
+        bias, noise = exact.errors(of, drawn, observed.sigma)
+        made[:, : len(members)] = exact.widths(bias, noise, members, spec.prior, one.interval_sigmas)
     elif one.combine == "expected_error":
         manoeuvres = exact.expected_motions(one.manoeuvres, observed.t)
         motions = np.concatenate([drawn[:1], manoeuvres])
-        weight = np.array([prior[0], *np.full(len(manoeuvres), 1 / len(manoeuvres))])
-        bias, noise = exact.errors(of, motions, observed.sigma)
-        made[:, : len(members)] = exact.best_shares(exact.joint(bias, noise, weight), known)
+        weight = np.array([spec.prior.sigma_velocity_mps**2, *np.full(len(manoeuvres), 1 / len(manoeuvres))])
+        E = exact.joint(*exact.errors(of, motions, observed.sigma), weight)
+        made[:, : len(members)] = exact.best_shares(E, np.array([member.components for member in members]))
     return made
 
 
@@ -82,7 +80,13 @@ def axes(spec: Any, observed: records.World, banks: records.Banks) -> FoldedAxes
             found = exact_values(spec, one, observed, banks.shares[banks.bank[f]])
             for name, values in found.items():
                 known[name][f] = np.where(available[f], values, np.nan)
-            if one.hypotheses == 1 and follows_the_model(spec, one):
+            if one.doppler == "remainder":
+                joint = np.concatenate([[0.0], observed.joint[observed.turn[1:], observed.turn[:-1]]])
+                velocities = observed.truth[:, 1]
+                right[f] = exact.remainders_right(
+                    velocities, observed.spread, observed.t, observed.sigma[1], observed.spans, joint
+                )
+            elif one.hypotheses == 1 and one.combine is None and follows_the_model(spec, one):
                 (member,) = filters.members(one)
                 of = exact.gains(member, spec.prior, observed.sigma, spec.radar.scan_period_s, spec.scans)
                 right[f] = exact.all_right(of, observed.spans)
@@ -96,8 +100,8 @@ def axes(spec: Any, observed: records.World, banks: records.Banks) -> FoldedAxes
         exact_sigma=known["sigma"],
         exact_bias=known["bias"],
         spans=observed.spans,
-        folded=np.array([one.doppler == "folded" for one in spec.filters]),
-        remembers=banks.kind[banks.bank] == records.REMEMBERS,
+        folded=np.array([one.folds for one in spec.filters]),
+        remembers=records.remembers(banks)[banks.bank],
         combines=np.array([one.combine is not None for one in spec.filters]),
         exact_right=right,
         oracle_sigma=known["oracle_sigma"],
@@ -126,7 +130,7 @@ def exact_values(spec: Any, one: Any, observed: records.World, held: np.ndarray)
     own = held[:, : len(members)] if one.combine == "expected_error" else np.ones((spec.scans, 1, 3))
     if one.combine in (None, "expected_error"):
         sigma = np.sqrt(np.einsum("kix,kxij,kjx->kx", own, E, own))
-        if one.doppler == "folded":
+        if one.folds:
             return found | {"oracle_sigma": sigma}
         return found | {"sigma": sigma, "bias": np.einsum("kix,ikx->kx", own, bias[0])}
     return found

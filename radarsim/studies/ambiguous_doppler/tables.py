@@ -77,7 +77,7 @@ def folds(results: Sequence[Result]) -> "pd.DataFrame":
 
 def _folds(result: Result) -> dict[str, np.ndarray]:
     axes = result.axes
-    unfolds = np.array([one.doppler == "folded" and one.combine in (None, "likelihood") for one in result.spec.filters])
+    unfolds = np.array([one.folds and one.combine in (None, "likelihood") for one in result.spec.filters])
     shown = np.broadcast_to(unfolds[:, None], axes.exact_right.shape)
     at = f, k = np.nonzero(shown & (np.asarray(result.sums["estimates"])[..., 0] > 0))
     n = np.asarray(result.sums["estimates"])[..., 0][at]

@@ -22,7 +22,7 @@ def warnings(experiment: Experiment) -> list[str]:
     for case in experiment.cases:
         radar = case.spec.radar
         for span in radar.spans_mps:
-            if span < 2 * radar.sigma_velocity_mps and any(one.doppler == "folded" for one in case.spec.filters):
+            if span < 2 * radar.sigma_velocity_mps and any(one.folds for one in case.spec.filters):
                 sigma = f"2 σ_V, {2 * radar.sigma_velocity_mps:g} m/s"
                 words = f"its span of {span:g} m/s is under {sigma}: next to nothing can be unfolded"
                 lines[f"{case.stem}: radar.repetition_rate_hz: {words}"] = None
@@ -32,7 +32,7 @@ def warnings(experiment: Experiment) -> list[str]:
 def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
     names = " and ".join(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases))
-    if any(one.doppler == "folded" for case in experiment.cases for one in case.spec.filters):
+    if any(one.folds for case in experiment.cases for one in case.spec.filters):
         return f"How much is the folded velocity of {names} worth, and from which scan on?"
     return f"Which order of filter follows the target of {names}, and how are several combined?"
 
@@ -58,7 +58,7 @@ def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
 
 def _told_of(result: Result) -> list[str]:
     """Of the filters that unfold those that are told of: the means over kept hypotheses, else all."""
-    unfolding = [one for one in result.spec.filters if one.doppler == "folded" and one.combine is None]
+    unfolding = [one for one in result.spec.filters if one.folds and one.combine is None]
     means = [one for one in unfolding if one.merge == "never" and one.estimate == "mean" and one.hypotheses > 1]
     return [one.name for one in means or unfolding]
 

@@ -74,6 +74,32 @@ def single(kalman, plots, spans, how):
     return made[:, :3], made[:, 3]
 
 
+def remainder(z, rate, z_before, rate_before, wavelength):
+    """The velocity of the joint span that folds to z at one rate, most nearly to z_before at another; whole Hz."""
+    D, other = wavelength * rate / 2, wavelength * rate_before / 2
+    joint = wavelength * np.lcm(round(rate), round(rate_before)) / 2
+    every = z + D * np.arange(-int(joint / D) - 2, int(joint / D) + 3)
+    every = every[(every >= -joint / 2) & (every < joint / 2)]
+    assert len(every) == round(joint / D)
+    return every[np.argmin(np.abs(wrapped(every - z_before, other)))]
+
+
+def with_velocities(kalman, plots, velocities):
+    """States (K, 3) of a filter that takes ranges, and velocities (K,) where they are numbers."""
+    x, P, started, made = np.zeros(3), kalman.P0, False, []
+    for k, (r, _, _, came) in enumerate(plots):
+        if k > 0:
+            x, P = kalman.predicted(x, P)
+        if came and started:
+            taken = [r] if np.isnan(velocities[k]) else [r, velocities[k]]
+            x, P, _ = kalman.updated(x, P, taken, [0, 1][: len(taken)])
+        elif came:
+            x, P = kalman.started(r, P)
+            started = True
+        made.append(x)
+    return np.array(made)
+
+
 def merged(kalman, plots, spans, folds=60):
     """States (K, 3) of the filter that merges all folds of a scan into one state and covariance."""
     x, P, started, made = np.zeros(3), kalman.P0, False, []
@@ -194,6 +220,56 @@ def interacting(kalmans, plots, spans, stay, folds=0):
         made.append((*sum(m * x for m, (x, _) in zip(mu, states, strict=True)), *mu))
     made = np.array(made)
     return made[:, :3], made[:, 3:]
+
+
+def together(kalmans, plots, spans, stay, most, prune_below, folds):
+    """Outputs (K, 10 + M) of hypotheses in each of which orders interact: as `remembering`, then the orders' weights.
+
+    A hypothesis is (states and covariances of the orders, their probabilities, logarithm of weight, whether right).
+    """
+    M = len(kalmans)
+    p = np.full((M, M), (1 - stay) / (M - 1)) + np.eye(M) * (stay - (1 - stay) / (M - 1))
+    listed = [([(np.zeros(3), one.P0) for one in kalmans], np.full(M, 1 / M), 0.0, True)]
+    started, made = False, []
+    for k, (r, v, u, came) in enumerate(plots):
+        children, D = [], spans[k]
+        for states, mu, w, right in listed:
+            c = p.T @ mu
+            share = p * mu[:, None] / c
+            mean = [sum(share[j, i] * states[j][0] for j in range(M)) for i in range(M)]
+            apart = [[np.outer(states[j][0] - mean[i], states[j][0] - mean[i]) for j in range(M)] for i in range(M)]
+            P = [sum(share[j, i] * (states[j][1] + apart[i][j]) for j in range(M)) for i in range(M)]
+            after, logs = [], np.log(c)
+            for i, one in enumerate(kalmans):
+                x, Q = one.predicted(mean[i], P[i]) if k > 0 else (mean[i], P[i])
+                if came:
+                    x, Q, like = one.updated(x, Q, [r], [0]) if started else (*one.started(r, Q), 0.0)
+                    logs[i] += like
+                after.append((x, Q))
+            if not came:
+                children.append((after, np.exp(logs), w, right))
+                continue
+            about = v + D * np.rint((np.exp(logs - logs.max()) @ [x[1] for x, _ in after] - v) / D)
+            for n in range(-folds, folds + 1):
+                taken = [one.updated(*after[i], [about + n * D], [1]) for i, one in enumerate(kalmans)]
+                both = logs + [like for _, _, like in taken]
+                share = np.exp(both - both.max())
+                weight = w + both.max() + np.log(share.sum())
+                right_too = right and bool(abs(about + n * D - u) < D / 2)
+                children.append(([state[:2] for state in taken], share / share.sum(), weight, right_too))
+        top = max(one[2] for one in children)
+        children = [(*one[:2], one[2] - top, one[3]) for one in children]
+        if prune_below > 0:
+            children = [one for one in children if one[2] >= np.log(prune_below)]
+        listed = sorted(children, key=lambda one: -one[2])[:most]
+        started = started or came > 0
+        w = np.exp([one[2] for one in listed])
+        x = np.array([sum(m * state[0] for m, state in zip(one[1], one[0], strict=True)) for one in listed])
+        best = int(np.argmax(w))
+        known = (listed[best][3], any(one[3] for one in listed), len(listed), w[best] / w.sum())
+        of_orders = w @ np.array([one[1] for one in listed]) / w.sum()
+        made.append((*(w @ x / w.sum()), *x[best], *known, *of_orders))
+    return np.array(made, dtype=float)
 
 
 def intersected(estimates, widths):

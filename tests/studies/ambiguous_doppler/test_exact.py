@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from radarsim.studies.ambiguous_doppler import exact, study
 from tests.studies.ambiguous_doppler.conftest import FIXED, MEMORY, NEAREST, ORACLE, RANDOM, RANGE_ONLY, made, summed
@@ -67,12 +68,48 @@ def test_lower_orders_are_exact_of_what_they_estimate(order):
     assert np.abs(z).max() < LIMIT
 
 
-@pytest.mark.parametrize("radar", ["RLS 2", "RLS 3", "RLS 4", "RLS 5"])
-def test_nearest_fold_is_right_as_often_as_the_product_says(radar, matched):
-    plan, sums = matched(radar)
-    p, found = plan.axes.exact_right[2], sums.folds[2, :, 0] / N
+def binomial(found, n, p):
+    """Whether counts `found` of n lie within the interval that is missed once in 200 000 runs of 1000 counts."""
+    chance = 2.5e-9
+    return (stats.binom.ppf(chance, n, p) <= found) & (found <= stats.binom.isf(chance, n, p))
+
+
+@pytest.mark.parametrize(("radar", "scans"), [("RLS 2", 15), ("RLS 3", 29), ("RLS 4", 15), ("RLS 5", 29)])
+def test_nearest_fold_is_right_as_often_as_the_product_says(radar, scans):
+    """Over all scans of the published runs; the product falls from one half to one in 10⁶ and less."""
+    plan, sums = summed(made(radar, [NEAREST], scans, variance=0.0), N)
+    p, found = plan.axes.exact_right[0], sums.folds[0, :, 0]
     assert np.isfinite(p).all()
-    assert np.abs((found - p) / np.sqrt(p * (1 - p) / N)).max() < LIMIT
+    assert (p[1:] <= p[:-1]).all()
+    assert binomial(found, N, p).all()
+
+
+REMAINDER = {"name": "remainder", "doppler": "remainder"}
+SLOW = {"kind": "random_polynomial", "sigma_velocity_mps": 15.0, "sigma_acceleration_mps2": 0.01}
+STEADY = {"kind": "polynomial", "coefficients": [100e3, -40.0, 0.05]}
+
+
+@pytest.mark.parametrize("target", [RANDOM, SLOW, STEADY], ids=["drawn", "slow", "fixed"])
+@pytest.mark.parametrize("rates", [[1000.0, 1200.0], [1000.0, 1200.0, 1400.0]], ids=["two rates", "three"])
+def test_remainders_of_two_scans_are_right_as_often_as_calculated(rates, target):
+    plan, sums = summed(made("RLS 4", [REMAINDER], 15, target, repetition_rate_hz=rates), N)
+    p, found = plan.axes.exact_right[0], sums.folds[0, :, 0]
+    assert p[0] == 0
+    assert (p[1:] > 0.001).all()
+    assert binomial(found, N, p).all()
+    sure = plan.axes.oracle_sigma[0]
+    assert (sigma(sums)[0, 1:, 1] > sure[1:, 1]).all()  # wrong ones cost
+
+
+def test_a_remainder_is_right_by_hand():
+    """Two spans of 15 and 18 m/s and a still target: right where the difference of two noises of 1 m/s is under 1.5."""
+    rate = {"repetition_rate_hz": [1000.0, 1200.0], "wavelength_m": 0.03}
+    plan = study.prepare(made("RLS 4", [REMAINDER], 4, {"kind": "polynomial", "coefficients": [1e5]}, **rate))
+    wrong_by_a_span = [
+        stats.norm.cdf(15 * i + 1.5, scale=2**0.5) - stats.norm.cdf(15 * i - 1.5, scale=2**0.5) for i in (1, 2)
+    ]
+    expected = stats.norm.cdf(1.5 / 2**0.5) - stats.norm.cdf(-1.5 / 2**0.5) + 2 * sum(wrong_by_a_span)
+    assert np.allclose(plan.axes.exact_right[0, 1:], expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("radar", ["RLS 2", "RLS 3", "RLS 4", "RLS 5"])

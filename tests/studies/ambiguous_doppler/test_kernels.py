@@ -17,6 +17,8 @@ from tests.studies.ambiguous_doppler.conftest import (
     made,
 )
 
+REMAINDER = {"name": "remainder", "doppler": "remainder"}
+SLOW = {"kind": "random_polynomial", "sigma_velocity_mps": 20.0, "sigma_acceleration_mps2": 0.02}
 SINGLE = (RANGE_ONLY, ORACLE, NEAREST)
 HOW = {"range only": "none", "oracle": "unfolded", "nearest fold": "nearest"}
 
@@ -81,6 +83,27 @@ def test_remembering_filter(most, prune_below, detection):
         apart = (out[0][:, : records.WEIGHTS] - found)[there]
         assert np.abs(apart[:, :6] / np.tile([1e5, 1e3, 10.0], 2)).max() < 1e-9
         assert np.abs(apart[:, records.PROBABILITY]).max() < 1e-9
+
+
+@pytest.mark.parametrize("detection", [1.0, 0.6])
+def test_remainder_of_two_scans(detection):
+    """Velocities by trying all, gains by the textbook; a velocity only where the plot before had another rate."""
+    rates = [1000.0, 1200.0, 1400.0]
+    case = made("RLS 4", [REMAINDER], 12, SLOW, detection_probability=detection, repetition_rate_hz=rates)
+    seen = 0
+    for _, plots, out in compared(case):
+        solved, before = np.full(12, np.nan), None
+        for k in np.flatnonzero(plots[:, 3]):
+            if before is not None and k % 3 != before % 3:
+                solved[k] = naive.remainder(plots[k, 1], rates[k % 3], plots[before, 1], rates[before % 3], 0.03)
+            before = k
+        x = naive.with_velocities(twin(case, case.spec.filters[0]), plots, solved)
+        there = started(plots)
+        assert np.abs((out[0, :, :3] - x) / [1e5, 1e3, 10.0])[there].max() < 1e-10
+        right = np.abs(solved - plots[:, 2]) < 1e-6
+        assert np.array_equal(out[0, plots[:, 3] > 0, records.RIGHT], right[plots[:, 3] > 0])
+        seen += right.sum()
+    assert 20 < seen < 8 * 11
 
 
 def test_one_hypothesis_is_the_nearest_fold():

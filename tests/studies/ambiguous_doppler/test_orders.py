@@ -29,27 +29,84 @@ def outputs(case):
     return plan, columns, out
 
 
-@pytest.mark.parametrize("detection", [1.0, 0.6])
-@pytest.mark.parametrize("doppler", ["none", "unfolded", "folded"])
-def test_interacting_orders(doppler, detection):
-    case = made("RLS 2", [LIKELIHOOD | {"doppler": doppler}], 12, PULSE, detection_probability=detection)
-    plan, plots, out = outputs(case)
-    one = case.spec.filters[0]
-    kalmans = [
+def twins(case):
+    """The textbook filters of the first filter's orders."""
+    return [
         naive.Kalman(
             SimpleNamespace(orders=(m.order,), variances=(m.manoeuvre_variance,), doppler=m.doppler),
             case.spec.prior,
             (250.0, 15.0),
             10.0,
         )
-        for m in filters.members(one)
+        for m in filters.members(case.spec.filters[0])
     ]
+
+
+@pytest.mark.parametrize("detection", [1.0, 0.6])
+@pytest.mark.parametrize("doppler", ["none", "unfolded", "folded"])
+def test_interacting_orders(doppler, detection):
+    merged = {"merge": "each_scan"} if doppler == "folded" else {}
+    case = made("RLS 2", [LIKELIHOOD | {"doppler": doppler} | merged], 12, PULSE, detection_probability=detection)
+    plan, plots, out = outputs(case)
     for lane in range(4):
         own = plots[:, :, lane]
-        x, mu = naive.interacting(kalmans, own, plan.world.spans, 0.95, 40 if doppler == "folded" else 0)
+        x, mu = naive.interacting(twins(case), own, plan.world.spans, 0.95, 40 if doppler == "folded" else 0)
         there = np.cumsum(own[:, 3]) > 0
         assert np.abs((out[0, :, :3, lane] - x) / SCALE)[there].max() < 1e-9
         assert np.abs(out[0, :, records.WEIGHTS :, lane] - mu)[there].max() < 1e-9
+
+
+@pytest.mark.parametrize("detection", [1.0, 0.6])
+@pytest.mark.parametrize(
+    ("most", "prune_below", "orders"),
+    [(12, 1e-6, [0, 1, 2]), (40, 1e-4, [0, 1, 2]), (25, 0.0, [1, 2]), (1, 1e-6, [1, 2])],
+    ids=["twelve", "deep", "two orders", "nearest fold"],
+)
+def test_orders_within_remembered_hypotheses(most, prune_below, orders, detection):
+    """The IMM over orders and folds is its textbook twin: estimates, the best, what is right, weights of orders."""
+    variances = [9e4, 4.0, 1e-3][-len(orders) :]
+    options = {"hypotheses": most, "prune_below": prune_below, "orders": orders, "manoeuvre_variance": variances}
+    keys = {"detection_probability": detection, "repetition_rate_hz": [1000.0, 1200.0]}
+    filters = [LIKELIHOOD | options | {"doppler": "folded", "name": how, "estimate": how} for how in ("mean", "best")]
+    case = made("RLS 2", filters, 6, PULSE | {"start_s": 20.0, "duration_s": 10.0}, **keys)
+    plan, plots, out = outputs(case)
+    assert len(out) == 1  # the two filters share a list
+    assert plan.banks.place.tolist() == [records.MEAN, records.BEST]
+    for lane in range(2):
+        own = plots[:, :, lane]
+        found = naive.together(twins(case), own, plan.world.spans, 0.95, most, prune_below, 24)
+        there = np.cumsum(own[:, 3]) > 0
+        exactly = [records.RIGHT, records.LISTED, records.COUNT]
+        if prune_below > 0:  # beyond twenty-four folds the twin has none
+            assert np.array_equal(out[0][there][:, exactly, lane], found[there][:, exactly])
+        apart = (out[0, :, : records.WEIGHTS, lane] - found[:, : records.WEIGHTS])[there]
+        assert np.abs(apart[:, :6] / np.tile(SCALE, 2)).max() < 1e-9
+        assert np.abs(apart[:, records.PROBABILITY]).max() < 1e-9
+        mu = out[0, :, records.WEIGHTS :, lane][:, orders]
+        assert np.abs(mu - found[:, records.WEIGHTS :])[there].max() < 1e-9
+
+
+def test_with_a_wide_span_the_hypotheses_are_one_imm():
+    """Where no fold but the nearest is possible, orders and folds together are the orders with the true velocity."""
+    filters = [LIKELIHOOD | {"doppler": how, "name": how} for how in ("unfolded", "folded")]
+    case = made("RLS 2", filters, 12, PULSE, repetition_rate_hz=1e5)
+    plan, _, out = outputs(case)
+    first, second = (out[plan.banks.bank[f]] for f in range(2))
+    assert np.abs((first - second)[:, :3] / SCALE[None, :, None]).max() < 1e-9
+    assert np.abs((first - second)[:, records.WEIGHTS :]).max() < 1e-9
+    assert (second[:, records.RIGHT] == 1).all()
+
+
+def test_combinations_read_what_their_members_estimate():
+    """`estimate: best` of a combination is that of its members."""
+    options = INTERSECTION | {"doppler": "folded"}
+    case = made("RLS 2", [options | {"estimate": how, "name": how} for how in ("mean", "best")], 6, PULSE)
+    plan, _, out = outputs(case)
+    for f, place in enumerate((records.MEAN, records.BEST)):
+        bank = plan.banks.bank[f]
+        parts = out[plan.banks.parts[bank, :6]][:, :, place : place + 3]
+        assert (np.abs(parts - out[bank][None, :, :3]).min(axis=0) == 0).all()
+    assert np.abs(out[plan.banks.bank[0]] - out[plan.banks.bank[1]]).max() > 1
 
 
 def test_intersection_of_intervals():

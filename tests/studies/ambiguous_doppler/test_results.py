@@ -5,10 +5,10 @@ import pytest
 
 import radarsim
 from radarsim.app.configs import load
-from radarsim.errors import ConfigError
 from radarsim.studies import registry
 from radarsim.studies.ambiguous_doppler import map as fans
 from radarsim.studies.ambiguous_doppler import study, track
+from radarsim.studies.ambiguous_doppler.kernels import records
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +104,68 @@ def test_track_over_simulated_plots_is_the_study(keys):
             assert np.isnan(made.estimate[f][~started]).all()
 
 
-def test_track_refuses_combinations_of_orders():
-    with pytest.raises(ConfigError, match="track follows filters of one order"):
-        track.Tracker(load("orders").cases[0])
+COMBINED = {
+    "likelihood": "combine: likelihood",
+    "expected error": "combine: expected_error, manoeuvres: {acceleration_mps2: 20, duration_s: 30}",
+    "intersection": "combine: intersection",
+}
+
+
+@pytest.mark.parametrize(
+    ("doppler", "more"),
+    [
+        ("none", ""),
+        ("unfolded", ""),
+        ("folded", ", hypotheses: 40"),
+        ("folded", ", estimate: best"),
+        ("folded", ", merge: each_scan"),
+    ],
+)
+def test_track_follows_combined_orders_as_the_study_does(doppler, more):
+    orders = f"orders: [0, 1, 2], manoeuvre_variance: [9e4, 4, 1e-3], doppler: {doppler}{more}"
+    filters = ", ".join(f"{{name: {name}, {orders}, {how}}}" for name, how in COMBINED.items())
+    keys = [f"filters=[{filters}]", "scans=12", "target={kind: acceleration_pulse, coefficients: [100e3, -250], "]
+    keys[-1] += "acceleration_g: 2, start_s: 60, duration_s: 30}"
+    case = load("ambiguous_rls2", [*keys, "baseline=likelihood"]).cases[0]
+    plan = study.prepare(case)
+    plots, out = study.sums.simulated(plan.world, plan.banks, 8)
+    velocity = plots[:, records.UNFOLDED if doppler == "unfolded" else records.VELOCITY, 3]
+    found = track.Tracker(case).feed({"t_s": plan.world.t, "range_m": plots[:, 0, 3], "velocity_mps": velocity})
+    for f, name in enumerate(found.filters):
+        place = plan.banks.place[f]
+        own = out[plan.banks.bank[f], :, place : place + 3, 3]
+        assert np.abs((found.estimate[f] - own) / [1e5, 1e3, 10]).max() < 1e-7, name
+    # The sigma that is given beside is that of an expected error where it is exact.
+    sigma = found.sigma[1]
+    E = plan.axes.oracle_sigma[1] if doppler == "folded" else plan.axes.exact_sigma[1]
+    assert sigma.shape == E.shape
+    assert (sigma > 0).all()
+
+
+def test_track_of_combined_orders_over_gaps():
+    """Rows that lack a value, or are not there, are no fault; from the first range on there are estimates."""
+    case = load("orders").cases[0]
+    t = np.array([0.0, 10, 20, 33, 40, 90, 100])
+    z = np.array([np.nan, 1e5, 97.5e3, np.nan, 90e3, 77.5e3, 75e3])
+    v = np.array([-250.0, np.nan, -245, -251, np.nan, -240, -250])
+    tracker = track.Tracker(case)
+    found = tracker.feed({"t_s": t, "range_m": z, "velocity_mps": v})
+    assert np.isnan(found.estimate[:, 0]).all()
+    assert np.isfinite(found.estimate[:, 1:, 0]).all()
+    assert np.abs(found.estimate[:, -1, 0] - 75e3).max() < 1500
+    more = np.arange(110.0, 1110.0, 10)
+    many = tracker.feed({"t_s": more, "range_m": 75e3 - 250 * (more - 100), "velocity_mps": np.full(100, -250.0)})
+    assert np.abs(many.estimate[:, -1, 1] + 250).max() < 60
+    assert max(len(one.onsets) for one in tracker.filters if hasattr(one, "onsets")) == case.spec.scans
+
+
+def test_a_remainder_is_followed_as_the_study_does():
+    keys = ["radar.repetition_rate_hz=[1000, 1200, 1400]", "radar.detection_probability=0.7"]
+    one = "{name: remainder, doppler: remainder, manoeuvre_variance: 1e-3}"
+    case = load("ambiguous_rls4", [*keys, f"filters=[{one}]"]).cases[0]
+    plan = study.prepare(case)
+    _, out = study.sums.simulated(plan.world, plan.banks, 8)
+    made = track.Tracker(case).feed(track.simulated(case, 11))
+    there = np.isfinite(made.estimate[0, :, 0])
+    assert there.sum() > 8
+    assert np.abs((made.estimate[0] - out[0, :, :3, 3])[there] / [1e5, 1e3, 10]).max() < 1e-7

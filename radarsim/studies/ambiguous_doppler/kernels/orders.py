@@ -14,7 +14,6 @@ from radarsim.studies.ambiguous_doppler.kernels.records import (
     CAME,
     DESIGN,
     FIRST,
-    MEAN,
     MEMBERS,
     NONE,
     OUTPUT,
@@ -139,7 +138,10 @@ def taken(own, design, sigma, plot, D, unfolding, moves):
 
 @part
 def weighed(new, size):
-    """Probabilities of the orders after a plot, from those before it and the likelihoods."""
+    """Probabilities of the orders after a plot, from those before it and the likelihoods.
+
+    Gives the least distance and the plot's likelihood over exp(-least/2), apart from constants.
+    """
     least, total = get(new, DISTANCE), full(0.0)
     for i in range(1, size):
         distance = get(row(new, i * ROWS), DISTANCE)
@@ -152,6 +154,7 @@ def weighed(new, size):
     for i in range(size):
         own = row(new, i * ROWS)
         put(own, PROBABILITY, get(own, PROBABILITY) / total)
+    return least, total
 
 
 @part
@@ -193,14 +196,14 @@ def run_interacting(designs, parts, orders, size, stay, unfolding, sigma, spans,
 
 
 @part
-def run_weighing(outputs, parts, orders, size, shares, scans, out):
-    """Fixed shares of other banks, over all scans: shares (K, MEMBERS, 3); outputs of all banks."""
+def run_weighing(outputs, parts, orders, size, reads, shares, scans, out):
+    """Fixed shares of other banks, over all scans: shares (K, MEMBERS, 3); outputs of all banks, MEAN or BEST read."""
     zero, one = full(0.0), full(1.0)
     for k in range(scans):
         to = row(out, k * OUTPUT)
         x, w = (zero, zero, zero), (0.0, 0.0, 0.0)
         for i in range(size):
-            y, share = three(row(outputs, (parts[i] * scans + k) * OUTPUT), MEAN), 3 * (k * MEMBERS + i)
+            y, share = three(row(outputs, (parts[i] * scans + k) * OUTPUT), reads), 3 * (k * MEMBERS + i)
             x = (
                 x[0] + shares[share] * y[0],
                 x[1] + shares[share + 1] * y[1],
@@ -216,7 +219,7 @@ def run_weighing(outputs, parts, orders, size, shares, scans, out):
 
 
 @part
-def chosen(outputs, parts, orders, size, widths, scans, k, c):
+def chosen(outputs, parts, orders, size, reads, widths, scans, k, c):
     """Of component c at scan k: the smoothest whose interval meets those of all rougher ones, and its order."""
     x, order = full(0.0), full(0.0)
     low, high, meets, used = full(-FAR), full(FAR), full(1.0), 0
@@ -229,7 +232,7 @@ def chosen(outputs, parts, orders, size, widths, scans, k, c):
         if pick < 0:
             break
         used |= 1 << pick
-        y = get(row(outputs, (parts[pick] * scans + k) * OUTPUT), MEAN + c)
+        y = get(row(outputs, (parts[pick] * scans + k) * OUTPUT), reads + c)
         low, high = where_greater(y - width, low, y - width, low), where_greater(high, y + width, y + width, high)
         meets = where_greater(low, high, full(0.0), meets)
         x = where_greater(meets, full(0.5), y, x)
@@ -238,13 +241,13 @@ def chosen(outputs, parts, orders, size, widths, scans, k, c):
 
 
 @part
-def run_choosing(outputs, parts, orders, size, widths, scans, out):
+def run_choosing(outputs, parts, orders, size, reads, widths, scans, out):
     """The intersection of intervals, component by component, over all scans: widths (K, MEMBERS, 3) half ones."""
     zero, one = full(0.0), full(1.0)
     for k in range(scans):
-        x0, order = chosen(outputs, parts, orders, size, widths, scans, k, 0)
-        x1, _ = chosen(outputs, parts, orders, size, widths, scans, k, 1)
-        x2, _ = chosen(outputs, parts, orders, size, widths, scans, k, 2)
+        x0, order = chosen(outputs, parts, orders, size, reads, widths, scans, k, 0)
+        x1, _ = chosen(outputs, parts, orders, size, reads, widths, scans, k, 1)
+        x2, _ = chosen(outputs, parts, orders, size, reads, widths, scans, k, 2)
         to = row(out, k * OUTPUT)
         put_single(to, (x0, x1, x2), one)
         zeroth, second = where_greater(full(0.5), order, one, zero), where_greater(order, full(1.5), one, zero)

@@ -1,18 +1,52 @@
 """Plots of eight realisations: range and folded velocity, missed ones, and the truth that each realisation has."""
 
-from radarsim.kernels.compile import part
-from radarsim.kernels.lanes import address, full, get, nearest, put, row, where_greater
+import math
+
+from radarsim.kernels.compile import inline, part
+from radarsim.kernels.lanes import WIDTH, address, full, get, nearest, put, row, where_greater
 from radarsim.kernels.random import fill_normal_strip, fill_uniform_pairs
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     CAME,
     FIRST,
+    PAIRED,
     PLOT,
     RANGE,
+    SOLVED,
     STARTED,
     TRUTH,
     UNFOLDED,
     VELOCITY,
 )
+
+
+@inline
+def remainder(z, D, z_before, D_before, joint):
+    """The velocity in ± joint/2 that folds to z in a span D and, as nearly as any, to z_before in D_before."""
+    found, least, u = 0.0, D_before, z + D * math.ceil((-0.5 * joint - z) / D)
+    while u < 0.5 * joint:
+        off = u - z_before
+        off = abs(off - D_before * math.floor(off / D_before + 0.5))
+        if off < least:
+            found, least = u, off
+        u += D
+    return found
+
+
+@part
+def solve_remainders(world, plots):
+    """The velocities that follow from a plot and the one before it, of one realisation: plots is its lane's address."""
+    before = -1
+    for k in range(world.truth.shape[0]):
+        scan = row(plots, k * PLOT)
+        scan[SOLVED * WIDTH] = scan[PAIRED * WIDTH] = 0.0
+        if scan[CAME * WIDTH] > 0.0:
+            joint = world.joint[world.turn[k], world.turn[before]] if before >= 0 else 0.0
+            if joint > 0.0:
+                z = row(plots, before * PLOT)[VELOCITY * WIDTH]
+                spans = world.spans
+                scan[SOLVED * WIDTH] = remainder(scan[VELOCITY * WIDTH], spans[k], z, spans[before], joint)
+                scan[PAIRED * WIDTH] = 1.0
+            before = k
 
 
 @part
@@ -52,3 +86,6 @@ def fill_plots(world, first, random, plots):
         put(scan, FIRST, came * (one - started))
         started = where_greater(came, started, one, started)
         put(scan, STARTED, started)
+    if world.joint.any():
+        for lane in range(WIDTH):
+            solve_remainders(world, address(plots[lane:]))

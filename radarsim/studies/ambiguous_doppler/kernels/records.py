@@ -11,8 +11,9 @@ import numpy as np
 from radarsim.kernels.lanes import WIDTH, rows
 
 # A scan's plot and truth: range and folded velocity; the velocity before it was folded; 1 where there is a plot, where
-# it is the first, where there has been one; the truth (3).
-RANGE, VELOCITY, UNFOLDED, CAME, FIRST, STARTED, TRUTH, PLOT = 0, 1, 2, 3, 4, 5, 6, 9
+# it is the first, where there has been one; the truth (3); the velocity by the Chinese remainder of this plot and the
+# one before it, and 1 where these have one.
+RANGE, VELOCITY, UNFOLDED, CAME, FIRST, STARTED, TRUTH, SOLVED, PAIRED, PLOT = 0, 1, 2, 3, 4, 5, 6, 9, 10, 11
 
 # A scan's gains, shared by all hypotheses of a realisation: 1/(2S) of the range's innovation and its gains (3); of the
 # velocity's the variance S, which stands also where there is no plot, and its gains (3). Zero where nothing is taken.
@@ -23,11 +24,11 @@ WEIGHT, RANGE_GAIN, VARIANCE, VELOCITY_GAIN, GAINS = 0, 1, 4, 5, 8
 MEAN, BEST, RIGHT, LISTED, COUNT, PROBABILITY, WEIGHTS, OUTPUT = 0, 3, 6, 7, 8, 9, 10, 13
 
 # Numbers of a design: F above its diagonal of ones and zeros (5) and Q (6) as `kernels.symmetric` has them, the prior
-# variances of velocity and acceleration, 1 where it takes the velocity.
+# variances of velocity and acceleration, 1 where it takes the velocity, 2 where it takes that of two scans.
 MOTION, NOISE, PRIOR, TAKES_VELOCITY, DESIGN = 0, 5, 11, 13, 16
 
-NONE, UNFOLDS, NEAREST, MERGES, REMEMBERS = 0, 1, 2, 3, 4  # what a bank does about the folds
-INTERACTS, WEIGHS, CHOOSES = 5, 6, 7  # and one that combines orders: by likelihood, by fixed shares, by intersection
+NONE, UNFOLDS, NEAREST, REMAINDER, MERGES, REMEMBERS = 0, 1, 2, 3, 4, 5  # what a bank does about the folds
+INTERACTS, WEIGHS, CHOOSES = 6, 7, 8  # and one that combines orders: by likelihood, by fixed shares, by intersection
 MEMBERS = 6  # most that are combined: three orders, with the velocity and without
 
 RIGHT_SUM, LISTED_SUM, COUNT_SUM, BEYOND_SUM, FOLD_SUMS = 0, 1, 2, 3, 4  # last axis of `Sums.folds`
@@ -43,6 +44,8 @@ class World(NamedTuple):
     spread  (2,)     standard deviations of the velocity and of the acceleration that each realisation adds
     sigma   (2,)     of the plots: m, m/s
     spans   (K,)     of velocity at each scan, m/s
+    turn    (K,)     which of the R repetition rates a scan has
+    joint   (R, R)   span in which two rates together are unambiguous, m/s; zero where no filter asks for it
     detection        probability of a plot
     """
 
@@ -52,6 +55,8 @@ class World(NamedTuple):
     spread: np.ndarray
     sigma: np.ndarray
     spans: np.ndarray
+    turn: np.ndarray
+    joint: np.ndarray
     detection: float
 
 
@@ -65,6 +70,7 @@ class Banks(NamedTuple):
     size     (B,)         how many parts there are
     most     (B,)         hypotheses kept
     deepest  (B,)         logarithm of the largest ratio of the best hypothesis's probability to a kept one's
+    reads    (B,)         WEIGHS, CHOOSES: MEAN or BEST of the parts
     stay     (B,)         INTERACTS: probability that an order lasts from scan to scan
     unfolding (B,)        INTERACTS: what it does about the folds
     shares   (B, K, MEMBERS, 3)  WEIGHS: the parts' shares in each component; CHOOSES: half widths of their intervals,
@@ -81,6 +87,7 @@ class Banks(NamedTuple):
     size: np.ndarray
     most: np.ndarray
     deepest: np.ndarray
+    reads: np.ndarray
     stay: np.ndarray
     unfolding: np.ndarray
     shares: np.ndarray
@@ -93,7 +100,8 @@ class Banks(NamedTuple):
 class Memory(NamedTuple):
     """Work arrays for a group of eight realisations.
 
-    plots (K × PLOT rows), gains (D × K × GAINS), out (B × K × OUTPUT), and room for hypotheses, see `hypotheses.Lists`.
+    plots (K × PLOT rows), gains (D × K × GAINS), out (B × K × OUTPUT), and room for hypotheses, see `hypotheses.Lists`
+    and `together`.
     """
 
     random: np.ndarray
@@ -105,6 +113,8 @@ class Memory(NamedTuple):
     children: np.ndarray
     parents: np.ndarray
     interacting: np.ndarray
+    together: np.ndarray
+    broad: np.ndarray
     room: int
 
 
@@ -145,9 +155,14 @@ def shapes(filters: int, scans: int) -> Mapping[str, tuple[int, ...]]:
     }
 
 
+def remembers(banks: Banks) -> np.ndarray:
+    """Which banks (B,) keep several hypotheses."""
+    return (banks.kind == REMEMBERS) | ((banks.kind == INTERACTS) & (banks.unfolding == REMEMBERS))
+
+
 def memory(scans: int, banks: Banks) -> Memory:
     """Work arrays for so many scans."""
-    most = max((int(n) for n, kind in zip(banks.most, banks.kind, strict=True) if kind == REMEMBERS), default=1)
+    most = max((int(n) for n, kept in zip(banks.most, remembers(banks), strict=True) if kept), default=1)
     room = -(-most // WIDTH) * WIDTH + WIDTH
     children = 4 * room + 64
     return Memory(
@@ -160,5 +175,7 @@ def memory(scans: int, banks: Banks) -> Memory:
         children=rows(3 * children // WIDTH),
         parents=np.zeros(children, dtype=np.int64),
         interacting=rows(2 * 3 * 12),
+        together=rows(2 * room // WIDTH * 3 * 12 if (remembers(banks) & (banks.kind == INTERACTS)).any() else 1),
+        broad=rows(PLOT + 3),
         room=room,
     )

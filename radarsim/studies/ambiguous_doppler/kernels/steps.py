@@ -26,12 +26,15 @@ from radarsim.studies.ambiguous_doppler.kernels.records import (
     NOISE,
     NONE,
     OUTPUT,
+    PAIRED,
     PLOT,
     PRIOR,
     PROBABILITY,
     RANGE,
     RANGE_GAIN,
+    REMAINDER,
     RIGHT,
+    SOLVED,
     TAKES_VELOCITY,
     UNFOLDED,
     UNFOLDS,
@@ -137,7 +140,8 @@ def fill_gains(design, sigma, scans, plots, gains):
         P, weight, g = range_taken(P, first, came - first, sigma[0] * sigma[0])
         put(to, WEIGHT, weight)
         put_three(to, RANGE_GAIN, g)
-        P, S, g = velocity_taken(P, came * design[TAKES_VELOCITY], sigma[1] * sigma[1])
+        taken = get(plot, PAIRED) if design[TAKES_VELOCITY] > 1.0 else came * design[TAKES_VELOCITY]
+        P, S, g = velocity_taken(P, taken, sigma[1] * sigma[1])
         put(to, VARIANCE, S)
         put_three(to, VELOCITY_GAIN, g)
 
@@ -171,7 +175,10 @@ def put_single(to, x, right):
 
 @part
 def run_single(kind, design, spans, plots, gains, out):
-    """A bank with one hypothesis over all scans: of range alone, with the true folds, or with the nearest ones."""
+    """A bank with one hypothesis over all scans: of range alone, with the true folds, the nearest, or remainders.
+
+    `right` of a remainder is that of its scan alone: it rests on two plots, and not on what was before.
+    """
     F, _ = motion(design)
     zero = full(0.0)
     x, right = (zero, zero, zero), full(1.0)
@@ -180,7 +187,10 @@ def run_single(kind, design, spans, plots, gains, out):
         x = with_range(predicted_axis(x, F), plot, scan)
         if kind != NONE:
             u = get(plot, UNFOLDED)
-            if kind != UNFOLDS:
+            if kind == REMAINDER:
+                right = whether_right(get(plot, PAIRED), plot, get(plot, SOLVED), D)
+                u = get(plot, SOLVED)
+            elif kind != UNFOLDS:
                 z = get(plot, VELOCITY)
                 u = z + D * nearest((x[1] - z) / D)
                 right = whether_right(right, plot, u, D)

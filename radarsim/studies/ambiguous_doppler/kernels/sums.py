@@ -35,6 +35,7 @@ from radarsim.studies.ambiguous_doppler.kernels.records import (
     memory,
 )
 from radarsim.studies.ambiguous_doppler.kernels.steps import fill_gains, run_merged, run_single
+from radarsim.studies.ambiguous_doppler.kernels.together import run_together
 
 
 @part
@@ -45,27 +46,42 @@ def run_filters(world, banks, memory, fresh):
     if fresh:
         for d in range(banks.designs.shape[0]):
             fill_gains(address(banks.designs[d]), sigma, scans, plots, row(address(memory.gains), d * scans * GAINS))
+    lists = Lists(
+        address(memory.listed), address(memory.children), address(memory.parents), memory.room, memory.parents.size
+    )
     for b in range(banks.kind.size):
         kind, part, size = banks.kind[b], banks.parts[b, 0], banks.size[b]
         parts, orders, shares = address(banks.parts[b]), address(banks.orders[b]), address(banks.shares[b])
         outputs = address(memory.out)
         out = row(outputs, b * scans * OUTPUT)
         if kind == WEIGHS:
-            run_weighing(outputs, parts, orders, size, shares, scans, out)
+            run_weighing(outputs, parts, orders, size, banks.reads[b], shares, scans, out)
         elif kind == CHOOSES:
-            run_choosing(outputs, parts, orders, size, shares, scans, out)
+            run_choosing(outputs, parts, orders, size, banks.reads[b], shares, scans, out)
         elif kind == INTERACTS:
             designs, room = address(banks.designs), address(memory.interacting)
             how, stay = banks.unfolding[b], banks.stay[b]
-            run_interacting(designs, parts, orders, size, stay, how, sigma, world.spans, plots, out, room)
+            if how != REMEMBERS:
+                run_interacting(designs, parts, orders, size, stay, how, sigma, world.spans, plots, out, room)
+                continue
+            for lane in range(WIDTH):
+                run_together(
+                    designs,
+                    parts,
+                    orders,
+                    size,
+                    stay,
+                    banks.most[b],
+                    np.exp(-banks.deepest[b]),
+                    sigma,
+                    world.spans,
+                    address(memory.plots[lane:]),
+                    address(memory.out[b * scans * OUTPUT * WIDTH + lane :]),
+                    address(memory.together),
+                    address(memory.broad),
+                    lists,
+                )
         elif kind == REMEMBERS:
-            lists = Lists(
-                address(memory.listed),
-                address(memory.children),
-                address(memory.parents),
-                memory.room,
-                memory.parents.size,
-            )
             for lane in range(WIDTH):
                 run_remembering(
                     address(banks.designs[part]),
@@ -155,9 +171,10 @@ def add_group(world, banks, memory, sums):
             folds[RIGHT_SUM] += total(counted * get(bank, RIGHT))
             folds[LISTED_SUM] += total(counted * get(bank, LISTED))
             folds[COUNT_SUM] += total(counted * get(bank, COUNT))
-            if banks.kind[banks.bank[f]] == REMEMBERS:
+            kind, unfolding = banks.kind[banks.bank[f]], banks.unfolding[banks.bank[f]]
+            if kind == REMEMBERS or (kind == INTERACTS and unfolding == REMEMBERS):
                 add_calibration(bank, plot, address(sums.calibration[f, k]))
-            elif banks.kind[banks.bank[f]] >= INTERACTS:
+            if kind >= INTERACTS:
                 for order in range(3):
                     w = counted * get(bank, WEIGHTS + order)
                     sums.orders[f, k, order, 0] += total(w)

@@ -1,0 +1,393 @@
+"""Filters over recorded plots, row by row at any times: one order with its hypotheses, and combinations of orders."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from radarsim.physics import targets
+from radarsim.studies.ambiguous_doppler import exact, filters, world
+from radarsim.studies.ambiguous_doppler.config import joint_span
+
+LEAST = 1e-150  # probability of an order: none is ruled out for good
+FARTHEST = 9.0  # standard deviations of the velocity's innovation up to which folds are looked at
+CERTAIN = 4.0  # standard deviations of the velocity's innovation that half a span must hold for the fold to be certain
+
+
+class Row(NamedTuple):
+    """What one row made of a filter: estimate and σ (3,), residuals of range and velocity after the update (2,), and
+    the squares of their innovations over their variances (2,); not-a-number where there is none."""
+
+    estimate: np.ndarray
+    sigma: np.ndarray
+    residual: np.ndarray
+    nis: np.ndarray
+
+
+NOTHING = Row(*np.full((2, 3), np.nan), *np.full((2, 2), np.nan))
+
+
+def follower(options: Any, spec: Any) -> "Single | Interacting | Combined":
+    """What follows a filter's options; it has `step(t, z, v, span)`, which gives a `Row`."""
+    if options.combine is None:
+        return single(options, spec)
+    return (Interacting if options.combine == "likelihood" else Combined)(options, spec)
+
+
+def single(options: Any, spec: Any) -> "Single":
+    """Of a filter of one order."""
+    (member,) = filters.members(options)
+    return Single(member, options, spec)
+
+
+def _taken(P: np.ndarray, component: int, sigma: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Covariances (..., 3, 3) after a measured component, its gains (..., 3), and the innovation's variances (...)."""
+    S = P[..., component, component] + sigma**2
+    gain = P[..., component] / S[..., None]
+    return P - gain[..., :, None] * gain[..., None, :] * S[..., None, None], gain, S
+
+
+def _kept(w: np.ndarray, options: Any) -> np.ndarray:
+    """Which hypotheses are kept, the best first, by the logarithms of their weights, the best one's 0."""
+    kept = np.flatnonzero(np.exp(w) >= options.prune_below)
+    return kept[np.argsort(-w[kept], kind="stable")[: options.hypotheses]]
+
+
+class Folds:
+    """What a velocity may have been before it was folded: by the span of its row, or by those of two rows."""
+
+    def __init__(self, radar: Any):
+        self.radar = radar
+        self.span = np.nan  # of this row
+        self.before: tuple[float, float] | None = None  # the velocity of the last plot, and its span
+
+    def begin(self, t: float, span: float) -> None:
+        """Begin a row, whose span stands beside it or follows from its time."""
+        spans = self.radar.spans_mps
+        self.span = spans[round(t / self.radar.scan_period_s) % len(spans)] if np.isnan(span) else span
+
+    def folded(self, e: np.ndarray) -> np.ndarray:
+        """Innovations with the nearest folds."""
+        return e - self.span * np.rint(e / self.span)
+
+    def innovations(self, e: np.ndarray, S: np.ndarray) -> np.ndarray:
+        """Innovations e + n D (..., folds) of folds near enough to matter; e (...) as measured, S (...) variances."""
+        farthest = int(FARTHEST * np.sqrt(np.max(S)) / self.span) + 1
+        return self.folded(e)[..., None] + self.span * np.arange(-farthest, farthest + 1)
+
+    def certain(self, S: float) -> bool:
+        """Whether an innovation of that variance leaves but one fold."""
+        return 2 * CERTAIN * np.sqrt(S) <= self.span
+
+    def remainder(self, v: float) -> float:
+        """The velocity by the Chinese remainder of this row and the last with a plot; not-a-number: there is none."""
+        before, self.before = self.before, (v, self.span)
+        joint = joint_span(self.span, before[1]) if before else 0.0
+        if before is None or joint == 0:
+            return np.nan
+        u = np.arange(v + self.span * np.ceil((-joint / 2 - v) / self.span), joint / 2, self.span)
+        off = u - before[0]
+        return u[np.argmin(np.abs(off - before[1] * np.floor(off / before[1] + 0.5)))]
+
+
+class Single:
+    """One filter: states (n, 3) of its hypotheses, logarithms of their weights (n,), the common covariance (3, 3).
+
+    `sure` is the covariance of right folds, which only merging widens; `last_step` what the filter does at the last row
+    with such, None before the first range.
+    """
+
+    def __init__(self, member: filters.Member, options: Any, spec: Any):
+        self.member, self.options, self.radar = member, options, spec.radar
+        self.folds = Folds(spec.radar)
+        self.x, self.w = np.zeros((1, 3)), np.zeros(1)
+        self.P = np.diag([0.0, *filters.prior_variances(member.order, spec.prior)])
+        self.sure = self.P.copy()
+        self.known = np.array(member.components)
+        self.last = np.nan
+        self.began = self.started = False
+        self.last_step: exact.Step | None = None
+        self.nis, self.log_density = np.full(2, np.nan), np.zeros(2)  # of the last row, for range and velocity
+
+    def step(self, t: float, z: float, v: float, span: float = np.nan) -> Row:
+        """The estimate after one row; not-a-number before the first range."""
+        self.folds.begin(t, span)
+        self.nis, self.log_density = np.full(2, np.nan), np.zeros(2)
+        F, gains, known = np.eye(3), [np.zeros(3), np.zeros(3)], self.started
+        if self.began:
+            F, Q = filters.model(self.member.order, self.member.manoeuvre_variance, t - self.last)
+            self.x, self.P, self.sure = self.x @ F.T, F @ self.P @ F.T + Q, F @ self.sure @ F.T + Q
+        self.began, self.last = True, t
+        if not np.isnan(z):
+            gains[0] = self._take_range(z)
+        if self.member.doppler == "remainder" and not np.isnan(v) and not np.isnan(z):
+            v = self.folds.remainder(v)
+        if self.started and not np.isnan(v) and self.member.doppler != "none":
+            gains[1] = self._take_velocity(v)
+        if not self.started:
+            return NOTHING
+        self.last_step = exact.Step(F if known else np.eye(3), *gains)
+        p = np.exp(self.w - self.w.max())
+        p /= p.sum()
+        best = self.x[np.argmax(self.w)]
+        mean = best if self.options.estimate == "best" else p @ self.x
+        variance = np.diagonal(self.P) + p @ (self.x - mean) ** 2
+        estimate, sigma = np.where(self.known, mean, np.nan), np.where(self.known, np.sqrt(variance), np.nan)
+        residual = np.array([z, v]) - estimate[:2]
+        if self.member.doppler == "folded":
+            residual[1] = self.folds.folded(residual[1])
+        return Row(estimate, sigma, residual, self.nis)
+
+    def _take_range(self, z: float) -> np.ndarray:
+        """Take a range; gives the gains of right folds."""
+        if not self.started:  # before the first range none is known
+            self.x[:, 0] = z
+            for P in (self.P, self.sure):
+                P[0], P[:, 0] = 0.0, 0.0
+                P[0, 0] = self.radar.sigma_range_m**2
+            self.started = True
+            return np.array([1.0, 0.0, 0.0])
+        e = z - self.x[:, 0]
+        self.P, gain, S = _taken(self.P, 0, self.radar.sigma_range_m)
+        self._judge(0, e[:, None], S)
+        self.w, self.x = self.w - e**2 / (2 * S), self.x + e[:, None] * gain
+        self.sure, gain, _ = _taken(self.sure, 0, self.radar.sigma_range_m)
+        return gain
+
+    def _take_velocity(self, v: float) -> np.ndarray:
+        """Take a velocity, folded or not; gives the gains of right folds."""
+        P, gain, S = _taken(self.P, 1, self.radar.sigma_velocity_mps)
+        e = (v - self.x[:, 1])[:, None]
+        if self.member.doppler == "folded":
+            e = self.folds.innovations(e[:, 0], S)
+            if self.options.hypotheses == 1:
+                e = e[:, e.shape[1] // 2, None]
+        self._judge(1, e, S)
+        if self.member.doppler == "folded" and not self.folds.certain(float(S)):
+            self.nis[1] = np.nan
+        w = self.w[:, None] - e**2 / (2 * S)
+        x = self.x[:, None, :] + e[..., None] * gain
+        self.P, self.x, self.w = P, x.reshape(-1, 3), w.ravel() - w.max()
+        if self.member.doppler == "folded" and self.options.merge == "each_scan":
+            p = np.exp(self.w) / np.exp(self.w).sum()
+            mean = p @ self.x
+            self.P = self.P + np.einsum("n,ni,nj->ij", p, self.x - mean, self.x - mean)
+            self.x, self.w = mean[None], np.zeros(1)
+        elif self.member.doppler == "folded":
+            kept = _kept(self.w, self.options)
+            self.x, self.w = self.x[kept], self.w[kept]
+        self.sure, gain, _ = _taken(self.sure, 1, self.radar.sigma_velocity_mps)
+        return gain
+
+    def _judge(self, number: int, e: np.ndarray, S: np.ndarray) -> None:
+        """Note a number's innovations e (n, folds) before they are taken in: the square over the variance S of that of
+        the most probable hypothesis, and the logarithm of the density that all of them give the number."""
+        self.nis[number] = np.min(e[np.argmax(self.w)] ** 2) / S
+        powers = (self.w[:, None] - e**2 / (2 * S)).ravel()
+        most, whole = powers.max(), self.w.max()
+        given = most + np.log(np.exp(powers - most).sum()) - whole - np.log(np.exp(self.w - whole).sum())
+        self.log_density[number] = given - 0.5 * np.log(2 * np.pi * S)
+
+
+class Interacting:
+    """Orders combined by likelihood, with a memory of folds or without.
+
+    Of n hypotheses the states (n, M, 3), covariances (n, M, 3, 3) and probabilities (n, M) of M orders, and logarithms
+    of weights (n,). Over a gap the orders pass into each other as often as there were scans. Innovations are those of
+    the most probable hypothesis, mean and variance over its orders.
+    """
+
+    def __init__(self, options: Any, spec: Any):
+        self.members, self.options, self.radar = filters.members(options), options, spec.radar
+        self.folds = Folds(spec.radar)
+        many = len(self.members)
+        prior = [np.diag([0.0, *filters.prior_variances(one.order, spec.prior)]) for one in self.members]
+        self.x, self.P, self.w = np.zeros((1, many, 3)), np.array(prior)[None], np.zeros(1)
+        self.mu = np.full((1, many), 1 / many)
+        self.known = np.any([one.components for one in self.members], axis=0)
+        self.last = np.nan
+        self.started = False
+
+    def step(self, t: float, z: float, v: float, span: float = np.nan) -> Row:
+        """As `Single.step`."""
+        self.folds.begin(t, span)
+        self.nis = np.full(2, np.nan)
+        self._mix(1 if np.isnan(self.last) else max(1, round((t - self.last) / self.radar.scan_period_s)))
+        if not np.isnan(self.last):
+            for i, one in enumerate(self.members):
+                F, Q = filters.model(one.order, one.manoeuvre_variance, t - self.last)
+                self.x[:, i], self.P[:, i] = self.x[:, i] @ F.T, F @ self.P[:, i] @ F.T + Q
+        self.last = t
+        if not np.isnan(z):
+            self._take_range(z)
+        if self.started and not np.isnan(v) and self.options.doppler != "none":
+            self._take_velocity(v)
+        if not self.started:
+            return NOTHING
+        p = np.exp(self.w - self.w.max())
+        p = p[:, None] * self.mu / p.sum()
+        best = np.argmax(self.w)
+        mean = self.mu[best] @ self.x[best] if self.options.estimate == "best" else np.einsum("ni,nix->x", p, self.x)
+        spread = np.einsum("nixx->nix", self.P) + (self.x - mean) ** 2
+        estimate = np.where(self.known, mean, np.nan)
+        sigma = np.where(self.known, np.sqrt(np.einsum("ni,nix->x", p, spread)), np.nan)
+        residual = np.array([z, v]) - estimate[:2]
+        if self.options.doppler == "folded":
+            residual[1] = self.folds.folded(residual[1])
+        return Row(estimate, sigma, residual, self.nis)
+
+    def _mix(self, scans: int) -> None:
+        """Let the orders pass into each other over so many scans."""
+        many = len(self.members)
+        once = self.options.stay_probability - (1 - self.options.stay_probability) / (many - 1)
+        passes = (1 - once**scans) / many + np.eye(many) * once**scans
+        before = self.mu @ passes
+        share = passes * self.mu[:, :, None] / before[:, None, :]  # (n, from, to)
+        x = np.einsum("nji,njx->nix", share, self.x)
+        apart = self.x[:, :, None] - x[:, None]
+        self.P = np.einsum("nji,njxy->nixy", share, self.P) + np.einsum("nji,njix,njiy->nixy", share, apart, apart)
+        self.x, self.mu = x, before
+
+    def _take_range(self, z: float) -> None:
+        if not self.started:
+            self.x[..., 0], self.P[..., 0, :], self.P[..., :, 0] = z, 0.0, 0.0
+            self.P[..., 0, 0], self.started = self.radar.sigma_range_m**2, True
+            return
+        e = z - self.x[..., 0]
+        self.P, gain, S = _taken(self.P, 0, self.radar.sigma_range_m)
+        self._judge(0, e, S)
+        self.x = self.x + e[..., None] * gain
+        self._weigh(np.log(np.maximum(self.mu, LEAST)) - e**2 / (2 * S) - np.log(S) / 2)
+
+    def _judge(self, number: int, e: np.ndarray, S: np.ndarray) -> None:
+        """Note the innovations (n, M) of a number and their variances before they are taken in."""
+        best = np.argmax(self.w)
+        mean = self.mu[best] @ e[best]
+        variance = self.mu[best] @ (S[best] + (e[best] - mean) ** 2)
+        if number == 1 and self.options.doppler == "folded":
+            if not self.folds.certain(float(variance)):
+                return
+            mean = self.folds.folded(mean)
+        self.nis[number] = mean**2 / variance
+
+    def _weigh(self, logs: np.ndarray) -> None:
+        """Probabilities of orders and weights of hypotheses from logarithms (n, M) of both together."""
+        most = logs.max(axis=1, keepdims=True)
+        self.mu = np.exp(logs - most)
+        self.w = self.w + most[:, 0] + np.log(self.mu.sum(axis=1))
+        self.w -= self.w.max()
+        self.mu /= self.mu.sum(axis=1, keepdims=True)
+
+    def _take_velocity(self, v: float) -> None:
+        P, gain, S = _taken(self.P, 1, self.radar.sigma_velocity_mps)
+        e, logs = v - self.x[..., 1], np.log(np.maximum(self.mu, LEAST)) - np.log(S) / 2
+        self._judge(1, e, S)
+        self.P = P
+        if self.options.doppler == "unfolded":
+            self.x = self.x + e[..., None] * gain
+            self._weigh(logs - e**2 / (2 * S))
+        elif self.options.merge == "each_scan":
+            folds = self.folds.innovations(e, S)
+            like = -(folds**2) / (2 * S[..., None])
+            most = like.max(axis=-1, keepdims=True)
+            p = np.exp(like - most)
+            logs = logs + most[..., 0] + np.log(p.sum(axis=-1))
+            p /= p.sum(axis=-1, keepdims=True)
+            mean = (p * folds).sum(axis=-1)
+            variance = (p * (folds - mean[..., None]) ** 2).sum(axis=-1)
+            self.x = self.x + mean[..., None] * gain
+            self.P = self.P + variance[..., None, None] * gain[..., :, None] * gain[..., None, :]
+            self._weigh(logs)
+        else:
+            self._branch(v, gain, S, logs)
+
+    def _branch(self, v: float, gain: np.ndarray, S: np.ndarray, logs: np.ndarray) -> None:
+        """Every hypothesis with every fold near any of its orders; those kept that weigh enough."""
+        mean = np.einsum("ni,ni->n", self.mu, self.x[..., 1])
+        reach = np.max(np.sqrt(S) + np.abs(self.x[..., 1] - mean[:, None]) / FARTHEST) ** 2
+        u = mean[:, None] + self.folds.innovations(v - mean, reach)
+        e = u[:, :, None] - self.x[:, None, :, 1]  # (n, folds, M)
+        both = logs[:, None] - e**2 / (2 * S[:, None])
+        w = self.w[:, None] + both.max(axis=2) + np.log(np.exp(both - both.max(axis=2, keepdims=True)).sum(axis=2))
+        kept = _kept(w.ravel() - w.max(), self.options)
+        of, n = np.unravel_index(kept, w.shape)
+        self.x, self.P = self.x[of] + e[of, n][..., None] * gain[of], self.P[of]
+        self.w = self.w[of]
+        self._weigh(both[of, n])
+
+
+class Combined:
+    """Orders combined by their expected error, or by intersecting intervals: the members, and their joint errors.
+
+    The errors are those of right folds, by the recursion of `exact`, with the gains that each row had. A manoeuvre may
+    begin at each of the last `scans` rows. A combination foretells nothing, so that there are no innovations.
+    """
+
+    def __init__(self, options: Any, spec: Any):
+        self.options, self.spec = options, spec
+        self.members = filters.members(options)
+        self.singles = [Single(member, options, spec) for member in self.members]
+        self.known = np.array([member.components for member in self.members])
+        self.sigma = np.array([spec.radar.sigma_range_m, spec.radar.sigma_velocity_mps])
+        many = len(self.members)
+        self.bias, self.noise = np.zeros((2, many, 3)), np.zeros((3 * many, 3 * many))
+        self.before = np.zeros((2, 3))
+        self.onsets: list[float] = []
+        self.first = np.nan
+
+    def step(self, t: float, z: float, v: float, span: float = np.nan) -> Row:
+        """As `Single.step`."""
+        self.first = t if np.isnan(self.first) else self.first
+        estimates = np.array([one.step(t, z, v, span).estimate for one in self.singles])
+        now = self._motions(t)
+        steps = [one.last_step for one in self.singles if one.last_step is not None]
+        if not steps:
+            return NOTHING
+        self.bias, self.noise = exact.advanced(self.bias, self.noise, self.before, now, steps, self.sigma)
+        self.before = now
+        many = len(self.members)
+        bias, noise = self.bias[:, :, None], self.noise.reshape(1, many, 3, many, 3)
+        estimates = np.where(self.known, estimates, 0.0)
+        if self.options.combine == "intersection":
+            width = exact.widths(bias, noise, self.members, self.spec.prior, self.options.interval_sigmas)[0]
+            chosen = [_smoothest(estimates[:, c], width[:, c]) for c in range(3)]
+            mean = np.array([estimates[i, c] for c, i in enumerate(chosen)])
+            sigma = np.array([width[i, c] for c, i in enumerate(chosen)]) / self.options.interval_sigmas
+        else:
+            weight = np.full(len(bias) - 1, 1 / self.spec.scans)
+            weight[0] = self.spec.prior.sigma_velocity_mps**2
+            E = exact.joint(np.delete(bias, 1, axis=0), noise, weight)
+            share = exact.best_shares(E, self.known)[0]
+            mean = np.einsum("ix,ix->x", share, estimates)
+            sigma = np.sqrt(np.einsum("ix,xij,jx->x", share, E[0], share))
+        known = self.known.any(axis=0)
+        estimate, residual = np.where(known, mean, np.nan), np.array([z, v]) - np.where(known, mean, np.nan)[:2]
+        if self.options.doppler == "folded":
+            residual[1] = self.singles[0].folds.folded(residual[1])
+        return Row(estimate, np.where(known, sigma, np.nan), residual, np.full(2, np.nan))
+
+    def _motions(self, t: float) -> np.ndarray:
+        """What each motion is at a row (M, 3): a drawn velocity and acceleration of one, and the manoeuvres."""
+        drawn = world.drawn_motions(np.array([t - self.first]))[:, 0]
+        if self.options.combine != "expected_error":
+            return drawn
+        if len(self.onsets) == self.spec.scans:
+            self.onsets.pop(0)
+            self.bias, self.before = np.delete(self.bias, 2, axis=0), np.delete(self.before, 2, axis=0)
+        self.onsets.append(t)
+        self.bias = np.concatenate([self.bias, np.zeros((1, *self.bias.shape[1:]))])
+        self.before = np.concatenate([self.before, np.zeros((1, 3))])
+        of = self.options.manoeuvres
+        size, length = of.acceleration_mps2, of.duration_s
+        flown = [targets.acceleration_pulse((0.0,), size, onset, length, np.array([t]))[0] for onset in self.onsets]
+        return np.concatenate([drawn, flown])
+
+
+def _smoothest(estimates: np.ndarray, widths: np.ndarray) -> int:
+    """The smoothest of estimates (I,) whose interval meets those of all rougher; widths (I,) half, 0: not there."""
+    chosen, low, high = 0, -np.inf, np.inf
+    for i in np.argsort(-widths, kind="stable"):
+        low, high = max(low, estimates[i] - widths[i]), min(high, estimates[i] + widths[i])
+        if widths[i] == 0 or low > high:
+            break
+        chosen = int(i)
+    return chosen

@@ -1,0 +1,314 @@
+"""Hypotheses on the folds of one realisation, in each of which orders interact: an IMM over orders and folds.
+
+Given its folds a hypothesis is a filter of interacting orders (`kernels.orders`), with an unfolded velocity. A scan
+mixes and moves the orders of every hypothesis and weighs all by the range, branches each over the folds that any of its
+orders leaves possible, and drops what is too far below the best or beyond the number that is kept. Mixing makes
+covariances depend on the data, so that each hypothesis has its own; lanes are eight hypotheses.
+
+    W      weight of a hypothesis, the best one's 1; 0 in a place that holds none
+    mu     probability of an order within it
+    u      velocity z + n D of the fold n; the same for all orders
+    p      weight of a branch: W times the sum over orders of mu N(u; v, S), apart from a common factor
+    least  distance of the nearest fold of all, in variances: taken off every exponent, so that no weight vanishes
+"""
+
+import math
+
+from radarsim.kernels.compile import part
+from radarsim.kernels.lanes import WIDTH, exponential, full, get, nearest, put, root, row, total, where_greater
+from radarsim.studies.ambiguous_doppler.kernels.hypotheses import column, keep_greatest
+from radarsim.studies.ambiguous_doppler.kernels.orders import (
+    BEFORE,
+    COVARIANCE,
+    DISTANCE,
+    FAR,
+    PROBABILITY,
+    ROWS,
+    STATE,
+    mixed,
+    put_six,
+    six,
+    taken,
+    weighed,
+)
+from radarsim.studies.ambiguous_doppler.kernels.records import (
+    BEST,
+    CAME,
+    COUNT,
+    DESIGN,
+    LISTED,
+    MEAN,
+    NONE,
+    OUTPUT,
+    PLOT,
+    RIGHT,
+    UNFOLDED,
+    VELOCITY,
+    WEIGHTS,
+)
+from radarsim.studies.ambiguous_doppler.kernels.records import PROBABILITY as OF_THE_BEST
+from radarsim.studies.ambiguous_doppler.kernels.steps import FARTHEST, moved, prior, put_three, three, velocity_taken
+
+GROUP = 3 * ROWS  # rows of eight hypotheses: of three orders, as `kernels.orders` has them
+BROAD = PLOT + 3  # rows of a plot in all lanes, then the numbers 0 … 7, and two rows of branches
+LEAST_SHARE = 1e-150  # an order's least probability after a range, so that a product with a far velocity's is not zero
+NO_WEIGHT = 1e-200  # a share of the whole below which an order's nearest fold does not count
+LEAST_WEIGHT = 1e-280  # of a branch beside the best
+
+
+@part
+def extreme(values, greatest):
+    """The greatest of a row's eight numbers, or the least."""
+    found = values[0]
+    for i in range(1, WIDTH):
+        found = max(found, values[i]) if greatest else min(found, values[i])
+    return found
+
+
+@part
+def begun(designs, parts, size, lists, old):
+    """One hypothesis before the first scan, in the first group of the list."""
+    zero = full(0.0)
+    for i in range(size):
+        own = row(old, i * ROWS)
+        put_three(own, STATE, (zero, zero, zero))
+        put_six(own, COVARIANCE, prior(row(designs, parts[i] * (DESIGN // WIDTH))))
+        put(own, PROBABILITY, full(1.0 / size))
+    weights = column(lists, 0, 0)
+    for i in range(WIDTH):
+        weights[i] = 1.0 if i == 0 else 0.0
+
+
+@part
+def ranged(designs, parts, size, stay, sigma, plot, moves, groups, old, new, lists):
+    """Mix and move the orders of every hypothesis and take the range: from the list `old` into `new`, and weights."""
+    zero, floor = full(0.0), full(LEAST_SHARE)
+    weights, distances, least = column(lists, 0, 0), column(lists, 0, 1), full(FAR)
+    for g in range(groups):
+        own = row(new, g * GROUP)
+        mixed(row(old, g * GROUP), own, size, stay)
+        for i in range(size):
+            design = row(designs, parts[i] * (DESIGN // WIDTH))
+            taken(row(own, i * ROWS), design, sigma, plot, 1.0, NONE, moves)
+        distance, likelihood = weighed(own, size)
+        for i in range(size):
+            mu = get(row(own, i * ROWS), PROBABILITY)
+            put(row(own, i * ROWS), PROBABILITY, where_greater(mu, floor, mu, floor))
+        w = get(weights, g)
+        put(distances, g, distance)
+        put(weights, g, w * likelihood)
+        distance = where_greater(w, zero, distance, full(FAR))
+        least = where_greater(least, distance, distance, least)
+    put(column(lists, 0, 2), 0, least)
+    nearest_of_all = extreme(column(lists, 0, 2), False)
+    for g in range(groups):
+        off = nearest_of_all - get(distances, g)
+        put(weights, g, get(weights, g) * exponential(0.5 * where_greater(zero, off, off, zero)))
+
+
+@part
+def nearest_branch(size, variance, z, D, groups, new, lists):
+    """`least`, and the greatest term of any p: of an order's nearest fold."""
+    zero, far = full(0.0), full(FAR)
+    weights, best, at = column(lists, 0, 0), column(lists, 0, 1), column(lists, 0, 2)
+    all_ = zero
+    for g in range(groups):
+        all_ = all_ + get(weights, g)
+    whole, least = total(all_), far
+    for g in range(groups):
+        for i in range(size):
+            own = row(new, g * GROUP + i * ROWS)
+            e = z - get(own, STATE + 1)
+            e = e - D * nearest(e / D)
+            share = get(weights, g) * get(own, PROBABILITY)
+            distance = e * e / (get(own, COVARIANCE + 3) + variance)
+            distance = where_greater(share, full(NO_WEIGHT * whole), distance, far)
+            least = where_greater(least, distance, distance, least)
+    put(best, 0, least)
+    of_all, top = extreme(best, False), zero
+    for g in range(groups):
+        for i in range(size):
+            own = row(new, g * GROUP + i * ROWS)
+            S = get(own, COVARIANCE + 3) + variance
+            e = z - get(own, STATE + 1)
+            e = e - D * nearest(e / D)
+            off = 0.5 * (of_all - e * e / S)
+            off = where_greater(zero, off, off, zero)
+            p = get(weights, g) * get(own, PROBABILITY) * exponential(off) / root(S)
+            top = where_greater(p, top, p, top)
+    put(at, 0, top)
+    return of_all, extreme(at, True)
+
+
+@part
+def window(c, v, S, z, D, least, floor, size):
+    """First and last fold of an order that can give a branch of weight `floor`; c its share of p at its prediction."""
+    e = z - v
+    e -= D * math.floor(e / D + 0.5)
+    reach = 0.0
+    if c > 0.0:
+        reach = 2.0 * S * (0.5 * least + math.log(size * c / floor))
+    if reach < e * e:
+        return 1.0, 0.0
+    reach = math.sqrt(min(reach, e * e + FARTHEST * S)) * (1.0 + 1e-12)
+    return math.ceil((v - reach - z) / D), math.floor((v + reach - z) / D)
+
+
+@part
+def branched(size, variance, z, D, prune, most, count, new, plot, lists):
+    """Branch `count` hypotheses over their folds: weights and velocities u of the branches; how many, and the best."""
+    weights = column(lists, 0, 0)
+    branch, found = lists.children, row(lists.children, lists.most // WIDTH)
+    groups = (count + WIDTH - 1) // WIDTH
+    least, top = nearest_branch(size, variance, z, D, groups, new, lists)
+    floor, made, steps = top * max(prune, LEAST_WEIGHT), 0, get(plot, PLOT)
+    at_p, at_u = row(plot, PLOT + 1), row(plot, PLOT + 2)
+    for h in range(count):
+        lane, own = h % WIDTH, row(new, (h // WIDTH) * GROUP)
+        first, last = 1.0, 0.0
+        for i in range(size):
+            order = row(own, i * ROWS)
+            v, S = order[(STATE + 1) * WIDTH + lane], order[(COVARIANCE + 3) * WIDTH + lane] + variance
+            c = weights[h] * order[PROBABILITY * WIDTH + lane] / math.sqrt(S)
+            low, high = window(c, v, S, z, D, least, floor, size)
+            if low <= high:
+                first, last = (low, high) if first > last else (min(first, low), max(last, high))
+        n = first
+        while n <= last:
+            u, p = z + D * (n + steps), full(0.0)
+            for i in range(size):
+                order = row(own, i * ROWS)
+                v, S = order[(STATE + 1) * WIDTH + lane], order[(COVARIANCE + 3) * WIDTH + lane] + variance
+                c, e = weights[h] * order[PROBABILITY * WIDTH + lane] / math.sqrt(S), u - v
+                off = 0.5 * least - (0.5 / S) * (e * e)
+                p = p + c * exponential(where_greater(full(200.0), off, off, full(200.0)))
+            put(at_p, 0, p)
+            put(at_u, 0, u)
+            for i in range(WIDTH):
+                if n + i <= last and at_p[i] >= floor:
+                    if made == lists.most:
+                        floor, made = max(floor, keep_greatest(lists, made, most)), most
+                        if at_p[i] < floor:
+                            continue
+                    branch[made], found[made], lists.parents[made] = at_p[i], at_u[i], h
+                    made += 1
+            n += WIDTH
+    return kept(lists, made, prune, most)
+
+
+@part
+def kept(lists, made, prune, most):
+    """Drop the branches that weigh too little beside the best, and those beyond the number kept: how many, the best."""
+    branch, found = lists.children, row(lists.children, lists.most // WIDTH)
+    top = 0.0
+    for i in range(made):
+        top = max(top, branch[i])
+    count = 0
+    for i in range(made):
+        if branch[i] >= top * prune:
+            branch[count], found[count], lists.parents[count] = branch[i], found[i], lists.parents[i]
+            count += 1
+    if count > most:
+        keep_greatest(lists, count, most)
+        count = most
+    return count, top
+
+
+@part
+def inherited(size, variance, count, top, new, old, lists):
+    """Write `count` branches into the list `old`, with their velocities taken, and their weights."""
+    weights = column(lists, 0, 0)
+    branch, found, one = lists.children, row(lists.children, lists.most // WIDTH), full(1.0)
+    groups = (count + WIDTH - 1) // WIDTH
+    for i in range(groups * WIDTH):
+        j = lists.parents[i] if i < count else lists.parents[0]
+        to, of = row(old, (i // WIDTH) * GROUP), row(new, (j // WIDTH) * GROUP)
+        for r in range(size * ROWS):
+            to[r * WIDTH + i % WIDTH] = of[r * WIDTH + j % WIDTH]
+        weights[i] = branch[i] / top if i < count else 0.0
+        if i >= count:
+            found[i] = found[0]
+    for g in range(groups):
+        own, u = row(old, g * GROUP), get(found, g)
+        for i in range(size):
+            order = row(own, i * ROWS)
+            x, e = three(order, STATE), u - get(order, STATE + 1)
+            P, S, gain = velocity_taken(six(order, COVARIANCE), one, variance)
+            put_three(order, STATE, moved(x, gain, e))
+            put_six(order, COVARIANCE, P)
+            put(order, BEFORE, get(order, PROBABILITY))
+            put(order, PROBABILITY, one / root(S))
+            put(order, DISTANCE, e * e / S)
+        weighed(own, size)
+
+
+@part
+def put_estimates(size, orders, count, right, states, lists, to):
+    """Write this lane of the output: means over hypotheses and orders, the best hypothesis, whether it is right."""
+    weights, zero = column(lists, 0, 0), full(0.0)
+    best, sum_, of_orders = 0, zero, (zero, zero, zero)
+    x0, x1, x2 = zero, zero, zero
+    for i in range(count):
+        best = i if weights[i] > weights[best] else best
+    for g in range((count + WIDTH - 1) // WIDTH):
+        w = get(weights, g)
+        sum_ = sum_ + w
+        for i in range(size):
+            order = row(states, g * GROUP + i * ROWS)
+            share, y = w * get(order, PROBABILITY), three(order, STATE)
+            x0, x1, x2 = x0 + share * y[0], x1 + share * y[1], x2 + share * y[2]
+            of_orders = (
+                of_orders[0] + (share if orders[i] == 0 else zero),
+                of_orders[1] + (share if orders[i] == 1 else zero),
+                of_orders[2] + (share if orders[i] == 2 else zero),
+            )
+    whole = total(sum_)
+    to[MEAN * WIDTH], to[(MEAN + 1) * WIDTH], to[(MEAN + 2) * WIDTH] = (
+        total(x0) / whole,
+        total(x1) / whole,
+        total(x2) / whole,
+    )
+    to[WEIGHTS * WIDTH] = total(of_orders[0]) / whole
+    to[(WEIGHTS + 1) * WIDTH] = total(of_orders[1]) / whole
+    to[(WEIGHTS + 2) * WIDTH] = total(of_orders[2]) / whole
+    for c in range(3):
+        y = 0.0
+        for i in range(size):
+            order = row(states, (best // WIDTH) * GROUP + i * ROWS)
+            y += order[PROBABILITY * WIDTH + best % WIDTH] * order[(STATE + c) * WIDTH + best % WIDTH]
+        to[(BEST + c) * WIDTH] = y
+    to[RIGHT * WIDTH] = 1.0 if best == right else 0.0
+    to[LISTED * WIDTH] = 1.0 if right >= 0 else 0.0
+    to[COUNT * WIDTH] = count
+    to[OF_THE_BEST * WIDTH] = weights[best] / whole
+
+
+@part
+def run_together(designs, parts, orders, size, stay, most, prune, sigma, spans, plots, out, memory, plot, lists):
+    """Orders that interact within remembered hypotheses, over all scans of one realisation.
+
+    plots, out are addresses of its lane; memory has room for two lists of groups, plot for BROAD rows.
+    """
+    variance = sigma[1] * sigma[1]
+    old, new = row(memory, 0), row(memory, (lists.room // WIDTH) * GROUP)
+    begun(designs, parts, size, lists, old)
+    count, right = 1, 0
+    for i in range(WIDTH):
+        plot[PLOT * WIDTH + i] = i
+    for k in range(spans.size):
+        here, D = row(plots, k * PLOT), spans[k]
+        for i in range(PLOT):
+            put(plot, i, full(here[i * WIDTH]))
+        groups = (count + WIDTH - 1) // WIDTH
+        ranged(designs, parts, size, stay, sigma, plot, k > 0, groups, old, new, lists)
+        if here[CAME * WIDTH] > 0.0:
+            made, top = branched(size, variance, here[VELOCITY * WIDTH], D, prune, most, count, new, plot, lists)
+            found, is_right = row(lists.children, lists.most // WIDTH), -1
+            for i in range(made):
+                if lists.parents[i] == right and abs(found[i] - here[UNFOLDED * WIDTH]) < 0.5 * D:
+                    is_right = i
+            right, count = is_right, made
+            inherited(size, variance, count, top, new, old, lists)
+        else:
+            old, new = new, old
+        put_estimates(size, orders, count, right, old, lists, row(out, k * OUTPUT))
