@@ -6,11 +6,11 @@ import numpy as np
 
 from radarsim.engine.results import Track
 from radarsim.report import panels
-from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
+from radarsim.report.drawing import COLUMN_MM, GREY, PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
 from radarsim.report.statistics import Z95
 
 TIME = Axis("time, s")
-PLOT = Style(7, None, 0, size_pt=1.6)
+PLOT = Style(GREY, None, 0, size_pt=1.6)
 MOST_FILTERS = 8
 MOST_DOTS = 300  # of a filter in a panel of residuals
 

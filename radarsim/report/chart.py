@@ -13,15 +13,16 @@ from markupsafe import Markup
 from radarsim.report import chart_look as look
 from radarsim.report import chart_pieces as pieces
 from radarsim.report.chart_pieces import SIZE
-from radarsim.report.chart_scale import Scale, scale, tick_text
+from radarsim.report.chart_scale import Scale, equal, heat_scale, scale, tick_text
 from radarsim.report.chart_text import html, spoken
 from radarsim.report.drawing import Bars, Figure, Heat, Line, Mark, Note, Panel, Reference, Style
 
 WIDTH, HEIGHT = 440.0, 280.0  # of a panel, in units of the SVG
 LETTER = 0.62 * SIZE  # mean width of one
 RIGHT, BOTTOM = 12.0, 44.0
-MARKED = 12  # at most about so many markers or crosses a line
+MARKED = 16  # at most about so many markers or crosses a line
 POINTS = 400  # of a line; a panel is as many units wide
+Heats = dict[str, tuple[float, float, bool]]  # of maps with the same words: least, largest value, logarithmic or not
 SEEN = 0.7  # units from the line from which its band is drawn
 
 
@@ -60,7 +61,9 @@ def chart(figure: Figure, points: int = POINTS) -> Chart:
     for mark in (m for panel in shown for m in panel.marks if isinstance(m, Line) and named(m)):
         groups.setdefault(named(mark), mark.style)
     numbers = {name: n for n, name in enumerate(groups)}
-    panels = tuple(_panel(figure, panel, numbers, points) for panel in shown)
+    maps = [mark for panel in shown for mark in panel.marks if isinstance(mark, Heat)]
+    heats = {one.label: heat_scale([m.values for m in maps if m.label == one.label]) for one in maps}
+    panels = tuple(_panel(figure, panel, numbers, points, heats) for panel in shown)
     switches = tuple(Switch(n, html(name), pieces.sample(groups[name])) for name, n in numbers.items())
     return Chart(panels, switches, len(panels) > 1)
 
@@ -70,8 +73,8 @@ def named(line: Line) -> str:
     return line.name or line.label
 
 
-def _panel(figure: Figure, panel: Panel, numbers: dict[str, int], points: int) -> Drawn:
-    frame = _Frame(panel)
+def _panel(figure: Figure, panel: Panel, numbers: dict[str, int], points: int, heats: Heats) -> Drawn:
+    frame = _Frame(panel, heats)
     marks = Markup("").join(frame.draw(mark, numbers, points) for mark in panel.marks)
     whole = " – ".join(filter(None, (spoken(figure.title), spoken(panel.title))))
     axes = f"{spoken(panel.y.label)} against {spoken(panel.x.label)}"
@@ -87,7 +90,8 @@ def _panel(figure: Figure, panel: Panel, numbers: dict[str, int], points: int) -
 class _Frame:
     """A panel's axes, and the marks put into them."""
 
-    def __init__(self, panel: Panel):
+    def __init__(self, panel: Panel, heats: Heats):
+        self.heats = heats
         self.panel, extent = panel, [pieces.extent(mark) for mark in panel.marks]
         if any(isinstance(mark, Heat | Bars) for mark in panel.marks):
             panel = self.panel = pieces.by_number(panel)
@@ -99,6 +103,9 @@ class _Frame:
         widest = max((len(line) for _, text in self.y_ticks for line in text.split("\n")), default=1)
         self.left = max(30.0, 12.0 + LETTER * min(widest, 22))
         self.x: Scale = scale(panel.x, [x for x, _ in extent], "x", self.left, WIDTH - RIGHT)
+        if panel.equal:
+            self.x, self.y = equal(self.x, self.y)
+            self.y_ticks = list(panel.y.ticks) or self.y.ticks(5)
         self.x_ticks = list(panel.x.ticks) or self.x.ticks(6)
         ends = [[s.log, *(float(f"{v:.9g}") for v in (s.low, s.high, s.start, s.end))] for s in (self.x, self.y)]
         labels = {"xl": spoken(panel.x.label), "yl": spoken(panel.y.label)}
@@ -158,7 +165,8 @@ class _Frame:
         if line.style.marker is not None:
             made += pieces.markers(pieces.places(x[::step], y[::step]), line.style)
         if "exact" in whole:
-            known = pieces.places(x[step // 2 :: step], self.y.place(whole["exact"])[step // 2 :: step])
+            first = 0 if step == 1 else step // 2  # of many, markers and crosses by turns
+            known = pieces.places(x[first::step], self.y.place(whole["exact"])[first::step])
             made += Markup('<path class="x" d="{}"/>').format(
                 "".join(f"M{a:.1f} {b:.1f}{look.CROSS}" for a, b in known)
             )
@@ -220,13 +228,14 @@ class _Frame:
         return Markup("<g{}>{}</g>").format(pieces.ink(bars.style), made)
 
     def _heat(self, heat: Heat) -> Markup:
-        low, high = np.nanmin(heat.values), np.nanmax(heat.values)
+        low, high, log = self.heats[heat.label]
+        shades = Scale(log, low, high if high > low else low + 1, 0.0, 1.0).place(heat.values)
         wide, deep = abs(self.x.place(1.0) - self.x.place(0.0)), abs(self.y.place(1.0) - self.y.place(0.0))
         few, made = heat.values.size <= 60, Markup("")
         for (i, j), value in np.ndenumerate(heat.values):
             if not np.isfinite(value):
                 continue
-            colour = look.mixed(look.HEAT, (value - low) / ((high - low) or 1.0))
+            colour = look.mixed(look.HEAT, float(shades[i, j]))
             x, y = float(self.x.place(j)), float(self.y.place(i))
             made += Markup('<path fill="{}" d="M{:.1f} {:.1f}h{:.1f}v{:.1f}h{:.1f}z"/>').format(
                 colour, x - wide / 2, y - deep / 2, wide, deep, -wide

@@ -5,12 +5,17 @@ Every colour stands out from its page by 3 : 1 at least (WCAG 2.2, 1.4.11); dash
 
 import numpy as np
 
-from radarsim.report.drawing import Style
+from radarsim.report.drawing import GREY, Style
 
-COLOURS = (
-    *(("#14213d", "#e8edf5"), ("#0a6ebd", "#5cb3f5"), ("#c8440b", "#ff8f5e"), ("#1b7f55", "#4fce97")),
-    *(("#a0529f", "#dc9bdb"), ("#946800", "#e3b341"), ("#2a7f9e", "#7fd3ee"), ("#6b6b6b", "#a9a9a9")),
+# Ten even steps of lightness, on a light page and on a dark one, with hues found by search so that every two are told
+# apart in grey and under protanopia, deuteranopia and tritanopia (CIEDE2000; tests/report/test_colours.py).
+LADDER = (
+    *(("#2d0257", "#fefa41"), ("#5c0126", "#beefad"), ("#0810ba", "#6de1fd"), ("#881800", "#cebeca")),
+    *(("#074dae", "#27cba1"), ("#7d0af9", "#c4a50d"), ("#437a04", "#829bc7"), ("#756cd8", "#a78662")),
+    *(("#109b4d", "#598783"), ("#fe5292", "#6c753e")),
 )
+COLOURS = tuple(LADDER[i] for i in (0, 6, 3, 9, 4, 8, 1, 7, 2, 5))  # in the order of use: few curves lie far apart
+NEUTRAL = ("#6b6b6b", "#a9a9a9")  # of what is no curve of its own
 SHADES = (  # of an ordered scale, least to most
     ("#440154", "#3b528b", "#2a788e", "#1f9a6e", "#4f8a10"),
     ("#8c8cf0", "#4fa3e0", "#35b7a0", "#7ad151", "#fde725"),
@@ -39,6 +44,8 @@ def ink(style: Style) -> tuple[str, str]:
     """The colour of a style on a light and on a dark page."""
     if isinstance(style.colour, float):
         return mixed(SHADES[0], style.colour), mixed(SHADES[1], style.colour)
+    if style.colour == GREY:
+        return NEUTRAL
     return COLOURS[style.colour % len(COLOURS)]
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,8 @@ from radarsim.report.text import number, power_of_ten
 MARGIN = {"x": 0.02, "y": 0.06}  # of the span of the data, on either side
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 TICK_DIGITS = 6
+WIDE = 20.0  # largest over least value of maps from which their colours go by the logarithm
+FURTHER = 3  # ticks more than wanted that a logarithmic axis may have
 MOST_DECADES = 7  # labelled on a logarithmic axis
 
 
@@ -39,7 +41,7 @@ class Scale:
     def ticks(self, wanted: int) -> list[tuple[float, str]]:
         """About `wanted` round values inside the axis, with their text."""
         if self.log and self.high / self.low >= 10:
-            return decades(self.low, self.high)
+            return decades(self.low, self.high, wanted)
         return [(v, tick_text(v)) for v in steps(self.low, self.high, wanted)]
 
 
@@ -72,14 +74,14 @@ def steps(low: float, high: float, wanted: int) -> list[float]:
     return [n * step for n in range(first, last + 1)]
 
 
-def decades(low: float, high: float) -> list[tuple[float, str]]:
-    """Powers of ten, and of few of them 2 and 5 times as well."""
+def decades(low: float, high: float, wanted: int) -> list[tuple[float, str]]:
+    """Powers of ten, and 2 and 5 times as well where these are not many more than wanted."""
     first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
     stride = max(1, -(-(last - first + 1) // MOST_DECADES))
     ticks = [(10.0**n, power(n)) for n in range(first, last + 1, stride)]
-    if len(ticks) > 3:
-        return ticks
     fine = [m * 10.0**n for n in range(first - 1, last + 1) for m in (2, 5) if low <= m * 10.0**n <= high]
+    if stride > 1 or len(ticks) + len(fine) > wanted + FURTHER:
+        return ticks
     return sorted([*ticks, *((v, tick_text(v)) for v in fine)])
 
 
@@ -91,3 +93,22 @@ def power(n: int) -> str:
 def tick_text(value: float) -> str:
     """A tick's number: at most six digits, a true minus, powers of ten raised."""
     return number(value, TICK_DIGITS)
+
+
+def heat_scale(parts: Sequence[np.ndarray]) -> tuple[float, float, bool]:
+    """Least and largest of the values of maps side by side, and whether their colours go by the logarithm."""
+    values = np.concatenate([np.zeros(0), *map(np.ravel, parts)])
+    values = values[np.isfinite(values)]
+    low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
+    return low, high, bool(low > 0 and high > WIDE * low)
+
+
+def equal(x: Scale, y: Scale) -> tuple[Scale, Scale]:
+    """Two linear scales with as many units to a place each: the one with the smaller span sees more, to both sides."""
+    per_place = max((one.high - one.low) / abs(one.end - one.start) for one in (x, y))
+
+    def widened(one: Scale) -> Scale:
+        more = (per_place * abs(one.end - one.start) - (one.high - one.low)) / 2
+        return replace(one, low=one.low - more, high=one.high + more)
+
+    return widened(x), widened(y)

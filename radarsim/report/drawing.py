@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 COLUMN_MM = 85.0  # one column of a journal page
 PAGE_MM = 175.0  # two columns
+GREY = -1  # the colour of what is no curve of its own: guides, crowds of points
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ class Axis:
 class Style:
     """How a mark is distinguished, in grey too: each number picks from a list of its own.
 
-    colour: an int picks a distinct colour, a float from 0 to 1 a shade of an ordered scale. dash and marker: ints,
-    None for no line or no marker. flat: a line ends where its data end, as a bar does, however wide it is.
+    colour: an int picks a distinct colour, GREY none of these, a float from 0 to 1 a shade of an ordered scale. dash
+    and marker: ints, None for no line or no marker. flat: a line ends where its data end, as a bar does, however wide.
     """
 
     colour: int | float = 0
@@ -111,9 +112,10 @@ Mark = Line | Reference | Bars | Heat | Note
 class Panel:
     """One pair of axes. keys explain styles (not single lines) in a small legend: (words, style).
 
-    direct: lines are named at their ends where the names fit; else always in the legend, at its place, "none", or
-    "right", beside the panel. A remark stands above the panel, at its right. Without marks a panel is its legend alone.
-    crosses is what the crosses of exact values are called.
+    direct: lines are named at their ends where the names fit; else always in the figure's legend, which stands below
+    the panels; "right": beside a single panel; "none": they are named in another panel. A remark stands above the
+    panel, at its right. Without marks a panel adds its keys to the legend. crosses is what the crosses of exact values
+    are called. equal: x and y are drawn at one scale, as a map.
     """
 
     x: Axis
@@ -126,6 +128,7 @@ class Panel:
     legend: str = "best"
     remark: str = ""
     crosses: str = "exact"
+    equal: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,12 @@
 """Draws report/drawing.py's figures in the one style of this project. The only file that knows Matplotlib.
 
-Legible in grey: colours fall in lightness, and dash and marker tell the same apart. The bytes of an SVG depend on the
-data and on the versions of Matplotlib and its fonts alone.
+Legible in grey: the colours are steps of lightness, and dash and marker tell the same apart. The bytes of an SVG depend
+on the data and on the versions of Matplotlib and its fonts alone.
 """
 
 import io
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -14,25 +14,33 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import XAxis, YAxis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LogNorm, Normalize, to_hex, to_rgb
 from matplotlib.figure import Figure as Canvas
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import FuncFormatter, Locator, NullFormatter
 
+from radarsim.report import chart_look, legends
+from radarsim.report.chart_look import contrast
+from radarsim.report.chart_scale import Scale, heat_scale, tick_text
+from radarsim.report.chart_text import spoken
+from radarsim.report.drawing import Axis as Ends
 from radarsim.report.drawing import Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 
+Colours = dict[str, Normalize]  # of maps, by the words of their bars
 MM = 1 / 25.4
 PNG_DPI = 200
-COLOURS = ("#14213d", "#0a6ebd", "#c8440b", "#1b8a5a", "#a65fa8", "#c98a00", "#4aa3c7", "#8a8a8a")
+COLOURS = tuple(light for light, _ in chart_look.COLOURS)
 DASHES = ("-", (0, (5, 1.8)), (0, (1.3, 1.3)), (0, (6, 1.6, 1.3, 1.6)), (0, (9, 2.5)), (0, (3, 1.2, 1, 1.2, 1, 1.2)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", "h", ">", "d", "p")  # no multiple of the colours
 POINTS = 2000  # of a line; longer ones are drawn at every n-th scan
-LONGEST_AT_END = 28  # letters of a name that may stand at a line's end
-TITLE_LETTERS_PER_MM = 0.49  # of a panel's cell with its axis, in the bold of titles
-MOST_IN_COLUMN = 10  # names in one column of a legend
+TITLE_LETTERS_PER_MM = 0.45  # of a panel's cell with its axis, in the bold of titles
+LABEL_LETTERS_PER_MM = 0.62  # of an axis' side, in the letters of labels
 MARKED = 16  # at most about so many markers or crosses a line
+WHOLE = (0, 1)  # limits of a share
 EXACT: dict[str, Any] = {
     "linestyle": "none",
     "marker": "+",
@@ -83,25 +91,36 @@ def _unknown_letters_pass() -> Iterator[None]:
 
 
 def _laid_out(figure: Figure) -> Canvas:
-    rows = -(-len(figure.panels) // figure.columns)
-    size = (figure.width_mm * MM, rows * figure.panel_height_mm * MM)
+    plan = legends.named(figure)
+    columns = min(figure.columns, len(plan.panels))
+    rows = -(-len(plan.panels) // columns)
+    height = rows * figure.panel_height_mm
+    free = rows * columns > len(plan.panels)  # a cell: the legend has it, where it is large enough
+    common = plan.common
+    inside = common is not None and free and common.height_mm(figure.width_mm / columns) < figure.panel_height_mm
+    if common is not None and not inside and not plan.beside:
+        height += common.height_mm(figure.width_mm)
     layout = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.05)
-    canvas = Canvas(figsize=size, dpi=PNG_DPI, layout=layout)
+    canvas = Canvas(figsize=(figure.width_mm * MM, height * MM), dpi=PNG_DPI, layout=layout)
     FigureCanvasAgg(canvas)
-    grid = canvas.subplots(rows, figure.columns, squeeze=False, sharey=figure.share_y)
+    grid = canvas.subplots(rows, columns, squeeze=False, sharey=figure.share_y)
     ended: list[list[Annotation]] = []
-    explained = False  # crosses are explained once a figure
-    letters = TITLE_LETTERS_PER_MM * figure.width_mm / figure.columns
-    for axes, panel in zip(grid.flat, figure.panels, strict=False):
-        panel = replace(panel, title=wrapped(panel.title, letters))
-        crosses = not explained and any(isinstance(m, Line) and m.exact is not None for m in panel.marks)
-        explained |= crosses
-        if panel.marks:
-            ended.append(_draw(axes, panel, crosses))
-        else:
-            _legend(axes, panel, list(panel.keys), False)
-    for axes in grid.flat[len(figure.panels) :]:
-        axes.set_visible(False)
+    letters = TITLE_LETTERS_PER_MM * figure.width_mm / columns
+    maps = common_colours(plan.panels)
+    for n, (axes, panel) in enumerate(zip(grid.flat, plan.panels, strict=False)):
+        x, y = _wrapped(panel.x, figure.width_mm / columns), _wrapped(panel.y, figure.panel_height_mm - 5)
+        fitted = replace(panel, title=wrapped(panel.title, letters), x=x, y=y)
+        _draw(axes, fitted, maps)
+        ended.append(_at_ends(axes, panel) if plan.at_ends[n] else [])
+        _legend(axes, plan.own[n], 1, loc="best")
+    for axes in grid.flat[len(plan.panels) :]:
+        axes.set_axis_off()
+    if plan.beside:
+        _legend(grid.flat[0], common, 1, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    elif inside and common is not None:
+        _legend(grid.flat[len(plan.panels)], common, common.columns(figure.width_mm / columns), loc="center")
+    elif common is not None:
+        _legend(canvas, common, common.columns(figure.width_mm), loc="outside lower center")
     layout.execute(canvas)
     canvas.set_layout_engine(None)  # not "none": an engine that does nothing still has savefig draw everything twice
     for texts in ended:
@@ -109,15 +128,23 @@ def _laid_out(figure: Figure) -> Canvas:
     return canvas
 
 
-def wrapped(title: str, letters: float) -> str:
-    """A title in lines of at most so many letters, broken after commas alone."""
+def _wrapped(axis: Ends, side_mm: float) -> Ends:
+    """An axis whose label is broken between words where it is longer than its side."""
+    return replace(axis, label=wrapped(axis.label, LABEL_LETTERS_PER_MM * side_mm, " "))
+
+
+def wrapped(text: str, letters: float, mark: str = ", ") -> str:
+    """Words in lines of at most so many letters, broken at a mark, of text without one between words."""
+    if len(spoken(text)) <= letters or "\n" in text:
+        return text
+    mark = mark if mark in text else " "
     lines: list[str] = []
-    for part in title.split(", "):
-        if lines and len(lines[-1]) + 2 + len(part) <= letters:
-            lines[-1] += f", {part}"
+    for part in text.split(mark):
+        if lines and len(spoken(lines[-1])) + len(mark) + len(spoken(part)) <= letters:
+            lines[-1] += f"{mark}{part}"
         else:
             lines.append(part)
-    return ",\n".join(lines)
+    return f"{mark.rstrip()}\n".join(lines)
 
 
 def save(figure: Figure, formats: Iterable[str] = ("svg", "png")) -> dict[str, bytes]:
@@ -135,11 +162,8 @@ def _bytes(canvas: Canvas, kind: str, name: str) -> bytes:
     return out.getvalue()
 
 
-def _draw(axes: Axes, panel: Panel, crosses: bool) -> list[Annotation]:
-    """Draw a panel, with a key to exact crosses or not.
-
-    The texts written at line ends come back, to be moved apart once the layout stands.
-    """
+def _draw(axes: Axes, panel: Panel, maps: Colours) -> None:
+    """Draw a panel's marks and axes."""
     axes.set_xscale(panel.x.scale)
     axes.set_yscale(panel.y.scale)
     axes.margins(x=0.02)
@@ -152,29 +176,59 @@ def _draw(axes: Axes, panel: Panel, crosses: bool) -> list[Annotation]:
             case Bars():
                 _bars(axes, mark)
             case Heat():
-                _heat(axes, mark)
+                _heat(axes, mark, maps)
             case Note():
                 _note(axes, mark)
     axes.set_xlabel(panel.x.label)
     axes.set_ylabel(panel.y.label)
     axes.set_title(panel.title, loc="left", fontweight="bold")
-    for limits, axis, put in ((panel.x.limits, panel.x, axes.set_xlim), (panel.y.limits, panel.y, axes.set_ylim)):
+    for limits, put in ((panel.x.limits, axes.set_xlim), (panel.y.limits, axes.set_ylim)):
         if limits != (None, None):
             put(*limits)
-        if axis.ticks:
-            where, labels = zip(*axis.ticks, strict=True)
-            (axes.set_xticks if axis is panel.x else axes.set_yticks)(where, labels)
-            (axes.xaxis if axis is panel.x else axes.yaxis).set_minor_formatter(NullFormatter())
+    if panel.equal:
+        axes.set_aspect("equal", adjustable="datalim")
+    placed = any(isinstance(mark, Bars | Heat) for mark in panel.marks)
+    _ticks(axes.xaxis, panel.x, placed)
+    _ticks(axes.yaxis, panel.y, any(isinstance(mark, Heat) for mark in panel.marks))
+    if panel.y.limits == WHOLE and panel.x.limits[1] is None:  # a share of one is drawn whole
+        for line in axes.lines:
+            line.set_clip_on(False)
     if panel.remark:
         axes.set_title(panel.remark, loc="right", fontsize=7)
-    return _name(axes, panel, crosses)
+
+
+def _ticks(side: XAxis | YAxis, axis: Ends, placed: bool) -> None:
+    """The ticks of an axis: those given; those that its bars or its map have set; else round values."""
+    if axis.ticks:
+        where, labels = zip(*axis.ticks, strict=True)
+        side.set_ticks(where, labels)
+    elif not placed:
+        side.set_major_locator(Round(axis.scale == "log", 6 if side.axis_name == "x" else 5))
+        side.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
+    side.set_minor_formatter(NullFormatter())
+
+
+class Round(Locator):
+    """Ticks at the round values that the page's charts have too (report/chart_scale.py)."""
+
+    def __init__(self, log: bool, wanted: int):
+        self.log, self.wanted = log, wanted
+
+    def __call__(self) -> list[float]:
+        assert self.axis is not None  # Matplotlib sets it before it asks
+        return self.tick_values(*self.axis.get_view_interval())
+
+    def tick_values(self, vmin: float, vmax: float) -> list[float]:
+        """The ticks between two ends."""
+        low, high = sorted((float(vmin), float(vmax)))
+        return [value for value, _ in Scale(self.log, low, high, 0.0, 1.0).ticks(self.wanted)]
 
 
 def _colour(style: Style) -> str | tuple[float, float, float, float]:
     if isinstance(style.colour, float):
         red, green, blue, alpha = matplotlib.colormaps["viridis"](0.72 * style.colour)
         return red, green, blue, alpha
-    return COLOURS[style.colour % len(COLOURS)]
+    return chart_look.ink(style)[0]
 
 
 def _look(style: Style) -> dict[str, Any]:
@@ -190,11 +244,19 @@ def _look(style: Style) -> dict[str, Any]:
     }
 
 
+def readable(colour: Any) -> str:
+    """A colour for letters: darkened until it stands out from white by 4.5 : 1 (WCAG 2.2)."""
+    shade, (red, green, blue) = 1.0, to_rgb(colour)
+    while contrast(dark := to_hex((shade * red, shade * green, shade * blue)), "#ffffff") < 4.5:
+        shade *= 0.97
+    return dark
+
+
 def _line(axes: Axes, line: Line) -> None:
     line = _thinned(line)
-    step = 1 if line.style.dash is None else max(1, -(-len(line.x) // MARKED))
     scattered = line.style.dash is None
-    every = step if line.exact is None or scattered else 2 * step  # markers and crosses by turns
+    step = 1 if scattered else max(1, -(-len(line.x) // MARKED))
+    every = step if line.exact is None or step == 1 else 2 * step  # of many, markers and crosses by turns
     axes.plot(line.x, line.y, markevery=every, zorder=3, **_look(line.style))
     if line.lo is not None and line.hi is not None:
         if line.style.dash is None:
@@ -202,7 +264,7 @@ def _line(axes: Axes, line: Line) -> None:
         else:
             axes.fill_between(line.x, line.lo, line.hi, color=_colour(line.style), alpha=0.25, linewidth=0, zorder=2)
     if line.exact is not None:
-        first = 0 if scattered else step
+        first = 0 if step == 1 else step
         axes.plot(line.x[first::every], line.exact[first::every], zorder=4, **EXACT)
 
 
@@ -234,18 +296,32 @@ def _bars(axes: Axes, bars: Bars) -> None:
     axes.grid(False, axis="x")
 
 
-def _heat(axes: Axes, heat: Heat) -> None:
-    drawn = axes.pcolormesh(
-        np.arange(len(heat.x)), np.arange(len(heat.y)), heat.values, cmap="viridis", shading="nearest"
-    )
+def common_colours(panels: Sequence[Panel]) -> Colours:
+    """The colours of maps: one scale for all of a figure whose bars have the same words."""
+    values: dict[str, list[np.ndarray]] = {}
+    for mark in (mark for panel in panels for mark in panel.marks if isinstance(mark, Heat)):
+        values.setdefault(mark.label, []).append(np.ravel(mark.values))
+    scales: Colours = {}
+    for label, parts in values.items():
+        low, high, log = heat_scale(parts)
+        scales[label] = LogNorm(low, high) if log else Normalize(low, high)
+    return scales
+
+
+def _heat(axes: Axes, heat: Heat, maps: Colours) -> None:
+    norm = maps[heat.label]
+    where = np.arange(len(heat.x)), np.arange(len(heat.y))
+    drawn = axes.pcolormesh(*where, heat.values, cmap="viridis", norm=norm, shading="nearest")
     axes.set_xticks(np.arange(len(heat.x)), [f"{v:g}" for v in heat.x])
     axes.set_yticks(np.arange(len(heat.y)), [f"{v:g}" for v in heat.y])
     axes.grid(False)
-    axes.figure.colorbar(drawn, ax=axes, label=heat.label)
+    bar = axes.figure.colorbar(drawn, ax=axes, label=heat.label)
+    _ticks(bar.ax.yaxis, Ends("", "log" if isinstance(norm, LogNorm) else "linear"), False)
     if heat.values.size <= 100:
-        middle = (np.nanmin(heat.values) + np.nanmax(heat.values)) / 2
         for (i, j), value in np.ndenumerate(heat.values):
-            axes.text(j, i, f"{value:.3g}", ha="center", va="center", color="white" if value < middle else "black")
+            if np.isfinite(value):
+                ink = "white" if norm(value) < 0.5 else "black"
+                axes.text(j, i, f"{value:.3g}", ha="center", va="center", color=ink, fontsize=7)
 
 
 def _note(axes: Axes, note: Note) -> None:
@@ -255,22 +331,10 @@ def _note(axes: Axes, note: Note) -> None:
     axes.annotate(note.text, (note.x, note.y), xytext=shift, textcoords="offset points", **look)
 
 
-def _name(axes: Axes, panel: Panel, crosses: bool) -> list[Annotation]:
-    """Name the lines, at their ends where there are few enough, else in a legend, and explain the styles in a legend.
-
-    Gives the names at line ends.
-    """
-    lines = [m for m in panel.marks if isinstance(m, Line) and m.label and np.isfinite(m.y).any()]
-    handles = list(panel.keys)
-    short = all(len(m.label) <= LONGEST_AT_END for m in lines)
-    direct = panel.direct and short and all(m.style.dash is not None for m in lines) and len(lines) <= _fitting(axes)
-    if not direct:
-        handles = [(m.label, m.style) for m in lines] + handles
-    _legend(axes, panel, handles if panel.legend != "none" else [], crosses)
-    if not direct:
-        return []
+def _at_ends(axes: Axes, panel: Panel) -> list[Annotation]:
+    """The names of a panel's lines, written at their ends; to be moved apart once the layout stands."""
     texts = []
-    for m in lines:
+    for m in legends.lines(panel):
         last = np.flatnonzero(np.isfinite(m.y))[-1]
         texts.append(
             axes.annotate(
@@ -279,38 +343,22 @@ def _name(axes: Axes, panel: Panel, crosses: bool) -> list[Annotation]:
                 xytext=(1.015, m.y[last]),
                 textcoords=axes.get_yaxis_transform(),
                 va="center",
-                color=_colour(m.style),
+                color=readable(_colour(m.style)),
                 annotation_clip=False,
             )
         )
     return texts
 
 
-def _legend(axes: Axes, panel: Panel, handles: list[tuple[str, Style]], crosses: bool) -> None:
-    """A legend of names and styles, with the exact crosses where asked; of a panel without marks in its middle."""
-    look = [Line2D([], [], **_look(style)) for _, style in handles] + [Line2D([], [], **EXACT)] * crosses
-    names = [name for name, _ in handles] + [panel.crosses] * crosses
-    if not names:
+def _legend(where: Axes | Canvas, legend: legends.Legend | None, columns: int, **place: Any) -> None:
+    """Names and styles, the exact crosses among them, in so many columns."""
+    if legend is None:
         return
-    place: dict[str, Any] = {"loc": "best" if panel.legend == "none" else panel.legend}
-    if not panel.marks:
-        axes.set_axis_off()
-        place = {"loc": "center"}
-    elif panel.legend == "right":
-        place = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
-    room: dict[str, Any] = {"ncols": -(-len(names) // MOST_IN_COLUMN), "borderaxespad": 0.3, "labelspacing": 0.3}
-    legend = axes.legend(look, names, title=panel.key_title or None, alignment="left", **place, **room)
-    # Inside the panel it may not push it to nothing; beside it, it takes its room.
-    legend.set_in_layout(panel.legend == "right")
-
-
-def _fitting(axes: Axes) -> int:
-    """How many labels of one line fit one below the other beside a panel."""
-    canvas, place = axes.figure, axes.get_subplotspec()
-    assert isinstance(canvas, Canvas)  # and no part of one
-    assert place is not None  # every panel is a cell of its figure
-    height = canvas.get_size_inches()[1] / place.get_gridspec().nrows
-    return int(0.75 * height * 72 / (1.25 * STYLE["font.size"]))
+    handles = [Line2D([], [], **(EXACT if look is None else _look(look))) for look in legend.keys.values()]
+    room: dict[str, Any] = {"ncols": columns, "borderaxespad": 0.3, "labelspacing": 0.3, "columnspacing": 1.2}
+    drawn = where.legend(handles, list(legend.keys), title=legend.title or None, alignment="left", **place, **room)
+    # Inside a panel it may not push it to nothing; beside it, it takes its room.
+    drawn.set_in_layout(isinstance(where, Canvas) or "bbox_to_anchor" in place)
 
 
 def _spread(texts: list[Annotation]) -> None:

@@ -20,9 +20,12 @@ if TYPE_CHECKING:
 
 WIDE_MM = 120.0  # one panel of many lines
 MOST_AT_ENDS = 6  # lines of one panel named at their ends; more by colour and dash
-MOST = 8  # cases a figure shows; more are named in its caption
+MOST = 8  # cases of a panel; more are named in its caption
+MOST_PANELS = 12
+WIDE = 30  # largest over least value from which an axis is logarithmic
 LONGEST_INSIDE = 28  # letters of a name that may stand in a legend inside a panel of many lines
 GREEK = {"b": "\\beta", "e": "\\varepsilon"}  # bearing and elevation, as the components' names begin or end
+DEGREES = 180 / np.pi
 POWERS = ("manoeuvre_variance",)  # swept keys that are read as powers of ten
 
 
@@ -117,6 +120,19 @@ def letter(component: str) -> str:
     return f"${found[1]}_{base}$" if found[1] else f"${base}$"
 
 
+def in_degrees(unit: str) -> tuple[float, str]:
+    """The factor by which an angle, or its rate, is shown, and its unit: degrees for radians; others as they are."""
+    return (DEGREES, unit.replace("rad", "°", 1)) if unit == "rad" or unit.startswith("rad/") else (1.0, unit)
+
+
+def scaled(line: Line, factor: float) -> Line:
+    """A line in another unit."""
+    if factor == 1.0:
+        return line
+    parts = {name: getattr(line, name) for name in ("y", "lo", "hi", "exact")}
+    return replace(line, **{name: part * factor for name, part in parts.items() if part is not None})
+
+
 def with_unit(words: str, unit: str) -> str:
     """An axis' words with their unit, where there is one."""
     return ", ".join(filter(None, (words, unit_of(unit))))
@@ -184,6 +200,26 @@ def families(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
     return found
 
 
+def by_panel(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
+    """Cases that share a panel, by its title: those of a config, and of several swept keys all but the last alike."""
+    found: dict[str, list[CaseResult]] = {}
+    several = len(families(results)) > 1
+    for result in results:
+        outer = result.swept[:-1]
+        words = ", ".join(f"{symbol_of(result, key)} = {with_its_unit(result, key, value)}" for key, value in outer)
+        of = (device(result) if several or not words else "", words)
+        found.setdefault("\0".join((stem(result), *filter(None, of))), []).append(result)
+    titles = [key.partition("\0")[2].replace("\0", ", ") for key in found]
+    return dict(zip(titles if len(set(titles)) == len(titles) else found, found.values(), strict=True))
+
+
+def spread_out(items: Sequence[Any], most: int) -> list[Any]:
+    """At most so many of the items, evenly spaced from the first to the last."""
+    if len(items) <= most:
+        return list(items)
+    return [items[i] for i in np.linspace(0, len(items) - 1, most).round().astype(int)]
+
+
 def realisations(results: Sequence[CaseResult]) -> str:
     """How many realisations stand behind a figure: "100,000 to 200,000 realisations" where its cases differ."""
     return _of_realisations([result.count for result in results])
@@ -218,11 +254,22 @@ def shown(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[Cas
 
 
 def shown_families(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
-    """The results of a figure with a panel for each config: at most eight configs, of each at most eight cases."""
+    """The results of a figure with a panel for each of `by_panel`: at most twelve panels of at most eight cases.
+
+    Of more, those evenly spaced from the first to the last.
+    """
     wanted = [result for result in results if result.name in set(names)]
-    some = [result for members in list(families(wanted).values())[:MOST] for result in members[:MOST]]
-    left = len(wanted) - len(some)
-    return some, left_out(left)
+    groups = spread_out(list(by_panel(wanted).values()), MOST_PANELS)
+    some = [result for members in groups for result in spread_out(members, MOST)]
+    return some, left_out(len(wanted) - len(some))
+
+
+def fitting_axis(label: str, marks: Sequence[Mark]) -> Axis:
+    """An axis of values above zero: logarithmic where the least would else lie on zero."""
+    values = np.concatenate([np.asarray(mark.y, float) for mark in marks if isinstance(mark, Line)] or [np.ones(1)])
+    least = values[values > 0].min(initial=np.inf)
+    wide = (values[np.isfinite(values)] > WIDE * least).any()
+    return Axis(label, "log") if wide else Axis(label, limits=(0, None))
 
 
 def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity) -> Figure:
@@ -230,14 +277,9 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
 
     curves is tables.groups(table, "case", "filter", "component").
     """
-    panels = [_sigma_panel(members, curves, component, of) for members in families(results).values()]
+    every = by_panel(results)
+    panels = [_sigma_panel(title, members, curves, component, of) for title, members in every.items()]
     panels = [panel for panel in panels if panel.marks]
-    single = len(panels) == 1
-    if not single and all(panel.keys == panels[0].keys for panel in panels):
-        if panels[0].legend == "right":
-            own = Panel(panels[0].x, panels[0].y, (), keys=panels[0].keys, key_title=panels[0].key_title)
-            panels = [replace(panel, keys=(), key_title="", legend="none") for panel in panels] + [own]
-        panels[1:] = [replace(panel, keys=()) if panel.marks else panel for panel in panels[1:]]
     caption = tr(
         "Root-mean-square error of the {quantity} about the truth against time, of {realisations}. "
         "Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact values.",
@@ -245,45 +287,74 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
         realisations=realisations(results),
     )
     title = tr("σ of the {quantity}", quantity=of.name)
-    beside = single and panels[0].legend == "right"
-    if not single:
-        panels = [replace(panel, legend="none" if panel.legend == "none" else "best") for panel in panels]
-    wordy = panels and not panels[-1].marks and any(len(words) > LONGEST_INSIDE for words, _ in panels[-1].keys)
-    columns, width, height = 2 if wordy else min(3, len(panels)), PAGE_MM, 56
-    if single:
-        columns, width, height = 1, WIDE_MM if beside else COLUMN_MM, 64
-    return Figure(name, title, caption, tuple(panels), columns, width, height)
+    return in_columns(Figure(name, title, caption, tuple(panels)))
 
 
-def _sigma_panel(members: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity) -> Panel:
+def in_columns(figure: Figure) -> Figure:
+    """A figure of as many columns as its panels fill, at one of the widths of a page."""
+    count = len([panel for panel in figure.panels if panel.marks])
+    if count == 1:
+        wide = figure.panels[0].legend == "right"
+        return replace(figure, columns=1, width_mm=WIDE_MM if wide else COLUMN_MM, panel_height_mm=64.0)
+    return replace(figure, columns=2 if count in (2, 4) else 3, width_mm=PAGE_MM, panel_height_mm=56.0)
+
+
+def _sigma_panel(title: str, members: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity) -> Panel:
+    marks = _lines_of(members, curves, component, _sigma_line)
+    unit = next((rows["unit"].iloc[0] for key, rows in curves.items() if key[2] == component), "")
+    y = fitting_axis(with_unit(tr("$\\sigma$ of {symbol}", symbol=of.symbol), unit), marks)
+    return _keyed(Panel(time_axis(), y, tuple(marks), title), members)
+
+
+def _lines_of(
+    members: Sequence[CaseResult], rows: Mapping, component: str, draw: Callable[..., Line], first: int = 0
+) -> list[Mark]:
+    """A line for each filter of each case of a panel: named by the filter of a lone case, by the value of a swept one.
+
+    rows by case, filter and component; first: the first filter of those that a legend has beside them.
+    """
     filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
     marks: list[Mark] = []
-    one_key = len({tuple(key for key, _ in result.swept) for result in members}) == 1 == len(members[0].swept)
-    unit = ""
     for i, result in enumerate(members):
         for f in result.axes.filters:
-            rows = curves.get((result.name, f, component))
-            if rows is None:
+            own = rows.get((result.name, f, component))
+            if own is None:
                 continue
-            unit = rows["unit"].iloc[0]
-            style = look(filters.index(f), i, len(members))
-            words = number(result.swept[0][1], is_power(result.swept[0][0])) if one_key else swept(result)
-            name = literal(f) if len(members) == 1 else f"{literal(f)}, {swept(result)}"
-            marks.append(_sigma_line(rows, literal(f) if len(members) == 1 else words, style, name))
-    y = Axis(with_unit(tr("$\\sigma$ of {symbol}", symbol=of.symbol), unit), limits=(0, None))
-    panel = Panel(time_axis(), y, tuple(marks), device(members[0]))
+            style = look(filters.index(f) - first, i, len(members))
+            if len(members) == 1:
+                marks.append(draw(own, literal(f), style, literal(f)))
+            else:
+                key, value = result.swept[-1] if result.swept else ("", device(result))
+                marks.append(draw(own, number(value, is_power(key)), style, f"{literal(f)}, {swept(result)}"))
+    return marks
+
+
+def family_panel(title: str, members: Sequence[CaseResult], rows: Mapping, words: str) -> Panel:
+    """A panel of any quantity of the members about one; rows by case, filter and its column, against t_s."""
+
+    def draw(own: "pd.DataFrame", label: str, style: Style, name: str) -> Line:
+        return Line(own["t_s"].to_numpy(float), own[column].to_numpy(float), label, style, name=name)
+
+    column = next(key[2] for key in rows)
+    marks = _lines_of(members, rows, column, draw)
+    return _keyed(Panel(time_axis(), fitting_axis(words, marks), (Reference(1), *marks), title), members)
+
+
+def _keyed(panel: Panel, members: Sequence[CaseResult], first: int = 0) -> Panel:
+    """A panel whose legend explains dashes by filter and colours by swept value; few lines are named at their ends."""
     if len(members) == 1:
         return panel
-    dashes = tuple((literal(f), Style(0, n, n)) for n, f in enumerate(filters))
-    if len(marks) > MOST_AT_ENDS and len(filters) > 1:
-        return _by_colour(panel, dashes, key_title(members[0]) if one_key else "")
-    title = tr("at the lines: {key}", key=key_title(members[0])) if one_key else ""
-    return replace(panel, keys=dashes, key_title=title)
+    filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))[first:]
+    dashes = tuple((literal(f), Style(0, n, n)) for n, f in enumerate(filters)) if len(filters) > 1 else ()
+    title = key_title(members[0]) if members[0].swept else ""
+    if sum(isinstance(mark, Line) for mark in panel.marks) > MOST_AT_ENDS:
+        return _by_colour(panel, dashes, title)
+    return replace(panel, keys=dashes, key_title=tr("at the lines: {key}", key=title) if title else "")
 
 
 def key_title(result: CaseResult) -> str:
-    """What a legend of values of a case's one swept key is headed: its letter or name, and its unit."""
-    key = result.swept[0][0]
+    """What a legend of values of a case's last swept key is headed: its letter or name, and its unit."""
+    key = result.swept[-1][0]
     return with_unit(symbol_of(result, key), key_label(result, key).unit)
 
 
@@ -291,7 +362,7 @@ def _by_colour(panel: Panel, dashes: tuple, title: str) -> Panel:
     """A panel of many lines: names not at the lines but in a legend beside it, one of each colour and each dash."""
     lines = [mark for mark in panel.marks if isinstance(mark, Line)]
     shades = {line.label: Style(line.style.colour, 0) for line in lines}
-    marks = tuple(replace(line, label="") for line in lines)
+    marks = tuple(replace(mark, label="") if isinstance(mark, Line) else mark for mark in panel.marks)
     return replace(panel, marks=marks, keys=(*shades.items(), *dashes), key_title=title, legend="right")
 
 
@@ -310,28 +381,11 @@ def look(nth_filter: int, nth_case: int, cases: int) -> Style:
 
 
 def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, component: str, of: Quantity) -> Figure:
-    """Relative gain of one component against time: one panel, a line for each case and filter.
+    """Relative gain of one component against time, a line for each case and filter.
 
-    gains is tables.groups(table, "case", "filter", "component").
+    One panel where no config is swept; else one for each of `by_panel`. gains is
+    tables.groups(table, "case", "filter", "component").
     """
-    marks: list[Mark] = [Reference(0)]
-    family = len(families(results)) == 1 and len(results) > 1
-    several = any(len(result.axes.filters) > 2 for result in results)
-    for i, result in enumerate(results):
-        for n, f in enumerate(result.axes.filters):
-            rows = gains.get((result.name, f, component))
-            if rows is None:
-                continue
-            t, value, lo, hi, exact = (
-                rows[key].to_numpy(dtype=float)
-                for key in ("t_s", "gain_percent", "gain_lo", "gain_hi", "exact_percent")
-            )
-            case = swept(result) if family else label(result)
-            words = ", ".join(
-                filter(None, (case if len(results) > 1 else "", f if several or len(results) == 1 else ""))
-            )
-            style = Style(i / (len(results) - 1) if family else i, n if several else i, n if several else i)
-            marks.append(Line(t, value, words, style, lo, hi, exact if np.isfinite(exact).any() else None))
     base = results[0].axes.filters[results[0].axes.baseline]
     caption = tr(
         "Relative gain in σ of the {quantity} against filter {base}, paired on common noise, of {realisations}. "
@@ -340,12 +394,39 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
         base=base,
         realisations=realisations(results),
     )
+    y, title = (
+        Axis(tr("gain in $\\sigma$ of {symbol}, %", symbol=of.symbol)),
+        tr("Gain in σ of the {quantity}", quantity=of.name),
+    )
+    if any(result.swept for result in results):
+        drawn = []
+        for words, members in by_panel(results).items():
+            lines = _lines_of(members, gains, component, _gain_line, 1)
+            panel = Panel(time_axis(), y, (Reference(0), *lines), words)
+            drawn += [_keyed(panel, members, 1)] if lines else []
+        return in_columns(Figure(name, title, caption, tuple(drawn)))
+    marks: list[Mark] = [Reference(0)]
+    several = any(len(result.axes.filters) > 2 for result in results)
+    for i, result in enumerate(results):
+        for n, f in enumerate(result.axes.filters):
+            rows = gains.get((result.name, f, component))
+            if rows is not None:
+                case = label(result) if len(results) > 1 else ""
+                words = ", ".join(filter(None, (case, literal(f) if several or len(results) == 1 else "")))
+                mark = n if several else i
+                marks.append(_gain_line(rows, words, Style(i if len(results) > 1 else n, mark, mark), words))
     # Many long names would cover the lines: they stand beside the panel.
     long = len(marks) > 4 and any(isinstance(mark, Line) and len(mark.label) > LONGEST_INSIDE for mark in marks)
-    y = Axis(tr("gain in $\\sigma$ of {symbol}, %", symbol=of.symbol))
     panel = Panel(time_axis(), y, tuple(marks), direct=not long, legend="right" if long else "best")
-    width = PAGE_MM if long else COLUMN_MM if len(results) < 3 else 120.0
-    return Figure(name, tr("Gain in σ of the {quantity}", quantity=of.name), caption, (panel,), width_mm=width)
+    width = PAGE_MM if long else COLUMN_MM if len(results) < 3 else WIDE_MM
+    return Figure(name, title, caption, (panel,), width_mm=width)
+
+
+def _gain_line(rows: "pd.DataFrame", label: str, style: Style, name: str) -> Line:
+    t, value, lo, hi, exact = (
+        rows[key].to_numpy(dtype=float) for key in ("t_s", "gain_percent", "gain_lo", "gain_hi", "exact_percent")
+    )
+    return Line(t, value, label, style, lo, hi, exact if np.isfinite(exact).any() else None, name)
 
 
 def per_component(
@@ -367,7 +448,7 @@ def per_component(
             ("dynamic", dynamic_figure, curves),
         ):
             name = f"{kind}_{component}"
-            some, left_out = (shown_families if kind == "sigma" else shown)(results, chosen(name))
+            some, left_out = shown_families(results, chosen(name))
             figure = draw(name, some, rows, component, of) if some else None
             if figure and any(isinstance(mark, Line) for panel in figure.panels for mark in panel.marks):
                 made[name] = replace(figure, caption=figure.caption + left_out)
@@ -399,10 +480,9 @@ def dynamic_figure(
         quantity=of.name,
         realisations=realisations(results),
     )
-    columns = min(3, len(drawn))
-    width = COLUMN_MM if columns == 1 else PAGE_MM
+    caption += left_out(len(drawn) - MOST_PANELS)
     title = tr("Dynamic and fluctuation error of the {quantity}", quantity=of.name)
-    return Figure(name, title, caption, tuple(drawn), columns, width, 56)
+    return in_columns(Figure(name, title, caption, tuple(spread_out(drawn, MOST_PANELS))))
 
 
 def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Quantity) -> Panel:

@@ -72,20 +72,18 @@ def line_figure(name: str, key: str, members: Sequence[CaseResult], curves: Mapp
     x, axis = places(members[0], key, [dict(result.swept)[key] for result in members])
     order, made = np.argsort(x), []
     filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
-    for n, (component, unit) in enumerate(components(members[0])):
-        marks = []
+    for n, (component, given) in enumerate(components(members[0])):
+        marks, (factor, unit) = [], panels.in_degrees(given)
         for i, f in enumerate(filters):
-            found = np.array([last(members[j], f, component, curves) for j in order])
+            found = factor * np.array([last(members[j], f, component, curves) for j in order])
             if np.isfinite(found[:, 0]).any():
                 words, exact = panels.literal(f), found[:, 3] if np.isfinite(found[:, 3]).any() else None
                 style = Style(i, i, i)
                 label = words if n == 0 else ""
                 marks.append(Line(x[order], found[:, 0], label, style, found[:, 1], found[:, 2], exact, words))
         if marks:
-            y = Axis(
-                panels.with_unit(tr("$\\sigma$ of {symbol} at the end", symbol=panels.letter(component)), unit),
-                limits=(0, None),
-            )
+            words = tr("$\\sigma$ of {symbol} at the end", symbol=panels.letter(component))
+            y = panels.fitting_axis(panels.with_unit(words, unit), marks)
             made.append(Panel(axis, y, tuple(marks), direct=False))
     if not made:
         return None
@@ -108,7 +106,8 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
     (x, x_axis), (y, y_axis) = (places(members[0], key, v) for key, v in zip(keys, ranked, strict=True))
     component, unit = members[0].axes.components[0]
     made = []
-    for f in list(dict.fromkeys(f for result in members for f in result.axes.filters))[:MOST_PANELS]:
+    filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
+    for f in filters[:MOST_PANELS]:
         grid = np.full((len(y), len(x)), np.nan)
         for result in members:
             column, row = (ranked[i].index(_hashable(dict(result.swept)[key])) for i, key in enumerate(keys))
@@ -130,6 +129,8 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
         second=second,
         realisations=panels.realisations(members),
     )
+    if len(filters) > MOST_PANELS:
+        caption += " " + tr("{count} further filters are in the tables alone.", count=len(filters) - MOST_PANELS)
     title = tr("σ over the {first} and the {second}", first=first, second=second)
     columns = min(2, len(made))
     return Figure(name, title, caption, tuple(made), columns, panels.WIDE_MM if columns == 1 else PAGE_MM, 62)

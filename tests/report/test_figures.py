@@ -1,12 +1,13 @@
 """Figures: what is drawn is what is described, in the same bytes each time, and no user's name breaks them."""
 
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from radarsim.report import chart_look, figures, panels, tables
+from radarsim.report import chart, chart_look, figures, panels, tables
 from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.studies.range_doppler import figures as range_doppler_figures
 from radarsim.studies.range_doppler import tables as range_doppler
@@ -62,9 +63,70 @@ def test_few_lines_are_named_at_their_ends_many_in_a_legend():
     assert [text.get_text() for text in few.texts] == ["l0", "l1", "l2"]
     assert few.get_legend() is None
     many = drawn(one(*[Line(np.arange(3.0), np.full(3, float(i)), f"l{i}") for i in range(30)]))
-    assert len(many.get_legend().get_texts()) == 30
+    assert len(many.figure.legends[0].get_texts()) == 30
     keyed = drawn(one(line(), keys=(("solid", Style()),), key_title="what"))
-    assert keyed.get_legend().get_title().get_text() == "what"
+    assert keyed.figure.legends[0].get_title().get_text() == "what"
+
+
+def test_a_legend_lies_on_no_curve_and_stands_once_a_figure():
+    marks = tuple(Line(np.arange(3.0), np.full(3, float(i)), f"filter {i}", Style(i, i, i)) for i in range(9))
+    panel = Panel(Axis("x"), Axis("y"), marks, direct=False)
+    canvas = figures.render(Figure("f", "", "", (panel,) * 4, columns=2))
+    (legend,) = canvas.legends
+    assert len(legend.get_texts()) == 9
+    box = legend.get_window_extent()
+    for axes in canvas.axes:
+        assert axes.get_legend() is None
+        assert not box.overlaps(axes.get_tightbbox())
+    assert box.x0 >= 0
+    assert box.x1 <= canvas.bbox.x1
+
+
+def test_panels_that_name_different_things_alike_keep_their_legends():
+    first = Panel(Axis("x"), Axis("y"), (Line(np.arange(3.0), np.arange(3.0), "a", Style(0)),), direct=False)
+    other = Panel(Axis("x"), Axis("y"), (Line(np.arange(3.0), np.arange(3.0), "a", Style(1)),), direct=False)
+    canvas = figures.render(Figure("f", "", "", (first, other), columns=2))
+    assert not canvas.legends
+    assert all(len(axes.get_legend().get_texts()) == 1 for axes in canvas.axes)
+
+
+def test_log_axes_have_round_ticks():
+    t = np.arange(3.0)
+
+    def ticks(low, high):
+        values = Line(t, np.array([low, np.sqrt(low * high), high]))
+        axes = figures.render(Figure("f", "", "", (Panel(Axis("x"), Axis("y", "log"), (values,)),))).axes[0]
+        low, high = axes.get_ylim()
+        return [text.get_text() for text in axes.get_yticklabels() if low <= text.get_position()[1] <= high]
+
+    assert ticks(6, 95) == ["10", "20", "50", "100"]
+    assert ticks(0.91, 0.99) == ["0.92", "0.94", "0.96", "0.98"]
+    assert ticks(1e-4, 1) == ["0.0001", "0.001", "0.01", "0.1", "1"]
+
+
+def test_a_share_is_drawn_whole_up_to_one():
+    panel = Panel(Axis("x"), Axis("share", limits=(0, 1)), (Line(np.arange(3.0), np.ones(3)),))
+    axes = figures.render(Figure("f", "", "", (panel,))).axes[0]
+    assert axes.get_ylim() == (0, 1)
+    assert not axes.lines[0].get_clip_on()
+
+
+def test_maps_side_by_side_have_one_scale_of_colours():
+    heats = [Heat(np.arange(2.0), np.arange(2.0), np.full((2, 2), v) + np.eye(2), "σ") for v in (1.0, 5.0)]
+    both = tuple(Panel(Axis("x"), Axis("y"), (heat,)) for heat in heats)
+    axes = figures.render(Figure("f", "", "", both, columns=2)).axes[:2]
+    assert {one.collections[0].get_clim() for one in axes} == {(1.0, 6.0)}
+
+
+def test_a_ground_track_has_one_scale_north_and_east():
+    track = Line(np.array([0.0, 10.0]), np.array([0.0, 1.0]))
+    axes = figures.render(Figure("f", "", "", (Panel(Axis("east"), Axis("north"), (track,), equal=True),))).axes[0]
+    axes.apply_aspect()
+    (x0, y0), (x1, y1) = axes.transData.transform([(0.0, 0.0), (1.0, 1.0)])
+    assert x1 - x0 == pytest.approx(y1 - y0, rel=0.005)  # from where on Matplotlib leaves it
+    drawn = chart.chart(Figure("f", "", "", (Panel(Axis("east"), Axis("north"), (track,), equal=True),))).panels[0]
+    (_, low, high, start, end), (_, lowest, highest, bottom, top) = drawn.data["x"], drawn.data["y"]
+    assert (end - start) / (high - low) == pytest.approx((bottom - top) / (highest - lowest), rel=1e-6)
 
 
 def test_labels_at_ends_do_not_overlap():
@@ -90,7 +152,7 @@ def test_same_bytes_each_time():
 
 
 def test_size_in_millimetres():
-    described = one(line())
+    described = one(replace(line(), exact=None))
     width, height = figures.render(described).get_size_inches() * 25.4
     assert width == pytest.approx(described.width_mm)
     assert height == pytest.approx(described.panel_height_mm)
@@ -148,9 +210,9 @@ def test_many_lines_have_their_legend_in_a_cell_of_its_own():
     assert [mark.name for mark in whole[1].marks] == [f"filter {i}" for i in range(7)]
     assert not any(mark.label for panel in whole for mark in panel.marks)
     canvas = figures.render(Figure("f", "", "", tuple(whole), columns=2))
-    legend = canvas.axes[2].get_legend()
+    (legend,) = canvas.legends
     assert [text.get_text() for text in legend.get_texts()] == [f"filter {i}" for i in range(7)]
-    assert all(axes.get_legend() is None for axes in canvas.axes[:2])
+    assert len(canvas.axes) == 2
 
 
 @pytest.mark.parametrize(("highest", "last"), [(3, 3), (20, 20), (40, 40), (95, 80), (1000, 1000)])
@@ -172,8 +234,15 @@ def test_a_sweep_is_shown_whole_in_figures_with_a_panel_for_each_config(expected
 
 def test_crosses_have_the_name_of_what_they_are():
     panel = Panel(Axis("x"), Axis("y"), (line(),), crosses="formula")
-    axes = figures.render(Figure("f", "", "", (panel,))).axes[0]
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["formula"]
+    (legend,) = figures.render(Figure("f", "", "", (panel,))).legends
+    assert [text.get_text() for text in legend.get_texts()] == ["formula"]
+
+
+def test_up_to_sixteen_points_measured_and_exact_stand_together():
+    for points, together in ((5, True), (16, True), (17, False)):
+        curve, crosses = drawn(one(line(points, marker=0))).lines
+        marked = set(curve.get_xdata()[:: curve.get_markevery()])
+        assert (marked == set(crosses.get_xdata())) is together
 
 
 def test_titles_are_broken_after_commas_alone():

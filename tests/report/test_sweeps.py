@@ -1,13 +1,16 @@
 """Figures that a sweep has by itself: what is drawn is σ at the last scan; and the page of claims."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 from radarsim.app import output
 from radarsim.app import run as experiment
-from radarsim.report import chart_text, panels, sweeps
+from radarsim.report import chart_text, figures, legends, panels, sweeps
 from radarsim.report import tables as common
 from radarsim.report.claims import page
+from radarsim.report.drawing import Line
 
 
 def swept(config, *overrides, n=200):
@@ -126,16 +129,30 @@ def test_measured_values_are_written_to_two_figures_of_their_half_width():
     assert said(0.53452248, 0.53452248, 0.53452248, "") == "0.5345"
 
 
-def test_long_names_of_two_keys_stand_beside_the_lines():
-    keys = ("sweep.radar.bias_velocity_mps=[4, 16]", "sweep.manoeuvre_variance=[1e-4, 1e-2]")
-    _, described = swept({"include": ["rls2", "rls5"]}, *keys, n=50)
-    gain, sigma = described["gain_r"], described["sigma_r"]
-    assert gain.panels[0].legend == "right"
-    *drawn, legend = sigma.panels
-    assert [panel.legend for panel in drawn] == ["none", "none"]
-    assert not legend.marks
-    assert [words for words, _ in legend.keys] == [
-        *(f"bias of the measured radial velocity = {v} m/s, $D_M$ = {d}" for v in (4, 16) for d in ("10⁻⁴", "10⁻²")),
-        *("r", "r+Vr"),
-    ]
-    assert sigma.columns == 2
+def test_two_keys_make_a_panel_a_value_and_a_map_and_leave_nothing_out():
+    keys = ("sweep.radar.sigma_velocity_mps=[1, 5, 15]", "sweep.manoeuvre_variance=[1e-4, 1e-3, 1e-2]")
+    _, described = swept({"include": ["rls2"]}, *keys, n=50)
+    for name in ("sigma_r", "gain_r", "consistency"):
+        assert [panel.title for panel in described[name].panels] == [f"$σ_V$ = {v} m/s" for v in (1, 5, 15)], name
+        lines = [[mark for mark in panel.marks if isinstance(mark, Line)] for panel in described[name].panels]
+        assert {len(own) for own in lines} == {3 if name == "gain_r" else 6}
+    plan = legends.named(described["sigma_r"])
+    assert plan.at_ends == (True,) * 3
+    assert {line.label for line in legends.lines(plan.panels[0])} == {"10⁻⁴", "10⁻³", "10⁻²"}
+    assert list(plan.common.keys) == ["r", "r+Vr", "exact"]
+    assert plan.common.title == "at the lines: $D_M$, (m/s³)²"
+    assert described["sweep_sigma_velocity_mps_manoeuvre_variance"].panels[0].marks[0].values.shape == (3, 3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # of a layout that finds no room
+        for figure in described.values():
+            figures.save(figure, ("svg",))
+
+
+def test_of_very_many_cases_the_caption_says_how_many_are_left_out():
+    velocities, variances = list(range(1, 15)), [10.0**-n for n in range(10)]
+    keys = (f"sweep.radar.sigma_velocity_mps={velocities}", f"sweep.manoeuvre_variance={variances}")
+    _, described = swept({"include": ["rls2"]}, *keys, n=50)
+    sigma = described["sigma_r"]
+    assert len(sigma.panels) == 12
+    assert sigma.panels[-1].title == "$σ_V$ = 14 m/s"  # the ends are among those shown
+    assert f"{14 * 10 - 12 * 8} further cases" in sigma.caption

@@ -8,10 +8,10 @@ import numpy as np
 from radarsim.report.claims import page
 from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
 from radarsim.report.claims.rule import CLASSES, VOID
-from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
+from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
 
 FURTHEST = 4.0  # margins: what lies further is drawn there
-COLOURS = (3, 2, 1, 7, 4, 5, 6)  # of the classes in their order: green, red, blue, grey, …
+COLOURS = (5, 2, 4, GREY, 3, 1, 6)  # of the classes in their order: green, red, blue, grey, …
 STYLES = {
     kind: Style(colour=colour, dash=None, marker=i, size_pt=4.0)
     for i, (kind, colour) in enumerate(zip(CLASSES, COLOURS, strict=True))

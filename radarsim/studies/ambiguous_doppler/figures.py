@@ -32,10 +32,7 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
     def chosen(name: str) -> list[str]:
         return [case.name for case in experiment.shown_in(name)]
 
-    drawn = {
-        name: replace(figure, panels=tuple(map(_wide, figure.panels))) if name.startswith("sigma") else figure
-        for name, figure in panels.per_component(results, curves, gains, QUANTITIES, chosen).items()
-    }
+    drawn = panels.per_component(results, curves, gains, QUANTITIES, chosen)
     for name, (column, words, caption) in SHARES.items():
         some, left_out = panels.shown_families(results, chosen(name))
         figure = share_figure(name, some, made["folds"], (column, words, caption + left_out)) if some else None
@@ -43,16 +40,6 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
     drawn |= hypotheses_figure(experiment.shown_in("hypotheses"))
     some, left_out = panels.shown(results, chosen("orders"))
     return drawn | orders_figure(some, made["orders"], left_out)
-
-
-WIDE = 30  # largest over least σ from which its axis is logarithmic
-
-
-def _wide(panel: Panel) -> Panel:
-    """A panel of σ with a logarithmic axis where a lost track would hide the others."""
-    values = np.concatenate([mark.y for mark in panel.marks if isinstance(mark, Line)] or [np.ones(1)])
-    least = values[values > 0].min(initial=np.inf)
-    return replace(panel, y=Axis(panel.y.label, "log")) if values.max() > WIDE * least else panel
 
 
 SHARES = {  # figure: column of folds.csv, what it is, caption
@@ -78,7 +65,7 @@ def share_figure(
     of is a value of SHARES: the column of the table, the axis, the caption.
     """
     rows = common.groups(table, "case", "filter")
-    drawn = [_share_panel(members, rows, of[:2]) for members in panels.families(results).values()]
+    drawn = [_share_panel(members, rows, of[:2]) for members in panels.by_panel(results).values()]
     drawn = [panel for panel in drawn if panel.marks]
     if not drawn:
         return None
@@ -101,7 +88,7 @@ def _share_panel(members: Sequence[Result], rows: Mapping, of: tuple[str, str]) 
         exact = own["exact_right"].to_numpy() if of[0] == "right" else np.full(x.shape, np.nan)
         style = panels.look(names.index(f), i, len(members))
         marks.append(Line(x, y, words or panels.literal(f), style, lo, hi, exact if np.isfinite(exact).any() else None))
-    y_axis = Axis(of[1], limits=(0, 1.05))
+    y_axis = Axis(of[1], limits=(0, 1))
     return Panel(panels.time_axis(), y_axis, tuple(marks), panels.device(members[0]))
 
 

@@ -26,7 +26,7 @@ SYMBOLS = {
 NAMES = {"phi0": "$\\varphi_0$"} | {f"f{n}": f"$f_{n}$" for n in range(5)}
 WHOLE = ("density", "steps")  # keys that take whole numbers
 WINDOW = "window length, s"
-MOST_LINES = 9
+MOST_LINES = 10
 MOST_TICKS = 8
 SURE = 0.99
 
@@ -107,7 +107,6 @@ def residuals(result: CaseResult, made: Mapping) -> Figure:
                 marks,
                 letter,
                 direct=False,
-                legend="lower left" if letter == "b" else "none",
             )
         )
     caption = (
@@ -122,19 +121,20 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
     """Share of locked bursts at each window of every estimator."""
     rows = common.groups(made["locks"], "case", "filter")
     marks = []
+    left = len(result.axes.filters) - MOST_LINES
     for n, name in enumerate(result.axes.filters[:MOST_LINES]):
         own = rows[(result.name, name)]
         t, value, lo, hi = (own[c].to_numpy(float) for c in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
-        marks.append(Line(t, value, name, Style(n, (n + n // 8) % 4, n + n // 8), lo, hi))
+        marks.append(Line(t, value, name, Style(n, n, n), lo, hi))
     caption = (
         "Share of bursts with every component within five potential spreads of the window (without prior; the phase to "
         f"the nearest turn), of {result.count:,} bursts; right: its upper end. Bands: 95 % intervals."
-    )
+    ) + (f" {left} further estimators are in locks.csv alone." if left > 0 else "")
     x = Axis(WINDOW, "log")
-    whole = Panel(x, Axis("share locked", limits=(0, 1.02)), tuple(marks), direct=False, legend="center left")
+    whole = Panel(x, Axis("share locked", limits=(0, 1)), tuple(marks), direct=False)
     upper = Panel(
         x,
-        Axis("share locked", limits=(0.85, 1.003)),
+        Axis("share locked", limits=(0.85, 1)),
         tuple(replace(m, label="", name=m.label) for m in marks),
         direct=False,
     )
@@ -156,8 +156,7 @@ def accuracy(result: CaseResult, made: Mapping) -> Figure:
             marks.append(Line(t, value, NAMES[component], Style(n, n % 4, n), lo, hi))
         if len(marks) > 1:
             axis = Axis("$\\sigma$ / bound", limits=(0.9, 1.3))
-            legend = "none" if drawn else "upper right"
-            drawn.append(Panel(Axis(WINDOW, "log"), axis, tuple(marks), name, direct=False, legend=legend))
+            drawn.append(Panel(Axis(WINDOW, "log"), axis, tuple(marks), name, direct=False))
     caption = (
         "Root-mean-square error of the locked bursts over the potential spread of the window, prior included. "
         f"Bands: 95 % intervals. {result.count:,} bursts; lock is judged at five spreads without prior."
@@ -192,7 +191,7 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
     ticks = numbers(x[order]) if key in WHOLE else ()
     panel = Panel(
         Axis(_called(key, members[0]), scale, ticks=ticks),
-        Axis("share locked", limits=(None, 1.02)),
+        Axis("share locked", limits=(None, 1)),
         tuple(marks),
         direct=False,
     )
@@ -201,7 +200,7 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
         f"Lock against the {called}",
         caption,
         (panel,),
-        width_mm=110.0,
+        width_mm=panels.WIDE_MM,
         panel_height_mm=70.0,
     )
 

@@ -11,7 +11,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 from radarsim.report import tables as common
-from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
+from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.studies.multimodel.filters import labels
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def _several(name: str, title: str, caption: str, drawn: Sequence[Panel], height
     if not drawn:
         return None
     width = panels.WIDE_MM if len(drawn) == 1 else PAGE_MM
-    columns = 1 if len(drawn) == 1 else 3 if len(drawn) in (3, 5, 6, 9) else 2
+    columns = 1 if len(drawn) == 1 else 3 if len(drawn) in (3, 5, 6, 9, 12) else 2
     return Figure(name, title, caption, tuple(drawn), columns, width, height)
 
 
@@ -71,11 +71,12 @@ def _styles(result: CaseResult) -> list[Style]:
 def _keys(result: CaseResult, **look: Any) -> tuple[tuple[str, Style], ...]:
     """What the looks of many filters say: colours of rules, marks of families; look: how they differ from _styles."""
     styled = list(zip(result.spec.filters, _styles(result), strict=True))
-    rules = {of.merge: replace(style, dash=0, marker=0) for of, style in styled}
+    rules = {of.merge: replace(style, dash=0, marker=None, width_pt=4.0, flat=True) for of, style in styled}
     families = {of.family: replace(style, colour=0) for of, style in styled}
     named = [(rule.replace("_", " "), style) for rule, style in rules.items()]
     named += [(FAMILIES.get(family, family), style) for family, style in families.items()]
-    return tuple((label, replace(style, **look)) for label, style in named)
+    marked = {FAMILIES.get(family, family) for family in families}
+    return tuple((label, replace(style, **look) if label in marked else style) for label, style in named)
 
 
 def _beside(drawn: Sequence[Panel], result: CaseResult, **look: Any) -> list[Panel]:
@@ -110,7 +111,14 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
             lines[place].append(Line(t, values, words, style))
     ends = _stage_lines(list(flights.values()))
     axes = (
-        (Axis("east $z$, km"), Axis("north $x$, km", limits=(0, None)), "1  ground track", ()),
+        (
+            Axis("east $z$, km"),
+            Axis(
+                "north $x$, km",
+            ),
+            "1  ground track",
+            (),
+        ),
         (panels.time_axis(), Axis("height $y$, km", limits=(0, None)), "2  height", ends),
         (panels.time_axis(), Axis("speed, m/s", limits=(0, None)), "3  speed", ends),
         (panels.time_axis(), Axis("acceleration, m/s²", limits=(0, None)), "4  acceleration", ends),
@@ -119,10 +127,31 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
     drawn = [
         Panel(x, y, (*marks, *own), title, direct=False) for (x, y, title, marks), own in zip(axes, lines, strict=True)
     ]
+    drawn[0] = replace(drawn[0], marks=(*drawn[0].marks, *_landmarks(lines[0])), equal=True)
     caption = (
-        "The true flight (the paper's figures 1 to 4); the radar stands at the origin. Dotted: ends of the stages."
+        "The true flight (the paper's figures 1 to 4): the ground track from its start, at one scale north and east, "
+        "with the radar at the origin. Dotted: ends of the stages."
     )
     return _several("trajectory", "Flight", caption, drawn, 56)
+
+
+def _landmarks(tracks: Sequence[Line]) -> list[Line | Note]:
+    """The radar, and where each track begins and which way it goes."""
+    radar = Line(np.zeros(1), np.zeros(1), "", Style(0, None, 1, size_pt=5.0), name="radar")
+    marks: list[Line | Note] = [radar, Note(0.0, 0.0, "radar", "ne")]
+    for track in tracks:
+        start = Line(track.x[:1], track.y[:1], "", replace(track.style, dash=None, marker=0, size_pt=5.0), name="start")
+        third = len(track.x) // 3
+        marks += [start, Note(float(track.x[third]), float(track.y[third]), _arrow(track, third), "se")]
+    marks.append(Note(float(tracks[0].x[0]), float(tracks[0].y[0]), "start", "ne"))
+    return marks
+
+
+def _arrow(track: Line, at: int) -> str:
+    """An arrow of the eight winds along a track at a place, east to the right, north up."""
+    ahead = min(at + max(1, len(track.x) // 50), len(track.x) - 1)
+    turn = np.arctan2(track.y[ahead] - track.y[at], track.x[ahead] - track.x[at])
+    return "→↗↑↖←↙↓↘"[round(float(turn) / (np.pi / 4)) % 8]
 
 
 def _stage_lines(results: Sequence[CaseResult]) -> tuple[Reference, ...]:
@@ -155,8 +184,13 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
         f"Root-mean-square error of {words.split(' $')[0]} about the truth, of {results[0].count if results else 0:,} "
         "realisations; bands: 95 % intervals. Dotted: ends of the stages."
     )
-    number = {"y": 5, "vy": 6}[component]
-    return _several(f"sigma_{component}", f"σ of the {words.split(' $')[0]} (figure {number})", caption, drawn, 76)
+    number = _of_the_paper(results, {"y": 5, "vy": 6}[component])
+    return _several(f"sigma_{component}", f"σ of the {words.split(' $')[0]}{number}", caption, drawn, 76)
+
+
+def _of_the_paper(results: Sequence[CaseResult], number: int) -> str:
+    """The paper's number of a figure, where it is of the paper's own experiment."""
+    return f" (figure {number})" if all(result.name == "multimodel" for result in results) else ""
 
 
 def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure | None:
@@ -165,7 +199,7 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
     drawn: list[Panel] = []
     for result in results:
         for name, options in zip(result.axes.filters, result.spec.filters, strict=True):
-            if len(options.models) < 2 or len(drawn) >= panels.MOST:
+            if len(options.models) < 2:
                 continue
             marks: list = list(_stage_lines([result]))
             for m, motion in enumerate(labels(options.models)):
@@ -179,12 +213,14 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
                 Panel(panels.time_axis(), Axis("mean probability", limits=(0, 1)), tuple(marks), title, direct=False)
             )
     banks = {tuple(mark.label for mark in panel.marks if isinstance(mark, Line)) for panel in drawn}
+    left = len(drawn) - panels.MOST_PANELS
+    drawn = drawn[: panels.MOST_PANELS]
     if len(drawn) > 2 and len(banks) == 1:
         drawn = panels.in_legend(drawn)
     caption = (
-        "Mean posterior probabilities of the models (figure 7); the numbers behind the motions are the spreads of the "
-        "random acceleration, m/s². Dotted: ends of the stages."
-    )
+        f"Mean posterior probabilities of the models{_of_the_paper(results, 7)}; the numbers behind the motions are "
+        "the spreads of the random acceleration, m/s². Dotted: ends of the stages."
+    ) + (f" {left} further filters are in probabilities.csv alone." if left > 0 else "")
     return _several("probabilities", "Probabilities of the models", caption, drawn, 58)
 
 
@@ -237,9 +273,14 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     drawn = _beside(drawn, result, dash=None)
     caption = (
         "Accuracy against cost: σ of the height over a stage (whiskers: 95 %) and the mean count of arithmetic "
-        f"operations of one update. {panels.plain_label(result)}."
+        f"operations of one update.{_of_case(result, results)}"
     )
     return _several("cost", "Cost and accuracy", caption, drawn, 62)
+
+
+def _of_case(result: CaseResult, results: Sequence[CaseResult]) -> str:
+    """A sentence on which of several cases is shown."""
+    return f" Of {panels.plain_label(result)}; the other cases are in the tables alone." if len(results) > 1 else ""
 
 
 def _unnamed(lines: Sequence) -> list:
@@ -268,6 +309,6 @@ def consistency(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure 
     drawn = _beside(drawn, result, dash=None)
     caption = (
         "Normalised errors squared, per degree of freedom, by stage: 1 where the filter's own covariance is right, "
-        f"more where it is optimistic, less where it is pessimistic. {panels.plain_label(result)}."
+        f"more where it is optimistic, less where it is pessimistic.{_of_case(result, results)}"
     )
     return _several("consistency", "What the filters believe of themselves", caption, drawn, 66)

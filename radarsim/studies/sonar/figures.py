@@ -10,7 +10,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import term
 from radarsim.report import panels
 from radarsim.report import tables as common
-from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Style
+from radarsim.report.drawing import Figure, Line, Panel, Style
 from radarsim.studies.sonar.axes import SonarAxes
 
 if TYPE_CHECKING:
@@ -36,7 +36,6 @@ QUANTITIES = {
     "ve": panels.Quantity("$v_\\varepsilon$", term("rate of elevation")),
     "ae": panels.Quantity("$a_\\varepsilon$", term("second rate of elevation")),
 }
-MOST_IN_PANEL = 5  # filters whose legend leaves room for the curves
 SIGMA = ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")  # columns of a line of σ against time
 
 
@@ -84,10 +83,10 @@ def sigma_figure(
     """σ(t) of one component: a panel for each case, a line for each filter."""
     quantity, drawn = QUANTITIES[component], []
     for result in results:
-        marks = case_lines(result, curves, component, SIGMA)
+        factor, unit = panels.in_degrees(dict(result.axes.components).get(component, ""))
+        marks = [panels.scaled(one, factor) for one in case_lines(result, curves, component, SIGMA)]
         if marks:
-            unit = dict(result.axes.components)[component]
-            y = Axis(panels.with_unit(f"$\\sigma$ of {quantity.symbol}", unit), limits=(0, None))
+            y = panels.fitting_axis(panels.with_unit(f"$\\sigma$ of {quantity.symbol}", unit), marks)
             drawn.append(Panel(panels.time_axis(), y, tuple(marks), panels.swept(result), direct=False))
     if not drawn:
         return None
@@ -95,8 +94,4 @@ def sigma_figure(
         f"Root-mean-square error of the {quantity.name} about the truth against time, of {results[0].count:,} "
         "realisations. Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact values." + left_out
     )
-    if len(results[0].axes.filters) > MOST_IN_PANEL:
-        drawn = panels.in_legend(drawn)
-    columns = min(2, len(drawn))
-    width = 95.0 if columns == 1 else PAGE_MM
-    return Figure(name, f"σ of the {quantity.name}", caption, tuple(drawn), columns, width, 62)
+    return panels.in_columns(Figure(name, f"σ of the {quantity.name}", caption, tuple(drawn)))

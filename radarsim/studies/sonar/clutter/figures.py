@@ -8,7 +8,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 from radarsim.report import tables as common
-from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Style
+from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.map import realisation_map
 from radarsim.studies.sonar.figures import line
@@ -21,7 +21,6 @@ KEYS = {  # columns of the table of tracking, and the keys that they hold
     "detection_probability": "sensor.detection_probability",
     "gate_probability": "gate_probability",
 }
-WIDE = 150.0
 Results = Sequence[CaseResult[ClutterAxes]]
 
 
@@ -83,7 +82,7 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
                 marks.append(line(rows, ("t_s", "kept", "kept_lo", "kept_hi"), "", Style(n, n, None, 0.7)))
         if marks:
             keys = (("thin: kept at that time", Style(0, 0, None, 0.7)),) if not drawn else ()
-            y = Axis("probability", limits=(0, 1.02))
+            y = Axis("probability", limits=(0, 1))
             drawn.append(Panel(panels.time_axis(), y, tuple(marks), _swept(result), keys, direct=False))
     if not drawn:
         return None
@@ -159,7 +158,7 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
     )
     x, y = axis_over(results[0], column, rows[column]), Axis("false tracks per hour", "log")
     panel = Panel(x, y, tuple(_lines(rows, column, rate, "false")), direct=False)
-    return Figure("false_tracks", "False tracks", caption, (panel,), width_mm=WIDE)
+    return Figure("false_tracks", "False tracks", caption, (panel,), width_mm=panels.WIDE_MM)
 
 
 def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
@@ -174,7 +173,7 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
     drawn = []
     if false:
         longest = max(false, key=lambda mark: len(mark.x))
-        bound = Line(longest.x, np.exp(-longest.x), "bound", Style(7, 1, None))
+        bound = Line(longest.x, np.exp(-longest.x), "bound", Style(GREY, 1, None))
         y = Axis("share of false tracks called true", "log")
         drawn.append(Panel(x, y, (*false, bound), direct=False))
     if true:
@@ -194,7 +193,7 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
     shown = realisation_map(result)
     km = 1e-3
     marks = [
-        Line(shown.false[1] * km, shown.false[0] * km, "false plots", Style(7, None, 0, 1.1, 1.0)),
+        Line(shown.false[1] * km, shown.false[0] * km, "false plots", Style(GREY, None, 0, 1.1, 1.0)),
         Line(shown.truth[1] * km, shown.truth[0] * km, "target", Style(1, 1, None)),
         Line(shown.plots[1] * km, shown.plots[0] * km, "its plots", Style(1, None, 1, 1.1, 2.0)),
     ]
@@ -210,5 +209,7 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
         Axis("distance east, km", limits=(west * km, east * km)),
         Axis("distance north, km", limits=(south * km, north * km)),
     )
-    panel = Panel(x, y, tuple(marks), direct=False, legend="right")
-    return Figure("track_map", "Plots, gates and tracks", caption, (panel,), width_mm=WIDE, panel_height_mm=100)
+    panel = Panel(x, y, tuple(marks), direct=False, equal=True)
+    return Figure(
+        "track_map", "Plots, gates and tracks", caption, (panel,), width_mm=panels.WIDE_MM, panel_height_mm=100
+    )

@@ -1,6 +1,7 @@
 """P3's figures on manoeuvres: ROC, detection by strength, delay, filters during the manoeuvre; uses of a track."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels
 from radarsim.report import tables as common
-from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.studies.sonar.figures import QUANTITIES, SIGMA, case_lines, line
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
 USUAL = 0.01  # false alarms per test at which detectors are compared, or the nearest rate to it
 MOST_PANELS = 4
-BESIDE_LEGEND = 3  # panels of a figure whose legend takes the place of one
 SYMBOLS = {"course": "course", "speed": "speed", "x_ahead": "$x$ ahead", "y_ahead": "$y$ ahead"}
 SYMBOLS |= {"cpa": "CPA", "t_cpa": "$t$ to CPA"}
 RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # ticks of a measured over a believed σ
@@ -33,22 +33,27 @@ def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, F
     responding = [result for result in results if "modes" in result.sums]
     drawn: dict[str, Figure | None] = {}
     if moving:
-        drawn["roc"] = roc_figure(spread_out(moving), made["detections"])
+        some, left = shown(moving)
+        drawn["roc"] = _said(roc_figure(some, made["detections"]), left)
         drawn["detection"] = detection_figure(measured, made["detections"])
-        drawn["delay"] = delay_figure(spread_out(moving), made["delays"])
+        drawn["delay"] = _said(delay_figure(some, made["delays"]), left)
     if responding:
-        drawn["response"] = response_figure(spread_out(responding, BESIDE_LEGEND), made["curves"])
-        drawn["modes"] = modes_figure(spread_out(responding, BESIDE_LEGEND), made["modes"])
+        some, left = shown(responding)
+        drawn["response"] = _said(response_figure(some, made["curves"]), left)
+        drawn["modes"] = _said(modes_figure(some, made["modes"]), left)
     if "uses" in made:
         drawn["uses"] = uses_figure([result for result in results if "uses" in result.sums], made["uses"])
     return drawn
 
 
-def spread_out(results: Results, most: int = MOST_PANELS) -> list[CaseResult[ManoeuvreAxes]]:
-    """At most so many of the cases, evenly spaced from the first to the last."""
-    if len(results) <= most:
-        return list(results)
-    return [results[i] for i in np.linspace(0, len(results) - 1, most).round().astype(int)]
+def shown(results: Results) -> tuple[list[CaseResult[ManoeuvreAxes]], str]:
+    """Four of the cases at most, evenly spaced from the first to the last, and words on the others."""
+    return panels.spread_out(results, MOST_PANELS), panels.left_out(len(results) - MOST_PANELS)
+
+
+def _said(figure: Figure | None, more: str) -> Figure | None:
+    """The figure with a further sentence in its caption."""
+    return replace(figure, caption=figure.caption + more) if figure else None
 
 
 def first_component(rows: "pd.DataFrame", detector: str) -> "pd.DataFrame":
@@ -101,8 +106,8 @@ def roc_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
             marks.append(line(points, ("false_alarms", "probability", "lo", "hi"), label, Style(n, None, n)))
         if marks:
             x = Axis("false alarms a test", "log", limits=(3e-4, 0.5))
-            y = Axis("detection probability", limits=(0, 1.02))
-            drawn.append(Panel(x, y, tuple(marks), _title(result), direct=False, legend=_first_legend(drawn)))
+            y = Axis("detection probability", limits=(0, 1))
+            drawn.append(Panel(x, y, tuple(marks), _title(result), direct=False))
     caption = (
         "Detectors of manoeuvres in the range: probability of an alarm at the last scan of the manoeuvre against that "
         f"at the last scan before it. Lines: exact laws; markers: measured, of {results[0].count:,} realisations, with "
@@ -131,8 +136,8 @@ def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | N
             known = v["exact"] if np.isfinite(v["exact"]).all() else None
             marks.append(Line(strength, v["probability"], name, Style(n, n, n), v["lo"], v["hi"], known))
         title = ", ".join(panels.with_its_unit(members[0], k, v) for k, v in others)
-        x, y = Axis(panels.axis_of(members[0], key)), Axis("detection probability", limits=(0, 1.02))
-        drawn.append(Panel(x, y, tuple(marks), title, direct=False, legend="right"))
+        x, y = Axis(panels.axis_of(members[0], key)), Axis("detection probability", limits=(0, 1))
+        drawn.append(Panel(x, y, tuple(marks), title, direct=False))
     caption = (
         f"Probability of an alarm of detectors in the range at about {USUAL:g} false alarms a test, at the last scan "
         "of the manoeuvre (of a steady target, at the last of all), against the manoeuvre's strength. Bands: 95 % "
@@ -160,8 +165,8 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
             if len(alarms):
                 marks.append(line(alarms, ("delay_s", "probability", "lo", "hi", "exact"), name, n))
         if marks:
-            x, y = Axis("time since it began, s", limits=(0, None)), Axis("an alarm has come", limits=(0, 1.02))
-            drawn.append(Panel(x, y, tuple(marks), _title(result), direct=False, legend=_first_legend(drawn)))
+            x, y = Axis("time since it began, s", limits=(0, None)), Axis("an alarm has come", limits=(0, 1))
+            drawn.append(Panel(x, y, tuple(marks), _title(result), direct=False))
     caption = (
         "Probability that the first alarm of a detector in the range has come, against the time since the manoeuvre "
         f"began, at about {USUAL:g} false alarms a test. Crosses: exact, where windows are apart and tests "
@@ -181,9 +186,9 @@ def response_figure(results: Results, curves: "pd.DataFrame") -> Figure | None:
         drawn.append(Panel(panels.time_axis(), y, marks, _title(result), direct=False))
     caption = (
         f"Root-mean-square error of the first coordinate about the truth on the same plots, of "
-        f"{results[0].count:,} realisations. Dashed: the manoeuvre begins and ends. Crosses: exact values."
+        f"{results[0].count:,} realisations. Dotted: the manoeuvre begins and ends. Crosses: exact values."
     )
-    return _figure("response", "Filters through a manoeuvre", caption, _one_legend(drawn))
+    return _figure("response", "Filters through a manoeuvre", caption, drawn)
 
 
 def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
@@ -192,13 +197,13 @@ def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
     drawn = []
     for result in results:
         lines = case_lines(result, groups, result.axes.components[0][0], ("t_s", "probability", "lo", "hi"))
-        y = Axis("probability of a manoeuvre", limits=(0, 1.02))
+        y = Axis("probability of a manoeuvre", limits=(0, 1))
         drawn.append(Panel(panels.time_axis(), y, (*_ends(result), *lines), _title(result), direct=False))
     caption = (
         "Share of realisations in which an adaptive filter is in its manoeuvring mode, and mean probability of the "
-        "manoeuvring model of an imm, first coordinate. Dashed: the manoeuvre begins and ends."
+        "manoeuvring model of an imm, first coordinate. Dotted: the manoeuvre begins and ends."
     )
-    return _figure("modes", "What filters take the target to be doing", caption, _one_legend(drawn))
+    return _figure("modes", "What filters take the target to be doing", caption, drawn)
 
 
 def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
@@ -223,7 +228,7 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
         f"σ about the truth over the one computed from the track's covariance to first order{case}, of "
         f"{result.count:,} realisations, with 95 % intervals."
     ) + (f" {left} further cases are in the tables alone." if left else "")
-    return _figure("uses", "What a track is used for", caption, _one_legend(drawn), 2)
+    return _figure("uses", "What a track is used for", caption, drawn, 2)
 
 
 def _ends(result: CaseResult[ManoeuvreAxes]) -> list[Reference]:
@@ -237,20 +242,8 @@ def _title(result: CaseResult[ManoeuvreAxes]) -> str:
     return ", ".join(panels.with_its_unit(result, key, value) for key, value in result.swept)
 
 
-def _first_legend(drawn: Sequence[Panel]) -> str:
-    """The place of a panel's legend: only the first panel has one."""
-    return "none" if drawn else "best"
-
-
-def _one_legend(drawn: Sequence[Panel]) -> list[Panel]:
-    """Panels that all have the same lines, followed by a separate legend."""
-    keys = tuple((mark.label, mark.style) for mark in drawn[0].marks if isinstance(mark, Line))
-    bare = [Panel(p.x, p.y, p.marks, p.title, direct=False, legend="none") for p in drawn]
-    return [*bare, Panel(Axis(""), Axis(""), (), keys=keys)]
-
-
 def _figure(name: str, title: str, caption: str, drawn: Sequence[Panel], most: int = 3) -> Figure | None:
     if not drawn:
         return None
     columns = 2 if len(drawn) in (2, 4) else min(most, len(drawn))
-    return Figure(name, title, caption, tuple(drawn), columns, 95.0 if columns == 1 else PAGE_MM, 58)
+    return Figure(name, title, caption, tuple(drawn), columns, COLUMN_MM if columns == 1 else PAGE_MM, 58)

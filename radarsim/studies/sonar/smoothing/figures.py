@@ -15,8 +15,6 @@ from radarsim.studies.sonar.figures import QUANTITIES, SIGMA, line
 if TYPE_CHECKING:
     import pandas as pd
 
-WIDE = 150.0
-
 
 def figures(
     results: Sequence[CaseResult[GivenPlotsAxes]], made: "Mapping[str, pd.DataFrame]"
@@ -53,7 +51,7 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
         "Left: σ of the position at the last plot (smoothed) and one scan ahead (extrapolated) in σ of a single plot, "
         "growing memory of degree 1. Crosses: the paper's formulas. Right: by how much the n-th plot lowers that σ."
     )
-    return Figure("plots", "What each further plot buys", caption, drawn, 2, WIDE)
+    return Figure("plots", "What each further plot buys", caption, drawn, 2, PAGE_MM)
 
 
 def gains_figure(table: "pd.DataFrame") -> Figure:
