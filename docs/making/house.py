@@ -16,7 +16,7 @@ ROWS = (
     ("cli",),
     ("app", "recorded"),
     ("registry",),
-    ("range_doppler", "multimodel", "sonar", "discriminator", "ambiguous_doppler"),
+    ("range_doppler", "multimodel", "sonar", "discriminator", "ambiguous_doppler", "pulses_to_tracks"),
     ("interface", "report"),
     ("config", "engine", "bursts"),
     ("kernels", "physics"),
@@ -34,13 +34,14 @@ ABOUT = {
     "sonar": "P3, three studies",
     "discriminator": "P4",
     "ambiguous_doppler": "folded velocity",
+    "pulses_to_tracks": "P4 into P1",
     "config": "YAML to checked cases",
     "engine": "blocks, sums, store",
     "kernels": "compiled, shared",
     "physics": "motion, targets, frames",
     "bursts": "a burst and its estimator",
 }
-WIDTH, ROOM, HEIGHT, GAP, MARGIN = 1220, 216, 44, 62, 12  # px
+WIDTH, ROOM, HEIGHT, GAP, MARGIN = 1290, 196, 44, 62, 12  # px
 
 
 def room_of(module: str) -> str | None:

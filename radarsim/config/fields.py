@@ -252,8 +252,8 @@ class Study(Model):
 
     bare_keys names the list whose members a bare key of `sweep` and `--set` speaks to. figure_names are all figures
     that the study's report may draw, with * for what depends on the config; None: not known here, and names under
-    `figures` go unchecked. in_place_of names the key that a key stands in place of: where an override or a sweep sets
-    the one, the other goes.
+    `figures` go unchecked. in_place_of names the key, by its dotted name, that a key beside it stands in place of:
+    where an override or a sweep sets the one, the other goes.
     """
 
     bare_keys: ClassVar[str] = "filters"

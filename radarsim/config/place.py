@@ -89,9 +89,8 @@ def _in_every_member(document: Document, model: type[Study], key: str) -> list[P
 def _without_twin(document: Document, path: Path, model: type[Study]) -> Document:
     """The document without what the new value replaces: the same quantity in the other unit, or said another way."""
     twin = in_degrees(str(path[-1])) or in_radians(str(path[-1]))
-    if len(path) == 1:
-        twin = twin or model.in_place_of.get(str(path[0]))
-    if twin is None or document.get((*path[:-1], twin)) is ABSENT:
+    twin = twin or model.in_place_of.get(".".join(map(str, path)), "").rpartition(".")[2]
+    if not twin or document.get((*path[:-1], twin)) is ABSENT:
         return document
     holder = document.get(path[:-1])
     assert isinstance(holder, dict)  # it has the twin

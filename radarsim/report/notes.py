@@ -18,7 +18,7 @@ THIN = f"under {FEW_EFFECTIVE} effective realisations: heavy tails"
 SAME = ["case", "filter", "component", "k"]
 # Columns that hold shares of realisations, by table: rare events make their intervals' coverage uneven.
 SHARES = {
-    "locks": ("lock_rate", "always_rate_3sigma", "always_posterior_rate_3sigma"),
+    "locks": ("lock_rate", "always_rate_3sigma", "always_posterior_rate_3sigma", "wrong_fold"),
     "probabilities": ("probability",),
 }
 
@@ -34,7 +34,7 @@ def _noted(
     if not len(table) or "case" not in table or not any(str(column).endswith("_lo") for column in table):
         return table
     n, effective = _realisations(table, made, results)
-    shares = [table[column].to_numpy(dtype=float) for column in SHARES.get(name, ())]
+    shares = [table[column].to_numpy(dtype=float) for column in SHARES.get(name, ()) if column in table]
     events = np.min([n * np.minimum(share, 1 - share) for share in shares], axis=0) if shares else np.inf
     notes = notes_on(n, events, effective)
     return table.assign(note=notes) if any(notes) else table

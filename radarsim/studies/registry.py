@@ -26,6 +26,7 @@ SHIPPED = {  # in the order of the papers, then what goes beyond them
     "sonar": "radarsim.studies.sonar",
     "discriminator": "radarsim.studies.discriminator",
     "ambiguous_doppler": "radarsim.studies.ambiguous_doppler",
+    "pulses_to_tracks": "radarsim.studies.pulses_to_tracks",
 }
 
 

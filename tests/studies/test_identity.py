@@ -16,7 +16,10 @@ from radarsim.studies import identity, registry
 from radarsim.studies.folder import StudyFolder
 
 ROOT = Path(__file__).parents[2]
-STEMS = ("rls2", "multimodel", "sonar_smoothing", "sonar_manoeuvre", "sonar_clutter", "discriminator", "ambiguous_rls4")
+STEMS = (
+    *("rls2", "multimodel", "sonar_smoothing", "sonar_manoeuvre", "sonar_clutter", "discriminator"),
+    *("ambiguous_rls4", "pulses"),
+)
 SONAR = {stem for stem in STEMS if stem.startswith("sonar_")}
 ALL, NONE = set(STEMS), set()
 FOLDERS = {
@@ -24,6 +27,7 @@ FOLDERS = {
     "multimodel": {"multimodel"},
     "discriminator": {"discriminator"},
     "ambiguous_doppler": {"ambiguous_rls4"},
+    "pulses_to_tracks": {"pulses"},
     "sonar": SONAR,
 }
 COMPUTING = ("study", "config", "world", "filters", "exact")
@@ -171,14 +175,14 @@ def test_sentences_move_nothing(folder, moved):
     [
         ("kernels/random.py", ALL),
         ("kernels/compile.py", ALL),
-        ("physics/motion.py", {"rls2", "ambiguous_rls4"} | SONAR),
+        ("physics/motion.py", {"rls2", "ambiguous_rls4", "pulses"} | SONAR),
         ("physics/frames.py", {"multimodel"}),
-        ("bursts/fisher.py", {"discriminator"}),
-        ("bursts/kernels/scoring.py", {"discriminator"}),
+        ("bursts/fisher.py", {"discriminator", "pulses"}),
+        ("bursts/kernels/scoring.py", {"discriminator", "pulses"}),
         ("studies/noise.py", ALL),
-        ("studies/radial.py", {"rls2", "ambiguous_rls4"}),
+        ("studies/radial.py", {"rls2", "ambiguous_rls4", "pulses"}),
         ("config/fields.py", ALL),
-        ("config/radial.py", {"rls2", "ambiguous_rls4"}),
+        ("config/radial.py", {"rls2", "ambiguous_rls4", "pulses"}),
         ("config/identity.py", ALL),
         ("engine/moments.py", ALL),
         ("kernels/cache.py", NONE),

@@ -152,6 +152,7 @@ MANOEUVRE = [*HELD, "sweep.target.acceleration_mps2=[0.2]", f"detectors=[{DETECT
 DRAWN = "target={kind: polynomial, coefficients: [1e5, -250, 4], sigma_coefficients: [10, 1, 0.1]}"
 MISSES = ["scans=9", "radar.detection_probability=0.7", "radar.sigma_bias_range_m=20", DRAWN]
 FEW = "filters=[{name: H 3, doppler: folded, manoeuvre_variance: 1e-3, hypotheses: 3}]"
+PULSES = "filters.5={name: a, observes: [range, velocity, acceleration], manoeuvre_variance: 1, use: mixture}"
 # What is run: name → config, overrides, realisations; of several cases the last.
 RUNS = {
     "linear": ("rls2", ["scans=9"], 11),
@@ -159,6 +160,8 @@ RUNS = {
     "folds": ("ambiguous_depth", ["scans=4", FEW], 8),
     "folds missed": ("ambiguous_missed", ["scans=5"], 8),
     "orders": ("orders", ["scans=6"], 8),
+    "pulses": ("pulses", ["scans=3"], 8),
+    "pulses fixed": ("pulses_forecast", ["scans=2", PULSES], 8),
     "sonar alike": ("sonar_smoothing", ["scans=9"], 9),
     "sonar correlated": ("sonar_correlated", ["scans=9"], 9),
     "sonar missed": ("sonar_missed", ["scans=12", "sweep.sensor.detection_probability=[0.7]", NEAR], 9),

@@ -177,6 +177,12 @@ def draw_forecasts(key, first, sigma, work):
 def draw_strip(key, first, mean, factor, a, b, drawn):
     """Block sums of realisations first … first + 7 into rows; draws 2i and 2i + 1 make block i."""
     fill_normal_strip(key, first, 0, a, b)
+    put_drawn(mean, factor, a, b, drawn)
+
+
+@kernel
+def put_drawn(mean, factor, a, b, drawn):
+    """Block sums into rows, of normals a and b: numbers 2i and 2i + 1 of either make block i."""
     a, b, drawn = address(a), address(b), address(drawn)
     for i in range(mean.shape[0]):
         n0, n1, n2, n3 = get(a, 2 * i), get(b, 2 * i), get(a, 2 * i + 1), get(b, 2 * i + 1)

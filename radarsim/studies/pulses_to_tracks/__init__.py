@@ -1,0 +1,17 @@
+"""From pulses to tracks: what a burst's estimate of velocity and acceleration is worth to the track (P4 into P1)."""
+
+from radarsim.studies.folder import StudyFolder
+
+STUDY = StudyFolder(
+    package=__name__,
+    name="pulses_to_tracks",
+    about="Beyond P1 and P4: bursts whose Doppler is estimated, and may not lock, and the tracks made of them.",
+    filters={
+        "observes: [range]": "Kalman filter on range alone, which needs no burst",
+        "estimator: sequence": "with the velocity, or velocity and acceleration, that P4's sequence finds in the burst",
+        "estimator: dense": "the same with twice as many windows; cured: with a search where coherence is short",
+        "estimator: spectrum": "the same found classically: the peak of the spectrum, then scoring",
+        "estimator: fisher_bound": "the idealisation: Gaussian errors of the Fisher bound, which always lock",
+    },
+    offers=("inputs", "warnings"),
+)

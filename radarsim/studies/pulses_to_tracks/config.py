@@ -1,0 +1,324 @@
+"""Keys of the pulses_to_tracks study: a radar and its burst, a target in range, filters with the burst's estimator."""
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validator
+
+from radarsim.config.faults import short
+from radarsim.config.fields import (
+    At,
+    Design,
+    Display,
+    Model,
+    Name,
+    NameIn,
+    NonNegative,
+    NotRead,
+    Number,
+    Positive,
+    Scenario,
+    Study,
+    Whole,
+    at,
+    cross_check,
+    of_each,
+    unique_names,
+)
+from radarsim.config.radial import NEAREST_M, AccelerationStart, FlyBy, Polynomial, Recorded, Starting, Turn
+from radarsim.physics.bands import Band, outside_band
+
+MOST_SCANS = 1000  # each scan has windows of its own
+FEWEST_PULSES, MOST_PULSES = 4, 4096
+SIGMAS = 3.0  # of the prior that the checks of spans and rates reckon with
+MOST_DERIVATIVES = 1
+SEQUENCES = ("sequence", "dense", "cured")
+USES = {"gated": {"gate_probability": 0.999}, "mixture": {"lock_probability": 0.95}}  # keys of a use, and defaults
+Target = Annotated[Polynomial | AccelerationStart | Turn | FlyBy | Recorded, Field(discriminator="kind")]
+
+
+class Radar(Model):
+    """A surveillance radar: wavelength, accuracy of a range, period of its scans. Its velocity comes from the burst."""
+
+    name: Annotated[Name | None, Display()] = Field(None, description="display name")
+    band: Annotated[Band | None, Display()] = Field(
+        None, description="wave band, for display: by its wavelength, or by its letter (IEEE Std 521)"
+    )
+    wavelength_m: Positive = Field(description="wavelength, m")
+    sigma_range_m: Positive = Field(description="standard deviation of a measured range, m")
+    scan_period_s: Positive = Field(description="time between two bursts, s")
+
+    @cross_check
+    def _in_its_band(self) -> Iterator[At]:
+        limits = outside_band(self.band, self.wavelength_m)
+        if limits is not None:
+            yield at("band", f"{self.band} is {' to '.join(map(short, limits))} m, not {short(self.wavelength_m)}")
+
+
+class Burst(Model):
+    """The coherent burst of a scan, one complex sample a pulse behind the filter that is matched to it."""
+
+    repetition_rate_hz: Positive = Field(description="pulse repetition rate, Hz; velocity folds into λ/2 times it")
+    pulses: Annotated[int, Whole(FEWEST_PULSES, MOST_PULSES)] | None = Field(
+        None, description="number of pulses; or give pulses_per_second"
+    )
+    pulses_per_second: Positive | None = Field(
+        None, description="ratio of pulses to the scan period, 1/s, in place of pulses: a constant share of time"
+    )
+    pulse_length_s: Positive = Field(
+        description="length of a pulse, s: the matched filter loses sinc² of it times the Doppler frequency"
+    )
+    snr_db: Annotated[Number, Field(ge=-60, le=100)] = Field(
+        description="ratio of the power of the echo to that of the noise in the sample of a pulse, dB"
+    )
+    snr_range_m: Positive | None = Field(
+        None, description="range at which snr_db holds, m: it then falls with the fourth power; default: everywhere"
+    )
+
+    @cross_check
+    def _one_number(self) -> Iterator[At]:
+        if (self.pulses is None) == (self.pulses_per_second is None):
+            yield at("pulses", "give either pulses or pulses_per_second")
+
+    @cross_check
+    def _pulse_fits(self) -> Iterator[At]:
+        if self.pulse_length_s * self.repetition_rate_hz > 1:
+            yield at("pulse_length_s", f"must be <= 1/repetition_rate_hz, {short(1 / self.repetition_rate_hz)} s")
+
+
+class Prior(Model):
+    """What is known when the track begins: the errors of a designation about the truth, drawn, Gaussian."""
+
+    sigma_velocity_mps: Positive = Field(description="standard deviation of the radial velocity, m/s")
+    sigma_acceleration_mps2: Positive = Field(description="standard deviation of the radial acceleration, m/s²")
+
+
+class Forecast(Model):
+    """A forecast that is the same at each scan: errors about the truth, drawn anew, Gaussian."""
+
+    sigma_velocity_mps: Positive = Field(description="standard deviation of the radial velocity, m/s")
+    sigma_acceleration_mps2: Positive = Field(description="standard deviation of the radial acceleration, m/s²")
+
+
+class Filter(Model):
+    """A Kalman filter of range, and of what an estimator finds in the burst."""
+
+    name: Annotated[Name, Display()] = Field(description="label; every filter has its own")
+    observes: tuple[Literal["range", "velocity", "acceleration"], ...] = Field(
+        description="what it takes: [range], [range, velocity] or [range, velocity, acceleration]"
+    )
+    manoeuvre_variance: NonNegative = Field(
+        description="variance of the random jerk it allows for, (m/s³)²; as in P1 not over the scans of its start"
+    )
+    estimator: Literal["sequence", "dense", "cured", "spectrum", "fisher_bound"] | None = Field(
+        None,
+        description="how the burst is estimated: P4's sequence of windows, with twice as many, with the search where "
+        "coherence is short; peak of the spectrum and scoring; or ideal Gaussian errors; default: cured",
+    )
+    forecast: Literal["track"] | Forecast | None = Field(
+        None,
+        description="where a sequence starts and how wide its first window is: track (the filter's own prediction "
+        "with its covariance), or a forecast of fixed accuracy; default: track",
+    )
+    derivatives: Annotated[int, Whole(0, MOST_DERIVATIVES)] | None = Field(
+        None,
+        description="derivatives of the Doppler frequency that are estimated; default: 1 with the acceleration, else 0 "
+        "(it is then taken as forecast)",
+    )
+    use: Literal["as_measured", "gated", "mixture"] | None = Field(
+        None,
+        description="as_measured: every estimate as if it had locked; gated: those near the prediction; mixture: "
+        "weighed by the probability that it locked; default: as_measured",
+    )
+    gate_probability: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="gated: probability that an estimate that locked is within the gate; default: 0.999"
+    )
+    lock_probability: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="mixture: probability before it is seen that an estimate has locked; default: 0.95"
+    )
+
+    @property
+    def takes(self) -> int:
+        """How many numbers of the burst it takes: none, the velocity, or the acceleration too."""
+        return len(self.observes) - 1
+
+    @cross_check
+    def _observes_what_there_is(self) -> Iterator[At]:
+        allowed = ("range", "velocity", "acceleration")
+        if not self.observes or self.observes != allowed[: len(self.observes)]:
+            yield at("observes", "must be [range], [range, velocity] or [range, velocity, acceleration]")
+
+    @cross_check
+    def _keys_have_an_effect(self) -> Iterator[At]:
+        if self.observes == ("range",):
+            for key in ("estimator", "forecast", "derivatives", "use", "gate_probability", "lock_probability"):
+                if getattr(self, key) is not None:
+                    yield at(key, "has no effect on range alone; leave it out")
+            return
+        if self.estimator in ("spectrum", "fisher_bound") and self.forecast is not None:
+            yield at("forecast", f"has no effect with estimator: {self.estimator}; leave it out")
+        if self.estimator == "fisher_bound" and self.use not in (None, "as_measured"):
+            yield at("use", "must be as_measured with estimator: fisher_bound, whose estimates always lock")
+        for use, keys in USES.items():
+            for key in keys:
+                if getattr(self, key) is not None and self.use != use:
+                    yield at(key, f"has no effect without use: {use}; leave it out")
+
+    @cross_check
+    def _acceleration_is_estimated(self) -> Iterator[At]:
+        if self.takes == 2 and self.derivatives == 0:
+            yield at("derivatives", "must be >= 1 for a filter that observes the acceleration")
+
+    @model_validator(mode="after")
+    def _completed(self) -> Self:
+        """The same with the defaults of what has an effect written out."""
+        if self.takes == 0:
+            return self
+        defaults: dict[str, Any] = {"estimator": "cured", "derivatives": self.takes - 1, "use": "as_measured"}
+        if (self.estimator or "cured") in SEQUENCES:
+            defaults["forecast"] = "track"
+        defaults |= USES.get(self.use or "", {})
+        missing = {key: value for key, value in defaults.items() if getattr(self, key) is None}
+        return self.model_copy(update=missing) if missing else self
+
+
+class Keys(Study):
+    """From pulses to tracks: how many pulses buy which track, and what a lost lock costs."""
+
+    figure_names = (
+        *(f"{kind}_{component}" for component in ("r", "Vr", "ar") for kind in ("sigma", "gain", "dynamic")),
+        "locks",
+        "measured",
+        "losses",
+        "threshold",
+    )
+    in_place_of: ClassVar = {
+        "scans": "duration_s",
+        "duration_s": "scans",
+        "burst.pulses": "burst.pulses_per_second",
+        "burst.pulses_per_second": "burst.pulses",
+    }
+
+    radar: Radar = Field(description="the radar")
+    burst: Burst = Field(description="the burst of each scan")
+    target: Annotated[Target, Scenario()] = Field(description="the target: a scenario's stem, or inline")
+    prior: Prior = Field(description="what is known when the track begins")
+    filters: Annotated[
+        tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
+    ] = Field(description="the filters; all see the same ranges and bursts")
+    baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
+        None, description="name of the filter that gains are against; default: the first"
+    )
+    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = Field(
+        None, description="number of scans; or give duration_s"
+    )
+    duration_s: Annotated[Positive | None, Design()] = Field(
+        None, description="time from the first scan to the last, s, in place of scans: to the last scan within it"
+    )
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        schema = super().__get_pydantic_json_schema__(core_schema, handler)
+        length = {"oneOf": [{"required": ["scans"]}, {"required": ["duration_s"]}]}
+        return schema | {"allOf": [*schema.get("allOf", []), length]}
+
+    @property
+    def pulses(self) -> int:
+        """Pulses of a burst, given or by their number a second."""
+        burst = self.burst
+        if burst.pulses is not None:
+            return burst.pulses
+        if burst.pulses_per_second is None:
+            raise NotRead("pulses")
+        return round(burst.pulses_per_second * self.radar.scan_period_s)
+
+    @property
+    def burst_s(self) -> float:
+        """Length of a burst: a period for every pulse, s."""
+        return self.pulses / self.burst.repetition_rate_hz
+
+    @property
+    def span_mps(self) -> float:
+        """The span into which velocity folds, λF/2, m/s."""
+        return self.radar.wavelength_m * self.burst.repetition_rate_hz / 2
+
+    @property
+    def plots(self) -> int:
+        """How many scans there are, given or by the duration."""
+        if self.duration_s is None:
+            if self.scans is None:
+                raise NotRead("scans")
+            return self.scans
+        return int(self.duration_s / self.radar.scan_period_s * (1 + 1e-12)) + 1
+
+    @model_validator(mode="after")
+    def _completed(self) -> Self:
+        target = self.target.timed(self.radar.scan_period_s) if isinstance(self.target, Starting) else self.target
+        burst = self.burst.model_copy(update={"pulses": self.pulses, "pulses_per_second": None})
+        update = {"target": target, "burst": burst, "scans": self.plots, "duration_s": None}
+        return self.model_copy(update=update)
+
+    @cross_check
+    def _length_given(self) -> Iterator[At]:
+        if self.scans is None and self.duration_s is None:
+            yield at("scans", "required key is missing, or duration_s in its place")
+        elif self.scans is not None and self.duration_s is not None:
+            yield at("duration_s", "stands in place of scans: give one of them")
+        elif not 2 <= self.plots <= MOST_SCANS:
+            yield at("duration_s", f"must be 2 to {MOST_SCANS} scans of radar.scan_period_s, makes {self.plots}")
+
+    @cross_check
+    def _pulses_in_bounds(self) -> Iterator[At]:
+        if self.burst.pulses is None and not FEWEST_PULSES <= self.pulses <= MOST_PULSES:
+            bounds = f"{FEWEST_PULSES} to {MOST_PULSES} pulses in radar.scan_period_s, makes {self.pulses}"
+            yield at("burst.pulses_per_second", f"must be {bounds}")
+
+    @cross_check
+    def _burst_fits_the_scan(self) -> Iterator[At]:
+        if self.burst_s > self.radar.scan_period_s:
+            words = f"the burst must be <= radar.scan_period_s, {short(self.radar.scan_period_s)} s"
+            key = "pulses" if self.burst.pulses is not None else "pulses_per_second"
+            yield at(f"burst.{key}", f"{words}, is {short(self.burst_s)} s")
+
+    @cross_check
+    def _rate_carries_the_derivatives(self) -> Iterator[At]:
+        """Refuse a burst over which the forecast acceleration could sweep the frequency past half the rate."""
+        if not any(one.takes for one in self.filters):
+            return
+        swept = 2 / self.radar.wavelength_m * SIGMAS * self.prior.sigma_acceleration_mps2 * self.burst_s
+        if self.burst.repetition_rate_hz < 2 * swept:
+            words = f"must be >= {short(2 * swept)} Hz, twice what {SIGMAS:g} σ of the prior's acceleration sweep"
+            yield at("burst.repetition_rate_hz", f"{words} over the burst")
+
+    @cross_check
+    def _enough_pulses(self) -> Iterator[At]:
+        yield from of_each(self.filters, self._determined)
+
+    def _determined(self, i: int, one: Filter) -> Iterator[At]:
+        fewest = 2 + (one.derivatives if one.derivatives is not None else max(one.takes - 1, 0))
+        if one.takes and self.pulses < 2 * fewest:
+            words = f"{self.pulses} pulses are too few for {fewest} parameters: at least {2 * fewest}"
+            yield at(f"filters.{i}.derivatives" if one.derivatives is not None else "burst.pulses", words)
+
+    @cross_check
+    def _in_proportion(self) -> Iterator[At]:
+        dt, sigma = self.radar.scan_period_s, self.radar.sigma_range_m
+        for key, value in (
+            ("sigma_velocity_mps", self.prior.sigma_velocity_mps * dt),
+            ("sigma_acceleration_mps2", self.prior.sigma_acceleration_mps2 * dt**2),
+        ):
+            if not 1e-6 <= value / sigma <= 1e6:
+                words = (
+                    "out of proportion: what it moves a target in a scan over sigma_range_m must be from 1e-6 to 1e6"
+                )
+                yield at(f"prior.{key}", words)
+
+    @cross_check
+    def _target_in_reach(self) -> Iterator[At]:
+        target = self.target.timed(self.radar.scan_period_s) if isinstance(self.target, Starting) else self.target
+        last = (self.plots - 1) * self.radar.scan_period_s
+        if not math.isfinite(target.reach_m(last)) or target.reach_m(last) > 1e12:
+            yield at("target", "must stay within 1e12 m of the radar up to the last scan")
+        elif isinstance(target, Turn) and target.closest_m(last) < NEAREST_M:
+            yield at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")

@@ -1,0 +1,175 @@
+"""The study's figures: σ and gains, locks by scan, what the bursts measured, what a loss costs."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from radarsim.config.experiment import Experiment
+from radarsim.report import panels, sweeps
+from radarsim.report import tables as common
+from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
+from radarsim.studies.pulses_to_tracks.kernels.records import AGES
+from radarsim.studies.pulses_to_tracks.tables import Result
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+QUANTITIES = {
+    "r": panels.Quantity("$r$", "range"),
+    "Vr": panels.Quantity("$V_r$", "radial velocity"),
+    "ar": panels.Quantity("$a_r$", "radial acceleration"),
+}
+FEW = 30  # realisations behind a point
+WIDE = 30  # largest over least σ from which its axis is logarithmic
+
+
+def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
+    """sigma_r … gain_ar; locks, measured, losses of what is not swept, threshold of what is."""
+    curves = common.groups(made["curves"], "case", "filter", "component")
+    gains = common.groups(made["gains"], "case", "filter", "component")
+
+    def chosen(name: str) -> list[str]:
+        return [case.name for case in experiment.shown_in(name)]
+
+    drawn = {
+        name: replace(figure, panels=tuple(map(wide, figure.panels))) if name.startswith("sigma") else figure
+        for name, figure in panels.per_component(results, curves, gains, QUANTITIES, chosen).items()
+    }
+    for name, (draw, title, caption) in OWN.items():
+        some, left_out = panels.shown(panels.unswept(results), chosen(name))
+        found = [panel for result in some if not result.swept and (panel := draw(result, made)).marks]
+        if found:
+            drawn[name] = _figure(name, title, caption + left_out, found)
+    return drawn | threshold_figure(results, made)
+
+
+def wide(panel: Panel) -> Panel:
+    """A panel of σ with a logarithmic axis where a lost track would hide the others."""
+    values = np.concatenate([mark.y for mark in panel.marks if isinstance(mark, Line)] or [np.ones(1)])
+    least = values[values > 0].min(initial=np.inf)
+    return replace(panel, y=Axis(panel.y.label, "log")) if values.max() > WIDE * least else panel
+
+
+def _figure(name: str, title: str, caption: str, found: list[Panel]) -> Figure:
+    if len(found) > 1 or any(len(panel.marks) > panels.MOST_AT_ENDS for panel in found):
+        found = panels.in_legend(found)
+    columns = min(3, len(found))
+    return Figure(name, title, caption, tuple(found), columns, COLUMN_MM if columns == 1 else PAGE_MM)
+
+
+def _title(result: Result) -> str:
+    return panels.swept(result) or panels.device(result)
+
+
+def threshold_figure(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> dict[str, Figure]:
+    """Share of bursts that locked, and σ of range at the last scan, against one swept number, for each config."""
+    drawn: list[Panel] = []
+    for (_, keys), members in sweeps.families(results).items():
+        x, axis = sweeps.places(keys[0], [dict(result.swept)[keys[0]] for result in members])
+        if len(keys) == 1 and not axis.ticks:
+            drawn += _threshold_panels([members[i] for i in np.argsort(x)], np.sort(x), axis, made)
+    if not any(panel.marks for panel in drawn):
+        return {}
+    caption = (
+        "Left: share of bursts that lock at the scan where fewest do: velocity (and acceleration, where it is taken) "
+        "within five Fisher bounds of the truth. Right: σ of the range at the last scan. Bands: 95 % intervals. "
+        "Crosses: exact values."
+    )
+    figure = Figure("threshold", "The threshold", caption, tuple(panels.in_legend(drawn)), 3, PAGE_MM, 60)
+    return {"threshold": figure}
+
+
+def _threshold_panels(
+    members: Sequence[Result], x: np.ndarray, axis: Axis, made: "Mapping[str, pd.DataFrame]"
+) -> list[Panel]:
+    """The two panels of cases in the order of their swept values x (n,)."""
+    locks: list[Line] = []
+    sigmas: list[Line] = []
+    curves = common.groups(made["curves"], "case", "filter", "component")
+    for n, name in enumerate(members[0].axes.filters):
+        style, words = panels.look(n, 0, 1), panels.literal(name)
+        found = np.array([sweeps.last(result, name, "r", curves) for result in members])
+        exact = found[:, 3] if np.isfinite(found[:, 3]).any() else None
+        sigmas.append(Line(x, found[:, 0], words, style, found[:, 1], found[:, 2], exact))
+        if members[0].axes.ideal[n] >= 0:
+            shares = np.array([_locked(result, made["locks"], name) for result in members])
+            locks.append(Line(x, shares[:, 0], words, style, shares[:, 1], shares[:, 2]))
+    of_r = wide(Panel(axis, Axis("$\\sigma$ of $r$ at the end, m"), tuple(sigmas), panels.device(members[0])))
+    return [Panel(axis, Axis("P(locked)", limits=(0, 1.02)), tuple(locks), panels.device(members[0])), of_r]
+
+
+def _locked(result: Result, locks: "pd.DataFrame", name: str) -> tuple[float, float, float]:
+    """The least share of locks over the scans, with its interval."""
+    rows = locks[(locks["case"] == result.name) & (locks["filter"] == name)]
+    row = rows.iloc[int(rows["lock_rate"].to_numpy().argmin())]
+    return float(row["lock_rate"]), float(row["lock_lo"]), float(row["lock_hi"])
+
+
+def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
+    """Share of bursts that locked against time, a line for each estimator."""
+    rows = common.groups(made["locks"][made["locks"]["case"] == result.name], "filter")
+    marks = []
+    for n, ((name,), own) in enumerate(rows.items()):
+        x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
+        if (y < 1).any():
+            marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, hi))
+    return Panel(
+        Axis(panels.TIME, limits=(0, None)), Axis("P(locked)", limits=(None, 1.0)), tuple(marks), _title(result)
+    )
+
+
+def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
+    """Errors of the measured velocity of all bursts against time, and the Fisher bound."""
+    table = made["estimates"]
+    rows = common.groups(table[(table["case"] == result.name) & (table["component"] == "Vr")], "filter")
+    marks: list[Line] = []
+    for n, ((name,), own) in enumerate(rows.items()):
+        x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", "sigma_all", "sigma_all_lo", "sigma_all_hi"))
+        marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, hi))
+    if rows:
+        own = next(iter(rows.values()))
+        marks.append(Line(own["t_s"].to_numpy(), own["bound"].to_numpy(), "Fisher bound", Style(9, 1)))
+    panel = Panel(
+        Axis(panels.TIME, limits=(0, None)), Axis("$\\sigma$ of measured $V_r$, m/s"), tuple(marks), _title(result)
+    )
+    return wide(panel)
+
+
+def losses_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
+    """σ of the range at the last scan by the scans since a burst was lost, a line for each filter that lost some."""
+    table = made["losses"]
+    own = table[(table["case"] == result.name) & (table["component"] == "r") & (table["k"] == result.axes.k[-1])]
+    marks = []
+    for n, ((name,), rows) in enumerate(common.groups(own, "filter").items()):
+        rows = rows[rows["n"] >= FEW]
+        if len(rows) > 1:
+            x, y, lo, hi = (rows[c].to_numpy(dtype=float) for c in ("since_loss", "sigma", "sigma_lo", "sigma_hi"))
+            marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, np.minimum(hi, 1e3 * y)))
+    ticks = tuple((float(age), str(age) if age < AGES - 1 else f"{age}+ or none") for age in range(AGES))
+    x_axis = Axis("scans since a burst was lost", ticks=ticks)
+    return wide(Panel(x_axis, Axis("$\\sigma$ of $r$ at the last scan, m"), tuple(marks), _title(result)))
+
+
+Draw = Callable[[Result, "Mapping[str, pd.DataFrame]"], Panel]
+OWN: dict[str, tuple[Draw, str, str]] = {
+    "locks": (
+        locks_panel,
+        "Bursts that lock",
+        "Share of bursts whose velocity (and acceleration, where it is taken) is within five Fisher bounds of the "
+        "truth. Bands: 95 % intervals. Estimators that always lock are left out.",
+    ),
+    "measured": (
+        measured_panel,
+        "What the bursts measure",
+        "Root-mean-square error of the burst's velocity, of all bursts, those that did not lock included. "
+        "Bands: 95 % intervals.",
+    ),
+    "losses": (
+        losses_panel,
+        "What a lost burst costs",
+        "Root-mean-square error of the range at the last scan, of realisations by the number of scans since their "
+        "last burst that did not lock. Bands: 95 % intervals.",
+    ),
+}

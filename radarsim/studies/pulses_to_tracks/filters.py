@@ -1,0 +1,236 @@
+"""From a filter's options to the arrays that the kernels read: menus of windows, gates, noise.
+
+A sequence whose forecast is the track's takes its windows from a menu: they are designed for standard deviations of
+velocity and acceleration in geometric progression, and each scan of each realisation takes the least that is no less
+than its own. The menu begins with what the ranges alone leave open and ends where the whole burst is the first window.
+"""
+
+import math
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from radarsim.bursts import estimators, schedule
+from radarsim.bursts.blocks import Tables, block_edges
+from radarsim.bursts.burst import Burst
+from radarsim.bursts.fisher import fisher, fisher_sums
+from radarsim.bursts.kernels.data import BLOCK_SUMS
+from radarsim.bursts.kernels.sequence import OPTIONS, WINDOW
+from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.studies.pulses_to_tracks import world
+from radarsim.studies.pulses_to_tracks.kernels import records
+
+RATIOS = (math.sqrt(2.0), 2.0)  # of neighbouring standard deviations of a menu: velocity, acceleration
+MOST_LEVELS = (40, 16)
+STILL = 0.02  # turns at the ends of the burst, left by an acceleration: below it none is designed for
+BLOCKS_PER_WINDOW = 20  # as the discriminator's
+UNKNOWN_RAD = 2.0 * math.pi  # the phase's spread before a burst
+KINDS = {None: records.NONE, "fisher_bound": records.BOUND, "spectrum": records.SPECTRUM}
+USES = {None: records.AS_MEASURED, "as_measured": records.AS_MEASURED} | {
+    "gated": records.GATED,
+    "mixture": records.MIXTURE,
+}
+SEARCH: dict[str, Any] = {"coherent": True, "search": 2, "margin": 2.0, "tolerance": 0.3}  # P4's cure at a hand-over
+
+
+@dataclass(frozen=True)
+class Menu:
+    """Standard deviations (m/s, m/s²) that windows are designed for, and the windows in pulses of each pair.
+
+    spreads are the largest of either; levels how many of either, the next one RATIOS times less.
+    """
+
+    top: tuple[float, float]
+    levels: tuple[int, int]
+    windows: tuple[tuple[int, ...], ...]
+
+    def spreads(self, entry: int) -> tuple[float, float]:
+        """The standard deviations of an entry; velocity counts fastest."""
+        a, v = divmod(entry, self.levels[0])
+        return self.top[0] / RATIOS[0] ** v, self.top[1] / RATIOS[1] ** a
+
+
+def parameters(one: Any) -> int:
+    """How many parameters a filter's estimator has: phase, frequency, derivatives."""
+    return 2 + (one.derivatives or 0)
+
+
+def theta_spreads(burst: Burst, size: int, spreads: tuple[float, float]) -> np.ndarray:
+    """Standard deviations (size,) of θ at the burst's beginning, of a forecast of velocity and acceleration."""
+    velocity, acceleration = spreads
+    at_start = math.hypot(velocity, acceleration * world.centre(burst) * burst.duration_s)
+    return np.array([UNKNOWN_RAD, *(2.0 / burst.wavelength_m * np.array([at_start, acceleration]))])[:size]
+
+
+def designer(burst: Burst, size: int, spreads: tuple[float, float]) -> schedule.Designer:
+    """Who designs the windows of a forecast: by the paper's Gaussian tail, P_Δ = 0.99, c = 1."""
+    sigma = theta_spreads(burst, size, spreads)
+    return schedule.Designer(burst, sigma, partial(fisher, burst, size), schedule.Condition())
+
+
+def windows(burst: Burst, one: Any, spreads: tuple[float, float]) -> tuple[int, ...]:
+    """The windows in pulses of a filter's sequence; raises NoSchedule where there are none."""
+    found = designer(burst, parameters(one), spreads).windows()
+    return tuple(schedule.denser(found, 2) if one.estimator == "dense" else found)
+
+
+def menu(burst: Burst, one: Any, widest: tuple[float, float]) -> Menu:
+    """The menu of a filter: of its fixed forecast alone, or from the widest that the track may have."""
+    if one.forecast != "track":
+        spreads = one.forecast.sigma_velocity_mps, one.forecast.sigma_acceleration_mps2
+        return Menu(spreads, (1, 1), (windows(burst, one, spreads),))
+    of_acceleration = 1
+    if parameters(one) > 2:
+        turns = widest[1] / burst.wavelength_m * (0.5 * burst.duration_s) ** 2
+        of_acceleration = min(1 + max(0, math.ceil(math.log(turns / STILL, RATIOS[1]))), MOST_LEVELS[1])
+    rows: list[list[tuple[int, ...]]] = []
+    for a in range(of_acceleration):
+        row: list[tuple[int, ...]] = []
+        while len(row) < MOST_LEVELS[0] and (not row or row[-1] != (burst.pulses,)):
+            row.append(windows(burst, one, (widest[0] / RATIOS[0] ** len(row), widest[1] / RATIOS[1] ** a)))
+        rows.append(row)
+    longest = max(map(len, rows))
+    every = tuple(own for row in rows for own in (*row, *[row[-1]] * (longest - len(row))))
+    return Menu(widest, (longest, of_acceleration), every)
+
+
+def widest(spec: Any, one: Any) -> tuple[float, float]:
+    """The largest standard deviations of velocity and acceleration that a forecast of the track may have.
+
+    Those of range alone: a burst only adds to what is known.
+    """
+    dt = spec.radar.scan_period_s
+    F, Q = transition(dt), manoeuvre_covariance(one.manoeuvre_variance, dt)
+    P = np.diag([0.0, spec.prior.sigma_velocity_mps**2, spec.prior.sigma_acceleration_mps2**2])
+    found = []
+    for k in range(spec.scans):
+        if k == 0:
+            P[0, 0] = spec.radar.sigma_range_m**2
+        else:
+            P = F @ P @ F.T + (Q if k >= start_scans(one) else 0.0)
+            P = P - np.outer(P[0], P[0]) / (P[0, 0] + spec.radar.sigma_range_m**2)
+        found.append(np.sqrt(np.diag(P)[1:]))
+    largest = np.max(found, axis=0)
+    return float(largest[0]), float(largest[1])
+
+
+def start_scans(one: Any) -> int:
+    """Scans that start a filter, as in P1: the manoeuvre is allowed for after them."""
+    return 2 if one.takes else 3
+
+
+@dataclass
+class Gathered:
+    """Windows of all designs so far."""
+
+    windows: list[np.ndarray] = field(default_factory=list)
+
+    def add(self, made: np.ndarray) -> int:
+        """Where these begin."""
+        begins = sum(map(len, self.windows))
+        self.windows.append(made)
+        return begins
+
+
+@dataclass(frozen=True)
+class Designed:
+    """The arrays of the filters, and what they were made from."""
+
+    arrays: records.Filters
+    tables: Tables
+    sums: estimators.World
+    menus: tuple[Menu | None, ...]
+
+
+def designed(spec: Any, bursts: list[Burst]) -> Designed:
+    """All filters of a case: their menus, and of every scan and entry the records of its windows.
+
+    Windows are designed for the weakest of the bursts, and weighed with the noise of each.
+    """
+    weakest = max(bursts, key=lambda one: one.noise_variance)
+    menus = tuple(None if one.estimator in KINDS else menu(weakest, one, widest(spec, one)) for one in spec.filters)
+    every = sorted({spec.pulses} | {w for one in menus if one for own in one.windows for w in own})
+    if any(one.estimator == "spectrum" for one in spec.filters):
+        every = list(range(1, spec.pulses + 1))  # a spectrum needs every pulse
+    edges = block_edges(every, BLOCKS_PER_WINDOW)
+    zero = np.zeros((1, spec.pulses))
+    sums = estimators.world(weakest, BLOCK_SUMS, edges, False, zero, zero)
+    tables = Tables(edges, sums.mean, BLOCKS_PER_WINDOW)
+    return Designed(_arrays(spec, bursts, menus, tables), tables, sums, menus)
+
+
+def _arrays(spec: Any, bursts: list[Burst], menus: tuple[Menu | None, ...], tables: Tables) -> records.Filters:
+    count, scans = len(spec.filters), len(bursts)
+    entries = max((len(one.windows) for one in menus if one), default=1)
+    gathered = Gathered()
+    options = np.zeros(count, OPTIONS)
+    first, many = np.zeros((count, scans, entries), np.int64), np.zeros((count, scans, entries), np.int64)
+    free, sigma = np.zeros((count, scans), np.int64), np.ones((count, scans, 2))
+    for f, (one, own) in enumerate(zip(spec.filters, menus, strict=True)):
+        known: dict[Burst, int] = {}
+        for k, burst in enumerate(bursts):
+            if burst in known:
+                for array in (first, many, free, sigma):
+                    array[f, k] = array[f, known[burst]]
+                continue
+            known[burst] = k
+            if one.takes:
+                sigma[f, k] = world.bounds(burst, parameters(one))
+                free[f, k] = gathered.add(_records(burst, one, (spec.pulses,), None, tables)[0])
+            for entry, windows_ in enumerate(own.windows if own else ()):
+                made, options[f] = _records(burst, one, windows_, own.spreads(entry) if own else None, tables)
+                first[f, k, entry], many[f, k, entry] = gathered.add(made), len(made)
+        if one.takes and own is None:
+            options[f] = _records(bursts[0], one, (spec.pulses,), None, tables)[1]
+    last = options.copy()
+    last["search"] = 0
+    names = [one.name for one in spec.filters]
+    return records.Filters(
+        filters=np.array([_filter(spec, one, own) for one, own in zip(spec.filters, menus, strict=True)]),
+        options=options,
+        last=last,
+        windows=np.concatenate([*gathered.windows, np.zeros(1, WINDOW)]),
+        first=first,
+        count=many,
+        free=free,
+        sigma=sigma,
+        baseline=names.index(spec.baseline) if spec.baseline else 0,
+    )
+
+
+def _records(
+    burst: Burst, one: Any, own: tuple[int, ...], spreads: tuple[float, float] | None, tables: Tables
+) -> tuple[np.ndarray, np.void]:
+    """Records of the windows of an estimator and its options; without a forecast where no spreads are given."""
+    size = parameters(one)
+    cure = SEARCH if one.estimator == "cured" and spreads else {}
+    of = designer(burst, size, spreads or (1.0, 1.0))
+    design = estimators.Design(own, forecast=spreads is not None, **cure)
+    information = dict(zip(own, fisher_sums(burst, size, list(own)), strict=True))
+    made, options = estimators.estimators([design], tables.window, burst, of.sigma, information, of)
+    return made[0], options[0]
+
+
+def _filter(spec: Any, one: Any, own: Menu | None) -> np.void:
+    """A filter's record."""
+    dt = spec.radar.scan_period_s
+    made = np.zeros(1, records.FILTER)[0]
+    made["kind"] = KINDS.get(one.estimator, records.SEQUENCE)
+    made["takes"], made["use"], made["start"] = one.takes, USES[one.use], start_scans(one)
+    made["track"] = one.forecast == "track"
+    made["noise"] = manoeuvre_covariance(one.manoeuvre_variance, dt)[np.triu_indices(3)]
+    if one.use == "gated":
+        from scipy.special import chdtri
+
+        made["gate"] = chdtri(one.takes, 1.0 - one.gate_probability)
+    if one.use == "mixture":
+        # An estimate that did not lock is anywhere in the span, its acceleration anywhere the rate can be swept.
+        made["lock"], made["density"] = one.lock_probability, 1.0 / spec.span_mps
+        if one.takes == 2:
+            made["density"] /= spec.span_mps / spec.burst_s
+    if own is not None:
+        made["top"], made["levels"], made["ratio"] = own.top, own.levels, np.log(RATIOS)
+        made["fixed"] = own.top if one.forecast != "track" else 0.0
+    return made

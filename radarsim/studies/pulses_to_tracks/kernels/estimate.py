@@ -1,0 +1,97 @@
+"""The bursts of eight realisations: their sums drawn, and what a filter's estimator makes of them.
+
+As in P4's kernels an estimate is its deviation from the truth, in turns over the burst.
+"""
+
+from radarsim.bursts.kernels.lanes import LIVE, PASSES, PRIOR, X, lane, merge, step
+from radarsim.bursts.kernels.lanes import ROWS as WORK
+from radarsim.bursts.kernels.scoring import SIZE
+from radarsim.bursts.kernels.strip import evaluate, put_drawn, take_window
+from radarsim.kernels.compile import kernel, part
+from radarsim.kernels.lanes import WIDTH, address, full, get, put, rows
+from radarsim.kernels.random import LANE_BITS, U, normals
+from radarsim.studies.pulses_to_tracks.kernels.records import BOUND, SEQUENCE
+from radarsim.studies.pulses_to_tracks.kernels.spectrum import highest_line
+
+
+@kernel
+def draw_sums(world, k, who, a, b, drawn):
+    """Block sums of scan k of the realisations who (8,) into rows; as `bursts.kernels.strip.draw_strip`."""
+    k0, k1 = world.keys[1, 0], world.keys[1, 1]
+    pair = U(2 * world.mean.shape[0] * k)
+    for i in range(a.size):
+        a[i], b[i] = normals(k0, k1, U(who[i & (WIDTH - 1)]), pair + U(i >> LANE_BITS))
+    put_drawn(world.mean, world.factor[world.law[k]], a, b, drawn)
+
+
+@part
+def put_forecast(world, forecast, work):
+    """Errors of the forecast (8, 2) of velocity and acceleration as those of the phase's coefficients."""
+    zero = full(0.0)
+    for j in range(SIZE):
+        put(work, PRIOR + j, zero)
+    for n in range(WIDTH):
+        v, a = forecast[n, 0], forecast[n, 1]
+        work[lane(PRIOR + 1, n)] = world.to_turns[0, 0] * v + world.to_turns[0, 1] * a
+        work[lane(PRIOR + 2, n)] = world.to_turns[1, 1] * a
+    for j in range(SIZE):
+        put(work, X + j, get(work, PRIOR + j))
+
+
+@part
+def ideal(world, k, window, work, sums, drawn):
+    """The estimate that the Fisher bound allows: one step from the truth, linear in the noise."""
+    zero = full(0.0)
+    physics, table = world.physics[k], address(world.tables[0])
+    for j in range(SIZE):
+        put(work, PRIOR + j, zero)
+        put(work, X + j, zero)
+    merge(drawn, table, address(world.tables[1]), window.table, window.weights, window.blocks, sums)
+    evaluate(physics, work, sums, table, window)
+    put(work, LIVE, full(1.0))
+    step(work, window, physics.amplitude / physics.sigma**2, False, full(1.0))
+
+
+@kernel
+def estimate(world, filters, f, k, entry, who, forecast, room, found):
+    """Velocity and acceleration at the middle of the bursts of scan k, less the true ones, into found (8, 2).
+
+    By the estimator of filter f with windows of an entry of its menu, of the realisations who (8,), whose forecasts err
+    by forecast (8, 2). Returns the passes over a window's data of each as the sum over the first eight lanes of work.
+    """
+    work_, sums_, drawn_, a, b, re, im = room
+    draw_sums(world, k, who, a, b, drawn_)
+    work, sums, drawn = address(work_), address(sums_), address(drawn_)
+    physics, own, free = world.physics[k], filters.filters[f], filters.windows[filters.free[f, k]]
+    put(work, PASSES, full(0.0))
+    if own.kind == BOUND:
+        ideal(world, k, free, work, sums, drawn)
+    else:
+        table, weights = address(world.tables[0]), address(world.tables[1])
+        put_forecast(world, forecast, work)
+        if own.kind == SEQUENCE:
+            first = filters.first[f, k, entry]
+            for w in range(filters.count[f, k, entry]):
+                window = filters.windows[first + w]
+                take_window(physics, drawn, table, weights, window, filters.options[f], w == 0, work, sums)
+        else:
+            highest_line(
+                *(drawn, physics.pulses, world.offset[k], world.twiddle, world.reversed),
+                *(work, address(re), address(im)),
+            )
+        # What goes to the filter must not hold the forecast once more: the last step is on the likelihood alone.
+        take_window(physics, drawn, table, weights, free, filters.last[f], own.kind != SEQUENCE, work, sums)
+    for n in range(WIDTH):
+        for c in range(2):
+            total = 0.0
+            for j in range(SIZE):
+                total += world.measured[c, j] * work[lane(X + j, n)]
+            found[n, c] = total
+
+
+def room_for(blocks: int, lines: int) -> tuple:
+    """Work arrays for eight bursts: estimates, sums of a window, sums drawn, normals, a spectrum."""
+    return (
+        *(rows(WORK), rows(4 * blocks), rows(4 * blocks), rows(2 * blocks), rows(2 * blocks)),
+        *(rows(lines), rows(lines)),
+    )

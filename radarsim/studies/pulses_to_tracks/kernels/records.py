@@ -1,0 +1,133 @@
+"""The arrays that the kernels read and fill.
+
+Letters: K scans, F filters, S laws of the noise (bursts of another signal-to-noise ratio), W windows of all designs.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+NONE, BOUND, SEQUENCE, SPECTRUM = 0, 1, 2, 3  # how a filter's bursts are estimated
+AS_MEASURED, GATED, MIXTURE = 0, 1, 2  # what it does with an estimate
+# Counted of the estimates of a scan: within 5 and 3 bounds of the truth; the weight with which they were taken; those
+# taken in a fold that is not the truth's.
+LOCKED, LOCKED_3, TAKEN, WRONG_FOLD, COUNTS = 0, 1, 2, 3, 4
+AGES = 7  # scans since the last burst that was lost: 0 … 5, then six and more, or none was lost so far
+
+FILTER = np.dtype(
+    [
+        ("kind", np.int64),  # NONE … SPECTRUM
+        ("takes", np.int64),  # numbers of the burst: 0, 1 velocity, 2 acceleration too
+        ("use", np.int64),  # AS_MEASURED … MIXTURE
+        ("track", np.int64),  # whether its forecast is its own prediction
+        ("start", np.int64),  # scans without manoeuvre noise
+        ("gate", np.float64),  # largest squared deviation in variances
+        ("lock", np.float64),  # probability of lock before an estimate is seen
+        ("density", np.float64),  # of an estimate that did not lock
+        ("fixed", np.float64, 2),  # standard deviations of a forecast that is not the track's
+        ("top", np.float64, 2),  # largest standard deviations of the menu: velocity, acceleration
+        ("ratio", np.float64, 2),  # logarithm of the ratio of neighbouring ones
+        ("levels", np.int64, 2),  # how many
+        ("noise", np.float64, 6),  # Q, packed
+    ],
+    align=True,
+)
+
+
+class World(NamedTuple):
+    """What is observed.
+
+    keys     (4, 2)           of the streams of ranges, bursts, the designation, fixed forecasts
+    missed   (K, 3)           see `world.defects`
+    motion   (5,)             F, as `kernels.symmetric` has it
+    sigma_r                   of a range, m
+    prior    (2,)             standard deviations of the designation
+    span                      of velocity, m/s
+    physics  (K,)             bursts, see `bursts.kernels.data.PHYSICS`
+    law      (K,)             of which law
+    mean     (blocks, 4)      of the sums drawn
+    factor   (S, blocks, 10)  roots of their covariances
+    tables   two flat arrays, see `bursts.blocks.Tables`
+    to_turns (2, 2)           of a forecast's errors of velocity and acceleration b₁ and b₂ in turns over the burst
+    measured (2, 6)           of an estimate in turns over the burst velocity and acceleration at its middle
+    offset   (K,)             of the true Doppler frequency from the spectrum's lines, in lines
+    twiddle  (M / 2, 2)       cosines and sines of the transform of M points
+    reversed (M,)             its order
+    """
+
+    keys: np.ndarray
+    missed: np.ndarray
+    motion: np.ndarray
+    sigma_r: float
+    prior: np.ndarray
+    span: float
+    physics: np.ndarray
+    law: np.ndarray
+    mean: np.ndarray
+    factor: np.ndarray
+    tables: tuple[np.ndarray, np.ndarray]
+    to_turns: np.ndarray
+    measured: np.ndarray
+    offset: np.ndarray
+    twiddle: np.ndarray
+    reversed: np.ndarray
+
+
+class Filters(NamedTuple):
+    """The filters.
+
+    filters (F,)        see FILTER
+    options (F,)        of their sequences, see `bursts.kernels.sequence.OPTIONS`
+    last    (F,)        of the last step, which is without forecast
+    windows (W,)        of all designs, see `bursts.kernels.sequence.WINDOW`
+    first   (F, K, E)   where those of an entry of the menu begin
+    count   (F, K, E)   how many there are
+    free    (F, K)      the whole burst without forecast
+    sigma   (F, K, 2)   Fisher bounds of velocity and acceleration
+    baseline            the filter that gains are against
+    """
+
+    filters: np.ndarray
+    options: np.ndarray
+    last: np.ndarray
+    windows: np.ndarray
+    first: np.ndarray
+    count: np.ndarray
+    free: np.ndarray
+    sigma: np.ndarray
+    baseline: int
+
+
+class Sums(NamedTuple):
+    """Sums over realisations; e = estimate − truth.
+
+    error    (F, K, 3, 4)        e, e², e³, e⁴ of range, velocity, acceleration
+    paired   (F, K, 3)           e² times the baseline's
+    measured (F, K, 2, 2, 2)     of the burst's velocity and acceleration e², e⁴: of those that locked, of all
+    locks    (F, K, COUNTS)      see above
+    ages     (F, K, AGES)        realisations by the scans since the last burst that was lost
+    losses   (F, K, AGES, 3, 2)  e², e⁴ of these
+    passes   (F, 2)              passes over a window's data a burst, and their squares
+    """
+
+    error: np.ndarray
+    paired: np.ndarray
+    measured: np.ndarray
+    locks: np.ndarray
+    ages: np.ndarray
+    losses: np.ndarray
+    passes: np.ndarray
+
+
+def shapes(filters: int, scans: int) -> dict[str, tuple[int, ...]]:
+    """The shapes of `Sums`, by name."""
+    each = (filters, scans)
+    return {
+        "error": (*each, 3, 4),
+        "paired": (*each, 3),
+        "measured": (*each, 2, 2, 2),
+        "locks": (*each, COUNTS),
+        "ages": (*each, AGES),
+        "losses": (*each, AGES, 3, 2),
+        "passes": (filters, 2),
+    }

@@ -1,0 +1,126 @@
+"""The study's own tables: locks, what was measured, what a loss costs, and the idealisation beside each filter."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import panels, statistics
+from radarsim.report import tables as common
+from radarsim.studies.pulses_to_tracks.axes import PulsesAxes
+from radarsim.studies.pulses_to_tracks.kernels.records import LOCKED, LOCKED_3, TAKEN, WRONG_FOLD
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Result = CaseResult[PulsesAxes]
+MEASURED = 1  # number of the component that a burst's first number measures
+LOCKS = (
+    *("case", "filter", "k", "t_s", "n", "lock_rate", "lock_lo", "lock_hi", "lock_rate_3sigma"),
+    *("taken", "wrong_fold", "wrong_fold_lo", "wrong_fold_hi"),
+)
+ESTIMATES = (
+    *("case", "filter", "component", "unit", "k", "t_s", "n", "sigma", "sigma_lo", "sigma_hi"),
+    *("sigma_all", "sigma_all_lo", "sigma_all_hi", "bound", "energy_db"),
+)
+LOSSES = ("case", "filter", "component", "unit", "k", "t_s", "since_loss", "n", "sigma", "sigma_lo", "sigma_hi")
+IDEAL = ("case", "filter", "ideal", "component", "unit", "k", "t_s", "over_ideal", "over_ideal_lo", "over_ideal_hi")
+PASSES = ("case", "filter", "passes", "passes_lo", "passes_hi")
+
+
+def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
+    """The tables beyond curves and gains."""
+    return {
+        "gains": common.gains(results),
+        "locks": common.joined([_locks(result) for result in results], LOCKS),
+        "estimates": common.joined([_estimates(result) for result in results], ESTIMATES),
+        "losses": common.joined([_losses(result) for result in results], LOSSES),
+        "idealisations": common.joined([_ideal(result) for result in results], IDEAL),
+        "passes": common.joined([_passes(result) for result in results], PASSES),
+    }
+
+
+def _scans(result: Result, shown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Filters and scans (n,) of the rows of the filters shown (F,)."""
+    f, k = np.nonzero(np.broadcast_to(shown[:, None], (shown.size, result.axes.k.size)))
+    return f, k
+
+
+def _locks(result: Result) -> dict[str, np.ndarray]:
+    """Share of bursts that locked, of those taken (or mean weight), and of those taken in a fold that is not true."""
+    f, k = _scans(result, result.axes.takes > 0)
+    of, n = np.asarray(result.sums["locks"])[f, k], np.full(f.size, float(result.count))
+    return {
+        **common.leading(result, f, k),
+        "n": n.astype(np.int64),
+        **common.interval("lock_rate", statistics.Estimate(*statistics.rate(of[:, LOCKED], n)), "lock"),
+        "lock_rate_3sigma": of[:, LOCKED_3] / n,
+        "taken": of[:, TAKEN] / n,
+        **common.interval("wrong_fold", statistics.Estimate(*statistics.rate(of[:, WRONG_FOLD], n))),
+    }
+
+
+def _estimates(result: Result) -> dict[str, np.ndarray]:
+    """Errors of the burst's velocity and acceleration, of those that locked and of all, beside the Fisher bound."""
+    axes = result.axes
+    f, c, k = np.nonzero(np.moveaxis(np.isfinite(axes.bound), 1, 2))
+    of, locked = np.asarray(result.sums["measured"])[f, k, c], np.asarray(result.sums["locks"])[f, k, LOCKED]
+    n = np.full(f.size, float(result.count))
+    return {
+        **common.leading(result, f, k, **common.components(result, MEASURED + c)),
+        "n": locked.astype(np.int64),
+        **common.interval("sigma", statistics.root_mean_square(of[:, 0, 0], of[:, 0, 1], locked)),
+        **common.interval("sigma_all", statistics.root_mean_square(of[:, 1, 0], of[:, 1, 1], n)),
+        "bound": axes.bound[f, k, c],
+        "energy_db": axes.energy_db[k],
+    }
+
+
+def _losses(result: Result) -> dict[str, np.ndarray]:
+    """σ of the track by the scans since the last burst that did not lock; 6: six and more, or none was lost so far."""
+    counted = np.asarray(result.sums["ages"])
+    shown = (counted > 0) & (result.axes.takes > 0)[:, None, None]
+    f, c, k, age = np.nonzero(np.broadcast_to(shown[:, None], (len(counted), 3, *shown.shape[1:])))
+    of, n = np.asarray(result.sums["losses"])[f, k, age, c], counted[f, k, age]
+    return {
+        **common.leading(result, f, k, **common.components(result, c)),
+        "since_loss": age,
+        "n": n.astype(np.int64),
+        **common.interval("sigma", statistics.root_mean_square(of[:, 0], of[:, 1], n)),
+    }
+
+
+def _ideal(result: Result) -> dict[str, np.ndarray]:
+    """σ of a filter over the exact σ of its idealisation, where the case has one."""
+    axes = result.axes
+    at = f, k, c = common.shown(result, np.broadcast_to((axes.ideal >= 0)[:, None, None], axes.available.shape))
+    moments = np.asarray(result.sums["error"])[at]
+    of = statistics.errors(moments, np.full(f.size, float(result.count))).sigma
+    exact = axes.exact_sigma[axes.ideal[f], k, c]
+    return {
+        **common.leading(result, f, k, ideal=common.names(axes.filters, axes.ideal[f]), **common.components(result, c)),
+        **common.interval("over_ideal", statistics.Estimate(*(end / exact for end in of))),
+    }
+
+
+def _passes(result: Result) -> dict[str, np.ndarray]:
+    """Mean passes over a window's data that a burst takes: the measure of cost."""
+    f = np.flatnonzero(result.axes.takes > 0)
+    of, n = np.asarray(result.sums["passes"])[f], np.full(f.size, float(result.count * result.axes.k.size))
+    return {**common.leading(result, f), **common.interval("passes", statistics.mean(of[:, 0], of[:, 1], n))}
+
+
+INPUTS = ("radar", "σ_r, m", "Δt, s", "λ, m", "F, Hz", "pulses", "burst, ms", "SNR a pulse, dB", "energy, dB", "D, m/s")
+
+
+def inputs(results: Sequence[Result]) -> "pd.DataFrame":
+    """What was put in, for the page: a row for each radar and burst that differ from the others."""
+    rows: dict[tuple, None] = {}
+    for result in results:
+        spec, energy = result.spec, result.axes.energy_db
+        radar = spec.radar.sigma_range_m, spec.radar.scan_period_s, spec.radar.wavelength_m
+        burst = spec.burst.repetition_rate_hz, spec.pulses, 1e3 * spec.burst_s, spec.burst.snr_db
+        said = " … ".join(dict.fromkeys(f"{end:.3g}" for end in (energy.min(), energy.max())))
+        rows[(panels.plain(panels.device(result)), *radar, *burst, said, spec.span_mps)] = None
+    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(INPUTS)})

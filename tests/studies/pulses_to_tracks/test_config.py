@@ -1,0 +1,65 @@
+"""What a config of the study may say, and what is told of one that is wrong."""
+
+import pytest
+
+from radarsim.app.configs import load
+from radarsim.errors import ConfigError
+from radarsim.studies.pulses_to_tracks import words
+
+ALL = "[range, velocity, acceleration]"
+FAULTS = [
+    (["burst.pulses=400000"], "burst.pulses: "),
+    (["burst.repetition_rate_hz=1"], "burst.pulses: the burst must be <= radar.scan_period_s, 10 s, is 16 s"),
+    (["burst.repetition_rate_hz=100"], "burst.repetition_rate_hz: must be >= "),
+    (["burst.pulse_length_s=1e-3"], "burst.pulse_length_s: must be <= 1/repetition_rate_hz"),
+    (["burst.pulses=4", "filters.2.derivatives=1"], "4 pulses are too few for 3 parameters: at least 6"),
+    (["filters.0.estimator=cured"], "filters.0.estimator: has no effect on range alone; leave it out"),
+    (["filters.4.forecast=track"], "filters.4.forecast: has no effect with estimator: spectrum; leave it out"),
+    (["filters.1.use=gated"], "filters.1.use: must be as_measured with estimator: fisher_bound"),
+    (["filters.2.gate_probability=0.9"], "filters.2.gate_probability: has no effect without use: gated; leave it out"),
+    (["filters.2.observes=[velocity]"], "filters.2.observes: must be [range]"),
+    ([f"filters.2.observes={ALL}", "filters.2.derivatives=0"], "filters.2.derivatives: must be >= 1"),
+    (["prior.sigma_velocity_mps=1e9"], "prior.sigma_velocity_mps: out of proportion"),
+    (["radar.band=L"], "radar.band: L is"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("overrides", "said"), FAULTS)
+def test_faults_are_told_at_their_key(overrides, said):
+    with pytest.raises(ConfigError) as caught:
+        load("pulses", overrides)
+    assert any(said in line for line in caught.value.lines), caught.value.lines
+
+
+def test_defaults_are_written_out():
+    spec = load("pulses").cases[0].spec
+    cured, gated, mixture = spec.filters[3], spec.filters[5], spec.filters[6]
+    assert (cured.forecast, cured.derivatives, cured.use, cured.gate_probability) == ("track", 0, "as_measured", None)
+    assert (gated.gate_probability, mixture.lock_probability) == (0.999, 0.95)
+    assert spec.filters[0].estimator is None
+    assert spec.span_mps == pytest.approx(300.0)
+
+
+def test_pulses_by_their_number_a_second_and_a_duration():
+    cases = load("pulses_energy").cases
+    assert [case.spec.burst.pulses for case in cases] == [8, 16, 32, 64]
+    assert [case.spec.scans for case in cases] == [57, 29, 15, 8]
+    assert load("pulses", ["burst.pulses_per_second=1.6"]).cases[0].spec == load("pulses").cases[0].spec
+
+
+def test_a_forecast_wider_than_the_span_is_warned_of():
+    assert words.warnings(load("pulses")) == []
+    (line,) = words.warnings(load("pulses", ["prior.sigma_velocity_mps=100"]))
+    assert line.startswith(
+        "pulses: prior.sigma_velocity_mps: 3 σ of the velocity, 300 m/s, are over half the span of 300 m/s"
+    )
+
+
+def test_no_windows_lead_there():
+    """A burst whose noise leaves no schedule ends in one line."""
+    from radarsim.studies.pulses_to_tracks import study
+
+    with pytest.raises(ConfigError, match="no windows lead from the forecast to the burst"):
+        study.prepare(
+            load("pulses", ["burst.snr_db=-60", "burst.pulses=4096", "burst.repetition_rate_hz=1e6"]).cases[0]
+        )

@@ -1,0 +1,229 @@
+"""The compiled chain: against P4's own kernels on the same samples, and against the textbook, sample by sample."""
+
+import math
+
+import numpy as np
+import pytest
+
+from radarsim.bursts.burst import turns_per_parameter
+from radarsim.bursts.kernels import lanes, sequence, strip
+from radarsim.bursts.kernels.data import SAMPLES
+from radarsim.bursts.kernels.scoring import SIZE, STATE
+from radarsim.kernels.random import fill_normal_pairs
+from radarsim.studies.pulses_to_tracks import filters, study, world
+from radarsim.studies.pulses_to_tracks.kernels import chain
+from radarsim.studies.pulses_to_tracks.kernels.estimate import draw_sums, estimate, room_for
+from radarsim.studies.pulses_to_tracks.kernels.records import Sums
+from tests.studies.pulses_to_tracks import naive
+from tests.studies.pulses_to_tracks.conftest import CURED, IDEAL, RANGE, SEQUENCE, SPECTRUM, A, made
+
+WHO = np.array([3, 1, 4, 15, 9, 2, 6, 5])
+SCAN = 2
+ACCELERATION = {"name": "a", "observes": A, "estimator": "sequence"}
+LONG = {"pulses": 64, "repetition_rate_hz": 4e3, "snr_db": 8.0}
+SHORT_PRIOR = {"sigma_velocity_mps": 3.0, "sigma_acceleration_mps2": 2.0}
+
+
+def samples_of(plan, k, who):
+    """Complex samples (8, pulses) of the bursts of scan k, turned back by the true phase, and the room they are in."""
+    room = room_for(len(plan.world.mean), plan.world.reversed.size)
+    draw_sums(plan.world, k, who, room[3], room[4], room[2])
+    drawn = room[2].reshape(-1, 4, lanes.WIDTH)
+    return (drawn[:, 0] + 1j * drawn[:, 1]).T, room
+
+
+def forecasts(plan, n=8):
+    """Errors of forecasts (n, 2) of velocity and acceleration."""
+    random = np.random.default_rng(7)
+    return random.standard_normal((n, 2)) * plan.world.prior * 0.7
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return study.prepare(made([CURED, SEQUENCE, SPECTRUM, IDEAL, ACCELERATION], burst=LONG, prior=SHORT_PRIOR))
+
+
+def own_sums(plan, f):
+    """The windows of the first entry of a filter's menu, and the last one, which is without forecast."""
+    own = plan.filters
+    first, count = own.first[f, SCAN, 0], own.count[f, SCAN, 0]
+    return np.concatenate([own.windows[first : first + count], own.windows[own.free[f, SCAN]][None]])
+
+
+def test_the_estimator_is_p4s_on_the_same_sums(plan):
+    """Bursts estimated in the chain are those that P4's strips make of the same sums, to the last bit."""
+    own = forecasts(plan)
+    for f in (1, 4):
+        _, room = samples_of(plan, SCAN, WHO)
+        found = np.zeros((8, 2))
+        estimate(plan.world, plan.filters, f, SCAN, 0, WHO, own, room, found)
+        windows, work = own_sums(plan, f), room_for(len(plan.world.mean), 1)[0]
+        for n in range(8):
+            b = plan.world.to_turns @ own[n]
+            work[(lanes.PRIOR + 1) * lanes.WIDTH + n], work[(lanes.PRIOR + 2) * lanes.WIDTH + n] = b
+        options = plan.filters.options[f].copy()
+        options["windows"] = len(windows)
+        errors = np.zeros((8, len(windows), SIZE))
+        strip.run_strip(
+            *(plan.world.physics[SCAN], room[2], plan.world.tables, windows, options),
+            *(work, np.zeros(room[1].size), errors),
+        )
+        expected = errors[:, -1] @ plan.world.measured.T
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("f", [0, 1, 4])
+def test_the_estimator_is_p4s_on_the_samples_themselves(plan, f):
+    """On bursts of 64 pulses sums of up to three are within a thousandth of a bound of the samples."""
+    own = forecasts(plan)
+    u, room = samples_of(plan, SCAN, WHO)
+    found = np.zeros((8, 2))
+    estimate(plan.world, plan.filters, f, SCAN, 0, WHO, own, room, found)
+    physics, windows = plan.world.physics[SCAN].copy(), own_sums(plan, f)
+    physics["mode"] = SAMPLES
+    state, none = np.zeros(1, STATE)[0], np.zeros((1, 1))
+    assert u.shape[1] == physics["pulses"]
+    for n in range(8):
+        state["prior"][1:3] = plan.world.to_turns @ own[n]
+        state["amplitude"] = 1.0
+        options = plan.filters.options[f].copy()
+        options["windows"] = len(windows) - 1
+        samples = np.stack([u[n].real, u[n].imag])
+        errors = np.zeros((len(windows), SIZE))
+        sequence.run_sequence(physics, np.zeros(1, np.int64), samples, none, windows, options, state, errors)
+        sequence.scored(physics, samples, none, windows[-1], plan.filters.last[f], False, state)
+        expected = plan.world.measured @ state["x"]
+        assert abs(found[n] - expected)[0] < 2e-2 * plan.filters.sigma[f, SCAN, 0]
+
+
+def test_ideal_errors_are_the_score_at_the_truth(plan):
+    f = 3
+    u, room = samples_of(plan, SCAN, WHO)
+    found = np.zeros((8, 2))
+    estimate(plan.world, plan.filters, f, SCAN, 0, WHO, np.zeros((8, 2)), room, found)
+    tau = np.arange(u.shape[1]) / u.shape[1]
+    powers = tau[:, None] ** np.arange(2)
+    x = np.linalg.solve(powers.T @ powers, powers.T @ u.imag.T).T / (2 * math.pi)
+    np.testing.assert_allclose(found[:, 0], x @ plan.world.measured[0, :2], rtol=2e-3)
+
+
+def test_the_highest_line_is_that_of_the_discrete_transform(plan):
+    f = 2
+    u, room = samples_of(plan, SCAN, WHO)
+    own, lines = forecasts(plan), plan.world.reversed.size
+    found = np.zeros((8, 2))
+    estimate(plan.world, plan.filters, f, SCAN, 0, WHO, own, room, found)
+    variance = float(plan.world.physics[SCAN]["sigma"]) ** 2
+    for n in range(8):
+        b = np.zeros(6)
+        b[1:3] = plan.world.to_turns @ own[n]
+        x = naive.spectrum(u[n], variance, b, 2, lines, plan.world.offset[SCAN])
+        assert found[n, 0] == pytest.approx(plan.world.measured[0] @ x, abs=2e-2 * plan.filters.sigma[f, SCAN, 0])
+
+
+def test_lines_lie_where_they_do_beside_the_true_frequency(plan):
+    """The true Doppler frequency plus the offset is a whole number of lines."""
+    t = plan.axes.t_s
+    velocity = -250.0 + 4.0 * t
+    lines = 2 * velocity / 0.03 / 4e3 * plan.world.reversed.size + plan.world.offset
+    np.testing.assert_allclose(lines, np.rint(lines), atol=1e-7)
+
+
+def normals(plan, which, pair, n):
+    """The two unit normals of a draw pair of realisations 0 … n − 1 of a stream."""
+    a, b = np.empty(n), np.empty(n)
+    fill_normal_pairs(plan.world.keys[which], 0, pair, a, b)
+    return a, b
+
+
+def textbook(plan, case, f, count):
+    """Errors (K, count, 3) of filter f, one realisation after the other."""
+    spec, one = case.spec, case.spec.filters[f]
+    size = filters.parameters(one) if one.takes else 0
+    errors = np.zeros((spec.scans, count, 3))
+    designation = normals(plan, 2, 0, count)
+    noise = [normals(plan, 0, k, count)[0] for k in range(spec.scans)]
+    fixed = [normals(plan, 3, k, count) for k in range(spec.scans)]
+    bursts = []
+    for k in range(spec.scans if one.takes else 0):
+        groups = [np.minimum(np.arange(i, i + 8), count - 1) for i in range(0, count, 8)]
+        bursts.append(np.concatenate([samples_of(plan, k, who)[0] for who in groups])[:count])
+    keys = {"gate": plan.filters.filters[f]["gate"], "lock": plan.filters.filters[f]["lock"]}
+    keys["density"] = plan.filters.filters[f]["density"]
+    for i in range(count):
+        prior = plan.world.prior
+        track = naive.Track(50.0, 50.0 * noise[0][i], prior * [designation[0][i], designation[1][i]], prior)
+        for k in range(spec.scans):
+            if k:
+                track.predict(
+                    10.0, one.manoeuvre_variance if k >= (2 if one.takes else 3) else 0.0, plan.world.missed[k]
+                )
+                track.take([0], np.array([50.0 * noise[k][i]]) - track.x[:1], [2500.0])
+            if one.takes:
+                x = estimated(plan, one, f, k, track, bursts[k][i], [fixed[k][0][i], fixed[k][1][i]], size)
+                measured = (plan.world.measured @ x)[: one.takes]
+                innovation = measured - track.x[1 : 1 + one.takes]
+                innovation[0] -= plan.world.span * round(innovation[0] / plan.world.span)
+                rows, sigma = list(range(1, 1 + one.takes)), plan.filters.sigma[f, k, : one.takes]
+                track.take(rows, innovation, sigma**2, one.use, **keys)
+            errors[k, i] = track.x
+    return errors
+
+
+def estimated(plan, one, f, k, track, samples, drawn, size):
+    """The textbook's estimate of a burst: coefficients (6,), less the truth."""
+    burst = world.bursts(SPEC[0], np.array([[1e5, 0.0, 0.0]]))[0]
+    variance = float(plan.world.physics[k]["sigma"]) ** 2
+    forecast = track.x[1:] if plan.filters.filters[f]["track"] else plan.filters.filters[f]["fixed"] * drawn
+    b = np.zeros(6)
+    b[1:3] = plan.world.to_turns @ forecast
+    if one.estimator == "spectrum":
+        return naive.spectrum(samples, variance, b, size, plan.world.reversed.size, plan.world.offset[k])
+    menu, entry = plan.menus[f], 0
+    if one.forecast == "track":
+        spreads = [menu.spreads(e) for e in range(len(menu.windows))]
+        fits = [e for e, (v, a) in enumerate(spreads) if v >= track.P[1, 1] ** 0.5 * (1 - 1e-9)]
+        entry = max(fits) if fits else 0
+    sigma = filters.theta_spreads(burst, size, menu.spreads(entry))
+    precision = np.zeros(6)
+    precision[1:size] = (sigma * turns_per_parameter(size, burst.duration_s))[1:] ** -2.0
+    return naive.sequence(samples, variance, b, precision, size, menu.windows[entry])
+
+
+SPEC = []  # the case that `estimated` reckons with
+FIXED = {"name": "fixed", "forecast": {"sigma_velocity_mps": 10.0, "sigma_acceleration_mps2": 5.0}}
+USES = [
+    RANGE,
+    SEQUENCE,
+    SPECTRUM,
+    SEQUENCE | {"name": "gated", "use": "gated", "gate_probability": 0.9},
+    SEQUENCE | {"name": "mixture", "use": "mixture", "lock_probability": 0.8},
+    SEQUENCE | FIXED,
+]
+
+
+@pytest.mark.parametrize("count", [24, pytest.param(200, marks=pytest.mark.slow)])
+def test_the_chain_is_the_textbooks(count):
+    """Every filter over all scans, realisation by realisation, sample by sample."""
+    case = made(USES, scans=4 if count < 200 else 15)
+    plan = study.prepare(case)
+    SPEC[:] = [case.spec]
+    values = np.zeros(plan.layout.size)
+    errors = chain.simulate_block(plan.world, plan.filters, Sums(**plan.layout.unpack(values)), 0, count)
+    assert len(plan.world.mean) == case.spec.pulses  # a block a sample: sums are the samples
+    for f in range(len(USES)):
+        expected = textbook(plan, case, f, count)
+        scale = np.array([50.0, 1.0, 0.1])
+        off = (abs(errors[f] - expected) / scale).max(axis=(0, 2))
+        # Where a start lies between two maxima a rounding decides; of locked bursts none is off by a hundredth.
+        assert (off < 1e-2).mean() > 0.97, USES[f]["name"]
+        assert np.median(off) < 1e-4, USES[f]["name"]
+
+
+def test_a_realisation_is_the_same_in_any_block():
+    plan = study.prepare(made([RANGE, CURED, SPECTRUM], scans=4))
+    values = np.zeros(plan.layout.size)
+    sums = Sums(**plan.layout.unpack(values))
+    whole = chain.simulate_block(plan.world, plan.filters, sums, 0, 40)
+    part = chain.simulate_block(plan.world, plan.filters, sums, 16, 11)
+    np.testing.assert_array_equal(whole[:, :, 16:27], part)

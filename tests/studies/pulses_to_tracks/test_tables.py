@@ -1,0 +1,91 @@
+"""Tables, figures and sentences of a small run."""
+
+import numpy as np
+import pytest
+
+import radarsim
+from radarsim.app.configs import load
+from radarsim.studies import registry
+
+
+@pytest.fixture(scope="module")
+def found():
+    return radarsim.run("pulses", realisations=1500)
+
+
+@pytest.fixture(scope="module")
+def swept():
+    overrides = ["sweep.burst.snr_db=[-4, 1, 14]", "scans=4"]
+    return radarsim.run("pulses_snr", realisations=600, overrides=overrides)
+
+
+def test_curves_have_the_idealisation_exact(found):
+    curves = found.curves
+    assert set(curves[curves["exact_sigma"].notna()]["filter"]) == {"r", "ideal"}
+    assert len(curves) == 7 * 15 * 3
+
+
+def test_locks(found):
+    locks = found.tables["locks"]
+    assert set(locks["filter"]) == set(found.curves["filter"]) - {"r"}
+    assert (locks["lock_rate_3sigma"] <= locks["lock_rate"]).all()
+    assert ((locks["lock_lo"] <= locks["lock_rate"]) & (locks["lock_rate"] <= locks["lock_hi"])).all()
+    ideal = locks[locks["filter"] == "ideal"]
+    assert (ideal["lock_rate"] == 1).all()
+    assert (locks[locks["filter"] == "cured"]["taken"] == 1).all()
+    assert 0.99 < locks[locks["filter"] == "cured, gated"]["taken"].mean() < 1
+
+
+def test_estimates_beside_the_bound(found):
+    table = found.tables["estimates"]
+    ideal = table[table["filter"] == "ideal"]
+    np.testing.assert_allclose(ideal["sigma_all"], ideal["bound"], rtol=5.85 / (2 * 1500) ** 0.5)
+    assert (table["sigma"] <= table["sigma_all"] * (1 + 1e-12)).all()
+    assert set(table["component"]) == {"Vr"}
+    np.testing.assert_allclose(table["energy_db"], 17.28, atol=0.011)
+
+
+def test_losses_hold_every_realisation(found):
+    table = found.tables["losses"]
+    assert (table.groupby(["filter", "component", "k"])["n"].sum() == 1500).all()
+    assert table["since_loss"].between(0, 6).all()
+
+
+def test_idealisations(found):
+    table = found.tables["idealisations"]
+    assert set(table["ideal"]) == {"ideal"}
+    own = table[(table["filter"] == "spectrum") & (table["component"] == "Vr")]
+    assert (own["over_ideal_lo"] < 1.06).all()
+    curves = found.curves.set_index(["filter", "component", "k"])
+    row = own[own["k"] == 7].iloc[0]
+    ratio = curves.loc[("spectrum", "Vr", 7), "sigma"] / curves.loc[("ideal", "Vr", 7), "exact_sigma"]
+    assert row["over_ideal"] == pytest.approx(ratio)
+
+
+def test_the_cure_is_the_cheapest_of_the_sequences(found):
+    passes = found.tables["passes"].set_index("filter")["passes"]
+    assert passes["ideal"] == 0
+    assert passes["cured"] < passes["sequence"]
+
+
+def test_sentences(found):
+    one, experiment = registry.study("pulses_to_tracks"), load("pulses")
+    assert one.question(experiment).startswith("What are the bursts of RLS 4 worth to the track")
+    told = one.answer(found.cases, found.tables)
+    assert told[0] == "RLS 4: 16 pulses in 0.8 ms, 17.3 dB in all, allow σ_V = 1 m/s (Fisher bound)."
+    assert len(told) == 6
+    (spectrum,) = [line for line in told if line.startswith("RLS 4, spectrum: ")]
+    assert "its idealisation's" in spectrum
+
+
+def test_figures(found, swept):
+    assert {"sigma_r", "gain_Vr", "locks", "measured"} <= set(found.figures)
+    assert "threshold" in swept.figures
+    assert "losses" not in swept.figures
+
+
+def test_the_threshold_is_seen(swept):
+    locks = swept.tables["locks"]
+    rate = locks.groupby(["case", "filter"])["lock_rate"].min()
+    low, high = (f"pulses_snr burst.snr_db={value}" for value in (-4, 14))
+    assert rate[low, "spectrum"] < 0.95 < 0.99 < rate[high, "spectrum"]
