@@ -72,6 +72,8 @@ def record(argument):
         return np.array(argument).reshape(1).view(np.recarray)[0]
     if isinstance(argument, np.ndarray) and argument.dtype.names and not isinstance(argument, np.recarray):
         return argument.view(np.recarray)
+    if isinstance(argument, tuple) and hasattr(argument, "_fields"):
+        return argument._make(map(record, argument))
     return argument
 
 

@@ -41,13 +41,19 @@ Target = Annotated[Polynomial | AccelerationStart | Turn | FlyBy | Recorded, Fie
 class Radar(Model):
     """A surveillance radar: wavelength, accuracy of a range, period of its scans. Its velocity comes from the burst."""
 
-    name: Annotated[Name | None, Display()] = Field(None, description="display name")
+    name: Annotated[Name | None, Display()] = Field(None, title="name", description="display name")
     band: Annotated[Band | None, Display()] = Field(
-        None, description="wave band, for display: by its wavelength, or by its letter (IEEE Std 521)"
+        None, title="band", description="wave band, for display: by its wavelength, or by its letter (IEEE Std 521)"
     )
-    wavelength_m: Positive = Field(description="wavelength, m")
-    sigma_range_m: Positive = Field(description="standard deviation of a measured range, m")
-    scan_period_s: Positive = Field(description="time between two bursts, s")
+    wavelength_m: Positive = Field(title="wavelength", json_schema_extra={"symbol": "λ"}, description="wavelength, m")
+    sigma_range_m: Positive = Field(
+        title="σ of the measured range",
+        json_schema_extra={"symbol": "σ_r"},
+        description="standard deviation of a measured range, m",
+    )
+    scan_period_s: Positive = Field(
+        title="scan period", json_schema_extra={"symbol": "Δt"}, description="time between two bursts, s"
+    )
 
     @cross_check
     def _in_its_band(self) -> Iterator[At]:
@@ -59,21 +65,37 @@ class Radar(Model):
 class Burst(Model):
     """The coherent burst of a scan, one complex sample a pulse behind the filter that is matched to it."""
 
-    repetition_rate_hz: Positive = Field(description="pulse repetition rate, Hz; velocity folds into λ/2 times it")
+    repetition_rate_hz: Positive = Field(
+        title="pulse repetition rate",
+        json_schema_extra={"symbol": "F_r"},
+        description="pulse repetition rate, Hz; velocity folds into λ/2 times it",
+    )
     pulses: Annotated[int, Whole(FEWEST_PULSES, MOST_PULSES)] | None = Field(
-        None, description="number of pulses; or give pulses_per_second"
+        None,
+        title="pulses of a burst",
+        json_schema_extra={"symbol": "N"},
+        description="number of pulses; or give pulses_per_second",
     )
     pulses_per_second: Positive | None = Field(
-        None, description="ratio of pulses to the scan period, 1/s, in place of pulses: a constant share of time"
+        None,
+        title="pulses a second",
+        json_schema_extra={"unit": "1/s"},
+        description="ratio of pulses to the scan period, 1/s, in place of pulses: a constant share of time",
     )
     pulse_length_s: Positive = Field(
-        description="length of a pulse, s: the matched filter loses sinc² of it times the Doppler frequency"
+        title="pulse length",
+        json_schema_extra={"symbol": "t_p"},
+        description="length of a pulse, s: the matched filter loses sinc² of it times the Doppler frequency",
     )
     snr_db: Annotated[Number, Field(ge=-60, le=100)] = Field(
-        description="ratio of the power of the echo to that of the noise in the sample of a pulse, dB"
+        title="signal-to-noise ratio of a pulse",
+        json_schema_extra={"unit": "dB"},
+        description="ratio of the power of the echo to that of the noise in the sample of a pulse, dB",
     )
     snr_range_m: Positive | None = Field(
-        None, description="range at which snr_db holds, m: it then falls with the fourth power; default: everywhere"
+        None,
+        title="range of the signal-to-noise ratio",
+        description="range at which snr_db holds, m: it then falls with the fourth power; default: everywhere",
     )
 
     @cross_check
@@ -90,52 +112,74 @@ class Burst(Model):
 class Prior(Model):
     """What is known when the track begins: the errors of a designation about the truth, drawn, Gaussian."""
 
-    sigma_velocity_mps: Positive = Field(description="standard deviation of the radial velocity, m/s")
-    sigma_acceleration_mps2: Positive = Field(description="standard deviation of the radial acceleration, m/s²")
+    sigma_velocity_mps: Positive = Field(
+        title="σ of the designated velocity",
+        json_schema_extra={"symbol": "σ_V0"},
+        description="standard deviation of the radial velocity, m/s",
+    )
+    sigma_acceleration_mps2: Positive = Field(
+        title="σ of the designated acceleration",
+        json_schema_extra={"symbol": "σ_a0"},
+        description="standard deviation of the radial acceleration, m/s²",
+    )
 
 
 class Forecast(Model):
     """A forecast that is the same at each scan: errors about the truth, drawn anew, Gaussian."""
 
-    sigma_velocity_mps: Positive = Field(description="standard deviation of the radial velocity, m/s")
-    sigma_acceleration_mps2: Positive = Field(description="standard deviation of the radial acceleration, m/s²")
+    sigma_velocity_mps: Positive = Field(
+        title="σ of the forecast velocity", description="standard deviation of the radial velocity, m/s"
+    )
+    sigma_acceleration_mps2: Positive = Field(
+        title="σ of the forecast acceleration", description="standard deviation of the radial acceleration, m/s²"
+    )
 
 
 class Filter(Model):
     """A Kalman filter of range, and of what an estimator finds in the burst."""
 
-    name: Annotated[Name, Display()] = Field(description="label; every filter has its own")
+    name: Annotated[Name, Display()] = Field(title="name", description="label; every filter has its own")
     observes: tuple[Literal["range", "velocity", "acceleration"], ...] = Field(
-        description="what it takes: [range], [range, velocity] or [range, velocity, acceleration]"
+        title="observes", description="what it takes: [range], [range, velocity] or [range, velocity, acceleration]"
     )
     manoeuvre_variance: NonNegative = Field(
-        description="variance of the random jerk it allows for, (m/s³)²; as in P1 not over the scans of its start"
+        title="manoeuvre variance",
+        json_schema_extra={"symbol": "D_M", "unit": "(m/s³)²"},
+        description="variance of the random jerk it allows for, (m/s³)²; as in P1 not over the scans of its start",
     )
     estimator: Literal["sequence", "dense", "cured", "spectrum", "fisher_bound"] | None = Field(
         None,
+        title="estimator",
         description="how the burst is estimated: P4's sequence of windows, with twice as many, with the search where "
         "coherence is short; peak of the spectrum and scoring; or ideal Gaussian errors; default: cured",
     )
     forecast: Literal["track"] | Forecast | None = Field(
         None,
+        title="forecast",
         description="where a sequence starts and how wide its first window is: track (the filter's own prediction "
         "with its covariance), or a forecast of fixed accuracy; default: track",
     )
     derivatives: Annotated[int, Whole(0, MOST_DERIVATIVES)] | None = Field(
         None,
+        title="derivatives estimated",
         description="derivatives of the Doppler frequency that are estimated; default: 1 with the acceleration, else 0 "
         "(it is then taken as forecast)",
     )
     use: Literal["as_measured", "gated", "mixture"] | None = Field(
         None,
+        title="use of an estimate",
         description="as_measured: every estimate as if it had locked; gated: those near the prediction; mixture: "
         "weighed by the probability that it locked; default: as_measured",
     )
     gate_probability: Annotated[float, Field(gt=0, lt=1)] | None = Field(
-        None, description="gated: probability that an estimate that locked is within the gate; default: 0.999"
+        None,
+        title="gate probability",
+        description="gated: probability that an estimate that locked is within the gate; default: 0.999",
     )
     lock_probability: Annotated[float, Field(gt=0, lt=1)] | None = Field(
-        None, description="mixture: probability before it is seen that an estimate has locked; default: 0.95"
+        None,
+        title="lock probability",
+        description="mixture: probability before it is seen that an estimate has locked; default: 0.95",
     )
 
     @property
@@ -200,21 +244,25 @@ class Keys(Study):
         "burst.pulses_per_second": "burst.pulses",
     }
 
-    radar: Radar = Field(description="the radar")
-    burst: Burst = Field(description="the burst of each scan")
-    target: Annotated[Target, Scenario()] = Field(description="the target: a scenario's stem, or inline")
-    prior: Prior = Field(description="what is known when the track begins")
+    radar: Radar = Field(title="radar", description="the radar")
+    burst: Burst = Field(title="burst", description="the burst of each scan")
+    target: Annotated[Target, Scenario()] = Field(
+        title="target", description="the target: a scenario's stem, or inline"
+    )
+    prior: Prior = Field(title="designation", description="what is known when the track begins")
     filters: Annotated[
         tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = Field(description="the filters; all see the same ranges and bursts")
+    ] = Field(title="filters", description="the filters; all see the same ranges and bursts")
     baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
-        None, description="name of the filter that gains are against; default: the first"
+        None, title="baseline", description="name of the filter that gains are against; default: the first"
     )
     scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = Field(
-        None, description="number of scans; or give duration_s"
+        None, title="scans", description="number of scans; or give duration_s"
     )
     duration_s: Annotated[Positive | None, Design()] = Field(
-        None, description="time from the first scan to the last, s, in place of scans: to the last scan within it"
+        None,
+        title="duration",
+        description="time from the first scan to the last, s, in place of scans: to the last scan within it",
     )
 
     @classmethod

@@ -67,7 +67,7 @@ def threshold_figure(results: Sequence[Result], made: "Mapping[str, pd.DataFrame
     """Share of bursts that locked, and σ of range at the last scan, against one swept number, for each config."""
     drawn: list[Panel] = []
     for (_, keys), members in sweeps.families(results).items():
-        x, axis = sweeps.places(keys[0], [dict(result.swept)[keys[0]] for result in members])
+        x, axis = sweeps.places(members[0], keys[0], [dict(result.swept)[keys[0]] for result in members])
         if len(keys) == 1 and not axis.ticks:
             drawn += _threshold_panels([members[i] for i in np.argsort(x)], np.sort(x), axis, made)
     if not any(panel.marks for panel in drawn):
@@ -115,9 +115,7 @@ def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
         x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
         if (y < 1).any():
             marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, hi))
-    return Panel(
-        Axis(panels.TIME, limits=(0, None)), Axis("P(locked)", limits=(None, 1.0)), tuple(marks), _title(result)
-    )
+    return Panel(panels.time_axis(), Axis("P(locked)", limits=(None, 1.0)), tuple(marks), _title(result))
 
 
 def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
@@ -131,9 +129,7 @@ def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     if rows:
         own = next(iter(rows.values()))
         marks.append(Line(own["t_s"].to_numpy(), own["bound"].to_numpy(), "Fisher bound", Style(9, 1)))
-    panel = Panel(
-        Axis(panels.TIME, limits=(0, None)), Axis("$\\sigma$ of measured $V_r$, m/s"), tuple(marks), _title(result)
-    )
+    panel = Panel(panels.time_axis(), Axis("$\\sigma$ of measured $V_r$, m/s"), tuple(marks), _title(result))
     return wide(panel)
 
 
