@@ -168,11 +168,19 @@ def import_(
 @config_argument
 @click.argument("plots", metavar="PLOTS.csv")
 @click.option("-o", "--output", metavar="TRACK.csv", help="Where the track is written; default: to the terminal.")
-@click.option("--figures", metavar="DIR", help="Draw track, residuals and probabilities of the models into DIR.")
+@click.option("--report", metavar="DIR", help="Write a report into DIR: report.html, and its figures as files.")
+@click.option("--figures", metavar="DIR", help="Draw the figures alone into DIR.")
+@click.option("--threads", type=click.IntRange(min=1), metavar="T", help="Tracks followed at once; default: all cores.")
 @click.option("-q", "--quiet", is_flag=True, help="Report neither gaps nor how well the accuracies fit.")
 @set_option
 def track(
-    config: str, plots: str, output: str | None, figures: str | None, quiet: bool, overrides: tuple[str, ...]
+    config: str,
+    plots: str,
+    output: str | None,
+    figures: str | None,
+    quiet: bool,
+    overrides: tuple[str, ...],
+    **further: "Any",
 ) -> None:
     """The config's filters over recorded measurements.
 
@@ -189,15 +197,18 @@ def track(
     TRACK.csv begins with the column recorded_track, and figures are drawn of the longest. Where columns true_… give the
     truth, as `radarsim simulate` and `radarsim import` write it, the errors against it are reported.
 
+    The report shows where the plots are (plan view, range), the estimates, the residuals between their bounds, the
+    innovations over time, and all that is printed.
+
     \b
     Example
-      radarsim track sonar_smoothing plots.csv -o track.csv --figures figures
+      radarsim track sonar_smoothing plots.csv -o track.csv --report report
     """
     import contextlib
 
     from radarsim.app import run as experiment
     from radarsim.cli import console, findings
-    from radarsim.recorded import accuracy, advice
+    from radarsim.recorded import accuracy, advice, page
     from radarsim.recorded import follow as recorded
     from radarsim.recorded import plots as files
     from radarsim.report.files import Writer
@@ -213,16 +224,26 @@ def track(
             started = True
         write(files.rows_of(piece, name))
 
+    sources = [plots, *([loaded.path] if loaded.path else [])]
     with contextlib.ExitStack() as stack:
         write = stack.enter_context(Writer(output, read)).write if output else findings.echo
-        followed = recorded.follow(loaded, plots, sink)
-    drawn = recorded.draw(followed, figures, [plots, *([loaded.path] if loaded.path else [])]) if figures else []
+        counter = stack.enter_context(console.Counter("tracking", "rows"))
+        followed = recorded.follow(loaded, plots, sink, further["threads"], counter.update)
+    drawn = recorded.draw(followed, figures, sources) if figures else []
+    folder = further["report"]
+    if folder or not quiet:
+        with console.Counter("judging", "likelihoods") as counter:
+            judged = accuracy.judged(followed)
+            advised = advice.advised(followed, counter.update)
     if not quiet:
-        findings.report(followed, accuracy.judged(followed), advice.advised(followed), stderr=output is None)
+        findings.report(followed, judged, advised, stderr=output is None)
     if output:
         click.echo(f"track    {output}")
     if drawn:
         click.echo(f"figures  {figures} ({', '.join(drawn)})")
+    if folder:
+        page.write(followed, loaded, plots, judged, advised, folder, sources)
+        click.echo(f"report   {Path(folder) / page.NAME}", err=output is None)
     console.print_warnings(experiment.cache_troubles())
 
 
@@ -251,11 +272,12 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
 
     from radarsim.app import configs
     from radarsim.app import run as experiment
-    from radarsim.cli import findings
+    from radarsim.cli import console, findings
     from radarsim.recorded import fit as fitting
 
     (loaded,) = experiment.load_all([config], overrides)
-    found = fitting.fit(loaded, plots, options["filter_name"], options["robust"])
+    with console.Counter("fitting", "likelihoods") as counter:
+        found = fitting.fit(loaded, plots, options["filter_name"], options["robust"], counter.update)
     if options["as_json"]:
         click.echo(json.dumps(fitting.as_json(found), indent=2))
     else:

@@ -57,8 +57,9 @@ class Track:
     (F, n, M) of a filter's models, not-a-number beyond its own, or None where the study has no models.
 
     What tells whether the stated accuracies fit, where a study gives it: residual (F, n, D), the plot less the
-    estimate, of the measured (name, unit); nis (F, n, Q), the squared innovation over its believed variance, of the
-    tested (name, degrees of freedom); not-a-number where there is no plot or no freedom.
+    estimate, of the measured (name, unit), and residual_sigma (F, n, D), the σ that the filter believes of it; nis
+    (F, n, Q), the squared innovation over its believed variance, of the tested (name, degrees of freedom); not-a-number
+    where there is no plot or no freedom.
 
     Where filters find several tracks, a filter stands once for each: numbers (F,) tell them apart, score (F, n) is the
     logarithm of the likelihood ratio that the track is a target's.
@@ -76,3 +77,4 @@ class Track:
     nis: np.ndarray | None = None
     numbers: np.ndarray | None = None
     score: np.ndarray | None = None
+    residual_sigma: np.ndarray | None = None

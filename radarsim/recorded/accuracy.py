@@ -49,14 +49,19 @@ def judged(followed: Followed) -> list[Judged]:
 
 
 def _judge(tally: Tally) -> Judged:
-    """The verdict at 95 %: N·d times the mean is chi-square of N·d degrees of freedom (Wilson and Hilferty)."""
-    freedom = max(tally.count * tally.freedom, 1)
-    ninth, z = 2 / (9 * freedom), NormalDist().inv_cdf(0.975)
-    lo, hi = (1 - ninth - z * ninth**0.5) ** 3, (1 - ninth + z * ninth**0.5) ** 3
+    """The verdict at 95 %."""
+    lo, hi = right_mean(max(tally.count * tally.freedom, 1))
     verdict = SMALL if tally.mean > hi else LARGE if tally.mean < lo else FITS
     if tally.count < LEAST_TESTS:
         verdict = UNKNOWN
     return Judged(tally.filter, tally.name, tally.count, tally.mean, lo, hi, verdict, {})
+
+
+def right_mean(freedom: int) -> tuple[float, float]:
+    """Between what the mean NIS of a right filter lies in 95 % of cases, of so many degrees of freedom altogether: so
+    many times the mean is chi-square (Wilson and Hilferty)."""
+    ninth, z = 2 / (9 * freedom), NormalDist().inv_cdf(0.975)
+    return (1 - ninth - z * ninth**0.5) ** 3, (1 - ninth + z * ninth**0.5) ** 3
 
 
 def _own(case: Case, one: Judged, improved: Mapping[str, float]) -> dict[str, float]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from radarsim.recorded.fit import LEAST_ROWS, units
+from radarsim.recorded.fit import LEAST_ROWS, Progress, silent, units
 from radarsim.recorded.follow import Followed, recorded_of
 from radarsim.studies.interface import BIAS, OUTLIERS, Likelihood
 
@@ -52,8 +52,9 @@ class Advice:
     rows: int
 
 
-def advised(followed: Followed) -> Advice | None:
-    """Advice from the first rows of each track; none where the study has no likelihood of recorded plots."""
+def advised(followed: Followed, progress: Progress = silent) -> Advice | None:
+    """Advice from the first rows of each track; none where the study has no likelihood of recorded plots. progress is
+    called with the number of likelihoods found."""
     case, of = followed.case, recorded_of(followed.case)
     heads = [one.head for one in followed.tracks.values()] or [followed.head]
     long = [head for head in heads if len(head["t_s"]) >= LEAST_ROWS]
@@ -66,7 +67,7 @@ def advised(followed: Followed) -> Advice | None:
         return None
     best = compared(known)
     (chosen,) = (one for one in known if one.filter == best.best)
-    return Advice(best, findings(chosen), chosen.rows)
+    return Advice(best, findings(chosen, progress), chosen.rows)
 
 
 def some(heads: Sequence[Mapping[str, np.ndarray]], most: int) -> list[Mapping[str, np.ndarray]]:
@@ -76,17 +77,30 @@ def some(heads: Sequence[Mapping[str, np.ndarray]], most: int) -> list[Mapping[s
     return [{name: column[:share] for name, column in head.items()} for head in chosen]
 
 
-def findings(likelihood: Likelihood) -> list[Finding]:
+class _Counted:
+    """A likelihood that counts how often it is found."""
+
+    def __init__(self, of: Likelihood, progress: Progress):
+        self.of, self.progress, self.count = of, progress, 0
+        self.keys, self.stated = of.keys, of.stated
+
+    def __call__(self, values: np.ndarray, outliers: float, bias: float) -> float:
+        self.count += 1
+        self.progress(self.count)
+        return self.of(values, outliers, bias)
+
+
+def findings(likelihood: Likelihood, progress: Progress = silent) -> list[Finding]:
     """What is wrong with the stated numbers, the weightiest first; empty where nothing is."""
     from scipy.stats import chi2
 
-    whats = [*likelihood.keys, *likelihood.explains]
+    of, whats = _Counted(likelihood, progress), [*likelihood.keys, *likelihood.explains]
     needed = 0.5 * float(chi2.ppf(1 - LEVEL / len(whats), 1))
     chosen: list[str] = []
     start: dict[str, float] = {}
-    reached, found = _value(likelihood, {}), []
+    reached, found = _value(of, {}), []
     while len(chosen) < min(MOST_FOUND, len(whats)):
-        trials = {what: _best(likelihood, [*chosen, what], start) for what in whats if what not in chosen}
+        trials = {what: _best(of, [*chosen, what], start) for what in whats if what not in chosen}
         what = max(trials, key=lambda name: trials[name][1])
         values, top = trials[what]
         if top - reached < needed:
@@ -106,7 +120,7 @@ def compared(likelihoods: Sequence[Likelihood]) -> Compared:
     return Compared(best, {name: totals[best] - total for name, total in totals.items()})
 
 
-def _value(likelihood: Likelihood, changed: dict[str, float]) -> float:
+def _value(likelihood: _Counted, changed: dict[str, float]) -> float:
     """The likelihood with some of the explanations at work."""
     stated = zip(likelihood.keys, likelihood.stated, strict=True)
     values = np.array([changed.get(key, value) for key, value in stated])
@@ -114,11 +128,11 @@ def _value(likelihood: Likelihood, changed: dict[str, float]) -> float:
     return found if np.isfinite(found) else -1e300
 
 
-def _best(likelihood: Likelihood, whats: list[str], start: dict[str, float]) -> tuple[dict[str, float], float]:
+def _best(likelihood: _Counted, whats: list[str], start: dict[str, float]) -> tuple[dict[str, float], float]:
     """Where the likelihood is largest along some explanations, and its logarithm there."""
     from scipy.optimize import minimize
 
-    unit = dict(zip(likelihood.keys, units(likelihood).tolist(), strict=True))
+    unit = dict(zip(likelihood.keys, units(likelihood.of).tolist(), strict=True))
     scales = [_scale(what, unit) for what in whats]
 
     def cost(at: np.ndarray) -> float:

@@ -1,31 +1,50 @@
-"""Figures of a track over recorded plots: estimates and plots, residuals, probabilities of the models."""
+"""Figures of tracks over recorded plots: plan view and range, estimates, residuals, innovations, probabilities."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from radarsim.engine.results import Track
+from radarsim.recorded.accuracy import right_mean
+from radarsim.recorded.places import Path
 from radarsim.report import panels
-from radarsim.report.drawing import COLUMN_MM, GREY, PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
+from radarsim.report.drawing import COLUMN_MM, GREY, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
 from radarsim.report.statistics import Z95
 
 TIME = Axis("time, s")
 PLOT = Style(GREY, None, 0, size_pt=1.6)
+BOUND = Style(GREY, 1, width_pt=0.8)
+RADAR = Style(0, None, 2, size_pt=5.0)
 MOST_FILTERS = 8
+MOST_TRACKS = 8  # with a colour of their own; more are grey
+MOST_RESIDUALS = 9  # panels of residuals
 MOST_DOTS = 300  # of a filter in a panel of residuals
+WINDOW = 15  # innovations that a mean over time takes
+TALL_MM, USUAL_MM = 74.0, 52.0  # of a panel: of a plan view, of others
+TICKS = (0.01, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0, 1000.0)  # of a mean NIS
+FAR_M = 2e4  # from which a plan view counts in km
 
 
-def figures(track: Track) -> dict[str, Figure]:
-    """`track`, and where there are such `residuals` and `probabilities`, described; by name."""
-    drawn = {"track": estimates(track), "residuals": residuals(track), "probabilities": probabilities(track)}
+def figures(track: Track, paths: Mapping[str, Path]) -> dict[str, Figure]:
+    """`plan`, `track`, `residuals`, `nis` and `probabilities`, as far as there are such, described; by name.
+
+    track: the one that is drawn; paths: where the plots of every track are, that one first.
+    """
+    drawn = {
+        "plan": plan(track, paths),
+        "track": estimates(track),
+        "residuals": residuals(track),
+        "nis": innovations(track),
+        "probabilities": probabilities(track),
+    }
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
 def _several(name: str, title: str, caption: str, made: list[Panel], keys: Sequence[tuple[str, Style]] = ()) -> Figure:
     """A figure of panels and, where there are keys, their legend in a cell of its own."""
     made = [*made, *([Panel(TIME, TIME, (), keys=tuple(keys))] if keys else [])]
-    columns = min(3 if len(made) > 4 else 2, len(made))
-    return Figure(name, title, caption, tuple(made), columns, PAGE_MM if columns > 1 else COLUMN_MM, 52.0)
+    columns = min(2 if len(made) == 4 else 3, len(made))
+    return Figure(name, title, caption, tuple(made), columns, PAGE_MM if columns > 1 else COLUMN_MM, USUAL_MM)
 
 
 def _usual(values: np.ndarray) -> tuple[float | None, float | None]:
@@ -38,6 +57,73 @@ def _usual(values: np.ndarray) -> tuple[float | None, float | None]:
     return (float(low - pad), float(high + pad)) if pad else (None, None)
 
 
+# ---- where ----------------------------------------------------------------------------------------------------------
+def plan(track: Track, paths: Mapping[str, Path]) -> Figure | None:
+    """Plan view with equal units, the radar at the origin, and the range over time; None where no range is known."""
+    own = [path for path in _drawn_paths(track, paths) if len(path.t_s)]
+    if not own:
+        return None
+    places = np.concatenate([path.places for path in own])
+    far = np.nanmax(np.abs(places)) > FAR_M
+    unit, size = ("km", 1e3) if far else ("m", 1.0)
+    styles = [Style(i if i < MOST_TRACKS else GREY, None, 0, size_pt=1.6) for i in range(len(own))]
+    names = [panels.literal(name) for name in paths]
+    several = len(own) > 1
+    over_time = [
+        Line(path.t_s, path.places[:, 2] / size, "", style, name=f"track {name}" if several else "plots")
+        for path, style, name in zip(own, styles, names, strict=False)
+    ]
+    made = [Panel(TIME, Axis(f"range, {unit}"), tuple(over_time), "Range", direct=False)]
+    if np.isfinite(places[:, :2]).all(axis=1).any():
+        marks: list = [
+            Line(path.places[:, 1] / size, path.places[:, 0] / size, "", style, name=line.name)
+            for path, style, line in zip(own, styles, over_time, strict=True)
+        ]
+        marks.append(Line(np.zeros(1), np.zeros(1), "", RADAR, name="radar"))
+        marks += _ends(own[0], size)
+        view = Panel(Axis(f"east, {unit}"), Axis(f"north, {unit}"), tuple(marks), "Plan view", direct=False, equal=True)
+        made.insert(0, view)
+    keys = [(f"track {name}", style) for name, style in zip(names[:MOST_TRACKS], styles, strict=False)]
+    if len(own) > MOST_TRACKS:
+        keys.append((f"{len(own) - MOST_TRACKS} more", styles[-1]))
+    if several:
+        made.append(Panel(TIME, TIME, (), keys=(("radar", RADAR), *keys)))
+    caption = (
+        "Where the plots are: triangle, the radar; start and end of the longest track with their times. "
+        "Where a file tells no heights, the slant range stands for the range over ground."
+        if len(made) > 1 + several
+        else "The range of the plots over time; the file does not tell their bearing."
+    )
+    columns = min(len(made), 2)
+    return Figure("plan", "Where", caption, tuple(made), columns, PAGE_MM if columns > 1 else COLUMN_MM, TALL_MM)
+
+
+def _drawn_paths(track: Track, paths: Mapping[str, Path]) -> list[Path]:
+    """Where the plots are; of a single track whose file has angles of an antenna, by its own coordinates."""
+    names = [name for name, _ in track.components]
+    if len(paths) == 1 and {"x", "y", "z"} <= set(names) and track.residual is not None:
+        (path,) = paths.values()
+        if not np.isfinite(path.places[:, :2]).any():
+            at = track.estimate[..., [names.index(axis) for axis in "xyz"]] + track.residual
+            f = int(np.isfinite(at).all(axis=2).sum(axis=1).argmax())
+            there = np.isfinite(at[f]).all(axis=1)
+            x, y, z = at[f, there].T
+            return [Path(track.t_s[there], np.stack([x, z, np.sqrt(x**2 + y**2 + z**2)], axis=1))]
+    return list(paths.values())
+
+
+def _ends(path: Path, size: float) -> list:
+    """Words at the first and the last place of a track."""
+    known = np.flatnonzero(np.isfinite(path.places[:, :2]).all(axis=1))
+    if not known.size:
+        return []
+    return [
+        Note(path.places[i, 1] / size, path.places[i, 0] / size, f"{what}, {path.t_s[i]:g} s", place)
+        for i, what, place in ((known[0], "start", "ne"), (known[-1], "end", "se"))
+    ]
+
+
+# ---- estimates and what they miss -----------------------------------------------------------------------------------
 def estimates(track: Track) -> Figure:
     """A panel for each component: the filters' estimates with what they believe of themselves, and the plots."""
     made, every = [], max(1, len(track.components) // max(1, len(track.measured)))
@@ -66,24 +152,62 @@ def estimates(track: Track) -> Figure:
 
 
 def residuals(track: Track) -> Figure | None:
-    """Plot less estimate of what is measured, a panel each, dots of every filter."""
+    """Plot less estimate, a panel for each filter and each number that is measured, between its ± 2 σ bounds."""
     if track.residual is None:
         return None
-    made = []
-    for d, (name, unit) in enumerate(track.measured):
-        marks: list = [Reference(0.0)]
-        for f, filter_name in enumerate(track.filters[:MOST_FILTERS]):
+    made: list[Panel] = []
+    fitting = max(MOST_RESIDUALS // len(track.measured), 1)
+    for f, filter_name in enumerate(track.filters[:fitting]):
+        for d, (name, unit) in enumerate(track.measured):
             known = np.flatnonzero(np.isfinite(track.residual[f, :, d]))
-            known = known[:: -(-max(known.size, 1) // MOST_DOTS)]
-            label = panels.literal(filter_name)
-            style = Style(f, None, f, size_pt=1.8)
-            marks.append(Line(track.t_s[known], track.residual[f, known, d], "", style, name=label))
+            if not known.size:
+                continue
+            known = known[:: -(-known.size // MOST_DOTS)]
+            t, miss = track.t_s[known], track.residual[f, known, d]
+            marks: list = [Reference(0.0), Line(t, miss, "", Style(f, None, 0, size_pt=1.8), name="plots")]
+            if track.residual_sigma is not None and np.isfinite(track.residual_sigma[f, known, d]).any():
+                bound = 2 * track.residual_sigma[f, known, d]
+                marks += [Line(t, bound, "", BOUND, name="± 2 σ"), Line(t, -bound, "", BOUND, name="± 2 σ")]
+            axis = Axis(panels.with_unit(f"residual of {name.rpartition('_')[0]}", unit), limits=_usual(miss))
+            made.append(Panel(TIME, axis, tuple(marks), panels.literal(filter_name), direct=False))
+    caption = (
+        "What each plot differs from the estimate after it; dashed, twice the standard deviation that the filter "
+        "believes of that: 95 % of the plots lie between if it is right."
+    )
+    if len(track.filters) > fitting:
+        caption += f" The first {fitting} of {len(track.filters)} filters are drawn."
+    return _several("residuals", "Residuals", caption, made) if made else None
+
+
+def innovations(track: Track) -> Figure | None:
+    """The mean of the normalised innovations squared over the last WINDOW plots, a panel for each test."""
+    if track.nis is None:
+        return None
+    made: list[Panel] = []
+    for q, (name, freedom) in enumerate(track.tested):
+        marks: list = [Reference(1.0)]
+        low, high = right_mean(WINDOW * freedom)
+        for f, filter_name in enumerate(track.filters[:MOST_FILTERS]):
+            known = np.flatnonzero(np.isfinite(track.nis[f, :, q]))
+            if len(known) < WINDOW:
+                continue
+            sums = np.cumsum(np.append(0.0, track.nis[f, known, q])) / (WINDOW * freedom)
+            t, mean = track.t_s[known[WINDOW - 1 :]], sums[WINDOW:] - sums[:-WINDOW]
+            marks.append(Line(t, mean, "", Style(f, f), name=panels.literal(filter_name)))
         if len(marks) > 1:
-            axis = Axis(panels.with_unit(f"residual of {name.rpartition('_')[0]}", unit))
-            made.append(Panel(TIME, axis, tuple(marks), direct=False))
-    caption = "What each plot differs from the estimate after it. Around zero without a trend where the filter follows."
-    keys = [(panels.literal(one), Style(f, None, f)) for f, one in enumerate(track.filters[:MOST_FILTERS])]
-    return _several("residuals", "Residuals", caption, made, keys) if made else None
+            ends = np.array([marks[1].x[0], max(line.x[-1] for line in marks[1:])])
+            marks += [Line(ends, np.full(2, value), "", BOUND, name="bounds") for value in (low, high)]
+            values = np.concatenate([line.y for line in marks[1:]])
+            ticks = tuple((at, f"{at:g}") for at in TICKS if values.min() <= at <= values.max())
+            made.append(
+                Panel(TIME, Axis("mean NIS", "log", ticks=ticks), tuple(marks), panels.literal(name), direct=False)
+            )
+    caption = (
+        f"Normalised innovations squared, the mean of {WINDOW} plots: 1 for a filter that is right about its errors; "
+        "95 % of such means lie between the dashed bounds. Above: plots worse than stated, or a manoeuvre."
+    )
+    keys = [(panels.literal(name), Style(f, f)) for f, name in enumerate(track.filters[:MOST_FILTERS])]
+    return _several("nis", "Innovations", caption, made, [*keys, ("bounds", BOUND)]) if made else None
 
 
 def probabilities(track: Track) -> Figure | None:

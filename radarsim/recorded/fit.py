@@ -7,7 +7,7 @@ likelihood over all other keys is within half the 95 % point of chi-square of it
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,7 +63,7 @@ def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name
     names = [member.name for member in case.spec.members]
     if filter_name is not None and filter_name not in names:
         raise ConfigError(f"filter: must be one of {', '.join(names)}; got {filter_name}")
-    tracks = _tracks(source, of.columns(case.spec))
+    tracks = _tracks(source, of.columns(case.spec), of.from_any_origin)
     long = [columns for columns in tracks if len(columns["t_s"]) >= LEAST_ROWS]
     if not long:
         raise ConfigError(f"{source}: must have a track of at least {LEAST_ROWS} rows")
@@ -77,27 +77,43 @@ def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name
     return found
 
 
-def _tracks(source: str | os.PathLike, choices: Sequence[Sequence[str]]) -> list[dict[str, np.ndarray]]:
+def _tracks(
+    source: str | os.PathLike, choices: Sequence[Sequence[str]], any_origin: bool
+) -> list[dict[str, np.ndarray]]:
     """The columns (n,) of each track of a file of plots."""
     parts: dict[str | None, list[dict[str, np.ndarray]]] = {}
-    for piece in plots.pieces(source, choices):
-        for name, columns, _ in by_track(piece):
-            if name != "":
-                parts.setdefault(name, []).append(columns)
-    return [{key: np.concatenate([part[key] for part in own]) for key in own[0]} for own in parts.values()]
+    for piece in plots.pieces(source, choices, any_origin=any_origin):
+        for own in by_track(piece):
+            if own.name != "":
+                parts.setdefault(own.name, []).append(own.columns)
+    return [{key: np.concatenate([part[key] for part in pieces]) for key in pieces[0]} for pieces in parts.values()]
 
 
-def fit(experiment: Experiment, source: str | os.PathLike, filter_name: str | None = None, robust: bool = False) -> Fit:
-    """The config's numbers as the plots of a file have them; robust: allowing for outliers. Raises ConfigError."""
-    return fitted(likelihood_of(experiment, source, filter_name), robust)
+Progress = Callable[[int], None]
 
 
-def fitted(likelihood: Likelihood, robust: bool = False) -> Fit:
+def silent(evaluations: int) -> None:
+    """Progress that nobody sees."""
+
+
+def fit(
+    experiment: Experiment,
+    source: str | os.PathLike,
+    filter_name: str | None = None,
+    robust: bool = False,
+    progress: Progress = silent,
+) -> Fit:
+    """The config's numbers as the plots of a file have them; robust: allowing for outliers. progress is called with the
+    number of likelihoods found. Raises ConfigError."""
+    return fitted(likelihood_of(experiment, source, filter_name), robust, progress)
+
+
+def fitted(likelihood: Likelihood, robust: bool = False, progress: Progress = silent) -> Fit:
     """The keys of a likelihood where it is largest, with profile intervals. Raises ConfigError where it is asked to
     allow for outliers and cannot."""
     if robust and OUTLIERS not in likelihood.explains:
         raise ConfigError(f"robust: the likelihood of filter {likelihood.filter} cannot allow for outliers")
-    search = _Search(likelihood, robust)
+    search = _Search(likelihood, robust, progress)
     keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
     share = float(search.natural(search.best)[-1]) if robust else None
     stated = likelihood(np.array(likelihood.stated), 0.0)
@@ -114,8 +130,8 @@ class _Search:
     """The maximum of a likelihood, and its profile along each key. Searched are logarithms of the keys, and the logit
     of the share of outliers."""
 
-    def __init__(self, likelihood: Likelihood, robust: bool):
-        self.likelihood, self.robust = likelihood, robust
+    def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress):
+        self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, 0
         start = np.log(units(likelihood))
         if robust:
             start = np.append(start, _logit(0.05))
@@ -138,6 +154,8 @@ class _Search:
 
     def _value(self, searched: np.ndarray) -> float:
         values = self.natural(searched)
+        self.evaluations += 1
+        self.progress(self.evaluations)
         count = len(self.likelihood.stated)
         found = self.likelihood(values[:count], float(values[count]) if self.robust else 0.0)
         return found if math.isfinite(found) else -1e300

@@ -4,10 +4,11 @@ import itertools
 import json
 import os
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -18,15 +19,20 @@ from radarsim.config.schema import LARGEST_REALISATIONS
 from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
 from radarsim.recorded import plots
+from radarsim.recorded.places import Path as Places
 from radarsim.recorded.rounding import Twin
 from radarsim.studies.interface import RecordedPlots, true_column
 from radarsim.studies.registry import study
+
+if TYPE_CHECKING:
+    from radarsim.report.drawing import Figure
 
 MOST_DRAWN = 2000  # rows kept for figures; of more, every second is dropped again and again
 GAP = 3.0  # intervals' median lengths that make a gap
 MOST_NAMED = 12  # configs or values listed where one must be chosen
 BEFORE = 10  # estimates of a filter's start that do not count against the truth
 HEAD = 5000  # rows that a better σ is looked for on
+BY_ROW = ("estimate", "sigma", "probability", "residual", "nis", "score", "residual_sigma")  # arrays (F, n, …)
 
 
 def recorded_of(case: Case) -> RecordedPlots:
@@ -161,6 +167,7 @@ class Followed:
     tracks: dict[str, "Followed"] = field(default_factory=dict)  # of a file that tells several apart, by name
     passed_over: int = 0  # rows that belong to no track
     errors: dict[tuple[str, str], Errors] = field(default_factory=dict)  # by filter and component, where there is truth
+    places: Places = field(default_factory=Places)  # where the plots are, for the plan view
 
     def take(self, columns: Mapping[str, np.ndarray], track: Track) -> None:
         """Count one more piece of the file."""
@@ -227,18 +234,16 @@ class Followed:
 
 def rows_of(track: Track, kept: np.ndarray) -> Track:
     """Some rows of a track, copied."""
-    arrays = ("estimate", "sigma", "probability", "residual", "nis", "score")
-    some: dict[str, Any] = {name: getattr(track, name)[:, kept] for name in arrays if getattr(track, name) is not None}
+    some: dict[str, Any] = {name: getattr(track, name)[:, kept] for name in BY_ROW if getattr(track, name) is not None}
     return replace(track, t_s=track.t_s[kept], **some)
 
 
 def joined(parts: list[Track]) -> Track:
     """Tracks one after the other."""
-    arrays = ("estimate", "sigma", "probability", "residual", "nis", "score")
     first = parts[0]
     whole: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts], axis=1)
-        for name in arrays
+        for name in BY_ROW
         if getattr(first, name) is not None
     }
     return replace(first, t_s=np.concatenate([part.t_s for part in parts]), **whole)
@@ -253,11 +258,12 @@ class Follower:
         self.tracker, self.followed = of.tracker(case), Followed(case)
         self.twin = Twin(of.tracker(case), of.scan_period_s(case.spec))
 
-    def feed(self, columns: dict[str, np.ndarray], truth: Mapping[str, np.ndarray]) -> Track:
+    def feed(self, own: "Own") -> Track:
         """The estimates over the next rows of the track; raises ConfigError where they are only rounding errors.
 
-        truth: columns (n,), counted against the estimates where their names fit the components.
+        The truth is counted against the estimates where its names fit the components.
         """
+        columns = own.columns
         try:
             track = self.tracker.feed(columns)
             lost = self.twin.lost(columns, track)
@@ -270,7 +276,8 @@ class Follower:
                 raise ConfigError(f"{plots.place_of(self.source, self.twin.gap_row)}: t_s: {fault}")
             raise ConfigError(f"{self.source}: {self._named()}row {self.twin.gap_row + 1} of it: t_s: {fault}")
         self.followed.take(columns, track)
-        self.followed.compare(track, columns["t_s"], truth)
+        self.followed.compare(track, columns["t_s"], own.truth)
+        self.followed.places.add(columns["t_s"], own.places)
         return track
 
     def _named(self) -> str:
@@ -281,13 +288,17 @@ def follow(
     experiment: Experiment,
     source: str | os.PathLike,
     sink: Callable[[Track, str | None], None] = lambda track, name: None,
+    threads: int | None = None,
+    progress: Callable[[int], None] = lambda rows: None,
 ) -> Followed:
     """The filters of an experiment's one case over the recorded plots in a CSV file, piece by piece to `sink`.
 
     A file with a column `track` holds several tracks: the filters follow each by itself, and the sink is given its
-    name; rows without a name belong to none and are passed over. Memory does not grow with a track's rows where the
-    study's filters go from row to row; others take so many rows at most. Raises ConfigError for an experiment of
-    several cases, a study without recorded plots, and faults in the file.
+    name; rows without a name belong to none and are passed over. Tracks are followed in several threads (all cores
+    where None), and come to the sink in the order of the file. Memory does not grow with a track's rows where the
+    study's filters go from row to row; others take so many rows at most. progress is called with the rows done.
+
+    Raises ConfigError for an experiment of several cases, a study without recorded plots, and faults in the file.
     """
     plots_named = shlex.quote(os.fspath(source)).replace("{", "{{").replace("}", "}}")
     case = one_case(experiment, "track with", f"radarsim track {{}} {plots_named}")
@@ -295,36 +306,51 @@ def follow(
     tracker = of.tracker(case)
     size = tracker.most_rows or plots.CHUNK
     followers: dict[str | None, Follower] = {}
-    passed_over = 0
-    for piece in plots.pieces(source, of.columns(case.spec), size, tracker.several):
-        if followers and tracker.most_rows:
-            raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
-        for name, columns, truth in by_track(piece):
-            if name == "":
-                passed_over += len(columns["t_s"])
-                continue
-            if name not in followers:
-                followers[name] = Follower(case, source, name)
-            sink(followers[name].feed(columns, truth), name)
+    passed_over = rows = 0
+    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+        for piece in plots.pieces(source, of.columns(case.spec), size, tracker.several, of.from_any_origin):
+            if followers and tracker.most_rows:
+                raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
+            named_parts = [own for own in by_track(piece) if own.name != ""]
+            passed_over += len(piece.columns["t_s"]) - sum(own.rows for own in named_parts)
+            for own in named_parts:
+                if own.name not in followers:
+                    followers[own.name] = Follower(case, source, own.name)
+            done = pool.map(lambda own: followers[own.name].feed(own), named_parts)
+            for own, track in zip(named_parts, done, strict=True):
+                sink(track, own.name)
+                rows += own.rows
+                progress(rows)
     if not followers:
         raise ConfigError(f"{source}: track: must name the track of some rows, all {passed_over} are empty")
     found = {name: one.followed for name, one in followers.items()}
     return found[None] if None in found else together(case, found, passed_over)
 
 
-Columns = dict[str, np.ndarray]
+class Own(NamedTuple):
+    """The rows of one track in a piece of a file: its name, None where tracks are not distinguished, and columns (n,)
+    as in `plots.Piece`."""
+
+    name: str | None
+    columns: dict[str, np.ndarray]
+    truth: dict[str, np.ndarray]
+    places: dict[str, np.ndarray]
+
+    @property
+    def rows(self) -> int:
+        """How many there are."""
+        return len(self.columns["t_s"])
 
 
-def by_track(piece: plots.Piece) -> Iterator[tuple[str | None, Columns, Columns]]:
-    """Measured and true columns of each track by its name, or of all rows where tracks are not distinguished."""
+def by_track(piece: plots.Piece) -> list[Own]:
+    """The rows of each track, in the order in which the tracks come first."""
+    tables = (piece.columns, piece.truth, piece.places)
     if piece.tracks is None:
-        yield None, piece.columns, piece.truth
-        return
-    for name, rows in plots.grouped(piece.tracks).items():
-        measured, true = (
-            {key: column[rows] for key, column in columns.items()} for columns in (piece.columns, piece.truth)
-        )
-        yield name, measured, true
+        return [Own(None, *tables)]
+    return [
+        Own(name, *({key: column[rows] for key, column in columns.items()} for columns in tables))
+        for name, rows in plots.grouped(piece.tracks).items()
+    ]
 
 
 def together(case: Case, found: Mapping[str | None, Followed], passed_over: int) -> Followed:
@@ -364,18 +390,31 @@ def track(experiment: Experiment, source: str | os.PathLike) -> tuple[Case, Trac
     return followed.case, joined(parts)
 
 
+def drawn(followed: Followed) -> "dict[str, Figure]":
+    """The figures of a track, or of the longest of several, described; by name."""
+    from radarsim.recorded import figures
+
+    ways = {name: one.places for name, one in followed.tracks.items()} or {"": followed.places}
+    order = sorted(ways, key=lambda name: ways[name] is not followed.places)
+    return figures.figures(followed.track(), {name: ways[name] for name in order})
+
+
 def draw(followed: Followed, folder: str | os.PathLike, sources: Iterable[str | os.PathLike] = ()) -> list[str]:
-    """Figures of a track as SVG and PNG into a folder; their names. Raises StoreError.
+    """Figures of a track as SVG and PNG into a folder; their names. Errors of `put`."""
+    from radarsim.report import figures
 
-    ConfigError, and nothing drawn, where a figure would take the place of one of the sources.
-    """
-    from radarsim.recorded import figures as described
-    from radarsim.report import figures, files
+    made = drawn(followed)
+    saved = {f"{name}.{kind}": data for name, one in made.items() for kind, data in figures.save(one).items()}
+    put(folder, saved, sources)
+    return list(made)
 
-    made = described.figures(followed.track())
-    contents = {f"{name}.{kind}": data for name, one in made.items() for kind, data in figures.save(one).items()}
+
+def put(folder: str | os.PathLike, contents: Mapping[str, bytes], sources: Iterable[str | os.PathLike] = ()) -> None:
+    """Write files into a folder. Raises StoreError, and ConfigError, with nothing written, where one of them would take
+    the place of one of the sources."""
+    from radarsim.report import files
+
     for name, source in itertools.product(contents, sources):
         if files.same_file(Path(folder) / name, source):
-            raise ConfigError(f"{Path(folder) / name}: would be overwritten by a figure; choose another folder")
+            raise ConfigError(f"{Path(folder) / name}: would be overwritten; choose another folder")
     files.replace_all(Path(folder), contents)
-    return list(made)

@@ -27,6 +27,7 @@ LARGEST = 1e18  # of any number, as in configs
 SEPARATORS = {";": "semicolons", "\t": "tabulators"}  # of other programs
 DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
 TRACK = "track"  # the column that tells several tracks of a file apart
+PLACES = ("range_m", "bearing_rad", "x_m", "y_m", "z_m")  # columns that say where a plot is: for figures alone
 CHUNK = 20_000  # rows read, filtered and written at a time
 
 
@@ -54,20 +55,27 @@ def chunks(
 
 class Piece(NamedTuple):
     """Some rows of a file of plots: the columns (n,) that are measured; the track of each row, none where the file does
-    not tell tracks apart; the columns (n,) of the truth, `true_…`."""
+    not tell tracks apart; the columns (n,) of the truth, `true_…`; and those that say where the plots are, of PLACES.
+    """
 
     columns: dict[str, np.ndarray]
     tracks: list[str] | None
     truth: dict[str, np.ndarray]
+    places: dict[str, np.ndarray]
 
 
 def pieces(
-    path: str | os.PathLike, choices: Sequence[Sequence[str]], size: int = CHUNK, several: bool = False
+    path: str | os.PathLike,
+    choices: Sequence[Sequence[str]],
+    size: int = CHUNK,
+    several: bool = False,
+    any_origin: bool = False,
 ) -> Iterator[Piece]:
-    """As `chunks`, with tracks and truth; where there are tracks the times rise within each."""
+    """As `chunks`, with tracks and truth; where there are tracks the times rise within each. any_origin: ranges may be
+    negative."""
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
-            yield from _Reader(str(path), csv.reader(file, strict=True), choices, several).chunks(size)
+            yield from _Reader(str(path), csv.reader(file, strict=True), choices, several, any_origin).chunks(size)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
@@ -88,8 +96,10 @@ def place_of(path: str | os.PathLike, row: int) -> str:
 class _Reader:
     """Header, then numbers, then the order of the times; faults are collected."""
 
-    def __init__(self, path: str, rows: "_csv.Reader", choices: Sequence[Sequence[str]], several: bool):
-        self.several = several
+    def __init__(
+        self, path: str, rows: "_csv.Reader", choices: Sequence[Sequence[str]], several: bool, any_origin: bool
+    ):
+        self.several, self.any_origin = several, any_origin
         self.path, self.rows, self.measured = path, rows, False
         self.faults: list[str] = []
         try:
@@ -99,7 +109,8 @@ class _Reader:
         self.wanted = _chosen(path, header, choices)
         self.width, self.places = len(header), [header.index(name) for name in self.wanted]
         self.track = header.index(TRACK) if TRACK in header else None
-        self.true = {name: place for place, name in enumerate(header) if name.startswith(TRUE)}
+        # Not measured, in so far as the filters do not take them: what is no number there is missing.
+        self.beside = {name: place for place, name in enumerate(header) if name.startswith(TRUE) or name in PLACES}
         self.last: dict[str, float] = {}
 
     def chunks(self, size: int) -> Iterator[Piece]:
@@ -110,15 +121,17 @@ class _Reader:
             if not lines:
                 break
             any_row = True
-            table = np.array(values, dtype=float).reshape(-1, len(self.wanted) + len(self.true))
-            array, truth = table[:, : len(self.wanted)], table[:, len(self.wanted) :]
+            table = np.array(values, dtype=float).reshape(-1, len(self.wanted) + len(self.beside))
+            array = table[:, : len(self.wanted)]
+            beside = dict(zip(self.beside, table[:, len(self.wanted) :].T.copy(), strict=True))
             self._judge(array, lines)
             self._in_order(array[:, 0], lines, tracks)
             if not self.faults:
                 yield Piece(
                     dict(zip(self.wanted, array.T.copy(), strict=True)),
                     None if self.track is None else tracks,
-                    dict(zip(self.true, truth.T.copy(), strict=True)),
+                    {name: column for name, column in beside.items() if name.startswith(TRUE)},
+                    {name: column for name, column in beside.items() if name in PLACES},
                 )
         if not any_row and not self.faults:
             self.faults.append(f"{self.path}: has no rows")
@@ -152,7 +165,7 @@ class _Reader:
         """Note values that no sensor can have given."""
         path, wanted, places = self.path, self.wanted, self.places
         self.measured |= bool(np.isfinite(array[:, 1:]).any())
-        for i, j in np.argwhere(impossible(array, wanted))[:MOST_FAULTS]:
+        for i, j in np.argwhere(impossible(array, wanted, self.any_origin))[:MOST_FAULTS]:
             allowed = "must be > 0" if wanted[j] == "range_m" else "must be in radians, from -2 pi to 2 pi"
             self.faults.append(f"{path}:{lines[i]}:{places[j] + 1}: {wanted[j]}: {allowed}, got {array[i, j]:g}")
 
@@ -173,10 +186,10 @@ class _Reader:
         """The wanted numbers of a row; faults are noted and stand as not-a-number."""
         if len(row) != self.width:
             self.faults.append(f"{self.path}:{line}: must have {self.width} cells as the header, got {len(row)}")
-            return [math.nan] * (len(self.wanted) + len(self.true))
+            return [math.nan] * (len(self.wanted) + len(self.beside))
         wanted = zip(self.wanted, self.places, strict=True)
         measured = [self._number(row[place].strip(), line, place, name) for name, place in wanted]
-        return [*measured, *(_number_or_missing(row[place]) for place in self.true.values())]
+        return [*measured, *(_number_or_missing(row[place]) for place in self.beside.values())]
 
     def _number(self, text: str, line: int, place: int, name: str) -> float:
         if not text and name != "t_s":
@@ -217,11 +230,12 @@ def _comment(row: list[str]) -> bool:
     return bool(row) and row[0].startswith("#")
 
 
-def impossible(array: np.ndarray, names: list[str]) -> np.ndarray:
-    """Which values (n, columns) no sensor can have given: ranges not positive, angles beyond a turn (degrees?)."""
+def impossible(array: np.ndarray, names: list[str], any_origin: bool = False) -> np.ndarray:
+    """Which values (n, columns) no sensor can have given: ranges not positive, unless they count from any origin, and
+    angles beyond a turn (degrees?)."""
     wrong = np.zeros(array.shape, dtype=bool)
     for j, name in enumerate(names):
-        if name == "range_m":
+        if name == "range_m" and not any_origin:
             wrong[:, j] = array[:, j] <= 0
         elif name.endswith("_rad"):
             wrong[:, j] = np.abs(array[:, j]) > 2 * np.pi

@@ -96,6 +96,39 @@ def comparison(
     )
 
 
+def followed(
+    config: str,
+    source: str,
+    answer: Sequence[str],
+    plots: Sequence[str],
+    figures: Sequence[Figure],
+    tables: Mapping[str, Sequence[Mapping[str, object]]],
+    yaml: str,
+    command: str,
+) -> str:
+    """The page of tracks over recorded plots: answer, what the plots are, figures, tables of rows by column, config."""
+    return whole(
+        "track.html.j2",
+        config=config,
+        source=source,
+        answer=answer,
+        plots=plots,
+        figures=_figures(figures),
+        tables=[_grid(name, rows) for name, rows in tables.items() if rows],
+        yaml=yaml,
+        command=command,
+        version=provenance.versions()["radarsim"],
+    )
+
+
+def _grid(name: str, rows: Sequence[Mapping[str, object]]) -> dict[str, Any]:
+    """A table of rows by column, as far as it is shown."""
+    shown = rows[:ROWS]
+    columns = [{"name": key, "numeric": isinstance(value, int | float)} for key, value in rows[0].items()]
+    cells = [[number(value) for value in row.values()] for row in shown]
+    return {"name": name, "columns": columns, "rows": cells, "count": len(rows), "cut": len(rows) > len(shown)}
+
+
 def yaml_of(resolved: Mapping[str, Any]) -> str:
     """The resolved experiment as YAML; of very many cases the first."""
     cases = resolved["cases"]

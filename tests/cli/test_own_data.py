@@ -190,7 +190,7 @@ def test_the_command_tells_gaps_missing_values_and_draws(tmp_path):
     assert "gaps     1 of over three times the usual interval, 10 s; the longest 110 s, after 180 s" in result.stdout
     assert "NIS" in result.stdout
     assert {path.name for path in figures.iterdir()} == {
-        f"{n}.{k}" for n in ("track", "residuals") for k in ("svg", "png")
+        f"{n}.{k}" for n in ("plan", "track", "residuals", "nis") for k in ("svg", "png")
     }
     written = table_of(track)
     assert written[0] == ["t_s", "filter", "component", "unit", "estimate", "sigma"]

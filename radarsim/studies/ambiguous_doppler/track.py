@@ -50,6 +50,9 @@ class Tracker:
     def __init__(self, case: Case):
         self.names = tuple(one.name for one in case.spec.filters)
         self.filters = [followers.follower(one, case.spec) for one in case.spec.filters]
+        self.errors = np.array([case.spec.radar.sigma_range_m, case.spec.radar.sigma_velocity_mps])
+        # A number that was taken in has drawn the estimate to itself; of another the errors add.
+        self.drawn = np.array([[-1.0, 1.0 if one.doppler == "none" else -1.0] for one in case.spec.filters])
 
     def feed(self, columns: Mapping[str, np.ndarray]) -> Track:
         """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
@@ -60,7 +63,12 @@ class Tracker:
         )
         tested = tuple((name, 1) for name, _ in MEASURED)
         t = columns["t_s"]
-        return Track(self.names, COMPONENTS, t, estimate, sigma, None, MEASURED, residual, tested, nis)
+        spread = self.errors**2 + self.drawn[:, None] * sigma[..., :2] ** 2
+        believed = np.where(np.isfinite(residual), np.sqrt(np.maximum(spread, 0.0)), np.nan)
+        return Track(
+            *(self.names, COMPONENTS, t, estimate, sigma, None, MEASURED, residual, tested, nis),
+            residual_sigma=believed,
+        )
 
 
 def rows_of(columns: Mapping[str, np.ndarray]) -> list[tuple[float, ...]]:
@@ -123,6 +131,7 @@ class Recorded(RecordedPlots):
     """The study's part in `radarsim track` and `radarsim simulate`."""
 
     rows_asked = 100
+    from_any_origin = True
 
     def columns(self, spec: Any) -> Sequence[Sequence[str]]:
         return ((*COLUMNS, SPAN), COLUMNS)

@@ -130,9 +130,13 @@ class Tracker:
             nis[f, first:, 0] = np.where(tested, out[:, INNOVATION], np.nan)
         self.begun, self.last = len(self.held) == START, t[-1]
         residual = np.where(whole[:, None], z, np.nan)[None] - estimate[..., 0::3]
+        spread = R[None][..., [0, 3, 5]] - sigma[..., 0::3] ** 2  # of residuals after the update
+        believed = np.where(np.isfinite(residual), np.sqrt(np.maximum(spread, 0.0)), np.nan)
         labels = (("x_m", "m"), ("y_m", "m"), ("z_m", "m"))
         shares = probability if self.most > 1 else None
-        return Track(self.names, COMPONENTS, t, estimate, sigma, shares, labels, residual, TESTED, nis)
+        return Track(
+            self.names, COMPONENTS, t, estimate, sigma, shares, labels, residual, TESTED, nis, residual_sigma=believed
+        )
 
     def _first(self, t: np.ndarray, plots: np.ndarray) -> int:
         """The first row with an estimate: that of the third whole plot, or all once the track has begun."""

@@ -83,8 +83,14 @@ class Tracker:
         made = [one.feed(t, z) for one in self.filters]
         estimate, sigma, nis = (np.stack([part[i] for part in made]) for i in range(3))
         residual = z[None] - estimate[..., :2]
+        taken = np.arange(2) < np.array([one.observes for one in self.filters])[:, None]
+        # A number that was taken in has drawn the estimate to itself; of another the errors add.
+        spread = self.sigma**2 + np.where(taken[:, None], -1.0, 1.0) * sigma[..., :2] ** 2
+        believed = np.where(np.isfinite(residual), np.sqrt(np.maximum(spread, 0.0)), np.nan)
         labels = (("range_m", "m"), ("velocity_mps", "m/s"))
-        return Track(self.names, COMPONENTS, t, estimate, sigma, None, labels, residual, MEASURED, nis)
+        return Track(
+            self.names, COMPONENTS, t, estimate, sigma, None, labels, residual, MEASURED, nis, residual_sigma=believed
+        )
 
 
 class _One:

@@ -119,7 +119,7 @@ class Tracker:
         estimate = np.where(known, x, np.nan)[..., :size].reshape(flat)
         spread = np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan)[..., :size].reshape(flat)
         derived = self.derived(t, x, P, known)
-        residual, nis = self._residuals(z, weight, sigma, estimate[..., ::size], spread[..., ::size])
+        residual, nis, believed = self._residuals(z, weight, sigma, estimate[..., ::size], spread[..., ::size])
         measures = tuple(sigmas(spec))
         return Track(
             filters=tuple(member.name for member in spec.filters),
@@ -131,12 +131,14 @@ class Tracker:
             residual=residual,
             tested=tuple((name, 1) for name in measures),
             nis=nis,
+            residual_sigma=believed,
         )
 
     def _residuals(
         self, z: np.ndarray, weight: np.ndarray, sigma: np.ndarray, value: np.ndarray, spread: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Residuals and their normalised squares (F, n, C) of plots z (C, n); value and its σ `spread` (F, n, C)."""
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Residuals, their normalised squares and their σ (F, n, C) of plots z (C, n); value and its σ `spread`
+        (F, n, C)."""
         residual = np.where(weight > 0, z, np.nan).T[None] - value
         with np.errstate(divide="ignore", invalid="ignore"):
             variance = np.where(weight > 0, sigma[:, None] ** 2 / weight, np.nan).T[None]
@@ -144,8 +146,11 @@ class Tracker:
             # For least squares and Kalman filters the residual after the update has variance R - P, and its normalised
             # square equals that of the innovation.
             nis = np.where(freedom > LEAST_FREEDOM * variance, residual**2 / freedom, np.nan)
-        nis[[member.kind not in OPTIMAL for member in self.spec.filters]] = np.nan
-        return residual, nis
+        others = [member.kind not in OPTIMAL for member in self.spec.filters]
+        nis[others] = np.nan
+        believed = np.sqrt(np.maximum(freedom, 0.0))
+        believed[others] = np.nan
+        return residual, nis, believed
 
 
 def _estimated(

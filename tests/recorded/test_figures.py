@@ -1,0 +1,128 @@
+"""Figures and report of tracks over recorded plots."""
+
+import csv
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from radarsim.app.run import load_all
+from radarsim.cli import main
+from radarsim.recorded import figures, follow
+from radarsim.recorded.places import MOST, Path, in_plane
+from radarsim.report.drawing import Line, Note
+
+
+def loaded(config, *overrides):
+    (one,) = load_all([config], overrides)
+    return one
+
+
+def written(path, columns, **more):
+    table = columns | more
+    with open(path, "w", newline="") as file:
+        csv.writer(file).writerows([list(table), *zip(*(np.asarray(one).tolist() for one in table.values()))])  # noqa: B905
+    return path
+
+
+@pytest.mark.parametrize("config", ["rls2", "sonar_smoothing", "multimodel_1hz", "ambiguous_rls4"])
+def test_residuals_lie_between_their_bounds(tmp_path, config):
+    """Over realisations of what the filter is made for: 95.4 % within two σ, by 5.85 standard errors."""
+    calm = "filters=[{name: k, family: kalman, models: [{motion: accelerated, sigma_acceleration_mps2: 1}]}]"
+    more = {
+        "rls2": ("scans=60",),
+        "ambiguous_rls4": ("filters=[{name: m, doppler: folded, manoeuvre_variance: 0.0}]", "scans=25"),
+        "multimodel_1hz": ("scans=60", calm),
+    }
+    more = more.get(config, ())
+    one, inside, count = loaded(config, *more), 0, 0
+    for i in range(12):
+        _, track = follow.track(one, written(tmp_path / "plots.csv", follow.simulated(one, i)))
+        share = np.abs(track.residual[:, 10:]) / track.residual_sigma[:, 10:]
+        share = share[np.isfinite(share)]
+        inside, count = inside + int((share < 2).sum()), count + share.size
+    # Filters of one case share their plots, and neighbouring residuals are not independent: a tenth counts.
+    assert abs(inside / count - 0.954) < 5.85 * np.sqrt(0.954 * 0.046 / (count / 10))
+
+
+def test_plan_view_has_equal_units_and_shows_radar_start_and_end():
+    t, angle = np.arange(40) * 10.0, np.linspace(0, 3, 40)
+    places = np.stack([5e4 * np.cos(angle), 5e4 * np.sin(angle), np.full(40, 5e4)], axis=1)
+    one = loaded("rls2", "scans=40")
+    track = follow.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(follow.simulated(one))
+    view, over_time = figures.plan(track, {"": Path(t, places)}).panels
+    assert (view.equal, view.x.label, view.y.label) == (True, "east, km", "north, km")
+    lines = {mark.name: mark for mark in view.marks if isinstance(mark, Line)}
+    np.testing.assert_allclose(lines["plots"].x, places[:, 1] / 1e3)
+    np.testing.assert_allclose(lines["plots"].y, places[:, 0] / 1e3)
+    assert (lines["radar"].x.tolist(), lines["radar"].y.tolist()) == ([0], [0])
+    assert [mark.text for mark in view.marks if isinstance(mark, Note)] == ["start, 0 s", "end, 390 s"]
+    np.testing.assert_allclose(over_time.marks[0].y, 50)
+
+
+def test_places_of_plots():
+    x, y, z = np.array([3.0]), np.array([12.0]), np.array([4.0])
+    np.testing.assert_allclose(in_plane({"x_m": x, "y_m": y, "z_m": z}), [[3, 4, 13]])
+    r = np.array([10.0])
+    np.testing.assert_allclose(
+        in_plane({"range_m": r, "bearing_rad": np.array([np.pi / 2])}), [[0, 10, 10]], atol=1e-12
+    )
+    assert np.isnan(in_plane({"range_m": r})[0, :2]).all()
+    assert in_plane({"bearing_rad": r}) is None
+
+
+def test_places_are_thinned():
+    path = Path()
+    for k in range(0, 10 * MOST, 500):
+        t = np.arange(k, k + 500.0)
+        path.add(t, {"range_m": t, "bearing_rad": t * 0})
+    assert MOST // 2 < len(path.t_s) <= MOST
+    assert len(set(np.diff(path.t_s))) == 1
+
+
+def test_the_report_shows_what_the_terminal_says(tmp_path):
+    one = loaded("sonar_smoothing")
+    source = written(tmp_path / "plots <b>.csv", follow.simulated(one), track=["7"] * 40)
+    arguments = ["track", "sonar_smoothing", source, "-o", tmp_path / "track.csv", "--report", tmp_path / "out"]
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert result.exit_code == 0, result.output
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert "What do the filters of sonar_smoothing make of plots &lt;b&gt;.csv?" in page
+    assert "Best: " in page
+    assert "Advice: nothing is wrong with the stated numbers, as far as 40 rows tell." in page
+    for name in ("plan", "track", "residuals", "nis"):
+        assert f'id="figure-{name}"' in page
+        assert (tmp_path / f"out/figures/{name}.png").stat().st_size > 1000
+    assert "Errors against the truth" in page
+    assert f"report   {tmp_path / 'out/report.html'}" in result.stdout
+
+
+def test_nothing_is_drawn_over_the_plots(tmp_path):
+    one = loaded("rls2")
+    (tmp_path / "figures").mkdir()
+    source = written(tmp_path / "figures/track.svg", follow.simulated(one))
+    before = source.read_bytes()
+    for arguments in (("--figures", tmp_path / "figures"), ("--report", tmp_path)):
+        command = ["track", "rls2", source, "-o", tmp_path / "t.csv", "-q", *arguments]
+        result = CliRunner().invoke(main, [str(argument) for argument in command])
+        assert result.exit_code == 2
+        assert "would be overwritten; choose another folder" in result.stderr
+    assert source.read_bytes() == before
+
+
+@pytest.mark.parametrize("config", ["rls2", "multimodel_1hz"])
+def test_the_bytes_are_those_of_any_number_of_threads(tmp_path, config):
+    one, rows = loaded(config, "scans=20"), []
+    for i in range(4):
+        columns = follow.simulated(one, i)
+        rows += [(f"{i}", *row) for row in zip(*(column.tolist() for column in columns.values()), strict=True)]
+    rows.sort(key=lambda row: row[1])
+    with open(tmp_path / "plots.csv", "w", newline="") as file:
+        csv.writer(file).writerows([("track", *columns), *rows])
+    made = []
+    for threads in (1, 2, 5):
+        command = ["track", config, tmp_path / "plots.csv", "-o", tmp_path / "t.csv", "-q", "--threads", threads]
+        result = CliRunner().invoke(main, [str(argument) for argument in command])
+        assert result.exit_code == 0, result.output
+        made.append((tmp_path / "t.csv").read_bytes())
+    assert made[0] == made[1] == made[2]
