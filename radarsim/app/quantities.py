@@ -13,7 +13,6 @@ from radarsim.config.experiment import Case
 from radarsim.config.lookup import did_you_mean
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError
-from radarsim.report import tables as common
 from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
 
@@ -114,17 +113,23 @@ def unit(quantity: Quantity, axes: Axes) -> str:
     return quantity.of.unit or text.unit(dict(axes.components)[str(quantity.component)])
 
 
+def labels(quantity: Quantity, case: Case) -> Axes:
+    """The labels of a case's plan, with the exact errors as far as a quantity asks for them. Raises ConfigError."""
+    study = registry.study(case.study)
+    return study.prepare(study.shortened(case, quantity.at_s, quantity.at_k)).axes
+
+
 def exact(quantity: Quantity, case: Case, axes: Axes) -> float:
     """The exact value from the labels of a case's plan; not-a-number where none is known without sampling."""
     if quantity.kind not in ("gain", "sigma") or not registry.study(case.study).exact_errors:
         return np.nan
     f = axes.filters.index(str(quantity.filter))
     c = [name for name, _ in axes.components].index(str(quantity.component))
-    known = np.where(axes.available, np.asarray(axes.exact_sigma, dtype=float), np.nan)
-    value = known[f, :, c]
+    there = axes.available[f, :, c]
     if quantity.kind == "gain":
-        with np.errstate(divide="ignore", invalid="ignore"):
-            value = 100 * (1 - value / known[axes.baseline, :, c])
+        there = there & axes.available[axes.baseline, :, c]
+    known = np.asarray(axes.exact_gains if quantity.kind == "gain" else axes.exact_sigma, dtype=float)
+    value = np.where(there, known[f, :, c], np.nan)
     k, t_s = np.asarray(axes.k), np.asarray(axes.t_s, dtype=float)
     return float(at(quantity, Series(k, t_s, Estimate(value, value, value))).value)
 
@@ -161,10 +166,10 @@ def _rows(quantity: Quantity, result: CaseResult) -> "pd.DataFrame":
     """
     study, name = registry.study(result.study), quantity.of.table
     table: Any
-    if name == "gains":
-        table = common.gains([result])
+    if name in ("curves", "gains"):
+        table = study.gains([result]) if name == "gains" else study.curves([result])
     else:
-        table = study.curves([result]) if name == "curves" else study.tables([result]).get(name)
+        table = study.tables([result]).get(name)
     if table is None:
         raise ConfigError(f"{result.name}: study {result.study} knows no {quantity.of.words}: it makes no {name}.csv")
     table = table[table["filter"] == quantity.filter]

@@ -146,15 +146,17 @@ def _with_edges(function: Function, over: Range, places: list[tuple[float, float
 def _with_turns(function: Function, over: Range, places: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """The places with the extremes, found by golden sections, at which the function turns back before it reaches zero.
 
-    Only where it may reach it: beyond a turn the parabola through the three places comes at most so much nearer.
+    Only where it may reach it: beyond a turn the parabola through the three places comes at most so much nearer; and,
+    where it reaches zero nowhere, the turn that comes nearest.
     """
     made = list(places)
     if over.whole:
         return made
+    crossed = any(one[1] * other[1] <= 0 for one, other in pairwise(places))
     for (a, ya), (b, yb), (c, yc) in zip(places, places[1:], places[2:], strict=False):
         if math.isnan(ya + yb + yc) or not (ya * yb > 0 and yb * yc > 0 and abs(ya) > abs(yb) <= abs(yc)):
             continue
-        if abs(yb) > 2 * max(abs(ya - yb), abs(yc - yb)) + 1e-12 and not _least(places, b):
+        if abs(yb) > 2 * max(abs(ya - yb), abs(yc - yb)) + 1e-12 and (crossed or not _least(places, b)):
             continue
         made.append(_turn(function, over, a, c, math.copysign(1.0, yb)))
     return sorted(made)

@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -82,7 +82,7 @@ def sensitivity(
     asked = Quantity("sigma", at_s=float(axes.t_s[-1]) if timed else at_s, at_k=at_k)
     look = Look(asked, axes, realisations or cases.base.realisations)
     base = look.of(cases.base)
-    if not np.isfinite(base).any():
+    if not np.isfinite(base.whole[0]).any():
         raise ConfigError("there is no estimate there")
     keys = [key for key in numeric.keys(cases.base.spec) if key.value and not ("." not in key.path and key.whole)]
     rows, left_out = [], {}
@@ -122,9 +122,21 @@ def size(rows: Sequence[dict[Hashable, Any]], path: str, leading: str) -> tuple[
     return first, every
 
 
+class Seen(NamedTuple):
+    """σ, and gain in per cent, of F filters and C components at one time: of the whole case (2, F, C), and of n batches
+    of its realisations (2, n, F, C), one where exact. Not-a-number where there is no estimate."""
+
+    whole: np.ndarray
+    batches: np.ndarray
+
+    @property
+    def exact(self) -> bool:
+        return self.batches.shape[1] == 1
+
+
 @dataclass(frozen=True)
 class Look:
-    """How a case is looked at: σ of every filter and component at one time, exactly or in batches of realisations."""
+    """How a case is looked at: every filter and component at one time, exactly or in batches of realisations."""
 
     asked: Quantity
     axes: Axes
@@ -135,56 +147,52 @@ class Look:
         """Filters and components, by their places."""
         return [(f, c) for f in range(len(self.axes.filters)) for c in range(len(self.axes.components))]
 
-    def quantity(self, f: int, c: int) -> Quantity:
-        """σ of one filter and component."""
-        return replace(self.asked, filter=self.axes.filters[f], component=self.axes.components[c][0])
+    def quantity(self, kind: str, f: int, c: int) -> Quantity:
+        """σ or gain of one filter and component."""
+        return replace(self.asked, kind=kind, filter=self.axes.filters[f], component=self.axes.components[c][0])
 
-    def of(self, case: Case) -> np.ndarray:
-        """σ (batches, F, C) of a case; one batch where exact, not-a-number where there is no estimate."""
-        axes = registry.study(case.study).prepare(case).axes
-        known = np.array([[quantities.exact(self.quantity(f, c), case, axes) for f, c in self.cells]])
-        if not np.isfinite(known).any():
-            known = np.array(list(self._sampled(case)))
-        return known.reshape(len(known), len(self.axes.filters), len(self.axes.components))
+    def of(self, case: Case) -> Seen:
+        """What a case shows. Raises ConfigError."""
+        axes = quantities.labels(self.asked, case)
+        known = self._each(lambda quantity: quantities.exact(quantity, case, axes))
+        return Seen(known, known[:, None]) if np.isfinite(known[0]).any() else self._sampled(case)
 
-    def _sampled(self, case: Case) -> "list[list[float]]":
+    def _each(self, of: Callable[[Quantity], float]) -> np.ndarray:
+        """(2, F, C) of a function of the quantity."""
+        values = [of(self.quantity(kind, f, c)) for kind in ("sigma", "gain") for f, c in self.cells]
+        return np.array(values).reshape(2, len(self.axes.filters), len(self.axes.components))
+
+    def _sampled(self, case: Case) -> Seen:
         work, each = CaseWork(case), max(2, self.realisations // BATCHES)
-        found = []
-        for batch in range(BATCHES):
-            sums = work.plan.layout.unpack(work.simulate(batch * each, each))
-            result = CaseResult(case.name, case.study, case.spec, case.swept, each, sums, work.plan.axes)
-            curves = registry.study(case.study).curves([result])
-            found.append([quantities.of_table(self.quantity(f, c), curves) for f, c in self.cells])
-        return found
+        batches = [work.simulate(batch * each, each) for batch in range(BATCHES)]
+        whole = self._of_sums(case, work, np.sum(batches, axis=0), BATCHES * each)
+        return Seen(whole, np.stack([self._of_sums(case, work, sums, each) for sums in batches], axis=1))
 
-    def rows(
-        self, case: Case, key: numeric.NumericKey, base: np.ndarray, raised: np.ndarray
-    ) -> list[dict[Hashable, Any]]:
+    def _of_sums(self, case: Case, work: CaseWork, packed: np.ndarray, count: int) -> np.ndarray:
+        sums = work.plan.layout.unpack(packed)
+        study = registry.study(case.study)
+        results = [CaseResult(case.name, case.study, case.spec, case.swept, count, sums, work.plan.axes)]
+        tables = {"sigma": study.curves(results), "gain": study.gains(results)}
+        return self._each(lambda quantity: quantities.of_table(quantity, tables[quantity.kind]))
+
+    def rows(self, case: Case, key: numeric.NumericKey, base: Seen, raised: Seen) -> list[dict[Hashable, Any]]:
         """A row for each filter and component that has an estimate, with the changes from base to raised."""
         made: list[dict[Hashable, Any]] = []
-        b = self.axes.baseline
-        whole, changed = root_mean_square(base), root_mean_square(raised)
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratios = np.log(raised / base)
-            gains = [100 * (1 - part / part[:, b : b + 1]) for part in (base, raised)]
+            grown, ratios = np.log(raised.whole[0] / base.whole[0]), np.log(raised.batches[0] / base.batches[0])
+        gained, points = raised.whole[1] - base.whole[1], raised.batches[1] - base.batches[1]
         for f, c in self.cells:
-            if not np.isfinite(whole[f, c]) or not np.isfinite(changed[f, c]):
+            if not np.isfinite(grown[f, c]):
                 continue
-            grown = interval(ratios[:, f, c], math.log(changed[f, c] / whole[f, c]))
-            gain, gained = (100 * (1 - part[f, c] / part[b, c]) for part in (whole, changed))
-            own = math.nan if f == b else gain
-            points = interval((gains[1] - gains[0])[:, f, c], gained - gain)
+            change = interval(ratios[:, f, c], grown[f, c])
+            gain = [math.nan] * 4
+            if f != self.axes.baseline:
+                gain = [base.whole[1, f, c], *interval(points[:, f, c], gained[f, c])]
             name, unit = self.axes.components[c]
-            values = [case.name, self.axes.filters[f], name, unit, key.path, key.value, more(key), whole[f, c]]
-            values += [100 * math.expm1(end) for end in grown]
-            values += [own, *(points if f != b else [math.nan] * 3), len(base) == 1]
+            values = [case.name, self.axes.filters[f], name, unit, key.path, key.value, more(key), base.whole[0, f, c]]
+            values += [*(100 * math.expm1(end) for end in change), *gain, base.exact]
             made.append(dict(zip(COLUMNS, values, strict=True)))
         return made
-
-
-def root_mean_square(batches: np.ndarray) -> np.ndarray:
-    """σ of all batches together."""
-    return np.sqrt(np.mean(batches**2, axis=0))
 
 
 def interval(batches: np.ndarray, value: float) -> tuple[float, float, float]:

@@ -26,7 +26,6 @@ from radarsim.engine.collect import collect
 from radarsim.engine.results import Axes
 from radarsim.errors import ConfigError
 from radarsim.report.statistics import Estimate
-from radarsim.studies import registry
 
 FACTOR = 1000.0  # the search goes from a thousandth of a positive key's value to a thousand times it
 NEAR = 1e-4  # of a value: the step of a derivative
@@ -124,9 +123,11 @@ def solve(
 
     Raises ConfigError for a wrong config, key, filter or component, and for a key without effect.
     """
+    if not math.isfinite(equals):
+        raise ConfigError(f"--equals: must be a finite number, got {equals:g}")
     cases = Cases(config, tuple(overrides), case)
     found = numeric.find(cases.base.spec, key)
-    axes = registry.study(cases.base.study).prepare(cases.base).axes
+    axes = quantities.labels(quantity, cases.base)
     quantity = quantities.resolved(quantity, axes)
     over = range_of(found, key, between)
     curve = Curve(cases, key, quantity, threads, progress, realisations or cases.base.realisations)
@@ -247,8 +248,7 @@ class Curve:
         if self.from_tables:
             value = self._sampled(case, 1)[1]
         else:
-            axes = registry.study(case.study).prepare(case).axes
-            value = quantities.exact(self.quantity, case, axes)
+            value = quantities.exact(self.quantity, case, quantities.labels(self.quantity, case))
         return Estimate(value, value, value)
 
     def _sampled(self, case: Case, realisations: int) -> tuple[Estimate, float]:

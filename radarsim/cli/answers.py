@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from radarsim.app.solve import Answer
 
 PLAIN = ".6g"
+SAME = 1e-9  # of a quantity: how near an exact root comes
 
 
 def print_answer(answer: "Answer") -> None:
@@ -24,6 +25,8 @@ def print_answer(answer: "Answer") -> None:
     interval = "exact" if answer.exact else f"95 % {_number(lo)} … {_number(hi)}"
     say(f"{answer.key} = {_with_unit(value, answer.unit)}   {interval}")
     attained = math.nan if answer.attained is None else answer.attained
+    if abs(attained - answer.equals) < SAME * max(abs(answer.equals), abs(answer.attained_now)):
+        attained = answer.equals  # of a root at zero rounding is all that is left
     say(f"attains  {answer.quantity.words}: {_quantity(answer, attained)}{_now(answer)}")
     if answer.slope is not None:
         say(f"slope    {slope(answer)}")

@@ -25,6 +25,16 @@ class Axes:
     exact_sigma: np.ndarray
     exact_bias: np.ndarray
 
+    @property
+    def exact_gains(self) -> np.ndarray:
+        """Exact gains (F, K, C) against the baseline, per cent, of the realisations in which both have an estimate.
+
+        Here all have one wherever it is available.
+        """
+        sigma = np.asarray(self.exact_sigma, dtype=float)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(100 * (1 - sigma / sigma[self.baseline]))
+
 
 A_co = TypeVar("A_co", bound=Axes, covariant=True)
 

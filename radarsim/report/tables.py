@@ -121,16 +121,14 @@ def _gains(result: CaseResult) -> dict[str, np.ndarray]:
     both[b] = False
     both &= "paired" in result.sums  # trackers keep tracks in realisations of their own
     at = f, k, c = shown(result, both)
-    error, exact = np.asarray(result.sums["error"]), np.asarray(axes.exact_sigma, dtype=float)
+    error = np.asarray(result.sums["error"])
     own, base = error[at], error[b, k, c]
     cross = np.asarray(result.sums["paired"])[at] if f.size else np.zeros(0)  # a lone filter pairs with none
     of = statistics.gain(own[:, 1], own[:, 3], base[:, 1], base[:, 3], cross, realisations(result)[at])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        exact_percent = 100 * (1 - exact[at] / exact[b, k, c])
     return {
         **leading(result, f, k, baseline=np.full(f.size, axes.filters[b], dtype=object), **components(result, c)),
         **interval("gain_percent", of, "gain"),
-        "exact_percent": exact_percent,
+        "exact_percent": axes.exact_gains[at],
     }
 
 

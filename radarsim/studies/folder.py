@@ -15,12 +15,13 @@ A study that follows this declares an object and writes no class:
 |---|---|
 | `keys` | the class `config.Keys` |
 | `prepare`, `simulate` | functions of `study` |
-| `tables`; if offered `curves`, `inputs`, `cost` | functions of `tables` |
+| `tables`; if offered `curves`, `gains`, `inputs`, `cost` | functions of `tables` |
 | `figures` | the function of `figures` |
 | `question`, `answer` | functions of `words` |
 | `warnings`, if offered | the function of `words` |
 | `claims`, if there is a paper | `claims.CLAIMS`, judged by `measures.Evidence` |
 | `seconds_per_update`, if offered | the function of `cost` |
+| `shortened`, if offered | the function of `study` |
 | `readings`, if offered | an object of the class `readings.Readings` |
 | `recorded`, if offered | an object of the class `track.Recorded` |
 | `chart`, if offered | the function of `chart` |
@@ -89,6 +90,10 @@ class StudyFolder(Study):
     def simulate(self, plan: Any, first: int, count: int) -> "np.ndarray":
         return self.file("study").simulate(plan, first, count)
 
+    def shortened(self, case: "Case", at_s: float | None, at_k: int | None) -> "Case":
+        offered = "shortened" in self.offers
+        return self.file("study").shortened(case, at_s, at_k) if offered else super().shortened(case, at_s, at_k)
+
     def seconds_per_update(self, plan: Any) -> Mapping[str, float]:
         offered = "seconds_per_update" in self.offers
         return self.file("cost").seconds_per_update(plan) if offered else super().seconds_per_update(plan)
@@ -99,6 +104,9 @@ class StudyFolder(Study):
 
     def curves(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
         return self.file("tables").curves(results) if "curves" in self.offers else super().curves(results)
+
+    def gains(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
+        return self.file("tables").gains(results) if "gains" in self.offers else super().gains(results)
 
     def inputs(self, results: "Sequence[CaseResult]") -> "pd.DataFrame | None":
         return self.file("tables").inputs(results) if "inputs" in self.offers else super().inputs(results)

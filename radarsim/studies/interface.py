@@ -148,9 +148,8 @@ class Paper(NamedTuple):
     may_shorten: tuple[str, ...] = ()
 
 
-OptionalPart = Literal[
-    "curves", "inputs", "cost", "seconds_per_update", "readings", "recorded", "shipped", "warnings", "chart"
-]
+Beside = Literal["readings", "recorded", "shipped", "chart", "shortened"]
+OptionalPart = Literal["curves", "gains", "inputs", "cost", "seconds_per_update", "warnings", Beside]
 
 
 class Study(ABC):
@@ -188,6 +187,13 @@ class Study(ABC):
         Realisation i has the same noise in any block, whatever N, threads or machine.
         """
 
+    def shortened(self, case: "Case", at_s: float | None, at_k: int | None) -> "Case":
+        """A case with the same exact errors at a time (s) or scan, cheaper to prepare. Default: the case itself.
+
+        Raises ConfigError where the whole case cannot be.
+        """
+        return case
+
     def relabelled(self, axes: "Axes", case: "Case") -> "Axes":
         """The axes of a plan with the display names of a case that has the same identity. Default: names of filters."""
         return replace(axes, filters=tuple(member.name for member in case.spec.members))
@@ -206,6 +212,12 @@ class Study(ABC):
         from radarsim.report import tables
 
         return tables.curves(results)
+
+    def gains(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
+        """The table `gains` alone. Default: the common one."""
+        from radarsim.report import tables
+
+        return tables.gains(results)
 
     @abstractmethod
     def figures(

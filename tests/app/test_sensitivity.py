@@ -123,3 +123,16 @@ def test_the_command_gives_one_json_document(tmp_path):
 def test_faults(given, words):
     with pytest.raises(ConfigError, match=words):
         sensitivity("rls2", **given)
+
+
+def test_with_missed_plots_gains_are_those_of_the_run():
+    """Of the realisations in which both filters have an estimate, exactly and sampled."""
+    import radarsim
+
+    missed = ["radar.detection_probability=0.8", "scans=8"]
+    result = radarsim.run("rls2", overrides=missed, realisations=1000)
+    known = result.gains.query("component == 'r' and k == 3").iloc[0]["exact_percent"]
+    found = sensitivity("rls2", overrides=missed, at_k=3)
+    one = row(found, "radar.sigma_velocity_mps")
+    assert one["gain_percent"] == pytest.approx(known, rel=1e-12)
+    assert one["exact"]

@@ -253,3 +253,63 @@ def test_rates_of_other_studies_are_read_by_the_names_of_their_tables():
     assert first.lo < first.value < first.hi
     assert first.slope < 0
     assert first.attained == pytest.approx(85.0, abs=1.0)
+
+
+# ---- missed plots ----------------------------------------------------------------------------------------------------
+MISSED = ["radar.detection_probability=0.8"]
+
+
+@pytest.mark.parametrize("k", [3, 6])
+def test_with_missed_plots_the_gain_is_the_run_s(k):
+    """Of the realisations in which both filters have an estimate; at scan 3 the range alone has not always begun."""
+    result = radarsim.run("rls2", overrides=MISSED, realisations=1000)
+    row = result.gains.query(f"component == 'r' and k == {k}").iloc[0]
+    found = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r", at_k=k), 20, overrides=MISSED)
+    assert found.exact
+    assert found.attained_now == pytest.approx(row["exact_percent"], rel=1e-12)
+
+
+@pytest.mark.parametrize("at", [{"at_s": 0.0}, {"at_s": 60.0}, {"at_s": 64.0}, {"at_k": 2}, {"at_k": 9}, {}])
+@pytest.mark.parametrize("overrides", [[], MISSED, ["target=turn"]])
+def test_what_comes_later_is_left_out_and_changes_nothing(at, overrides):
+    """The exact errors of the shortened case are those of the whole one."""
+    from radarsim.app import quantities
+    from radarsim.app.configs import load
+    from radarsim.studies import registry
+
+    case = load("rls2", overrides).cases[0]
+    whole = registry.study(case.study).prepare(case).axes
+    for kind, name in (("gain", "r+Vr"), ("sigma", "r")):
+        quantity = Quantity(kind, name, "r", **at)
+        part = quantities.labels(quantity, case)
+        assert len(part.k) < len(whole.k) or not at
+        expected = quantities.exact(quantity, case, whole)
+        assert quantities.exact(quantity, case, part) == pytest.approx(expected, rel=1e-13, abs=1e-13)
+
+
+def test_a_variance_that_is_looked_for_is_of_the_whole_run():
+    from radarsim.app import quantities
+    from radarsim.app.configs import load
+
+    best = ["target=turn", "manoeuvre_variance={minimise: sigma_r, over: worst}", "scans=20"]
+    assert len(quantities.labels(Quantity("sigma", "r", "r", at_k=4), load("rls2", best).cases[0]).k) == 20
+
+
+def test_a_value_that_makes_the_run_impossible_is_refused_though_only_its_beginning_is_asked():
+    """The target flies through the radar after the time that is asked for."""
+    with pytest.raises(ConfigError, match="its range must stay > 0"):
+        solve("rls2", "radar.sigma_range_m", GAIN, 30, overrides=["target.coefficients=[5e3, -45, 0]"])
+
+
+def test_a_root_at_zero_is_printed_as_zero():
+    ended = command("rls2", "manoeuvre_variance", "--gain", "ar", "--at", 100, "--equals", 0, "--between", 1e-6, 1e-1)
+    assert ended.exit_code == 0, ended.stderr
+    assert "gain of r+Vr in ar at 100 s: 0 % (" in ended.stdout
+
+
+@pytest.mark.parametrize("equals", ["nan", "inf", "-inf"])
+def test_a_target_that_is_no_number_is_refused(equals):
+    ended = command("rls2", "radar.sigma_range_m", "--sigma", "r", "--filter", "r", "--equals", equals, "--json")
+    assert ended.exit_code == 2
+    assert ended.stdout == ""
+    assert "--equals: must be a finite number" in ended.stderr

@@ -12,5 +12,5 @@ STUDY = StudyFolder(
         "observes: [range, velocity]": "the same on range and radial velocity, started on two scans",
     },
     paper=Paper("Gorshkov & Zavizhenets 2017", page="range_doppler", may_shorten=("scans",)),
-    offers=("inputs", "readings", "recorded", "chart"),
+    offers=("gains", "inputs", "readings", "recorded", "chart", "shortened"),
 )

@@ -1,11 +1,12 @@
 """Exact errors where plots may be missed: the mean over all patterns of plots that came and that did not.
 
 A filter's gains depend on the pattern alone, so each pattern has its covariance and its mean error, and σ² is their
-mean, weighted by the patterns' probabilities. Their number doubles at every scan. Past `MOST` of them, patterns whose
+mean, weighted by the patterns' probabilities. Their number doubles at every scan. Past some thousands, patterns whose
 believed covariances agree to a small fraction are merged, the less probable ones sooner: these have the same gains from
 then on, and what they have been through is kept by the first two moments of their errors, so that the merging errs by
 about the square of that fraction. How much it errs is seen by merging to a quarter as many, which errs about five times
-as much (tried against 131 072 patterns): where that changes σ by more than `CLOSE`, no exact value is given.
+as much (tried against 131 072 patterns). Where that changes σ by more than `CLOSE`, more are kept; where it still does
+with the most of `KEPT`, no exact value is given.
 """
 
 from collections.abc import Sequence
@@ -16,8 +17,7 @@ import numpy as np
 
 from radarsim.studies.range_doppler.propagation import Errors, Information, Plots
 
-MOST = 8192  # patterns side by side: thirteen scans
-COARSE = MOST // 4
+KEPT = (512, 2048, 8192)  # patterns side by side, each compared with the one before; the most: thirteen scans
 CLOSE = 4e-4  # of σ, between the two; so the finer one is right to about a ten-thousandth
 ALIKE = 1e-4  # fraction by which the covariances of merged patterns may differ, to begin with
 LIGHTER = 4  # patterns 2 to this power less probable may differ twice as much
@@ -125,7 +125,7 @@ def mixture(
     plots: Plots,
     truth: np.ndarray,
     dt: float,
-    most: int = MOST,
+    most: int = KEPT[-1],
     beside: Sequence[Design] = (),
 ) -> Mixture:
     """Means over all patterns of plots, of a filter on the truth (K, 3) at scans dt (s) apart; beside it others."""
@@ -263,6 +263,12 @@ def _grouped(patterns: _Patterns, cell: np.ndarray) -> _Patterns:
     S = mean(errors.second_moments()) - np.einsum("icb,jcb->ijb", E, E)
     one = order[first]
     return _Patterns(total, patterns.count[one], patterns.came[one], Errors(mean(errors.P), S, E))
+
+
+def settled(fine: Mixture, coarse: Mixture) -> bool:
+    """Whether every mean that there is changes by little when merged to a quarter as many patterns."""
+    pairs = ((fine.moment, coarse.moment), (fine.nees, coarse.nees), (fine.beside, coarse.beside))
+    return all(bool((close(one, other) | np.isnan(one)).all()) for one, other in pairs)
 
 
 def close(fine: np.ndarray, coarse: np.ndarray) -> np.ndarray:

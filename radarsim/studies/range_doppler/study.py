@@ -1,7 +1,7 @@
 """P1 (Gorshkov & Zavizhenets 2017): range-only against range + Doppler Kalman filters of the second order."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from radarsim.kernels import linear
 from radarsim.physics.motion import process_noise
 from radarsim.studies.noise import noise_key
 from radarsim.studies.range_doppler import exact, filters, patterns, tuning, world
-from radarsim.studies.range_doppler.config import Keys
+from radarsim.studies.range_doppler.config import Best, Keys
 from radarsim.studies.range_doppler.kernels import missed
 from radarsim.studies.range_doppler.propagation import Plots
 
@@ -48,6 +48,10 @@ class RangeDopplerAxes(Axes):
     repetition_rate_hz: float
     speed_mps: float
     plain: bool
+
+    @property
+    def exact_gains(self) -> np.ndarray:
+        return self.exact_gain
 
 
 @dataclass(frozen=True)
@@ -123,6 +127,21 @@ def prepare(case: Case) -> Plan:
     if labels.plain and not world.sigma_state(made.spec.target).any():
         return Plan(Layout(**linear.shapes(count, scans)), labels, shared_gains(case, made, labels).plain(), True)
     return Plan(Layout(**missed.shapes(count, scans)), labels, own_gains(case, made, labels).plain(), False)
+
+
+def shortened(case: Case, at_s: float | None, at_k: int | None) -> Case:
+    """The case up to a time (s) or scan: what comes later changes no error there, but by a D_M that is looked for."""
+    spec: Keys = case.spec
+    world.true_motion(case)
+    if any(isinstance(f.manoeuvre_variance, Best) for f in spec.filters):
+        return case
+    until = spec.plots
+    if at_k is not None and at_k > 0:
+        until = min(at_k, until)
+    elif at_s is not None and 0 <= at_s < until * spec.radar.scan_period_s:
+        until = min(int(at_s / spec.radar.scan_period_s) + 2, until)  # the scans before and after it
+    scans = max(until, *(f.plots_to_start for f in spec.filters))
+    return replace(case, spec=spec.model_copy(update={"scans": scans}))
 
 
 def shared_gains(case: Case, made: Designed, labels: RangeDopplerAxes) -> linear.Problem:
@@ -255,10 +274,11 @@ class Means:
 
 
 def means(design: patterns.Design, beside: Sequence[patterns.Design], made: Designed) -> Means:
-    """The means of one filter over the patterns."""
-    fine, coarse = (
-        patterns.mixture(design, made.plots, made.x, made.dt, most, beside) for most in (patterns.MOST, patterns.COARSE)
-    )
+    """The means of one filter over the patterns, of which as many are kept as it takes."""
+    mixtures = (patterns.mixture(design, made.plots, made.x, made.dt, most, beside) for most in patterns.KEPT)
+    coarse, fine = next(mixtures), next(mixtures)
+    while not patterns.settled(fine, coarse) and (finer := next(mixtures, None)) is not None:
+        coarse, fine = fine, finer
     known = patterns.close(fine.moment, coarse.moment)
     whole = patterns.close(fine.nees, coarse.nees) & known.all(axis=1)
     others = np.where(patterns.close(fine.beside, coarse.beside), np.sqrt(fine.beside), np.nan)

@@ -73,7 +73,7 @@ def _own_gains(result: Result) -> dict[str, np.ndarray]:
         "gain_percent": of.value,
         "gain_lo": of.lo,
         "gain_hi": of.hi,
-        "exact_percent": axes.exact_gain[at],
+        "exact_percent": axes.exact_gains[at],
     }
 
 
