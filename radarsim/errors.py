@@ -47,13 +47,13 @@ class NonFiniteError(RadarsimError):
 
 
 class Interrupted(RadarsimError):
-    """A signal stopped the run; what was done is stored."""
+    """A signal stopped the run; what was done is stored, where it goes on."""
 
-    def __init__(self, signal_number: int):
+    def __init__(self, signal_number: int, goes_on: bool = True):
         name = {2: "Ctrl-C", 15: "SIGTERM"}.get(signal_number, f"signal {signal_number}")
-        super().__init__(f"stopped by {name}; run the same command again to continue")
-        self.signal_number = signal_number
+        super().__init__(f"stopped by {name}" + ("; run the same command again to continue" if goes_on else ""))
+        self.signal_number, self.goes_on = signal_number, goes_on
         self.exit_code = 128 + signal_number
 
     def __reduce__(self) -> tuple[type[RadarsimError], tuple[object, ...]]:
-        return type(self), (self.signal_number,)
+        return type(self), (self.signal_number, self.goes_on)

@@ -6,6 +6,8 @@ import os
 import re
 import signal
 import sys
+import threading
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
@@ -24,6 +26,7 @@ SECTIONS = {
     "Maintenance": ("list", "schema", "doctor", "clean"),
 }
 ORDER = tuple(name for names in SECTIONS.values() for name in names)
+PATIENCE_S = 1.0  # from a signal to the end of whatever a command is doing
 SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 
 
@@ -42,13 +45,12 @@ class Commands(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            result = super().invoke(ctx)
-            sys.stdout.flush()
-            return result
+            with stoppable():
+                result = super().invoke(ctx)
+                sys.stdout.flush()
+                return result
         except RadarsimError as error:
             fail(error)
-        except KeyboardInterrupt:
-            fail(Interrupted(signal.SIGINT))
         except BrokenPipeError:
             # The reader of our output has closed it (`| head`), which is no fault.
             sys.stdout = open(os.devnull, "w")  # noqa: SIM115
@@ -56,6 +58,40 @@ class Commands(click.Group):
         except OSError as error:
             sys.stdout = open(os.devnull, "w")  # noqa: SIM115
             fail(StoreError(f"{error.filename or 'output'}: cannot be written: {error.strerror or error}"))
+
+
+@contextlib.contextmanager
+def stoppable() -> Iterator[None]:
+    """While entered, SIGINT and SIGTERM end a command, with what it had begun to write taken away.
+
+    What a handler raises may be turned into another exception on its way, as by an import, or be swallowed, as by the
+    finalisers that Python calls at any time; then the process ends on the spot a little later. Runs, which store what
+    they have done, take both signals in a way of their own meanwhile. A signal that is ignored (nohup) stays so.
+    """
+    numbers = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) is not signal.SIG_IGN]
+    if threading.current_thread() is not threading.main_thread():
+        numbers = []
+
+    received: list[Interrupted] = []
+
+    def stop(number: int, frame: object) -> NoReturn:
+        error = Interrupted(number, goes_on=False)
+        received.append(error)
+        late = threading.Timer(PATIENCE_S, fail, (error,))
+        late.daemon = True
+        late.start()
+        raise error
+
+    before = {number: signal.signal(number, stop) for number in numbers}
+    try:
+        yield
+    except Exception:
+        if received:
+            raise received[0] from None
+        raise
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def fail(error: RadarsimError) -> NoReturn:

@@ -69,7 +69,7 @@ def test_what_is_not_offered_is_as_the_interface_has_it():
 
 
 def test_a_part_of_another_name_is_refused():
-    with pytest.raises(ValueError, match="study bare: offers input, must be of curves, inputs, cost"):
+    with pytest.raises(ValueError, match="study bare: offers input, must be of curves, gains, inputs, cost"):
         StudyFolder(package=__name__, name="bare", about="a study", filters={}, offers=("input",))
 
 

@@ -1,0 +1,95 @@
+"""Commands that store nothing, stopped by a signal: the exit code, one line, nothing half written."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from radarsim.cli import group
+from radarsim.errors import Interrupted
+
+LONG = {
+    "solve": [
+        "solve",
+        "ambiguous_rls2",
+        "radar.sigma_velocity_mps",
+        "--right",
+        "memory",
+        "--equals",
+        "99",
+        "-n",
+        "1e6",
+    ],
+    "sensitivity": ["sensitivity", "multimodel_1hz", "-n", "1e6"],
+    "chart": ["chart", "manoeuvre_variance"],
+}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("name", LONG)
+def test_a_signal_ends_it_at_once_with_one_line_and_no_file(name, number, tmp_path):
+    command = [sys.executable, "-m", "radarsim", *LONG[name]]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        time.sleep(1.2)
+        process.send_signal(number)
+        since = time.monotonic()
+        said, error = process.communicate(timeout=20)
+    assert process.returncode == 128 + number, error
+    assert time.monotonic() - since < 3
+    assert said == ""
+    assert error == f"stopped by {'Ctrl-C' if number == signal.SIGINT else 'SIGTERM'}\n"
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_an_exception_that_a_library_makes_of_the_signal_is_still_the_signal():
+    @group.stoppable()
+    def importing():
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(0.1)
+        except Interrupted as error:
+            _late().cancel()
+            raise RuntimeError("an import that failed") from error
+
+    with pytest.raises(Interrupted):
+        importing()
+
+
+def test_a_signal_that_is_swallowed_ends_the_process_a_little_later(monkeypatch):
+    left = []
+    monkeypatch.setattr(group, "PATIENCE_S", 0.05)
+    monkeypatch.setattr(group, "fail", left.append)
+    with group.stoppable():
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(0.1)
+        except Interrupted:
+            pass
+        time.sleep(0.3)
+    assert [error.exit_code for error in left] == [143]
+
+
+def test_other_faults_pass_and_handlers_are_as_before():
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    with pytest.raises(KeyError), group.stoppable():
+        {}["x"]
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
+
+
+def test_an_ignored_signal_stays_ignored():
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with group.stoppable():
+            assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _late():
+    """The timer that a signal has started."""
+    (timer,) = [thread for thread in threading.enumerate() if isinstance(thread, threading.Timer)]
+    return timer
