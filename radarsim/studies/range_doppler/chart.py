@@ -79,7 +79,8 @@ def placed(case: Case) -> Place | None:
     of = closed_form.groups(*inputs)
     both = np.flatnonzero((axes.available[base] & axes.available[own]).all(axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
-        gain = 100 * (1 - axes.exact_sigma[own, both] / axes.exact_sigma[base, both])
+        ratio = axes.exact_sigma[own, both] / axes.exact_sigma[base, both]
+    gain = axes.exact_gains[own, both] if base == axes.baseline else 100 * (1 - ratio)
     errors = [
         exact.steady_state(observes, float(axes.manoeuvre_variance[f]), axes.sigma, axes.scan_period_s)[1]
         for observes, f in ((1, base), (2, own))
@@ -97,9 +98,13 @@ def sentence(place: Place) -> str:
     verbs += [f"{V:g} % off the velocity" if V >= 0 else f"adds {-V:g} % to the velocity"]
     acceleration = f"the acceleration gains {a:g} %" if a >= 0 else f"the acceleration loses {-a:g} %"
     times = f"τ₁ = {place.tau_1_s:.3g} s, τ₂ = {place.tau_2_s:.3g} s"
+    away = significant_digits(float(np.abs(place.exact - place.limit).max()), ".2g")
+    period = place.inputs[2]
     return (
         f"{place.name}: c = {c} ({times}): Doppler {' and '.join(verbs)} in the long run; {acceleration}. "
-        f"At its last scan, {place.t_s[-1]:g} s: {', '.join(significant_digits(float(g), '.3g') for g in last)} %."
+        f"At its last scan, {place.t_s[-1]:g} s: {', '.join(significant_digits(float(g), '.3g') for g in last)} %. "
+        f"With Δt/τ₁ = {period / place.tau_1_s:.2g} and Δt/τ₂ = {period / place.tau_2_s:.2g} "
+        f"the curve of short periods is up to {away} points off."
     )
 
 

@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Gains with the first order of the period are within ERROR_POINTS of the recursion's where Δt/τ₁ and Δt/τ₂ are at most
-# SMALL and c at most LARGEST: beyond, the fastest root of the error, ~ √2 c^(1/4)/τ₂, is no longer slow against a scan.
+# Where Δt/τ₁ and Δt/τ₂ are at most SMALL and c at most LARGEST, gains are within LIMIT_POINTS of the recursion's, and
+# with the first order of the period within ERROR_POINTS. Beyond LARGEST the fastest root of the error, ~ √2 c^(1/4)/τ₂, is no
+# longer slow against a scan.
 SMALL, LARGEST = 0.05, 1000.0
-ERROR_POINTS = 0.1
+LIMIT_POINTS, ERROR_POINTS = 0.55, 0.11
 
 
 class Groups(NamedTuple):
@@ -91,7 +92,8 @@ def noise_variances(c: np.ndarray | float, step: np.ndarray | float = 0.0) -> np
 def steady_gains(c: np.ndarray | float, step: np.ndarray | float = 0.0) -> np.ndarray:
     """Relative gains (3, …) of range, velocity, acceleration by the velocity in the limit, %: functions of c alone.
 
-    With the first order of the period, step = Δt/τ₂, within ERROR_POINTS of the recursion up to SMALL and LARGEST.
+    Within LIMIT_POINTS of the recursion up to SMALL and LARGEST; with the first order of the period, step = Δt/τ₂,
+    within ERROR_POINTS.
     """
     with np.errstate(invalid="ignore"):
         return 100 * (1 - np.sqrt(noise_variances(c, step) / noise_variances(np.zeros_like(c, dtype=float), step)))

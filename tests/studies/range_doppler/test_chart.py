@@ -35,8 +35,7 @@ def recursion(shares):
 
 
 def test_a_thousand_random_radars_lie_on_the_chart():
-    """Where Δt/τ₁ and Δt/τ₂ are at most 0.05, and c at most 1000, the closed form with its first order is within the
-    stated 0.1 points."""
+    """Where Δt/τ₁ and Δt/τ₂ are at most 0.05, and c at most 1000, the closed form is within the stated points."""
     shares = random_radars(2000, closed_form.SMALL, 1)
     shares = shares[:, (shares[1] / shares[0]) ** 2 <= closed_form.LARGEST][:, :1000]
     assert shares.shape == (2, 1000)
@@ -46,8 +45,19 @@ def test_a_thousand_random_radars_lie_on_the_chart():
     # Without the correction: half a point is just exceeded in the range, where Δt/τ₂ is 0.05.
     limit = closed_form.steady_gains((shares[1] / shares[0]) ** 2)
     away = np.abs(limit - gains)
-    assert away.max() < 0.6
+    assert away.max() < closed_form.LIMIT_POINTS
     assert away[:, shares[1] < 0.045].max() < 0.5
+
+
+def test_where_the_closed_form_is_worst_it_is_within_the_stated_points():
+    """Along the edge: the larger of both shares is 0.05, c up to 1000. Neither bound has much to spare."""
+    c = np.geomspace(1e-3, closed_form.LARGEST, 600)
+    shares = closed_form.SMALL * np.array([np.minimum(c**-0.5, 1.0), np.minimum(c**0.5, 1.0)])
+    gains = recursion(shares)
+    corrected = np.abs(closed_form.steady_gains(c, shares[1]) - gains).max()
+    limit = np.abs(closed_form.steady_gains(c) - gains).max()
+    assert 0.9 * closed_form.ERROR_POINTS < corrected < closed_form.ERROR_POINTS
+    assert 0.9 * closed_form.LIMIT_POINTS < limit < closed_form.LIMIT_POINTS
 
 
 def test_the_correction_is_of_the_first_order():
