@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 # Where Δt/τ₁ and Δt/τ₂ are at most SMALL and c at most LARGEST, gains are within LIMIT_POINTS of the recursion's, and
-# with the first order of the period within ERROR_POINTS. Beyond LARGEST the fastest root of the error, ~ √2 c^(1/4)/τ₂, is no
-# longer slow against a scan.
+# with the first order of the period within ERROR_POINTS. Beyond LARGEST the fastest root of the error, ~ √2 c^(1/4)/τ₂,
+# is no longer slow against a scan.
 SMALL, LARGEST = 0.05, 1000.0
 LIMIT_POINTS, ERROR_POINTS = 0.55, 0.11
 
