@@ -65,6 +65,8 @@ class Found:
 def roots(function: Function, over: Range) -> Found:
     """All roots that a scan of the range shows: changes of sign, and touching ones where it turns near zero.
 
+    Where the function jumps over zero, the place of the jump counts as one, unless it is undefined between.
+
     Raises ValueError where the function is defined nowhere on the scan.
     """
     places = [(x, function(x)) for x in over.grid()]
@@ -77,6 +79,7 @@ def roots(function: Function, over: Range) -> Found:
     for (a, ya), (b, yb) in pairwise(places):
         if ya * yb < 0:
             found.append(closed(function, over, (a, ya), (b, yb)))
+    found = [x for x in found if not math.isnan(function(x))]
     nearest, at_nearest = min(known, key=lambda one: abs(one[1]))
     return Found(tuple(sorted(found)), nearest, at_nearest)
 

@@ -31,6 +31,8 @@ FACTOR = 1000.0  # the search goes from a thousandth of a positive key's value t
 NEAR = 1e-4  # of a value: the step of a derivative
 WHOLE = "of whole numbers the one beside the target that does at least as well"
 MOST_NAMED = 6  # cases that a message lists
+JUMP = 1e-4  # of a quantity: more than means over patterns of plots may jump where others are merged
+JUMPS = "the quantity jumps over the target there"
 SAME = 1e-12  # of a quantity: what rounding may make of no change
 
 Config = str | os.PathLike[str] | Mapping[str, Any]
@@ -277,11 +279,13 @@ def _exactly(asked: Question, curve: Curve) -> Answer:
         limit = found.at_nearest + asked.equals
         return answer(limit=limit, limit_at=found.nearest, notes=boundary(asked, curve, found.nearest))
     value = nearest(values, asked)
+    attained = curve.exactly(value)
+    jumps = not asked.over.whole and abs(attained - asked.equals) > JUMP * max(abs(asked.equals), abs(attained_now))
     return answer(
-        **{"value": value, "lo": value, "hi": value, "attained": curve.exactly(value)},
-        slope=slope(curve.exactly, value, asked.over),
+        **{"value": value, "lo": value, "hi": value, "attained": attained},
+        slope=None if jumps else slope(curve.exactly, value, asked.over),
         others=tuple(x for x in values if x != value),
-        notes=(WHOLE,) if asked.over.whole and curve.exactly(value) != asked.equals else (),
+        notes=((JUMPS,) if jumps else ()) + ((WHOLE,) if asked.over.whole and attained != asked.equals else ()),
     )
 
 

@@ -104,3 +104,15 @@ def test_the_search_takes_few_values():
 
     search.roots(function, search.searched(1e-3, 1e3))
     assert count <= 45
+
+
+def test_a_change_of_sign_across_a_gap_is_no_root():
+    over = search.searched(-1.0, 2.0)
+    found = search.roots(lambda x: math.nan if -0.001 < x < 0.001 else x / abs(x) * (1 + x * x), over)
+    assert found.roots == ()
+    assert abs(found.at_nearest) == pytest.approx(1, abs=0.01)
+
+
+def test_a_jump_over_zero_is_where_it_jumps():
+    found = search.roots(lambda x: 1.0 if x > 0.3 else -1.0, search.searched(-1.0, 2.0))
+    assert found.roots == (pytest.approx(0.3, abs=1e-12),)
