@@ -49,7 +49,7 @@ def figures(
     drawn = dict(own.figures(results, _banded(made), experiment))
     if (judged := forest.figure(made["claims"].to_dict("records"))) is not None:
         drawn["claims"] = judged
-    if any("note" in made[name] and (made[name]["note"] == notes.THIN).any() for name in ("curves", "gains")):
+    if any("note" in made[name] and made[name]["note"].isin(notes.HEAVY).any() for name in ("curves", "gains")):
         drawn = {
             name: _said(figure) if name.startswith(("sigma", "gain")) else figure for name, figure in drawn.items()
         }
@@ -68,7 +68,7 @@ def _banded(made: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:
     thinned = {}
     for name, ends in (("curves", ("sigma_lo", "sigma_hi")), ("gains", ("gain_lo", "gain_hi"))):
         table = made[name]
-        if "note" in table and (thin := table["note"] == notes.THIN).any():
+        if "note" in table and (thin := table["note"].isin(notes.HEAVY)).any():
             thinned[name] = table.assign(**{end: table[end].mask(thin) for end in ends})
     return {**made, **thinned}
 

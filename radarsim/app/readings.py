@@ -18,6 +18,7 @@ from radarsim.errors import ConfigError, TargetUnmet
 from radarsim.report import files
 from radarsim.report.claims import PaperClaims
 from radarsim.report.claims.declared import Claim
+from radarsim.report.claims.joint import Joint, joint
 from radarsim.report.claims.over import Over, Under, columns, depth, rows, under
 from radarsim.report.claims.readings import PaperReadings, Reading, Seen, Unreadable
 from radarsim.report.claims.search import Search
@@ -38,11 +39,11 @@ class Paper:
 
 @dataclass(frozen=True)
 class Read:
-    """What came of the readings of a paper; search: None where there is none, or only single claims were asked for."""
+    """What came of the readings of a paper, and of its joint search where the whole paper was asked for."""
 
     paper: Paper
     over: list[Over]
-    search: Search | None = None
+    counted: Search | Joint | None = None
 
 
 @dataclass
@@ -162,12 +163,16 @@ def readings(
     for plan, one in zip(plans, wanted, strict=True):
         over = plan.judged(options, _after(progress, done, total), stop)
         done += plan.total
-        search = one.paper.readings.search() if one.whole and not one.only else None
-        read.append(Read(one.paper, over, search))
+        read.append(Read(one.paper, over, _counted(one.paper, over) if one.whole and not one.only else None))
     made = Done(read, Path(out) / FOLDER)
     if not any(one.only for one in wanted):
         made.files = _write(made, figures)
     return made
+
+
+def _counted(paper: Paper, over: list[Over]) -> Search | Joint:
+    """The joint search of a paper: over all it computes at once, else over its declared readings."""
+    return paper.readings.search() or joint(paper.readings, over)
 
 
 def _after(progress: Progress | None, before: int, total: int) -> Progress | None:
@@ -315,9 +320,10 @@ def _table(done: Done) -> str:
     kept = [row for row in stored_readings(done.folder.parent) if row["claim"] not in own]
     new = [row for read in done.read for over in read.over for one in over.under for row in rows(one, names)]
     text = io.StringIO(newline="")
-    table = csv.DictWriter(text, names, restval="", extrasaction="ignore", lineterminator="\n")
-    table.writeheader()
-    table.writerows(sorted([*kept, *new], key=lambda row: _order(str(row["claim"]))))
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(names)
+    every = sorted([*kept, *new], key=lambda row: _order(str(row["claim"])))
+    table.writerows([row.get(name, "") for name in names] for row in every)
     return text.getvalue()
 
 
@@ -332,7 +338,10 @@ def pages(done: Done) -> str:
     """The page of each paper, one after the other."""
     from radarsim.report.claims.readings_page import page
 
-    return "\n".join(page(read.paper.readings, read.paper.claims.paper, read.over, read.search) for read in done.read)
+    return "\n".join(
+        page(read.paper.readings, read.paper.claims.paper, read.over, read.counted or _counted(read.paper, read.over))
+        for read in done.read
+    )
 
 
 def documents(done: Done) -> list[dict[str, Any]]:

@@ -106,7 +106,8 @@ class Result:
         """The rows of curves at the last scan of each case, filter and component, with those of gains beside them."""
         keys = ["case", "filter", "component"]
         last = self.curves.groupby(keys, sort=False).tail(1)
-        return last.merge(self.gains.groupby(keys, sort=False).tail(1), on=[*keys, "k", "t_s"], how="left")
+        gains = self.gains.groupby(keys, sort=False).tail(1).drop(columns="note", errors="ignore")
+        return last.merge(gains, on=[*keys, "k", "t_s"], how="left")
 
     @cached_property
     def _described(self) -> "dict[str, Figure]":

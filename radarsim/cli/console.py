@@ -194,7 +194,7 @@ def show_last_scan(last: "pd.DataFrame") -> None:
         (
             *(row.case, row.filter, row.component, f"{row.t_s:g} s"),
             f"{significant_digits(row.sigma)} {row.unit.replace('s2', 's²')}",
-            f"{significant_digits(row.sigma_lo)} … {significant_digits(row.sigma_hi)}" + too_narrow(row.n_eff),
+            f"{significant_digits(row.sigma_lo)} … {significant_digits(row.sigma_hi)}" + too_narrow(row),
             known(row.exact_sigma),
             known(row.gain_percent, ".2f", " %"),
             known(row.gain_lo, ".2f", " … ") + known(row.gain_hi, ".2f"),
@@ -234,11 +234,12 @@ def print_comparison(compared: "Compared") -> None:
     print_warnings(compared.warnings)
 
 
-def too_narrow(effective: float) -> str:
-    """A mark behind an interval that rests on too few effective realisations."""
-    from radarsim.report.statistics import FEW_EFFECTIVE
+def too_narrow(row: Any) -> str:
+    """A mark behind an interval, of a row of curves, that rests, there or nearby, on too few effective realisations."""
+    from radarsim.report import notes
 
-    return f" ({effective:.0f} effective)" if effective < FEW_EFFECTIVE else ""
+    marks = {notes.THIN: f" ({row.n_eff:.0f} effective)", notes.NEAR: " (heavy tails)"}
+    return marks.get(getattr(row, "note", ""), "")
 
 
 def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
@@ -371,8 +372,8 @@ def print_readings(done: "Done", detailed: bool) -> None:
                     say(f"       {one.kind}  {outcome:<24} {one.name}")
             found = over.outcome
             say(f"{over.claim.id:<6} {found.words if found else 'not judged':<24} {over.sentence()}")
-        if read.search is not None:
-            say(f"{read.search.paper}: {read.search.sentence()}")
+        if read.counted is not None:
+            say(f"{read.paper.readings.paper}: {read.counted.sentence()}")
     if done.files:
         say(f"table    {done.folder / 'readings.csv'}; curves: {plural(len(done.files) - 1, 'figure')} drawn again")
 

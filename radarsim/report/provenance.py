@@ -134,8 +134,9 @@ def few(results: Sequence[CaseResult], curves: "pd.DataFrame | None" = None) -> 
         names = list(dict.fromkeys(marked["case"]))
         least = marked["n_eff"].min()
         said.append(
-            f"{_named(names)}: {len(marked):,} of {len(curves):,} rows of curves.csv rest on under {FEW_EFFECTIVE} "
-            f"effective realisations, the least on {least:.0f}; these intervals are too narrow, and marked"
+            f"{_named(names)}: {len(marked):,} of {len(curves):,} rows of curves.csv rest, there or at a scan nearby, "
+            f"on under {FEW_EFFECTIVE} effective realisations, the least on {least:.0f}; these intervals are too "
+            "narrow, and marked"
         )
     return said
 

@@ -14,6 +14,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 if TYPE_CHECKING:
@@ -146,6 +147,7 @@ class Paper(NamedTuple):
     page: str = ""
     may_grow: tuple[str, ...] = ()
     may_shorten: tuple[str, ...] = ()
+    held_too: Mapping[str, tuple[str, ...]] = MappingProxyType({})
 
 
 Beside = Literal["readings", "recorded", "shipped", "chart", "shortened"]

@@ -39,9 +39,10 @@ def test_effective_realisations_mark_a_row_whatever_n():
 def test_a_gain_rests_on_the_fewer_of_its_two_filters():
     import pandas as pd
 
-    rows = {"case": "a", "component": "x", "k": 1, "n": 5000, "sigma_lo": 1.0, "sigma_hi": 2.0}
+    rows = {"case": "a", "component": "x", "k": 1, "n": 5000, "sigma": 1.5, "sigma_lo": 1.0, "sigma_hi": 2.0}
     curves = pd.DataFrame([{**rows, "filter": "one", "n_eff": 2000.0}, {**rows, "filter": "two", "n_eff": 20.0}])
-    gains = pd.DataFrame([{**rows, "filter": "one", "baseline": "two", "gain_lo": 0.0, "gain_hi": 1.0}])
+    gain = {"baseline": "two", "gain_percent": 0.5, "gain_lo": 0.0, "gain_hi": 1.0, "exact_percent": np.nan}
+    gains = pd.DataFrame([{**rows, "filter": "one", **gain}])
     noted = notes.noted({"curves": curves, "gains": gains.drop(columns="n")}, [])
     assert list(noted["curves"]["note"]) == ["", notes.THIN]
     assert list(noted["gains"]["note"]) == [notes.THIN]
@@ -54,3 +55,44 @@ def test_rare_locks_are_noted_row_by_row():
     table = pd.DataFrame({"case": "a", "n": 1000, "probability": rates, "probability_lo": 0.0, "probability_hi": 1.0})
     noted = notes.noted({"probabilities": table}, [])["probabilities"]
     assert list(noted["note"] == f"under {FEW_EVENTS} events") == [True, True, False, False, True, True]
+
+
+def test_a_scan_near_one_with_heavy_tails_is_marked_too():
+    import pandas as pd
+
+    of = [{"case": "a", "component": c, "k": k, "n": 5000, "filter": f} for f in "fg" for c in "xy" for k in range(50)]
+    curves = pd.DataFrame(of).assign(sigma=1.0, sigma_lo=0.9, sigma_hi=1.1, n_eff=2500.0)
+    curves.loc[(curves["filter"] == "g") & (curves["component"] == "x") & (curves["k"] == 20), "n_eff"] = 30.0
+    noted = notes.noted({"curves": curves}, [])["curves"].set_index(["filter", "component", "k"])["note"]
+    assert noted["g", "x", 20] == notes.THIN
+    near = noted[noted == notes.NEAR].index.tolist()
+    assert near == [("g", "x", k) for k in range(15, 26) if k != 20]  # a tenth of 50 scans on either side
+    assert (noted == "").sum() == 200 - 11
+
+
+@pytest.mark.parametrize(
+    ("half", "exact", "alike"), [(0.5, np.nan, True), (5.0, np.nan, False), (0.5, 3.0, False), (0.0, np.nan, False)]
+)
+def test_gains_of_filters_that_err_nearly_alike_are_marked(half, exact, alike):
+    """Independent σ to ± 4 % would give a gain to ± 5.7; the same filter twice has no chance in it."""
+    import pandas as pd
+
+    row = {"case": "a", "component": "x", "k": 1, "n": 5000, "sigma": 1.0, "sigma_lo": 0.96, "sigma_hi": 1.04}
+    curves = pd.DataFrame([{**row, "filter": name, "n_eff": 2500.0} for name in ("one", "two")])
+    gain = {"gain_percent": 0.0, "gain_lo": -half, "gain_hi": half, "exact_percent": exact}
+    gains = pd.DataFrame([{**row, "filter": "one", "baseline": "two", **gain}]).drop(columns="n")
+    noted = notes.noted({"curves": curves, "gains": gains}, [])["gains"]
+    assert list(noted.get("note", [""])) == [notes.ALIKE if alike else ""]
+
+
+def test_a_table_keeps_the_notes_that_it_brings():
+    import pandas as pd
+
+    table = pd.DataFrame({"case": "a", "n": [5000, 50], "ratio": 1.0, "ratio_lo": 0.9, "ratio_hi": 1.1, "note": "own"})
+    for empty in (False, True):
+        made = {"curves": pd.DataFrame(), "believed": table.assign(note="") if empty else table}
+        noted = notes.noted(made, [])["believed"]
+        assert list(noted["note"]) == ["" if empty else "own", f"under {FEW} realisations"]
+    assert list(table["note"]) == ["own", "own"]
+    none = notes.noted({"curves": pd.DataFrame(), "believed": table[:1].assign(note="")}, [])["believed"]
+    assert "note" not in none

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 import radarsim
-from radarsim.app import configs, output
+from radarsim.app import configs
 from radarsim.app.run import papers
 from radarsim.config.check import models_in
 from radarsim.config.fields import Display, Model
@@ -147,7 +147,40 @@ def test_a_file_of_the_users_is_no_measure_of_the_paper(tmp_path, monkeypatch):
     (tmp_path / "rls1.yaml").write_text(text.replace("sigma_range_m: 25", "sigma_range_m: 30"))
     monkeypatch.chdir(tmp_path)
     configs.shipped.cache_clear()
-    assert radarsim.run("rls1.yaml", realisations=50).tables["claims"].empty
-    assert not output.tables(radarsim.run(configs.lookup.SHIPPED / "configs" / "rls1.yaml", realisations=50).cases)[
-        "claims"
-    ].empty
+    found = radarsim.run("rls1.yaml", realisations=50).tables["claims"]
+    assert found["class"].eq(claims.NOT_JUDGED).all()
+    why = "not the paper's experiment: rls1: radar.sigma_range_m is 30, the paper's 25"
+    assert found["why"].str.startswith(why).all()
+
+
+HELD_TOO = {stem: ids for of in papers() for stem, ids in of.held_too.items()}
+QUICK = ("rls1", "rls2", "rls3", "discriminator_as_printed", "sonar_fluctuating")
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        pytest.param(path.stem, marks=() if path.stem in QUICK else pytest.mark.slow)
+        for path in sorted((configs.lookup.SHIPPED / "configs").glob("*.yaml"))
+    ],
+)
+def test_a_config_holds_the_claims_that_it_is_said_to_hold(config):
+    """Unchanged it judges its own and those of `held_too`, and no other; that these are lost can then be said."""
+    own = {claim.id for of in papers() for claim in of.claims if claim.config == config}
+    table = radarsim.run(config, realisations=20).tables["claims"]
+    assert set(table["claim"]) == own | set(HELD_TOO.get(config, ()))
+    assert not table["class"].eq(claims.NOT_JUDGED).any()
+
+
+@pytest.mark.parametrize(
+    ("config", "override"),
+    [("rls1", "radar.sigma_range_m=30"), ("rls2", "target.coefficients=[1e5]"), ("rls2", "scans=12")],
+)
+def test_claims_of_another_config_are_not_lost_in_silence(config, override):
+    found = radarsim.run(config, overrides=[override], realisations=50)
+    table = found.tables["claims"]
+    assert set(table["claim"]) == set(HELD_TOO[config])
+    lost = table["verdict"].eq(claims.NOT_JUDGED)
+    assert lost.any()
+    assert table.loc[lost, "why"].ne("").all()
+    assert {claim for names in found.unjudged().values() for claim in names} == set(table.loc[lost, "claim"])

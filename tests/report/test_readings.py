@@ -6,14 +6,16 @@ import re
 import numpy as np
 import pytest
 
-from radarsim.report.claims import Claim, Part, certain, printed
+from radarsim.report.claims import Claim, Part, about, certain, printed
 from radarsim.report.claims import readings as data
 from radarsim.report.claims.evidence import Missing
-from radarsim.report.claims.over import Over, columns, depth, rows, together, under
+from radarsim.report.claims.joint import joint
+from radarsim.report.claims.over import Over, columns, depth, rows, under
 from radarsim.report.claims.readings import Alternative, Choice, PaperReadings
 from radarsim.report.claims.readings_page import page
 from radarsim.report.claims.rule import AGAINST, CONFIRMED, DEPENDS, EQUIVALENT, REFUTED, UNSTATED
 from radarsim.report.claims.search import Fine, Printed, Search
+from radarsim.report.statistics import Estimate
 
 
 class Small(PaperReadings):
@@ -43,6 +45,13 @@ class Small(PaperReadings):
         if reading["form"] == "square" and reading["scale"] == "two":
             raise Missing("no square is so large")
         return {"one": 1.0, "two": 2.0, "ten": 10.0}[reading["scale"]]
+
+
+class Sampled(Small):
+    """The same, of numbers with an interval."""
+
+    def exact(self, claim, reading):
+        return False
 
 
 def claim(number, *values):
@@ -109,16 +118,51 @@ def test_depth_is_in_margins_with_its_sign():
     assert depth(over(of, claim(2, "1")).under[0])[0] == 0
 
 
-def test_claims_together():
+def test_printed_numbers_together():
+    """P9.1 prints 1 and 1.6, and may be of a square form; P9.2 prints 2. One reading cannot be done for P9.1."""
     of = Small()
-    every = together(of, [over(of, claim(1, "1")), over(of, claim(2, "2"))])
-    best = every[0]
-    assert len(best.held) == 1
-    by_name = {one.name: one for one in every}
-    assert by_name["as shipped"].held == ("P9.1",)
+    found = joint(of, [over(of, claim(1, "1", "1.6")), over(of, claim(2, "2"))])
+    by_name = {one.name: one for one in found.every}
+    assert [one.what for one in found.numbers.values()] == ["number 1", "number 1.6", "number 2"]
+    assert by_name["as shipped"].held == ()
+    assert by_name["as shipped"].count(granular=False) == by_name["as shipped"].count(granular=True) == 1
     assert by_name["scale: two"].held == ("P9.2",)
-    assert by_name["scale: two; form: square"].held == ("P9.2",)  # the form does not bear on it
-    assert by_name["scale: two; form: square"].judged == ("P9.2",)
+    assert len(by_name["scale: two"].came) == 3
+    assert by_name["scale: two; form: square"].judged == ("P9.2",)  # the form does not bear on it
+    assert found.every[0].count(granular=False) == 1
+    assert found.best(granular=False) is found.shipped  # of several with one, none nearer the shipped
+    windows = found.windows("scale")
+    assert list(windows.values()) == ["one", "none", "two"]
+
+
+def test_a_number_comes_out_by_its_interval():
+    """To the print, within its margin, undecided, beyond: by the whole interval, not by its middle."""
+    part = Part((), "number", "m", lambda seen: Estimate(*seen), about("10"))  # 9 … 11, the margin 1 too
+    coarse = dataclasses.replace(part, expected=about("10", margin=3.0))
+    one = Claim("P9.3", "somewhere", "about ten", (part, coarse))
+    came = {}
+    for name, seen in {"in": (10, 9.5, 10.5), "wide": (10, 8, 11.5), "beyond": (15, 14, 16)}.items():
+        found = under(Sampled(), one, Sampled().reading(), seen)
+        own = joint(Sampled(), [Over(one, (found,))]).shipped
+        came[name] = [(number.strict, number.granular, number.open) for number in own.came.values()]
+    assert came["in"] == [(True, True, False), (True, True, False)]
+    assert came["wide"] == [(False, False, True), (False, True, False)]
+    assert came["beyond"] == [(False, False, False), (False, False, False)]
+
+
+def test_of_variants_one_suffices_and_void_parts_count_for_nothing():
+    parts = tuple(
+        Part((), text, "m", lambda seen: certain(seen), printed(text), number="one", variant=text)
+        for text in ("1", "2")
+    )
+    void = Part((), "void", "m", lambda seen: certain(seen), printed("5"), ceiling=lambda seen: 1.0)
+    ours = Part((), "ours", "m", lambda seen: certain(seen), printed("1"), asserted=False)
+    one = Claim("P9.4", "somewhere", "one or two", (*parts, void, ours))
+    found = under(Small(), one, Small().reading(), 2.0)
+    own = joint(Small(), [Over(one, (found,))]).shipped
+    ((number, came),) = own.came.items()
+    assert number == ("P9.4", ": one")
+    assert (came.value, came.strict) == (2.0, True)
 
 
 @pytest.fixture
@@ -157,5 +201,8 @@ def test_the_page_holds_it_all(search):
     assert "| ten | N | not as printed |" in text
     table = re.findall(r"^\| P9.1 \| number 0 \|.*$", text, flags=re.MULTILINE)
     assert table
-    without = page(of, "Nobody 1900", [over(of, claim(2, "1"))], None)
-    assert "3 readings: as shipped 1 of 1 claims hold" in without
+    every = [over(of, claim(2, "1"))]
+    without = page(of, "Nobody 1900", every, joint(of, every))
+    assert "3 readings: to the print 1 of 1 numbers come out as shipped, and no reading" in without
+    assert re.search(r"^\| as shipped \| E \| 1 of 1 \|", without, flags=re.MULTILINE)
+    assert "| P9.2 | number 1 | 1 ± 0.5 m | **1** |" in without

@@ -1,7 +1,7 @@
 """The papers' claims as data: what a study declares."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from radarsim.report.claims.evidence import Evidence
@@ -76,6 +76,8 @@ class PaperClaims:
     may_shorten names keys that only cut a run short, or let it go on: what does not hang on its end is judged still.
     may_grow names the study's lists to which members may be added without its being another experiment than the
     paper's; every other key must be as in the claim's config, see `radarsim.report.claims.paper`.
+    held_too names, by the stem of a shipped config, the claims of other configs of which it holds every part: when it
+    is changed so that it no longer judges them, it says so.
     """
 
     claims: Sequence[Claim]
@@ -84,3 +86,8 @@ class PaperClaims:
     page: str = ""
     may_grow: tuple[str, ...] = ()
     may_shorten: tuple[str, ...] = ()
+    held_too: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def holds(self, claim: Claim, stem: str) -> bool:
+        """Whether the shipped config of that stem holds a claim whole."""
+        return claim.config == stem or claim.id in self.held_too.get(stem, ())

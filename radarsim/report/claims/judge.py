@@ -60,15 +60,15 @@ def judged(
 ) -> "pd.DataFrame":
     """claims.csv: a row for each part of each claim that these results can judge.
 
-    A claim sees only the cases that are the paper's: those of its config, which `shipped` gives by its stem. Claims of
-    the config `stem`, which is the one that was run, are all there: what cannot be judged says why. Of other configs
-    those of which every part can be judged.
+    A claim sees only the cases that are the paper's: those of its config, which `shipped` gives by its stem. Claims
+    that the config `stem` holds, which is the one that was run, are all there: what cannot be judged says why. Of
+    others those of which every part can be judged.
     """
     rows: list[dict[str, Any]] = []
     if of is not None:
         papers = _Papers(of, results, made, shipped)
         for claim in of.claims:
-            rows += _rows(claim, of.paper, papers, own=claim.config == stem)
+            rows += _rows(claim, of.paper, papers, own=of.holds(claim, stem))
     return common.frame({name: [row[name] for row in rows] for name in CLAIMED})
 
 

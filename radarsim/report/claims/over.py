@@ -131,36 +131,6 @@ class Over:
         return "; ".join(words)
 
 
-@dataclass(frozen=True)
-class Together:
-    """A reading with the claims that hold under it, and those that were judged under it."""
-
-    reading: Reading
-    name: str
-    kind: str
-    held: tuple[str, ...]
-    judged: tuple[str, ...]
-
-
-def together(of: PaperReadings, over: Sequence[Over]) -> list[Together]:
-    """The joint search over the declared readings: which makes most claims true, the best first.
-
-    Under a reading a claim is judged as under the one that takes what bears on it, where that is declared.
-    """
-    found = []
-    for reading in dict.fromkeys(one.reading for claim in over for one in claim.under):
-        held, judged = [], []
-        for claim in over:
-            own = of.bearing(reading, claim.claim.id)
-            for one in claim.under:
-                if one.reading == own and one.outcome is not None:
-                    judged.append(claim.claim.id)
-                    if one.outcome.kind == rule.CONFIRMED:
-                        held.append(claim.claim.id)
-        found.append(Together(reading, of.name(reading), of.kind(reading), tuple(held), tuple(judged)))
-    return sorted(found, key=lambda one: (-len(one.held), -len(one.judged)))
-
-
 def columns(every: Iterable[PaperReadings]) -> tuple[str, ...]:
     """The columns of readings.csv: one for each choice of these papers."""
     choices = dict.fromkeys(choice.key for of in every for choice in of.choices)

@@ -5,13 +5,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from radarsim.report.claims.over import Over, together
+from radarsim.report.claims.joint import Joint, Key, Together
+from radarsim.report.claims.over import Over
+from radarsim.report.claims.page import plain
 from radarsim.report.claims.readings import PaperReadings
-from radarsim.report.claims.rule import AGAINST
 from radarsim.report.claims.search import Search
 
 SHOWN = 12  # readings of the table of claims by reading
 KINDS = "E: equivalent in every respect; U: the paper does not say; N: against its print."
+COUNTED = (
+    "Counted are the numbers, limits and comparisons that the claims of this page assert, each once. One comes out to "
+    "the print where its 95 % interval, all of a claim's at once, or its exact value lies in the range that the print "
+    "rounds to; within margins where it lies in the margin of the words; undecided where the interval is too wide to "
+    "say. Below: bold to the print, plain within margins, – beyond them, ? undecided."
+)
 INTRODUCTION = (
     "Written by `radarsim readings {paper} --markdown`; every number by reading stands in "
     "`results/readings/readings.csv`, and beside it a specification curve a claim. The rule: "
@@ -19,11 +26,10 @@ INTRODUCTION = (
 )
 
 
-def page(of: PaperReadings, cited: str, over: Sequence[Over], search: Search | None) -> str:
-    """The page as Markdown."""
+def page(of: PaperReadings, cited: str, over: Sequence[Over], counted: Search | Joint) -> str:
+    """The page as Markdown; counted is what the joint search of the paper came to."""
     parts = [f"# {of.paper} by reading", f"{cited}. {INTRODUCTION.format(paper=of.paper)}"]
-    if search is not None:
-        parts += [f"**{search.sentence()}**"]
+    parts += [f"**{counted.sentence()}**"]
     parts += ["## Claims over all readings", _claims(over)]
     changed = _changed(over)
     if changed:
@@ -32,10 +38,11 @@ def page(of: PaperReadings, cited: str, over: Sequence[Over], search: Search | N
     impossible = _impossible(over)
     if impossible:
         parts += ["Readings that cannot be flown, designed or measured:", impossible]
-    if search is None:
-        parts += ["## Claims by reading", _together(of, over)]
+    if isinstance(counted, Joint):
+        numbers, windows = f"{_best(counted)}\n\n{_printed(counted)}", _alternatives(counted)
     else:
-        parts += ["## Printed numbers by reading", _numbers(search), "## Where each number comes out", _windows(search)]
+        numbers, windows = _numbers(counted), _windows(counted)
+    parts += ["## Printed numbers by reading", numbers, "## Where each number comes out", windows]
     parts += ["## What the paper leaves open", KINDS, *(_choice(of, number) for number in range(len(of.choices)))]
     return "\n\n".join(parts) + "\n"
 
@@ -77,21 +84,53 @@ def _impossible(over: Sequence[Over]) -> str:
     return _table(("claim", "readings", "such as", "why not"), rows) if rows else ""
 
 
-def _together(of: PaperReadings, over: Sequence[Over]) -> str:
-    """The readings that make most claims true, and the shipped one."""
-    every = together(of, over)
-    shipped = next(one for one in every if one.reading == of.reading())
-    most = max(len(one.held) for one in every if one.kind != AGAINST)
-    sentence = (
-        f"{len(every)} readings: as shipped {len(shipped.held)} of {len(shipped.judged)} claims hold; of those that "
-        f"the paper allows the best makes {most} hold."
-    )
-    best = every[:SHOWN]
+def _best(of: Joint) -> str:
+    """The readings that give most numbers, and the shipped one."""
+    best = of.every[:SHOWN]
     rows = [
-        (one.name, one.kind, f"{len(one.held)} of {len(one.judged)}", ", ".join(one.held))
-        for one in [*best, *([] if shipped in best else [shipped])]
+        (
+            *(one.name, one.kind, f"{one.count(False)} of {len(one.came)}", str(one.count(True)), str(one.open)),
+            *(f"{len(one.held)} of {len(one.judged)}", ", ".join(one.held)),
+        )
+        for one in [*best, *([] if of.shipped in best else [of.shipped])]
     ]
-    return f"{sentence}\n\n{_table(('reading', 'kind', 'claims that hold', 'which'), rows)}"
+    columns = ("reading", "kind", "to the print", "within margins", "undecided", "claims that hold", "which")
+    return f"{COUNTED}\n\n{_table(columns, rows)}"
+
+
+def _printed(of: Joint) -> str:
+    """Every number under the shipped reading and the best ones."""
+    places = {"as shipped": of.shipped, "most to the print": of.best(False), "most within margins": of.best(True)}
+    places = {name: one for i, (name, one) in enumerate(places.items()) if one not in list(places.values())[:i]}
+    rows = []
+    for key, number in of.numbers.items():
+        printed = f"{number.words} {number.unit}".strip()
+        rows.append((number.claim, number.what, printed, *(_came(one, key) for one in places.values())))
+    words = [f"*{name}*: {one.name}." for name, one in places.items() if one != of.shipped]
+    return "\n\n".join([_table(("claim", "number", "printed", *places), rows), *words])
+
+
+def _came(of: Together, key: Key) -> str:
+    if key not in of.came:
+        return "not judged"
+    came = of.came[key]
+    text = plain(came.value) if math.isfinite(came.value) else "none"
+    if came.strict:
+        return f"**{text}**"
+    return text if came.granular else f"{text} ?" if came.open else f"{text} –"
+
+
+def _alternatives(of: Joint) -> str:
+    """Choices as columns, those that change anything; what comes out everywhere, or nowhere, is left out."""
+    windows = {choice.key: of.windows(choice.key) for choice in of.of.choices}
+    kept = {key: own for key, own in windows.items() if set(own.values()) - {"all", "none"}}
+    rows = [
+        (number.claim, number.what, *(own[key] for own in kept.values()))
+        for key, number in of.numbers.items()
+        if any(own[key] not in ("all", "none") for own in kept.values())
+    ]
+    words = "Values of one choice, all others as shipped, with which a number comes out to the print."
+    return f"{words}\n\n{_table(('claim', 'number', *kept), rows)}"
 
 
 def _numbers(search: Search) -> str:

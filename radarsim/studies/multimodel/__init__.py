@@ -13,6 +13,11 @@ STUDY = StudyFolder(
         "output": "rule by which the estimate is made: moment, best",
         "covariance_at": "the plot's covariance at the plot or at its prediction",
     },
-    paper=Paper("Sychev & Osipov 2023", page="multimodel", may_grow=("filters",)),
+    paper=Paper(
+        "Sychev & Osipov 2023",
+        page="multimodel",
+        may_grow=("filters",),
+        held_too={"multimodel_families": ("P2.8", "P2.9")},
+    ),
     offers=("cost", "readings", "seconds_per_update", "recorded"),
 )

@@ -146,7 +146,7 @@ class Readings(PaperReadings):
         return True
 
     def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> "ExactEvidence":
-        return ExactEvidence(reading, limit_s=100.0 if reading["falls_to"] == "100 s" else np.inf)
+        return _evidence(reading)
 
     def search(self) -> Search:
         from radarsim.studies.range_doppler import search
@@ -161,6 +161,12 @@ class Readings(PaperReadings):
             for variance in (float(one["manoeuvre_variance"]), *SWEPT):
                 found[form, variance, start] = None
         return list(found)
+
+
+@cache
+def _evidence(reading: Reading) -> "ExactEvidence":
+    """That of a reading, which many claims share."""
+    return ExactEvidence(reading, limit_s=100.0 if reading["falls_to"] == "100 s" else np.inf)
 
 
 @cache
@@ -216,9 +222,16 @@ class ExactEvidence(measures.Evidence):
         super().__init__((), {}, {})
         self._reading, self._limit_s = reading, limit_s
         self._own = float(reading["manoeuvre_variance"])
+        self._cases: dict[Any, _Radar] = {}
+        self._curves: dict[tuple[Any, str, str], Series] = {}
 
     def case(self, key: Any) -> Any:
         """key: the number of a radar (at the reading's D_M), or (number, D_M)."""
+        if key not in self._cases:
+            self._cases[key] = self._case(key)
+        return self._cases[key]
+
+    def _case(self, key: Any) -> _Radar:
         number, variance = key if isinstance(key, tuple) else (key, self._own)
         period = PERIOD[number]
         k = np.arange(1, round(measures.DURATION / period) + 2)
@@ -242,14 +255,21 @@ class ExactEvidence(measures.Evidence):
 
     def curve(self, key: Any, filter_name: str, component: str) -> Series:
         """σ(k) of a filter."""
-        return self._cut(key, self._sigma(key)[FILTERS.index(filter_name)][:, self._place(component)])
+        place = key, filter_name, component
+        if place not in self._curves:
+            sigma = self._sigma(key)[FILTERS.index(filter_name)][:, self._place(component)]
+            self._curves[place] = self._cut(key, sigma)
+        return self._curves[place]
 
     def gain(self, key: Any, filter_name: str, component: str) -> Series:
         """Relative gain of the filter with velocity, %, from the scan at which it has filtered."""
-        base, own = (sigma[:, self._place(component)] for sigma in self._sigma(key))
-        gain = recursion.gain(base, own)
-        gain[: recursion.first_scan(self._start, 2) - 1] = np.nan
-        return self._cut(key, gain)
+        place = key, "", component
+        if place not in self._curves:
+            base, own = (sigma[:, self._place(component)] for sigma in self._sigma(key))
+            gain = recursion.gain(base, own)
+            gain[: recursion.first_scan(self._start, 2) - 1] = np.nan
+            self._curves[place] = self._cut(key, gain)
+        return self._curves[place]
 
     def settling(self, key: Any, observes: tuple[str, ...], component: str = "r") -> Estimate:
         """Scan periods from the first plot to settling for good; infinite where it does not within the run."""

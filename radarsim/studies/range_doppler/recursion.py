@@ -177,7 +177,19 @@ def _recursion(
             for observed in range(observes):
                 P, S = _updated(P, S, observed, sigma[observed] ** 2)
         true[k], believed[k] = np.sqrt(S[[0, 3, 5]]), np.sqrt(P[[0, 3, 5]])
+        if k % LOOK == LOOK - 1 and _steady(true[k - 1 : k + 1]) and _steady(believed[k - 1 : k + 1]):
+            true[k:], believed[k:] = true[k], believed[k]
+            break
     return true, believed
+
+
+LOOK = 16  # scans between looks whether all σ have settled
+SETTLED = 1e-14  # relative change of a scan: some roundings
+
+
+def _steady(sigma: np.ndarray) -> bool:
+    """Whether σ of two scans (2, …) are the same but for rounding."""
+    return bool((abs(sigma[1] - sigma[0]) <= SETTLED * sigma[1]).all())
 
 
 def _packed(matrices: np.ndarray) -> np.ndarray:

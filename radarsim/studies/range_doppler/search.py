@@ -218,11 +218,12 @@ def numbers(versions: Sequence[recursion.Version], span: str = SPANS[0]) -> np.n
 def search() -> Search:
     """The printed numbers under every combination of the choices, and their windows in each choice alone."""
     lasts = [_last(span) for span in SPANS]
-
     versions = list(itertools.product(FORMS, VARIANCES, START_NAMES))
-    both = np.array([[_numbers(of, last) for last in lasts] for of in _chunks(versions)])  # truth, span, n, B, scans
-    shape = (len(PRINTED), len(FORMS), len(VARIANCES), len(START_NAMES), len(TRUTHS), len(SCANS), len(SPANS))
-    values = both.transpose(2, 3, 0, 4, 1).reshape(shape)
+    values = np.empty((len(PRINTED), len(versions), len(TRUTHS), len(SCANS), len(SPANS)), dtype=np.float32)
+    for truth, of in enumerate(_chunks(versions)):
+        for span, last in enumerate(lasts):
+            values[:, :, truth, :, span] = _numbers(of, last)
+    values = values.reshape(len(PRINTED), len(FORMS), len(VARIANCES), len(START_NAMES), *values.shape[2:])
     strict, granular = (_inside(values, [getattr(one, rule) for one in PRINTED]) for rule in ("strict", "granular"))
     axes: dict[str, tuple[str, ...]] = {
         **{"process_noise": FORMS, "manoeuvre_variance": tuple(f"{v:g}" for v in VARIANCES), "start": START_NAMES},

@@ -103,7 +103,9 @@ class Sonar(Study):
 
         claims = [claim for part in parts().values() for claim in part.claims()]
         claims.sort(key=lambda claim: int(claim.id.partition(".")[2]))
-        return PaperClaims(claims, Evidence, paper="Butyrskiy", page="sonar", may_grow=("filters",))
+        of_smoothing = tuple(claim.id for claim in claims if claim.config == "sonar_smoothing")
+        held_too = {"sonar_fluctuating": of_smoothing}  # which includes its cases
+        return PaperClaims(claims, Evidence, "Butyrskiy", page="sonar", may_grow=("filters",), held_too=held_too)
 
     def readings(self) -> "PaperReadings":
         from radarsim.studies.sonar.manoeuvre.readings import Readings

@@ -233,6 +233,7 @@ def _uses(result: CaseResult[ManoeuvreAxes]) -> Columns:
         **compared,
         "distance_in_sigma": distance,
         "first_order": verdict.astype(object),
+        "note": np.full(f.size, consistency.VARIES, dtype=object),
     }
 
 

@@ -1,0 +1,112 @@
+"""How often the intervals of a study's tables hold what they are of, over many runs of its own realisations."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy.stats import binom
+
+from radarsim.app import output
+from radarsim.app.work import CaseWork
+from radarsim.config.experiment import Experiment
+from radarsim.engine.results import CaseResult
+from radarsim.report import notes
+from radarsim.report.statistics import Z95
+
+# What tells the rows of a table apart; `plots` and `m` are settings where they stand, but in gates.csv.
+LABELS = (
+    *("case", "filter", "baseline", "component", "model", "order", "k", "stage", "phase", "shift", "event", "delay_s"),
+    *(
+        "truth",
+        "duration_s",
+        "threshold_k",
+        "threshold",
+        "association",
+        "m",
+        "of",
+        "what",
+        "degree",
+        "frame",
+        "range_m",
+    ),
+    *("bin_lo", "plots"),
+)
+MEASURED = {("gates", "plots")}
+NO_INTERVALS = ("bin_lo", "nees_bound_lo", "nis_bound_lo")
+SAME = 1e-9  # of a column's size: an interval as narrow has no chance in it but rounding's
+LOW, HIGH = 0.93, 0.97
+RARE = 1e-5  # a row that covers just LOW, or HIGH, is called wrong so often
+
+
+class Kept(NamedTuple):
+    """Of the rows (n,) of an interval: runs in which each was unmarked, and of these those that held the truth."""
+
+    unmarked: np.ndarray
+    held: np.ndarray
+
+    @property
+    def share(self) -> float:
+        """Held, of all unmarked."""
+        return self.held.sum() / self.unmarked.sum()
+
+    def wrong(self, runs: int, high: float = HIGH) -> np.ndarray:
+        """Rows, unmarked in half of the runs or more, whose share is no chance of 93 … 97 %."""
+        n, k = self.unmarked, self.held
+        few, many = binom.cdf(k, n, LOW) < RARE, binom.sf(k - 1, n, high) < RARE
+        return np.flatnonzero((n >= runs / 2) & (few | many))
+
+
+def kept(experiment: Experiment, n: int, runs: int) -> dict[tuple[str, str], Kept]:
+    """Of so many runs of n realisations each, by table and column: which rows were unmarked and held the truth.
+
+    The truth is what all runs give together; its own error widens what is seen of an interval's misses by a factor of
+    √(1 + 1/runs) at most.
+    """
+    works = [CaseWork(case) for case in experiment.cases]
+    sums = [[work.simulate(run * n, n) for work in works] for run in range(runs)]
+    whole = _tables(experiment, works, [sum(own) for own in zip(*sums, strict=True)], n * runs)
+    found = {}
+    for name, table in whole.items():
+        for value, *_ in _intervals(name, table):
+            found[name, value] = Kept(np.zeros(len(table), dtype=int), np.zeros(len(table), dtype=int))
+    for own in sums:
+        for name, table in _tables(experiment, works, own, n).items():
+            if not len(table) or not any(True for _ in _intervals(name, table)):
+                continue
+            place = _index(name, whole[name]).get_indexer(_index(name, table))
+            table, place = table[place >= 0], place[place >= 0]
+            unmarked = table["note"].eq("").to_numpy() if "note" in table else np.full(len(table), True)
+            for value, lo, hi in _intervals(name, table):
+                truth = whole[name][value].to_numpy(dtype=float)
+                size = SAME * max(np.nanmedian(abs(truth)), np.finfo(float).tiny)
+                by_chance = unmarked & (hi > lo + size) & np.isfinite(truth[place])
+                found[name, value].unmarked[place] += by_chance
+                found[name, value].held[place] += by_chance & (lo <= truth[place]) & (truth[place] <= hi)
+    return {key: one for key, one in found.items() if one.unmarked.any()}
+
+
+def _tables(experiment: Experiment, works: list[CaseWork], sums: list[np.ndarray], n: int) -> dict[str, pd.DataFrame]:
+    results = [
+        CaseResult(case.name, case.study, case.spec, case.swept, n, work.plan.layout.unpack(own), work.plan.axes)
+        for case, work, own in zip(experiment.cases, works, sums, strict=True)
+    ]
+    return notes.noted(output.measured(results), results)
+
+
+def _index(name: str, table: pd.DataFrame) -> pd.MultiIndex:
+    labels = [label for label in LABELS if label in table and (name, label) not in MEASURED]
+    return pd.MultiIndex.from_frame(table[labels])
+
+
+def _intervals(name: str, table: pd.DataFrame) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+    """The columns with an interval, each before the two with its ends, and that of the bias by its standard error."""
+    columns = list(table)
+    for i, column in enumerate(columns):
+        if column in NO_INTERVALS or not (column == "lo" or column.endswith(("_lo", "_lo_s"))):
+            continue
+        yield columns[i - 1], *(table[columns[at]].to_numpy(dtype=float) for at in (i, i + 1))
+    if "bias_se" in columns:
+        half = Z95 * table["bias_se"].to_numpy(dtype=float)
+        bias = table["bias"].to_numpy(dtype=float)
+        yield "bias", bias - half, bias + half
