@@ -21,7 +21,7 @@ HEAVY = (THIN, NEAR)
 # them. They last for some scans, and begin at any: a row is marked too where a scan is so near, in scans of the run.
 # Of `multimodel_1hz`, 200 × 1000 realisations, rows that their own scan alone marks cover 16 … 100 % where unmarked;
 # with a twentieth of the run on either side no row can be told from 95 %.
-NEARBY = 0.1
+NEARBY = 0.05
 # A paired gain of two filters that err nearly alike hangs on the few realisations in which they do not, of which the
 # moments of either tell nothing. Of `multimodel_families_1hz`, 200 × 1000 realisations, intervals that are under a
 # tenth of what independent filters would have cover 53 … 91 %, to 0.2 of it 92 %, to 0.3 and over 95 %. Gaussian errors
@@ -109,7 +109,8 @@ def _alike(gains: "pd.DataFrame", curves: "pd.DataFrame") -> np.ndarray:
     ends = ["sigma", "sigma_lo", "sigma_hi"]
     own = gains[SAME].merge(curves[[*SAME, *ends]], on=SAME, how="left")
     sigma, low, high = (own[end].to_numpy(dtype=float) for end in ends)
-    independent = np.sqrt(2) * (high - low) / sigma
+    with np.errstate(invalid="ignore", divide="ignore"):
+        independent = np.sqrt(2) * (high - low) / sigma
     found = np.full(len(gains), False)
     for name, sign in PAIRED.items():
         if f"{name}_percent" in gains:

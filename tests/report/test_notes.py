@@ -60,14 +60,14 @@ def test_rare_locks_are_noted_row_by_row():
 def test_a_scan_near_one_with_heavy_tails_is_marked_too():
     import pandas as pd
 
-    of = [{"case": "a", "component": c, "k": k, "n": 5000, "filter": f} for f in "fg" for c in "xy" for k in range(50)]
+    of = [{"case": "a", "component": c, "k": k, "n": 5000, "filter": f} for f in "fg" for c in "xy" for k in range(60)]
     curves = pd.DataFrame(of).assign(sigma=1.0, sigma_lo=0.9, sigma_hi=1.1, n_eff=2500.0)
     curves.loc[(curves["filter"] == "g") & (curves["component"] == "x") & (curves["k"] == 20), "n_eff"] = 30.0
     noted = notes.noted({"curves": curves}, [])["curves"].set_index(["filter", "component", "k"])["note"]
     assert noted["g", "x", 20] == notes.THIN
     near = noted[noted == notes.NEAR].index.tolist()
-    assert near == [("g", "x", k) for k in range(15, 26) if k != 20]  # a tenth of 50 scans on either side
-    assert (noted == "").sum() == 200 - 11
+    assert near == [("g", "x", k) for k in range(17, 24) if k != 20]  # a twentieth of 60 scans on either side
+    assert (noted == "").sum() == 240 - 7
 
 
 @pytest.mark.parametrize(

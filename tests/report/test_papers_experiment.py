@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 import radarsim
-from radarsim.app import configs
+from radarsim.app import configs, output
 from radarsim.app.run import papers
 from radarsim.config.check import models_in
 from radarsim.config.fields import Display, Model
@@ -151,6 +151,8 @@ def test_a_file_of_the_users_is_no_measure_of_the_paper(tmp_path, monkeypatch):
     assert found["class"].eq(claims.NOT_JUDGED).all()
     why = "not the paper's experiment: rls1: radar.sigma_range_m is 30, the paper's 25"
     assert found["why"].str.startswith(why).all()
+    unchanged = radarsim.run(configs.lookup.SHIPPED / "configs" / "rls1.yaml", realisations=50).cases
+    assert not output.tables(unchanged)["claims"].empty
 
 
 HELD_TOO = {stem: ids for of in papers() for stem, ids in of.held_too.items()}

@@ -4,11 +4,15 @@ Places are the article's sections (Aviacionno-kosmicheskaya tehnika i tehnologiy
 the experiment. Its numbers are judged in both readings of its noise and threshold, see discriminator_measures.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import Any, TypeVar
 
 from radarsim.report.claims import (
     Claim,
     Part,
+    Range,
     about,
     above,
     at_most,
@@ -20,6 +24,7 @@ from radarsim.report.claims import (
     same,
     within,
 )
+from radarsim.report.statistics import Estimate
 from radarsim.studies.discriminator.measures import (
     COMPONENTS,
     COMPUTED,
@@ -28,9 +33,16 @@ from radarsim.studies.discriminator.measures import (
     SPEEDS,
     WORDS,
     Evidence,
+    OfReading,
+    accuracy_of,
     doppler_of_polynomial,
     doppler_of_speed,
+    efficient,
     forecast_spread,
+    growth_of_first_window,
+    loss_of_lock,
+    potential_of,
+    wide_over_whole,
 )
 
 __all__ = ["CLAIMS", "Evidence"]
@@ -54,28 +66,50 @@ SCALE, NOISE, ERROR = "prior.scale", "burst.noise_variance", "prior.error_scale"
 
 
 def _claim(
-    number: int, place: str, statement: str, *parts: Part, original: str, reading: str = "", config: str = PAPER, **more
+    number: int,
+    place: str,
+    statement: str,
+    *parts: Part,
+    original: str,
+    reading: str = "",
+    config: str = PAPER,
+    **more: Any,
 ) -> Claim:
     return Claim(f"P4.{number}", place, statement, parts, reading, config, original, **more)
 
 
-def _both(what: str, unit: str, measure, expected, asserted: bool = True, ceiling: bool = False) -> list[Part]:
+Value = TypeVar("Value")
+
+
+def _at(measure: Callable[[Evidence, str], Value], key: str, seen: Evidence) -> Value:
+    """What is measured of a reading, with the evidence last."""
+    return measure(seen, key)
+
+
+def _known(value: Estimate) -> Callable[[Evidence], Estimate]:
+    """What needs no run."""
+    return lambda seen: value
+
+
+def _both(
+    what: str, unit: str, measure: OfReading, expected: Range, asserted: bool = True, ceiling: bool = False
+) -> list[Part]:
     """A part for each reading, both of which have to be true; measure(evidence, key)."""
     return [
         Part(
             (key,),
             f"{what} ({WORDS[key]})",
             unit,
-            lambda seen, key=key: measure(seen, key),
+            partial(_at, measure, key),
             expected,
-            ceiling=(lambda seen, key=key: seen.efficient(key)) if ceiling else None,
+            ceiling=partial(_at, efficient, key) if ceiling else None,
             asserted=asserted,
         )
         for key in (COMPUTED, PRINTED)
     ]
 
 
-def _number(number: str, what: str, unit: str, measure, expected) -> list[Part]:
+def _number(number: str, what: str, unit: str, measure: OfReading, expected: Range) -> list[Part]:
     """A printed number in both readings, of which one suffices; σ² = 2.25 is not what the paper prints."""
     return [
         replace(part, number=number, variant=key, against_print=key == COMPUTED)
@@ -90,7 +124,7 @@ SPREAD_PARTS = [
         component,
         f"potential spread of {component}",
         unit,
-        lambda seen, key, component=component: seen.potential(key, component),
+        potential_of(component),
         printed(number),
     )
 ]
@@ -144,7 +178,7 @@ CLAIMS = (
             for part in _both(
                 f"σ of {component} over the potential one, locked bursts",
                 "",
-                lambda seen, key, component=component: seen.accuracy(key, "sequence", component),
+                accuracy_of(component),
                 same(1, 0.01, strict=0.1),
             )
         ),
@@ -202,7 +236,7 @@ CLAIMS = (
             for part in _both(
                 f"σ of {component} of the first window over the potential one of the burst",
                 "",
-                lambda seen, key, component=component: seen.over_whole(key, "wide", component),
+                wide_over_whole(component),
                 greater(),
             )
         ),
@@ -218,7 +252,7 @@ CLAIMS = (
                 ((SCALE, better), (SCALE, worse)),
                 f"first window with the forecast's spread × {better:g} over that with × {worse:g}",
                 "",
-                lambda seen, b=better, w=worse: certain(seen.windows((SCALE, b))[0] / seen.windows((SCALE, w))[0]),
+                growth_of_first_window(SCALE, better, worse),
                 greater(),
             )
             for worse, better in ((10, 1), (1, 0.1), (0.1, 0.01), (0.01, 0.001))
@@ -261,7 +295,7 @@ CLAIMS = (
                 ((ERROR, factor), (ERROR, 1)),
                 f"lock with errors {factor:g} times those believed less that with right ones",
                 "",
-                lambda seen, factor=factor: seen.lock_loss((ERROR, factor), (ERROR, 1), "sequence"),
+                loss_of_lock(ERROR, factor, 1),
                 below(0, 0.01),
             )
             for factor in (2, 4)
@@ -329,7 +363,7 @@ CLAIMS = (
                 (PRINTED,),
                 f"printed potential spread of {component} times its factor",
                 SPREADS[component][1],
-                lambda seen, component=component: forecast_spread(component),
+                _known(forecast_spread(component)),
                 on_grid(value, value, half, strict=(value - half, value + half)),
             )
             for component, (value, half) in PRINTED_FORECAST.items()
@@ -349,7 +383,7 @@ CLAIMS = (
                 (PRINTED,),
                 f"Doppler frequency of the printed derivatives at {t:g} s",
                 "kHz",
-                lambda seen, t=t: doppler_of_polynomial(t),
+                _known(doppler_of_polynomial(t)),
                 about(f"{doppler_of_speed(t):.4g}", margin=max(0.1 * doppler_of_speed(t), 1.0)),
             )
             for t in SPEEDS

@@ -5,8 +5,10 @@ one it states, and then its threshold c is the 1 of (14); its first window follo
 0.5 of (11). Both readings are judged: "computed" and "printed".
 """
 
+from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -25,13 +27,14 @@ READINGS = {COMPUTED: (2.25, 1.0), PRINTED: (9.0, 0.5)}  # noise variance, thres
 WORDS = {COMPUTED: "σ² = 2.25, c = 1", PRINTED: "σ² = 9, c = 0.5"}
 DOPPLER = (10e3, 180e3, -750e3, 1000e3)
 COMPONENTS = ("phi0", "f0", "f1", "f2", "f3")
+Key = str | tuple[str, float]  # a reading, or a swept key and its value
 ESTIMATE = 1.17  # the paper's own estimate of the amplitude, which it puts into (17)
 
 
 class Evidence(claims.Evidence):
     """Finds the paper's experiment in its two readings, its swept variants, and the estimators, by what they are."""
 
-    def case(self, key) -> CaseResult:
+    def case(self, key: Any) -> CaseResult:
         """key: a reading, or (swept key, value) of the maps."""
         for result in self.results:
             if not self._is_papers(result):
@@ -59,7 +62,7 @@ class Evidence(claims.Evidence):
             and len(truth.doppler_derivatives) == 4
         )
 
-    def estimator(self, key, kind: str) -> int:
+    def estimator(self, key: Key, kind: str) -> int:
         """Index of an estimator of a case by its kind: sequence, narrow, wide, cured, truth."""
         threshold = READINGS.get(key, (0, 1.0))[1] if not isinstance(key, tuple) else 1.0
         for i, e in self.members(self.case(key), "estimators"):
@@ -67,32 +70,32 @@ class Evidence(claims.Evidence):
                 return i
         raise Missing((key, kind))
 
-    def windows(self, key, kind: str = "sequence") -> np.ndarray:
+    def windows(self, key: Key, kind: str = "sequence") -> np.ndarray:
         """Window lengths in s of an estimator."""
         durations = self.case(key).axes.duration_s[self.estimator(key, kind)]
         return durations[np.isfinite(durations)]
 
     def lock(
-        self, key, kind: str, column: str = "lock_rate", ends: tuple[str, str] = ("lock_lo", "lock_hi")
+        self, key: Key, kind: str, column: str = "lock_rate", ends: tuple[str, str] = ("lock_lo", "lock_hi")
     ) -> Estimate:
         """Share of bursts at the last window of an estimator."""
         result, i = self.case(key), self.estimator(key, kind)
         row = self.row("locks", case=result.name, filter=result.axes.filters[i], k=len(self.windows(key, kind)))
         return Estimate(*(float(row[name]) for name in (column, *ends)))
 
-    def always(self, key) -> Estimate:
+    def always(self, key: Key) -> Estimate:
         """Share of bursts with every component of the sequence within 3σ at every window, σ with the prior."""
         ends = ("always_posterior_lo", "always_posterior_hi")
         return self.lock(key, "sequence", "always_posterior_rate_3sigma", ends)
 
-    def accuracy(self, key, kind: str, component: str) -> Estimate:
+    def accuracy(self, key: Key, kind: str, component: str) -> Estimate:
         """σ of the locked bursts over the potential one of the window, at the last window."""
         result, i = self.case(key), self.estimator(key, kind)
         k, c = len(self.windows(key, kind)) - 1, COMPONENTS.index(component)
         moments = result.sums["error"][i, k, c]
         return root_mean_square(moments[1], moments[3], result.sums["locks"][i, k, LOCKS.index("lock")])
 
-    def over_whole(self, key, kind: str, component: str) -> Estimate:
+    def over_whole(self, key: Key, kind: str, component: str) -> Estimate:
         """σ of all bursts at an estimator's last window over the potential one of the whole burst."""
         result, i = self.case(key), self.estimator(key, kind)
         k, c = len(self.windows(key, kind)) - 1, COMPONENTS.index(component)
@@ -100,19 +103,19 @@ class Evidence(claims.Evidence):
         scale = result.axes.exact_sigma[i, k, c] / result.axes.potential_closed_form[c]
         return Estimate(*(scale * part for part in root_mean_square(moments[1], moments[3], result.count)))
 
-    def potential(self, key, component: str) -> Estimate:
+    def potential(self, key: Key, component: str) -> Estimate:
         """Potential spread by the discrete sum over the pulses l = 0 … n − 2, of which the paper's digits are."""
         burst = study.burst_of(self.case(key).spec)
         found = exact.spreads(exact.fisher_sums(burst, len(COMPONENTS), [burst.pulses - 1])[0])
         return certain(found[COMPONENTS.index(component)])
 
-    def efficient(self, key) -> float:
+    def efficient(self, key: Key) -> float:
         """What an efficient estimator would score in `always`, over the windows of the sequence."""
         result, i = self.case(key), self.estimator(key, "sequence")
         forecast = tuple(map(float, result.axes.prior_sigma))
         return ceiling.always_within(study.burst_of(result.spec), tuple(result.axes.pulses[i]), forecast)
 
-    def worst_handover(self, key) -> Estimate:
+    def worst_handover(self, key: str) -> Estimate:
         """The largest probability over the hand-overs that Z passes c: of the form's own law, not of a Gaussian."""
         result, i = self.case(key), self.estimator(key, "sequence")
         burst, threshold = study.burst_of(result.spec), READINGS[key][1]
@@ -122,20 +125,54 @@ class Evidence(claims.Evidence):
         forms = [designer.handover(before)(after) for before, after in pairwise(times[:-1])]  # the last is cut short
         return certain(max(schedule.tail_probability(form.values, threshold) for form in forms))
 
-    def spare_window(self, key, amplitude: float) -> Estimate:
+    def spare_window(self, key: Key, amplitude: float) -> Estimate:
         """First window less the shortest allowed at an amplitude, ms."""
         return certain(1e3 * self.windows(key)[0] - self.shortest_window(key, amplitude).value)
 
-    def shortest_window(self, key, amplitude: float) -> Estimate:
+    def shortest_window(self, key: Key, amplitude: float) -> Estimate:
         """T_min (17) in ms at an amplitude."""
         return certain(1e3 * self.case(key).axes.shortest_window_s / amplitude**2)
 
-    def lock_loss(self, key, other, kind: str) -> Estimate:
+    def lock_loss(self, key: Key, other: Key, kind: str) -> Estimate:
         """Lock of one case less that of another."""
         return difference(self.lock(key, kind), self.lock(other, kind))
 
 
-def kind_of(estimator, threshold: float) -> str:
+Measure = Callable[[Evidence], Estimate]
+OfReading = Callable[[Evidence, str], Estimate]
+
+
+def potential_of(component: str) -> OfReading:
+    """Potential spread of a component."""
+    return lambda seen, key: seen.potential(key, component)
+
+
+def accuracy_of(component: str) -> OfReading:
+    """σ of the locked bursts over the potential one, at the last window of the sequence."""
+    return lambda seen, key: seen.accuracy(key, "sequence", component)
+
+
+def wide_over_whole(component: str) -> OfReading:
+    """σ of the wide discriminator alone over the potential one of the whole burst."""
+    return lambda seen, key: seen.over_whole(key, "wide", component)
+
+
+def efficient(seen: Evidence, key: str) -> float:
+    """What an efficient estimator would score, see `Evidence.efficient`."""
+    return seen.efficient(key)
+
+
+def growth_of_first_window(key: str, better: float, worse: float) -> Measure:
+    """The first window at one value of a swept key over that at another."""
+    return lambda seen: certain(seen.windows((key, better))[0] / seen.windows((key, worse))[0])
+
+
+def loss_of_lock(key: str, value: float, other: float) -> Measure:
+    """Lock of the sequence at one value of a swept key less that at another."""
+    return lambda seen: seen.lock_loss((key, value), (key, other), "sequence")
+
+
+def kind_of(estimator: Any, threshold: float) -> str:
     """What an estimator is, at the reading's threshold c; "other" for variants."""
     e = estimator
     plain = e.method == "sequence" and e.amplitude == "known" and e.density == 1 and e.tail == "gaussian"

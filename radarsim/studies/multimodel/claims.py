@@ -7,9 +7,11 @@ same" is read as within 1 % of σ. Where the words name no stage and no componen
 of climb.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from radarsim.report.claims import Claim, Part, above, at_least, below, certain, greater, kept, less, same
+from radarsim.report.statistics import Estimate
 from radarsim.studies.multimodel.measures import (
     AEROBALLISTIC,
     BANK_122,
@@ -75,7 +77,7 @@ def _key(flight: str) -> tuple:
     return (flight, 0.05, SIX)
 
 
-def _powers(tenfold: bool):
+def _powers(tenfold: bool) -> Callable[[Evidence], Estimate]:
     return lambda seen: certain(largest_fault_of_powers(seen, PAPER, tenfold))
 
 

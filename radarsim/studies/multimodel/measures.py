@@ -5,6 +5,7 @@ Cases are found by target, scan period and what their filters are, whatever thei
 and bank.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -46,7 +47,7 @@ def is_flight(target: Any, flight: str) -> bool:
 class Evidence(claims.Evidence):
     """Finds cases by (target's stages and kind, scan period), and filters by what they are."""
 
-    def case(self, key) -> CaseResult:
+    def case(self, key: Any) -> CaseResult:
         """key: (name of the flight, scan period, filters that must be there)."""
         flight, period, wanted = key
         for result in self.results:
@@ -82,26 +83,26 @@ class Evidence(claims.Evidence):
                 return f
         return None
 
-    def filter(self, key, wanted: tuple) -> int:
+    def filter(self, key: tuple, wanted: tuple) -> int:
         """The number of a filter in a case; raises Missing."""
         found = self._index(self.case(key), wanted)
         if found is None:
             raise claims.Missing(wanted)
         return found
 
-    def stage(self, key, name: str) -> int:
+    def stage(self, key: tuple, name: str) -> int:
         """The number of a stage of a case; raises Missing."""
         names = tables.stage_names(self.case(key))
         if name not in names:
             raise claims.Missing(name)
         return names.index(name)
 
-    def gain(self, key, wanted: tuple, base: tuple, stage: str, component: str) -> Estimate:
+    def stage_gain(self, key: tuple, wanted: tuple, base: tuple, stage: str, component: str) -> Estimate:
         """Paired gain of a filter against another over a stage, %."""
         of, s = self.case(key), self.stage(key, stage)
         return tables.stage_gain(of, self.filter(key, wanted), self.filter(key, base), s, COMPONENTS[component])
 
-    def probability(self, key, wanted: tuple, stage: str, model: int) -> Estimate:
+    def probability(self, key: tuple, wanted: tuple, stage: str, model: int) -> Estimate:
         """Mean probability of a model (from 0) over the reported scans of a stage; ends of intervals are averaged."""
         of, f = self.case(key), self.filter(key, wanted)
         rows = self.tables["probabilities"]
@@ -119,7 +120,7 @@ class Evidence(claims.Evidence):
                 return begin, np.inf if last else end
         raise claims.Missing(stage)
 
-    def operations(self, key, wanted: tuple) -> float:
+    def operations(self, key: tuple, wanted: tuple) -> float:
         """Operations of one update, mean over the whole flight."""
         of = self.case(key)
         name = of.axes.filters[self.filter(key, wanted)]
@@ -153,9 +154,9 @@ def largest_fault_of_powers(seen: Evidence, key: tuple, tenfold: bool) -> float:
 def rival_parts(key: tuple, stages: tuple[str, ...], expected: Range) -> tuple[Part, ...]:
     """MMA2-122 against the best of the other five, by stage and component: the paired gain of MMA2-122 over it, %."""
 
-    def measure(stage: str, component: str):
+    def measure(stage: str, component: str) -> Callable[[Evidence], Estimate]:
         def least(seen: Evidence) -> Estimate:
-            gains = [seen.gain(key, MMA2_122, rival, stage, component) for rival in RIVALS]
+            gains = [seen.stage_gain(key, MMA2_122, rival, stage, component) for rival in RIVALS]
             return min(gains, key=lambda of: of.value)
 
         return least
@@ -176,7 +177,7 @@ def rival_parts(key: tuple, stages: tuple[str, ...], expected: Range) -> tuple[P
 def gain_part(key: tuple, wanted: tuple, base: tuple, stage: str, component: str, expected: Range, words: str) -> Part:
     """Paired gain of one filter over another."""
     what = f"gain of {words}, {UNITS[component]}, stage {stage}"
-    return Part((key,), what, "%", lambda seen: seen.gain(key, wanted, base, stage, component), expected)
+    return Part((key,), what, "%", lambda seen: seen.stage_gain(key, wanted, base, stage, component), expected)
 
 
 def probability_part(key: tuple, wanted: tuple, stage: str, model: int, expected: Range) -> Part:

@@ -39,7 +39,7 @@ SLOW = 10.0  # s: period of the slower radars
 SHARE = 0.01  # of σ: what is no material difference
 
 
-def _claim(number: int, place: str, statement: str, *parts: Part, original: str, reading: str = ""):
+def _claim(number: int, place: str, statement: str, *parts: Part, original: str, reading: str = "") -> Claim:
     return Claim(f"P1.{number}", place, statement, parts, reading, "range_doppler", original)
 
 
@@ -185,7 +185,7 @@ CLAIMS = (
                 (n,),
                 "largest acceleration gain at the scans 3 to 5",
                 "%",
-                lambda seen, n=n: seen.k_gain(n, "ar").upto(5).largest(),
+                measured.largest_early(n),
                 above(80),
             )
             for n in (2, 3, 4, 5)
@@ -248,7 +248,7 @@ CLAIMS = (
                 (n,),
                 "first σ of velocity, with velocity",
                 "m/s",
-                lambda seen, n=n: seen.sigma(n, RV, "Vr").at(1),
+                measured.first_velocity(n),
                 same(row[1], SHARE * row[1], strict=0.5),
             )
             for n, row in RADARS.items()
@@ -277,7 +277,7 @@ CLAIMS = (
                 (2,),
                 f"σ of range at the end against the 4th scan, {words}",
                 "%",
-                lambda seen, observes=observes: measured.final_to_fourth(seen, observes),
+                measured.final_to_fourth(observes),
                 below(100, 1),
             )
             for observes, words in BOTH
@@ -287,7 +287,7 @@ CLAIMS = (
                 (n,),
                 "settling of σ of range, range only",
                 "Δt",
-                lambda seen, n=n: seen.settling(n, R),
+                measured.settling(n),
                 below(10),
                 asserted=False,
             )
@@ -307,9 +307,7 @@ CLAIMS = (
                 (n,),
                 f"σ of range at the end, least D_M − greatest, {words}",
                 "m",
-                measured.by_variance(
-                    n, lambda seen, key, observes=observes: seen.whole_sigma(key, observes, "r").last()
-                ),
+                measured.by_variance(n, measured.last_range(observes)),
                 below(0, SHARE),
                 scale=measured.sigma_of(n, observes, "r", "last"),
                 statement="steady error",
@@ -322,7 +320,7 @@ CLAIMS = (
                 (n,),
                 f"settling of σ of range, least D_M − greatest, {words}",
                 "Δt",
-                measured.by_variance(n, lambda seen, key, observes=observes: seen.settling(key, observes)),
+                measured.by_variance(n, measured.settling_of(observes)),
                 above(0),
                 statement="settling",
             )

@@ -5,7 +5,9 @@ variance are the paper's, whatever its name.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -21,12 +23,13 @@ SPEED_MPS = 300.0  # the paper's example of an ambiguous Doppler frequency
 DURATION = 140.0  # s: fifteen points at Δt = 10 s
 R, RV = ("range",), ("range", "velocity")
 COMPONENTS = {"r": "range", "Vr": "velocity", "ar": "acceleration"}
+Key = int | tuple[int, float]  # a radar at D_M = 10⁻³, or a radar and its D_M
 
 
 class Evidence(claims.Evidence):
     """Finds the paper's radars, and its two filters, by what they are."""
 
-    def case(self, key) -> CaseResult:
+    def case(self, key: Any) -> CaseResult:
         """key: the number of a radar (at D_M = 10⁻³), or (number, D_M)."""
         radar, variance = key if isinstance(key, tuple) else (key, VARIANCE)
         for result in self.results:
@@ -55,19 +58,19 @@ class Evidence(claims.Evidence):
             return float("nan")
         return filters[0].manoeuvre_variance
 
-    def whole_sigma(self, key, observes: tuple[str, ...], component: str) -> Series:
+    def whole_sigma(self, key: Key, observes: tuple[str, ...], component: str) -> Series:
         """σ(k) of the filter that observes these, to the end of the run."""
         return self.marked(self.curve(key, self.filter(key, observes), component), key)
 
-    def sigma(self, key, observes: tuple[str, ...], component: str) -> Series:
+    def sigma(self, key: Key, observes: tuple[str, ...], component: str) -> Series:
         """σ(k) of the filter that observes these, over the paper's fifteen points."""
         return _as_long_as_the_papers(self.whole_sigma(key, observes, component))
 
-    def filter(self, key, observes: tuple[str, ...]) -> str:
+    def filter(self, key: Key, observes: tuple[str, ...]) -> str:
         """The name of the filter that observes these."""
         return next(f.name for f in self.case(key).spec.filters if f.observes == observes)
 
-    def k_gain(self, radar, component: str) -> Series:
+    def k_gain(self, radar: Key, component: str) -> Series:
         """The relative gain K (eq. 17), from the scan at which the filter with velocity has filtered, k ≥ 2.
 
         At k = 1 both filters give the same measured range, and no gain is spoken of.
@@ -75,7 +78,7 @@ class Evidence(claims.Evidence):
         gain = self.marked(self.gain(radar, self.filter(radar, RV), component), radar)
         return _as_long_as_the_papers(gain.since(2))
 
-    def settling(self, key, observes: tuple[str, ...], component: str = "r") -> Estimate:
+    def settling(self, key: Key, observes: tuple[str, ...], component: str = "r") -> Estimate:
         """Scan periods from the first plot to settling (5 % of the steady value, for good)."""
         sigma = self.whole_sigma(key, observes, component)
         sigma.last()  # missing where the run is too short to settle in
@@ -86,7 +89,7 @@ class Evidence(claims.Evidence):
         when = tables.settling(Estimate(sigma.value, sigma.lo, sigma.hi), sigma.t, float(np.sqrt(steady[c, c])))
         return Estimate(*(part / axes.scan_period_s for part in when))
 
-    def marked(self, series: Series, key) -> Series:
+    def marked(self, series: Series, key: Key) -> Series:
         """A curve of a case, marked where its run ends before the paper's 140 s."""
         result = self.case(key)
         end = float(result.axes.t_s[-1])
@@ -95,11 +98,16 @@ class Evidence(claims.Evidence):
 
     def variances(self, radar: int) -> list[float]:
         """The manoeuvre variances at hand for a radar; raises Missing where there are fewer than two."""
-        found = {self._variance(result) for result in self.results if self._radar(result) == radar}
-        found = sorted(v for v in found if not np.isnan(v))
+        every = {self._variance(result) for result in self.results if self._radar(result) == radar}
+        found = sorted(v for v in every if not np.isnan(v))
         if len(found) < 2:
             raise claims.Missing(radar)
         return found
+
+
+Measure = Callable[[Evidence], Estimate]
+Comparison = Callable[[Evidence, int, int], Estimate]  # of a slow and a fast radar
+Number = Callable[[Evidence], float]
 
 
 def _as_long_as_the_papers(series: Series) -> Series:
@@ -117,7 +125,9 @@ def gain_part(radar: int, component: str, pick: str, what: str, expected: Range,
     )
 
 
-def faster_part(slow: int, fast: int, what: str, unit: str, measure, expected: Range, scale=None) -> Part:
+def faster_part(
+    slow: int, fast: int, what: str, unit: str, measure: Comparison, expected: Range, scale: Number | None = None
+) -> Part:
     """A part that compares two radars differing only in their period: measure(evidence, slow, fast)."""
     return Part((slow, fast), what, unit, lambda seen: measure(seen, slow, fast), expected, scale)
 
@@ -150,7 +160,7 @@ def apart_in_time(one: tuple[Estimate, Estimate], other: tuple[Estimate, Estimat
     return Estimate(float(gap), float(least), float(gap))
 
 
-def apart(component: str):
+def apart(component: str) -> Comparison:
     """How far two radars' gains lie apart at most, in % of the larger curve's height, over common times."""
 
     def measure(seen: Evidence, slow: int, fast: int) -> Estimate:
@@ -168,7 +178,7 @@ def apart(component: str):
     return measure
 
 
-def sigma_change(observes: tuple[str, ...], component: str, pick: str):
+def sigma_change(observes: tuple[str, ...], component: str, pick: str) -> Comparison:
     """σ fast − σ slow of two radars, first or last of each."""
 
     def measure(seen: Evidence, slow: int, fast: int) -> Estimate:
@@ -178,12 +188,12 @@ def sigma_change(observes: tuple[str, ...], component: str, pick: str):
     return measure
 
 
-def sigma_of(radar: int, observes: tuple[str, ...], component: str, pick: str):
+def sigma_of(radar: int, observes: tuple[str, ...], component: str, pick: str) -> Number:
     """σ of a radar, first or last, as what a margin is a share of."""
     return lambda seen: getattr(seen.sigma(radar, observes, component), pick)().value
 
 
-def largest_rise(radar: int, observes: tuple[str, ...], component: str, since: int):
+def largest_rise(radar: int, observes: tuple[str, ...], component: str, since: int) -> Measure:
     """The largest rise of σ over an earlier scan's from scan `since` on, in % of that; 0 where it never rises."""
 
     def measure(seen: Evidence) -> Estimate:
@@ -196,7 +206,7 @@ def largest_rise(radar: int, observes: tuple[str, ...], component: str, since: i
     return measure
 
 
-def likeness(radar: int, one: str, other: str):
+def likeness(radar: int, one: str, other: str) -> Measure:
     """Correlation over the scans of two components' gains of a radar; half-widths of all points add in squares."""
 
     def measure(seen: Evidence) -> Estimate:
@@ -212,7 +222,7 @@ def likeness(radar: int, one: str, other: str):
     return measure
 
 
-def gain_by_variance(radar: int):
+def gain_by_variance(radar: int) -> Measure:
     """Final range gain at the greatest D_M at hand less that at the least, points; without its sign."""
 
     def measure(seen: Evidence) -> Estimate:
@@ -228,7 +238,7 @@ def _gain_at(seen: Evidence, key: tuple[int, float]) -> Series:
     return seen.marked(seen.gain(key, seen.filter(key, RV), "r"), key)
 
 
-def ineffective_from(radar: int):
+def ineffective_from(radar: int) -> Measure:
     """The first time at which the acceleration gain is gone (zero or a loss)."""
 
     def measure(seen: Evidence) -> Estimate:
@@ -243,7 +253,9 @@ def ineffective_from(radar: int):
     return measure
 
 
-def least_minus_largest(component: str, high: tuple[int, ...], low: tuple[int, ...], pick: str, strict: bool):
+def least_minus_largest(
+    component: str, high: tuple[int, ...], low: tuple[int, ...], pick: str, strict: bool
+) -> Measure:
     """Gain of radars `high` less the largest of radars `low`: the least of high (strict), or its largest."""
 
     def measure(seen: Evidence) -> Estimate:
@@ -256,7 +268,8 @@ def least_minus_largest(component: str, high: tuple[int, ...], low: tuple[int, .
 
 def final_share(seen: Evidence) -> Estimate:
     """Δσ_r at the end in % of its largest value, RLS 2."""
-    return ratio(*(getattr(range_difference(seen), pick)() for pick in ("last", "largest")), scale=100)
+    apart = range_difference(seen)
+    return ratio(apart.last(), apart.largest(), 100)
 
 
 def range_difference(seen: Evidence) -> Series:
@@ -267,13 +280,42 @@ def range_difference(seen: Evidence) -> Series:
     return minus(seen.sigma(2, R, "r").since(2), seen.sigma(2, RV, "r").since(2))
 
 
-def final_to_fourth(seen: Evidence, observes: tuple[str, ...]) -> Estimate:
+def final_to_fourth(observes: tuple[str, ...]) -> Measure:
     """σ of range of RLS 2 at the end in % of that at the 4th scan."""
-    sigma = seen.sigma(2, observes, "r")
-    return ratio(sigma.last(), sigma.at(4), scale=100)
+
+    def measure(seen: Evidence) -> Estimate:
+        sigma = seen.sigma(2, observes, "r")
+        return ratio(sigma.last(), sigma.at(4), scale=100)
+
+    return measure
 
 
-def by_variance(radar: int, measure):
+def largest_early(radar: int) -> Measure:
+    """The largest acceleration gain up to the fifth scan."""
+    return lambda seen: seen.k_gain(radar, "ar").upto(5).largest()
+
+
+def first_velocity(radar: int) -> Measure:
+    """σ of the velocity at the first scan, with velocity."""
+    return lambda seen: seen.sigma(radar, RV, "Vr").at(1)
+
+
+def settling(radar: int) -> Measure:
+    """The same of one radar, range only."""
+    return lambda seen: seen.settling(radar, R)
+
+
+def last_range(observes: tuple[str, ...]) -> Callable[[Evidence, Key], Estimate]:
+    """σ of the range of the filter that observes these at the end of the run."""
+    return lambda seen, key: seen.whole_sigma(key, observes, "r").last()
+
+
+def settling_of(observes: tuple[str, ...]) -> Callable[[Evidence, Key], Estimate]:
+    """Scan periods in which σ of the range of the filter that observes these settles."""
+    return lambda seen, key: seen.settling(key, observes)
+
+
+def by_variance(radar: int, measure: Callable[[Evidence, Key], Estimate]) -> Measure:
     """measure(evidence, key) at the least D_M at hand less that at the greatest."""
 
     def compared(seen: Evidence) -> Estimate:
@@ -302,12 +344,12 @@ def after_loss(seen: Evidence) -> Estimate:
     return gain.where(slice(int(lost[0]) + 1 if lost.size else len(gain.k) - 1, None)).largest()
 
 
-def after_peak(radar: int):
+def after_peak(radar: int) -> Measure:
     """The largest range gain less the last one."""
     return lambda seen: difference((gain := seen.k_gain(radar, "r")).largest(), gain.last())
 
 
-def rise(radar: int):
+def rise(radar: int) -> Measure:
     """The largest rise of the velocity gain over an earlier scan's."""
 
     def measure(seen: Evidence) -> Estimate:
@@ -319,7 +361,7 @@ def rise(radar: int):
     return measure
 
 
-def fall(radar: int):
+def fall(radar: int) -> Measure:
     """The velocity gain at the end less that at its first scan."""
 
     def measure(seen: Evidence) -> Estimate:
@@ -329,7 +371,7 @@ def fall(radar: int):
     return measure
 
 
-def earlier(radar: int, unit: str):
+def earlier(radar: int, unit: str) -> Measure:
     """How much earlier the filter with velocity has a velocity: in scans, or in seconds."""
 
     def measure(seen: Evidence) -> Estimate:
@@ -339,7 +381,7 @@ def earlier(radar: int, unit: str):
     return measure
 
 
-def doppler(radar: int):
+def doppler(radar: int) -> Measure:
     """Doppler frequency of the paper's 300 m/s in repetition rates."""
 
     def measure(seen: Evidence) -> Estimate:
@@ -349,6 +391,6 @@ def doppler(radar: int):
     return measure
 
 
-def c_theta(radar: int):
+def c_theta(radar: int) -> Measure:
     """C_θ (11) of a radar: algebra."""
     return lambda seen: certain(seen.case(radar).axes.C_theta)

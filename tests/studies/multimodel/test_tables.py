@@ -57,7 +57,7 @@ def test_gains_between_any_two_filters_are_paired(result):
     (case,) = result.cases
     seen = Evidence(result.cases, result.tables, {case.name: {"filters": set(range(len(case.axes.filters)))}})
     key = ("aeroballistic", 0.05, (MMA2_122, *RIVALS))
-    gain = seen.gain(key, MMA2_122, RIVALS[2], "ballistic", "y")
+    gain = seen.stage_gain(key, MMA2_122, RIVALS[2], "ballistic", "y")
     s = np.array(case.sums["stage"])[[0, 3], 1, 3, 0] / case.count
     assert np.isclose(gain.value, 100 * (1 - np.sqrt(s[0] / s[1])))
     assert gain.lo < gain.value < gain.hi
