@@ -131,10 +131,11 @@ def import_(
     asterix  categories 048 and 001 (plots of a radar: range, bearing, height, Doppler speed
              and the span by which it is ambiguous) and 062 (positions: the truth of the plots
              of the same aircraft); needs radarsim[asterix]
-    opensky  latitude, longitude, altitude and time of aircraft, in CSV; needs --at
+    opensky  latitude, longitude, altitude and time of aircraft, in CSV; needs --at; in feet and
+             knots where the names are those of aviation (gs, alt, …)
     ais      sentences !AIVDM of ships; needs --at and radarsim[ais]
     csv      any table with a header: time, and range or latitude and longitude; units as in
-             `range_km` or `Altitude [ft]`
+             `range_km` or `Altitude [ft]`; by commas, semicolons or tabulators
 
     \b
     Example

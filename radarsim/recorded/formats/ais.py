@@ -1,7 +1,8 @@
 """Ships by AIS: NMEA sentences `!AIVDM…`, by pyais.
 
 A message gives only the second of its minute. The time is that of the tag block (`\\c:1577836800*..\\!AIVDM…`) or of
-a number or ISO time before the sentence; where there is neither, the seconds are made to run on from minute to minute.
+a number or ISO time before the sentence, or of a number after it; where there is neither, the seconds are made to run
+on from minute to minute.
 """
 
 import math
@@ -33,6 +34,7 @@ except ImportError:
 KNOT_MPS = 1852 / 3600
 SENTENCE = re.compile(rb"![A-Z]{2}VD[MO],[^\r\n]*")
 TAG_TIME = re.compile(rb"[\\,]c:(\d{9,13})")
+AFTER = re.compile(rb"\*[0-9A-Fa-f]{2}[,; \t]+(\d{9,13}(?:\.\d+)?)\s*$")
 PARTS = re.compile(rb"![A-Z]{2}VD[MO],(\d),(\d),(\d?),")
 NO_SPEED, NO_COURSE, NO_SECOND = 102.2, 360.0, 60
 MOST_OPEN = 100  # messages of several sentences that wait for their end
@@ -110,7 +112,7 @@ class Ais:
     def _stated(self, line: bytes, before: int, number: int) -> float:
         """The time before a sentence, s from 1970; not-a-number where none is stated."""
         head = line[:before]
-        if found := TAG_TIME.search(head):
+        if found := TAG_TIME.search(head) or AFTER.search(line):
             stamp = float(found[1])
             return stamp / 1000 if stamp > 1e11 else stamp
         text = head.decode("ascii", "replace").strip(" \t,;\\")

@@ -392,14 +392,16 @@ class Asterix:
 
     of_day = True
 
-    def __init__(self, path: str, file: BinaryIO):
-        self.path, self.file = path, file
+    def __init__(self, path: str, file: BinaryIO, truth: bool = False):
+        """truth: positions alone are decoded, of other categories only the blocks are followed."""
+        self.path, self.file, self.truth = path, file, truth
         self.records = 0
         self.skipped: Counter[str] = Counter()
         self.decoders: dict[int, Any] = {48: _Plots048(), 1: _Plots001(), 62: _Tracks062()}
         self.sectors = _Profile(2, ("030",))
         self.sector_time = field(self.sectors.spec, "030")
         self.clock = Unrolled(DAY_S)
+        self.plots = False  # whether there are plots beside the truth
 
     def batches(self) -> Iterator[Batch]:
         """The records, some at a time; raises ConfigError where a block or record is not as the specification says."""
@@ -437,6 +439,9 @@ class Asterix:
             at += length
 
     def _block(self, category: int, data: bytes, gathered: Gathered) -> None:
+        if self.truth and category != 62:
+            self.plots |= category in (1, 48)
+            return
         if category == 2:
             self._sectors(data)
             return

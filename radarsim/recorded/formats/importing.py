@@ -71,14 +71,16 @@ class Imported:
 
 
 @contextmanager
-def opened(path: str, options: Options) -> Iterator[tuple[Format, Reader]]:
-    """The reader of a recording, by the format that is asked for or that its first bytes show; raises ConfigError."""
+def opened(path: str, options: Options, truth: bool = False) -> Iterator[tuple[Format, Reader]]:
+    """The reader of a recording, by the format that is asked for or that its first bytes show; raises ConfigError.
+
+    truth: only the positions of an ASTERIX file are wanted."""
     try:
         with open(path, "rb") as file:
             head = file.peek(HEAD)[:HEAD]
             kind = options.format or found(path, head)
             if kind == "asterix":
-                yield kind, Asterix(path, file)
+                yield kind, Asterix(path, file, truth)
             elif kind == "ais":
                 yield kind, Ais(path, file)
             else:
@@ -97,8 +99,12 @@ def found(path: str, head: bytes) -> Format:
     if ais.SENTENCE.search(head):
         return "ais"
     text = b"\0" not in head and sum(byte < 9 or 13 < byte < 32 for byte in head) == 0
-    if text and b"," in head.split(b"\n", 1)[0]:
-        names = head.lower()
+    lines = [line for line in head.splitlines() if line.strip() and not line.startswith(b"#")]
+    if text and lines[:1] and lines[0].startswith((b"MSG,", b"STA,", b"AIR,", b"SEL,", b"ID,", b"CLK,")):
+        raise ConfigError(f"{path}:1: must have a header; lines such as MSG,3,… are those of a BaseStation port (SBS): "
+                          "give them one with time, icao24, lat, lon, alt")  # fmt: skip
+    if text and lines and any(sign in lines[0] for sign in (b",", b";", b"\t")):
+        names = lines[0].lower()
         return "opensky" if b"icao24" in names and b"lat" in names else "csv"
     if not text and asterix.looks_like(head):
         return "asterix"
@@ -278,6 +284,8 @@ class _Import:
         if self.behind:
             fault = "are behind the antenna or without height: elevation_rad and azimuth_rad are empty there"
             done.notes.append(f"{self.behind} of {done.rows} plots {fault}")
+        if isinstance(self.reader, Table):
+            done.notes += self.reader.notes()
         if self.truth is not None:
             done.notes += self.truth.notes(done.rows)
         if unnamed := done.tracks.get("", 0):
@@ -301,7 +309,7 @@ class _Truth:
             self._read_own(path, options)
         else:
             assert options.truth is not None
-            with opened(options.truth, Options()) as (_, reader):
+            with opened(options.truth, Options(), truth=True) as (_, reader):
                 self._read(reader, options.site)
             if not self.tables:
                 raise ConfigError(f"{options.truth}: has no positions on the earth, which the truth must have")
@@ -312,26 +320,24 @@ class _Truth:
         if not os.path.isfile(path):
             self.own = False
             return
-        with opened(path, options) as (kind, reader):
-            if kind == "asterix":
-                plots = self._read(reader, options.site)
-            self.own = kind == "asterix" and plots > 0 and bool(self.tables)
+        with opened(path, options, truth=True) as (_, reader):
+            if isinstance(reader, Asterix):
+                self._read(reader, options.site)
+            self.own = isinstance(reader, Asterix) and reader.plots and bool(self.tables)
         if not self.own:
             self.tables = {}
 
-    def _read(self, reader: Reader, site: Site) -> int:
-        """Take the positions in; how many plots there were beside them."""
-        plots, self.of_day = 0, reader.of_day
+    def _read(self, reader: Reader, site: Site) -> None:
+        """Take the positions in."""
+        self.of_day = reader.of_day
         for batch in reader.batches():
             if batch.kind == PLOTS:
-                plots += len(batch.track)
                 continue
             seen = site.seen(batch.columns)
             table = np.stack([batch.columns["t_s"], *(seen[name] for name in LOCAL)], axis=-1)
             for name in set(batch.address):
                 rows = [i for i, one in enumerate(batch.address) if one == name]
                 self.tables.setdefault(name, []).append(table[rows])
-        return plots
 
     def columns(self, batch: Batch, of_day: bool) -> dict[str, np.ndarray]:
         """The truth at the times of a batch: true range, bearing, velocity, coordinates and speeds (n,)."""

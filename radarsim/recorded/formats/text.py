@@ -2,9 +2,15 @@
 
 Columns are found by their names, whatever the case and the spaces; a unit may stand at the end of a name (`range_km`,
 `Altitude [ft]`). Times are seconds from 1970, or ISO 8601 with or without a zone (UTC is taken where there is none).
+Cells are parted by commas, semicolons or tabulators, whatever the header has most of; parted by other than commas,
+numbers may have a decimal comma.
+
+Where a name has no unit, SI is taken; but positions whose names are those of aviation (`gs`, `groundspeed`, `alt`, …)
+count in feet, knots and feet a minute, as the exports do that use them.
 """
 
 import csv
+import itertools
 import math
 import re
 from collections import Counter
@@ -34,19 +40,27 @@ UNITS = {
 # Our name of what is read: the names it goes by, in lower case without spaces and units.
 NAMES = {
     "t_s": ("t", "time", "timestamp", "t_s", "datetime", "date_time", "utc", "time_position", "lastposupdate"),
-    "track": ("track", "track_id", "icao24", "icao", "hex", "address", "callsign", "mmsi", "id", "flight", "name"),
+    "track": ("icao24", "icao", "hex", "mmsi", "track_id", "address", "callsign", "flight", "id", "track", "name"),
     "latitude_deg": ("lat", "latitude"),
     "longitude_deg": ("lon", "lng", "long", "longitude"),
-    "altitude_m": ("geoaltitude", "geo_altitude", "altitude", "alt", "height", "baroaltitude", "baro_altitude"),
+    "altitude_m": (
+        *("geoaltitude", "geo_altitude", "alt_geom", "altitude", "alt", "height"),
+        *("baroaltitude", "baro_altitude", "alt_baro"),
+    ),
     "speed_mps": ("velocity", "groundspeed", "ground_speed", "gs", "speed", "sog"),
-    "course_deg": ("heading", "true_track", "course", "cog", "track_angle"),
-    "up_mps": ("vertrate", "vertical_rate", "vert_rate", "climb"),
+    "course_deg": ("heading", "true_track", "course", "cog", "track_angle", "direction", "track"),
+    "up_mps": ("vertrate", "vertical_rate", "vert_rate", "geom_rate", "baro_rate", "climb"),
     "range_m": ("range", "slant_range", "distance", "rho"),
     "bearing_rad": ("bearing", "azimuth", "az", "theta"),
     "velocity_mps": ("radial_velocity", "doppler", "radial_speed", "range_rate", "velocity"),
     "span_mps": ("span", "ambiguity", "doppler_span"),
 }
 ON_EARTH = ("latitude_deg", "longitude_deg")
+POSITION = "position"  # latitude and longitude in one cell, parted by a comma
+AVIATION = ("gs", "groundspeed", "ground_speed", "alt", "alt_baro", "alt_geom", "direction")  # names without a unit
+AVIATION_UNITS = {"altitude_m": "ft", "speed_mps": "kn", "up_mps": "fpm"}
+HIGHEST_M = 20_000.0  # of an aircraft; higher altitudes are feet
+DELIMITERS = ",;\t"
 UNIT = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]$")
 
 
@@ -73,19 +87,49 @@ class Table:
     of_day = False
 
     def __init__(self, path: str, file: TextIO, given: Mapping[str, str] | None = None):
-        self.path = path
-        self.rows = csv.reader(file, strict=True)
-        self.records = 0
+        self.path, self.records, self.highest = path, 0, 0.0
         self.skipped: Counter[str] = Counter()
         self.faults: list[str] = []
-        try:
-            header = next((row for row in self.rows if row and not row[0].startswith("#")), [])
-        except csv.Error as error:
-            raise ConfigError(f"{path}:{self.rows.line_num}: not a CSV row: {error}") from error
+        header = self._opened(file)
         self.width = len(header)
+        names = {split(name) for name in header}
+        self.aviation = any((name, "") in names for name in AVIATION)
         self.columns = self._found(header, given or {})
         self.kind = POSITIONS if set(ON_EARTH) <= set(self.columns) else PLOTS
         self._complete(header)
+
+    def _opened(self, file: TextIO) -> list[str]:
+        """The header; from there on the rows are read with what parts its cells."""
+        before, text = 0, ""
+        for text in file:
+            if text.strip() and not text.startswith("#"):
+                break
+            before, text = before + 1, ""
+        delimiter = max(DELIMITERS, key=text.count)
+        self.decimal_comma = delimiter != ","
+        self.rows = csv.reader(itertools.chain([text], file), strict=True, delimiter=delimiter)
+        self.before = before
+        try:
+            return next(self.rows, [])
+        except csv.Error as error:
+            raise ConfigError(f"{self.path}:{self.line}: not a CSV row: {error}") from error
+
+    @property
+    def line(self) -> int:
+        """The line of the file that was read last."""
+        return self.before + self.rows.line_num
+
+    def notes(self) -> list[str]:
+        """What was taken for granted of units, and what speaks against it."""
+        if self.kind != POSITIONS:
+            return []
+        if self.aviation:
+            plain = [c.name for ours, c in self.columns.items() if ours in AVIATION_UNITS and not split(c.name)[1]]
+            return [f"taken in feet, knots, feet a minute, as names such as gs and alt are: {', '.join(plain)}"]
+        if self.highest > HIGHEST_M:
+            name = self.columns["altitude_m"].name
+            return [f"altitudes up to {self.highest:.0f} m: if {name} is in feet, name it {name}_ft"]
+        return []
 
     def _found(self, header: list[str], given: Mapping[str, str]) -> dict[str, Column]:
         """Which of our columns the header has; those that were given by name first."""
@@ -96,17 +140,22 @@ class Table:
                 allowed = f"one of {', '.join(NAMES)}" if ours not in NAMES else f"a column of {', '.join(names)}"
                 raise ConfigError(f"{self.path}:1: column {ours}={theirs}: must name {allowed}")
             found[ours] = self._column(ours, names.index(theirs), header)
-        earth = any(split(name)[0] in NAMES["latitude_deg"] for name in header)
+        earth = any(split(name)[0] in (*NAMES["latitude_deg"], POSITION) for name in header)
+        places = {split(name)[0]: i for i, name in reversed(list(enumerate(header)))}
         for ours, known in NAMES.items():
             if ours in found or (ours == "velocity_mps" and earth) or (ours == "speed_mps" and not earth):
                 continue
-            places = {split(name)[0]: i for i, name in reversed(list(enumerate(header)))}
-            if one := next((name for name in known if name in places), None):
+            taken = {column.place for column in found.values()}
+            if one := next((name for name in known if name in places and places[name] not in taken), None):
                 found[ours] = self._column(ours, places[one], header)
+        if POSITION in places and not set(ON_EARTH) & set(found):
+            found |= {ours: self._column(ours, places[POSITION], header) for ours in ON_EARTH}
         return found
 
     def _column(self, ours: str, place: int, header: list[str]) -> Column:
         unit = split(header[place])[1]
+        if self.aviation and not unit:
+            unit = AVIATION_UNITS.get(ours, "")
         if unit not in UNITS and ours not in ("track", "t_s"):
             raise ConfigError(f"{self.path}:1: {header[place].strip()}: the unit must be one of "
                               f"{', '.join(name for name in UNITS if name)}; got {unit!r}")  # fmt: skip
@@ -134,7 +183,7 @@ class Table:
                 if len(gathered) >= BATCH and not self.faults:
                     yield gathered.taken()
         except csv.Error as error:
-            self.faults.append(f"{self.path}:{self.rows.line_num}: not a CSV row: {error}")
+            self.faults.append(f"{self.path}:{self.line}: not a CSV row: {error}")
         if self.faults:
             raise ConfigError(*self.faults)
         if len(gathered):
@@ -145,8 +194,7 @@ class Table:
             raise ConfigError(*self.faults, f"{self.path}: more faults may follow")
         self.records += 1
         if len(cells) != self.width:
-            line = self.rows.line_num
-            self.faults.append(f"{self.path}:{line}: must have {self.width} cells as the header, got {len(cells)}")
+            self.faults.append(f"{self.path}:{self.line}: must have {self.width} cells as the header, got {len(cells)}")
             return
         row = row_of(cells)
         if any(math.isnan(row[i]) for i in ((0, 1, 2) if self.kind == POSITIONS else (0, 1))):
@@ -163,7 +211,9 @@ class Table:
         for name, value, most in (("latitude_deg", lat, 90), ("longitude_deg", lon, 360)):
             if abs(value) > most:
                 self._fault(name, f"must be from -{most} to {most} degrees, got {value:g}")
-        return t, lat, lon, self._number(cells, "altitude_m"), speed * math.sin(course), speed * math.cos(course), up
+        altitude = self._number(cells, "altitude_m")
+        self.highest = max(self.highest, altitude)  # not-a-number is not larger
+        return t, lat, lon, altitude, speed * math.sin(course), speed * math.cos(course), up
 
     def _plot(self, cells: list[str]) -> tuple[float, ...]:
         """PLOT_COLUMNS of a row."""
@@ -174,7 +224,7 @@ class Table:
         column = self.columns["t_s"]
         text = cells[column.place].strip()
         try:
-            return float(text) * column.factor if text else math.nan
+            return float(self._pointed(text)) * column.factor if text else math.nan
         except ValueError:
             pass
         try:
@@ -186,10 +236,12 @@ class Table:
     def _number(self, cells: list[str], name: str) -> float:
         column = self.columns.get(name)
         text = cells[column.place].strip() if column else ""
+        if column and split(column.name)[0] == POSITION:
+            text = text.partition(",")[2 * (name == "longitude_deg")]
         if not column or not text or text.lower() in ("nan", "null", "none", "na"):
             return math.nan
         try:
-            value = float(text)
+            value = float(self._pointed(text))
         except ValueError:
             value = math.inf
         if not abs(value) <= LARGEST:
@@ -197,6 +249,10 @@ class Table:
             return math.nan
         return value * column.factor
 
+    def _pointed(self, text: str) -> str:
+        """A number with a decimal point."""
+        return text.replace(",", ".") if self.decimal_comma and text.count(",") == 1 and "." not in text else text
+
     def _fault(self, name: str, what: str) -> None:
         column = self.columns[name]
-        self.faults.append(f"{self.path}:{self.rows.line_num}:{column.place + 1}: {column.name}: {what}")
+        self.faults.append(f"{self.path}:{self.line}:{column.place + 1}: {column.name}: {what}")

@@ -340,7 +340,8 @@ def test_ships_by_ais(tmp_path):
         lines.append(sentence)
     stamped = [f"\\s:r3669961,c:{1700000000 + 10 * k}*00\\{line}" for k, line in enumerate(lines)]
     dated = [f"2023-11-14T22:13:{20 + 7 * k}Z {line}" for k, line in enumerate(lines)]
-    for text, step in ((lines, 10), (stamped, 10), (dated, 7)):
+    after = [f"{line},{1700000000 + 8 * k}" for k, line in enumerate(lines)]
+    for text, step in ((lines, 10), (stamped, 10), (dated, 7), (after, 8)):
         done, columns, tracks = imported(tmp_path, "\n".join(text).encode(), Options(site=SITE))
         assert (done.format, set(tracks)) == ("ais", {"244660000"})
         np.testing.assert_allclose(columns["t_s"], step * np.arange(5))
@@ -411,13 +412,69 @@ def test_a_column_named_by_hand(tmp_path):
     assert "must name a column of when, d1, d2" in line
 
 
-def refused_again(tmp_path, data, options):
-    """As `refused`, in a folder that holds an earlier output, which stays as it was."""
+def refused_again(tmp_path, data, options, write=False):
+    """As `refused`, in a folder that holds an earlier output, which stays; write: the recording is another."""
+    if write:
+        (tmp_path / "recording").write_bytes(data)
     before = (tmp_path / "plots.csv").read_bytes()
     with pytest.raises(ConfigError) as caught:
         import_recording(tmp_path / "recording", tmp_path / "plots.csv", options)
     assert (tmp_path / "plots.csv").read_bytes() == before
     return list(caught.value.lines)
+
+
+FLIGHT = [(1_700_000_000 + 10 * k, 52.0 + 0.01 * k, 4.5 + 0.012 * k) for k in range(4)]
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "feet"),
+    [
+        # OpenSky's states, which are in SI
+        ("time,icao24,lat,lon,velocity,heading,vertrate,callsign,onground,baroaltitude,geoaltitude,lastposupdate",
+         "{t},4ca1fa,{lat},{lon},200,90,0,KLM1,False,9900,10000,{t}", False),
+        ("timestamp,lat,lon,alt,gs,heading", "{t},{lat},{lon},10000,200,90", True),
+        # the course is called track
+        ("timestamp,icao24,latitude,longitude,groundspeed,track,altitude", "{t},4ca1fa,{lat},{lon},200,90,10000", True),
+        ("Timestamp,UTC,Callsign,Position,Altitude,Speed,Direction", '{t},x,K1,"{lat},{lon}",10000,200,90', True),
+        ("time;icao24;lat;lon;velocity;heading;geoaltitude", "{t};a;{lat};{lon};200,0;90;10000,0", False),
+    ],
+)  # fmt: skip
+def test_exports_of_positions(tmp_path, header, row, feet):
+    """The altitude, and the speed to the east as seen from a radar that is far to the west."""
+    west, text = Options(site=Site(52.0, 4.0, 0.0)), header + "\n"
+    for t, lat, lon in FLIGHT:
+        line = row.format(t=t, lat=lat, lon=lon)
+        text += (line.replace(".", ",") if ";" in line else line) + "\n"
+    done, columns, tracks = imported(tmp_path, text.encode(), west)
+    assert len(set(tracks)) == 1
+    np.testing.assert_allclose(columns["t_s"], [0, 10, 20, 30])
+    np.testing.assert_allclose(columns["altitude_m"], 10000 * (0.3048 if feet else 1), rtol=1e-12)
+    speed = 200 * (NM / 3600 if feet else 1)
+    assert 0.9 * speed < columns["velocity_mps"][0] < speed
+    assert any("taken in feet, knots" in note for note in done.notes) == feet
+
+
+def test_altitudes_that_no_aircraft_has_are_asked_about(tmp_path):
+    done, _, _ = imported(tmp_path, b"time,lat,lon,altitude\n1,52,4,36000\n", Options(site=SITE))
+    assert done.notes == ["altitudes up to 36000 m: if altitude is in feet, name it altitude_ft"]
+
+
+@pytest.mark.parametrize("sign", [";", "\t"])
+def test_a_spreadsheet_with_decimal_commas(tmp_path, sign):
+    rows = ["# exported", "Zeit;Time;Slant Range [NM];Azimuth [deg];Height [ft];Radial velocity [kn]"]
+    rows += ["12:00;0,5;20,5;90;25000;-150,5", "12:04;4,5;20,7;90;25000;"]
+    _, columns, _ = imported(tmp_path, "\n".join(rows).replace(";", sign).encode())
+    np.testing.assert_allclose(columns["range_m"], [20.5 * NM, 20.7 * NM])
+    np.testing.assert_allclose(columns["velocity_mps"], [-150.5 * NM / 3600, np.nan])
+    np.testing.assert_allclose(columns["t_s"], [0, 4])
+    rows[2] = "12:00;0,5;a;90;25000;1"
+    (line,) = refused_again(tmp_path, "\n".join(rows).encode(), PLAIN, write=True)
+    assert line.endswith("recording:3:3: Slant Range [NM]: must be a number, got 'a'")
+
+
+def test_lines_of_a_port_without_header_are_told(tmp_path):
+    (line,) = refused(tmp_path, b"MSG,3,1,1,4CA1FA,1,2023/11/14,22:13:20.000,,,,36000,,,52.0,4.5,,,0,0,0,0\n")
+    assert line.startswith("recording:1: must have a header; lines such as MSG,3,… are those of a BaseStation port")
 
 
 # ---- all -------------------------------------------------------------------------------------------------------------
