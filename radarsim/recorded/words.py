@@ -22,6 +22,7 @@ def verdict(judged: Sequence[accuracy.Judged], advised: Advice | None) -> list[s
 
 
 def rows(followed: Followed) -> list[str]:
+    """How many rows and tracks there are, over what time, what is missing, and the gaps."""
     span = followed.last_s - followed.first_s
     lines = [f"plots    {plural(followed.rows, 'row')} over {span:g} s, from {followed.first_s:g} s"]
     if followed.tracks:
