@@ -1,7 +1,7 @@
 """`radarsim compare`: stored results side by side on common axes, with their differences. Computes nothing."""
 
 import os
-from collections.abc import Hashable, Sequence
+from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -81,7 +81,7 @@ def compare(
 
         for name, figure in described.items():
             contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.save(figure, formats).items()}
-    contents["compare.html"] = _page(runs, told, notes, warnings, list(described.values()), made).encode()
+    contents["compare.html"] = _page(runs, told, notes, warnings, list(described.values()), made, contents).encode()
     contents["compare.json"] = provenance.to_json(_record(runs, contents))
     files.replace_all(folder, contents, stale=_earlier)
     last = words.at_the_end(made)
@@ -211,6 +211,7 @@ def _page(
     warnings: Sequence[str],
     described: "Sequence[Any]",
     made: "pd.DataFrame",
+    outputs: Collection[str],
 ) -> str:
     """compare.html."""
     from radarsim.report import html
@@ -218,9 +219,9 @@ def _page(
     cases = [case for run in runs for case in _cases(run)]
     names = [case.name for case in cases]
     unique = len(set(names)) == len(names) and len({case.study for case in cases}) == 1
-    return html.comparison(
-        [run.label for run in runs], told, notes, warnings, described, made, asked.asked(cases) if unique else {}
-    )
+    differing = asked.asked(cases) if unique else {}
+    labels = [run.label for run in runs]
+    return html.comparison(labels, told, notes, warnings, described, made, differing, outputs)
 
 
 def _cases(run: Run) -> list[Case]:

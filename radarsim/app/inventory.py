@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from radarsim.app.configs import lookup
+from radarsim.errors import ConfigError
 from radarsim.studies import registry
 
 Inventory = Sequence[tuple[str, Sequence[str], Sequence[tuple[str, ...]]]]  # title, columns, rows
@@ -37,3 +38,23 @@ def inventory() -> Inventory:
         ("Studies (study: NAME)", ("name", "paper and question"), about),
         ("Filters", ("study", "keys", "what it is"), filters),
     ]
+
+
+def selected(whole: Inventory, words: Sequence[str]) -> Inventory:
+    """Of an inventory the kinds that some words name, and the rows that hold all other words, in any case of letters.
+
+    Raises ConfigError where nothing is left.
+    """
+    kinds = {title.partition(" ")[0].lower(): title for title, _, _ in whole}
+    wanted = {kinds[word.lower()] for word in words if word.lower() in kinds} or set(kinds.values())
+    parts = [word.lower() for word in words if word.lower() not in kinds]
+    found = [
+        (title, columns, [row for row in rows if all(part in " ".join(row).lower() for part in parts)])
+        for title, columns, rows in whole
+        if title in wanted
+    ]
+    if parts and not any(rows for _, _, rows in found):
+        raise ConfigError(
+            f"{' '.join(words)}: nothing of this name; `radarsim list` shows all, or one of {', '.join(kinds)}"
+        )
+    return [(title, columns, rows) for title, columns, rows in found if rows or not parts]

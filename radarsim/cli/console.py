@@ -2,7 +2,10 @@
 
 import math
 import os
+import re
 import sys
+import textwrap
+import threading
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
     from radarsim.app.simulation import Shares
     from radarsim.config.experiment import Experiment
 
-SILENT_S = 2.0  # a run shorter than this shows no progress
+SILENT_S = 0.7  # a run shorter than this shows no progress
 PIPED_WIDTH = 10_000  # whatever reads it wraps it, or not
 ROOMY = 110  # columns of a terminal from which claims are shown with place and config
 MOST_ROWS = 36  # of the last scan's table; of a larger experiment the answer and the files are enough
@@ -44,45 +47,56 @@ def console(stderr: bool = False) -> "Console":
 
 
 class Progress:
-    """What is done, its rate and the time left, on stderr if that is a terminal, once it has lasted two seconds."""
+    """What is done, its rate and the time left, on stderr if that is a terminal, once it has lasted most of a second.
+
+    Until the first report, while kernels are compiled, the bar moves without saying how much.
+    """
 
     def __init__(self, title: str, quiet: bool, what: str = "realisations"):
         self.title, self.quiet, self.what = title, quiet, what
         self.started = time.monotonic()
         self.bar: Bar | None = None
         self.task: TaskID
+        self.lock = threading.Lock()
+        self.timer = threading.Timer(SILENT_S, self._begin)
+        self.timer.daemon = True
 
     def __enter__(self) -> Self:
+        if not self.quiet and sys.stderr.isatty():
+            self.timer.start()
         return self
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
-        if self.bar is not None:
-            self.bar.stop()
+        self.timer.cancel()
+        with self.lock:
+            self.quiet = True  # a timer that has just run out begins nothing
+            if self.bar is not None:
+                self.bar.stop()
+
+    def _begin(self) -> None:
+        with self.lock:
+            if self.bar is None and not self.quiet:
+                self.bar = self._begun()
 
     def update(self, done: int, total: int, from_store: int) -> None:
         """How many are done, of how many, and how many of them were read from the store."""
         elapsed = time.monotonic() - self.started
         if self.quiet or elapsed < SILENT_S or not sys.stderr.isatty():
             return
-        if self.bar is None:
-            self.bar = self._begun(total)
+        self._begin()
+        assert self.bar is not None  # it has just begun
         rate = (done - from_store) / elapsed
         left = clock((total - done) / rate) if rate > 0 else "–"
-        self.bar.update(self.task, completed=done, rate=rate, left=left)
+        told = f"{done / max(total, 1):6.1%}  {rate:,.0f} {self.what}/s  {left} left".replace("%", " %", 1)
+        self.bar.update(self.task, total=total, completed=done, told=told)
 
-    def _begun(self, total: int) -> "Bar":
+    def _begun(self) -> "Bar":
         from rich.progress import BarColumn, TextColumn
         from rich.progress import Progress as Bar
 
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn(
-                "{task.percentage:5.1f} %  {task.fields[rate]:,.0f} " + f"{self.what}/s  {{task.fields[left]}} left"
-            ),
-        )
+        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[told]}"))
         bar = Bar(*columns, console=console(stderr=True), transient=True)
-        self.task = bar.add_task(self.title, total=total, rate=0.0, left="–")
+        self.task = bar.add_task(self.title, total=None, told="begins")
         bar.start()
         return bar
 
@@ -137,6 +151,8 @@ def show(
         screen.print(table)
     for line in captured.get().rstrip("\n").split("\n"):
         sys.stdout.write(line.rstrip() + "\n")
+    if missing := [columns[i] for i in range(len(columns)) if i not in shown]:
+        say(f"         left out at {screen.width} columns: {', '.join(missing)}")
 
 
 def fitting(columns: Sequence[str], cells: Sequence[Sequence[str]], spare: Sequence[str], width: int) -> list[int]:
@@ -152,8 +168,21 @@ def fitting(columns: Sequence[str], cells: Sequence[Sequence[str]], spare: Seque
 
 
 def say(line: str) -> None:
-    """Print one line, never wrapped."""
-    sys.stdout.write(printable(line) + "\n")
+    """Print one line: to a terminal in as many as its width takes, broken between words; else never broken."""
+    text = printable(line)
+    for part in wrapped(text, console().width) if sys.stdout.isatty() else [text]:
+        sys.stdout.write(part + "\n")
+
+
+def wrapped(line: str, width: int) -> list[str]:
+    """A line broken between words, a unit kept with its number; what follows stands under its first words."""
+    label = re.match(r"\S* {2,}|", line)
+    indent = " " * len(label[0]) if label and len(label[0]) < width // 2 else ""
+    kept = re.sub(r"(?<=\d) (?=(%|°|m|s|km|Hz|rad|m/s²?|rad/s²?)(\W|$))", "\N{NO-BREAK SPACE}", line)
+    broken = textwrap.wrap(
+        kept, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False, drop_whitespace=True
+    )
+    return [part.replace("\N{NO-BREAK SPACE}", " ") for part in broken] or [""]
 
 
 def print_result(result: "Result") -> None:
@@ -324,10 +353,10 @@ def print_claims(rows: Sequence[dict[str, Any]]) -> None:
         cells = []
         for own in page.grouped(rows):
             first, done = own[0], own[0]["class"] != "not run"
-            measured = "\n".join(page.shown(row) for row in own) if done else f"radarsim run {first['config']}"
+            measured = "\n".join(map(_measured, own)) if done else f"radarsim run {first['config']}"
             said = first["statement"] + (f"\n«{first['original']}»" if first["original"] else "")
             cells.append((first["claim"], said, first["place"], measured, page.verdict_of(own), first["config"]))
-        columns = ("claim", "statement", "place", "measured", "class", "config")
+        columns = ("claim", "statement", "place", "measured and expected", "class", "config")
         show("", columns, cells, spare=() if console().width >= ROOMY else ("place", "config"))
     else:
         for own in page.grouped(rows):
@@ -335,6 +364,15 @@ def print_claims(rows: Sequence[dict[str, Any]]) -> None:
     say(page.counted(rows) or "no claims are judged by this")
     if rows and all(row["class"] == "not run" for row in rows):
         say("nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has the results at full size")
+
+
+def _measured(row: Mapping[str, Any]) -> str:
+    """What was measured for a part of a claim: its name, its value, what was expected."""
+    from radarsim.report.claims import page
+
+    name = f"{row['case']}: {row['what']}" if row["case"] else str(row["what"])
+    expected = f"; expected {row['expected']}" if row["expected"] else ""
+    return f"{name}: {page.shown(row)}{expected}"
 
 
 def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
@@ -379,7 +417,8 @@ def print_readings(done: "Done", detailed: bool) -> None:
 
 
 def print_inventory(inventory: "Inventory") -> None:
-    """Configs, scenarios, studies and filters, with a line on each."""
-    for title, columns, rows in inventory:
+    """Filters, studies, scenarios and configs, with a line on each: what is asked for most stands last."""
+    for n, (title, columns, rows) in enumerate(reversed(inventory)):
+        if n:
+            say("")
         show(title, columns, rows)
-        say("")

@@ -7,23 +7,29 @@ from radarsim.errors import StoreError
 
 
 @main.command(name="list")
+@click.argument("words", nargs=-1, metavar="[WORD…]")
 @json_option
-def list_(as_json: bool) -> None:
+def list_(words: tuple[str, ...], as_json: bool) -> None:
     """Available configs, scenarios, studies and filters.
+
+    WORD is one of these kinds, or what an entry's name or line has to contain.
 
     \b
     Examples
       radarsim list
+      radarsim list sonar
+      radarsim list filters
       radarsim list --json | jq -r '.configs[].name'
     """
     from radarsim.app import documents
-    from radarsim.app.inventory import inventory
+    from radarsim.app.inventory import inventory, selected
     from radarsim.cli import console
 
+    found = selected(inventory(), words)
     if as_json:
-        click.echo(documents.text(documents.inventory(inventory())))
+        click.echo(documents.text(documents.inventory(found)))
     else:
-        console.print_inventory(inventory())
+        console.print_inventory(found)
 
 
 @main.command()

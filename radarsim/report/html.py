@@ -5,7 +5,7 @@ import hashlib
 import json
 import math
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
@@ -64,6 +64,7 @@ def page(
         claims=claims,
         verdicts=claims_page.counted(made["claims"].to_dict("records")),
         figures=_figures(figures),
+        files=_files(figures, record["outputs"]),
         tables=_tables({name: table for name, table in made.items() if name != "claims" and len(table)}),
         facts=[(name.replace("_", " "), number(record[name])) for name in SHOWN_FACTS if name in record],
         command=command(experiment, record),
@@ -78,10 +79,12 @@ def comparison(
     figures: Sequence[Figure],
     made: "pd.DataFrame",
     differing: "Mapping[str, pd.DataFrame]",
+    outputs: Collection[str],
 ) -> str:
     """The page of a comparison: sentences, figures, in what the configs differ, the table.
 
-    differing are tables of keys by their title, empty where the configs are of several studies.
+    differing are tables of keys by their title, empty where the configs are of several studies; outputs the files
+    beside the page.
     """
     return whole(
         "compare.html.j2",
@@ -90,6 +93,7 @@ def comparison(
         notes=notes,
         warnings=warnings,
         figures=_figures(figures),
+        files=_files(figures, outputs),
         asked=[_table(title, table) for title, table in differing.items()],
         table=_table("comparison", made.drop(columns=["label", "against_label"])),
         version=provenance.versions()["radarsim"],
@@ -239,6 +243,13 @@ def _figures(figures: Sequence[Figure]) -> list[dict[str, Any]]:
         named = {"name": figure.name, "title": spoken(figure.title), "caption": spoken(figure.caption)}
         made.append({**named, "chart": drawn, "data": safe})
     return made
+
+
+def _files(figures: Sequence[Figure], outputs: Collection[str]) -> dict[str, list[str]]:
+    """The formats of each figure's files beside the page."""
+    kinds = ("svg", "png", "pdf")
+    found = {one.name: [kind for kind in kinds if f"figures/{one.name}.{kind}" in outputs] for one in figures}
+    return {name: own for name, own in found.items() if own}
 
 
 @cache

@@ -1,5 +1,6 @@
 """report.html in Chromium: it loads offline without a word in the console; sorting, hovering, switching work."""
 
+import base64
 import re
 
 import pytest
@@ -196,8 +197,79 @@ def test_it_prints_whole(page, results):
     page.open(results / "rls2" / "report.html", media="print")
     assert page.evaluate("getComputedStyle(document.querySelector('button.copy')).display") == "none"
     assert page.evaluate("getComputedStyle(document.querySelector('.scroll')).maxHeight") == "none"
-    printed = page.call("Page.printToPDF")["data"]
-    assert len(printed) > 50_000
+    printed = base64.b64decode(page.call("Page.printToPDF")["data"])
+    assert len(printed) > 40_000
+    assert len(re.findall(rb"/Type\s*/Page[^s]", printed)) <= 8
+
+
+@pytest.mark.parametrize("anchor", ["claims", "tables", "asked"])
+def test_anchors_land_where_they_point(page, results, anchor):
+    page.open(results / "range_doppler" / "report.html")
+    page.evaluate("document.documentElement.style.scrollBehavior = 'auto'")
+    page.click(f"nav a[href='#{anchor}']")
+    assert abs(page.evaluate(f"document.getElementById('{anchor}').getBoundingClientRect().top")) < 2
+
+
+@pytest.mark.parametrize("name", ["rls2", "range_doppler"])
+def test_the_answer_and_its_figure_are_on_the_first_screen(page, results, name):
+    page.open(results / name / "report.html", width=1400, height=900)
+    assert page.evaluate("document.querySelector('.answer').getBoundingClientRect().bottom") < 500
+    assert page.evaluate("document.querySelector('svg.chart').getBoundingClientRect().top") < 700
+
+
+def tip(page):
+    """What the first figure's reading says; None where it is not shown."""
+    return page.evaluate(
+        "(() => { const t = document.querySelector('.tip'); return t.hidden ? null : t.innerText; })()"
+    )
+
+
+def test_a_reading_is_kept_by_a_click_and_by_a_touch_and_lies_on_no_curve(page, results):
+    page.open(results / "range_doppler" / "report.html")
+    page.click("svg.chart")
+    kept = tip(page)
+    page.move(5, 5)
+    assert tip(page) == kept
+    over = "[...document.querySelectorAll('.tip, svg.chart')].slice(0, 2).map((e) => e.getBoundingClientRect())"
+    apart = f"(([a, b]) => a.bottom <= b.top || b.bottom <= a.top)({over})"
+    assert page.evaluate(apart)
+    page.click("svg.chart")
+    page.move(5, 5)
+    assert tip(page) is None
+    x, y = page.place("svg.chart")
+    page.call("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
+    page.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+    assert tip(page) == kept
+
+
+def test_a_reading_tells_every_curve_the_highest_first(page, results):
+    page.open(results / "range_doppler" / "report.html")
+    nth = page.evaluate("[...document.querySelectorAll('figure')].findIndex((f) => f.id === 'figure-gain_r')")
+    page.evaluate(f"document.querySelectorAll('figure')[{nth}].querySelector('svg.chart').id = 'here'")
+    page.click("#here")
+    told = page.evaluate(f"document.querySelectorAll('figure')[{nth}].querySelector('.tip').innerText")
+    values = [float(v) for v in re.findall(r"^RLS \d: ([\d.]+)", told, re.MULTILINE)]
+    assert len(values) >= 3
+    assert values == sorted(values, reverse=True)
+
+
+@pytest.mark.parametrize("width", [360, 800, 1400])
+def test_it_is_whole_at_every_width_and_in_forced_colours(page, results, width):
+    page.open(results / "range_doppler" / "report.html", width=width)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.call("Emulation.setEmulatedMedia", features=[{"name": "forced-colors", "value": "active"}])
+    assert page.evaluate("matchMedia('(forced-colors: active)').matches")
+    assert page.complaints() == []
+
+
+def test_claims_have_an_address_and_lead_to_their_table_and_figure(page, results):
+    page.open(results / "range_doppler" / "report.html")
+    links = page.evaluate("[...document.querySelectorAll('#claims ~ p a')].map((a) => a.getAttribute('href'))")
+    assert "claims.csv" in links
+    assert "#figure-claims" in links
+    assert page.evaluate("document.querySelectorAll('tr[id^=claim-P1]').length") > 10
+    shown = page.evaluate("document.querySelector('#figure-sigma_r .links a').getAttribute('href')")
+    assert (results / "range_doppler" / shown).is_file()
 
 
 def test_the_index_leads_to_every_run(page, results):

@@ -1,5 +1,6 @@
 """What the terminal shows: numbers as sentences have them, and where claims without results are to be had."""
 
+import io
 import re
 
 import numpy as np
@@ -38,3 +39,63 @@ def test_claims_without_results_say_where_to_find_them(tmp_path):
     assert re.fullmatch(r"\d+ not run; \d+ extensions not counted", counted.strip())
     assert "make reproduce-figures" in pointer
     assert "docs/claims.md" in pointer
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "Range after 140 s: r alone 189.8 m [188.1, 191.5], r+Vr 155.1 m [153.5, 156.7], gain 18.27 % [17.60, 18.94].",
+        "claims   12 confirmed: P1.1, P1.2, P1.3, P1.4, P1.5, P1.6, P1.7, P1.8, P1.9, P1.10, P1.11, P1.12, P1.13",
+    ],
+)
+def test_sentences_are_broken_between_words_and_never_within_a_number(line):
+    broken = console.wrapped(line, 40)
+    assert " ".join(part.strip() for part in broken).split() == line.split()
+    assert all(len(part) <= 40 for part in broken)
+    assert not any(part.rstrip().endswith(("140", "189.8", "18.27")) for part in broken)  # a unit stays with its number
+    if line.startswith("claims"):
+        assert all(part.startswith(9 * " ") for part in broken[1:])
+
+
+class Terminal(io.StringIO):
+    """A stream that says that it is a terminal."""
+
+    def isatty(self):
+        return True
+
+
+def test_a_table_says_which_columns_it_leaves_out(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    screen = Terminal()
+    monkeypatch.setattr("sys.stdout", screen)
+    columns = ("case", "sigma", "95 %", "exact")
+    console.show("", columns, [("rls2", "189.8 m", "188.1 m … 191.5 m", "189.7 m")], spare=("exact", "95 %"))
+    assert "left out at 40 columns: exact" in screen.getvalue()
+    assert "188.1 m … 191.5 m" in screen.getvalue()
+
+
+def test_a_bar_moves_within_a_second_though_nothing_is_reported(monkeypatch):
+    screen = Terminal()
+    monkeypatch.setattr("sys.stderr", screen)
+    with console.Progress("rls2", quiet=False) as progress:
+        progress.timer.join(5)
+        assert progress.bar is not None
+        assert progress.bar.tasks[0].total is None
+        progress.update(50, 200, 0)
+        assert (progress.bar.tasks[0].total, progress.bar.tasks[0].completed) == (200, 50)
+    assert console.SILENT_S < 1
+
+
+def test_list_ends_with_configs_and_takes_words():
+    def listed(*words, code=0):
+        result = CliRunner().invoke(main, ["list", *words])
+        assert result.exit_code == code
+        return result.stdout if code == 0 else result.stderr
+
+    titles = [line for line in listed().splitlines() if line.startswith(("Configs", "Scenarios", "Studies", "Filters"))]
+    assert [title.split()[0] for title in titles] == ["Filters", "Studies", "Scenarios", "Configs"]
+    assert "rls2" not in listed("sonar")
+    assert "sonar_clutter" in listed("sonar")
+    assert listed("filters").startswith("Filters")
+    assert "Configs" not in listed("filters")
+    assert "nothing of this name" in listed("nosuchword", code=2)

@@ -1,7 +1,7 @@
 "use strict";
 // What a reader does with the page: switch curves, read values off them, sort and copy tables, light and dark.
 const REACH = 14; // units of a panel within which a point belongs to the pointer's place
-const MOST = 9; // curves told at once
+const MANY = 8; // curves told from which they stand in two columns
 const COMMA = document.documentElement.lang !== "en"; // in place of the point
 
 function words(value) {
@@ -75,7 +75,7 @@ function told(point) {
   const { line, i } = point;
   const part = (key) => (line[key] ? line[key][i] : null);
   let text = words(line.y[i]);
-  if (line.l && line.h) text += ` [${words(part("l")) || "−∞"}, ${words(part("h")) || "∞"}]`;
+  if (line.l && line.h && (part("l") !== null || part("h") !== null)) text += ` [${words(part("l")) || "−∞"}, ${words(part("h")) || "∞"}]`;
   if (part("e") !== null) text += `, exact ${words(part("e"))}`;
   return text;
 }
@@ -97,10 +97,10 @@ class Panel {
     this.figure = figure;
     this.cursor = svg.querySelector(".cursor");
     this.step = -1;
-    svg.addEventListener("pointermove", (event) => this.point(this.at(event)));
-    svg.addEventListener("pointerdown", (event) => this.point(this.at(event)));
-    svg.addEventListener("pointerleave", () => this.leave());
-    svg.addEventListener("blur", () => this.leave());
+    svg.addEventListener("pointermove", (event) => { if (!figure.pinned) this.point(this.at(event)); });
+    svg.addEventListener("pointerdown", (event) => this.pin(event));
+    svg.addEventListener("pointerleave", () => { if (!figure.pinned) this.leave(); });
+    svg.addEventListener("blur", () => { if (!figure.pinned) this.leave(); });
     svg.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -121,9 +121,22 @@ class Panel {
     this.point({ x: place(this.x, xs[this.step]), y: place(this.y, line.y[this.step]) });
   }
 
+  // A click or a touch keeps the reading until the next one, on whatever panel, or Escape.
+  pin(event) {
+    const was = this.figure.pinned;
+    if (was) was.leave();
+    if (was === this && event.pointerType === "mouse") return;
+    this.point(this.at(event));
+    if (this.figure.tip.hidden) return;
+    this.figure.pinned = this;
+    this.figure.tip.classList.add("pinned");
+  }
+
   leave() {
     this.cursor.replaceChildren();
     this.figure.tip.hidden = true;
+    this.figure.pinned = null;
+    this.figure.tip.classList.remove("pinned");
   }
 
   point(at) {
@@ -140,11 +153,12 @@ class Panel {
     const points = nearest(this, at);
     if (!points.length) return this.leave();
     tip.replaceChildren();
+    tip.classList.toggle("many", points.length > MANY);
     make("div", `${this.xl}: ${words(points[0].value)}`, tip, "soft");
-    for (const [n, one] of points.slice(0, MOST).entries()) {
+    for (const one of [...points].sort((a, b) => a.y - b.y)) { // as they stand, the highest first
       const row = make("div", null, tip);
       make("i", "", row).style.background = one.line.c[dark() ? 1 : 0];
-      make(n ? "span" : "b", `${one.line.n ? one.line.n + ": " : ""}${told(one)}`, row);
+      make(one === points[0] ? "b" : "span", `${one.line.n ? one.line.n + ": " : ""}${told(one)}`, row);
     }
     this.mark(points);
     this.show(points[0]);
@@ -156,7 +170,7 @@ class Panel {
     const ends = { x1: points[0].x, x2: points[0].x, y1: this.y[4], y2: this.y[3] };
     for (const [name, value] of Object.entries(ends)) line.setAttribute(name, value);
     this.cursor.append(line);
-    for (const one of points.slice(0, MOST)) {
+    for (const one of points) {
       const ring = document.createElementNS(this.svg.namespaceURI, "circle");
       for (const [name, value] of Object.entries({ cx: one.x, cy: one.y, r: 4 })) ring.setAttribute(name, value);
       this.cursor.append(ring);
@@ -168,10 +182,11 @@ class Panel {
     const box = this.svg.getBoundingClientRect(), whole = this.figure.node.getBoundingClientRect();
     const scale = box.width / this.svg.viewBox.baseVal.width;
     tip.hidden = false;
-    const x = box.left - whole.left + at.x * scale, y = box.top - whole.top + at.y * scale;
-    const right = x + 14 + tip.offsetWidth <= whole.width;
-    tip.style.left = `${Math.max(0, right ? x + 14 : Math.min(x - 14, whole.width) - tip.offsetWidth)}px`;
-    tip.style.top = `${Math.max(0, y - tip.offsetHeight / 2)}px`;
+    // Below the panel, or above it where the window ends: on no curve of the panel that is read.
+    const x = box.left - whole.left + at.x * scale - tip.offsetWidth / 2;
+    tip.style.left = `${Math.max(0, Math.min(x, whole.width - tip.offsetWidth))}px`;
+    const below = box.bottom + tip.offsetHeight + 4 <= innerHeight || box.top < tip.offsetHeight + 4;
+    tip.style.top = `${(below ? box.bottom + 2 : box.top - tip.offsetHeight - 2) - whole.top}px`;
   }
 }
 
@@ -180,7 +195,7 @@ function figure(node) {
   const tip = make("div", null, node, "tip");
   tip.hidden = true;
   tip.setAttribute("role", "status");
-  const whole = { node, tip };
+  const whole = { node, tip, pinned: null };
   const panels = [...node.querySelectorAll("svg.chart")].map((svg, i) => new Panel(whole, svg, data[i]));
   for (const button of node.querySelectorAll(".switches button")) {
     button.disabled = false;
@@ -266,6 +281,3 @@ for (const button of document.querySelectorAll("button.copy")) {
 }
 const switcher = document.getElementById("theme");
 if (switcher) theme(switcher);
-addEventListener("beforeprint", () => {
-  for (const node of document.querySelectorAll("details")) node.open = true;
-});
