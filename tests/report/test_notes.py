@@ -66,8 +66,8 @@ def test_a_scan_near_one_with_heavy_tails_is_marked_too():
     noted = notes.noted({"curves": curves}, [])["curves"].set_index(["filter", "component", "k"])["note"]
     assert noted["g", "x", 20] == notes.THIN
     near = noted[noted == notes.NEAR].index.tolist()
-    assert near == [("g", "x", k) for k in range(17, 24) if k != 20]  # a twentieth of 60 scans on either side
-    assert (noted == "").sum() == 240 - 7
+    assert near == [("g", "x", k) for k in range(14, 27) if k != 20]  # a tenth of 60 scans on either side
+    assert (noted == "").sum() == 240 - 13
 
 
 @pytest.mark.parametrize(
