@@ -9,6 +9,7 @@ from radarsim.app import configs
 from radarsim.config.experiment import Experiment
 from radarsim.engine import machine
 from radarsim.engine.results import CaseResult
+from radarsim.language import tr
 from radarsim.report import agreement, claims, controlled, files, notes, provenance, sweeps
 from radarsim.report import tables as common
 from radarsim.report.claims import forest
@@ -60,7 +61,8 @@ def figures(
 
 def _said(figure: Figure) -> Figure:
     """The figure whose caption says why a band is missing."""
-    return replace(figure, caption=f"{figure.caption} No band where it would rest on {notes.THIN.partition(':')[0]}.")
+    said = tr("No band where it would rest on under {few} effective realisations.", few=notes.FEW_EFFECTIVE)
+    return replace(figure, caption=f"{figure.caption} {said}")
 
 
 def _banded(made: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 import radarsim
-from radarsim.errors import Interrupted, RadarsimError, StoreError
+from radarsim import language
+from radarsim.errors import ConfigError, Interrupted, RadarsimError, StoreError
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -32,6 +33,10 @@ SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 
 class Commands(click.Group):
     """Commands in the order of their use; faults become lines on stderr and an exit code, never a traceback."""
+
+    def add_command(self, cmd: click.Command, name: str | None = None) -> None:
+        """Every command takes the language, as the group does."""
+        super().add_command(language_option(cmd), name)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted(self.commands, key=ORDER.index)
@@ -166,11 +171,32 @@ def _plain(ctx: click.Context, param: click.Parameter, value: bool) -> None:
         os.environ["NO_COLOR"] = "1"
 
 
+def _language(ctx: click.Context, param: click.Parameter, value: str | None) -> None:
+    """Choose the language of this run and of the processes that it starts; refuse one that is not known."""
+    try:
+        if value is not None:
+            os.environ[language.VARIABLE] = language.checked(value, "--language")
+        language.current()
+    except ConfigError as error:
+        fail(error)
+
+
+language_option = click.option(
+    "--language",
+    metavar="|".join(language.known()),
+    expose_value=False,
+    is_eager=True,
+    callback=_language,
+    help="Language of figures, reports, answers and claims; as RADARSIM_LANGUAGE. Tables are the same in all.",
+)
+
+
 @click.group(cls=Commands, context_settings=SETTINGS)
 @click.version_option(radarsim.__version__, prog_name="radarsim")
 @click.option(
     "--no-color", is_flag=True, expose_value=False, is_eager=True, callback=_plain, help="No colours; as NO_COLOR=1."
 )
+@language_option
 def main() -> None:
     """Monte-Carlo experiments on radar and sonar track processing.
 

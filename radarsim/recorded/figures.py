@@ -5,13 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from radarsim.engine.results import Track
+from radarsim.language import term, tr
 from radarsim.recorded.accuracy import right_mean
 from radarsim.recorded.places import Path
 from radarsim.report import panels
 from radarsim.report.drawing import COLUMN_MM, GREY, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
 from radarsim.report.statistics import Z95
 
-TIME = Axis("time, s")
+TIME = Axis(term("time, s"))
 PLOT = Style(GREY, None, 0, size_pt=1.6)
 BOUND = Style(GREY, 1, width_pt=0.8)
 RADAR = Style(0, None, 2, size_pt=5.0)
@@ -73,7 +74,7 @@ def plan(track: Track, paths: Mapping[str, Path]) -> Figure | None:
         Line(path.t_s, path.places[:, 2] / size, "", style, name=f"track {name}" if several else "plots")
         for path, style, name in zip(own, styles, names, strict=False)
     ]
-    made = [Panel(TIME, Axis(f"range, {unit}"), tuple(over_time), "Range", direct=False)]
+    made = [Panel(TIME, Axis(tr("range, {unit}", unit=unit)), tuple(over_time), "Range", direct=False)]
     if np.isfinite(places[:, :2]).all(axis=1).any():
         marks: list = [
             Line(path.places[:, 1] / size, path.places[:, 0] / size, "", style, name=line.name)
@@ -81,7 +82,14 @@ def plan(track: Track, paths: Mapping[str, Path]) -> Figure | None:
         ]
         marks.append(Line(np.zeros(1), np.zeros(1), "", RADAR, name="radar"))
         marks += _ends(own[0], size)
-        view = Panel(Axis(f"east, {unit}"), Axis(f"north, {unit}"), tuple(marks), "Plan view", direct=False, equal=True)
+        view = Panel(
+            Axis(tr("east, {unit}", unit=unit)),
+            Axis(tr("north, {unit}", unit=unit)),
+            tuple(marks),
+            tr("Plan view"),
+            direct=False,
+            equal=True,
+        )
         made.insert(0, view)
     keys = [(f"track {name}", style) for name, style in zip(names[:MOST_TRACKS], styles, strict=False)]
     if len(own) > MOST_TRACKS:
@@ -89,10 +97,12 @@ def plan(track: Track, paths: Mapping[str, Path]) -> Figure | None:
     if several:
         made.append(Panel(TIME, TIME, (), keys=(("radar", RADAR), *keys)))
     caption = (
-        "Where the plots are: triangle, the radar; start and end of the longest track with their times. "
-        "Where a file tells no heights, the slant range stands for the range over ground."
+        tr(
+            "Where the plots are: triangle, the radar; start and end of the longest track with their "
+            "times. Where a file tells no heights, the slant range stands for the range over ground."
+        )
         if len(made) > 1 + several
-        else "The range of the plots over time; the file does not tell their bearing."
+        else tr("The range of the plots over time; the file does not tell their bearing.")
     )
     columns = min(len(made), 2)
     return Figure("plan", "Where", caption, tuple(made), columns, PAGE_MM if columns > 1 else COLUMN_MM, TALL_MM)
@@ -143,9 +153,9 @@ def estimates(track: Track) -> Figure:
         if marks:
             y = Axis(panels.with_unit(panels.letter(component), unit), limits=_usual(track.estimate[..., c]))
             made.append(Panel(TIME, y, tuple(marks), direct=False))
-    caption = (
-        "Estimates over the recorded plots; bands: twice the standard deviation that each filter believes "
-        "(95 % if it is right)."
+    caption = tr(
+        "Estimates over the recorded plots; bands: twice the standard deviation that each filter "
+        "believes (95 % if it is right)."
     )
     keys = [(panels.literal(name), Style(f, f)) for f, name in enumerate(track.filters[:MOST_FILTERS])]
     return _several("track", "Track", caption, made, [("plots", PLOT), *keys])
@@ -168,14 +178,18 @@ def residuals(track: Track) -> Figure | None:
             if track.residual_sigma is not None and np.isfinite(track.residual_sigma[f, known, d]).any():
                 bound = 2 * track.residual_sigma[f, known, d]
                 marks += [Line(t, bound, "", BOUND, name="± 2 σ"), Line(t, -bound, "", BOUND, name="± 2 σ")]
-            axis = Axis(panels.with_unit(f"residual of {name.rpartition('_')[0]}", unit), limits=_usual(miss))
+            axis = Axis(
+                panels.with_unit(tr("residual of {value}", value=name.rpartition("_")[0]), unit), limits=_usual(miss)
+            )
             made.append(Panel(TIME, axis, tuple(marks), panels.literal(filter_name), direct=False))
-    caption = (
-        "What each plot differs from the estimate after it; dashed, twice the standard deviation that the filter "
-        "believes of that: 95 % of the plots lie between if it is right."
+    caption = tr(
+        "What each plot differs from the estimate after it; dashed, twice the standard deviation "
+        "that the filter believes of that: 95 % of the plots lie between if it is right."
     )
     if len(track.filters) > fitting:
-        caption += f" The first {fitting} of {len(track.filters)} filters are drawn."
+        caption += tr(
+            " The first {fitting} of {filters} filters are drawn.", fitting=fitting, filters=len(track.filters)
+        )
     return _several("residuals", "Residuals", caption, made) if made else None
 
 
@@ -200,11 +214,13 @@ def innovations(track: Track) -> Figure | None:
             values = np.concatenate([line.y for line in marks[1:]])
             ticks = tuple((at, f"{at:g}") for at in TICKS if values.min() <= at <= values.max())
             made.append(
-                Panel(TIME, Axis("mean NIS", "log", ticks=ticks), tuple(marks), panels.literal(name), direct=False)
+                Panel(TIME, Axis(tr("mean NIS"), "log", ticks=ticks), tuple(marks), panels.literal(name), direct=False)
             )
-    caption = (
-        f"Normalised innovations squared, the mean of {WINDOW} plots: 1 for a filter that is right about its errors; "
-        "95 % of such means lie between the dashed bounds. Above: plots worse than stated, or a manoeuvre."
+    caption = tr(
+        "Normalised innovations squared, the mean of {WINDOW} plots: 1 for a filter that is right "
+        "about its errors; 95 % of such means lie between the dashed bounds. Above: plots worse than "
+        "stated, or a manoeuvre.",
+        WINDOW=WINDOW,
     )
     keys = [(panels.literal(name), Style(f, f)) for f, name in enumerate(track.filters[:MOST_FILTERS])]
     return _several("nis", "Innovations", caption, made, [*keys, ("bounds", BOUND)]) if made else None
@@ -222,7 +238,7 @@ def probabilities(track: Track) -> Figure | None:
                 Line(track.t_s, track.probability[f, :, m], f"model {m + 1}", Style(m, m))
                 for m in np.flatnonzero(known).tolist()
             )
-            y = Axis("probability", limits=(0, 1.02))
+            y = Axis(tr("probability"), limits=(0, 1.02))
             made.append(Panel(TIME, y, marks, panels.literal(name), direct=False))
-    caption = "Probabilities of each filter's models, in the order of the config."
-    return _several("probabilities", "Probabilities of the models", caption, made[: panels.MOST]) if made else None
+    caption = tr("Probabilities of each filter's models, in the order of the config.")
+    return _several("probabilities", tr("Probabilities of the models"), caption, made[: panels.MOST]) if made else None

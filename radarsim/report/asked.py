@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, TypeGuard
 
 from radarsim.config.experiment import Case
 from radarsim.config.fields import Model
+from radarsim.language import numeral, plural, tr
 from radarsim.report import tables as common
+from radarsim.report.text import number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,9 +27,10 @@ def asked(cases: Sequence[Case]) -> "dict[str, pd.DataFrame]":
         for key, (value, about) in first.items()
         if all(key in other and other[key][0] == value for other in keys_of.values())
     ]
-    counted = [("realisations", f"{n:,}", "independent runs") for n in sorted({case.realisations for case in cases})]
-    counted += [("seed", str(s), "of the noise") for s in sorted({case.seed for case in cases})]
-    title = "Every key with its value and meaning" if len(cases) == 1 else f"What all {len(cases)} cases share"
+    counts, seeds = (sorted({value(case) for case in cases}) for value in (_realisations, _seed))
+    counted = [("realisations", numeral(f"{n:,}"), tr("independent runs")) for n in counts]
+    counted += [("seed", str(s), tr("of the noise")) for s in seeds]
+    title = plural("Every key with its value and meaning", "What all {count} cases share", len(cases))
     made = {title: _frame(COLUMNS, [*shared, *(counted if len(counted) == 2 else [])])}
     if len(cases) > 1:
         same = {key for key, _, _ in shared}
@@ -35,11 +38,21 @@ def asked(cases: Sequence[Case]) -> "dict[str, pd.DataFrame]":
         rows: list[tuple[object, ...]] = []
         for case in cases[:MOST_CASES]:
             values = (keys_of[case.name].get(key, ("–", ""))[0] for key in keys)
-            rows.append((case.name, *values, f"{case.realisations:,}", case.seed))
+            rows.append((case.name, *values, numeral(f"{case.realisations:,}"), case.seed))
         left = len(cases) - len(rows)
-        title = "In what the cases differ" + (f" (first {MOST_CASES}; {left} more in run.json)" if left else "")
+        title = tr("In what the cases differ")
+        if left:
+            title = tr("In what the cases differ (first {shown}; {left} more in run.json)", shown=len(rows), left=left)
         made[title] = _frame(("case", *keys, "realisations", "seed"), rows)
     return made
+
+
+def _realisations(case: Case) -> int:
+    return case.realisations
+
+
+def _seed(case: Case) -> int:
+    return case.seed
 
 
 def _frame(columns: Sequence[str], rows: Sequence[tuple[object, ...]]) -> "pd.DataFrame":
@@ -50,14 +63,14 @@ def described(model: Model, before: str = "") -> Iterator[tuple[str, str, str]]:
     """Key, value and meaning of every field that a checked model holds, in the order of its schema."""
     for name, field in type(model).model_fields.items():
         value = getattr(model, name)
-        about = " ".join((field.description or "").split())
+        about = tr(" ".join((field.description or "").split()))
         if isinstance(value, Model):
             yield from described(value, f"{before}{name}.")
         elif _models(value):
             for i, one in enumerate(value[:MOST_ENTRIES]):
                 yield f"{before}{name}.{i}", "; ".join(_pairs(one)), about if i == 0 else ""
             if len(value) > MOST_ENTRIES:
-                yield f"{before}{name}", f"{len(value) - MOST_ENTRIES} more", ""
+                yield f"{before}{name}", tr("{count} more", count=len(value) - MOST_ENTRIES), ""
         elif value is not None and value != ():
             yield f"{before}{name}", as_text(name, value), about
 
@@ -81,11 +94,11 @@ def _pairs(model: Model) -> Iterator[str]:
 def as_text(name: str, value: object) -> str:
     """A value as text: angles in degrees too, lists with commas."""
     if isinstance(value, bool):
-        return "yes" if value else "no"
+        return tr("yes") if value else tr("no")
     if isinstance(value, float):
-        text = f"{value:.6g}".replace("-", "−")
+        text = number(value, 6)
         degrees = {"_rad": "°", "_radps": "°/s"}.get(name[name.rfind("_") :]) if "_" in name else None
-        return f"{text} ({math.degrees(value):.6g}{degrees})".replace("-", "−") if degrees and value else text
+        return f"{text} ({number(math.degrees(value), 6)}{degrees})" if degrees and value else text
     if isinstance(value, tuple | list):
         return ", ".join(
             as_text(name, one) if not isinstance(one, tuple | list) else f"[{as_text(name, one)}]" for one in value

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from radarsim.language import tr
 from radarsim.report import chart_look as look
 from radarsim.report import chart_pieces as pieces
 from radarsim.report.chart_pieces import SIZE
@@ -77,7 +78,7 @@ def _panel(figure: Figure, panel: Panel, numbers: dict[str, int], points: int, h
     frame = _Frame(panel, heats)
     marks = Markup("").join(frame.draw(mark, numbers, points) for mark in panel.marks)
     whole = " – ".join(filter(None, (spoken(figure.title), spoken(panel.title))))
-    axes = f"{spoken(panel.y.label)} against {spoken(panel.x.label)}"
+    axes = tr("{y} against {x}", y=spoken(panel.y.label), x=spoken(panel.x.label))
     svg = Markup(
         '<svg class="chart" viewBox="0 0 {:g} {:g}" role="img" tabindex="0" aria-label="{}: {}">{}'
         '<svg x="{:g}" y="{:g}" width="{:g}" height="{:g}" viewBox="{:g} {:g} {:g} {:g}">{}</svg>'

@@ -115,7 +115,7 @@ class Panel:
     direct: lines are named at their ends where the names fit; else always in the figure's legend, which stands below
     the panels; "right": beside a single panel; "none": they are named in another panel. A remark stands above the
     panel, at its right. Without marks a panel adds its keys to the legend. crosses is what the crosses of exact values
-    are called. equal: x and y are drawn at one scale, as a map.
+    are called; empty: exact. equal: x and y are drawn at one scale, as a map.
     """
 
     x: Axis
@@ -127,7 +127,7 @@ class Panel:
     direct: bool = True
     legend: str = "best"
     remark: str = ""
-    crosses: str = "exact"
+    crosses: str = ""
     equal: bool = False
 
 

@@ -29,6 +29,7 @@ from radarsim.report.chart_scale import Scale, heat_scale, tick_text
 from radarsim.report.chart_text import spoken
 from radarsim.report.drawing import Axis as Ends
 from radarsim.report.drawing import Bars, Figure, Heat, Line, Note, Panel, Reference, Style
+from radarsim.report.text import number
 
 Colours = dict[str, Normalize]  # of maps, by the words of their bars
 MM = 1 / 25.4
@@ -312,8 +313,8 @@ def _heat(axes: Axes, heat: Heat, maps: Colours) -> None:
     norm = maps[heat.label]
     where = np.arange(len(heat.x)), np.arange(len(heat.y))
     drawn = axes.pcolormesh(*where, heat.values, cmap="viridis", norm=norm, shading="nearest")
-    axes.set_xticks(np.arange(len(heat.x)), [f"{v:g}" for v in heat.x])
-    axes.set_yticks(np.arange(len(heat.y)), [f"{v:g}" for v in heat.y])
+    axes.set_xticks(np.arange(len(heat.x)), [tick_text(float(v)) for v in heat.x])
+    axes.set_yticks(np.arange(len(heat.y)), [tick_text(float(v)) for v in heat.y])
     axes.grid(False)
     bar = axes.figure.colorbar(drawn, ax=axes, label=heat.label)
     _ticks(bar.ax.yaxis, Ends("", "log" if isinstance(norm, LogNorm) else "linear"), False)
@@ -321,7 +322,7 @@ def _heat(axes: Axes, heat: Heat, maps: Colours) -> None:
         for (i, j), value in np.ndenumerate(heat.values):
             if np.isfinite(value):
                 ink = "white" if norm(value) < 0.5 else "black"
-                axes.text(j, i, f"{value:.3g}", ha="center", va="center", color=ink, fontsize=7)
+                axes.text(j, i, number(float(value), 3), ha="center", va="center", color=ink, fontsize=7)
 
 
 def _note(axes: Axes, note: Note) -> None:

@@ -4,6 +4,7 @@ import base64
 import hashlib
 import json
 import math
+import re
 import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.config.experiment import Experiment
 from radarsim.config.load import as_yaml
-from radarsim.language import numeral
+from radarsim.language import current, numeral, plural, term, tr
 from radarsim.report import asked, chart, provenance, text
 from radarsim.report.chart_text import spoken
 from radarsim.report.claims import page as claims_page
@@ -21,8 +22,10 @@ from radarsim.report.drawing import Figure, Line
 if TYPE_CHECKING:
     import pandas as pd
     from jinja2 import Template
+    from markupsafe import Markup
 
-NOT_SETTLED = "not settled in the run"
+NOT_SETTLED = term("not settled in the run")
+SCRIPT = (term("Light page"), term("Dark page"), term("exact"), term("Copied"), term("Not allowed here"))
 ROWS = 200  # of a table shown in the page
 ALL_ROWS = 1200  # of all of them together: the page stays under 1.5 MB
 MOST_POINTS = 16_000  # of all curves of a page together, which keeps it small
@@ -54,10 +57,10 @@ def page(
         experiment=experiment,
         question=question,
         answer=answer,
-        inputs=None if inputs is None else _table("inputs", inputs),
-        asked=[_table(title, table) for title, table in asked.asked(experiment.cases).items()],
-        agreement=None if agreement is None else _table("exact against Monte-Carlo", agreement),
-        cost=None if cost is None else _table("cost against accuracy", cost),
+        inputs=None if inputs is None else told(tr("inputs"), inputs),
+        asked=[told(title, table) for title, table in asked.asked(experiment.cases).items()],
+        agreement=None if agreement is None else told(tr("exact against Monte-Carlo"), agreement),
+        cost=None if cost is None else told(tr("cost against accuracy"), cost),
         yaml=yaml_of(record["resolved"]),
         record=record,
         extent=provenance.extent(record),
@@ -94,7 +97,7 @@ def comparison(
         warnings=warnings,
         figures=_figures(figures),
         files=_files(figures, outputs),
-        asked=[_table(title, table) for title, table in differing.items()],
+        asked=[told(title, table) for title, table in differing.items()],
         table=_table("comparison", made.drop(columns=["label", "against_label"])),
         version=provenance.versions()["radarsim"],
     )
@@ -167,12 +170,14 @@ def _template(name: str) -> "Template":
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     own: dict[str, Callable[..., str]] = {
         "number": number,
-        "thousands": lambda n: f"{n:,}",
+        "unit": lambda name: tr(text.unit(name)),
+        "expected": claims_page.expected,
         "css": _css,
         "kept": kept,
         "measured": _measured,
     }
     environment.filters.update(own)
+    environment.globals.update(tr=tr, plural=plural)
     return environment.get_template(name)
 
 
@@ -184,7 +189,7 @@ def kept(words: object) -> str:
 def _measured(part: Mapping[str, Any]) -> str:
     """What a part of a claim measured; an infinite settling time as text."""
     if math.isinf(part["measured"]) and "settling" in part["what"]:
-        return NOT_SETTLED
+        return tr(NOT_SETTLED)
     return number(part["measured"])
 
 
@@ -207,7 +212,7 @@ def _claims(table: "pd.DataFrame") -> list[dict[str, Any]]:
 
 def _cell(column: str, value: object) -> str:
     endless = column.startswith("settling") and isinstance(value, float) and math.isinf(value)
-    return NOT_SETTLED if endless else number(value)
+    return tr(NOT_SETTLED) if endless else number(value)
 
 
 def _tables(made: "Mapping[str, pd.DataFrame]") -> list[dict[str, Any]]:
@@ -216,6 +221,52 @@ def _tables(made: "Mapping[str, pd.DataFrame]") -> list[dict[str, Any]]:
     while most > 10 and sum(min(count, most) for count in rows) > ALL_ROWS:
         most -= 10
     return [_table(name, table, most) for name, table in made.items()]
+
+
+def told(name: str, table: "pd.DataFrame") -> dict[str, Any]:
+    """A table that stands in the page alone, in words; one that is a file of its own is shown as it is there."""
+    made = _table(name, table)
+    for column in made["columns"]:
+        column["name"] = head(column["name"])
+    return made
+
+
+def head(column: str) -> str:
+    """What a column of a table that stands in the page alone is called; a unit stands behind the last comma."""
+    if column in HEADS:
+        return tr(HEADS[column])
+    by_stage = re.fullmatch(r"σ of y, (.+), m", column)
+    if by_stage:
+        return tr("σ of y, {stage}, m", stage=tr(by_stage[1]))
+    name, _, unit = column.rpartition(", ")
+    return f"{name}, {tr(unit)}" if name else column
+
+
+FACTS = (  # names of facts of a run and of its machine
+    *(term("system"), term("architecture"), term("processor"), term("cores"), term("byteorder"), term("threads")),
+    *(term("seconds"), term("kernel seconds"), term("realisations computed"), term("realisations from store")),
+)
+HEADS = {  # of tables that stand in pages alone
+    "at_k": term("at scan"),
+    "case": term("case"),
+    "component": term("component"),
+    "filter": term("filter"),
+    "family": term("family"),
+    "inside_percent": term("inside the interval, %"),
+    "key": term("key"),
+    "largest_difference_percent": term("largest difference, %"),
+    "meaning": term("meaning"),
+    "measured, ns": term("measured, ns"),
+    "merge": term("merging rule"),
+    "models": term("models"),
+    "operations": term("operations"),
+    "radar": term("radar"),
+    "realisations": term("realisations"),
+    "scans": term("scans"),
+    "seed": term("seed"),
+    "unit": term("unit"),
+    "value": term("value"),
+}
 
 
 def _table(name: str, table: "pd.DataFrame", most: int = ROWS) -> dict[str, Any]:
@@ -231,15 +282,13 @@ def _table(name: str, table: "pd.DataFrame", most: int = ROWS) -> dict[str, Any]
 
 def _figures(figures: Sequence[Figure]) -> list[dict[str, Any]]:
     """The figures as charts; where there are many curves, each is drawn of fewer points."""
-    from markupsafe import Markup
 
     lines = sum(isinstance(mark, Line) for figure in figures for panel in figure.panels for mark in panel.marks)
     points = max(LEAST_POINTS, min(chart.POINTS, MOST_POINTS // max(1, lines)))
     made = []
     for figure in figures:
         drawn = chart.chart(figure, points)
-        data = json.dumps([panel.data for panel in drawn.panels], ensure_ascii=False, separators=(",", ":"))
-        safe = Markup(data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+        safe = _json([panel.data for panel in drawn.panels])
         named = {"name": figure.name, "title": spoken(figure.title), "caption": spoken(figure.caption)}
         made.append({**named, "chart": drawn, "data": safe})
     return made
@@ -250,6 +299,19 @@ def _files(figures: Sequence[Figure], outputs: Collection[str]) -> dict[str, lis
     kinds = ("svg", "png", "pdf")
     found = {one.name: [kind for kind in kinds if f"figures/{one.name}.{kind}" in outputs] for one in figures}
     return {name: own for name, own in found.items() if own}
+
+
+def words_of_script() -> "Markup":
+    """What the page's script says, in the language spoken, as JSON by what it says in English."""
+    return _json({text: tr(text) for text in SCRIPT})
+
+
+def _json(value: object) -> "Markup":
+    """JSON that cannot end the element in which it stands."""
+    from markupsafe import Markup
+
+    data = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
+    return Markup(data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
 
 
 @cache
@@ -282,6 +344,7 @@ def whole(template: str, **content: object) -> str:
     from markupsafe import Markup
 
     code, digest = script()
+    content |= {"language": current(), "words": words_of_script()}
     return _template(template).render(
         style=Markup(_file("style.css")), script=Markup(code), script_hash=digest, **content
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from radarsim.language import tr
 from radarsim.report.drawing import Figure, Line, Panel, Style
 
 LONGEST_AT_END = 28  # letters of a name that may stand at a line's end
@@ -94,9 +95,10 @@ def _keys(panel: Panel, at_ends: bool, crossed: set[str]) -> Keys:
         found |= {m.label: m.style for m in lines(panel) if not at_ends}
         found |= dict(panel.keys)
     exact = any(isinstance(m, Line) and m.exact is not None and np.isfinite(m.exact).any() for m in panel.marks)
-    if exact and panel.crosses not in crossed:
-        crossed.add(panel.crosses)
-        found[panel.crosses] = None
+    called = panel.crosses or tr("exact")
+    if exact and called not in crossed:
+        crossed.add(called)
+        found[called] = None
     return found
 
 

@@ -105,6 +105,11 @@ def axis_of(result: CaseResult, key: str) -> str:
     return with_unit(" ".join(filter(None, (found.text, mathematical(found.symbol)))), found.unit)
 
 
+def sigma_of(symbol: str, unit: str) -> str:
+    """What an axis of σ of a component is called."""
+    return with_unit(tr("$\\sigma$ of {symbol}", symbol=symbol), unit)
+
+
 def mathematical(symbol: str) -> str:
     """A symbol as mathematical text: $D_M$ of D_M."""
     base, _bar, below = symbol.partition("_")
@@ -172,6 +177,12 @@ def counts(label: str, highest: float) -> Axis:
 def plain_label(result: CaseResult) -> str:
     """`label` for text: letters plain."""
     return plain(label(result))
+
+
+def at_its_place(result: CaseResult, sentence: str) -> str:
+    """A sentence on a case, after the values that it was swept to where there are several."""
+    where = plain(swept(result))
+    return f"{where}: {sentence}" if where else sentence
 
 
 def told(results: Sequence[CaseResult], most: int = 3) -> tuple[list[CaseResult], list[str]]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
+from radarsim.language import numeral, plural, tr
 from radarsim.report import files, notes
 from radarsim.report.statistics import FEW, FEW_EFFECTIVE, FEW_HEAVY
 
@@ -119,14 +120,23 @@ def few(results: Sequence[CaseResult], curves: "pd.DataFrame | None" = None) -> 
     said = []
     if rough:
         said.append(
-            f"{_named(rough)}: intervals of {span([counts[n] for n in rough])} realisations are rough, "
-            f"use at least {FEW}"
+            tr(
+                "{cases}: intervals of {counts} realisations are rough, use at least {least}",
+                cases=_named(rough),
+                counts=span([counts[n] for n in rough]),
+                least=FEW,
+            )
         )
     if curves is None or not len(curves):
         if heavy:
             said.append(
-                f"{_named(heavy)}: intervals of {span([counts[n] for n in heavy])} realisations are too narrow "
-                f"where errors have heavy tails, use at least {FEW_HEAVY} there"
+                tr(
+                    "{cases}: intervals of {counts} realisations are too narrow where errors have heavy tails, use at "
+                    "least {least} there",
+                    cases=_named(heavy),
+                    counts=span([counts[n] for n in heavy]),
+                    least=FEW_HEAVY,
+                )
             )
         return said
     marked = curves[notes.thin(curves) & ~curves["case"].isin(rough).to_numpy()]
@@ -134,9 +144,15 @@ def few(results: Sequence[CaseResult], curves: "pd.DataFrame | None" = None) -> 
         names = list(dict.fromkeys(marked["case"]))
         least = marked["n_eff"].min()
         said.append(
-            f"{_named(names)}: {len(marked):,} of {len(curves):,} rows of curves.csv rest, there or at a scan nearby, "
-            f"on under {FEW_EFFECTIVE} effective realisations, the least on {least:.0f}; these intervals are too "
-            "narrow, and marked"
+            tr(
+                "{cases}: {thin:,} of {rows:,} rows of curves.csv rest, there or at a scan nearby, on under {few} "
+                "effective realisations, the least on {least:.0f}; these intervals are too narrow, and marked",
+                cases=_named(names),
+                thin=len(marked),
+                rows=len(curves),
+                few=FEW_EFFECTIVE,
+                least=least,
+            )
         )
     return said
 
@@ -144,24 +160,34 @@ def few(results: Sequence[CaseResult], curves: "pd.DataFrame | None" = None) -> 
 def _named(names: Sequence[str]) -> str:
     """A few names, and how many more."""
     more = len(names) - MOST_NAMES
-    return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+    first = ", ".join(names[:MOST_NAMES])
+    return plural("{first} and {count} more", "{first} and {count} more", more, first=first) if more > 0 else first
 
 
 def extent(record: Mapping) -> str:
     """Realisations of a case and the seeds in words; how many were asked for only where a case is short of them."""
     cases = record["cases"].values()
     done, asked, seeds = (sorted({case[key] for case in cases}) for key in ("done", "asked", "seed"))
-    words = f"{span(done)} realisations{' a case' if len(cases) > 1 else ''}"
-    if any(case["done"] < case["asked"] for case in cases):
-        words += f" of {span(asked)} asked"
+    most, said = max(done, default=0), {"done": span(done), "asked": span(asked)}
+    short = any(case["done"] < case["asked"] for case in cases)
+    if len(cases) > 1 and short:
+        words = plural(
+            "{done} realisation a case of {asked} asked", "{done} realisations a case of {asked} asked", most, **said
+        )
+    elif len(cases) > 1:
+        words = plural("{done} realisation a case", "{done} realisations a case", most, **said)
+    elif short:
+        words = plural("{done} realisation of {asked} asked", "{done} realisations of {asked} asked", most, **said)
+    else:
+        words = plural("{done} realisation", "{done} realisations", most, **said)
     named = ", ".join(map(str, seeds[:MOST_SEEDS])) + (", …" if len(seeds) > MOST_SEEDS else "")
-    return f"{words}, {'seeds' if len(seeds) > 1 else 'seed'} {named}"
+    return plural("{words}, seed {seeds}", "{words}, seeds {seeds}", len(seeds), words=words, seeds=named)
 
 
 def span(counts: Sequence[int]) -> str:
     """Counts in words: the one there is, or the least to the largest."""
     low, high = min(counts, default=0), max(counts, default=0)
-    return f"{low:,}" if low == high else f"{low:,} to {high:,}"
+    return numeral(f"{low:,}") if low == high else tr("{low:,} to {high:,}", low=low, high=high)
 
 
 def to_json(value: object) -> bytes:

@@ -1,11 +1,16 @@
 """Numbers, units and counts as they stand in sentences, and text that is safe to print."""
 
 import math
+from collections.abc import Iterable
 
-from radarsim.language import numeral
+from radarsim.language import numeral, term, tr
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 UNITS = {"m/s2": "m/s²", "rad/s2": "rad/s²", "m/s3": "m/s³", "hz": "Hz"}  # of tables, as people write them
+SAID = (  # units that a language may write otherwise
+    *(term("m"), term("s"), term("m/s"), term("m/s²"), term("rad"), term("rad/s"), term("rad/s²")),
+    *(term("Hz"), term("Hz/s"), term("Hz/s²"), term("Hz/s³"), term("Hz/s⁴"), term("km"), term("°/s")),
+)
 PLAIN = 6  # digits before the point that are still written out
 
 
@@ -41,6 +46,17 @@ def number(value: float, digits: int = 4) -> str:
     short = f"{float(mantissa):g}"
     raised = power_of_ten(int(exponent))
     return raised if short == "1" else f"−{raised}" if short == "-1" else f"{numeral(short)}·{raised}"
+
+
+def interval(low: str, high: str) -> str:
+    """The ends of an interval in brackets, parted by what the language puts between decimal numbers."""
+    return tr("[{low}, {high}]", low=low, high=high)
+
+
+def estimate(values: Iterable[float], unit: str = "", form: str = ".4g") -> str:
+    """A value with its unit and its 95 % interval, from the value and the two ends: 12.3 m [12, 12.6]."""
+    said, lo, hi = (numeral(format(one, form)) for one in values)
+    return f"{' '.join(filter(None, (said, unit)))} {interval(lo, hi)}"
 
 
 def unit(name: str) -> str:

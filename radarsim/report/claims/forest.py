@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from radarsim.language import tr
 from radarsim.report.claims import page
 from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
 from radarsim.report.claims.rule import CLASSES, VOID
@@ -56,10 +57,13 @@ def figure(rows: Sequence[Mapping]) -> Figure | None:
         return None
     return Figure(
         name="claims",
-        title="Claims, in margins of what their papers say",
-        caption="Of each claim the part that lies furthest from the paper's words: measured, with its 95 % interval, "
-        f"and exactly (crosses), in margins of that part, cut at ± {FURTHEST:g}. Under 0 it is as the words say, up to "
-        "1 within their margin. The mark is the class of the claim, over all readings where these are known.",
+        title=tr("Claims, in margins of what their papers say"),
+        caption=tr(
+            "Of each claim the part that lies furthest from the paper's words: measured, with its 95 % interval, and "
+            "exactly (crosses), in margins of that part, cut at ± {furthest:g}. Under 0 it is as the words say, up to "
+            "1 within their margin. The mark is the class of the claim, over all readings where these are known.",
+            furthest=FURTHEST,
+        ),
         panels=tuple(panels),
         width_mm=PAGE_MM,
         panel_height_mm=58.0,
@@ -76,10 +80,10 @@ def _panel(paper: str, found: Sequence[tuple[Sequence[Mapping], Mapping]]) -> Pa
         if of:
             marks.append(_line(kind, style, of))
     return Panel(
-        Axis(f"claim of {key}", limits=(0, len(found) + 1), ticks=tuple(ticks)),
-        Axis("distance from the words, margins", limits=(-FURTHEST - 0.3, FURTHEST + 0.3)),
-        (*marks, Reference(0.0), Reference(1.0, label="beyond the margin")),
-        title=f"{key} {paper}",
+        Axis(tr("claim of {paper}", paper=key), limits=(0, len(found) + 1), ticks=tuple(ticks)),
+        Axis(tr("distance from the words, margins"), limits=(-FURTHEST - 0.3, FURTHEST + 0.3)),
+        (*marks, Reference(0.0), Reference(1.0, label=tr("beyond the margin"))),
+        title=f"{key} {tr(paper)}",
         direct=False,
         legend="right",
     )
@@ -93,4 +97,4 @@ def _line(kind: str, style: Style, of: Sequence[tuple[int, Mapping]]) -> Line:
     exact = [page.number(row["exact"]) for row in rows]
     crosses = np.array([math.nan if one is None else depth(one, row) for one, row in zip(exact, rows, strict=True)])
     lo, hi = np.minimum(ends[:, 0], value), np.maximum(ends[:, 1], value)
-    return Line(np.array([float(x) for x, _ in of]), value, kind, style, lo, hi, crosses)
+    return Line(np.array([float(x) for x, _ in of]), value, tr(kind), style, lo, hi, crosses)

@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from radarsim.language import numeral, plural, term, tr
 from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
 from radarsim.report.claims.rule import (
     CLASSES,
@@ -99,26 +100,31 @@ def extension(parts: Sequence[Mapping]) -> bool:
 def counted(rows: Sequence[Mapping]) -> str:
     """How many claims are of which class, in words."""
     classes, extensions = counts(rows)
-    said = ", ".join(f"{count} {kind}" for kind, count in classes.items())
-    more = f"{extensions} extension{'s' * (extensions != 1)} not counted" if extensions else ""
+    said = ", ".join(tr("{count} {kind}", count=count, kind=term(kind)) for kind, count in classes.items())
+    more = plural("{count} extension not counted", "{count} extensions not counted", extensions) if extensions else ""
     return "; ".join(filter(None, (said, more)))
 
 
 def verdict_of(parts: Sequence[Mapping]) -> str:
     """A claim's class in words, with the miss of one that is refuted and what would decide one that is not."""
     first = parts[0]
-    text = MARKS.get(first["overall"], first["overall"])
+    said = str(first["overall"])
+    keys = said.removeprefix(DEPENDS).strip()
+    text = tr("depends on {keys}", keys=keys) if said.startswith(DEPENDS) and keys else tr(said)
+    if said in MARKS:
+        text = MARKS[said].replace(said, text)
     notes = []
     if first["class"] in (REFUTED, CONTRADICTORY) and number(first["worst_miss"]) is not None:
-        notes.append(f"by {number(first['worst_miss']):.3g} margins")
+        notes.append(tr("by {miss:.3g} margins", miss=number(first["worst_miss"])))
     if first["class"] == UNDECIDED and number(first["needed"]) is not None:
-        notes.append(f"{number(first['needed']):.2g} realisations would decide")
+        notes.append(tr("{needed:.2g} realisations would decide", needed=number(first["needed"])))
     if number(first["of"]) is not None:
-        notes.append(f"in {number(first['holds']):.0f} of {number(first['of']):.0f} readings")
+        holds, of = number(first["holds"]), number(first["of"])
+        notes.append(tr("in {holds:.0f} of {of:.0f} readings", holds=holds, of=of))
     if first["class"] in (UNJUDGEABLE, NOT_JUDGED) and first["why"]:
-        notes.append(str(first["why"]))
+        notes.append(tr(str(first["why"])))
     if extension(parts):
-        notes.append("extension, not counted")
+        notes.append(tr("extension, not counted"))
     return f"{text} ({'; '.join(notes)})" if notes else text
 
 
@@ -193,9 +199,17 @@ def shown(row: Mapping) -> str:
     return measured(row) if exact is None else f"{plain(exact)} {row['unit']}".rstrip() + " exactly"
 
 
+def expected(words: str) -> str:
+    """What is expected of a part, in the language spoken: `about 20 to 30 ± 10`."""
+    return " ".join(tr(one) if one.isalpha() else numeral(one) for one in words.split())
+
+
+EXPECTED = (term("about"), term("to"))  # the words in it
+
+
 def plain(value: float) -> str:
     """A number at four digits."""
-    return f"{value:.4g}".replace("inf", "∞").replace("-", "\N{MINUS SIGN}")
+    return numeral(f"{value:.4g}").replace("inf", "∞")
 
 
 def measured(row: Mapping) -> str:

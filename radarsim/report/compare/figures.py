@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from radarsim.language import term, tr
 from radarsim.report.compare.sides import SERIES, Series, Side
 from radarsim.report.compare.table import filters_of
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
@@ -41,8 +42,11 @@ def _figure(
     some, left = every[:MOST], len(every) - MOST
     filters = list(dict.fromkeys(f for side in some for f in filters_of(side)))
     unit = rows["unit"].iloc[0]
-    what = {"sigma": "$\\sigma$ of ", "gain_percent": "gain in $\\sigma$ of "}.get(series.value, f"{series.words} ")
-    what = f"{what}{letter(component) if component else model}".strip()
+    symbol = letter(component) if component else model
+    what = f"{tr(series.words)} {symbol}".strip()
+    if series.value in ("sigma", "gain_percent"):
+        words = {"sigma": term("$\\sigma$ of {symbol}"), "gain_percent": term("gain in $\\sigma$ of {symbol}")}
+        what = tr(words[series.value], symbol=symbol)
     values = [line for n, side in enumerate(some) for line in _values(series, side, n, filters, component, model)]
     apart = _apart(series, some, rows, filters)
     keys = [(literal(side.label), Style(n, 0)) for n, side in enumerate(some)]
@@ -50,17 +54,23 @@ def _figure(
     low = None if series.value == "gain_percent" else 0.0
     y = Axis(with_unit(what, unit), limits=(low, None))
     of = "change" if series.ratio else "difference"
-    against = rows["against_label"].iloc[0] if rows["against_label"].nunique() == 1 else "the first"
+    against = rows["against_label"].iloc[0] if rows["against_label"].nunique() == 1 else tr("the first")
     difference = Axis(with_unit(f"{of} against {literal(against)}", "%" if series.ratio else unit))
     panels = (
         Panel(time_axis(), y, tuple(values), direct=False, legend="none"),
         Panel(time_axis(), difference, (Reference(0), *apart), keys=tuple(keys), legend="right"),
     )
     caption = (
-        f"Left: {series.words} of {', '.join(side.label for side in some)} on common axes. Right: the {of} against "
-        f"{against} at common times. Bands: 95 % intervals. Crosses: exact values, where known."
-    ) + (f" {left} further cases are in comparison.csv alone." if left > 0 else "")
-    return Figure(name, f"{what} side by side", caption, panels, 2, PAGE_MM, HEIGHT_MM)
+        tr(
+            "Left: {words} of {value} on common axes. Right: the {of} against {against} at common times. "
+            "Bands: 95 % intervals. Crosses: exact values, where known.",
+            words=series.words,
+            value=", ".join(side.label for side in some),
+            of=of,
+            against=against,
+        )
+    ) + (tr(" {left} further cases are in comparison.csv alone.", left=left) if left > 0 else "")
+    return Figure(name, tr("{what} side by side", what=what), caption, panels, 2, PAGE_MM, HEIGHT_MM)
 
 
 def _values(series: Series, side: Side, n: int, filters: Sequence[str], component: str, model: str) -> list[Mark]:

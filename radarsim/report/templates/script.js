@@ -11,6 +11,13 @@ function words(value) {
   return COMMA ? text.replace(".", ",") : text;
 }
 
+const SAID = JSON.parse(document.getElementById("words").textContent);
+
+// A word of this script in the page's language.
+function said(word) {
+  return SAID[word] || word;
+}
+
 function make(tag, text, parent, css) {
   const made = document.createElement(tag);
   if (text !== null) made.textContent = text;
@@ -36,7 +43,7 @@ function remembered(value) {
 function theme(button) {
   const kept = remembered();
   if (kept === "dark" || kept === "light") document.documentElement.dataset.theme = kept;
-  const told = () => { button.textContent = dark() ? "Light page" : "Dark page"; };
+  const told = () => { button.textContent = said(dark() ? "Light page" : "Dark page"); };
   button.hidden = false;
   button.addEventListener("click", () => {
     document.documentElement.dataset.theme = remembered(dark() ? "light" : "dark") || (dark() ? "light" : "dark");
@@ -76,7 +83,7 @@ function told(point) {
   const part = (key) => (line[key] ? line[key][i] : null);
   let text = words(line.y[i]);
   if (line.l && line.h && (part("l") !== null || part("h") !== null)) text += ` [${words(part("l")) || "−∞"}, ${words(part("h")) || "∞"}]`;
-  if (part("e") !== null) text += `, exact ${words(part("e"))}`;
+  if (part("e") !== null) text += `, ${said("exact")} ${words(part("e"))}`;
   return text;
 }
 
@@ -275,7 +282,7 @@ for (const button of document.querySelectorAll("button.copy")) {
     const from = document.getElementById(button.dataset.of);
     const done = await copy(from.tagName === "TABLE" ? copied(from) : from.textContent);
     const before = button.textContent;
-    button.textContent = done ? "Copied" : "Not allowed here";
+    button.textContent = said(done ? "Copied" : "Not allowed here");
     setTimeout(() => { button.textContent = before; }, 1500);
   });
 }

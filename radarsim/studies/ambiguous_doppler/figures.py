@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.config.experiment import Case, Experiment
-from radarsim.language import term
+from radarsim.language import term, tr
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
@@ -45,14 +45,16 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
 SHARES = {  # figure: column of folds.csv, what it is, caption
     "right": (
         "right",
-        "P(all folds right)",
-        "Share of realisations in which all folds so far are right, of the best hypothesis. Bands: 95 % intervals. "
-        "Crosses: exact, of the nearest fold where truth and filter agree.",
+        term("P(all folds right)"),
+        term(
+            "Share of realisations in which all folds so far are right, of the best hypothesis. Bands: "
+            "95 % intervals. Crosses: exact, of the nearest fold where truth and filter agree."
+        ),
     ),
     "lost": (
         "beyond",
-        "P(velocity off by over D/2)",
-        "Share of realisations whose velocity is off by more than half the span. Bands: 95 % intervals.",
+        term("P(velocity off by over D/2)"),
+        term("Share of realisations whose velocity is off by more than half the span. Bands: 95 % intervals."),
     ),
 }
 
@@ -103,14 +105,16 @@ def hypotheses_figure(cases: Sequence[Case]) -> dict[str, Figure]:
             drawn.append(_fan_panel(case, fan(case, remember[-1], min(FAN_SCANS, case.spec.scans)), remember[-1]))
     if not drawn:
         return {}
-    caption = (
-        "The hypotheses of one realisation (number 7): after each scan a line for every sequence of folds that is "
-        "kept, at its velocity and with its acceleration, up to the next scan; the brighter and broader, the more "
-        "probable. Dots: the true velocity."
+    caption = tr(
+        "The hypotheses of one realisation (number 7): after each scan a line for every sequence of "
+        "folds that is kept, at its velocity and with its acceleration, up to the next scan; the "
+        "brighter and broader, the more probable. Dots: the true velocity."
     )
     columns = min(2, len(drawn))
     width = COLUMN_MM if columns == 1 else PAGE_MM
-    return {"hypotheses": Figure("hypotheses", "How hypotheses thin out", caption, tuple(drawn), columns, width, 70)}
+    return {
+        "hypotheses": Figure("hypotheses", tr("How hypotheses thin out"), caption, tuple(drawn), columns, width, 70)
+    }
 
 
 FANS, FAN_SCANS, FAN_LINES = 4, 8, 40  # panels; scans of one; most lines of a scan
@@ -126,11 +130,11 @@ def _fan_panel(case: Case, of: Fan, number: int) -> Panel:
             marks.append(
                 Line(np.array([t, t + 0.92 * dt]), velocity + acceleration * np.array([0, 0.92 * dt]), "", style)
             )
-    marks.append(Line(of.t_s, of.truth, "", Style(1, None, 0, size_pt=3.5), name="true velocity"))
+    marks.append(Line(of.t_s, of.truth, "", Style(1, None, 0, size_pt=3.5), name=tr("true velocity")))
     title = f"{panels.literal(case.spec.device or case.stem)}, {panels.literal(case.spec.filters[number].name)}"
     low, high = of.truth.min() - FAN_SPANS * case.spec.radar.spans_mps[0], of.truth.max()
     limits = (low, high + FAN_SPANS * case.spec.radar.spans_mps[0])
-    x, y = replace(panels.time_axis(), limits=(None, None)), Axis("radial velocity, m/s", limits=limits)
+    x, y = replace(panels.time_axis(), limits=(None, None)), Axis(tr("radial velocity, m/s"), limits=limits)
     return Panel(x, y, tuple(marks), title, direct=False)
 
 
@@ -150,14 +154,16 @@ def orders_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: st
             if len(rows)
         )
         words = panels.literal(name) if len(results) == 1 else f"{panels.label(result)}, {panels.literal(name)}"
-        drawn.append(Panel(panels.time_axis(), Axis("mean weight in the range"), marks, words))
+        drawn.append(Panel(panels.time_axis(), Axis(tr("mean weight in the range")), marks, words))
     if not drawn:
         return {}
     caption = (
-        "Weights of the orders in the estimate of range, mean over realisations; shares may be negative." + left_out
+        tr("Weights of the orders in the estimate of range, mean over realisations; shares may be negative.") + left_out
     )
     columns = min(2, len(drawn))
     shown = tuple(panels.in_legend(drawn[: panels.MOST])) if len(drawn) > 1 else tuple(drawn)
     return {
-        "orders": Figure("orders", "Weights of orders", caption, shown, columns, PAGE_MM if columns > 1 else COLUMN_MM)
+        "orders": Figure(
+            "orders", tr("Weights of orders"), caption, shown, columns, PAGE_MM if columns > 1 else COLUMN_MM
+        )
     }

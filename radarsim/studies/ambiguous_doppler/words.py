@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.config.experiment import Experiment
-from radarsim.report import panels
+from radarsim.language import listed, numeral, tr
+from radarsim.report import panels, text
 from radarsim.studies.ambiguous_doppler.tables import Result
 
 if TYPE_CHECKING:
@@ -31,10 +32,10 @@ def warnings(experiment: Experiment) -> list[str]:
 
 def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
-    names = " and ".join(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases))
+    names = listed(list(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases)))
     if any(one.folds for case in experiment.cases for one in case.spec.filters):
-        return f"How much is the folded velocity of {names} worth, and from which scan on?"
-    return f"Which order of filter follows the target of {names}, and how are several combined?"
+        return tr("How much is the folded velocity of {radars} worth, and from which scan on?", radars=names)
+    return tr("Which order of filter follows the target of {radars}, and how are several combined?", radars=names)
 
 
 def answer(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> list[str]:
@@ -48,9 +49,11 @@ def answer(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> lis
 
 def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
     axes, told = result.axes, []
-    spans = ", ".join(f"{span:g}" for span in result.spec.radar.spans_mps)
+    spans = ", ".join(numeral(f"{span:g}") for span in result.spec.radar.spans_mps)
     for name in _told_of(result):
-        told.append(f"{panels.plain_label(result)}, D = {spans} m/s, {name}: {_as_good(result, name, made)}.")
+        where = f"{panels.plain_label(result)}, D = {spans} {tr('m/s')}, {name}"
+        clauses = filter(None, (_as_good(result, name, made), _right(result, name, made)))
+        told.append(f"{where}: {'; '.join(clauses)}.")
     if axes.combines.any():
         told.append(_orders_sentence(result, made))
     return told
@@ -68,36 +71,66 @@ def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> str:
     curves = made["curves"][(made["curves"]["case"] == result.name) & (made["curves"]["component"] == "r")]
     worst = curves.loc[curves.groupby("filter", sort=False)["sigma"].idxmax()]
     said = [
-        f"{row['filter']} {row['sigma']:.4g} m [{row['sigma_lo']:.4g}, {row['sigma_hi']:.4g}] at scan {row['k']}"
+        tr(
+            "{filter} {sigma} at scan {k}",
+            filter=row["filter"],
+            sigma=text.estimate((row["sigma"], row["sigma_lo"], row["sigma_hi"]), tr("m")),
+            k=row["k"],
+        )
         for row in worst.to_dict("records")
     ]
     axes = result.axes
     f = int(np.flatnonzero(axes.combines)[0])
     best, whole = (float(np.max(values[f, :, 0])) for values in (axes.best_order, axes.best_combination))
-    bounds = f"; who knew the target would have had {best:.4g} m by the best order of each scan"
-    bounds += f", {whole:.4g} m by the best combination" if np.isfinite(whole) else ""
-    ends = bounds if np.isfinite(best) else ""
-    return f"{panels.plain_label(result)}: largest σ of the range: {'; '.join(said)}{ends}."
+    words = [tr("largest σ of the range: {filters}", filters="; ".join(said))]
+    if np.isfinite(best) and np.isfinite(whole):
+        words.append(
+            tr(
+                "who knew the target would have had {best:.4g} m by the best order of each scan, {whole:.4g} m by the "
+                "best combination",
+                best=best,
+                whole=whole,
+            )
+        )
+    elif np.isfinite(best):
+        words.append(tr("who knew the target would have had {best:.4g} m by the best order of each scan", best=best))
+    return f"{panels.plain_label(result)}: {'; '.join(words)}."
+
+
+def _right(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str:
+    """How often all folds are right at the last scan."""
+    folds = made["folds"]
+    last = folds[(folds["case"] == result.name) & (folds["filter"] == name)].iloc[-1]
+    share = _percent(*(100 * last[key] for key in ("right", "right_lo", "right_hi")))
+    return tr("all folds are right in {share} of realisations at scan {k}", share=share, k=last["k"])
 
 
 def _as_good(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str:
-    """From which scan on σ of the velocity is within 5 % of the oracle's, for good, and the share of right folds."""
+    """From which scan on σ of the velocity is within 5 % of the oracle's, for good; empty where it has none."""
     gains, folds = (made[t][(made[t]["case"] == result.name) & (made[t]["filter"] == name)] for t in ("gains", "folds"))
     rows = gains[gains["component"] == "Vr"].dropna(subset=["above_oracle_percent"])
-    last = folds.iloc[-1]
-    ends = f"[{100 * last['right_lo']:.3g}, {100 * last['right_hi']:.3g}]"
-    right = f"all folds are right in {100 * last['right']:.4g} % {ends} of realisations at scan {last['k']}"
     if not len(rows):
-        return right
+        return ""
     late = rows["above_oracle_hi"].to_numpy() > AS_GOOD
-    if late[-1]:
-        end = rows.iloc[-1]
-        if end["above_oracle_percent"] > LOST:
-            ends = f"[{100 * last['beyond_lo']:.3g}, {100 * last['beyond_hi']:.3g}]"
-            off = f"off by more than half the span in {100 * last['beyond']:.4g} % {ends} of realisations"
-            return f"lost: at scan {end['k']}, the last, the velocity is {off}; {right}"
-        ends = f"[{end['above_oracle_lo']:.3g}, {end['above_oracle_hi']:.3g}]"
-        above = f"{end['above_oracle_percent']:.3g} % {ends} above that of unfolded velocity"
-        return f"σ of the velocity is still {above} at scan {end['k']}, the last; {right}"
-    since = rows["k"].to_numpy()[int(late.nonzero()[0][-1]) + 1 if late.any() else 0]
-    return f"as good as unfolded velocity, within {AS_GOOD:g} %, from scan {since} on; {right}"
+    if not late[-1]:
+        since = rows["k"].to_numpy()[int(late.nonzero()[0][-1]) + 1 if late.any() else 0]
+        return tr("as good as unfolded velocity, within {percent:g} %, from scan {k} on", percent=AS_GOOD, k=since)
+    last, end = folds.iloc[-1], rows.iloc[-1]
+    if end["above_oracle_percent"] > LOST:
+        return tr(
+            "lost: at scan {k}, the last, the velocity is off by more than half the span in {share} of realisations",
+            k=end["k"],
+            share=_percent(*(100 * last[key] for key in ("beyond", "beyond_lo", "beyond_hi"))),
+        )
+    keys = ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")
+    return tr(
+        "σ of the velocity is still {above} above that of unfolded velocity at scan {k}, the last",
+        above=_percent(*(float(f"{end[key]:.3g}") for key in keys)),
+        k=end["k"],
+    )
+
+
+def _percent(value: float, low: float, high: float) -> str:
+    """A percentage at four digits with the ends of its interval at three."""
+    ends = text.interval(*(numeral(f"{one:.3g}") for one in (low, high)))
+    return f"{numeral(f'{value:.4g}')} % {ends}"

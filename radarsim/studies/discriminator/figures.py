@@ -8,6 +8,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
+from radarsim.language import numeral, term, tr
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
@@ -16,16 +17,16 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SYMBOLS = {
-    "phi0": ("$|\\Delta\\varphi_0|$, rad", "phase"),
-    "f0": ("$|\\Delta f_0|$, Hz", "Doppler frequency"),
-    "f1": ("$|\\Delta f_1|$, Hz/s", "first derivative"),
-    "f2": ("$|\\Delta f_2|$, Hz/s²", "second derivative"),
-    "f3": ("$|\\Delta f_3|$, Hz/s³", "third derivative"),
-    "f4": ("$|\\Delta f_4|$, Hz/s⁴", "fourth derivative"),
+    "phi0": ("$|\\Delta\\varphi_0|$, rad", term("phase")),
+    "f0": ("$|\\Delta f_0|$, Hz", term("Doppler frequency")),
+    "f1": ("$|\\Delta f_1|$, Hz/s", term("first derivative")),
+    "f2": ("$|\\Delta f_2|$, Hz/s²", term("second derivative")),
+    "f3": ("$|\\Delta f_3|$, Hz/s³", term("third derivative")),
+    "f4": ("$|\\Delta f_4|$, Hz/s⁴", term("fourth derivative")),
 }
 NAMES = {"phi0": "$\\varphi_0$"} | {f"f{n}": f"$f_{n}$" for n in range(5)}
 WHOLE = ("density", "steps")  # keys that take whole numbers
-WINDOW = "window length, s"
+WINDOW = term("window length, s")
 MOST_LINES = 10
 MOST_TICKS = 8
 SURE = 0.99
@@ -64,7 +65,7 @@ def of_case(figure: Figure, case: str) -> Figure:
 
 def numbers(values: np.ndarray) -> tuple[tuple[float, str], ...]:
     """Ticks at whole numbers, every one or every few."""
-    return tuple((v, f"{v:g}") for v in values[:: -(-len(values) // MOST_TICKS)])
+    return tuple((v, numeral(f"{v:g}")) for v in values[:: -(-len(values) // MOST_TICKS)])
 
 
 def swept_families(results: Sequence[CaseResult]) -> dict[tuple[str, ...], list[CaseResult]]:
@@ -84,7 +85,7 @@ def residuals(result: CaseResult, made: Mapping) -> Figure:
     k, t = windows["k"].to_numpy(float), windows["t_s"].to_numpy(float)
     drawn = [
         Panel(
-            Axis("window $k$", ticks=numbers(k)),
+            Axis(tr("window $k$"), ticks=numbers(k)),
             Axis("$T_k$, s", "log"),
             (Line(k, t, "", Style(0, 0, 0)),),
             "a",
@@ -97,24 +98,32 @@ def residuals(result: CaseResult, made: Mapping) -> Figure:
             own[column].to_numpy(float) for column in ("t_s", "median", "q05", "q95", "posterior_sigma")
         )
         marks = (
-            Line(t, middle, "median", Style(0, 0, 0), low, high),
+            Line(t, middle, tr("median"), Style(0, 0, 0), low, high),
             Line(t, 3.0 * bound, "3σ", Style(1, 1)),
         )
         drawn.append(
             Panel(
-                Axis(WINDOW, "log"),
-                Axis(SYMBOLS[component][0], "log"),
+                Axis(tr(WINDOW), "log"),
+                Axis(_with_unit(SYMBOLS[component][0]), "log"),
                 marks,
                 letter,
                 direct=False,
             )
         )
-    caption = (
-        f"Windows of the estimator {name!r} and the absolute error of each component against the window's length: "
-        f"median and the band from 5 to 95 % of {result.count:,} bursts, locked or not. Dashed: three times the "
-        "potential spread of the window, prior included, the paper's limit."
+    caption = tr(
+        "Windows of the estimator {name!r} and the absolute error of each component against the "
+        "window's length: median and the band from 5 to 95 % of {count:,} bursts, locked or not. "
+        "Dashed: three times the potential spread of the window, prior included, the paper's limit.",
+        name=name,
+        count=result.count,
     )
-    return Figure("residuals", "Errors against the window (figure 2)", caption, tuple(drawn), 3, PAGE_MM, 52.0)
+    return Figure("residuals", tr("Errors against the window (figure 2)"), caption, tuple(drawn), 3, PAGE_MM, 52.0)
+
+
+def _with_unit(words: str) -> str:
+    """A symbol and its unit as the language spoken writes it."""
+    symbol, _comma, unit = words.rpartition(", ")
+    return panels.with_unit(symbol, unit)
 
 
 def locks(result: CaseResult, made: Mapping) -> Figure:
@@ -127,18 +136,22 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
         t, value, lo, hi = (own[c].to_numpy(float) for c in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
         marks.append(Line(t, value, name, Style(n, n, n), lo, hi))
     caption = (
-        "Share of bursts with every component within five potential spreads of the window (without prior; the phase to "
-        f"the nearest turn), of {result.count:,} bursts; right: its upper end. Bands: 95 % intervals."
-    ) + (f" {left} further estimators are in locks.csv alone." if left > 0 else "")
-    x = Axis(WINDOW, "log")
-    whole = Panel(x, Axis("share locked", limits=(0, 1)), tuple(marks), direct=False)
+        tr(
+            "Share of bursts with every component within five potential spreads of the window (without "
+            "prior; the phase to the nearest turn), of {count:,} bursts; right: its upper end. Bands: 95 "
+            "% intervals.",
+            count=result.count,
+        )
+    ) + (tr(" {left} further estimators are in locks.csv alone.", left=left) if left > 0 else "")
+    x = Axis(tr(WINDOW), "log")
+    whole = Panel(x, Axis(tr("share locked"), limits=(0, 1)), tuple(marks), direct=False)
     upper = Panel(
         x,
-        Axis("share locked", limits=(0.85, 1)),
+        Axis(tr("share locked"), limits=(0.85, 1)),
         tuple(replace(m, label="", name=m.label) for m in marks),
         direct=False,
     )
-    return Figure("locks", "Locked bursts against the window", caption, (whole, upper), 2, PAGE_MM, 80.0)
+    return Figure("locks", tr("Locked bursts against the window"), caption, (whole, upper), 2, PAGE_MM, 80.0)
 
 
 def accuracy(result: CaseResult, made: Mapping) -> Figure:
@@ -155,14 +168,16 @@ def accuracy(result: CaseResult, made: Mapping) -> Figure:
             value, lo, hi = (own[c].to_numpy(float) / bound for c in ("sigma", "sigma_lo", "sigma_hi"))
             marks.append(Line(t, value, NAMES[component], Style(n, n % 4, n), lo, hi))
         if len(marks) > 1:
-            axis = Axis("$\\sigma$ / bound", limits=(0.9, 1.3))
-            drawn.append(Panel(Axis(WINDOW, "log"), axis, tuple(marks), name, direct=False))
-    caption = (
-        "Root-mean-square error of the locked bursts over the potential spread of the window, prior included. "
-        f"Bands: 95 % intervals. {result.count:,} bursts; lock is judged at five spreads without prior."
+            axis = Axis(tr("$\\sigma$ / bound"), limits=(0.9, 1.3))
+            drawn.append(Panel(Axis(tr(WINDOW), "log"), axis, tuple(marks), name, direct=False))
+    caption = tr(
+        "Root-mean-square error of the locked bursts over the potential spread of the window, prior "
+        "included. Bands: 95 % intervals. {count:,} bursts; lock is judged at five spreads without "
+        "prior.",
+        count=result.count,
     )
     columns = min(3, max(1, len(drawn)))
-    return Figure("accuracy", "Accuracy of the locked bursts", caption, tuple(drawn), columns, PAGE_MM, 52.0)
+    return Figure("accuracy", tr("Accuracy of the locked bursts"), caption, tuple(drawn), columns, PAGE_MM, 52.0)
 
 
 def final(made: Mapping, result: CaseResult, name: str) -> "pd.Series":
@@ -184,20 +199,23 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
         marks.append(Line(x[order], value, estimator, Style(n, n % 4, n), lo, hi))
     scale = "log" if x.min() > 0 and x.max() / x.min() > 20 else "linear"
     called = panels.key_label(members[0], key).text
-    caption = (
-        f"Share of bursts locked at the end of the burst against the {called}, of {members[0].count:,} each. "
-        f"Bands: 95 % intervals; dotted: {SURE:g}."
+    caption = tr(
+        "Share of bursts locked at the end of the burst against the {called}, of {count:,} each. "
+        "Bands: 95 % intervals; dotted: {sure:g}.",
+        called=called,
+        count=members[0].count,
+        sure=SURE,
     )
     ticks = numbers(x[order]) if key in WHOLE else ()
     panel = Panel(
         Axis(_called(key, members[0]), scale, ticks=ticks),
-        Axis("share locked", limits=(None, 1)),
+        Axis(tr("share locked"), limits=(None, 1)),
         tuple(marks),
         direct=False,
     )
     return Figure(
         name,
-        f"Lock against the {called}",
+        tr("Lock against the {called}", called=called),
         caption,
         (panel,),
         width_mm=panels.WIDE_MM,
@@ -219,18 +237,22 @@ def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], ma
         for member in members:
             column, row = (np.searchsorted(a, float(member.swept[i][1])) for i, a in ((0, x), (1, y)))
             values[row, column] = final(made, member, estimator)["lock_rate"]
-        marks = (Heat(x, y, values, "share locked"),)
+        marks = (Heat(x, y, values, tr("share locked")),)
         across, up = (Axis(_called(key, members[0])) for key in keys)
         drawn.append(Panel(across, up, marks, estimator))
     drawn.append(region(keys, members, made, x, y))
     first, second = (panels.key_label(members[0], key).text for key in keys)
-    caption = (
-        f"Share of bursts locked at the end, over the {first} and the {second}, of {members[0].count:,} in each cell. "
-        f"Last: the largest {second} at which the whole 95 % interval of that share, here and below, lies above "
-        f"{SURE:g}; an estimator without a line is nowhere so sure."
+    caption = tr(
+        "Share of bursts locked at the end, over the {first} and the {second}, of {count:,} in each "
+        "cell. Last: the largest {second} at which the whole 95 % interval of that share, here and "
+        "below, lies above {sure:g}; an estimator without a line is nowhere so sure.",
+        first=first,
+        second=second,
+        count=members[0].count,
+        sure=SURE,
     )
     columns = min(2, len(drawn))
-    return Figure(name, "Where the sequence locks", caption, tuple(drawn), columns, PAGE_MM, 70.0)
+    return Figure(name, tr("Where the sequence locks"), caption, tuple(drawn), columns, PAGE_MM, 70.0)
 
 
 def region(keys: tuple[str, ...], members: Sequence[CaseResult], made: Mapping, x: np.ndarray, y: np.ndarray) -> Panel:
@@ -247,4 +269,4 @@ def region(keys: tuple[str, ...], members: Sequence[CaseResult], made: Mapping, 
     across, up = (
         Axis(_called(key, members[0]), "log" if a.min() > 0 else "linear") for key, a in zip(keys, (x, y), strict=True)
     )
-    return Panel(across, up, tuple(marks), f"locked in over {SURE:g}", direct=False)
+    return Panel(across, up, tuple(marks), tr("locked in over {sure:g}", sure=SURE), direct=False)

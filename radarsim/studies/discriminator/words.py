@@ -7,7 +7,8 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.report import panels
+from radarsim.language import listed, numeral, plural, tr
+from radarsim.report import panels, text
 from radarsim.report import tables as common
 
 if TYPE_CHECKING:
@@ -17,8 +18,11 @@ if TYPE_CHECKING:
 def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
     names = list(dict.fromkeys(e.name for case in experiment.cases for e in case.spec.estimators))
-    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-    return f"How often do {listed} lock onto the Doppler frequency and its derivatives, and how accurate are they then?"
+    return tr(
+        "How often do {estimators} lock onto the Doppler frequency and its derivatives, and how accurate are they "
+        "then?",
+        estimators=listed(names),
+    )
 
 
 def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
@@ -34,16 +38,36 @@ def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
     """Lock and accuracy of the first estimator at its last window, and the locks of the others."""
     first, *others = result.axes.filters
     row = _last(made, result, first)
-    k, n, accuracy = int(row["k"]), max(row["lock_rate"] * row["n"], 1), ""
+    k, n = int(row["k"]), max(row["lock_rate"] * row["n"], 1)
+    said = {"estimator": first, "lock": _lock(row), "bursts": result.count}
+    words = [
+        before
+        + plural(
+            "{estimator}: {count} window, locked in {lock} of {bursts:,} bursts.",
+            "{estimator}: {count} windows, locked in {lock} of {bursts:,} bursts.",
+            k,
+            **said,
+        )
+    ]
     if row["lock_rate"]:
         bound = result.axes.posterior_sigma[0, k - 1] / result.axes.exact_sigma[0, k - 1]
         ratio = np.sqrt(result.sums["error"][0, k - 1, :, 1] / n) / bound
-        accuracy = f"; σ of the locked over the bound (forecast included) {ratio.min():.3f} to {ratio.max():.3f}"
-    windows = f"{k} window{'s' if k > 1 else ''}"
-    words = [f"{before}{first}: {windows}, locked in {_lock(row)} of {result.count:,} bursts{accuracy}."]
+        words = [
+            before
+            + plural(
+                "{estimator}: {count} window, locked in {lock} of {bursts:,} bursts; σ of the locked over the bound "
+                "(forecast included) {least:.3f} to {most:.3f}.",
+                "{estimator}: {count} windows, locked in {lock} of {bursts:,} bursts; σ of the locked over the bound "
+                "(forecast included) {least:.3f} to {most:.3f}.",
+                k,
+                least=ratio.min(),
+                most=ratio.max(),
+                **said,
+            )
+        ]
     if others:
         locks = ", ".join(f"{name} {_lock(_last(made, result, name))}" for name in others)
-        words.append(f"{before}the others lock in: {locks}.")
+        words.append(before + tr("the others lock in: {locks}.", locks=locks))
     return words
 
 
@@ -54,7 +78,15 @@ def _over(results: Sequence[CaseResult], made: Mapping, name: str) -> str:
     found.sort(key=lambda result: rows[result.name]["lock_rate"])
     ends = (found[0], found[-1])
     least, most = (f"{_lock(rows[result.name])} ({panels.plain(panels.swept(result))})" for result in ends)
-    return f"{name}: locked in {least} to {most}; {len(found)} cases of {panels.realisations(found)}."
+    return plural(
+        "{estimator}: locked in {least} to {most}; {count} case of {realisations}.",
+        "{estimator}: locked in {least} to {most}; {count} cases of {realisations}.",
+        len(found),
+        estimator=name,
+        least=least,
+        most=most,
+        realisations=panels.realisations(found),
+    )
 
 
 def _last(made: Mapping, result: CaseResult, name: str) -> "pd.Series":
@@ -66,5 +98,5 @@ def _lock(row: "pd.Series") -> str:
     """A share of bursts with its interval; of all or none the bound to as many digits as it has."""
     value, low, high = (100 * row[name] for name in ("lock_rate", "lock_lo", "lock_hi"))
     if 0 < value < 100:
-        return f"{value:.2f} % [{low:.2f}, {high:.2f}]"
-    return f"{value:.0f} % [{low:.3f}, {high:.3f}]"
+        return text.estimate((value, low, high), "%", ".2f")
+    return f"{value:.0f} % {text.interval(numeral(f'{low:.3f}'), numeral(f'{high:.3f}'))}"

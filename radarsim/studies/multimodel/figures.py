@@ -9,17 +9,17 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
+from radarsim.language import numeral, term, tr
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
-from radarsim.studies.multimodel.filters import labels
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from radarsim.studies.multimodel.study import FlightAxes
 
-SIGMAS = {"y": ("height $y$", "m"), "vy": ("rate of climb $\\dot y$", "m/s")}
+SIGMAS = {"y": (term("the height"), "$y$", "m"), "vy": (term("the rate of climb"), "$\\dot y$", "m/s")}
 RULES = ("moment", "best", "combined", "modified_combined")
 FAMILIES = {"gpb1": "MMA1", "imm": "MMA2", "gpb2": "MMA3"}
 SPREAD = 0.5  # of the points of a stage, stages being one apart
@@ -112,38 +112,40 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
     ends = _stage_lines(list(flights.values()))
     axes = (
         (
-            Axis("east $z$, km"),
+            Axis(tr("east $z$, km")),
             Axis(
-                "north $x$, km",
+                tr("north $x$, km"),
             ),
-            "1  ground track",
+            tr("1  ground track"),
             (),
         ),
-        (panels.time_axis(), Axis("height $y$, km", limits=(0, None)), "2  height", ends),
-        (panels.time_axis(), Axis("speed, m/s", limits=(0, None)), "3  speed", ends),
-        (panels.time_axis(), Axis("acceleration, m/s²", limits=(0, None)), "4  acceleration", ends),
+        (panels.time_axis(), Axis(tr("height $y$, km"), limits=(0, None)), tr("2  height"), ends),
+        (panels.time_axis(), Axis(tr("speed, m/s"), limits=(0, None)), tr("3  speed"), ends),
+        (panels.time_axis(), Axis(tr("acceleration, m/s²"), limits=(0, None)), tr("4  acceleration"), ends),
     )
     lines[1:] = [_unnamed(own) for own in lines[1:]]
     drawn = [
         Panel(x, y, (*marks, *own), title, direct=False) for (x, y, title, marks), own in zip(axes, lines, strict=True)
     ]
     drawn[0] = replace(drawn[0], marks=(*drawn[0].marks, *_landmarks(lines[0])), equal=True)
-    caption = (
-        "The true flight (the paper's figures 1 to 4): the ground track from its start, at one scale north and east, "
-        "with the radar at the origin. Dotted: ends of the stages."
+    caption = tr(
+        "The true flight (the paper's figures 1 to 4): the ground track from its start, at one scale "
+        "north and east, with the radar at the origin. Dotted: ends of the stages."
     )
-    return _several("trajectory", "Flight", caption, drawn, 56)
+    return _several("trajectory", tr("Flight"), caption, drawn, 56)
 
 
 def _landmarks(tracks: Sequence[Line]) -> list[Line | Note]:
     """The radar, and where each track begins and which way it goes."""
-    radar = Line(np.zeros(1), np.zeros(1), "", Style(0, None, 1, size_pt=5.0), name="radar")
-    marks: list[Line | Note] = [radar, Note(0.0, 0.0, "radar", "ne")]
+    radar = Line(np.zeros(1), np.zeros(1), "", Style(0, None, 1, size_pt=5.0), name=tr("radar"))
+    marks: list[Line | Note] = [radar, Note(0.0, 0.0, tr("radar"), "ne")]
     for track in tracks:
-        start = Line(track.x[:1], track.y[:1], "", replace(track.style, dash=None, marker=0, size_pt=5.0), name="start")
+        start = Line(
+            track.x[:1], track.y[:1], "", replace(track.style, dash=None, marker=0, size_pt=5.0), name=tr("start")
+        )
         third = len(track.x) // 3
         marks += [start, Note(float(track.x[third]), float(track.y[third]), _arrow(track, third), "se")]
-    marks.append(Note(float(tracks[0].x[0]), float(tracks[0].y[0]), "start", "ne"))
+    marks.append(Note(float(tracks[0].x[0]), float(tracks[0].y[0]), tr("start"), "ne"))
     return marks
 
 
@@ -163,7 +165,7 @@ def _stage_lines(results: Sequence[CaseResult]) -> tuple[Reference, ...]:
 def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str) -> Figure | None:
     """σ of height or climb against time on a logarithmic scale (figures 5 and 6), a panel for each case."""
     rows = common.groups(curves[curves["component"] == component], "case", "filter")
-    words, unit = SIGMAS[component]
+    quantity, symbol, unit = SIGMAS[component]
     drawn = []
     for result in results:
         marks: list = list(_stage_lines([result]))
@@ -172,7 +174,7 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
             if own is not None:
                 t, value, lo, hi = (own[key].to_numpy(float) for key in ("t_s", "sigma", "sigma_lo", "sigma_hi"))
                 marks.append(Line(t, value, panels.literal(f), replace(style, marker=None), lo, hi))
-        y = Axis(f"$\\sigma$ of {words}, {unit}", "log")
+        y = Axis(panels.sigma_of(symbol, unit), "log")
         drawn.append(Panel(panels.time_axis(), y, tuple(marks), _title(result, results), direct=len(results) == 1))
     if len(drawn) > 1:
         drawn = _beside(drawn, results[0], marker=None)
@@ -180,17 +182,20 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
         (panel,) = drawn
         keys = _keys(results[0], marker=None)
         drawn = [replace(panel, marks=tuple(_unnamed(panel.marks)), keys=keys, direct=False, legend="right")]
-    caption = (
-        f"Root-mean-square error of {words.split(' $')[0]} about the truth, of {results[0].count if results else 0:,} "
-        "realisations; bands: 95 % intervals. Dotted: ends of the stages."
+    caption = tr(
+        "Root-mean-square error of {quantity} about the truth, of {count:,} realisations; bands: 95 % "
+        "intervals. Dotted: ends of the stages.",
+        quantity=quantity,
+        count=results[0].count if results else 0,
     )
     number = _of_the_paper(results, {"y": 5, "vy": 6}[component])
-    return _several(f"sigma_{component}", f"σ of the {words.split(' $')[0]}{number}", caption, drawn, 76)
+    title = tr("σ of {quantity}", quantity=quantity)
+    return _several(f"sigma_{component}", f"{title}{number}", caption, drawn, 76)
 
 
 def _of_the_paper(results: Sequence[CaseResult], number: int) -> str:
     """The paper's number of a figure, where it is of the paper's own experiment."""
-    return f" (figure {number})" if all(result.name == "multimodel" for result in results) else ""
+    return tr(" (figure {number})", number=number) if all(result.name == "multimodel" for result in results) else ""
 
 
 def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure | None:
@@ -202,7 +207,7 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
             if len(options.models) < 2:
                 continue
             marks: list = list(_stage_lines([result]))
-            for m, motion in enumerate(labels(options.models)):
+            for m, motion in enumerate(_motions(options.models)):
                 own = rows[(result.name, name, m + 1)]
                 t, value, lo, hi = (
                     own[key].to_numpy(float) for key in ("t_s", "probability", "probability_lo", "probability_hi")
@@ -210,7 +215,9 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
                 marks.append(Line(t, value, f"{m + 1} {motion}", Style(m, m), lo, hi))
             title = panels.literal(name) if len(results) == 1 else f"{_title(result, results)}: {panels.literal(name)}"
             drawn.append(
-                Panel(panels.time_axis(), Axis("mean probability", limits=(0, 1)), tuple(marks), title, direct=False)
+                Panel(
+                    panels.time_axis(), Axis(tr("mean probability"), limits=(0, 1)), tuple(marks), title, direct=False
+                )
             )
     banks = {tuple(mark.label for mark in panel.marks if isinstance(mark, Line)) for panel in drawn}
     left = len(drawn) - panels.MOST_PANELS
@@ -218,10 +225,13 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
     if len(drawn) > 2 and len(banks) == 1:
         drawn = panels.in_legend(drawn)
     caption = (
-        f"Mean posterior probabilities of the models{_of_the_paper(results, 7)}; the numbers behind the motions are "
-        "the spreads of the random acceleration, m/s². Dotted: ends of the stages."
-    ) + (f" {left} further filters are in probabilities.csv alone." if left > 0 else "")
-    return _several("probabilities", "Probabilities of the models", caption, drawn, 58)
+        tr(
+            "Mean posterior probabilities of the models{of_the_paper}; the numbers behind the motions "
+            "are the spreads of the random acceleration, m/s². Dotted: ends of the stages.",
+            of_the_paper=_of_the_paper(results, 7),
+        )
+    ) + (tr(" {left} further filters are in probabilities.csv alone.", left=left) if left > 0 else "")
+    return _several("probabilities", tr("Probabilities of the models"), caption, drawn, 58)
 
 
 def families(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
@@ -242,12 +252,14 @@ def families(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
                 continue
             value = own.set_index("filter")["sigma"]
             grid = np.array([[value.get(name, np.nan) for name in row] for row in names], dtype=float)
-            x = Axis("merging rule", ticks=tuple((i, rule.replace("_", "\n")) for i, rule in enumerate(RULES)))
-            y = Axis("family", ticks=tuple(enumerate(FAMILIES.values())))
+            x = Axis(tr("merging rule"), ticks=tuple((i, rule.replace("_", "\n")) for i, rule in enumerate(RULES)))
+            y = Axis(tr("family"), ticks=tuple(enumerate(FAMILIES.values())))
             title = stage if len(results) == 1 else f"{_title(result, results)}: {stage}"
-            drawn.append(Panel(x, y, (Heat(np.arange(4), np.arange(3), grid, "$\\sigma$ of $y$, m"),), title))
-    caption = "σ of the height over each stage, by family and rule of the partial merges; one bank, one set of plots."
-    return _several("families", "Families and merging rules", caption, drawn[: panels.MOST], 52)
+            drawn.append(Panel(x, y, (Heat(np.arange(4), np.arange(3), grid, panels.sigma_of("$y$", "m")),), title))
+    caption = tr(
+        "σ of the height over each stage, by family and rule of the partial merges; one bank, one set of plots."
+    )
+    return _several("families", tr("Families and merging rules"), caption, drawn[: panels.MOST], 52)
 
 
 def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
@@ -268,19 +280,35 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
             count = operations[(result.name, stage, row["filter"])]["operations"].to_numpy(float)
             lo, hi, value = (np.array([row[key]]) for key in ("sigma_lo", "sigma_hi", "sigma"))
             marks.append(Line(count, value, panels.literal(row["filter"]), style, lo, hi))
-        x, y = Axis("operations per update", limits=(0, 1.06 * float(most))), Axis("$\\sigma$ of $y$, m", "log")
-        drawn.append(Panel(x, y, tuple(marks), stage, direct=False))
+        x, y = (
+            Axis(tr("operations per update"), limits=(0, 1.06 * float(most))),
+            Axis(panels.sigma_of("$y$", "m"), "log"),
+        )
+        drawn.append(Panel(x, y, tuple(marks), tr(str(stage)), direct=False))
     drawn = _beside(drawn, result, dash=None)
-    caption = (
-        "Accuracy against cost: σ of the height over a stage (whiskers: 95 %) and the mean count of arithmetic "
-        f"operations of one update.{_of_case(result, results)}"
+    caption = tr(
+        "Accuracy against cost: σ of the height over a stage (whiskers: 95 %) and the mean count of "
+        "arithmetic operations of one update.{of_case}",
+        of_case=_of_case(result, results),
     )
-    return _several("cost", "Cost and accuracy", caption, drawn, 62)
+    return _several("cost", tr("Cost and accuracy"), caption, drawn, 62)
+
+
+def _motions(models: Sequence) -> list[str]:
+    """What each model of a bank is, in the language spoken: its motion and the spread in m/s²."""
+    return [f"{tr(MOTIONS[model.motion])} {numeral(f'{model.sigma_acceleration_mps2:g}')}" for model in models]
+
+
+MOTIONS = {"uniform": term("uniform"), "accelerated": term("accelerated"), "still": term("still")}
 
 
 def _of_case(result: CaseResult, results: Sequence[CaseResult]) -> str:
     """A sentence on which of several cases is shown."""
-    return f" Of {panels.plain_label(result)}; the other cases are in the tables alone." if len(results) > 1 else ""
+    return (
+        tr(" Of {plain_label}; the other cases are in the tables alone.", plain_label=panels.plain_label(result))
+        if len(results) > 1
+        else ""
+    )
 
 
 def _unnamed(lines: Sequence) -> list:
@@ -295,20 +323,21 @@ def consistency(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure 
     result = results[0]
     rows = common.groups(table[table["case"] == result.name], "filter")
     drawn = []
-    for key, title in (("nees", "NEES of the position"), ("nis", "NIS of the plot")):
+    for key, title in (("nees", tr("NEES of the position")), ("nis", tr("NIS of the plot"))):
         marks: list = [Reference(1.0)]
         stages: tuple = ()
         for n, (f, style) in enumerate(zip(result.axes.filters, _styles(result), strict=True)):
             own = rows[(f,)]
-            stages = tuple(own["stage"])
+            stages = tuple(tr(str(stage)) for stage in own["stage"])
             x = np.arange(len(own)) + SPREAD / len(result.axes.filters) * (n - (len(result.axes.filters) - 1) / 2)
             value, lo, hi = (own[name].to_numpy(float) for name in (key, f"{key}_lo", f"{key}_hi"))
             marks.append(Line(x, value, panels.literal(f), replace(style, dash=None), lo, hi))
-        axis = Axis("stage", ticks=tuple(enumerate(stages)))
-        drawn.append(Panel(axis, Axis("mean per degree of freedom", "log"), tuple(marks), title, direct=False))
+        axis = Axis(tr("stage"), ticks=tuple(enumerate(stages)))
+        drawn.append(Panel(axis, Axis(tr("mean per degree of freedom"), "log"), tuple(marks), title, direct=False))
     drawn = _beside(drawn, result, dash=None)
-    caption = (
-        "Normalised errors squared, per degree of freedom, by stage: 1 where the filter's own covariance is right, "
-        f"more where it is optimistic, less where it is pessimistic.{_of_case(result, results)}"
+    caption = tr(
+        "Normalised errors squared, per degree of freedom, by stage: 1 where the filter's own "
+        "covariance is right, more where it is optimistic, less where it is pessimistic.{of_case}",
+        of_case=_of_case(result, results),
     )
-    return _several("consistency", "What the filters believe of themselves", caption, drawn, 66)
+    return _several("consistency", tr("What the filters believe of themselves"), caption, drawn, 66)

@@ -4,23 +4,30 @@ from collections.abc import Mapping, Sequence
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.report import panels
+from radarsim.language import listed, numeral, plural, term, tr
+from radarsim.report import panels, text
 
 
 def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
     filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
-    names = ", ".join(filters[:-1]) + (" and " if len(filters) > 1 else "") + filters[-1]
-    flights = len(experiment.cases)
-    return f"How accurately do {names} track the target" + (f" in {flights} cases?" if flights > 1 else "?")
+    cases = len(experiment.cases)
+    if cases == 1:
+        return tr("How accurately do {filters} track the target?", filters=listed(filters))
+    return plural(
+        "How accurately do {filters} track the target in {count} case?",
+        "How accurately do {filters} track the target in {count} cases?",
+        cases,
+        filters=listed(filters),
+    )
 
 
 def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
     """Sentences: which filter has the least σ of the height in each stage, by case; for one case also of the rate of
     climb."""
     shown, others = panels.told(results, 4)
-    height = [f"{panels.plain_label(result)}: {_least(result, made, 'y', 'the height')}" for result in shown]
-    climb = [f"{panels.plain_label(results[0])}: {_least(results[0], made, 'vy', 'the rate of climb')}"]
+    height = [f"{panels.plain_label(result)}: {_least(result, made, 'y', term('the height'))}" for result in shown]
+    climb = [f"{panels.plain_label(results[0])}: {_least(results[0], made, 'vy', term('the rate of climb'))}"]
     return [*height, *(climb if len(results) == 1 else []), *others]
 
 
@@ -31,6 +38,9 @@ def _least(result: CaseResult, made: Mapping, component: str, quantity: str) -> 
     parts = []
     for stage, own in rows.groupby("stage", sort=False):
         best = own.loc[own["sigma"].idxmin()]
-        value, low, high = (f"{float(f'{best[name]:.3g}'):,.10g}" for name in ("sigma", "sigma_lo", "sigma_hi"))
-        parts.append(f"{stage} {best['filter']}, {value} {panels.unit_of(best['unit'])} [{low}, {high}]")
-    return f"least σ of {quantity} by stage: {'; '.join(parts)}."
+        value, low, high = (
+            numeral(f"{float(f'{best[name]:.3g}'):,.10g}") for name in ("sigma", "sigma_lo", "sigma_hi")
+        )
+        ends = text.interval(low, high)
+        parts.append(f"{tr(str(stage))} {best['filter']}, {value} {panels.unit_of(best['unit'])} {ends}")
+    return tr("least σ of {quantity} by stage: {stages}.", quantity=quantity, stages="; ".join(parts))

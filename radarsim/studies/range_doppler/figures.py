@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.config.experiment import Experiment
-from radarsim.language import term
+from radarsim.language import term, tr
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import GREY, Axis, Figure, Line, Note, Panel, Reference, Style
@@ -49,16 +49,16 @@ def consistency_figure(results: Sequence[Result], table: "pd.DataFrame", left_ou
     else:
         names = list(dict.fromkeys(name for result in results for name in result.axes.filters))
         drawn = [_consistency_panel(results, rows, name) for name in names]
-    caption = (
-        "Mean of the normalised squared error eᵀP⁻¹e per estimated component, P the covariance that the filter "
-        "believes; one (dotted) for a filter that is right about itself, more for an optimistic one, less for a "
-        "pessimistic one."
+    caption = tr(
+        "Mean of the normalised squared error eᵀP⁻¹e per estimated component, P the covariance that "
+        "the filter believes; one (dotted) for a filter that is right about itself, more for an "
+        "optimistic one, less for a pessimistic one."
     )
-    figure = Figure("consistency", "What the filters believe of themselves", caption + left_out, tuple(drawn))
+    figure = Figure("consistency", tr("What the filters believe of themselves"), caption + left_out, tuple(drawn))
     return panels.in_columns(figure)
 
 
-NEES = "NEES per component\n(1 = consistent, below = pessimistic)"
+NEES = term("NEES per component\n(1 = consistent, below = pessimistic)")
 MOST_NAMED = 2  # cases that are named at the ends of lines in half a page
 
 
@@ -85,13 +85,14 @@ def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure 
     drawn = panels.spread_out(drawn, panels.MOST_PANELS)
     if not drawn:
         return None
-    caption = (
-        "Exact steady σ of the range against the settling time of the measured σ (within 5 % of the steady value, for "
-        "good); grey lines join equal manoeuvre variances D_M, named in (m/s³)². Dotted: ten scan periods, the paper's "
-        "limit; star: the least steady error under it. What does not settle within the run is named and left out."
+    caption = tr(
+        "Exact steady σ of the range against the settling time of the measured σ (within 5 % of the "
+        "steady value, for good); grey lines join equal manoeuvre variances D_M, named in (m/s³)². "
+        "Dotted: ten scan periods, the paper's limit; star: the least steady error under it. What "
+        "does not settle within the run is named and left out."
     )
-    caption += f" {left} further panels: in steady.csv." if left > 0 else ""
-    return panels.in_columns(Figure("settling", "Steady error against settling time", caption, tuple(drawn)))
+    caption += tr(" {left} further panels: in steady.csv.", left=left) if left > 0 else ""
+    return panels.in_columns(Figure("settling", tr("Steady error against settling time"), caption, tuple(drawn)))
 
 
 def _settling_panel(title: str, result: Result, rows: "pd.DataFrame") -> Panel:
@@ -110,12 +111,15 @@ def _settling_panel(title: str, result: Result, rows: "pd.DataFrame") -> Panel:
         words, star = panels.literal(name), Style(n, None, 7, size_pt=8)
         marks.append(Line(own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy(), "", style, name=words))
         x, y = (best[key].to_numpy() for key in ("settling_s", "steady_sigma"))
-        marks.append(Line(x, y, "", star, name=f"{words}: best $D_M$"))
+        marks.append(Line(x, y, "", star, name=tr("{words}: best $D_M$", words=words)))
         keys.append((panels.literal(name), style))
     longest = max([limit, *settled["settling_s"]])
-    x = Axis("settling time of $\\sigma$ of $r$, s", limits=(-0.04 * longest, 1.15 * longest))
-    keys += [("best $D_M$", Style(0, None, 7, size_pt=8)), (f"{PERIODS} scan periods", Style(GREY, 2, width_pt=0.7))]
-    y, words = Axis("steady $\\sigma$ of $r$, m"), "at the points: $D_M$, (m/s³)²"
+    x = Axis(tr("settling time of $\\sigma$ of $r$, s"), limits=(-0.04 * longest, 1.15 * longest))
+    keys += [
+        (tr("best $D_M$"), Style(0, None, 7, size_pt=8)),
+        (tr("{periods} scan periods", periods=PERIODS), Style(GREY, 2, width_pt=0.7)),
+    ]
+    y, words = Axis(tr("steady $\\sigma$ of $r$, m")), tr("at the points: $D_M$, (m/s³)²")
     remark = _not_settled(rows[~np.isfinite(rows["settling_s"])])
     return Panel(x, y, tuple(marks), title, tuple(keys), words, direct=False, remark=remark)
 
@@ -126,4 +130,6 @@ def _not_settled(rows: "pd.DataFrame") -> str:
         (panels.number(same["manoeuvre_variance"].iloc[0], powers=True), panels.literal(", ".join(same["filter"])))
         for _, same in rows.groupby("manoeuvre_variance")
     ]
-    return "\n".join(f"{variance} ({names}): not settled" for variance, names in found)
+    return "\n".join(
+        tr("{variance} ({names}): not settled", variance=variance, names=names) for variance, names in found
+    )

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from radarsim.config.experiment import Experiment
-from radarsim.report import panels
+from radarsim.language import listed, plural, term, tr
+from radarsim.report import panels, text
 from radarsim.report import tables as common
 from radarsim.studies.range_doppler import tuning
 from radarsim.studies.range_doppler.config import Best
@@ -24,13 +25,8 @@ def question(experiment: Experiment) -> str:
     filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
     names = list(dict.fromkeys(getattr(case.spec.radar, "name", None) or case.stem for case in experiment.cases))
     if any("velocity" in f.observes for case in experiment.cases for f in case.spec.filters):
-        return f"How much does observing the radial velocity lower the errors of {listed(names)}?"
-    return f"How large are the errors of {listed(names)} with {listed(filters)}?"
-
-
-def listed(names: Sequence[str]) -> str:
-    """Names in a sentence: a, b and c."""
-    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+        return tr("How much does observing the radial velocity lower the errors of {radars}?", radars=listed(names))
+    return tr("How large are the errors of {radars} with {filters}?", radars=listed(names), filters=listed(filters))
 
 
 def answer(results: Sequence[Result], made: Made) -> list[str]:
@@ -76,13 +72,14 @@ def _compared(rows: "pd.DataFrame") -> _Moment:
     last = rows.loc[rows.groupby(["case", "filter"], sort=False)["k"].idxmax()]
     early, late = last["t_s"].min(), last["t_s"].max()
     if early == late:
-        return _Moment(last, f"at {early:g} s")
+        return _Moment(last, tr("at {t_s:g} s", t_s=early))
     times = [set(np.round(own["t_s"], 6)) for own in common.groups(rows, "case", "filter").values()]
     shared = set.intersection(*times) - {0.0}
     if not shared:
-        return _Moment(last, f"at the last scan (after {early:g} to {late:g} s)")
+        return _Moment(last, tr("at the last scan (after {early:g} to {late:g} s)", early=early, late=late))
     at = max(shared)
-    return _Moment(rows[np.round(rows["t_s"], 6) == at], f"at {at:g} s, the last time that all have in common,")
+    when = tr("at {t_s:g} s, the last time that all have in common,", t_s=at)
+    return _Moment(rows[np.round(rows["t_s"], 6) == at], when)
 
 
 def _gain_sentence(
@@ -94,46 +91,65 @@ def _gain_sentence(
     """
     last, when = _compared(rows)
     several = rows["filter"].nunique() > 1
-    base = _baseline(results)
+    said: dict[str, Any] = {"quantity": _capital(quantity), "when": when, "base": _baseline(results)}
     if len(last) > 1:
         low, high = (last.iloc[int(pick(last["gain_percent"].to_numpy()))] for pick in (np.argmin, np.argmax))
-        ends = " to ".join(f"{_gain(row)} ({_who(row, labels, several)})" for row in (low, high))
-        loss = _loss(every, low, labels)
+        said |= {"least": _gain(low), "low": _who(low, labels, several)}
+        said |= {"most": _gain(high), "high": _who(high, labels, several)}
         if last["gain_lo"].max() <= last["gain_hi"].min():
-            ends += ", which do not differ for certain,"
-        return f"{quantity.capitalize()}: {when} σ is {ends} {base}{loss}."
+            words = tr(
+                "{quantity}: {when} σ is {least} ({low}) to {most} ({high}), which do not differ for certain, {base}",
+                **said,
+            )
+        else:
+            words = tr("{quantity}: {when} σ is {least} ({low}) to {most} ({high}) {base}", **said)
+        return "; ".join([words, *_loss(every, low, labels)]) + "."
     row = last.iloc[0]
     best = rows.iloc[int(rows["gain_percent"].to_numpy().argmax())]
-    peak = "" if best["k"] == row["k"] else f"; at best {_gain(best)}, at {best['t_s']:g} s"
-    loss = _loss(every, row, labels)
-    return f"{quantity.capitalize()}: at {row['t_s']:g} s, the last scan, σ is {_gain(row)} {base}{peak}{loss}."
+    clauses = [
+        tr("{quantity}: at {t_s:g} s, the last scan, σ is {gain} {base}", t_s=row["t_s"], gain=_gain(row), **said)
+    ]
+    if best["k"] != row["k"]:
+        clauses.append(tr("at best {gain}, at {t_s:g} s", gain=_gain(best), t_s=best["t_s"]))
+    return "; ".join([*clauses, *_loss(every, row, labels)]) + "."
+
+
+def _capital(word: str) -> str:
+    """A word that begins a sentence."""
+    said = tr(word)
+    return said[:1].upper() + said[1:]
 
 
 LOSS = 1.0  # per cent: a gain certainly below minus this, at any scan, is told
 
 
-def _loss(every: "pd.DataFrame", told: "pd.Series[Any]", labels: dict[str, str]) -> str:
+def _loss(every: "pd.DataFrame", told: "pd.Series[Any]", labels: dict[str, str]) -> list[str]:
     """The greatest of the certain losses in words, unless there is none or it is the gain already told."""
     sure = every[every["gain_hi"] < -LOSS]
     if not len(sure):
-        return ""
+        return []
     worst = sure.iloc[int(sure["gain_percent"].to_numpy().argmin())]
     if worst.name == told.name:
-        return ""
+        return []
     several = every["filter"].nunique() > 1
-    who = f", with {_who(worst, labels, several)}" if several or every["case"].nunique() > 1 else ""
-    return f"; at worst {_gain(worst)}, at {worst['t_s']:g} s{who}"
+    gain, at = _gain(worst), worst["t_s"]
+    if several or every["case"].nunique() > 1:
+        who = _who(worst, labels, several)
+        return [tr("at worst {gain}, at {t_s:g} s, with {who}", gain=gain, t_s=at, who=who)]
+    return [tr("at worst {gain}, at {t_s:g} s", gain=gain, t_s=at)]
 
 
 def _baseline(results: Sequence[Result]) -> str:
     """Than what a gain is: range alone only where the baseline filter observes no more."""
     bases = [result.spec.filters[result.axes.baseline] for result in results]
     given = {base.manoeuvre_variance for base in bases if isinstance(base.manoeuvre_variance, float)}
-    same = " at the same D_M" if len(given) > 1 else ""
     if all(base.observes == ("range",) for base in bases):
-        return f"than with range alone{same}"
-    names = {base.name for base in bases}
-    return f"than with filter '{bases[0].name}'" if len(names) == 1 else "than with the baseline filter"
+        if len(given) > 1:
+            return tr("than with range alone at the same D_M")
+        return tr("than with range alone")
+    if len({base.name for base in bases}) == 1:
+        return tr("than with filter '{filter}'", filter=bases[0].name)
+    return tr("than with the baseline filter")
 
 
 def _best_sentences(results: Sequence[Result], made: Made) -> list[str]:
@@ -144,20 +160,32 @@ def _best_sentences(results: Sequence[Result], made: Made) -> list[str]:
         rows = table[table["case"].isin([r.name for r in members]) & (table["component"] == "r")]
         if rows.groupby("filter")["manoeuvre_variance"].nunique().max() > 1:
             chosen = [_best(rows[rows["filter"] == name], name) for name in members[0].axes.filters]
-            told.append(f"{panels.plain(panels.device(members[0]))}: {'; '.join(chosen)}")
+            told.append(f"{panels.plain(panels.device(members[0]))}: {'; '.join(chosen)}.")
     if not told:
         return []
-    rule = f"least steady σ of the range among those that settle in under {PERIODS} scan periods"
-    return [f"Best manoeuvre variance D_M, (m/s³)² ({rule}). {'. '.join(told)}."]
+    rule = plural(
+        "Best manoeuvre variance D_M, (m/s³)² (least steady σ of the range among those that settle in under {count} "
+        "scan period).",
+        "Best manoeuvre variance D_M, (m/s³)² (least steady σ of the range among those that settle in under {count} "
+        "scan periods).",
+        PERIODS,
+    )
+    return [" ".join([rule, *told])]
 
 
 def _best(rows: "pd.DataFrame", name: str) -> str:
     best = rows[rows["best"]]
     if not len(best):
-        return f"{name} none of those tried"
+        return tr("{filter} none of those tried", filter=name)
     row = best.iloc[0]
     variance = panels.number(float(row["manoeuvre_variance"]), powers=True)
-    return f"{name} {variance} (σ {row['steady_sigma']:.4g} m, settled after {row['settling_s']:g} s)"
+    return tr(
+        "{filter} {variance} (σ {sigma:.4g} m, settled after {settling:g} s)",
+        filter=name,
+        variance=variance,
+        sigma=row["steady_sigma"],
+        settling=row["settling_s"],
+    )
 
 
 FIRST = 3  # the scan from which on errors count when a D_M is the best on a manoeuvring target
@@ -193,13 +221,15 @@ def _best_of_broken(results: Sequence[Result], made: Made) -> list[str]:
     for name, members in _tried_on(results).items():
         own = rows[rows["case"].isin([member.name for member in members])]
         words = [_least_worst(own[own["filter"] == one], members, one) for one in members[0].axes.filters]
-        told.append(f"{panels.plain(name)}: {'; '.join(words)}")
+        told.append(f"{panels.plain(name)}: {'; '.join(words)}.")
     if not told:
         return []
-    return [
-        f"Best manoeuvre variance D_M, (m/s³)², on a target that breaks the filters' model (least worst σ of the range "
-        f"from scan {FIRST} on). {'. '.join(told)}."
-    ]
+    rule = tr(
+        "Best manoeuvre variance D_M, (m/s³)², on a target that breaks the filters' model (least worst σ of the range "
+        "from scan {k} on).",
+        k=FIRST,
+    )
+    return [" ".join([rule, *told])]
 
 
 def _least_worst(rows: "pd.DataFrame", members: Sequence[Result], name: str) -> str:
@@ -207,7 +237,13 @@ def _least_worst(rows: "pd.DataFrame", members: Sequence[Result], name: str) -> 
     row = worst.iloc[int(worst["error"].to_numpy().argmin())]
     result = next(member for member in members if member.name == row["case"])
     variance = float(result.axes.manoeuvre_variance[result.axes.filters.index(name)])
-    return f"{name} {panels.number(variance, powers=True)} (σ at worst {row['error']:.4g} m, at {row['t_s']:g} s)"
+    return tr(
+        "{filter} {variance} (σ at worst {sigma:.4g} m, at {t_s:g} s)",
+        filter=name,
+        variance=panels.number(variance, powers=True),
+        sigma=row["error"],
+        t_s=row["t_s"],
+    )
 
 
 MOST_TOLD = 4  # cases with a broken model told in the answer
@@ -221,9 +257,23 @@ def _broken_sentences(results: Sequence[Result], made: Made) -> list[str]:
     told = []
     for result in broken[:MOST_TOLD]:
         words = [f"{name} {_worst(rows[result.name, name])}" for name in result.axes.filters]
-        told.append(f"{panels.plain_label(result)}, a target that breaks the filters' model: {'; '.join(words)}.")
+        told.append(
+            tr(
+                "{case}, a target that breaks the filters' model: {filters}.",
+                case=panels.plain_label(result),
+                filters="; ".join(words),
+            )
+        )
     left = len(broken) - len(told)
-    return told + ([f"{left} further cases break the model: see curves.csv."] if left else [])
+    if left:
+        told.append(
+            plural(
+                "{count} further case breaks the model: see curves.csv.",
+                "{count} further cases break the model: see curves.csv.",
+                left,
+            )
+        )
+    return told
 
 
 def _tuned(result: Result) -> list[tuple[str, Best, float]]:
@@ -236,7 +286,11 @@ def _tuned(result: Result) -> list[tuple[str, Best, float]]:
     ]
 
 
-OVER = {"worst": "is least at its worst from scan {k} on", "mean": "is least on average from scan {k} on"}
+OVER = {
+    "worst": term("{error} is least at its worst from scan {k} on"),
+    "mean": term("{error} is least on average from scan {k} on"),
+    "last": term("{error} is least at the last scan"),
+}
 
 
 def _looked_for(results: Sequence[Result]) -> list[str]:
@@ -245,11 +299,24 @@ def _looked_for(results: Sequence[Result]) -> list[str]:
     for result in [result for result in results if _tuned(result)][:MOST_TOLD]:
         axes, words = result.axes, []
         for name, wanted, variance in _tuned(result):
-            rule = OVER.get(wanted.over, "is least at the last scan").format(k=wanted.from_k)
-            bound = tuning.at_a_limit(variance, len(axes.t_s), axes.sigma, axes.scan_period_s)
-            limit = ", the end of what is looked at: there is no best between" if bound else ""
-            words.append(f"{name} {variance:g} ({wanted.minimise} {rule}{limit})")
-        told.append(f"{panels.plain_label(result)}: D_M, (m/s³)², looked for by the exact errors: {'; '.join(words)}.")
+            said = {
+                "filter": name,
+                "variance": panels.number(variance, powers=True),
+                "rule": tr(OVER[wanted.over], error=wanted.minimise, k=wanted.from_k),
+            }
+            if tuning.at_a_limit(variance, len(axes.t_s), axes.sigma, axes.scan_period_s):
+                words.append(
+                    tr("{filter} {variance} ({rule}, the end of what is looked at: there is no best between)", **said)
+                )
+            else:
+                words.append(tr("{filter} {variance} ({rule})", **said))
+        told.append(
+            tr(
+                "{case}: D_M, (m/s³)², looked for by the exact errors: {filters}.",
+                case=panels.plain_label(result),
+                filters="; ".join(words),
+            )
+        )
     return told
 
 
@@ -259,12 +326,21 @@ def _ambiguity(results: Sequence[Result]) -> list[str]:
     for result in results:
         if "repetition_rate_hz" in result.spec.radar.model_fields_set and (result.axes.observes == 2).any():
             span, speed = span_mps(result), result.axes.speed_mps
-            folds = "" if 2 * speed < span else f", which the target's {speed:.4g} m/s exceed"
-            told.setdefault(panels.plain(panels.device(result)), f"a span of {span:.4g} m/s{folds}")
+            if 2 * speed < span:
+                words = tr("a span of {span:.4g} m/s", span=span)
+            else:
+                words = tr(
+                    "a span of {span:.4g} m/s, which the target's {speed:.4g} m/s exceed", span=span, speed=speed
+                )
+            told.setdefault(panels.plain(panels.device(result)), words)
     if not told:
         return []
-    words = "; ".join(f"{name}: {span}" for name, span in told.items())
-    return [f"Velocities are taken as unambiguous; the repetition rate alone tells apart λF/2 ({words})."]
+    return [
+        tr(
+            "Velocities are taken as unambiguous; the repetition rate alone tells apart λF/2 ({spans}).",
+            spans="; ".join(f"{name}: {span}" for name, span in told.items()),
+        )
+    ]
 
 
 def _worst(rows: "pd.DataFrame") -> str:
@@ -272,24 +348,36 @@ def _worst(rows: "pd.DataFrame") -> str:
         rows.iloc[int(rows["sigma"].to_numpy().argmax())],
         rows.iloc[int(np.abs(rows["bias"].to_numpy()).argmax())],
     )
-    text = (
-        f"worst σ of the range {worst['sigma']:.4g} m [{worst['sigma_lo']:.4g}, {worst['sigma_hi']:.4g}] "
-        f"at {worst['t_s']:g} s, largest bias {bias['bias']:.4g} m at {bias['t_s']:g} s"
+    return tr(
+        "worst σ of the range {sigma} at {t_s:g} s, largest bias {bias:.4g} m at {bias_t_s:g} s",
+        sigma=text.estimate((worst[key] for key in SIGMA), tr("m")),
+        t_s=worst["t_s"],
+        bias=bias["bias"],
+        bias_t_s=bias["t_s"],
     )
-    return text.replace("-", "−")
+
+
+SIGMA = ("sigma", "sigma_lo", "sigma_hi")
+MANIFOLD = 100.0  # per cent of loss from which it is told as a factor
 
 
 def _gain(row: "pd.Series[Any]") -> str:
     """A gain in words: lower, higher, or neither for certain."""
     value, lo, hi = (round(float(row[name]), 1) + 0.0 for name in ("gain_percent", "gain_lo", "gain_hi"))
     if value == lo == hi == 0:
-        return "no lower nor higher by 0.1 %"
+        return tr("no lower nor higher by 0.1 %")
     if row["gain_lo"] <= 0 <= row["gain_hi"]:
-        return f"neither lower nor higher for certain (gain {value:.1f} % [{lo:.1f}, {hi:.1f}])".replace("-", "−")
-    if row["gain_percent"] < 0:
-        value, lo, hi = 0.0 - value, 0.0 - hi, 0.0 - lo
-        return f"{value:.1f} % [{lo:.1f}, {hi:.1f}] higher"
-    return f"{value:.1f} % [{lo:.1f}, {hi:.1f}] lower"
+        return tr("neither lower nor higher for certain (gain {gain})", gain=_percent(value, lo, hi))
+    if value < -MANIFOLD:
+        factor = text.estimate((1 - value / 100, 1 - hi / 100, 1 - lo / 100), form=".3g")
+        return tr("higher by a factor of {factor}", factor=factor)
+    if value < 0:
+        return tr("{percent} higher", percent=_percent(0.0 - value, 0.0 - hi, 0.0 - lo))
+    return tr("{percent} lower", percent=_percent(value, lo, hi))
+
+
+def _percent(value: float, low: float, high: float) -> str:
+    return text.estimate((value, low, high), "%", ".1f")
 
 
 def _who(row: "pd.Series[Any]", labels: dict[str, str], several: bool) -> str:
@@ -300,7 +388,10 @@ def _sigma_sentence(result: Result, curves: "pd.DataFrame") -> str:
     """For experiments without a second filter: σ of the range at the end."""
     rows = curves[(curves["case"] == result.name) & (curves["component"] == "r")]
     row = rows.iloc[-1]
-    return (
-        f"{panels.plain_label(result)}, {row['filter']}: σ of the range at {row['t_s']:g} s is {row['sigma']:.4g} m "
-        f"[{row['sigma_lo']:.4g}, {row['sigma_hi']:.4g}]."
+    return tr(
+        "{case}, {filter}: σ of the range at {t_s:g} s is {sigma}.",
+        case=panels.plain_label(result),
+        filter=row["filter"],
+        t_s=row["t_s"],
+        sigma=text.estimate((row[key] for key in SIGMA), tr("m")),
     )

@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language import term
+from radarsim.language import term, tr
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import Figure, Line, Panel, Style
@@ -91,7 +91,13 @@ def sigma_figure(
     if not drawn:
         return None
     caption = (
-        f"Root-mean-square error of the {quantity.name} about the truth against time, of {results[0].count:,} "
-        "realisations. Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact values." + left_out
+        tr(
+            "Root-mean-square error of the {name} about the truth against time, of {count:,} "
+            "realisations. Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact "
+            "values.",
+            name=quantity.name,
+            count=results[0].count,
+        )
+        + left_out
     )
-    return panels.in_columns(Figure(name, f"σ of the {quantity.name}", caption, tuple(drawn)))
+    return panels.in_columns(Figure(name, tr("σ of the {name}", name=quantity.name), caption, tuple(drawn)))

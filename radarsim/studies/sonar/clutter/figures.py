@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
+from radarsim.language import tr
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Style
@@ -81,17 +82,21 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
                 marks.append(line(rows, confirmed, panels.literal(f), n))
                 marks.append(line(rows, ("t_s", "kept", "kept_lo", "kept_hi"), "", Style(n, n, None, 0.7)))
         if marks:
-            keys = (("thin: kept at that time", Style(0, 0, None, 0.7)),) if not drawn else ()
-            y = Axis("probability", limits=(0, 1))
+            keys = ((tr("thin: kept at that time"), Style(0, 0, None, 0.7)),) if not drawn else ()
+            y = Axis(tr("probability"), limits=(0, 1))
             drawn.append(Panel(panels.time_axis(), y, tuple(marks), _swept(result), keys, direct=False))
     if not drawn:
         return None
     left = len(results) - panels.MOST
     caption = (
-        f"Probability that a track of the target was confirmed by that time, of {panels.realisations(results)}; thin "
-        "lines: that a confirmed track is there and on the target. Bands: 95 % intervals. Crosses: exact."
-    ) + (f" {left} further cases are in the tables alone." if left > 0 else "")
-    title = "Probability of a confirmed track"
+        tr(
+            "Probability that a track of the target was confirmed by that time, of {realisations}; thin "
+            "lines: that a confirmed track is there and on the target. Bands: 95 % intervals. Crosses: "
+            "exact.",
+            realisations=panels.realisations(results),
+        )
+    ) + panels.left_out(left)
+    title = tr("Probability of a confirmed track")
     return Figure("confirmation", title, caption, tuple(drawn), min(2, len(drawn)), PAGE_MM)
 
 
@@ -109,24 +114,25 @@ def life_figure(results: Results, made: "Mapping[str, pd.DataFrame]") -> Figure 
         return None
     rows, x = by_line(tracking, column, results[0]), axis_over(results[0], column, tracking[column])
     shown = {
-        "life": ("life_s", Axis("track life, s", "log")),
-        "time": ("time_to_confirm_s", Axis("time to confirmation, s", limits=(0, None))),
-        "wrong": ("wrong_share", Axis("share of wrong plots", limits=(0, None))),
+        "life": ("life_s", Axis(tr("track life, s"), "log")),
+        "time": ("time_to_confirm_s", Axis(tr("time to confirmation, s"), limits=(0, None))),
+        "wrong": ("wrong_share", Axis(tr("share of wrong plots"), limits=(0, None))),
     }
     drawn = [Panel(x, y, tuple(_lines(rows, column, value, ends)), direct=False) for ends, (value, y) in shown.items()]
     curves = made["curves"]
     at_end = curves[(curves["component"] == "r") & (curves["k"] == results[0].axes.k[-1])]
     at_end = at_end.merge(tracking[["case", *KEYS]].drop_duplicates("case"), on="case", how="left")
-    y = Axis("$\\sigma$ of $r$ of kept tracks, m", limits=(0, None))
+    y = Axis(tr("$\\sigma$ of $r$ of kept tracks, m"), limits=(0, None))
     drawn.append(
         Panel(x, y, tuple(_lines(by_line(at_end, column, results[0]), column, "sigma", "sigma")), direct=False)
     )
-    caption = (
-        "Mean time between ends of a confirmed track (no point: no end was seen), mean time to its confirmation, "
-        "weight of false plots among those taken, and root-mean-square error of the range of the tracks kept at the "
-        f"end, of {panels.realisations(results)}. Bands: 95 % intervals."
+    caption = tr(
+        "Mean time between ends of a confirmed track (no point: no end was seen), mean time to its "
+        "confirmation, weight of false plots among those taken, and root-mean-square error of the "
+        "range of the tracks kept at the end, of {realisations}. Bands: 95 % intervals.",
+        realisations=panels.realisations(results),
     )
-    return Figure("track_life", "Track life and accuracy", caption, tuple(drawn), 2, PAGE_MM, 58)
+    return Figure("track_life", tr("Track life and accuracy"), caption, tuple(drawn), 2, PAGE_MM, 58)
 
 
 def _lines(table: "pd.DataFrame", x: str, value: str, ends: str) -> list[Line]:
@@ -152,13 +158,14 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
         filter=[f"{name} ({rules[name]})" for name in rows["filter"]],
         false_lo=np.maximum(rows["false_lo"], rows[rate] / 10),
     )
-    caption = (
-        "False tracks confirmed in an hour in the whole sector, every false plot beginning a tentative track, of "
-        f"{panels.realisations(results)} such plots a case. Bands: 95 % intervals."
+    caption = tr(
+        "False tracks confirmed in an hour in the whole sector, every false plot beginning a "
+        "tentative track, of {realisations} such plots a case. Bands: 95 % intervals.",
+        realisations=panels.realisations(results),
     )
-    x, y = axis_over(results[0], column, rows[column]), Axis("false tracks per hour", "log")
+    x, y = axis_over(results[0], column, rows[column]), Axis(tr("false tracks per hour"), "log")
     panel = Panel(x, y, tuple(_lines(rows, column, rate, "false")), direct=False)
-    return Figure("false_tracks", "False tracks", caption, (panel,), width_mm=panels.WIDE_MM)
+    return Figure("false_tracks", tr("False tracks"), caption, (panel,), width_mm=panels.WIDE_MM)
 
 
 def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
@@ -167,25 +174,28 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
     table = classes[(classes["case"] == case.name) & (classes["n_false"] > 0)]
     if table.empty:
         return None
-    x = Axis("threshold of the score")
+    x = Axis(tr("threshold of the score"))
     false = _lines(table[table["false_called_true"] > 0], "threshold", "false_called_true", "false")
     true = _lines(table, "threshold", "true_called_false", "true")
     drawn = []
     if false:
         longest = max(false, key=lambda mark: len(mark.x))
         bound = Line(longest.x, np.exp(-longest.x), "bound", Style(GREY, 1, None))
-        y = Axis("share of false tracks called true", "log")
+        y = Axis(tr("share of false tracks called true"), "log")
         drawn.append(Panel(x, y, (*false, bound), direct=False))
     if true:
-        y = Axis("share of target's tracks called false", limits=(0, None))
+        y = Axis(tr("share of target's tracks called false"), limits=(0, None))
         drawn.append(Panel(x, y, tuple(true), direct=False))
-    caption = (
-        "Error rates of calling a track true once its score (logarithm of the likelihood ratio) reaches a threshold, "
-        f"of {panels.realisations(results)} tracks each. Left: of tracks that false plots began; no more than "
-        "exp(−threshold) of them can (bound). Right: of the target's first tracks. Bands: 95 % intervals."
-        + (f" Case: {_swept(case)}." if case.swept else "")
+    caption = tr(
+        "Error rates of calling a track true once its score (logarithm of the likelihood ratio) "
+        "reaches a threshold, of {realisations} tracks each. Left: of tracks that false plots began; "
+        "no more than exp(−threshold) of them can (bound). Right: of the target's first tracks. "
+        "Bands: 95 % intervals.",
+        realisations=panels.realisations(results),
+    ) + (tr(" Case: {swept}.", swept=_swept(case)) if case.swept else "")
+    return (
+        Figure("track_classes", tr("True or false by the score"), caption, tuple(drawn), 2, PAGE_MM) if drawn else None
     )
-    return Figure("track_classes", "True or false by the score", caption, tuple(drawn), 2, PAGE_MM) if drawn else None
 
 
 def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
@@ -193,23 +203,27 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
     shown = realisation_map(result)
     km = 1e-3
     marks = [
-        Line(shown.false[1] * km, shown.false[0] * km, "false plots", Style(GREY, None, 0, 1.1, 1.0)),
+        Line(shown.false[1] * km, shown.false[0] * km, tr("false plots"), Style(GREY, None, 0, 1.1, 1.0)),
         Line(shown.truth[1] * km, shown.truth[0] * km, "target", Style(1, 1, None)),
-        Line(shown.plots[1] * km, shown.plots[0] * km, "its plots", Style(1, None, 1, 1.1, 2.0)),
+        Line(shown.plots[1] * km, shown.plots[0] * km, tr("its plots"), Style(1, None, 1, 1.1, 2.0)),
     ]
     curves = (("tracks", shown.tracks, Style(2, 0, None, 1.3)), ("gates", shown.gates, Style(3, 0, None, 0.6)))
     for label, drawn, style in curves:
         marks += [Line(y * km, x * km, "" if n else label, style) for n, (x, y) in enumerate(drawn)]
     (south, north), (west, east) = shown.window
-    caption = (
-        f"Realisation 0 of {result.name}, tracker {shown.tracker}: the target's course and plots, the false plots of "
-        f"all {len(result.axes.k)} scans, the confirmed tracks and their gates at every fourth scan, near the target."
+    caption = tr(
+        "Realisation 0 of {name}, tracker {tracker}: the target's course and plots, the false plots "
+        "of all {k} scans, the confirmed tracks and their gates at every fourth scan, near the "
+        "target.",
+        name=result.name,
+        tracker=shown.tracker,
+        k=len(result.axes.k),
     )
     x, y = (
-        Axis("distance east, km", limits=(west * km, east * km)),
-        Axis("distance north, km", limits=(south * km, north * km)),
+        Axis(tr("distance east, km"), limits=(west * km, east * km)),
+        Axis(tr("distance north, km"), limits=(south * km, north * km)),
     )
     panel = Panel(x, y, tuple(marks), direct=False, equal=True)
     return Figure(
-        "track_map", "Plots, gates and tracks", caption, (panel,), width_mm=panels.WIDE_MM, panel_height_mm=100
+        "track_map", tr("Plots, gates and tracks"), caption, (panel,), width_mm=panels.WIDE_MM, panel_height_mm=100
     )

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import panels
+from radarsim.language import numeral, tr
+from radarsim.report import panels, text
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.config import Keys
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 def question(specs: Sequence[Keys]) -> str:
     """The question of cases whose filters have to find their plots."""
-    return (
+    return tr(
         "How surely and how soon is a target's track confirmed among false and missed plots, how long is it kept, and "
         "how many false tracks does that cost?"
     )
@@ -29,21 +30,28 @@ def answer(results: Sequence[CaseResult[ClutterAxes]], made: "Mapping[str, pd.Da
     for result in shown:
         rows = made["tracking"][made["tracking"]["case"] == result.name]
         trackers = "; ".join(_of_tracker(row) for _, row in rows.iterrows())
-        where = panels.plain(panels.swept(result))
-        sentences.append(f"{where + ': ' if where else ''}{trackers}.")
+        sentences.append(panels.at_its_place(result, f"{trackers}."))
     return [*sentences, *others]
 
 
 def _of_tracker(row: "pd.Series") -> str:
-    life = "no track lost" if not np.isfinite(row["life_s"]) else f"life {_bounded(row, 'life_s', 'life', ' s')}"
-    confirmed = f"{100 * row['confirmed']:.4g} % [{100 * row['confirmed_lo']:.4g}, {100 * row['confirmed_hi']:.4g}]"
-    return (
-        f"{row['filter']} confirms {confirmed} after {_bounded(row, 'time_to_confirm_s', 'time', ' s')} on average, "
-        f"{life}, {_bounded(row, 'false_tracks_per_hour', 'false')} false tracks per hour"
+    said = {
+        "filter": row["filter"],
+        "confirmed": text.estimate((100 * row[key] for key in ("confirmed", "confirmed_lo", "confirmed_hi")), "%"),
+        "time": _bounded(row, "time_to_confirm_s", "time", tr("s")),
+        "rate": _bounded(row, "false_tracks_per_hour", "false"),
+        "life": _bounded(row, "life_s", "life", tr("s")) if np.isfinite(row["life_s"]) else "",
+    }
+    if not np.isfinite(row["life_s"]):
+        return tr(
+            "{filter} confirms {confirmed} after {time} on average, no track lost, {rate} false tracks per hour", **said
+        )
+    return tr(
+        "{filter} confirms {confirmed} after {time} on average, life {life}, {rate} false tracks per hour", **said
     )
 
 
 def _bounded(row: "pd.Series", name: str, stem: str, unit: str = "") -> str:
     """The value of a column with its interval, to three digits."""
-    value, low, high = (f"{float(f'{row[key]:.3g}'):,.10g}" for key in (name, f"{stem}_lo", f"{stem}_hi"))
-    return f"{value}{unit} [{low}, {high}]"
+    value, low, high = (numeral(f"{float(f'{row[key]:.3g}'):,.10g}") for key in (name, f"{stem}_lo", f"{stem}_hi"))
+    return f"{' '.join(filter(None, (value, unit)))} {text.interval(low, high)}"

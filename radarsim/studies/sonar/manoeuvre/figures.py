@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
+from radarsim.language import numeral, term, tr
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 USUAL = 0.01  # false alarms per test at which detectors are compared, or the nearest rate to it
 MOST_PANELS = 4
 SYMBOLS = {"course": "course", "speed": "speed", "x_ahead": "$x$ ahead", "y_ahead": "$y$ ahead"}
-SYMBOLS |= {"cpa": "CPA", "t_cpa": "$t$ to CPA"}
+SYMBOLS |= {"cpa": "CPA", "t_cpa": term("$t$ to CPA")}
 RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # ticks of a measured over a believed σ
 STRENGTHS = ("acceleration_mps2", "rate_radps")  # keys that say how strong a manoeuvre is
 Results = Sequence[CaseResult[ManoeuvreAxes]]
@@ -105,15 +106,16 @@ def roc_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
             label = "" if np.isfinite(shift) else name
             marks.append(line(points, ("false_alarms", "probability", "lo", "hi"), label, Style(n, None, n)))
         if marks:
-            x = Axis("false alarms a test", "log", limits=(3e-4, 0.5))
-            y = Axis("detection probability", limits=(0, 1))
+            x = Axis(tr("false alarms a test"), "log", limits=(3e-4, 0.5))
+            y = Axis(tr("detection probability"), limits=(0, 1))
             drawn.append(Panel(x, y, tuple(marks), _title(result), direct=False))
-    caption = (
-        "Detectors of manoeuvres in the range: probability of an alarm at the last scan of the manoeuvre against that "
-        f"at the last scan before it. Lines: exact laws; markers: measured, of {results[0].count:,} realisations, with "
-        "95 % intervals."
+    caption = tr(
+        "Detectors of manoeuvres in the range: probability of an alarm at the last scan of the "
+        "manoeuvre against that at the last scan before it. Lines: exact laws; markers: measured, of "
+        "{count:,} realisations, with 95 % intervals.",
+        count=results[0].count,
     )
-    return _figure("roc", "What a detector sees, and what it imagines", caption, drawn)
+    return _figure("roc", tr("What a detector sees, and what it imagines"), caption, drawn)
 
 
 def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
@@ -136,14 +138,16 @@ def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | N
             known = v["exact"] if np.isfinite(v["exact"]).all() else None
             marks.append(Line(strength, v["probability"], name, Style(n, n, n), v["lo"], v["hi"], known))
         title = ", ".join(panels.with_its_unit(members[0], k, v) for k, v in others)
-        x, y = Axis(panels.axis_of(members[0], key)), Axis("detection probability", limits=(0, 1))
+        x, y = Axis(panels.axis_of(members[0], key)), Axis(tr("detection probability"), limits=(0, 1))
         drawn.append(Panel(x, y, tuple(marks), title, direct=False))
-    caption = (
-        f"Probability of an alarm of detectors in the range at about {USUAL:g} false alarms a test, at the last scan "
-        "of the manoeuvre (of a steady target, at the last of all), against the manoeuvre's strength. Bands: 95 % "
-        "intervals, where not seen narrower than the line. Crosses: exact laws."
+    caption = tr(
+        "Probability of an alarm of detectors in the range at about {usual:g} false alarms a test, "
+        "at the last scan of the manoeuvre (of a steady target, at the last of all), against the "
+        "manoeuvre's strength. Bands: 95 % intervals, where not seen narrower than the line. "
+        "Crosses: exact laws.",
+        usual=USUAL,
     )
-    return _figure("detection", "Detection over the strength of the manoeuvre", caption, drawn)
+    return _figure("detection", tr("Detection over the strength of the manoeuvre"), caption, drawn)
 
 
 def _at_strongest(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame", name: str) -> "pd.Series":
@@ -165,14 +169,16 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
             if len(alarms):
                 marks.append(line(alarms, ("delay_s", "probability", "lo", "hi", "exact"), name, n))
         if marks:
-            x, y = Axis("time since it began, s", limits=(0, None)), Axis("an alarm has come", limits=(0, 1))
+            x, y = Axis(tr("time since it began, s"), limits=(0, None)), Axis(tr("an alarm has come"), limits=(0, 1))
             drawn.append(Panel(x, y, tuple(marks), _title(result), direct=False))
-    caption = (
-        "Probability that the first alarm of a detector in the range has come, against the time since the manoeuvre "
-        f"began, at about {USUAL:g} false alarms a test. Crosses: exact, where windows are apart and tests "
-        "independent; overlapping windows have no closed law. Bands: 95 % intervals."
+    caption = tr(
+        "Probability that the first alarm of a detector in the range has come, against the time "
+        "since the manoeuvre began, at about {usual:g} false alarms a test. Crosses: exact, where "
+        "windows are apart and tests independent; overlapping windows have no closed law. Bands: 95 "
+        "% intervals.",
+        usual=USUAL,
     )
-    return _figure("delay", "How soon a manoeuvre is seen", caption, drawn)
+    return _figure("delay", tr("How soon a manoeuvre is seen"), caption, drawn)
 
 
 def response_figure(results: Results, curves: "pd.DataFrame") -> Figure | None:
@@ -182,13 +188,14 @@ def response_figure(results: Results, curves: "pd.DataFrame") -> Figure | None:
     for result in results:
         component, unit = result.axes.components[0]
         marks: tuple[Mark, ...] = (*_ends(result), *case_lines(result, groups, component, SIGMA))
-        y = Axis(f"$\\sigma$ of {QUANTITIES[component].symbol}, {unit}", "log")
+        y = Axis(panels.sigma_of(QUANTITIES[component].symbol, unit), "log")
         drawn.append(Panel(panels.time_axis(), y, marks, _title(result), direct=False))
-    caption = (
-        f"Root-mean-square error of the first coordinate about the truth on the same plots, of "
-        f"{results[0].count:,} realisations. Dotted: the manoeuvre begins and ends. Crosses: exact values."
+    caption = tr(
+        "Root-mean-square error of the first coordinate about the truth on the same plots, of "
+        "{count:,} realisations. Dotted: the manoeuvre begins and ends. Crosses: exact values.",
+        count=results[0].count,
     )
-    return _figure("response", "Filters through a manoeuvre", caption, drawn)
+    return _figure("response", tr("Filters through a manoeuvre"), caption, drawn)
 
 
 def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
@@ -197,13 +204,14 @@ def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
     drawn = []
     for result in results:
         lines = case_lines(result, groups, result.axes.components[0][0], ("t_s", "probability", "lo", "hi"))
-        y = Axis("probability of a manoeuvre", limits=(0, 1))
+        y = Axis(tr("probability of a manoeuvre"), limits=(0, 1))
         drawn.append(Panel(panels.time_axis(), y, (*_ends(result), *lines), _title(result), direct=False))
-    caption = (
-        "Share of realisations in which an adaptive filter is in its manoeuvring mode, and mean probability of the "
-        "manoeuvring model of an imm, first coordinate. Dotted: the manoeuvre begins and ends."
+    caption = tr(
+        "Share of realisations in which an adaptive filter is in its manoeuvring mode, and mean "
+        "probability of the manoeuvring model of an imm, first coordinate. Dotted: the manoeuvre "
+        "begins and ends."
     )
-    return _figure("modes", "What filters take the target to be doing", caption, drawn)
+    return _figure("modes", tr("What filters take the target to be doing"), caption, drawn)
 
 
 def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
@@ -219,16 +227,20 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
             columns = ("x", "ratio", "ratio_lo", "ratio_hi")
             marks.append(line(part.assign(x=x), columns, str(f), Style(n, None, n)))
         low, high = at_time["ratio"].min(), at_time["ratio"].max()
-        shown = tuple((float(value), f"{value:g}") for value in RATIOS if low <= value <= high or value == 1)
-        y = Axis("measured / believed $\\sigma$", "log", ticks=shown)
-        drawn.append(Panel(Axis("", ticks=ticks), y, tuple(marks), f"t = {when:g} s", direct=False))
+        shown = tuple((float(value), numeral(f"{value:g}")) for value in RATIOS if low <= value <= high or value == 1)
+        y = Axis(tr("measured / believed $\\sigma$"), "log", ticks=shown)
+        drawn.append(Panel(Axis("", ticks=ticks), y, tuple(marks), tr("t = {t_s:g} s", t_s=when), direct=False))
     case = f" ({panels.plain(_title(result))})" if result.swept else ""
     left = len(results) - 1
     caption = (
-        f"σ about the truth over the one computed from the track's covariance to first order{case}, of "
-        f"{result.count:,} realisations, with 95 % intervals."
-    ) + (f" {left} further cases are in the tables alone." if left else "")
-    return _figure("uses", "What a track is used for", caption, drawn, 2)
+        tr(
+            "σ about the truth over the one computed from the track's covariance to first order{case}, "
+            "of {count:,} realisations, with 95 % intervals.",
+            case=case,
+            count=result.count,
+        )
+    ) + panels.left_out(left)
+    return _figure("uses", tr("What a track is used for"), caption, drawn, 2)
 
 
 def _ends(result: CaseResult[ManoeuvreAxes]) -> list[Reference]:

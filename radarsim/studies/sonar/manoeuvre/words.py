@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import panels
+from radarsim.language import term, tr
+from radarsim.report import panels, text
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
 from radarsim.studies.sonar.manoeuvre.config import Keys
 from radarsim.studies.sonar.manoeuvre.figures import USUAL, every_scan, last_of, usual
@@ -17,10 +18,10 @@ if TYPE_CHECKING:
 def question(specs: Sequence[Keys]) -> str:
     """The question of cases with detectors, filters that respond to manoeuvres, or uses."""
     if any(spec.detectors for spec in specs):
-        return "How surely and how soon is a manoeuvre detected, and what do filters that respond to it gain?"
+        return tr("How surely and how soon is a manoeuvre detected, and what do filters that respond to it gain?")
     if any(spec.uses for spec in specs):
-        return "How well are course, speed, position ahead and closest approach known from a track?"
-    return "What do filters that respond to manoeuvres gain?"
+        return tr("How well are course, speed, position ahead and closest approach known from a track?")
+    return tr("What do filters that respond to manoeuvres gain?")
 
 
 def answer(results: Sequence[CaseResult[ManoeuvreAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
@@ -38,15 +39,24 @@ def _detected(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame") -> 
     if not ranked:
         return ""
     ends = [
-        f"{row['filter']} {row['probability']:.3g} [{row['lo']:.3g}, {row['hi']:.3g}]"
+        f"{row['filter']} {text.estimate((row[key] for key in ('probability', 'lo', 'hi')), form='.3g')}"
         for row in ranked[:: len(ranked) - 1 or 1]
     ]
-    where = panels.plain(panels.swept(result))
-    shown = ends[0] if len(ends) == 1 else f"most with {ends[-1]}, least with {ends[0]}"
-    return (
-        f"{where + ': ' if where else ''}alarms a test at the end of the manoeuvre, at about {USUAL:g} false alarms: "
-        f"{shown}."
-    )
+    if len(ends) == 1:
+        words = tr(
+            "alarms a test at the end of the manoeuvre, at about {usual:g} false alarms: {one}.",
+            usual=USUAL,
+            one=ends[0],
+        )
+    else:
+        words = tr(
+            "alarms a test at the end of the manoeuvre, at about {usual:g} false alarms: most with {most}, least with "
+            "{least}.",
+            usual=USUAL,
+            most=ends[-1],
+            least=ends[0],
+        )
+    return panels.at_its_place(result, words)
 
 
 def _first_order(made: "Mapping[str, pd.DataFrame]") -> list[str]:
@@ -57,10 +67,26 @@ def _first_order(made: "Mapping[str, pd.DataFrame]") -> list[str]:
     first = rows.iloc[0]
     rows = rows[(rows["case"] == first["case"]) & (rows["filter"] == first["filter"])]
     rows = rows[rows["k"] == rows["k"].max()]
-    ratios = [
-        f"{row.component} {row.ratio:.3f} [{row.ratio_lo:.3f}, {row.ratio_hi:.3f}]"
-        f"{' (near zero)' if row.first_order == NEAR else ''}"
-        for row in rows.itertuples()
+    ratios = []
+    for row in rows.itertuples():
+        ratio = f"{tr(USES[row.component])} {text.estimate((row.ratio, row.ratio_lo, row.ratio_hi), form='.3f')}"
+        ratios.append(tr("{ratio} (near zero)", ratio=ratio) if row.first_order == NEAR else ratio)
+    return [
+        tr(
+            "Measured σ of the track's uses over that from its covariance ({filter}, {t_s:g} s, {case}): {ratios}.",
+            filter=first["filter"],
+            t_s=rows.iloc[0]["t_s"],
+            case=first["case"],
+            ratios=", ".join(ratios),
+        )
     ]
-    where = f"{first['filter']}, {rows.iloc[0]['t_s']:g} s, {first['case']}"
-    return [f"Measured σ of the track's uses over that from its covariance ({where}): {', '.join(ratios)}."]
+
+
+USES = {
+    "course": term("course"),
+    "speed": term("speed"),
+    "x_ahead": term("x ahead"),
+    "y_ahead": term("y ahead"),
+    "cpa": term("CPA"),
+    "t_cpa": term("time to CPA"),
+}

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
+from radarsim.language import numeral, tr
 from radarsim.report import panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
@@ -32,7 +33,7 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
     rows = table[(table["component"] == table["component"].iloc[0]) & (table["degree"] == 1) & (table["plots"] <= 20)]
     if rows.empty:
         return None
-    accuracy: list[Mark] = [Reference(1.0, label="one plot")]
+    accuracy: list[Mark] = [Reference(1.0, label=tr("one plot"))]
     bought: list[Mark] = []
     for n, (what, part) in enumerate(rows.groupby("what", sort=False)):
         accuracy.append(line(part, ("plots", "ratio", "ratio_lo", "ratio_hi", "formula"), str(what), n))
@@ -40,18 +41,19 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
             part[key].to_numpy(dtype=float)[1:] for key in ("plots", "bought_percent", "formula_bought_percent")
         )
         bought.append(Line(x, measured, str(what), Style(n, n, n), exact=formula))
-    x_axis = panels.counts("plots n", float(rows["plots"].max()))
-    left = Axis("$\\sigma$ / $\\sigma$ of a plot", limits=(0, None))
-    right = Axis("bought by the n-th plot, %", limits=(0, None))
+    x_axis = panels.counts(tr("plots n"), float(rows["plots"].max()))
+    left = Axis(tr("$\\sigma$ / $\\sigma$ of a plot"), limits=(0, None))
+    right = Axis(tr("bought by the n-th plot, %"), limits=(0, None))
     drawn = (
-        Panel(x_axis, left, tuple(accuracy), key_title="measured", direct=False, crosses="the paper's formula"),
+        Panel(x_axis, left, tuple(accuracy), key_title="measured", direct=False, crosses=tr("the paper's formula")),
         Panel(x_axis, right, tuple(bought), direct=False),
     )
-    caption = (
-        "Left: σ of the position at the last plot (smoothed) and one scan ahead (extrapolated) in σ of a single plot, "
-        "growing memory of degree 1. Crosses: the paper's formulas. Right: by how much the n-th plot lowers that σ."
+    caption = tr(
+        "Left: σ of the position at the last plot (smoothed) and one scan ahead (extrapolated) in σ "
+        "of a single plot, growing memory of degree 1. Crosses: the paper's formulas. Right: by how "
+        "much the n-th plot lowers that σ."
     )
-    return Figure("plots", "What each further plot buys", caption, drawn, 2, PAGE_MM)
+    return Figure("plots", tr("What each further plot buys"), caption, drawn, 2, PAGE_MM)
 
 
 def gains_figure(table: "pd.DataFrame") -> Figure:
@@ -62,15 +64,16 @@ def gains_figure(table: "pd.DataFrame") -> Figure:
         line(rows, ("plots", key, f"{key}_lo", f"{key}_hi", f"{key}_formula"), f"${key}_n$", n)
         for n, key in enumerate(("A", "B"))
     ]
-    caption = (
-        "Weights of the residual in position and velocity of growing memory, from the measured errors (var r / σ² and "
-        "T₀ cov(r, v) / σ²). Crosses: the paper's (14). They go to zero: new plots count less and less."
+    caption = tr(
+        "Weights of the residual in position and velocity of growing memory, from the measured "
+        "errors (var r / σ² and T₀ cov(r, v) / σ²). Crosses: the paper's (14). They go to zero: new "
+        "plots count less and less."
     )
     if table["case"].nunique() > 1:
-        caption += f" Case: {first['case']}."
-    x = panels.counts("plots n", float(rows["plots"].max()))
-    panel = Panel(x, Axis("gain", "log"), tuple(marks), crosses="the paper's (14)")
-    return Figure("smoothing_gains", "Gains of growing memory", caption, (panel,))
+        caption += tr(" Case: {case}.", case=first["case"])
+    x = panels.counts(tr("plots n"), float(rows["plots"].max()))
+    panel = Panel(x, Axis(tr("gain"), "log"), tuple(marks), crosses=tr("the paper's (14)"))
+    return Figure("smoothing_gains", tr("Gains of growing memory"), caption, (panel,))
 
 
 def believed_figure(
@@ -89,7 +92,7 @@ def believed_figure(
         for table in (believed, consistency)
     )
     left: list[Mark] = []
-    right: list[Mark] = [Reference(1.0, label="consistent")]
+    right: list[Mark] = [Reference(1.0, label=tr("consistent"))]
     for n, f in enumerate(cases[0].axes.filters):
         places = [(r.name, f) for r in cases]
         rows = true_rows.loc[places]
@@ -97,20 +100,25 @@ def believed_figure(
         ends = ((rows[key] * rows["believed_sigma"]).to_numpy() / sigma for key in ("ratio_lo", "ratio_hi"))
         left.append(Line(rho, true, f, Style(n, n, n), *ends))
         if np.max(np.abs(claimed / true - 1)) > 0.05:
-            left.append(Line(rho, claimed, f"{f}: believed", Style(n, None, n)))
+            left.append(Line(rho, claimed, tr("{f}: believed", f=f), Style(n, None, n)))
         rows = consistency_rows.loc[places].assign(rho=rho)
         right.append(line(rows, ("rho", "nees", "nees_lo", "nees_hi", "exact_nees"), f, n))
-    caption = (
-        f"Left: σ of the {QUANTITIES[component].name} at plot {last} in σ of a plot, true (lines) and as the filter "
-        "believes it (markers alone, where they differ by over 5 %). Right: normalised squared error per component, 1 "
-        "for a consistent filter; crosses: by calculation."
+    caption = tr(
+        "Left: σ of the {name} at plot {last} in σ of a plot, true (lines) and as the filter "
+        "believes it (markers alone, where they differ by over 5 %). Right: normalised squared error "
+        "per component, 1 for a consistent filter; crosses: by calculation.",
+        name=QUANTITIES[component].name,
+        last=last,
     )
-    x, y = Axis("correlation $\\rho$ of neighbouring errors"), Axis("$\\sigma$ / $\\sigma$ of a plot", limits=(0, 1.75))
+    x, y = (
+        Axis(tr("correlation $\\rho$ of neighbouring errors")),
+        Axis(tr("$\\sigma$ / $\\sigma$ of a plot"), limits=(0, 1.75)),
+    )
     drawn = (
         Panel(x, y, tuple(left), direct=False, legend="upper left"),
-        Panel(x, Axis("normalised squared error", "log"), tuple(right), direct=False),
+        Panel(x, Axis(tr("normalised squared error"), "log"), tuple(right), direct=False),
     )
-    return Figure("believed", "What a filter believes of itself", caption, drawn, 2, PAGE_MM)
+    return Figure("believed", tr("What a filter believes of itself"), caption, drawn, 2, PAGE_MM)
 
 
 def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.DataFrame") -> Figure | None:
@@ -120,40 +128,45 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
         return None
     component, unit = cases[0].axes.components[0]
     groups = common.groups(curves[curves["component"] == component], "case", "filter")
-    y = Axis(f"$\\sigma$ of {QUANTITIES[component].symbol}, {unit}", limits=(0, None))
+    y = Axis(panels.sigma_of(QUANTITIES[component].symbol, unit), limits=(0, None))
     drawn = []
     for f in cases[0].axes.filters:
         marks = []
         for n, result in enumerate(cases):
             if (result.name, f) in groups:
-                probability = f"{result.spec.sensor.detection_probability:g}"
+                probability = numeral(f"{result.spec.sensor.detection_probability:g}")
                 style = Style(n / max(1, len(cases) - 1), n, n)
                 marks.append(line(groups[result.name, f], SIGMA, probability, style, f"$P_D$ = {probability}"))
         drawn.append(Panel(panels.time_axis(), y, tuple(marks), f, key_title="$P_D$", direct=False))
     gap = cases[0].spec.sensor.missed_scans
-    caption = (
-        f"σ of the {QUANTITIES[component].name} for several detection probabilities (legend), one panel a filter, of "
-        f"{cases[0].count:,} realisations. Crosses: exact values, means over all patterns of misses where these can be "
-        "enumerated." + (f" Scans {', '.join(map(str, gap))} never give a plot." if gap else "")
-    )
+    caption = tr(
+        "σ of the {name} for several detection probabilities (legend), one panel a filter, of "
+        "{count:,} realisations. Crosses: exact values, means over all patterns of misses where "
+        "these can be enumerated.",
+        name=QUANTITIES[component].name,
+        count=cases[0].count,
+    ) + (tr(" Scans {scans} never give a plot.", scans=", ".join(map(str, gap))) if gap else "")
     columns = min(3, len(drawn))
-    return Figure("missed", "What missed plots cost", caption, tuple(drawn), columns, PAGE_MM, 54)
+    return Figure("missed", tr("What missed plots cost"), caption, tuple(drawn), columns, PAGE_MM, 54)
 
 
 def conversion_figure(table: "pd.DataFrame") -> Figure | None:
     """Bias of the converted plot against range × bearing error, in σ of the range."""
     if len(table) < 3:
         return None
-    marks: list[Mark] = [Reference(-1.0, label="one σ of the range")]
+    marks: list[Mark] = [Reference(-1.0, label=tr("one σ of the range"))]
     names = ("bias_m", "bias_lo", "bias_hi", "formula_m")
     for n, (frame, rows) in enumerate(table.groupby("frame", sort=False)):
         rows = rows.sort_values("across_m")
         rows = rows.assign(**{name: rows[name] / rows["sigma_range_m"] for name in names})
         label = "plain" if frame == "cartesian" else "unbiased"
         marks.append(line(rows, ("across_m", *names), label, n))
-    caption = (
-        "Mean error of the converted plot along the line of sight, in σ of the range, over range × σ of the bearing. "
-        "Bands: 95 % intervals. Crosses: (exp(−σ²/2) − 1) r, and zero. The plain conversion pulls the target in."
+    caption = tr(
+        "Mean error of the converted plot along the line of sight, in σ of the range, over range × σ "
+        "of the bearing. Bands: 95 % intervals. Crosses: (exp(−σ²/2) − 1) r, and zero. The plain "
+        "conversion pulls the target in."
     )
-    x, y = Axis("range × σ of the bearing, m", limits=(0, None)), Axis("bias / σ of the range")
-    return Figure("conversion", "Bias of the conversion to x, y", caption, (Panel(x, y, tuple(marks), direct=False),))
+    x, y = Axis(tr("range × σ of the bearing, m"), limits=(0, None)), Axis(tr("bias / σ of the range"))
+    return Figure(
+        "conversion", tr("Bias of the conversion to x, y"), caption, (Panel(x, y, tuple(marks), direct=False),)
+    )

@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import panels
+from radarsim.language import tr
+from radarsim.report import panels, text
 from radarsim.studies.sonar.axes import SonarAxes
 from radarsim.studies.sonar.config import Keys, correlation_of
 from radarsim.studies.sonar.figures import QUANTITIES
@@ -16,13 +17,15 @@ if TYPE_CHECKING:
 def question(specs: Sequence[Keys]) -> str:
     """The question of cases whose filters know their plots."""
     if any(spec.frame != "polar" for spec in specs):
-        return "What does it cost to convert range and bearing to x and y, and when does the conversion's bias matter?"
+        return tr(
+            "What does it cost to convert range and bearing to x and y, and when does the conversion's bias matter?"
+        )
     if any(correlation_of(spec.sensor.error_correlation, c) for spec in specs for c in range(3)):
-        return "What does it cost to ignore that the errors of neighbouring plots are correlated?"
+        return tr("What does it cost to ignore that the errors of neighbouring plots are correlated?")
     if any(spec.sensor.detection_probability < 1 or spec.sensor.missed_scans for spec in specs):
-        return "What does a missed plot cost?"
+        return tr("What does a missed plot cost?")
     names = list(dict.fromkeys(f.name for spec in specs for f in spec.filters))
-    return f"How accurate are range and bearing smoothed by {', '.join(names)}?"
+    return tr("How accurate are range and bearing smoothed by {filters}?", filters=", ".join(names))
 
 
 def answer(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
@@ -41,12 +44,22 @@ def _best(result: CaseResult[SonarAxes], curves: "pd.DataFrame") -> str:
     order = last["exact_sigma"].round(9) if last["exact_sigma"].notna().all() else last["sigma"]
     last = last.loc[order.sort_values(kind="stable").index]
     low, high = last.iloc[0], last.iloc[-1]
-    where = panels.plain(panels.swept(result))
-    ends = f"{low['filter']} {low['sigma']:.4g} {low['unit']} [{low['sigma_lo']:.4g}, {low['sigma_hi']:.4g}]"
+    said = {"quantity": QUANTITIES[first].name, "t_s": low["t_s"], "least": _with(low), "most": _with(high)}
     if len(last) > 1:
-        worst = f"{high['sigma']:.4g} {high['unit']} [{high['sigma_lo']:.4g}, {high['sigma_hi']:.4g}]"
-        ends = f"least with {ends}, largest with {high['filter']} {worst}"
-    return f"{where + ': ' if where else ''}σ of the {QUANTITIES[first].name} after {low['t_s']:g} s: {ends}."
+        words = tr("σ of the {quantity} after {t_s:g} s: least with {least}, largest with {most}.", **said)
+    else:
+        words = tr("σ of the {quantity} after {t_s:g} s: {least}.", **said)
+    return panels.at_its_place(result, words)
+
+
+def _with(row: "pd.Series") -> str:
+    """A filter and its σ with the interval."""
+    return " ".join(
+        (
+            row["filter"],
+            text.estimate((row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), panels.unit_of(row["unit"])),
+        )
+    )
 
 
 def _most_optimistic(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
@@ -58,9 +71,13 @@ def _most_optimistic(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[st
     if worst["ratio_lo"] <= 1.05:
         return []
     result = next(result for result in results if result.name == worst["case"])
-    where = f" at {panels.plain(panels.swept(result))}" if result.swept else ""
+    swept = panels.plain(panels.swept(result))
     return [
-        f"Most optimistic: {worst['filter']}{where}, whose true σ is "
-        f"{worst['ratio']:.2f} [{worst['ratio_lo']:.2f}, {worst['ratio_hi']:.2f}] times the one it believes "
-        f"({QUANTITIES[worst['component']].name}, scan {worst['k']})."
+        tr(
+            "Most optimistic: {filter}, whose true σ is {ratio} times the one it believes ({quantity}, scan {k}).",
+            filter=f"{worst['filter']} ({swept})" if swept else str(worst["filter"]),
+            ratio=text.estimate((worst[key] for key in ("ratio", "ratio_lo", "ratio_hi")), form=".2f"),
+            quantity=QUANTITIES[worst["component"]].name,
+            k=worst["k"],
+        )
     ]

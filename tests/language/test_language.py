@@ -1,0 +1,143 @@
+"""Messages in the language spoken: numbers, forms of words, counts; which language it is; what the catalogues hold."""
+
+import re
+from string import Formatter
+
+import pytest
+from click.testing import CliRunner
+from making import messages
+
+from radarsim import language
+from radarsim.cli import main
+from radarsim.errors import ConfigError
+from radarsim.language import listed, numeral, plural, speaking, term, tr
+from radarsim.report import text
+
+CODES = [code for code in language.known() if code != language.ENGLISH]
+
+
+@pytest.fixture(autouse=True)
+def _english(monkeypatch):
+    monkeypatch.delenv(language.VARIABLE, raising=False)
+
+
+def test_numbers_are_written_as_the_language_writes_them():
+    assert tr("a span of {span:.4g} m/s", span=-1.5) == "a span of −1.5 m/s"
+    assert numeral("-1,234.5") == "−1,234.5"
+    with speaking("ru"):
+        assert tr("a span of {span:.4g} m/s", span=-1.5) == "интервал однозначности −1,5 м/с"
+        assert numeral("-1,234.5") == "−1\N{NARROW NO-BREAK SPACE}234,5"
+        assert text.number(2.5e-7) == "2,5·10⁻⁷"
+        assert text.estimate((12.3, 12.0, 12.6), "м") == "12,3 м [12; 12,6]"
+        assert tr("{name}: bias", name="1.5") == "1.5: смещение"  # a name of the user's stays as it is
+
+
+@pytest.mark.parametrize(
+    ("count", "english", "russian"),
+    [
+        (1, "1 run", "1 расчёт"),
+        (2, "2 runs", "2 расчёта"),
+        (5, "5 runs", "5 расчётов"),
+        (11, "11 runs", "11 расчётов"),
+        (21, "21 runs", "21 расчёт"),
+    ],
+)
+def test_counts(count, english, russian):
+    assert plural("{count} run", "{count} runs", count) == english
+    with speaking("ru"):
+        assert plural("{count} run", "{count} runs", count) == russian
+
+
+def test_a_word_has_the_form_that_its_place_asks_for():
+    assert tr("σ of the {quantity}", quantity=term("range")) == "σ of the range"
+    with speaking("ru"):
+        assert tr(term("range")) == "дальность"
+        assert tr("σ of the {quantity}", quantity=term("range")) == "СКО дальности"
+        assert tr("σ of the {quantity}", quantity="range") == "СКО range"  # no word of ours
+
+
+def test_what_is_not_translated_is_said_in_english():
+    with speaking("ru"):
+        assert tr("no such message") == "no such message"
+        assert tr("") == ""
+
+
+def test_names_in_a_sentence():
+    assert [listed(names) for names in ([], ["a"], ["a", "b"], ["a", "b", "c"])] == ["", "a", "a and b", "a, b and c"]
+    with speaking("ru"):
+        assert listed(["a", "b", "c"]) == "a, b и c"
+
+
+def test_the_option_comes_before_the_variable_and_both_before_english(monkeypatch):
+    assert language.current() == "en"
+    monkeypatch.setenv(language.VARIABLE, "ru")
+    assert language.current() == "ru"
+    with speaking("en"):
+        assert language.current() == "en"
+    monkeypatch.setenv(language.VARIABLE, "")
+    assert language.current() == "en"
+
+
+def test_an_unknown_language_is_one_line_and_exit_2(monkeypatch):
+    known = ", ".join(language.known())
+    for arguments in (["--language", "xx", "list"], ["list", "--language", "xx"]):
+        outcome = CliRunner().invoke(main, arguments)
+        assert (outcome.exit_code, outcome.stderr) == (2, f"--language: must be one of {known}, got 'xx'\n")
+    monkeypatch.setenv(language.VARIABLE, "xx")
+    outcome = CliRunner().invoke(main, ["list"])
+    assert (outcome.exit_code, outcome.stderr) == (2, f"RADARSIM_LANGUAGE: must be one of {known}, got 'xx'\n")
+    with pytest.raises(ConfigError, match="RADARSIM_LANGUAGE"):
+        language.current()
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_every_message_is_translated(code):
+    """Made by `make messages`, then by hand."""
+    assert messages.untranslated(code) == []
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_a_translation_has_the_places_of_its_message(code):
+    for entry in language.messages(code):
+        if not entry.id or entry.context:
+            continue
+        allowed = {*places(entry.id), *places(entry.plural)}
+        for said in entry.said.values():
+            assert set(places(said)) <= allowed, entry.id
+            if not entry.plural:
+                assert set(places(said)) == allowed or entry.id == "{count} {kind}", entry.id
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_a_word_that_has_a_form_has_every_form_that_is_asked_for(code):
+    entries = language.messages(code)
+    asked = {spec for one in entries for said in one.said.values() for spec in forms(said)}
+    words = {one.id for one in entries if one.context in asked}
+    assert words
+    for context in asked:
+        assert words <= {one.id for one in entries if one.context == context}, context
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_no_letter_of_a_translation_is_latin_by_mistake(code):
+    """A Latin a, c, e, o, p or x inside a Cyrillic word looks right and is not."""
+    for entry in language.messages(code):
+        for said in entry.said.values():
+            mixed = re.findall(r"[А-Яа-яё][A-Za-z]|[A-Za-z][А-Яа-яё]", said.replace("\\n", " "))
+            assert not mixed, said
+
+
+def places(message):
+    """Names of the places; none where the message is no template."""
+    try:
+        return [name for _, name, _, _ in Formatter().parse(message) if name]
+    except ValueError:
+        return []
+
+
+def forms(message):
+    """The forms of words that a message's places ask for."""
+    try:
+        return [spec for _, name, spec, _ in Formatter().parse(message) if name and spec.isalpha() and len(spec) > 1]
+    except ValueError:
+        return []

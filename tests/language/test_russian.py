@@ -1,0 +1,125 @@
+"""Nothing untranslated in figures and reports of the shipped configs; the tables' bytes are the same."""
+
+import html
+import re
+
+import pytest
+
+from radarsim.app import output
+from radarsim.app.run import run
+from radarsim.config.lookup import SHIPPED
+from radarsim.language import speaking
+from radarsim.report.drawing import Figure
+from radarsim.report.tables import to_csv
+
+# A config of each study, and what of each other kind is quick.
+QUICK = ["rls2", "multimodel_1hz", "sonar_asynchronous", "sonar_manoeuvre", "discriminator_profile", "ambiguous_rls2"]
+ALL = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
+# Names, symbols, file formats and what a user types: the same in every language.
+NAMES = {
+    *("r", "Vr", "ar", "CSV", "YAML", "SI", "sha", "run", "json", "csv", "report", "html", "curves", "config"),
+    *(
+        "radarsim",
+        "figures",
+        "NEES",
+        "NIS",
+        "IMM",
+        "imm",
+        "MMA",
+        "GPB",
+        "PDA",
+        "Tab",
+        "exp",
+        "var",
+        "cov",
+        "max",
+        "min",
+    ),
+    *("RLS", "IEEE", "Std", "asin", "combined", "modified", "moment", "best"),
+    *("python", "numpy", "numba", "llvmlite", "scipy", "pandas", "matplotlib", "pydantic", "pyyaml"),
+}
+
+
+def shown(figure: Figure):
+    """All texts of a figure."""
+    yield from (figure.title, figure.caption)
+    for panel in figure.panels:
+        yield from (panel.x.label, panel.y.label, panel.title, panel.key_title, panel.remark, panel.crosses)
+        yield from (name for name, _ in panel.keys)
+        yield from (name for axis in (panel.x, panel.y) for _, name in axis.ticks)
+        for mark in panel.marks:
+            yield from (getattr(mark, "label", ""), getattr(mark, "name", ""), getattr(mark, "text", ""))
+
+
+def told(page: str):
+    """All texts of a report but what is typed, counted or quoted as it is: code, keys, tables that are files."""
+    page = re.sub(r"(?s)<(style|script|pre|code|svg|i)\b.*?</\1>", "", page)
+    page = re.sub(r"(?s)<table class=\"sortable\" id=\"table-asked.*?</table>", columns, page)
+    page = re.sub(r"(?s)<h2 id=\"tables\">.*?<h2 id=\"provenance\">", "", page)
+    page = re.sub(r"(?s)<dd>.*?</dd>", "", page)
+    yield from (html.unescape(words) for words in re.findall(r'aria-label="([^"]*)"', page))
+    yield from (html.unescape(words) for words in re.findall(r">([^<]+)<", page))
+
+
+def columns(table: re.Match) -> str:
+    """The heads and meanings of a table of keys, without keys and values."""
+    return re.sub(r"(?s)<tr><td[^>]*>.*?</td><td[^>]*>.*?</td>", "<tr>", table[0])
+
+
+def untranslated(words: str, names: set[str]) -> list[str]:
+    """English words in a text: Latin ones that are no names, symbols, keys or formulas."""
+    bare = re.sub(r"\$[^$]*\$|`[^`]*`|\w+[._]\w[\w.]*|«[^»]*»", " ", words)
+    return [word for word in re.findall(r"[A-Za-z]{3,}", bare) if word not in names]
+
+
+def check(stem: str, realisations: int, folder) -> None:
+    result = run(stem, realisations=realisations, out=folder, figures=False)
+    names = NAMES | {part for text in own_names(result) for part in re.findall("[A-Za-z]+", text)}
+    before = {name: to_csv(table) for name, table in output.tables(result.cases, stem=stem).items()}
+    with speaking("ru"):
+        made = output.tables(result.cases, stem=stem)
+        assert {name: to_csv(table) for name, table in made.items()} == before
+        figures = output.figures(result.cases, made, result.experiment)
+        written = output.write(result.experiment, result.cases, folder / "ru", {}, draw=False, made=made)
+        page = (written.folder / "report.html").read_text(encoding="utf-8")
+        texts = [words for figure in figures.values() for words in shown(figure)]
+    left = {words: found for words in [*texts, *told(page)] if (found := untranslated(words, names))}
+    assert left == {}
+
+
+def own_names(result):
+    """What the config calls things."""
+    for case in result.cases:
+        yield from (case.name, case.spec.device or "", *case.axes.filters, *(str(value) for _, value in case.swept))
+        yield from (name for name, _ in case.axes.components)
+    for case in result.experiment.cases:
+        yield from (str(value) for value in values(case.resolved()))
+
+
+def values(data):
+    """All texts of plain data, keys and values."""
+    if isinstance(data, dict):
+        for key, value in data.items():
+            yield key
+            yield from values(value)
+    elif isinstance(data, list):
+        for value in data:
+            yield from values(value)
+    elif isinstance(data, str):
+        yield data
+
+
+@pytest.mark.parametrize("stem", QUICK)
+def test_nothing_is_left_in_english(stem, tmp_path):
+    check(stem, 20, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stem", ALL)
+def test_nothing_is_left_in_english_in_any_shipped_config(stem, tmp_path):
+    check(stem, 20, tmp_path)
+
+
+def test_the_check_sees_what_is_english():
+    assert untranslated("σ of the range, m", {"r"}) == ["the", "range"]
+    assert untranslated("СКО $\\sigma$ of r, `radar.scan_period_s` radar.name «plain words»", {"of"}) == []
