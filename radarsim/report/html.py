@@ -228,6 +228,10 @@ def told(name: str, table: "pd.DataFrame") -> dict[str, Any]:
     made = _table(name, table)
     for column in made["columns"]:
         column["name"] = head(column["name"])
+    if "unit" in table:
+        place = list(table.columns).index("unit")
+        for row in made["rows"]:
+            row[place] = tr(text.unit(row[place]))
     return made
 
 

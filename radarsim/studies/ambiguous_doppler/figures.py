@@ -35,7 +35,7 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
     drawn = panels.per_component(results, curves, gains, QUANTITIES, chosen)
     for name, (column, words, caption) in SHARES.items():
         some, left_out = panels.shown_families(results, chosen(name))
-        figure = share_figure(name, some, made["folds"], (column, words, caption + left_out)) if some else None
+        figure = share_figure(name, some, made["folds"], (column, tr(words), tr(caption) + left_out)) if some else None
         drawn |= {name: figure} if figure else {}
     drawn |= hypotheses_figure(experiment.shown_in("hypotheses"))
     some, left_out = panels.shown(results, chosen("orders"))

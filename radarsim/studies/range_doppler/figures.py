@@ -44,7 +44,7 @@ def consistency_figure(results: Sequence[Result], table: "pd.DataFrame", left_ou
     if any(result.swept for result in results):
         nees = {(*key, "nees"): own for key, own in rows.items()}
         every = panels.by_panel(results)
-        drawn = [panels.family_panel(title, members, nees, NEES) for title, members in every.items()]
+        drawn = [panels.family_panel(title, members, nees, tr(NEES)) for title, members in every.items()]
         drawn = [panel for panel in drawn if len(panel.marks) > 1]
     else:
         names = list(dict.fromkeys(name for result in results for name in result.axes.filters))
@@ -69,7 +69,7 @@ def _consistency_panel(results: Sequence[Result], rows: dict[Any, Any], name: st
             own = rows[result.name, name]
             style = Style(i, i, i)
             marks.append(Line(own["t_s"].to_numpy(), own["nees"].to_numpy(), panels.label(result), style))
-    y, title = panels.fitting_axis(NEES, marks), panels.literal(name)
+    y, title = panels.fitting_axis(tr(NEES), marks), panels.literal(name)
     return Panel(panels.time_axis(), y, tuple(marks), title, direct=len(results) <= MOST_NAMED)
 
 

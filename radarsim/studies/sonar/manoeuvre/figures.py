@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 
 USUAL = 0.01  # false alarms per test at which detectors are compared, or the nearest rate to it
 MOST_PANELS = 4
-SYMBOLS = {"course": "course", "speed": "speed", "x_ahead": "$x$ ahead", "y_ahead": "$y$ ahead"}
-SYMBOLS |= {"cpa": "CPA", "t_cpa": term("$t$ to CPA")}
+SYMBOLS = {
+    **{"course": term("course"), "speed": term("speed"), "x_ahead": term("$x$ ahead"), "y_ahead": term("$y$ ahead")},
+    **{"cpa": term("CPA"), "t_cpa": term("$t$ to CPA")},
+}
 RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # ticks of a measured over a believed σ
 STRENGTHS = ("acceleration_mps2", "rate_radps")  # keys that say how strong a manoeuvre is
 Results = Sequence[CaseResult[ManoeuvreAxes]]
@@ -218,7 +220,7 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
     """Measured over believed σ of the quantities derived from a track, a panel for each time."""
     result = results[0]
     rows, names = uses[uses["case"] == result.name], list(SYMBOLS)
-    ticks = tuple((float(i), label) for i, label in enumerate(SYMBOLS.values()))
+    ticks = tuple((float(i), tr(label)) for i, label in enumerate(SYMBOLS.values()))
     drawn = []
     for when, at_time in rows.groupby("t_s", sort=True):
         marks: list[Mark] = [Reference(1.0, label="")]
