@@ -8,7 +8,7 @@ SMOKE := $(VENV)/smoke
 # Drawing takes twice as long as all the rest: `make smoke SMOKE_FLAGS=` draws too.
 SMOKE_FLAGS ?= --no-figures
 
-.PHONY: run test slow machines mutants lint smoke reproduce-figures claims-page readings-pages bench schema known docs docs-numbers docs-examples docs-house clean
+.PHONY: run test slow machines mutants lint smoke reproduce-figures claims-page readings-pages bench schema known docs docs-numbers docs-examples docs-house messages clean
 
 run: $(VENV)/installed
 	$(RADARSIM) run configs/rls2.yaml
@@ -77,6 +77,10 @@ docs-numbers: $(VENV)/installed
 # What the commands in the pages' examples print.
 docs-examples: $(VENV)/installed
 	PYTHONPATH=docs $(BIN)/python -m making.examples README.md docs/*.md docs/howto/*.md
+
+# The catalogues of other languages, with the messages of today; what is new in them waits for its translation.
+messages: $(VENV)/installed
+	PYTHONPATH=docs $(BIN)/python -m making.messages
 
 # The picture of the rooms, from the package's own imports.
 docs-house: $(VENV)/installed

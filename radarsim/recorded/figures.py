@@ -5,14 +5,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from radarsim.engine.results import Track
-from radarsim.language import term, tr
+from radarsim.language import tr
 from radarsim.recorded.accuracy import right_mean
 from radarsim.recorded.places import Path
 from radarsim.report import panels
 from radarsim.report.drawing import COLUMN_MM, GREY, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
 from radarsim.report.statistics import Z95
 
-TIME = Axis(term("time, s"))
 PLOT = Style(GREY, None, 0, size_pt=1.6)
 BOUND = Style(GREY, 1, width_pt=0.8)
 RADAR = Style(0, None, 2, size_pt=5.0)
@@ -41,9 +40,17 @@ def figures(track: Track, paths: Mapping[str, Path]) -> dict[str, Figure]:
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
+def _called(name: object) -> str:
+    return tr("track {number}", number=name)
+
+
+def _time() -> Axis:
+    return Axis(tr("time, s"))
+
+
 def _several(name: str, title: str, caption: str, made: list[Panel], keys: Sequence[tuple[str, Style]] = ()) -> Figure:
     """A figure of panels and, where there are keys, their legend in a cell of its own."""
-    made = [*made, *([Panel(TIME, TIME, (), keys=tuple(keys))] if keys else [])]
+    made = [*made, *([Panel(_time(), _time(), (), keys=tuple(keys))] if keys else [])]
     columns = min(2 if len(made) == 4 else 3, len(made))
     return Figure(name, title, caption, tuple(made), columns, PAGE_MM if columns > 1 else COLUMN_MM, USUAL_MM)
 
@@ -71,16 +78,22 @@ def plan(track: Track, paths: Mapping[str, Path]) -> Figure | None:
     names = [panels.literal(name) for name in paths]
     several = len(own) > 1
     over_time = [
-        Line(path.t_s, path.places[:, 2] / size, "", style, name=f"track {name}" if several else "plots")
+        Line(
+            path.t_s,
+            path.places[:, 2] / size,
+            "",
+            style,
+            name=tr("track {number}", number=name) if several else tr("plots"),
+        )
         for path, style, name in zip(own, styles, names, strict=False)
     ]
-    made = [Panel(TIME, Axis(tr("range, {unit}", unit=unit)), tuple(over_time), "Range", direct=False)]
+    made = [Panel(_time(), Axis(tr("range, {unit}", unit=unit)), tuple(over_time), tr("Range"), direct=False)]
     if np.isfinite(places[:, :2]).all(axis=1).any():
         marks: list = [
             Line(path.places[:, 1] / size, path.places[:, 0] / size, "", style, name=line.name)
             for path, style, line in zip(own, styles, over_time, strict=True)
         ]
-        marks.append(Line(np.zeros(1), np.zeros(1), "", RADAR, name="radar"))
+        marks.append(Line(np.zeros(1), np.zeros(1), "", RADAR, name=tr("radar")))
         marks += _ends(own[0], size)
         view = Panel(
             Axis(tr("east, {unit}", unit=unit)),
@@ -91,11 +104,13 @@ def plan(track: Track, paths: Mapping[str, Path]) -> Figure | None:
             equal=True,
         )
         made.insert(0, view)
-    keys = [(f"track {name}", style) for name, style in zip(names[:MOST_TRACKS], styles, strict=False)]
+    keys = [
+        (tr("track {number}", number=name), style) for name, style in zip(names[:MOST_TRACKS], styles, strict=False)
+    ]
     if len(own) > MOST_TRACKS:
-        keys.append((f"{len(own) - MOST_TRACKS} more", styles[-1]))
+        keys.append((tr("{count} more", count=len(own) - MOST_TRACKS), styles[-1]))
     if several:
-        made.append(Panel(TIME, TIME, (), keys=(("radar", RADAR), *keys)))
+        made.append(Panel(_time(), _time(), (), keys=((tr("radar"), RADAR), *keys)))
     caption = (
         tr(
             "Where the plots are: triangle, the radar; start and end of the longest track with their "
@@ -105,7 +120,7 @@ def plan(track: Track, paths: Mapping[str, Path]) -> Figure | None:
         else tr("The range of the plots over time; the file does not tell their bearing.")
     )
     columns = min(len(made), 2)
-    return Figure("plan", "Where", caption, tuple(made), columns, PAGE_MM if columns > 1 else COLUMN_MM, TALL_MM)
+    return Figure("plan", tr("Where"), caption, tuple(made), columns, PAGE_MM if columns > 1 else COLUMN_MM, TALL_MM)
 
 
 def _drawn_paths(track: Track, paths: Mapping[str, Path]) -> list[Path]:
@@ -128,8 +143,13 @@ def _ends(path: Path, size: float) -> list:
     if not known.size:
         return []
     return [
-        Note(path.places[i, 1] / size, path.places[i, 0] / size, f"{what}, {path.t_s[i]:g} s", place)
-        for i, what, place in ((known[0], "start", "ne"), (known[-1], "end", "se"))
+        Note(
+            path.places[i, 1] / size,
+            path.places[i, 0] / size,
+            tr("{what}, {t_s:g} s", what=what, t_s=path.t_s[i]),
+            place,
+        )
+        for i, what, place in ((known[0], tr("start"), "ne"), (known[-1], tr("end"), "se"))
     ]
 
 
@@ -144,7 +164,7 @@ def estimates(track: Track) -> Figure:
             plots = track.residual[..., d] + track.estimate[..., c]  # the same of every filter that has an estimate
             first, known = np.isfinite(plots).argmax(axis=0), np.isfinite(plots).any(axis=0)
             plots = plots[first, np.arange(plots.shape[1])]
-            marks.append(Line(track.t_s[known], plots[known], "", PLOT, name="plots"))
+            marks.append(Line(track.t_s[known], plots[known], "", PLOT, name=tr("plots")))
         for f, name in enumerate(track.filters[:MOST_FILTERS]):
             x, half = track.estimate[f, :, c], Z95 * track.sigma[f, :, c]
             if np.isfinite(x).any():
@@ -152,13 +172,13 @@ def estimates(track: Track) -> Figure:
                 marks.append(Line(track.t_s, x, "", Style(f, f), x - half, x + half, name=label))
         if marks:
             y = Axis(panels.with_unit(panels.letter(component), unit), limits=_usual(track.estimate[..., c]))
-            made.append(Panel(TIME, y, tuple(marks), direct=False))
+            made.append(Panel(_time(), y, tuple(marks), direct=False))
     caption = tr(
         "Estimates over the recorded plots; bands: twice the standard deviation that each filter "
         "believes (95 % if it is right)."
     )
     keys = [(panels.literal(name), Style(f, f)) for f, name in enumerate(track.filters[:MOST_FILTERS])]
-    return _several("track", "Track", caption, made, [("plots", PLOT), *keys])
+    return _several("track", tr("Track"), caption, made, [(tr("plots"), PLOT), *keys])
 
 
 def residuals(track: Track) -> Figure | None:
@@ -174,14 +194,15 @@ def residuals(track: Track) -> Figure | None:
                 continue
             known = known[:: -(-known.size // MOST_DOTS)]
             t, miss = track.t_s[known], track.residual[f, known, d]
-            marks: list = [Reference(0.0), Line(t, miss, "", Style(f, None, 0, size_pt=1.8), name="plots")]
+            marks: list = [Reference(0.0), Line(t, miss, "", Style(f, None, 0, size_pt=1.8), name=tr("plots"))]
             if track.residual_sigma is not None and np.isfinite(track.residual_sigma[f, known, d]).any():
                 bound = 2 * track.residual_sigma[f, known, d]
                 marks += [Line(t, bound, "", BOUND, name="± 2 σ"), Line(t, -bound, "", BOUND, name="± 2 σ")]
             axis = Axis(
-                panels.with_unit(tr("residual of {value}", value=name.rpartition("_")[0]), unit), limits=_usual(miss)
+                panels.with_unit(tr("residual of {measured}", measured=name.rpartition("_")[0]), unit),
+                limits=_usual(miss),
             )
-            made.append(Panel(TIME, axis, tuple(marks), panels.literal(filter_name), direct=False))
+            made.append(Panel(_time(), axis, tuple(marks), panels.literal(filter_name), direct=False))
     caption = tr(
         "What each plot differs from the estimate after it; dashed, twice the standard deviation "
         "that the filter believes of that: 95 % of the plots lie between if it is right."
@@ -190,7 +211,7 @@ def residuals(track: Track) -> Figure | None:
         caption += tr(
             " The first {fitting} of {filters} filters are drawn.", fitting=fitting, filters=len(track.filters)
         )
-    return _several("residuals", "Residuals", caption, made) if made else None
+    return _several("residuals", tr("Residuals"), caption, made) if made else None
 
 
 def innovations(track: Track) -> Figure | None:
@@ -210,20 +231,22 @@ def innovations(track: Track) -> Figure | None:
             marks.append(Line(t, mean, "", Style(f, f), name=panels.literal(filter_name)))
         if len(marks) > 1:
             ends = np.array([marks[1].x[0], max(line.x[-1] for line in marks[1:])])
-            marks += [Line(ends, np.full(2, value), "", BOUND, name="bounds") for value in (low, high)]
+            marks += [Line(ends, np.full(2, value), "", BOUND, name=tr("bounds")) for value in (low, high)]
             values = np.concatenate([line.y for line in marks[1:]])
             ticks = tuple((at, f"{at:g}") for at in TICKS if values.min() <= at <= values.max())
             made.append(
-                Panel(TIME, Axis(tr("mean NIS"), "log", ticks=ticks), tuple(marks), panels.literal(name), direct=False)
+                Panel(
+                    _time(), Axis(tr("mean NIS"), "log", ticks=ticks), tuple(marks), panels.literal(name), direct=False
+                )
             )
     caption = tr(
-        "Normalised innovations squared, the mean of {WINDOW} plots: 1 for a filter that is right "
+        "Normalised innovations squared, the mean of {window} plots: 1 for a filter that is right "
         "about its errors; 95 % of such means lie between the dashed bounds. Above: plots worse than "
         "stated, or a manoeuvre.",
-        WINDOW=WINDOW,
+        window=WINDOW,
     )
     keys = [(panels.literal(name), Style(f, f)) for f, name in enumerate(track.filters[:MOST_FILTERS])]
-    return _several("nis", "Innovations", caption, made, [*keys, ("bounds", BOUND)]) if made else None
+    return _several("nis", tr("Innovations"), caption, made, [*keys, (tr("bounds"), BOUND)]) if made else None
 
 
 def probabilities(track: Track) -> Figure | None:
@@ -235,10 +258,10 @@ def probabilities(track: Track) -> Figure | None:
         known = np.isfinite(track.probability[f]).any(axis=0)
         if known.sum() > 1:
             marks = tuple(
-                Line(track.t_s, track.probability[f, :, m], f"model {m + 1}", Style(m, m))
+                Line(track.t_s, track.probability[f, :, m], tr("model {number}", number=m + 1), Style(m, m))
                 for m in np.flatnonzero(known).tolist()
             )
             y = Axis(tr("probability"), limits=(0, 1.02))
-            made.append(Panel(TIME, y, marks, panels.literal(name), direct=False))
+            made.append(Panel(_time(), y, marks, panels.literal(name), direct=False))
     caption = tr("Probabilities of each filter's models, in the order of the config.")
     return _several("probabilities", tr("Probabilities of the models"), caption, made[: panels.MOST]) if made else None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.config.experiment import Experiment
+from radarsim.language import term, tr
 from radarsim.report import panels, sweeps
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
@@ -17,9 +18,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 QUANTITIES = {
-    "r": panels.Quantity("$r$", "range"),
-    "Vr": panels.Quantity("$V_r$", "radial velocity"),
-    "ar": panels.Quantity("$a_r$", "radial acceleration"),
+    "r": panels.Quantity("$r$", term("range")),
+    "Vr": panels.Quantity("$V_r$", term("radial velocity")),
+    "ar": panels.Quantity("$a_r$", term("radial acceleration")),
 }
 FEW = 30  # realisations behind a point
 WIDE = 30  # largest over least σ from which its axis is logarithmic
@@ -41,7 +42,7 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
         some, left_out = panels.shown(panels.unswept(results), chosen(name))
         found = [panel for result in some if not result.swept and (panel := draw(result, made)).marks]
         if found:
-            drawn[name] = _figure(name, title, caption + left_out, found)
+            drawn[name] = _figure(name, tr(title), tr(caption) + left_out, found)
     return drawn | threshold_figure(results, made)
 
 
@@ -72,12 +73,12 @@ def threshold_figure(results: Sequence[Result], made: "Mapping[str, pd.DataFrame
             drawn += _threshold_panels([members[i] for i in np.argsort(x)], np.sort(x), axis, made)
     if not any(panel.marks for panel in drawn):
         return {}
-    caption = (
-        "Left: share of bursts that lock at the scan where fewest do: velocity (and acceleration, where it is taken) "
-        "within five Fisher bounds of the truth. Right: σ of the range at the last scan. Bands: 95 % intervals. "
-        "Crosses: exact values."
+    caption = tr(
+        "Left: share of bursts that lock at the scan where fewest do: velocity (and acceleration, "
+        "where it is taken) within five Fisher bounds of the truth. Right: σ of the range at the "
+        "last scan. Bands: 95 % intervals. Crosses: exact values."
     )
-    figure = Figure("threshold", "The threshold", caption, tuple(panels.in_legend(drawn)), 3, PAGE_MM, 60)
+    figure = Figure("threshold", tr("The threshold"), caption, tuple(panels.in_legend(drawn)), 3, PAGE_MM, 60)
     return {"threshold": figure}
 
 
@@ -96,8 +97,8 @@ def _threshold_panels(
         if members[0].axes.ideal[n] >= 0:
             shares = np.array([_locked(result, made["locks"], name) for result in members])
             locks.append(Line(x, shares[:, 0], words, style, shares[:, 1], shares[:, 2]))
-    of_r = wide(Panel(axis, Axis("$\\sigma$ of $r$ at the end, m"), tuple(sigmas), panels.device(members[0])))
-    return [Panel(axis, Axis("P(locked)", limits=(0, 1.02)), tuple(locks), panels.device(members[0])), of_r]
+    of_r = wide(Panel(axis, Axis(tr("$\\sigma$ of $r$ at the end, m")), tuple(sigmas), panels.device(members[0])))
+    return [Panel(axis, Axis(tr("P(locked)"), limits=(0, 1.02)), tuple(locks), panels.device(members[0])), of_r]
 
 
 def _locked(result: Result, locks: "pd.DataFrame", name: str) -> tuple[float, float, float]:
@@ -115,7 +116,7 @@ def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
         x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
         if (y < 1).any():
             marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, hi))
-    return Panel(panels.time_axis(), Axis("P(locked)", limits=(None, 1.0)), tuple(marks), _title(result))
+    return Panel(panels.time_axis(), Axis(tr("P(locked)"), limits=(None, 1.0)), tuple(marks), _title(result))
 
 
 def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
@@ -128,8 +129,8 @@ def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
         marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, hi))
     if rows:
         own = next(iter(rows.values()))
-        marks.append(Line(own["t_s"].to_numpy(), own["bound"].to_numpy(), "Fisher bound", Style(9, 1)))
-    panel = Panel(panels.time_axis(), Axis("$\\sigma$ of measured $V_r$, m/s"), tuple(marks), _title(result))
+        marks.append(Line(own["t_s"].to_numpy(), own["bound"].to_numpy(), tr("Fisher bound"), Style(9, 1)))
+    panel = Panel(panels.time_axis(), Axis(tr("$\\sigma$ of measured $V_r$, m/s")), tuple(marks), _title(result))
     return wide(panel)
 
 
@@ -143,29 +144,35 @@ def losses_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
         if len(rows) > 1:
             x, y, lo, hi = (rows[c].to_numpy(dtype=float) for c in ("since_loss", "sigma", "sigma_lo", "sigma_hi"))
             marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, np.minimum(hi, 1e3 * y)))
-    ticks = tuple((float(age), str(age) if age < AGES - 1 else f"{age}+ or none") for age in range(AGES))
-    x_axis = Axis("scans since a burst was lost", ticks=ticks)
-    return wide(Panel(x_axis, Axis("$\\sigma$ of $r$ at the last scan, m"), tuple(marks), _title(result)))
+    ticks = tuple((float(age), str(age) if age < AGES - 1 else tr("{age}+ or none", age=age)) for age in range(AGES))
+    x_axis = Axis(tr("scans since a burst was lost"), ticks=ticks)
+    return wide(Panel(x_axis, Axis(tr("$\\sigma$ of $r$ at the last scan, m")), tuple(marks), _title(result)))
 
 
 Draw = Callable[[Result, "Mapping[str, pd.DataFrame]"], Panel]
 OWN: dict[str, tuple[Draw, str, str]] = {
     "locks": (
         locks_panel,
-        "Bursts that lock",
-        "Share of bursts whose velocity (and acceleration, where it is taken) is within five Fisher bounds of the "
-        "truth. Bands: 95 % intervals. Estimators that always lock are left out.",
+        term("Bursts that lock"),
+        term(
+            "Share of bursts whose velocity (and acceleration, where it is taken) is within five Fisher "
+            "bounds of the truth. Bands: 95 % intervals. Estimators that always lock are left out."
+        ),
     ),
     "measured": (
         measured_panel,
-        "What the bursts measure",
-        "Root-mean-square error of the burst's velocity, of all bursts, those that did not lock included. "
-        "Bands: 95 % intervals.",
+        term("What the bursts measure"),
+        term(
+            "Root-mean-square error of the burst's velocity, of all bursts, those that did not lock "
+            "included. Bands: 95 % intervals."
+        ),
     ),
     "losses": (
         losses_panel,
-        "What a lost burst costs",
-        "Root-mean-square error of the range at the last scan, of realisations by the number of scans since their "
-        "last burst that did not lock. Bands: 95 % intervals.",
+        term("What a lost burst costs"),
+        term(
+            "Root-mean-square error of the range at the last scan, of realisations by the number of "
+            "scans since their last burst that did not lock. Bands: 95 % intervals."
+        ),
     ),
 }

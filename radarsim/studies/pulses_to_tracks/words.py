@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.config.experiment import Experiment
-from radarsim.report import panels
+from radarsim.language import listed, tr
+from radarsim.report import panels, text
 from radarsim.studies.pulses_to_tracks.tables import Result
 
 if TYPE_CHECKING:
@@ -30,8 +31,11 @@ def warnings(experiment: Experiment) -> list[str]:
 
 def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
-    names = " and ".join(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases))
-    return f"What are the bursts of {names} worth to the track, and what does a burst that does not lock cost?"
+    names = listed(list(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases)))
+    return tr(
+        "What are the bursts of {radars} worth to the track, and what does a burst that does not lock cost?",
+        radars=names,
+    )
 
 
 def answer(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> list[str]:
@@ -45,14 +49,18 @@ def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
     bound = axes.bound[..., 0][np.isfinite(axes.bound[..., 0])]
     if not bound.size:
         return []
-    energy = (
-        f"{axes.energy_db[0]:.3g} dB"
-        if np.ptp(axes.energy_db) < 0.05
-        else (f"{axes.energy_db.min():.3g} to {axes.energy_db.max():.3g} dB")
-    )
+    low, high = float(axes.energy_db.min()), float(axes.energy_db.max())
+    energy = tr("{low:.3g} dB", low=low) if high - low < 0.05 else tr("{low:.3g} to {high:.3g} dB", low=low, high=high)
     told = [
-        f"{panels.plain_label(result)}: {spec.pulses} pulses in {1e3 * spec.burst_s:.3g} ms, {energy} in all, allow "
-        f"σ_V = {bound.min():.3g} m/s (Fisher bound)."
+        tr(
+            "{case}: {pulses} pulses in {burst_ms:.3g} ms, {energy} in all, allow σ_V = {sigma:.3g} m/s (Fisher "
+            "bound).",
+            case=panels.plain_label(result),
+            pulses=spec.pulses,
+            burst_ms=1e3 * spec.burst_s,
+            energy=energy,
+            sigma=bound.min(),
+        )
     ]
     for f, name in enumerate(axes.filters):
         if axes.ideal[f] >= 0:
@@ -66,10 +74,16 @@ def _filter(result: Result, made: "Mapping[str, pd.DataFrame]", name: str) -> st
         made[t][(made[t]["case"] == result.name) & (made[t]["filter"] == name)] for t in ("locks", "idealisations")
     )
     worst = locks.iloc[int(locks["lock_rate"].to_numpy().argmin())]
-    ends = f"[{100 * worst['lock_lo']:.4g}, {100 * worst['lock_hi']:.4g}]"
-    said = f"at least {100 * worst['lock_rate']:.4g} % {ends} of the bursts of a scan lock"
+    locked = tr(
+        "at least {share} of the bursts of a scan lock",
+        share=text.estimate((100 * worst[key] for key in ("lock_rate", "lock_lo", "lock_hi")), "%"),
+    )
     last = ideal[ideal["component"] == "r"].iloc[-1]
-    ends = f"[{last['over_ideal_lo']:.3g}, {last['over_ideal_hi']:.3g}]"
+    keys = ("over_ideal", "over_ideal_lo", "over_ideal_hi")
     if last["over_ideal_hi"] <= ALIKE:
-        return f"{said}; σ of the range at the last scan is its idealisation's, {last['over_ideal']:.4g} times {ends}"
-    return f"{said}; σ of the range at the last scan is {last['over_ideal']:.3g} times {ends} its idealisation's"
+        ratio = text.estimate((last[key] for key in keys), form=".4g")
+        words = tr("σ of the range at the last scan is that of its idealisation, {ratio} times", ratio=ratio)
+    else:
+        ratio = text.estimate((last[key] for key in keys), form=".3g")
+        words = tr("σ of the range at the last scan is {ratio} times its idealisation's", ratio=ratio)
+    return f"{locked}; {words}"
