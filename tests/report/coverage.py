@@ -30,7 +30,7 @@ LABELS = (
         "frame",
         "range_m",
     ),
-    *("bin_lo", "plots"),
+    *("bin_lo", "plots", "ideal", "since_loss"),
 )
 MEASURED = {("gates", "plots")}
 NO_INTERVALS = ("bin_lo", "nees_bound_lo", "nis_bound_lo")
