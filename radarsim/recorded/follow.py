@@ -184,8 +184,9 @@ class Followed:
                 known = known[np.isfinite(known)]
                 tally = self.tallies.setdefault((filter_name, name), Tally(filter_name, name, freedom))
                 tally.count, tally.total = tally.count + known.size, tally.total + float(known.sum())
-        if not self.head:
-            self.head = {name: column[:HEAD] for name, column in columns.items()}
+        if self.rows < HEAD:
+            before = self.head or {name: column[:0] for name, column in columns.items()}
+            self.head = {name: np.concatenate([before[name], column])[:HEAD] for name, column in columns.items()}
         self._draw(track)
         self.rows += len(t)
 

@@ -53,6 +53,15 @@ def test_each_track_is_followed_by_itself(tmp_path, realisations):
         assert tally.count == sum(one.tallies[key].count for one in followed.tracks.values())
 
 
+def test_what_advice_is_asked_of_is_the_beginning_of_each_track(tmp_path, monkeypatch, realisations):
+    """However many pieces of the file it lies in."""
+    monkeypatch.setattr(follow.plots, "CHUNK", 7)
+    monkeypatch.setattr(follow, "HEAD", 40)
+    followed, _ = tracks_of(written(tmp_path / "plots.csv", dict(zip("ab", realisations, strict=False))))
+    for name, table in zip("ab", realisations, strict=False):
+        np.testing.assert_array_equal(followed.tracks[name].head["range_m"], table["range_m"][:40])
+
+
 def test_times_must_rise_within_a_track_alone(tmp_path, realisations):
     path = written(tmp_path / "plots.csv", {"a": realisations[0], "b": realisations[1]})
     lines = path.read_text().splitlines()

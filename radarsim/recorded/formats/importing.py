@@ -320,10 +320,13 @@ class _Truth:
         if not os.path.isfile(path):
             self.own = False
             return
-        with opened(path, options, truth=True) as (_, reader):
-            if isinstance(reader, Asterix):
-                self._read(reader, options.site)
-            self.own = isinstance(reader, Asterix) and reader.plots and bool(self.tables)
+        try:
+            with opened(path, options, truth=True) as (_, reader):
+                if isinstance(reader, Asterix):
+                    self._read(reader, options.site)
+                self.own = isinstance(reader, Asterix) and reader.plots and bool(self.tables)
+        except ConfigError:
+            self.own = False  # told when the records are read, with how many there were before
         if not self.own:
             self.tables = {}
 

@@ -211,6 +211,7 @@ def test_a_damaged_file_is_refused_with_its_place(tmp_path, second, place, expec
     assert line.startswith(f"recording: byte {place}")
     assert expected in line
     assert line.endswith("; 2 records were read before")
+    assert refused(tmp_path, FIRST + second, Options(site=SITE)) == [line]  # the truth is looked for first
 
 
 def test_every_length_of_item_is_followed(tmp_path):
