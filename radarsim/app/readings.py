@@ -120,6 +120,10 @@ def _open(paper: Paper, claim: Claim) -> bool:
 
 
 def _unknown(name: str, every: Mapping[str, Paper], owner: Mapping[str, str]) -> str:
+    if any(
+        claim.id == name for of in registry.parts(lambda study: study.claims()).values() if of for claim in of.claims
+    ):
+        return f"readings: {name} is an extension, ours, of which no paper leaves anything open"
     ids = [claim for claim, key in owner.items() if key == name.partition(".")[0]]
     allowed = f"its claims: {', '.join(ids)}" if ids else f"papers: {', '.join(every)}; claims as P1.4"
     return f"readings: no paper or claim {name!r}; {allowed}"

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import sys
 import time
 import unicodedata
@@ -327,6 +328,30 @@ def papers() -> "list[PaperClaims]":
     return [of for of in registry.parts(lambda study: study.claims()).values() if of is not None]
 
 
+def _no_configs(names: Sequence[str], every: "Sequence[PaperClaims]") -> list[str]:
+    """A line for each name that is no config but one of a claim or of a paper, or is written like one."""
+    of = {claim.id: claim.config for paper in every for claim in paper.claims}
+    found = []
+    for name in names:
+        paper = re.fullmatch(r"(P\d+)(\.\w+)?", name)
+        if paper is None or Path(name).is_file():
+            continue
+        own = sorted({config for claim, config in of.items() if claim.startswith(f"{paper[1]}.")})
+        if name in of:
+            found.append(f"claims: {name} is a claim of the config {of[name]}: `radarsim claims {of[name]}`")
+        elif own:
+            what = "a paper, whose" if name == paper[1] else f"no claim of {paper[1]}; its"
+            found.append(f"claims: {name} is {what} claims are of the configs {', '.join(own)}")
+        else:
+            found.append(f"claims: {name} is no claim and no paper; papers: {', '.join(_keys(of))}")
+    return found
+
+
+def _keys(ids: Iterable[str]) -> list[str]:
+    """The papers of claims: P1 of P1.4."""
+    return sorted({claim.partition(".")[0] for claim in ids})
+
+
 def claims(configs: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, Any]]:
     """Rows of the claims, as stored under `out` or as not run; of some configs only if any are given.
 
@@ -336,6 +361,8 @@ def claims(configs: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str
     from radarsim.report.claims.judge import listed
 
     every = papers()
+    if faults := _no_configs(configs, every):
+        raise ConfigError(*faults)
     readings = stored_readings(Path(out))
     stems = [one.stem for one in load_all(configs)] or sorted({claim.config for of in every for claim in of.claims})
     held = {stem: rows for stem in stems if (rows := stored_claims.stored(Path(out) / stem / "claims.csv")) is not None}

@@ -228,6 +228,24 @@ def test_config_outside_a_checkout_runs_by_path(tmp_path):
     assert (tmp_path / "r" / "own" / "curves.csv").exists()
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("P1.4", "claims: P1.4 is a claim of the config range_doppler: `radarsim claims range_doppler`"),
+        ("P1.99", "claims: P1.99 is no claim of P1; its claims are of the configs ambiguous, orders, range_doppler"),
+        ("P1", "claims: P1 is a paper, whose claims are of the configs ambiguous, orders, range_doppler"),
+        ("P99", "claims: P99 is no claim and no paper; papers: P1, P2, P3, P4"),
+    ],
+)
+def test_a_claim_in_place_of_a_config_is_told_its_config(name, said):
+    from radarsim.app.run import claims
+    from radarsim.errors import ConfigError
+
+    with pytest.raises(ConfigError) as caught:
+        claims([name], "nowhere")
+    assert list(caught.value.lines) == [said]
+
+
 def test_claims_of_a_config_not_yet_run_are_listed_as_such(tmp_path):
     result = radarsim("claims", "range_doppler", "--out", tmp_path)
     assert "32 not run" in result.stdout
