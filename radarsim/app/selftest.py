@@ -47,6 +47,10 @@ TOLERANCES = {
     # Balanced information of five parameters, κ = 2.1·10⁵: its inverse is known to κε/2 = 2.3·10⁻¹¹. Estimates are
     # found by scoring steps that use the inverse, each a fraction of σ long and ended by a threshold.
     "discriminator": Tolerance(sampled=1e-9, exact=1e-10),
+    # Covariances of each realisation's own begin with a prior of (300 m/s)² beside plots of (15 m/s)², over scans of
+    # 10 s: κ near 10⁴, κε = 2·10⁻¹². Weights of hypotheses are exponentials of up to −40, multiplying that by 40. A
+    # hypothesis within rounding of `prune_below` might be dropped or kept: once in 10¹⁰ of some 10⁶ looked at.
+    "ambiguous_doppler": Tolerance(sampled=1e-10, exact=1e-11),
 }
 UNKNOWN = Tolerance(sampled=1e-9, exact=1e-9)  # of a study that another package offers
 

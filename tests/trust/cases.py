@@ -40,6 +40,6 @@ CASES = {
     "sonar_manoeuvre": Small("sonar_manoeuvre", MANOEUVRE, 36_001, 90_001),
     "sonar_clutter": Small("sonar_clutter", TRACKERS, 36_001, 80_001),
     "discriminator": known("discriminator", 601, 50_001),
-    "ambiguous_doppler": Small("ambiguous_rls2", (), 4_501, 200_001),
+    "ambiguous_doppler": known("ambiguous_doppler", 4_501, 60_001),
     "pulses_to_tracks": Small("pulses", ("scans=5",), 4_501, 60_001),
 }

@@ -2,10 +2,11 @@
 
 Each is a place of the program where a slip would give plausible, wrong numbers: a sign, a transposed index, a lost
 term, a bound one off. A test of the ordinary suite keeps the list in step with the sources. The list goes on in
-`mutants_further`.
+`mutants_further` and `mutants_folds`.
 """
 
 from tests.trust.mutant import mutants
+from tests.trust.mutants_folds import FOLDS
 from tests.trust.mutants_further import FURTHER
 
 LINEAR, RANDOM = "kernels/test_linear.py", "kernels/test_random.py"
@@ -334,4 +335,4 @@ ENGINE = (
     ),
 )
 
-ALL = (*KERNELS, *FILTERS, *FRAMES_AND_MODELS, *EXACT_VALUES, *NUMBERS, *ENGINE, *FURTHER)
+ALL = (*KERNELS, *FILTERS, *FRAMES_AND_MODELS, *EXACT_VALUES, *NUMBERS, *ENGINE, *FURTHER, *FOLDS)

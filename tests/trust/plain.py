@@ -155,6 +155,9 @@ DRAWN = "target={kind: polynomial, coefficients: [1e5, -250, 4], sigma_coefficie
 MISSES = ["scans=9", "radar.detection_probability=0.7", "radar.sigma_bias_range_m=20", DRAWN]
 FEW = "filters=[{name: H 3, doppler: folded, manoeuvre_variance: 1e-3, hypotheses: 3}]"
 PULSES = "filters.5={name: a, observes: [range, velocity, acceleration], manoeuvre_variance: 1, use: mixture}"
+ORDERS = "orders: [1, 2], manoeuvre_variance: [100, 1e-3], combine: likelihood"
+TOGETHER = f"filters=[{{name: few, doppler: folded, hypotheses: 12, {ORDERS}}}]"
+REMAINDER = "{name: remainder, doppler: remainder, manoeuvre_variance: 1e-3}"
 # What is run: name → config, overrides, realisations; of several cases the last.
 RUNS = {
     "linear": ("rls2", ["scans=9"], 11),
@@ -164,6 +167,8 @@ RUNS = {
     "orders": ("orders", ["scans=6"], 8),
     "pulses": ("pulses", ["scans=3"], 8),
     "pulses fixed": ("pulses_forecast", ["scans=2", PULSES], 8),
+    "folds and orders": ("ambiguous_orders", ["scans=4", "target.start_s=5", TOGETHER], 8),
+    "remainders": ("ambiguous_turns", ["scans=4", f"filters=[{REMAINDER}]"], 8),
     "sonar alike": ("sonar_smoothing", ["scans=9"], 9),
     "sonar correlated": ("sonar_correlated", ["scans=9"], 9),
     "sonar missed": ("sonar_missed", ["scans=12", "sweep.sensor.detection_probability=[0.7]", NEAR], 9),

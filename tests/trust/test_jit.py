@@ -14,7 +14,7 @@ AGREED = 1e-12
 # Runs that multiply rounding more. Covariances of each realisation's own, from a start of κ near 10⁴, so κε = 2·10⁻¹²;
 # weights of hypotheses are exponentials of up to −50, which multiplies a relative error by 50. A likelihood begins
 # with variances of 10⁹ beside plots of 1 … 10⁴.
-OWN = {"linear with misses": 1e-10, "folds": 1e-10, "folds missed": 1e-10, "orders": 1e-10, "tracks": 1e-10}
+OWN = dict.fromkeys(("linear with misses", "folds", "folds missed", "orders", "folds and orders", "tracks"), 1e-10)
 ROOT = Path(__file__).parents[2]
 MOMENTS = ("error", "error_all", "ahead")  # Σe, Σe², Σe³, Σe⁴ in the last axis
 

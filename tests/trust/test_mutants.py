@@ -17,6 +17,7 @@ PARTS = (
     "studies/multimodel",
     "studies/discriminator",
     "studies/sonar",
+    "studies/ambiguous_doppler",
 )
 
 

@@ -16,6 +16,7 @@ ORDERS = (
     "Необходимо рассматривать фильтры как нулевого, так и первого–второго порядков. Но использовать их оценки "
     "необходимо, комбинируя различные фильтры в зависимости от суммарных ошибок фильтрации на данном шаге"
 )
+THROUGH = "orders target=acceleration_pulse"  # the case of the manoeuvre
 RADARS = {2: "decimetre", 3: "decimetre", 4: "centimetre", 5: "centimetre"}
 
 
@@ -87,10 +88,10 @@ CLAIMS = (
             f"Orders pay: combined by {words} they lower the largest error of range through a manoeuvre",
             *(
                 Part(
-                    ("orders",),
+                    (THROUGH,),
                     f"largest σ of range: {name} over {single}",
                     "",
-                    measures.worst_to_worst("orders", name, single),
+                    measures.worst_to_worst(THROUGH, name, single),
                     less(),
                 )
                 for single in ("order 0", "order 1", "order 2")

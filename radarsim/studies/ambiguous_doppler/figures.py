@@ -48,7 +48,8 @@ SHARES = {  # figure: column of folds.csv, what it is, caption
         term("P(all folds right)"),
         term(
             "Share of realisations in which all folds so far are right, of the best hypothesis. Bands: "
-            "95 % intervals. Crosses: exact, of the nearest fold where truth and filter agree."
+            "95 % intervals. Crosses: exact, of the nearest fold where truth and filter agree, and of the Chinese "
+            "remainder of two scans."
         ),
     ),
     "lost": (

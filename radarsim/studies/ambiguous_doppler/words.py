@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 AS_GOOD = 5.0  # per cent above the oracle's σ
+HALF = 0.5  # share of realisations from which a filter counts as lost
 LOST = 100.0  # per cent above it, from which a σ is rather a share of lost tracks
 
 
@@ -61,14 +62,15 @@ def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
 
 def _told_of(result: Result) -> list[str]:
     """Of the filters that unfold those that are told of: the means over kept hypotheses, else all."""
-    unfolding = [one for one in result.spec.filters if one.folds and one.combine is None]
+    unfolding = [one for one in result.spec.filters if one.folds and one.combine in (None, "likelihood")]
     means = [one for one in unfolding if one.merge == "never" and one.estimate == "mean" and one.hypotheses > 1]
     return [one.name for one in means or unfolding]
 
 
 def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> str:
-    """The largest σ of range over the scans of every filter, and what is left to gain."""
+    """The largest σ of range over the scans of every filter, and what is left to gain; the first plot is common."""
     curves = made["curves"][(made["curves"]["case"] == result.name) & (made["curves"]["component"] == "r")]
+    curves = curves[curves["k"] > 1]
     worst = curves.loc[curves.groupby("filter", sort=False)["sigma"].idxmax()]
     said = [
         tr(
@@ -80,9 +82,9 @@ def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> str:
         for row in worst.to_dict("records")
     ]
     axes = result.axes
-    f = int(np.flatnonzero(axes.combines)[0])
-    best, whole = (float(np.max(values[f, :, 0])) for values in (axes.best_order, axes.best_combination))
-    words = [tr("largest σ of the range: {filters}", filters="; ".join(said))]
+    bounds = (axes.best_order[axes.combines, 1:, 0], axes.best_combination[axes.combines, 1:, 0])
+    best, whole = (float(np.min(np.max(values, axis=1))) for values in bounds)
+    words = [tr("largest σ of the range after the first plot: {filters}", filters="; ".join(said))]
     if np.isfinite(best) and np.isfinite(whole):
         words.append(
             tr(
@@ -117,11 +119,12 @@ def _as_good(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> s
         return tr("as good as unfolded velocity, within {percent:g} %, from scan {k} on", percent=AS_GOOD, k=since)
     last, end = folds.iloc[-1], rows.iloc[-1]
     if end["above_oracle_percent"] > LOST:
-        return tr(
-            "lost: at scan {k}, the last, the velocity is off by more than half the span in {share} of realisations",
+        off = tr(
+            "at scan {k}, the last, the velocity is off by more than half the span in {share} of realisations",
             k=end["k"],
             share=_percent(*(100 * last[key] for key in ("beyond", "beyond_lo", "beyond_hi"))),
         )
+        return tr("lost: {off}", off=off) if last["beyond"] > HALF else off
     keys = ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")
     return tr(
         "σ of the velocity is still {above} above that of unfolded velocity at scan {k}, the last",

@@ -30,6 +30,8 @@ def refused(stem, **keys):
         ("filters.5.orders", "[2, 1]", "filters.5.orders: must rise, each once"),
         ("filters.5.orders", "[1, 2]", "filters.5.manoeuvre_variance: must be a list of 2, one for each order"),
         ("filters.5.combine", "likelihood", "filters.5.combine: has no effect on one order; leave it out"),
+        ("filters.3.doppler", "remainder", "filters.3.merge: has no effect with doppler: remainder; leave it out"),
+        ("filters.1.doppler", "remainder", "filters.1.doppler: remainder needs several rates in radar.repetition_rate"),
         ("filters.5.stay_probability", "0.9", "filters.5.stay_probability: has no effect without combine: likelihood"),
         ("radar.repetition_rate_hz", "1", "radar.repetition_rate_hz: its span must be at least 0.03 m/s"),
         ("radar.repetition_rate_hz", "0", "radar.repetition_rate_hz: must be > 0, got 0"),

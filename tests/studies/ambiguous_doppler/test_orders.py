@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from radarsim.app.configs import load
+from radarsim.physics import targets
 from radarsim.studies.ambiguous_doppler import exact, filters, study
 from radarsim.studies.ambiguous_doppler.filters import Member
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
 from tests.studies.ambiguous_doppler import naive
-from tests.studies.ambiguous_doppler.conftest import FIXED, ORACLE, RANGE_ONLY, made, summed
+from tests.studies.ambiguous_doppler.conftest import RANGE_ONLY, made, summed
 
 ALL = {"orders": [0, 1, 2], "manoeuvre_variance": [9e4, 4.0, 1e-3]}
 LIKELIHOOD = {"name": "likelihood", "combine": "likelihood"} | ALL
@@ -149,16 +150,29 @@ def test_shares_of_least_error():
 
 
 def test_published_numbers_of_the_manoeuvre():
-    """RLS 2, σ_r at 140 s after 2 g for 30 s, in m: orders 1 and 2 with Doppler, the best combination of all."""
-    case = load("orders").cases[0]
-    plan = study.prepare(case)
-    sigma = dict(zip(plan.axes.filters, plan.axes.exact_sigma[:, -1, 0], strict=True))
-    assert sigma["order 1"] == pytest.approx(162, abs=1)
-    assert sigma["order 2"] == pytest.approx(347, abs=6)
-    assert plan.axes.best_combination[-1, -1, 0] == pytest.approx(155, abs=3)
-    straight = made("RLS 2", [ORACLE | {"orders": [1], "manoeuvre_variance": 4.0}, ORACLE | {"name": "two"}], 15, FIXED)
-    members = [Member(1, "unfolded", 4.0), Member(2, "unfolded", 1e-3)]
-    of = [exact.gains(one, straight.spec.prior, np.array([250.0, 15.0]), 10.0, 15) for one in members]
-    _, noise = exact.errors(of, np.zeros((0, 15, 3)), np.array([250.0, 15.0]))
+    """RLS 2, σ_r at 140 s after 2 g for 30 s, m, as two trials had it, with 20 m/s² for 2 g.
+
+    Orders 1 and 2 with the velocity, and the best combination of both orders with the velocity and without.
+    """
+    spec, t = load("orders").cases[1].spec, np.arange(15) * 10.0
+    members = [Member(order, how, {1: 4.0, 2: 1e-3}[order]) for how in ("unfolded", "none") for order in (1, 2)]
+    of = [exact.gains(one, spec.prior, np.array([250.0, 15.0]), 10.0, 15) for one in members]
+    motion = targets.acceleration_pulse([100e3, -250.0], 20.0, 60.0, 30.0, t)
+    bias, noise = exact.errors(of, motion[None], np.array([250.0, 15.0]))
+    E = exact.joint(bias, noise, np.ones(1))[-1, 0]
+    assert np.sqrt(np.diag(E)[:2]) == pytest.approx([162, 347], abs=0.5)
+    assert 1 / np.sqrt(np.linalg.inv(E).sum()) == pytest.approx(155, abs=0.5)
     one, two = np.sqrt([noise[-1, i, 0, i, 0] for i in range(2)])
-    assert one / two == pytest.approx(1.01, abs=0.005)
+    assert one / two == pytest.approx(1.01, abs=0.005)  # without a manoeuvre
+
+
+def test_the_shipped_cases_of_orders():
+    """The config's own 2 g are standard gravities, 19.6 m/s²; on the quadratic and the fly-by order 2 is best."""
+    names = ("order 0", "order 1", "order 2")
+    found = {}
+    for case in load("orders").cases:
+        axes = study.prepare(case).axes
+        found[case.spec.target.kind] = [axes.exact_sigma[axes.filters.index(name), -1, 0] for name in names]
+    assert found["acceleration_pulse"] == pytest.approx([178.3, 161.5, 341.8], abs=0.1)
+    assert found["polynomial"][2] < found["polynomial"][1] < found["polynomial"][0]
+    assert found["fly_by"][2] < found["fly_by"][1] < found["fly_by"][0]

@@ -59,11 +59,12 @@ def test_sentences_tell_from_which_scan_on_it_is_as_good(found):
 def test_orders_and_their_sentence():
     made = radarsim.run("orders", realisations=1000)
     table = made.tables["orders"]
-    assert table.groupby(["filter", "k"])["weight"].sum().to_numpy() == pytest.approx(1)
+    assert table.groupby(["case", "filter", "k"])["weight"].sum().to_numpy() == pytest.approx(1)
     assert set(table["filter"]) == {"likelihood", "expected error", "intersection"}
     assert len(made.tables["folds"]) == 0
-    (sentence,) = registry.study("ambiguous_doppler").answer(made.cases, made.tables)
-    assert "by the best combination" in sentence
+    sentences = registry.study("ambiguous_doppler").answer(made.cases, made.tables)
+    assert len(sentences) == 3
+    assert all("by the best combination" in sentence for sentence in sentences)
     assert {"orders", "sigma_r"} <= set(made.figures)
 
 
