@@ -53,7 +53,7 @@ def recorded_flight(file: str, t: np.ndarray) -> np.ndarray:
 
 
 def checked_truth(target: Any, t: np.ndarray, case: str) -> np.ndarray:
-    """As `truth`, (K, 3) at times t (K,); raises ConfigError, with the name of the case, for a target that cannot be."""
+    """As `truth`, (K, 3) at times t (K,); raises ConfigError, naming the case, for a target that cannot be."""
     try:
         x = truth(target, t)
     except recorded.Unreadable as error:
