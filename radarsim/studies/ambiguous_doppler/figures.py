@@ -150,7 +150,12 @@ def orders_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: st
         if result is None:
             continue
         marks = tuple(
-            Line(rows["t_s"].to_numpy(), rows["weight"].to_numpy(), f"order {order}", panels.look(order, 0, 1))
+            Line(
+                rows["t_s"].to_numpy(),
+                rows["weight"].to_numpy(),
+                tr("order {number}", number=order),
+                panels.look(order, 0, 1),
+            )
             for order, rows in ((n, own[own["order"] == n]) for n in range(3))
             if len(rows)
         )
