@@ -18,7 +18,7 @@ ROWS = (
     ("registry",),
     ("range_doppler", "multimodel", "sonar", "discriminator", "ambiguous_doppler", "pulses_to_tracks"),
     ("interface", "report"),
-    ("config", "engine", "bursts"),
+    ("config", "language", "engine", "bursts"),
     ("kernels", "physics"),
 )
 STUDIES = 3  # the row of the papers, which the registry knows by their names
@@ -29,6 +29,7 @@ ABOUT = {
     "registry": "which there are; identity",
     "interface": "what a study is; noise",
     "report": "statistics, charts, page",
+    "language": "what is said, in Russian too",
     "range_doppler": "P1",
     "multimodel": "P2",
     "sonar": "P3, three studies",
