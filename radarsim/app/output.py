@@ -12,6 +12,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import tr
 from radarsim.report import agreement, claims, controlled, files, notes, provenance, sweeps
 from radarsim.report import tables as common
+from radarsim.report.chart_text import spoken
 from radarsim.report.claims import forest
 from radarsim.report.drawing import Figure
 from radarsim.studies.registry import study
@@ -77,10 +78,14 @@ def _banded(made: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:
 
 @dataclass(frozen=True)
 class Written:
-    """What was written: the folder, its files by their path in it, the tables, and the sentences of the answer."""
+    """What was written: the folder, its files by their path in it, the tables, and the sentences of the answer.
+
+    removed are files of an earlier run that this one did not write.
+    """
 
     folder: Path
     files: tuple[str, ...]
+    removed: tuple[str, ...]
     tables: Mapping[str, "pd.DataFrame"] = field(repr=False)
     answer: tuple[str, ...]
 
@@ -97,12 +102,13 @@ def write(
     draw: bool = True,
     made: "Mapping[str, pd.DataFrame] | None" = None,
     formats: Sequence[str] = ("svg", "png"),
+    width_mm: float | None = None,
 ) -> Written:
     """Write all of an experiment's outputs into folder; every file at once, none half.
 
     run holds the facts of the run for run.json: see provenance.record; made the tables, where they are at hand; formats
-    those of the figures' files. Outputs of an earlier run that this one does not write (figures without `draw`) are
-    removed, so that nothing stale stands beside new numbers; nothing else is.
+    those of the figures' files, width_mm their width in place of their own. Outputs of an earlier run that this one
+    does not write (figures without `draw`) are removed, so that nothing stale stands beside new numbers.
     """
     from radarsim.report import html
 
@@ -112,8 +118,13 @@ def write(
     if draw:
         from radarsim.report import figures as drawing  # Matplotlib
 
+        made_by = (
+            f"radarsim {provenance.versions()['radarsim']}, {experiment.stem}, config {provenance.asked(experiment)}"
+        )
         for name, figure in described.items():
-            contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.save(figure, formats).items()}
+            saved = drawing.save(figure, formats, width_mm, made_by)
+            contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
+        contents["figures/captions.md"] = captions(described).encode()
     own = study(experiment.study)
     answer = tuple(own.answer(results, made))
     described_by = machine.described()
@@ -131,5 +142,12 @@ def write(
     )
     contents["report.html"] = page.encode()
     contents["run.json"] = provenance.to_json(provenance.with_output(record, "report.html", contents["report.html"]))
+    removed = sorted(set(provenance.outputs(folder)) - set(contents))
     files.replace_all(folder, contents, stale=provenance.outputs)
-    return Written(folder, tuple(sorted(contents)), made, answer)
+    return Written(folder, tuple(sorted(contents)), tuple(removed), made, answer)
+
+
+def captions(described: Mapping[str, Figure]) -> str:
+    """The captions of figures as Markdown: what each shows, then how it is drawn."""
+    parts = [f"## {name}\n\n**{spoken(one.title)}.** {spoken(one.caption)}\n" for name, one in described.items()]
+    return "\n".join(["# Captions\n", *parts])

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -136,11 +136,14 @@ class Result:
             raise KeyError(f"no figure {name!r}; there are: {', '.join(self._described)}")
         return figures.render(self._described[name])
 
-    def write(self, out: str | os.PathLike[str], figures: bool | str | Sequence[str] = True) -> "Written":
+    def write(
+        self, out: str | os.PathLike[str], figures: bool | str | Sequence[str] = True, width_mm: float | None = None
+    ) -> "Written":
         """Write tables, figures, claims, run.json and report.html into out/<stem>/, and out/index.html again.
 
-        figures may name the formats of their files: svg, png, pdf. What was written comes back. Raises
-        DisagreementError, with all written, where an exact value of a claim and its simulation differ beyond chance.
+        figures may name the formats of their files: svg, png, pdf; width_mm is their width in place of their own. What
+        was written comes back. Raises DisagreementError, with all written, where an exact value of a claim and its
+        simulation differ beyond chance.
         """
         from radarsim.app import arguments, output
         from radarsim.report import claims, index, provenance
@@ -150,9 +153,8 @@ class Result:
         formats = arguments.formats(figures)
         self.facts["warnings"] = [*self.facts["warnings"], *provenance.replaced(folder, self.experiment)]
         facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
-        self.written = output.write(
-            self.experiment, self.cases, folder, facts, draw=bool(formats), made=self.tables, formats=formats
-        )
+        write = partial(output.write, draw=bool(formats), formats=formats, width_mm=width_mm)
+        self.written = write(self.experiment, self.cases, folder, facts, made=self.tables)
         index.write(Path(out))
         if errors := claims.errors(self._tables["claims"]):
             raise DisagreementError(*errors)

@@ -84,6 +84,7 @@ def run(
     executor: Executor | None = None,
     out: str | os.PathLike[str] | None = None,
     figures: bool | str | Sequence[str] = True,
+    width_mm: float | None = None,
     progress: Progress | None = None,
     stop: Signals | None = None,
 ) -> Result:
@@ -95,6 +96,7 @@ def run(
     first of these at which every claim of the config is decided. time_limit is in seconds, or
     a condition that runs already. `result.unmet` says what of the two was not reached. workers are processes of this
     machine, scheduler the address of a Dask scheduler, executor one that is open already.
+    width_mm is the width of the figures' files in place of their own.
 
     Raises ConfigError for a wrong config, StoreError for a bad disk, NonFiniteError for a filter that diverged,
     TargetUnmet where the time did not suffice for a single block, and Interrupted, with all that was done stored, if
@@ -138,7 +140,7 @@ def run(
     ended_by = None if simulated.stopped else precision
     result = result_of(experiment, simulated, facts, repeated(experiment, simulated.done, overrides, ended_by))
     if out is not None:
-        result.write(out, figures)
+        result.write(out, figures, width_mm)
     return result
 
 
@@ -189,13 +191,15 @@ def report(
     out: str | os.PathLike[str],
     overrides: Sequence[str] = (),
     figures: bool | str | Sequence[str] = True,
+    width_mm: float | None = None,
 ) -> Result:
     """Tables, figures and report of a config from what is stored; raises ConfigError where something is missing.
 
     Where overrides do not say how many realisations, it is as many as the last run reported, else as the config asks.
+    width_mm is the width of the figures' files in place of their own.
     """
     result = from_store(experiment, out, overrides)
-    result.write(out, figures)
+    result.write(out, figures, width_mm)
     return result
 
 

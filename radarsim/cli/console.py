@@ -199,12 +199,15 @@ def print_result(result: "Result") -> None:
         for reason, names in result.unjudged().items():
             say(f"         not judged: {', '.join(names)}: {reason}")
         say(f"         `radarsim claims {result.experiment.stem}` says what each of them is")
-    drawn = [Path(name) for name in written.files if name.startswith("figures/")]
+    drawn = [Path(name) for name in written.files if name.startswith("figures/") and not name.endswith(".md")]
     say(f"tables   {written.folder / 'curves.csv'} and {sum(n.endswith('.csv') for n in written.files) - 1} more there")
     if drawn:
         kinds = " and ".join(sorted({path.suffix[1:].upper() for path in drawn}, reverse=True))
         say(f"figures  {written.folder / 'figures'} ({len({path.stem for path in drawn})}, each as {kinds})")
     say(f"report   {written.folder / 'report.html'}")
+    if written.removed:
+        more = f" and {len(written.removed) - 3} more" if len(written.removed) > 3 else ""
+        say(f"removed  of an earlier run, not made by this one: {', '.join(written.removed[:3])}{more}")
     print_warnings(result.warnings)
 
 

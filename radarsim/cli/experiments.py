@@ -20,6 +20,7 @@ from radarsim.cli.group import (
     realisations_option,
     seed_option,
     set_option,
+    width_option,
 )
 from radarsim.errors import ClusterError, DisagreementError, TargetUnmet
 
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 @out_option
 @figures_option
 @format_option
+@width_option
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @json_option
 def run(
@@ -61,6 +63,7 @@ def run(
     out: str,
     no_figures: bool,
     formats: tuple[str, ...],
+    width: str | None,
     quiet: bool,
     as_json: bool,
 ) -> None:
@@ -102,10 +105,16 @@ def run(
             means |= {"time_limit": limit, "stop": stop}
             figures = False if no_figures else formats or True
             compute: Callable[..., Result | Shares]
-            compute = partial(experiment.run, overrides=overrides, precision=precision, decide=decide, figures=figures)
+            draw = partial(experiment.run, figures=figures, width_mm=millimetres(width))
+            compute = partial(draw, overrides=overrides, precision=precision, decide=decide)
             if shard:
                 compute = partial(experiment.share, part=shard)
             _compute_each(loaded, partial(compute, **means), out, quiet, as_json)
+
+
+def millimetres(width: str | None) -> float | None:
+    """The width that was asked for; None where each figure has its own."""
+    return None if width is None else float(width)
 
 
 def _refuse_together(shard: object, precision: object, cluster: object, threads: object) -> None:
@@ -219,6 +228,7 @@ def check(
 @out_option
 @figures_option
 @format_option
+@width_option
 @json_option
 def report(
     configs: tuple[str, ...],
@@ -228,6 +238,7 @@ def report(
     out: str,
     no_figures: bool,
     formats: tuple[str, ...],
+    width: str | None,
     as_json: bool,
 ) -> None:
     """Tables, figures and report from what is stored; computes nothing.
@@ -245,7 +256,7 @@ def report(
     made = []
     for one in experiment.load_all(configs, overrides):
         figures = False if no_figures else formats or True
-        result = experiment.report(one, out=out, overrides=overrides, figures=figures)
+        result = experiment.report(one, out=out, overrides=overrides, figures=figures, width_mm=millimetres(width))
         made.append(documents.result(result))
         if not as_json:
             console.print_result(result)

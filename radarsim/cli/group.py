@@ -261,4 +261,11 @@ format_option = click.option(
     multiple=True,
     help="Formats of the figures' files, repeatable; default: svg and png.",
 )
+width_option = click.option(
+    "--width",
+    "width",
+    type=click.Choice(["85", "120", "175"]),
+    metavar="85|120|175",
+    help="Width of the figures' files, mm; letters keep their size. Default: each its own.",
+)
 figures_option = click.option("--no-figures", is_flag=True, help="Draw no figures; tables and report only.")

@@ -261,7 +261,7 @@ def probabilities(track: Track) -> Figure | None:
                 Line(track.t_s, track.probability[f, :, m], tr("model {number}", number=m + 1), Style(m, m))
                 for m in np.flatnonzero(known).tolist()
             )
-            y = Axis(tr("probability"), limits=(0, 1.02))
+            y = Axis(tr("probability"), limits=(0, 1))
             made.append(Panel(_time(), y, marks, panels.literal(name), direct=False))
     caption = tr("Probabilities of each filter's models, in the order of the config.")
     return _several("probabilities", tr("Probabilities of the models"), caption, made[: panels.MOST]) if made else None

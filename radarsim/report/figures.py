@@ -72,7 +72,7 @@ STYLE: dict[Any, Any] = {  # Matplotlib names every key that it knows as a type 
     "lines.markersize": 3.2,
     "lines.markeredgewidth": 0.7,
     "axes.formatter.useoffset": False,
-    "svg.fonttype": "path",
+    "svg.fonttype": "none",  # text that a journal can set and a reader can search
     "pdf.fonttype": 42,
 }
 
@@ -148,18 +148,28 @@ def wrapped(text: str, letters: float, mark: str = ", ") -> str:
     return f"{mark.rstrip()}\n".join(lines)
 
 
-def save(figure: Figure, formats: Iterable[str] = ("svg", "png")) -> dict[str, bytes]:
-    """The bytes of the figure in each format ("svg", "png" at 200 dpi, "pdf"), the same for the same data."""
-    canvas = render(figure)
-    return {kind: _bytes(canvas, kind, figure.name) for kind in formats}
+def save(
+    figure: Figure, formats: Iterable[str] = ("svg", "png"), width_mm: float | None = None, made_by: str = ""
+) -> dict[str, bytes]:
+    """The bytes of the figure in each format ("svg", "png" at 200 dpi, "pdf"), the same for the same data.
+
+    At a width in place of its own its letters keep their size. Title, caption and made_by (what it was made of, and
+    with what) stand in each file's metadata.
+    """
+    canvas = render(legends.at_width(figure, width_mm))
+    return {kind: _bytes(canvas, kind, figure, made_by) for kind in formats}
 
 
-def _bytes(canvas: Canvas, kind: str, name: str) -> bytes:
-    undated: dict[str, Any]
-    undated = {"svg": {"Date": None, "Creator": None}, "pdf": {"CreationDate": None}, "png": {"Software": None}}
+def _bytes(canvas: Canvas, kind: str, figure: Figure, made_by: str) -> bytes:
+    title, caption, undated = spoken(figure.title) or None, spoken(figure.caption) or None, made_by or None
+    metadata: dict[str, dict[str, Any]] = {
+        "svg": {"Title": title, "Description": caption, "Creator": undated, "Date": None},
+        "pdf": {"Title": title, "Subject": caption, "Keywords": undated, "CreationDate": None},
+        "png": {"Title": title, "Description": caption, "Software": undated},
+    }
     out = io.BytesIO()
-    with matplotlib.rc_context(STYLE | {"svg.hashsalt": name}), _unknown_letters_pass():
-        canvas.savefig(out, format=kind, dpi=PNG_DPI, metadata=undated[kind])
+    with matplotlib.rc_context(STYLE | {"svg.hashsalt": figure.name}), _unknown_letters_pass():
+        canvas.savefig(out, format=kind, dpi=PNG_DPI, metadata=metadata[kind])
     return out.getvalue()
 
 

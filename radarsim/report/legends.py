@@ -15,6 +15,7 @@ LONGEST_AT_END = 28  # letters of a name that may stand at a line's end
 AT_ENDS_MM = 4.4  # of a panel's height for each name at a line's end
 ROW_MM, LETTER_MM, SAMPLE_MM = 3.5, 1.45, 12.0  # of a legend: a row, a letter, the sample of a line with its gaps
 LEAST_PANEL_MM = 55.0  # wide, of a figure whose width is chosen
+WIDTHS_MM = (85, 120, 175)  # of a journal's page: one column, one and a half, two
 MOST_BESIDE = 16  # names in one column beside a panel
 
 Keys = Mapping[str, Style | None]  # words and the look that they explain; None for the crosses of exact values

@@ -55,13 +55,18 @@ def record(
         "stop": stop,
         "seed": experiment.seed,
         "resolved": experiment.resolved,
-        "resolved_sha256": hashlib.sha256(to_json(experiment.resolved)).hexdigest(),
+        "resolved_sha256": asked(experiment),
         **facts,
         "warnings": warnings,
         "versions": versions(),
         "machine": dict(machine),
         "outputs": {path: hashlib.sha256(data).hexdigest() for path, data in sorted(contents.items())},
     }
+
+
+def asked(experiment: Experiment) -> str:
+    """SHA-256 of a resolved config in hexadecimal."""
+    return hashlib.sha256(to_json(experiment.resolved)).hexdigest()
 
 
 def with_output(made: dict, path: str, data: bytes) -> dict:

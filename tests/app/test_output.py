@@ -10,6 +10,7 @@ import pytest
 from markupsafe import escape
 
 from radarsim.app import output
+from radarsim.app import run as running
 from radarsim.app.configs import load
 from radarsim.errors import StoreError
 from radarsim.report import files, html, provenance
@@ -18,6 +19,7 @@ TABLES = {"curves.csv", "gains.csv", "steady.csv", "believed.csv", "consistency.
 TABLES |= {"claims.csv"}
 FIGURES = {f"figures/{k}_{c}.{f}" for k in ("sigma", "gain") for c in ("r", "Vr", "ar") for f in ("svg", "png")}
 FIGURES |= {f"figures/{name}.{kind}" for name in ("consistency", "claims") for kind in ("svg", "png")}
+FIGURES |= {"figures/captions.md"}
 RUN = {"stop": "done", "threads": 2, "seconds": 1.5, "warnings": ["watch out"], "identities": {"rls2": "ab"}}
 
 
@@ -123,7 +125,8 @@ def test_no_claims_no_file(radar_config, expected_case, tmp_path):
 def test_page_is_whole_and_leads_nowhere(written):
     text = (written.folder / "report.html").read_text()
     page = Page(text)
-    assert all(address.startswith("#") or address == "data:," for address in page.addresses)
+    beside = set(written.files)  # leads to its own tables and figures, and fetches none
+    assert all(address.startswith("#") or address == "data:," or address in beside for address in page.addresses)
     assert "http://" not in re.sub(r'xmlns(:\w+)?="[^"]*"', "", text)
     assert page.tags.count("script") == 8 + 1  # the numbers of each figure, and the page's own
     assert "Content-Security-Policy" in text
@@ -131,7 +134,7 @@ def test_page_is_whole_and_leads_nowhere(written):
     assert len(ids) == len(set(ids))
     assert text.count('class="chart"') == 9  # two panels in that of consistency
     assert str(escape(written.answer[0])).replace(" %", "\u00a0%") in text
-    assert "C_θ" in text[text.index('id="asked"') : text.index('id="figures"')]
+    assert "C_θ" in text[text.index('id="asked"') : text.index('id="claims"')]
     assert "(1 rows)" not in text
     assert re.search(r">sigma</th><th[^>]*>exact_sigma<", text)
     assert "watch out" in text
@@ -185,3 +188,27 @@ def test_many_long_tables_share_the_room_of_a_page():
     assert len(shown[-1]["rows"]) == 30
     assert all(table["cut"] and table["count"] == 5000 for table in shown[:-1])
     assert len(html._tables({"alone": long})[0]["rows"]) == html.ROWS
+
+
+def test_figures_have_the_width_asked_for_their_captions_and_what_they_were_made_of(tmp_path):
+    first = running.run("rls2", realisations=2000, out=tmp_path)
+    folder = tmp_path / "rls2"
+    names = {path.name for path in (folder / "figures").iterdir()}
+    assert "captions.md" in names
+    captions = (folder / "figures" / "captions.md").read_text()
+    assert all(f"## {name}\n\n**" in captions for name in first.figures)
+    svg = (folder / "figures" / "sigma_r.svg").read_text()
+    assert ">time from the first plot, s</text>" in svg  # text, not paths
+    record = json.loads((folder / "run.json").read_text())
+    assert f"rls2, config {record['resolved_sha256']}" in svg
+    assert "Root-mean-square error of the range" in svg
+    for width in (85, 120, 175):
+        result = running.report(first.experiment, out=tmp_path, figures=("svg",), width_mm=width)
+        svg = (folder / "figures" / "sigma_r.svg").read_text()
+        points = float(re.search(r'<svg[^>]* width="([\d.]+)pt"', svg)[1])
+        assert points / 72 * 25.4 == pytest.approx(width, abs=0.05)
+        assert "7.5px" in svg  # as large as at any other width
+    assert result.written.removed == ()
+    kept = running.report(first.experiment, out=tmp_path, figures=("pdf",)).written
+    assert "figures/sigma_r.svg" in kept.removed
+    assert not (folder / "figures" / "sigma_r.svg").exists()

@@ -98,7 +98,7 @@ def _threshold_panels(
             shares = np.array([_locked(result, made["locks"], name) for result in members])
             locks.append(Line(x, shares[:, 0], words, style, shares[:, 1], shares[:, 2]))
     of_r = wide(Panel(axis, Axis(tr("$\\sigma$ of $r$ at the end, m")), tuple(sigmas), panels.device(members[0])))
-    return [Panel(axis, Axis(tr("P(locked)"), limits=(0, 1.02)), tuple(locks), panels.device(members[0])), of_r]
+    return [Panel(axis, Axis(tr("P(locked)"), limits=(0, 1)), tuple(locks), panels.device(members[0])), of_r]
 
 
 def _locked(result: Result, locks: "pd.DataFrame", name: str) -> tuple[float, float, float]:
