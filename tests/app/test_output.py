@@ -128,7 +128,7 @@ def test_page_is_whole_and_leads_nowhere(written):
     beside = set(written.files)  # leads to its own tables and figures, and fetches none
     assert all(address.startswith("#") or address == "data:," or address in beside for address in page.addresses)
     assert "http://" not in re.sub(r'xmlns(:\w+)?="[^"]*"', "", text)
-    assert page.tags.count("script") == 8 + 1  # the numbers of each figure, and the page's own
+    assert page.tags.count("script") == 8 + 2  # the numbers of each figure, the page's own, and its words
     assert "Content-Security-Policy" in text
     ids = re.findall(r'\bid="([^"]+)"', text)
     assert len(ids) == len(set(ids))
@@ -143,7 +143,8 @@ def test_page_is_whole_and_leads_nowhere(written):
 
 def test_names_are_escaped(written):
     text = (written.folder / "report.html").read_text()
-    assert set(re.findall("<script[^>]*>", text)) == {"<script>", '<script type="application/json">'}
+    scripts = {"<script>", '<script type="application/json">', '<script type="application/json" id="words">'}
+    assert set(re.findall("<script[^>]*>", text)) == scripts
     assert text.count("<script>") == 1
     assert "&lt;script&gt;" in text
     assert set(pd.read_csv(written.folder / "gains.csv")["baseline"]) == {HOSTILE}
