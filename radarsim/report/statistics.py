@@ -244,7 +244,8 @@ def difference(a: Estimate, b: Estimate, correlation: Values = 0.0) -> Estimate:
     """
 
     def joined(one: Values, other: Values) -> Values:
-        return np.hypot(one - correlation * other, np.sqrt(1 - np.square(correlation)) * other)
+        shared = np.where(np.equal(correlation, 0), 0.0, correlation * other)  # 0 · ∞ is no number
+        return np.hypot(one - shared, np.sqrt(1 - np.square(correlation)) * other)
 
     with np.errstate(invalid="ignore"):
         value = np.subtract(a.value, b.value)

@@ -135,3 +135,10 @@ def test_tables_read_back_as_they_were_written():
     assert read["filter"].tolist() == ["nan", "1", "a,b", ""]
     assert read["n"].tolist() == [1, 2, 3, 4]
     np.testing.assert_array_equal(read["sigma"], made["sigma"])
+
+
+def test_an_interval_without_an_upper_end_has_none_in_a_difference_either():
+    open_end = statistics.Estimate(2.0, 1.0, np.inf)
+    apart = statistics.difference(statistics.Estimate(5.0, 4.0, 6.0), open_end)
+    assert (apart.value, apart.lo) == (3.0, -np.inf)
+    assert apart.hi == pytest.approx(3 + np.sqrt(2))
