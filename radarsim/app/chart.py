@@ -7,6 +7,7 @@ from pathlib import Path
 
 from radarsim.app import arguments
 from radarsim.app.configs import load
+from radarsim.app.run import namesakes
 from radarsim.config.experiment import Case
 from radarsim.errors import ConfigError
 from radarsim.report import files
@@ -37,11 +38,13 @@ def chart(
     """Draw the chart of the configs' study, with their cases on it, into `out`/chart; nothing is simulated.
 
     Without configs, of the study that has a chart, with its paper's own devices. Raises ConfigError where the study
-    has none, or configs are of several.
+    has none, configs are of several, or two have one name.
     """
     arguments.directory(out)
-    cases = [case for config in configs for case in load(config, overrides).cases]
-    made = described(cases)
+    experiments = [load(config, overrides) for config in configs]
+    if faults := namesakes(experiments):
+        raise ConfigError(*faults)
+    made = described([case for one in experiments for case in one.cases])
     contents = {"chart.csv": common.to_csv(made.table), "chart.html": made.page.encode()}
     if formats:
         from radarsim.report import figures as drawing  # Matplotlib

@@ -176,3 +176,12 @@ def test_the_command(tmp_path):
     assert sorted(p.name for p in (tmp_path / "chart").iterdir()) == ["chart.csv", "chart.html"]
     words = CliRunner().invoke(main, ["chart", "rls4", "--out", str(tmp_path), "--no-figures"]).stdout
     assert "page     " in words
+
+
+def test_two_configs_of_one_name_could_not_be_told_apart(tmp_path):
+    text = (Path(__file__).parents[3] / "configs" / "rls2.yaml").read_text(encoding="utf-8")
+    for folder in ("one", "other"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "mine.yaml").write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError, match="rename one, or run them apart"):
+        chart([tmp_path / "one" / "mine.yaml", tmp_path / "other" / "mine.yaml"], tmp_path, formats=[])
