@@ -138,19 +138,18 @@ def _drawn_paths(track: Track, paths: Mapping[str, Path]) -> list[Path]:
 
 
 def _ends(path: Path, size: float) -> list:
-    """Words at the first and the last place of a track."""
+    """Words at the first and the last place of a track, on the side where the track does not go."""
     known = np.flatnonzero(np.isfinite(path.places[:, :2]).all(axis=1))
     if not known.size:
         return []
-    return [
-        Note(
-            path.places[i, 1] / size,
-            path.places[i, 0] / size,
-            tr("{what}, {t_s:g} s", what=what, t_s=path.t_s[i]),
-            place,
-        )
-        for i, what, place in ((known[0], tr("start"), "ne"), (known[-1], tr("end"), "se"))
-    ]
+    made, third = [], max(len(known) // 3, 1)  # its direction at an end is that of a third of it
+    ends = ((known[0], known[min(third, len(known) - 1)], tr("start")), (known[-1], known[-third], tr("end")))
+    for i, inner, what in ends:
+        north, east = path.places[i, :2] - path.places[inner, :2]
+        place = ("s" if north >= 0 else "n") + ("e" if east >= 0 else "w")
+        words = tr("{what}, {t_s:g} s", what=what, t_s=path.t_s[i])
+        made.append(Note(path.places[i, 1] / size, path.places[i, 0] / size, words, place))
+    return made
 
 
 # ---- estimates and what they miss -----------------------------------------------------------------------------------
