@@ -29,6 +29,8 @@ from radarsim.config.fields import (
 )
 from radarsim.config.radial import (
     COEFFICIENTS,
+    FASTEST_MPS,
+    HARDEST_MPS2,
     AccelerationStart,
     Coefficients,
     FlyBy,
@@ -134,12 +136,12 @@ class RandomPolynomial(Model):
         title="kind", description="a polynomial of the second degree, drawn each realisation"
     )
     range_m: Positive = Field(100e3, title="range", description="range at the first scan, m")
-    sigma_velocity_mps: NonNegative | None = Field(
+    sigma_velocity_mps: Annotated[NonNegative, Field(le=FASTEST_MPS)] | None = Field(
         None,
         title="σ of the target's radial velocity",
         description="standard deviation of the radial velocity, m/s; default: that of `prior`",
     )
-    sigma_acceleration_mps2: NonNegative | None = Field(
+    sigma_acceleration_mps2: Annotated[NonNegative, Field(le=HARDEST_MPS2)] | None = Field(
         None,
         title="σ of the target's radial acceleration",
         description="standard deviation of the radial acceleration, m/s²; default: that of `prior`",
@@ -205,7 +207,7 @@ class Filter(Model):
         title="hypotheses kept",
         description="folded: most sequences of folds that it keeps; 1: the nearest fold; default: 300",
     )
-    prune_below: Annotated[float, Field(ge=0, lt=1)] | None = Field(
+    prune_below: Annotated[Probability, Field(lt=1)] | None = Field(
         None,
         title="ratio under which a hypothesis is dropped",
         description="folded: ratio to the probability of the best, under which a hypothesis is dropped; 0: none is; "
@@ -227,7 +229,7 @@ class Filter(Model):
         description="several orders: likelihood (IMM, with transitions between orders), expected_error (the linear "
         "combination of least error over `manoeuvres`), intersection (the smoothest whose interval meets all rougher)",
     )
-    stay_probability: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+    stay_probability: Annotated[Probability, Field(gt=0, lt=1)] | None = Field(
         None,
         title="probability that an order lasts",
         description="likelihood: probability that an order lasts from scan to scan; default: 0.95",
@@ -348,8 +350,10 @@ class Keys(Study):
         radar, prior = self.radar, self.prior
         if prior.sigma_velocity_mps > PROPORTION * radar.sigma_velocity_mps:
             yield at("prior.sigma_velocity_mps", f"must be at most {PROPORTION:g} times the velocity's accuracy")
-        elif prior.sigma_velocity_mps > MOST_FOLDS * min(radar.spans_mps):
-            least = f"{prior.sigma_velocity_mps / MOST_FOLDS:g} m/s, prior.sigma_velocity_mps over {MOST_FOLDS:g}"
+            return
+        widest, name = max((prior.sigma_velocity_mps, "prior"), (radar.sigma_velocity_mps, "radar"))
+        if widest > MOST_FOLDS * min(radar.spans_mps):
+            least = f"{widest / MOST_FOLDS:g} m/s, {name}.sigma_velocity_mps over {MOST_FOLDS:g}"
             yield at("radar.repetition_rate_hz", f"its span must be at least {least}")
 
     @cross_check

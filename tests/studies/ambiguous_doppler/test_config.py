@@ -21,6 +21,7 @@ def refused(stem, **keys):
         ("filters.5.hypotheses", "-3", "filters.5.hypotheses: must be >= 1, got -3"),
         ("filters.5.hypotheses", "1e6", "filters.5.hypotheses: must be <= 100000, got 1000000"),
         ("filters.5.prune_below", "1", "filters.5.prune_below: must be < 1, got 1"),
+        ("filters.5.prune_below", "true", "filters.5.prune_below: must be a number, got true"),
         ("filters.5.prune_below", "-1e-3", "filters.5.prune_below: must be >= 0, got -0.001"),
         ("filters.5.merge", "sometimes", "filters.5.merge: must be one of never, each_scan"),
         ("filters.0.hypotheses", "10", "filters.0.hypotheses: has no effect with doppler: none; leave it out"),
@@ -34,6 +35,11 @@ def refused(stem, **keys):
         ("filters.1.doppler", "remainder", "filters.1.doppler: remainder needs several rates in radar.repetition_rate"),
         ("filters.5.stay_probability", "0.9", "filters.5.stay_probability: has no effect without combine: likelihood"),
         ("radar.repetition_rate_hz", "1", "radar.repetition_rate_hz: its span must be at least 0.03 m/s"),
+        (
+            "radar.sigma_velocity_mps",
+            "1e17",
+            "its span must be at least 1e+13 m/s, radar.sigma_velocity_mps over 10000",
+        ),
         ("radar.repetition_rate_hz", "0", "radar.repetition_rate_hz: must be > 0, got 0"),
         ("radar.repetition_rate_hz", "[1000, 1200, 1000]", "radar.repetition_rate_hz: must differ from rate to rate: "),
         ("radar.repetition_rate_hz", "[]", "radar.repetition_rate_hz: must hold at least 1"),
@@ -67,6 +73,7 @@ def test_orders_need_to_be_combined():
         ("{kind: acceleration_start, coefficients: [1e5], acceleration_mps2: 5}",
          "target.start_s: give either start_s or start_scan"),
         ("{kind: polynomial, coefficients: [1e5, 1e12]}", "target: must stay within 45e11 m of the radar"),
+        ("{kind: random_polynomial, sigma_acceleration_mps2: 1e17}", "sigma_acceleration_mps2: must be <= 1000, got"),
         ("{kind: hovering}", "target.kind: must be one of polynomial, random_polynomial, acceleration_start, "
          "acceleration_pulse, turn, fly_by, recorded"),
     ],
