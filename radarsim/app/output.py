@@ -150,4 +150,4 @@ def write(
 def captions(described: Mapping[str, Figure]) -> str:
     """The captions of figures as Markdown: what each shows, then how it is drawn."""
     parts = [f"## {name}\n\n**{spoken(one.title)}.** {spoken(one.caption)}\n" for name, one in described.items()]
-    return "\n".join(["# Captions\n", *parts])
+    return "\n".join([f"# {tr('Captions')}\n", *parts])
