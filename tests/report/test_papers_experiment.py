@@ -20,11 +20,13 @@ MAY_GROW = {
     "sonar": ("filters",),
     "discriminator": ("estimators",),
     "ambiguous_doppler": (),
+    "pulses_to_tracks": (),
 }
 # The only keys that may have another value than in the paper's experiment: names that are displayed.
 MAY_DIFFER = {
     "range_doppler": {"radar.name", "radar.band", "filters.name", "scans"},
     "ambiguous_doppler": {"radar.name", "radar.band", "filters.name"},
+    "pulses_to_tracks": {"radar.name", "radar.band", "filters.name"},
     "multimodel": {"sensor.name", "filters.name"},
     "sonar": {"sensor.name", "filters.name", "detectors.name"},
     "discriminator": {"estimators.name"},

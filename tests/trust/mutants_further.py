@@ -176,4 +176,53 @@ RUNS = (
         ),
     ),
 )
-FURTHER = (*MANOEUVRES, *FALSE_PLOTS, *SCORES, *LAWS_EXACT, *RUNS)
+CHAIN, BURSTS = "studies/pulses_to_tracks/test_kernels.py", "studies/pulses_to_tracks/test_study.py"
+TEXTBOOK = f"{CHAIN}::test_the_chain_is_the_textbooks"
+PULSES = (
+    *mutants(
+        "radarsim/studies/pulses_to_tracks/kernels/steps.py",
+        ("u * P[1] + w * Q[1] + v * d[0] * d[1]", "u * P[1] + w * Q[1]", TEXTBOOK),
+    ),
+    *mutants(
+        "radarsim/studies/pulses_to_tracks/kernels/chain.py",
+        ("if k >= own.start else", "if k > own.start else", TEXTBOOK),
+        (
+            "ages[i] = min(ages[i] + 1, AGES - 1) if locked else 0",
+            "ages[i] = min(ages[i] + 1, AGES - 1) if locked else 1",
+            f"{BURSTS}::test_ages_count_the_realisations_once",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/pulses_to_tracks/kernels/estimate.py",
+        (
+            "pair = U(2 * world.mean.shape[0] * k)",
+            "pair = U(0 * k)",
+            f"{BURSTS}::test_sampled_idealisations_have_their_exact_errors",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/pulses_to_tracks/kernels/spectrum.py",
+        (
+            "bend * (t * t) + offset * lines * j",
+            "bend * (t * t)",
+            f"{CHAIN}::test_the_highest_line_is_that_of_the_discrete_transform",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/pulses_to_tracks/world.py",
+        (
+            "power_db = power_db + 40.0",
+            "power_db = power_db + 20.0",
+            f"{BURSTS}::test_power_falls_with_range_and_with_the_pulses_length",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/pulses_to_tracks/exact.py",
+        (
+            "F @ mean + missed[k]",
+            "F @ mean",
+            f"{BURSTS}::test_exact_errors_follow_a_target_that_leaves_the_model",
+        ),
+    ),
+)
+FURTHER = (*MANOEUVRES, *FALSE_PLOTS, *SCORES, *LAWS_EXACT, *RUNS, *PULSES)

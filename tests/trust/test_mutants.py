@@ -18,6 +18,8 @@ PARTS = (
     "studies/discriminator",
     "studies/sonar",
     "studies/ambiguous_doppler",
+    "studies/pulses_to_tracks",
+    "bursts",
 )
 
 

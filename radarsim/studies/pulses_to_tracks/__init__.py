@@ -1,6 +1,7 @@
 """From pulses to tracks: what a burst's estimate of velocity and acceleration is worth to the track (P4 into P1)."""
 
 from radarsim.studies.folder import StudyFolder
+from radarsim.studies.interface import Paper
 
 STUDY = StudyFolder(
     package=__name__,
@@ -13,5 +14,6 @@ STUDY = StudyFolder(
         "estimator: spectrum": "the same found classically: the peak of the spectrum, then scoring",
         "estimator: fisher_bound": "the idealisation: Gaussian errors of the Fisher bound, which always lock",
     },
+    paper=Paper("Uss, Baryshev & Djavad 2010, into Gorshkov & Zavizhenets 2017", page="pulses_to_tracks"),
     offers=("inputs", "warnings"),
 )

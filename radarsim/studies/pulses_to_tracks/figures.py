@@ -23,7 +23,7 @@ QUANTITIES = {
     "ar": panels.Quantity("$a_r$", term("radial acceleration")),
 }
 FEW = 30  # realisations behind a point
-WIDE = 30  # largest over least σ from which its axis is logarithmic
+WIDE = 15  # largest over least σ from which its axis is logarithmic
 
 
 def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
@@ -144,7 +144,7 @@ def losses_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
         if len(rows) > 1:
             x, y, lo, hi = (rows[c].to_numpy(dtype=float) for c in ("since_loss", "sigma", "sigma_lo", "sigma_hi"))
             marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, np.minimum(hi, 1e3 * y)))
-    ticks = tuple((float(age), str(age) if age < AGES - 1 else tr("{age}+ or none", age=age)) for age in range(AGES))
+    ticks = tuple((float(age), str(age) if age < AGES - 1 else f"{age}+") for age in range(AGES))
     x_axis = Axis(tr("scans since a burst was lost"), ticks=ticks)
     return wide(Panel(x_axis, Axis(tr("$\\sigma$ of $r$ at the last scan, m")), tuple(marks), _title(result)))
 
