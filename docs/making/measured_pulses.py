@@ -93,15 +93,16 @@ def forecast(results: Results) -> list[tuple]:
 def acceleration(results: Results) -> list[tuple]:
     """σ of the acceleration at its worst over the scans, with the burst's acceleration and without."""
     stem = "pulses_acceleration"
-    made: list[tuple] = [("target", "r+V: largest σ_a, m/s²", "r+V+a", "r+V: largest σ_r, m", "r+V+a")]
+    names = ("r+V", "r+V+a", "r+V, random jerk", "r+V+a, random jerk")
+    made: list[tuple] = [("largest σ of", "target", *names)]
     for target in ("polynomial", "turn", "acceleration_start"):
-        cells = []
-        for component in ("ar", "r"):
-            for name in ("r+V", "r+V+a"):
+        for component, words in (("ar", "acceleration, m/s²"), ("r", "range, m")):
+            cells = []
+            for name in names:
                 found = rows(results, stem, "curves", case=f"target={target}", filter=name, component=component)
                 found = found[found["k"] > 2]
                 cells.append(bounded(found.loc[found["sigma"].idxmax()], "sigma"))
-        made.append((target.replace("acceleration_start", "brake"), *cells))
+            made.append((words, target.replace("acceleration_start", "brake"), *cells))
     return made
 
 

@@ -203,8 +203,8 @@ PULSES = (
     *mutants(
         "radarsim/studies/pulses_to_tracks/kernels/spectrum.py",
         (
-            "bend * (t * t) + offset * lines * j",
-            "bend * (t * t)",
+            "power = x * x + y * y",
+            "power = x * x",
             f"{CHAIN}::test_the_highest_line_is_that_of_the_discrete_transform",
         ),
     ),

@@ -147,6 +147,12 @@ class Filter(Model):
         json_schema_extra={"symbol": "D_M", "unit": "(m/s³)²"},
         description="variance of the random jerk it allows for, (m/s³)²; as in P1 not over the scans of its start",
     )
+    process_noise: Literal["random_jerk", "white_jerk", "white_acceleration"] = Field(
+        "random_jerk",
+        title="process noise",
+        description="how the allowed manoeuvre lies within a scan: a constant jerk (P1's), of which the velocity tells "
+        "the acceleration, white jerk, or a step of the acceleration",
+    )
     estimator: Literal["sequence", "dense", "cured", "spectrum", "fisher_bound"] | None = Field(
         None,
         title="estimator",

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.physics.motion import process_noise, transition
 from radarsim.studies.pulses_to_tracks.filters import start_scans
 
 
@@ -20,7 +20,7 @@ def errors(spec: Any, one: Any, sigma: np.ndarray, missed: np.ndarray) -> tuple[
     covariance P gives the gains; that of the errors, S, has no manoeuvre noise.
     """
     dt, scans = spec.radar.scan_period_s, len(missed)
-    F, Q = transition(dt), manoeuvre_covariance(one.manoeuvre_variance, dt)
+    F, Q = transition(dt), process_noise(one.process_noise, one.manoeuvre_variance, dt)
     prior = np.diag([0.0, spec.prior.sigma_velocity_mps**2, spec.prior.sigma_acceleration_mps2**2])
     P, S, mean = prior, prior, np.zeros(3)
     means, covariances = np.zeros((scans, 3)), np.zeros((scans, 3, 3))

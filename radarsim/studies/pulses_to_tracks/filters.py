@@ -18,7 +18,7 @@ from radarsim.bursts.burst import Burst
 from radarsim.bursts.fisher import fisher, fisher_sums
 from radarsim.bursts.kernels.data import BLOCK_SUMS
 from radarsim.bursts.kernels.sequence import OPTIONS, WINDOW
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.physics.motion import process_noise, transition
 from radarsim.studies.pulses_to_tracks import world
 from radarsim.studies.pulses_to_tracks.kernels import records
 
@@ -102,7 +102,7 @@ def widest(spec: Any, one: Any) -> tuple[float, float]:
     Those of range alone: a burst only adds to what is known.
     """
     dt = spec.radar.scan_period_s
-    F, Q = transition(dt), manoeuvre_covariance(one.manoeuvre_variance, dt)
+    F, Q = transition(dt), process_noise(one.process_noise, one.manoeuvre_variance, dt)
     P = np.diag([0.0, spec.prior.sigma_velocity_mps**2, spec.prior.sigma_acceleration_mps2**2])
     found = []
     for k in range(spec.scans):
@@ -220,7 +220,7 @@ def _filter(spec: Any, one: Any, own: Menu | None) -> np.void:
     made["kind"] = KINDS.get(one.estimator, records.SEQUENCE)
     made["takes"], made["use"], made["start"] = one.takes, USES[one.use], start_scans(one)
     made["track"] = one.forecast == "track"
-    made["noise"] = manoeuvre_covariance(one.manoeuvre_variance, dt)[np.triu_indices(3)]
+    made["noise"] = process_noise(one.process_noise, one.manoeuvre_variance, dt)[np.triu_indices(3)]
     if one.use == "gated":
         from scipy.special import chdtri
 

@@ -152,7 +152,8 @@ def idealisation(spec: Any, one: Any) -> int:
     if not one.takes or one.estimator == "fisher_bound":
         return -1
     for i, other in enumerate(spec.filters):
-        same = (other.observes, other.manoeuvre_variance) == (one.observes, one.manoeuvre_variance)
+        alike = ("observes", "manoeuvre_variance", "process_noise")
+        same = all(getattr(other, key) == getattr(one, key) for key in alike)
         if same and other.estimator == "fisher_bound" and other.derivatives == one.derivatives:
             return i
     return -1
