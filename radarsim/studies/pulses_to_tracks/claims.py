@@ -42,20 +42,23 @@ CLAIMS = (
         reading="the same burst; every estimate taken as measured; within 5 %",
         config="pulses",
     ),
-    _claim(
-        3,
-        "An acceleration from the burst pays where the velocity does",
-        *(
-            Part(
-                (f"pulses_acceleration target={target}",),
-                f"σ of acceleration at the last scan, with the acceleration over without: {target}",
-                "",
-                measures.last_to_last(f"pulses_acceleration target={target}", "r+V+a", "r+V", "ar"),
-                less(),
-            )
-            for target in TARGETS
-        ),
-        reading="2048 pulses in 51 ms, both filters with the burst's velocity",
-        config="pulses_acceleration",
+    *(
+        _claim(
+            number,
+            f"An acceleration from the burst pays where the velocity does, under {words}",
+            *(
+                Part(
+                    (f"pulses_acceleration target={target}",),
+                    f"σ of acceleration at the last scan, with the acceleration over without: {target}",
+                    "",
+                    measures.last_to_last(f"pulses_acceleration target={target}", f"r+V+a{of}", f"r+V{of}", "ar"),
+                    less(),
+                )
+                for target in TARGETS
+            ),
+            reading="2048 pulses in 51 ms, both filters with the burst's velocity",
+            config="pulses_acceleration",
+        )
+        for number, words, of in ((3, "white jerk", ""), (4, "P1's jerk, constant over a scan", ", random jerk"))
     ),
 )

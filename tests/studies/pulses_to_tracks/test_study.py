@@ -54,7 +54,12 @@ def test_the_idealisation_with_a_wide_prior_is_p1s_filter():
 
 
 def test_sampled_idealisations_have_their_exact_errors():
-    plan, sums = summed(made([RANGE, IDEAL, IDEAL | {"name": "a", "observes": A, "process_noise": "white_jerk"}], burst=STRONG, scans=5), N)
+    plan, sums = summed(
+        made(
+            [RANGE, IDEAL, IDEAL | {"name": "a", "observes": A, "process_noise": "white_jerk"}], burst=STRONG, scans=5
+        ),
+        N,
+    )
     sigma = np.sqrt(sums.error[..., 1] / N)
     np.testing.assert_allclose(sigma, plan.axes.exact_sigma, rtol=TOLERANCE)
     assert (sums.locks[1:, :, LOCKED] >= N - 1).all()
