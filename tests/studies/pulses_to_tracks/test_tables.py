@@ -75,7 +75,7 @@ def test_sentences(found):
     assert told[0] == "RLS 4: 16 pulses in 0.8 ms, 17.3 dB in all, allow σ_V = 1 m/s (Fisher bound)."
     assert len(told) == 6
     (spectrum,) = [line for line in told if line.startswith("RLS 4, spectrum: ")]
-    assert "its idealisation's" in spectrum
+    assert "idealisation" in spectrum
 
 
 def test_figures(found, swept):
