@@ -201,14 +201,6 @@ PULSES = (
         ),
     ),
     *mutants(
-        "radarsim/studies/pulses_to_tracks/kernels/spectrum.py",
-        (
-            "power = x * x + y * y",
-            "power = x * x",
-            f"{CHAIN}::test_the_highest_line_is_that_of_the_discrete_transform",
-        ),
-    ),
-    *mutants(
         "radarsim/studies/pulses_to_tracks/world.py",
         (
             "power_db = power_db + 40.0",
