@@ -386,3 +386,35 @@ def test_only_the_registry_names_the_studies_modules():
         if isinstance(node.value, str) and any(f"studies.{study}" in node.value for study in STUDIES)
     }
     assert named == {"studies.registry"}
+
+
+MOST_ARGUMENTS, LONGEST = 8, 60  # of a function of the kernels; entries from Python take arrays one by one
+
+
+def too_long(text: str) -> list[str]:
+    """Functions of a kernels' module that have too many arguments and are no compiled entry, or too many lines."""
+    functions = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]
+    return [
+        node.name
+        for node in functions
+        if node.end_lineno - node.lineno >= LONGEST
+        or (len(node.args.args) > MOST_ARGUMENTS and "kernel" not in [ast.unparse(by) for by in node.decorator_list])
+    ]
+
+
+@pytest.mark.parametrize("module", [module for module in MODULES if "kernels" in module.split(".")])
+def test_kernels_read_like_the_book(module):
+    assert too_long(text_of(module)) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("@part\ndef step(a, b, c, d, e, f, g, h, i):\n    pass\n", ["step"]),
+        ("@kernel\ndef step(a, b, c, d, e, f, g, h, i):\n    pass\n", []),
+        ("@kernel\ndef step(a):\n" + 60 * "    a += 1\n", ["step"]),
+        ("@part\ndef step(a, b, c, d, e, f, g, h):\n" + 59 * "    a += 1\n", []),
+    ],
+)
+def test_the_rule_finds(text, found):
+    assert too_long(text) == found

@@ -126,11 +126,12 @@ def best_of_phases(physics, work, sums, table, window, options):
 
 
 @part
-def take_window(physics, drawn, table, weights, window, options, first, work, sums):
+def take_window(physics, drawn, tables, window, options, first, work, sums):
     """One window of an estimator on eight bursts, the first or a later one: the estimate in work moves.
 
-    drawn are rows of the blocks' sums, table and weights those of `blocks.Tables`.
+    drawn are rows of the blocks' sums, tables the addresses of those of `blocks.Tables`: of the blocks, and weights.
     """
+    table, weights = tables
     merge(drawn, table, weights, window.table, window.weights, window.blocks, sums)
     starts = first and not options.from_truth
     if starts and options.phases > 0:
@@ -153,7 +154,7 @@ def run_strip(physics, drawn, tables, windows, options, work, sums, errors):
         put(work, X + j, full(0.0) if options.from_truth else get(work, PRIOR + j))
     put(work, PASSES, full(0.0))
     for k in range(options.windows):
-        take_window(physics, drawn, table, weights, windows[k], options, k == 0, work, sums)
+        take_window(physics, drawn, (table, weights), windows[k], options, k == 0, work, sums)
         for j in range(SIZE):
             error = get(work, X + j)
             put(work, BEGUN + j, fraction(error) if j == 0 else error)
@@ -212,11 +213,11 @@ def room_for(blocks: int) -> tuple[np.ndarray, ...]:
     return rows(ROWS), rows(4 * blocks), rows(4 * blocks), rows(2 * blocks), rows(2 * blocks)
 
 
-def estimate_strips(physics, mean, factor, tables, windows, options, keys, first, sigma, errors, passes) -> None:
+def estimate_strips(physics, law, tables, windows, options, noise, first, out) -> None:
     """As `sequence.estimate_block`, with block sums: errors (n, F, K, 6) and passes (n, F) are written.
 
-    mean (blocks, 4) and factor (blocks, 10) are the law of the sums drawn, sigma (6,) that of the forecast's errors,
-    tables those of `blocks.Tables`. All is relative to the truth.
+    law is of the sums drawn: mean (blocks, 4) and factor (blocks, 10); noise the keys (2, 2), and sigma (6,) of the
+    forecast's errors; tables those of `blocks.Tables`; out = (errors, passes). All is relative to the truth.
     """
-    room = room_for(len(mean))
-    run_strips(physics, mean, factor, tables, windows, options, keys, first, sigma, room, errors, passes)
+    (mean, factor), (keys, sigma) = law, noise
+    run_strips(physics, mean, factor, tables, windows, options, keys, first, sigma, room_for(len(mean)), *out)

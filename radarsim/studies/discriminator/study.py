@@ -308,16 +308,14 @@ def estimate(plan: Plan, first: int, count: int) -> tuple[np.ndarray, np.ndarray
     """Errors (count, F, K, 6) in turns over the burst and passes (count, F) of bursts first, first + 1, …."""
     shape = plan.windows.shape
     errors, passes = np.zeros((count, *shape, SIZE)), np.zeros((count, shape[0]), np.int64)
-    physics, law, bursts = plan.world.physics, plan.world, (plan.keys, first)
+    physics, law = plan.world.physics, plan.world
     if physics["mode"] == BLOCK_SUMS:
-        strips.estimate_strips(
-            *(physics, law.sums, law.factor, plan.tables, plan.windows, plan.options),
-            *(*bursts, plan.prior_sigma, errors, passes),
-        )
+        sums, noise = (law.sums, law.factor), (plan.keys, plan.prior_sigma)
+        strips.estimate_strips(physics, sums, plan.tables, plan.windows, plan.options, noise, first, (errors, passes))
         return errors, passes
     kernels.estimate_block(
         *(physics, law.edges, law.clean, law.mean, plan.windows, plan.options),
-        *(*bursts, plan.truth, plan.prior_sigma, errors, passes),
+        *(plan.keys, first, plan.truth, plan.prior_sigma, errors, passes),
     )
     for f in plan.ridges:
         _follow_ridges(plan, f, first, errors, passes)

@@ -7,6 +7,8 @@ as in `kernels.steps`, of each order j
     p    probability to pass from one order to another, `stay` to remain
 """
 
+from typing import Any, NamedTuple
+
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import exponential, full, get, nearest, put, root, row, where_greater
 from radarsim.kernels.symmetric import predicted_axis, predicted_own
@@ -42,6 +44,23 @@ from radarsim.studies.ambiguous_doppler.kernels.steps import (
 # Rows of one order in memory: state, covariance, probability after the scan, and before it, distance of its plot.
 STATE, COVARIANCE, PROBABILITY, BEFORE, DISTANCE, ROWS = 0, 3, 9, 10, 11, 12
 FAR = 1e300
+
+
+class Orders(NamedTuple):
+    """The filters of one bank that are made into one.
+
+    designs   address of the designs of all banks
+    parts     address of the numbers of its members' designs, or of the banks that it reads
+    orders    address of its members' orders
+    size      how many they are
+    stay      probability that an order stays what it is, over a scan
+    """
+
+    designs: Any
+    parts: Any
+    orders: Any
+    size: int
+    stay: float
 
 
 @inline
@@ -158,8 +177,9 @@ def weighed(new, size):
 
 
 @part
-def run_interacting(designs, parts, orders, size, stay, unfolding, sigma, spans, plots, out, memory):
+def run_interacting(bank, unfolding, sigma, spans, plots, out, memory):
     """Orders that interact, over all scans; memory has room for two times three orders."""
+    designs, parts, orders, size, stay = bank
     zero = full(0.0)
     old, new = row(memory, 0), row(memory, 3 * ROWS)
     right = full(1.0)
@@ -196,9 +216,10 @@ def run_interacting(designs, parts, orders, size, stay, unfolding, sigma, spans,
 
 
 @part
-def run_weighing(outputs, parts, orders, size, reads, shares, scans, out):
+def run_weighing(outputs, bank, reads, shares, scans, out):
     """Fixed shares of other banks, over all scans: shares (K, MEMBERS, 3); outputs of all banks, MEAN or BEST read."""
     zero, one = full(0.0), full(1.0)
+    parts, orders, size = bank.parts, bank.orders, bank.size
     for k in range(scans):
         to = row(out, k * OUTPUT)
         x, w = (zero, zero, zero), (0.0, 0.0, 0.0)
@@ -219,8 +240,9 @@ def run_weighing(outputs, parts, orders, size, reads, shares, scans, out):
 
 
 @part
-def chosen(outputs, parts, orders, size, reads, widths, scans, k, c):
+def chosen(outputs, bank, reads, widths, scans, k, c):
     """Of component c at scan k: the smoothest whose interval meets those of all rougher ones, and its order."""
+    parts, orders, size = bank.parts, bank.orders, bank.size
     x, order = full(0.0), full(0.0)
     low, high, meets, used = full(-FAR), full(FAR), full(1.0), 0
     for _ in range(size):
@@ -241,13 +263,13 @@ def chosen(outputs, parts, orders, size, reads, widths, scans, k, c):
 
 
 @part
-def run_choosing(outputs, parts, orders, size, reads, widths, scans, out):
+def run_choosing(outputs, bank, reads, widths, scans, out):
     """The intersection of intervals, component by component, over all scans: widths (K, MEMBERS, 3) half ones."""
     zero, one = full(0.0), full(1.0)
     for k in range(scans):
-        x0, order = chosen(outputs, parts, orders, size, reads, widths, scans, k, 0)
-        x1, _ = chosen(outputs, parts, orders, size, reads, widths, scans, k, 1)
-        x2, _ = chosen(outputs, parts, orders, size, reads, widths, scans, k, 2)
+        x0, order = chosen(outputs, bank, reads, widths, scans, k, 0)
+        x1, _ = chosen(outputs, bank, reads, widths, scans, k, 1)
+        x2, _ = chosen(outputs, bank, reads, widths, scans, k, 2)
         to = row(out, k * OUTPUT)
         put_single(to, (x0, x1, x2), one)
         zeroth, second = where_greater(full(0.5), order, one, zero), where_greater(order, full(1.5), one, zero)

@@ -5,7 +5,7 @@ import numpy as np
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, total, where_greater
 from radarsim.studies.ambiguous_doppler.kernels.hypotheses import Lists, run_remembering
-from radarsim.studies.ambiguous_doppler.kernels.orders import run_choosing, run_interacting, run_weighing
+from radarsim.studies.ambiguous_doppler.kernels.orders import Orders, run_choosing, run_interacting, run_weighing
 from radarsim.studies.ambiguous_doppler.kernels.plots import fill_plots
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     BEYOND_SUM,
@@ -51,36 +51,26 @@ def run_filters(world, banks, memory, fresh):
     )
     for b in range(banks.kind.size):
         kind, part, size = banks.kind[b], banks.parts[b, 0], banks.size[b]
-        parts, orders, shares = address(banks.parts[b]), address(banks.orders[b]), address(banks.shares[b])
+        shares, stay = address(banks.shares[b]), banks.stay[b]
+        bank = Orders(address(banks.designs), address(banks.parts[b]), address(banks.orders[b]), size, stay)
         outputs = address(memory.out)
         out = row(outputs, b * scans * OUTPUT)
         if kind == WEIGHS:
-            run_weighing(outputs, parts, orders, size, banks.reads[b], shares, scans, out)
+            run_weighing(outputs, bank, banks.reads[b], shares, scans, out)
         elif kind == CHOOSES:
-            run_choosing(outputs, parts, orders, size, banks.reads[b], shares, scans, out)
+            run_choosing(outputs, bank, banks.reads[b], shares, scans, out)
         elif kind == INTERACTS:
-            designs, room = address(banks.designs), address(memory.interacting)
-            how, stay = banks.unfolding[b], banks.stay[b]
+            how = banks.unfolding[b]
             if how != REMEMBERS:
-                run_interacting(designs, parts, orders, size, stay, how, sigma, world.spans, plots, out, room)
+                run_interacting(bank, how, sigma, world.spans, plots, out, address(memory.interacting))
                 continue
+            room, limits = (
+                (address(memory.together), address(memory.broad), lists),
+                (np.exp(-banks.deepest[b]), banks.most[b]),
+            )
             for lane in range(WIDTH):
-                run_together(
-                    designs,
-                    parts,
-                    orders,
-                    size,
-                    stay,
-                    banks.most[b],
-                    np.exp(-banks.deepest[b]),
-                    sigma,
-                    world.spans,
-                    address(memory.plots[lane:]),
-                    address(memory.out[b * scans * OUTPUT * WIDTH + lane :]),
-                    address(memory.together),
-                    address(memory.broad),
-                    lists,
-                )
+                own = address(memory.out[b * scans * OUTPUT * WIDTH + lane :])
+                run_together(bank, limits, sigma, world.spans, address(memory.plots[lane:]), own, room)
         elif kind == REMEMBERS:
             for lane in range(WIDTH):
                 run_remembering(
@@ -107,12 +97,12 @@ def errors(estimate, plot, counted, c):
 
 
 @part
-def add_scan(plot, own, base, oracle, counted, half_span, error, paired, against, estimates):
-    """Add a scan of a filter: own, base, oracle are the rows of estimates; counted (lanes); the rest addresses.
+def add_scan(plot, estimated, counted, half_span, sums):
+    """Add a scan of a filter: estimated are its rows, the baseline's and the oracle's; counted (lanes); sums addresses.
 
     Gives the number of lanes whose velocity is off by over half a span.
     """
-    beyond = full(0.0)
+    beyond, (own, base, oracle), (error, paired, against, estimates) = full(0.0), estimated, sums
     for c in range(3):
         e = errors(own, plot, counted, c)
         e2, b, o = e * e, errors(base, plot, counted, c), errors(oracle, plot, counted, c)
@@ -134,6 +124,7 @@ def add_calibration(out, plot, calibration):
     for i in range(WIDTH):
         if plot[CAME * WIDTH + i] > 0.0:
             p = out[PROBABILITY * WIDTH + i]
+            p = p if p >= 0.0 else 0.0  # not-a-number, which the errors show, is no place in the table
             number = 3 * min(int(p * BINS), BINS - 1)
             calibration[number] += 1.0
             calibration[number + 1] += out[RIGHT * WIDTH + i]
@@ -156,18 +147,10 @@ def add_group(world, banks, memory, sums):
             if banks.oracle >= 0:
                 oracle = row(out, (banks.bank[banks.oracle] * scans + k) * OUTPUT + banks.place[banks.oracle])
             folds = address(sums.folds[f, k])
-            folds[BEYOND_SUM] += add_scan(
-                plot,
-                row(bank, banks.place[f]),
-                base,
-                oracle,
-                counted,
-                0.5 * world.spans[k],
-                address(sums.error[f, k]),
-                address(sums.paired[f, k]),
-                address(sums.oracle[f, k]),
-                address(sums.estimates[f, k]),
-            )
+            into = address(sums.error[f, k]), address(sums.paired[f, k])
+            into += address(sums.oracle[f, k]), address(sums.estimates[f, k])
+            estimated, half_span = (row(bank, banks.place[f]), base, oracle), 0.5 * world.spans[k]
+            folds[BEYOND_SUM] += add_scan(plot, estimated, counted, half_span, into)
             folds[RIGHT_SUM] += total(counted * get(bank, RIGHT))
             folds[LISTED_SUM] += total(counted * get(bank, LISTED))
             folds[COUNT_SUM] += total(counted * get(bank, COUNT))

@@ -80,13 +80,14 @@ def begun(designs, parts, size, lists, old):
 
 
 @part
-def ranged(designs, parts, size, stay, sigma, plot, moves, groups, old, new, lists):
-    """Mix and move the orders of every hypothesis and take the range: from the list `old` into `new`, and weights."""
+def ranged(bank, sigma, plot, moves, groups, states, lists):
+    """Mix and move the orders of every hypothesis and take the range, from one list of states to another."""
+    designs, parts, size, (old, new) = bank.designs, bank.parts, bank.size, states
     zero, floor = full(0.0), full(LEAST_SHARE)
     weights, distances, least = column(lists, 0, 0), column(lists, 0, 1), full(FAR)
     for g in range(groups):
         own = row(new, g * GROUP)
-        mixed(row(old, g * GROUP), own, size, stay)
+        mixed(row(old, g * GROUP), own, size, bank.stay)
         for i in range(size):
             design = row(designs, parts[i] * (DESIGN // WIDTH))
             taken(row(own, i * ROWS), design, sigma, plot, 1.0, NONE, moves)
@@ -155,8 +156,12 @@ def window(c, v, S, z, D, least, floor, size):
 
 
 @part
-def branched(size, variance, z, D, prune, most, count, new, plot, lists):
-    """Branch `count` hypotheses over their folds: weights and velocities u of the branches; how many, and the best."""
+def branched(size, velocity, limits, count, new, plot, lists):
+    """Branch `count` hypotheses over their folds: weights and velocities u of the branches; how many, and the best.
+
+    velocity is the plot's variance, z and D; limits are the least share of the best weight and how many are kept.
+    """
+    (variance, z, D), (prune, most) = velocity, limits
     weights = column(lists, 0, 0)
     branch, found = lists.children, row(lists.children, lists.most // WIDTH)
     groups = (count + WIDTH - 1) // WIDTH
@@ -284,14 +289,15 @@ def put_estimates(size, orders, count, right, states, lists, to):
 
 
 @part
-def run_together(designs, parts, orders, size, stay, most, prune, sigma, spans, plots, out, memory, plot, lists):
+def run_together(bank, limits, sigma, spans, plots, out, room):
     """Orders that interact within remembered hypotheses, over all scans of one realisation.
 
-    plots, out are addresses of its lane; memory has room for two lists of groups, plot for BROAD rows.
+    plots, out are addresses of its lane; room: for two lists of groups, for BROAD rows of a plot, and the lists.
+    limits as in `branched`.
     """
-    variance = sigma[1] * sigma[1]
+    (memory, plot, lists), size, variance = room, bank.size, sigma[1] * sigma[1]
     old, new = row(memory, 0), row(memory, (lists.room // WIDTH) * GROUP)
-    begun(designs, parts, size, lists, old)
+    begun(bank.designs, bank.parts, size, lists, old)
     count, right = 1, 0
     for i in range(WIDTH):
         plot[PLOT * WIDTH + i] = i
@@ -300,9 +306,9 @@ def run_together(designs, parts, orders, size, stay, most, prune, sigma, spans, 
         for i in range(PLOT):
             put(plot, i, full(here[i * WIDTH]))
         groups = (count + WIDTH - 1) // WIDTH
-        ranged(designs, parts, size, stay, sigma, plot, k > 0, groups, old, new, lists)
+        ranged(bank, sigma, plot, k > 0, groups, (old, new), lists)
         if here[CAME * WIDTH] > 0.0:
-            made, top = branched(size, variance, here[VELOCITY * WIDTH], D, prune, most, count, new, plot, lists)
+            made, top = branched(size, (variance, here[VELOCITY * WIDTH], D), limits, count, new, plot, lists)
             found, is_right = row(lists.children, lists.most // WIDTH), -1
             for i in range(made):
                 if lists.parents[i] == right and abs(found[i] - here[UNFOLDED * WIDTH]) < 0.5 * D:
@@ -311,4 +317,4 @@ def run_together(designs, parts, orders, size, stay, most, prune, sigma, spans, 
             inherited(size, variance, count, top, new, old, lists)
         else:
             old, new = new, old
-        put_estimates(size, orders, count, right, old, lists, row(out, k * OUTPUT))
+        put_estimates(size, bank.orders, count, right, old, lists, row(out, k * OUTPUT))

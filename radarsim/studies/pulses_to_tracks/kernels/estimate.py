@@ -67,20 +67,20 @@ def estimate(world, filters, f, k, entry, who, forecast, room, found):
     if own.kind == BOUND:
         ideal(world, k, free, work, sums, drawn)
     else:
-        table, weights = address(world.tables[0]), address(world.tables[1])
+        tables = address(world.tables[0]), address(world.tables[1])
         put_forecast(world, forecast, work)
         if own.kind == SEQUENCE:
             first = filters.first[f, k, entry]
             for w in range(filters.count[f, k, entry]):
                 window = filters.windows[first + w]
-                take_window(physics, drawn, table, weights, window, filters.options[f], w == 0, work, sums)
+                take_window(physics, drawn, tables, window, filters.options[f], w == 0, work, sums)
         else:
             highest_line(
                 *(drawn, physics.pulses, world.offset[k], world.twiddle, world.reversed),
                 *(work, address(re), address(im)),
             )
         # What goes to the filter must not hold the forecast once more: the last step is on the likelihood alone.
-        take_window(physics, drawn, table, weights, free, filters.last[f], own.kind != SEQUENCE, work, sums)
+        take_window(physics, drawn, tables, free, filters.last[f], own.kind != SEQUENCE, work, sums)
     for n in range(WIDTH):
         for c in range(2):
             total = 0.0
