@@ -102,7 +102,7 @@ def add_scan(plot, estimated, counted, half_span, sums):
 
     Gives the number of lanes whose velocity is off by over half a span.
     """
-    beyond, (own, base, oracle), (error, paired, against, estimates) = full(0.0), estimated, sums
+    beyond, (own, base, oracle), (error, (paired, against), estimates) = full(0.0), estimated, sums
     for c in range(3):
         e = errors(own, plot, counted, c)
         e2, b, o = e * e, errors(base, plot, counted, c), errors(oracle, plot, counted, c)
@@ -147,9 +147,9 @@ def add_group(world, banks, memory, sums):
             if banks.oracle >= 0:
                 oracle = row(out, (banks.bank[banks.oracle] * scans + k) * OUTPUT + banks.place[banks.oracle])
             folds = address(sums.folds[f, k])
-            into = address(sums.error[f, k]), address(sums.paired[f, k])
-            into += address(sums.oracle[f, k]), address(sums.estimates[f, k])
             estimated, half_span = (row(bank, banks.place[f]), base, oracle), 0.5 * world.spans[k]
+            powers, products = address(sums.error[f, k]), (address(sums.paired[f, k]), address(sums.oracle[f, k]))
+            into = powers, products, address(sums.estimates[f, k])
             folds[BEYOND_SUM] += add_scan(plot, estimated, counted, half_span, into)
             folds[RIGHT_SUM] += total(counted * get(bank, RIGHT))
             folds[LISTED_SUM] += total(counted * get(bank, LISTED))
