@@ -29,15 +29,30 @@ LONG = {
 }
 
 
+def obedient():
+    """As from a terminal: a shell lets what it starts in the background ignore SIGINT."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("name", LONG)
 def test_a_signal_ends_it_at_once_with_one_line_and_no_file(name, number, tmp_path):
     command = [sys.executable, "-m", "radarsim", *LONG[name]]
-    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        command,
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=obedient,
+    ) as process:
         time.sleep(1.2)
         process.send_signal(number)
         since = time.monotonic()
-        said, error = process.communicate(timeout=20)
+        try:
+            said, error = process.communicate(timeout=20)
+        finally:
+            process.kill()
     assert process.returncode == 128 + number, error
     assert time.monotonic() - since < 3
     assert said == ""
