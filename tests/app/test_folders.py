@@ -259,7 +259,9 @@ def test_a_new_config_is_whole_or_not_there(tmp_path, monkeypatch):
     assert [one.name for one in tmp_path.iterdir()] == ["mine.yaml"]
 
 
-@pytest.mark.parametrize(("figures", "kinds"), [("svg", {".svg"}), (["pdf"], {".pdf"}), (None, set()), ((), set())])
+@pytest.mark.parametrize(
+    ("figures", "kinds"), [("svg", {".svg", ".md"}), (["pdf"], {".pdf", ".md"}), (None, set()), ((), set())]
+)
 def test_formats_of_figures(tmp_path, figures, kinds):
     radarsim.run("rls2", realisations=200, out=tmp_path, figures=figures)
     assert {path.suffix for path in (tmp_path / "rls2" / "figures").glob("*")} == kinds

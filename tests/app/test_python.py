@@ -95,7 +95,7 @@ def test_a_notebook_shows_the_answer_and_no_markup_of_a_users():
 def test_a_figure_as_pdf(tmp_path):
     result = radarsim.run(CONFIG)
     result.write(tmp_path, figures=["pdf"])
-    assert {path.suffix for path in (tmp_path / "config" / "figures").iterdir()} == {".pdf"}
+    assert {path.suffix for path in (tmp_path / "config" / "figures").iterdir()} == {".pdf", ".md"}
 
 
 def test_a_value_that_is_not_known_stays_empty_in_a_notebook():

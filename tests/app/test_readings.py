@@ -72,7 +72,7 @@ def test_what_is_known_of_the_first_paper(first):
     assert said["P1.18"].holds_in == 0
     assert said["P1.9"].kind == said["P1.25"].kind == rule.CONFIRMED
     assert said["P1.7"].depends_on  # fifteen points end at 70 s where Δt is 5 s
-    search = done.read[0].search
+    search = done.read[0].counted
     assert search.count(granular=False)[search.place] == search.count(granular=False).max() == 25
 
 

@@ -14,4 +14,6 @@ def without_drawing(monkeypatch):
     """Runs that draw no figure but write its files: drawing is most of an example's time, and tested elsewhere."""
     from radarsim.report import figures
 
-    monkeypatch.setattr(figures, "save", lambda figure, formats=("svg", "png"): dict.fromkeys(formats, b"<svg></svg>"))
+    monkeypatch.setattr(
+        figures, "save", lambda figure, formats=("svg", "png"), *_: dict.fromkeys(formats, b"<svg></svg>")
+    )

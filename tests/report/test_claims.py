@@ -14,6 +14,7 @@ from radarsim.report.claims.rule import UNDECIDED
 from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
 from radarsim.studies.range_doppler import tables as range_doppler
+from radarsim.studies.range_doppler.study import gains
 
 
 def judged(results, shipped=configs.shipped):
@@ -195,7 +196,8 @@ def test_the_papers_radar_under_another_name(expected_radar):
 
 
 def with_exact(result, exact_sigma):
-    return replace(result, axes=replace(result.axes, exact_sigma=exact_sigma))
+    exact_gain = gains(exact_sigma, exact_sigma[0])
+    return replace(result, axes=replace(result.axes, exact_sigma=exact_sigma, exact_gain=exact_gain))
 
 
 def test_exact_values_decide_and_simulation_checks_them(expected_radar, paper):

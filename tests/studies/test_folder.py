@@ -53,7 +53,7 @@ def test_every_part_is_there_and_takes_what_the_interface_gives(study, monkeypat
         assert isinstance(claims, PaperClaims)
         assert claims.claims
         assert issubclass(claims.evidence, Evidence)
-        assert (claims.paper, claims.page, claims.may_grow, claims.may_shorten) == study.paper
+        assert (claims.paper, claims.page, claims.may_grow, claims.may_shorten, claims.held_too) == study.paper
     if "recorded" in study.offers:
         assert isinstance(study.recorded(), RecordedPlots)
     if "shipped" in study.offers:

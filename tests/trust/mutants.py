@@ -258,8 +258,8 @@ NUMBERS = (
         ),
         ("middle, half = (p + zz / 2)", "middle, half = (p + zz)", f"{STATISTICS}::test_rate_is_wilsons"),
         (
-            "np.hypot(np.subtract(a.value, a.lo), np",
-            "np.maximum(np.subtract(a.value, a.lo), np",
+            "return np.hypot(one - shared, np",
+            "return np.maximum(one - shared, np",
             f"{STATISTICS}::test_difference_adds_in_squares",
         ),
         (

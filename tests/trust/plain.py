@@ -270,6 +270,8 @@ def tracks():
     recorded = dict(zip(("t_s", "range_m", "elevation_rad", "azimuth_rad"), columns, strict=True))
     track = multimodel_plots.track(one.case, recorded)
     made["multimodel track"] = np.nan_to_num(track.estimate)
+    likelihood = multimodel_plots.Recorded().likelihood(one.case, None, [recorded])
+    made["multimodel likelihood"] = np.array([likelihood(likelihood.stated), likelihood(likelihood.stated, 0.1)])
     one = work(*RUNS["sonar clutter"][:2])
     recorded = sonar_clutter_plots.simulated(one.case, 3)
     made["clutter plots"] = np.stack([np.nan_to_num(recorded[name]) for name in ("t_s", "range_m", "bearing_rad")])

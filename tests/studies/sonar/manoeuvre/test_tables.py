@@ -10,7 +10,6 @@ from radarsim.report import claims, figures, panels
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.exact import sigma_acceleration
 from radarsim.studies.sonar.manoeuvre import exact
-from radarsim.studies.sonar.manoeuvre import figures as drawn
 from radarsim.studies.sonar.manoeuvre import measures as measured
 
 N = 2000
@@ -171,11 +170,11 @@ def test_words(result, tables):
 
 
 def test_of_many_cases_the_ends_are_shown():
-    assert drawn.spread_out(list(range(10)), 3) == [0, 4, 9]
-    assert drawn.spread_out([1, 2], 3) == [1, 2]
+    assert panels.spread_out(list(range(10)), 3) == [0, 4, 9]
+    assert panels.spread_out([1, 2], 3) == [1, 2]
 
 
 def test_an_answer_of_many_cases_tells_the_ends():
     assert panels.told([1, 2, 3]) == ([1, 2, 3], [])
-    assert panels.told([1, 2, 3], 2) == ([1, 3], ["The case between: in the report and its tables."])
-    assert panels.told([1, 2, 3, 4]) == ([1, 4], ["The 2 cases between: in the report and its tables."])
+    assert panels.told([1, 2, 3], 2) == ([1, 3], ["The case between: in the report's tables."])
+    assert panels.told([1, 2, 3, 4]) == ([1, 4], ["The 2 cases between: in the report's tables."])
