@@ -115,7 +115,9 @@ def _alike(gains: "pd.DataFrame", curves: "pd.DataFrame") -> np.ndarray:
     for name, sign in PAIRED.items():
         if f"{name}_percent" in gains:
             low, high = (gains[f"{name}_{end}"].to_numpy(dtype=float) for end in ("lo", "hi"))
-            width = (high - low) / (100 + sign * gains[f"{name}_percent"].to_numpy(dtype=float))
+            share = 100 + sign * gains[f"{name}_percent"].to_numpy(dtype=float)
+            with np.errstate(invalid="ignore", divide="ignore"):  # a gain of 100 % leaves nothing to be alike
+                width = (high - low) / share
             found |= (width < INDEPENDENT * independent) & (width > ROUNDING)
     return found & gains["exact_percent"].isna().to_numpy()
 

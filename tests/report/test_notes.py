@@ -85,6 +85,18 @@ def test_gains_of_filters_that_err_nearly_alike_are_marked(half, exact, alike):
     assert list(noted.get("note", [""])) == [notes.ALIKE if alike else ""]
 
 
+def test_a_gain_of_all_there_is_divides_by_nothing():
+    import pandas as pd
+
+    row = {"case": "a", "component": "x", "k": 1, "n": 5000, "sigma": 0.0, "sigma_lo": 0.0, "sigma_hi": 0.0}
+    curves = pd.DataFrame([{**row, "filter": name, "n_eff": 2500.0} for name in ("one", "two")])
+    gain = {"gain_percent": 100.0, "gain_lo": 100.0, "gain_hi": 100.0, "exact_percent": np.nan}
+    gains = pd.DataFrame([{**row, "filter": "one", "baseline": "two", **gain}]).drop(columns="n")
+    with np.errstate(all="raise"):
+        noted = notes.noted({"curves": curves, "gains": gains}, [])["gains"]
+    assert list(noted.get("note", [""])) == [""]
+
+
 def test_a_table_keeps_the_notes_that_it_brings():
     import pandas as pd
 
