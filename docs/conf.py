@@ -39,9 +39,9 @@ nitpick_ignore_regex = [
     # Keys have a page of their own.
     (
         "py:class",
-        r"radarsim\.config\.(fields|schema)\..*|radarsim\.studies\..*\.(config|schema)\..*|(radarsim\..*\.)?(All)?Keys",
+        r"radarsim\.config\.(fields|schema|radial)\..*|radarsim\.studies\..*\.(config|schema)\..*|(radarsim\..*\.)?(All)?Keys",
     ),
-    ("py:class", r"FieldInfo|NoneType"),  # of pydantic's unions
+    ("py:class", r"FieldInfo|NoneType|Markup"),  # of unions, as pydantic and jinja2 spell them
     ("py:class", r"(radarsim\..*\.)?(A_co|M|Part|Asked|CaseOrResult|ClutterPlan)|Inventory"),  # names of types
     ("py:(class|obj)", r"(dict|list|tuple|typing\.Literal)\[.*"),  # a subscript that autodoc takes for a name
 ]
