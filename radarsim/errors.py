@@ -20,6 +20,12 @@ class ConfigError(RadarsimError):
     exit_code = 2
 
 
+class PlotFault(ConfigError):
+    """A row of recorded plots that a filter cannot take, and why; row counts from 0 in the columns that were fed."""
+
+    row = 0
+
+
 class TargetUnmet(RadarsimError):
     """A precision or time limit ended the run before its target was met."""
 

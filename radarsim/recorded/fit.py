@@ -24,6 +24,7 @@ LEAST_ROWS = 10  # of a track; shorter ones say next to nothing
 REACH = 1e4  # how many times larger or smaller than the estimate an end of an interval is looked for
 EVALUATIONS = 2000
 CLOSE = 1e-3  # to which an end of an interval is found, of the logarithm of a key and of the likelihood
+IMPOSSIBLE = -1e300  # what counts as the logarithm of no likelihood: a search needs a number
 FAR_FROM_ZERO = 1e4  # times what counts as zero of a key
 
 
@@ -110,10 +111,12 @@ def fit(
 
 def fitted(likelihood: Likelihood, robust: bool = False, progress: Progress = silent) -> Fit:
     """The keys of a likelihood where it is largest, with profile intervals. Raises ConfigError where it is asked to
-    allow for outliers and cannot."""
+    allow for outliers and cannot, or the plots have no likelihood whatever the keys."""
     if robust and OUTLIERS not in likelihood.explains:
         raise ConfigError(f"robust: the likelihood of filter {likelihood.filter} cannot allow for outliers")
     search = _Search(likelihood, robust, progress)
+    if search.top <= IMPOSSIBLE:
+        raise ConfigError(f"filter {likelihood.filter} cannot take the plots: `radarsim track` says at which row")
     keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
     share = float(search.natural(search.best)[-1]) if robust else None
     stated = likelihood(np.array(likelihood.stated), 0.0)
@@ -158,7 +161,7 @@ class _Search:
         self.progress(self.evaluations)
         count = len(self.likelihood.stated)
         found = self.likelihood(values[:count], float(values[count]) if self.robust else 0.0)
-        return found if math.isfinite(found) else -1e300
+        return found if math.isfinite(found) else IMPOSSIBLE
 
     def _climbed(self, start: np.ndarray, held: int | None) -> tuple[np.ndarray, float]:
         """The top reached from a start, one coordinate held or none, and the logarithm of the likelihood there."""

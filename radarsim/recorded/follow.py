@@ -17,7 +17,7 @@ from radarsim.config import lookup
 from radarsim.config.experiment import Case, Experiment, in_name
 from radarsim.config.schema import LARGEST_REALISATIONS
 from radarsim.engine.results import Track
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, PlotFault
 from radarsim.recorded import plots
 from radarsim.recorded.places import Path as Places
 from radarsim.recorded.rounding import Twin
@@ -260,7 +260,8 @@ class Follower:
         self.twin = Twin(of.tracker(case), of.scan_period_s(case.spec))
 
     def feed(self, own: "Own") -> Track:
-        """The estimates over the next rows of the track; raises ConfigError where they are only rounding errors.
+        """The estimates over the next rows of the track; raises ConfigError where they are only rounding errors, or a
+        filter cannot take a row.
 
         The truth is counted against the estimates where its names fit the components.
         """
@@ -271,15 +272,20 @@ class Follower:
         except LinAlgError as error:
             fault = "intervals so different leave a filter's equations without solution"
             raise ConfigError(f"{self.source}: {self._named()}t_s: {fault}") from error
+        except PlotFault as refused:
+            raise ConfigError(f"{self._place(self.twin.rows + refused.row)}: {refused}") from refused
         if lost:
             fault = f"after a gap of {self.twin.gap_s:g} s a filter's numbers are lost in rounding: split the file here"
-            if self.name is None:
-                raise ConfigError(f"{plots.place_of(self.source, self.twin.gap_row)}: t_s: {fault}")
-            raise ConfigError(f"{self.source}: {self._named()}row {self.twin.gap_row + 1} of it: t_s: {fault}")
+            raise ConfigError(f"{self._place(self.twin.gap_row)}: t_s: {fault}")
         self.followed.take(columns, track)
         self.followed.compare(track, columns["t_s"], own.truth)
         self.followed.places.add(columns["t_s"], own.places)
         return track
+
+    def _place(self, row: int) -> str:
+        if self.name is None:
+            return plots.place_of(self.source, row)
+        return f"{self.source}: {self._named()}row {row + 1} of it"
 
     def _named(self) -> str:
         return "" if self.name is None else f"track {self.name}: "

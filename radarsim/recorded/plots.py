@@ -166,7 +166,8 @@ class _Reader:
         path, wanted, places = self.path, self.wanted, self.places
         self.measured |= bool(np.isfinite(array[:, 1:]).any())
         for i, j in np.argwhere(impossible(array, wanted, self.any_origin))[:MOST_FAULTS]:
-            allowed = "must be > 0" if wanted[j] == "range_m" else "must be in radians, from -2 pi to 2 pi"
+            angle = wanted[j].endswith("_rad")
+            allowed = "must be in radians, from -2 pi to 2 pi" if angle else "must be > 0"
             self.faults.append(f"{path}:{lines[i]}:{places[j] + 1}: {wanted[j]}: {allowed}, got {array[i, j]:g}")
 
     def _in_order(self, t: np.ndarray, lines: list[int], tracks: list[str]) -> None:
@@ -231,11 +232,11 @@ def _comment(row: list[str]) -> bool:
 
 
 def impossible(array: np.ndarray, names: list[str], any_origin: bool = False) -> np.ndarray:
-    """Which values (n, columns) no sensor can have given: ranges not positive, unless they count from any origin, and
-    angles beyond a turn (degrees?)."""
+    """Which values (n, columns) no sensor can have given: ranges not positive, unless they count from any origin, spans
+    not positive, and angles beyond a turn (degrees?)."""
     wrong = np.zeros(array.shape, dtype=bool)
     for j, name in enumerate(names):
-        if name == "range_m" and not any_origin:
+        if name == "span_mps" or (name == "range_m" and not any_origin):
             wrong[:, j] = array[:, j] <= 0
         elif name.endswith("_rad"):
             wrong[:, j] = np.abs(array[:, j]) > 2 * np.pi

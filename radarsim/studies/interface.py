@@ -59,7 +59,10 @@ class Tracker(Protocol):
     several: bool
 
     def feed(self, columns: Mapping[str, "np.ndarray"]) -> "Track":
-        """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
+        """The estimates over the next rows: columns (n,), not-a-number where a value is missing.
+
+        Raises PlotFault for a row that a filter cannot take.
+        """
 
 
 TRUE = "true_"  # what the names of columns that hold the truth begin with

@@ -1,15 +1,18 @@
 """Filters over recorded plots, row by row at any times: one order with its hypotheses, and combinations of orders."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from radarsim.errors import PlotFault
 from radarsim.physics import targets
 from radarsim.studies.ambiguous_doppler import exact, filters, world
 from radarsim.studies.ambiguous_doppler.config import joint_span
 
 LEAST = 1e-150  # probability of an order: none is ruled out for good
 FARTHEST = 9.0  # standard deviations of the velocity's innovation up to which folds are looked at
+MOST_LOOKED_AT = 10_000_000  # sequences of folds at a row: states of 240 MB, seconds
 CERTAIN = 4.0  # standard deviations of the velocity's innovation that half a span must hold for the fold to be certain
 
 
@@ -70,8 +73,18 @@ class Folds:
         return e - self.span * np.rint(e / self.span)
 
     def innovations(self, e: np.ndarray, S: np.ndarray) -> np.ndarray:
-        """Innovations e + n D (..., folds) of folds near enough to matter; e (...) as measured, S (...) variances."""
-        farthest = int(FARTHEST * np.sqrt(np.max(S)) / self.span) + 1
+        """Innovations e + n D (..., folds) of folds near enough to matter; e (...) as measured, S (...) variances.
+
+        Raises PlotFault where these are too many, or the variances are only rounding errors.
+        """
+        most = float(np.max(S))
+        if not most > 0:
+            raise PlotFault("velocity_mps: a filter's numbers are lost in rounding: split the file here")
+        reach = FARTHEST * math.sqrt(most) / self.span
+        if 2 * reach * e.size > MOST_LOOKED_AT:
+            sigma, few = f"its σ before, {math.sqrt(most):g} m/s", f"{MOST_LOOKED_AT:g} sequences"
+            raise PlotFault(f"velocity_mps: {sigma}, leaves more than {few} of folds by {self.span:g} m/s")
+        farthest = int(reach) + 1
         return self.folded(e)[..., None] + self.span * np.arange(-farthest, farthest + 1)
 
     def certain(self, S: float) -> bool:
@@ -80,6 +93,7 @@ class Folds:
 
     def remainder(self, v: float) -> float:
         """The velocity by the Chinese remainder of this row and the last with a plot; not-a-number: there is none."""
+        v = math.remainder(v, self.span)
         before, self.before = self.before, (v, self.span)
         joint = joint_span(self.span, before[1]) if before else 0.0
         if before is None or joint == 0:

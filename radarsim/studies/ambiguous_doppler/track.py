@@ -8,6 +8,7 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
+from radarsim.errors import PlotFault
 from radarsim.kernels.lanes import WIDTH
 from radarsim.studies.ambiguous_doppler import followers
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
@@ -55,9 +56,12 @@ class Tracker:
         self.drawn = np.array([[-1.0, 1.0 if one.doppler == "none" else -1.0] for one in case.spec.filters])
 
     def feed(self, columns: Mapping[str, np.ndarray]) -> Track:
-        """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
+        """The estimates over the next rows: columns (n,), not-a-number where a value is missing.
+
+        Raises PlotFault for a row that leaves too many folds, or is beyond a filter's digits.
+        """
         rows = rows_of(columns)
-        made = [[one.step(*row) for row in rows] for one in self.filters]
+        made = [stepped(one, rows) for one in self.filters]
         estimate, sigma, residual, nis = (
             np.array([[getattr(row, name) for row in own] for own in made]) for name in followers.Row._fields
         )
@@ -69,6 +73,18 @@ class Tracker:
             *(self.names, COMPONENTS, t, estimate, sigma, None, MEASURED, residual, tested, nis),
             residual_sigma=believed,
         )
+
+
+def stepped(one: Any, rows: Sequence[tuple[float, ...]]) -> list[followers.Row]:
+    """What rows made of a filter, one after the other; raises PlotFault with the row."""
+    made: list[followers.Row] = []
+    try:
+        for row in rows:
+            made.append(one.step(*row))
+    except PlotFault as fault:
+        fault.row = len(made)
+        raise
+    return made
 
 
 def rows_of(columns: Mapping[str, np.ndarray]) -> list[tuple[float, ...]]:
@@ -102,7 +118,7 @@ class PlotLikelihood:
             self.explains = ()
 
     def _scores(self, values: np.ndarray, bias: float) -> np.ndarray:
-        """Sums (2,) over all tracks for range and velocity."""
+        """Sums (2,) over all tracks for range and velocity; minus infinity where a filter cannot take a row."""
         changed = dict(zip(("sigma_range_m", "sigma_velocity_mps"), values[: self.observes].tolist(), strict=False))
         radar = self.spec.radar.model_copy(update=changed)
         spec = self.spec.model_copy(update={"radar": radar})
@@ -111,7 +127,10 @@ class PlotLikelihood:
         for rows in self.recorded:
             one = followers.single(options, spec)
             for t, z, v, span in rows:
-                one.step(t, z, v - offset, span)
+                try:
+                    one.step(t, z, v - offset, span)
+                except PlotFault:
+                    return np.full(2, -np.inf)
                 total += one.log_density
         return total
 

@@ -53,10 +53,11 @@ def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
     spans = ", ".join(numeral(f"{span:g}") for span in result.spec.radar.spans_mps)
     for name in _told_of(result):
         where = f"{panels.plain_label(result)}, D = {spans} {tr('m/s')}, {name}"
-        clauses = filter(None, (_as_good(result, name, made), _right(result, name, made)))
-        told.append(f"{where}: {'; '.join(clauses)}.")
+        clauses = list(filter(None, (_as_good(result, name, made), _right(result, name, made))))
+        if clauses:
+            told.append(f"{where}: {'; '.join(clauses)}.")
     if axes.combines.any():
-        told.append(_orders_sentence(result, made))
+        told.extend(_orders_sentence(result, made))
     return told
 
 
@@ -67,10 +68,15 @@ def _told_of(result: Result) -> list[str]:
     return [one.name for one in means or unfolding]
 
 
-def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> str:
-    """The largest σ of range over the scans of every filter, and what is left to gain; the first plot is common."""
+def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
+    """The largest σ of range over the scans of every filter, and what is left to gain; the first plot is common.
+
+    None where no realisation had a plot.
+    """
     curves = made["curves"][(made["curves"]["case"] == result.name) & (made["curves"]["component"] == "r")]
-    curves = curves[curves["k"] > 1]
+    curves = curves[(curves["k"] > 1) & (curves["n"] > 0)]
+    if not len(curves):
+        return []
     worst = curves.loc[curves.groupby("filter", sort=False)["sigma"].idxmax()]
     said = [
         tr(
@@ -96,13 +102,16 @@ def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> str:
         )
     elif np.isfinite(best):
         words.append(tr("who knew the target would have had {best:.4g} m by the best order of each scan", best=best))
-    return f"{panels.plain_label(result)}: {'; '.join(words)}."
+    return [f"{panels.plain_label(result)}: {'; '.join(words)}."]
 
 
 def _right(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str:
-    """How often all folds are right at the last scan."""
+    """How often all folds are right at the last scan; empty where no realisation had a plot."""
     folds = made["folds"]
-    last = folds[(folds["case"] == result.name) & (folds["filter"] == name)].iloc[-1]
+    rows = folds[(folds["case"] == result.name) & (folds["filter"] == name)]
+    if not len(rows):
+        return ""
+    last = rows.iloc[-1]
     share = _percent(*(100 * last[key] for key in ("right", "right_lo", "right_hi")))
     return tr("all folds are right in {share} of realisations at scan {k}", share=share, k=last["k"])
 

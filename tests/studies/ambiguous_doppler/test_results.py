@@ -5,9 +5,11 @@ import pytest
 
 import radarsim
 from radarsim.app.configs import load
+from radarsim.errors import ConfigError, PlotFault
+from radarsim.recorded import fit, follow, plots
 from radarsim.studies import registry
+from radarsim.studies.ambiguous_doppler import followers, study, track
 from radarsim.studies.ambiguous_doppler import map as fans
-from radarsim.studies.ambiguous_doppler import study, track
 from radarsim.studies.ambiguous_doppler.kernels import records
 
 
@@ -66,6 +68,16 @@ def test_orders_and_their_sentence():
     assert len(sentences) == 3
     assert all("by the best combination" in sentence for sentence in sentences)
     assert {"orders", "sigma_r"} <= set(made.figures)
+
+
+@pytest.mark.parametrize("combine", [False, True])
+def test_without_any_plot_nothing_is_said(combine):
+    orders = "orders: [1, 2], combine: likelihood, manoeuvre_variance: [100, 1e-3]"
+    more = [f"filters=[{{name: one, doppler: folded, {orders}}}]"] if combine else []
+    made = radarsim.run("ambiguous_rls4", realisations=8, overrides=["radar.detection_probability=1e-9", *more])
+    assert (made.tables["curves"]["n"] == 0).all()
+    assert len(made.tables["folds"]) == 0
+    assert registry.study("ambiguous_doppler").answer(made.cases, made.tables) == []
 
 
 def test_figures(found):
@@ -170,3 +182,52 @@ def test_a_remainder_is_followed_as_the_study_does():
     there = np.isfinite(made.estimate[0, :, 0])
     assert there.sum() > 8
     assert np.abs((made.estimate[0] - out[0, :, :3, 3])[there] / [1e5, 1e3, 10]).max() < 1e-7
+
+
+def test_a_velocity_counts_in_the_remainder_as_it_folds():
+    """However many spans too large it is written."""
+    folds = followers.Folds(load("ambiguous_rls4", ["radar.repetition_rate_hz=[1000, 1200]"]).cases[0].spec.radar)
+    folds.begin(0.0, 15.0)
+    assert np.isnan(folds.remainder(2.0 + 15 * 2**20))
+    folds.begin(10.0, 18.0)
+    assert folds.remainder(5.0 + 18 * 2**40) == -13.0  # -13 + 15 = 2 and -13 + 18 = 5, and no other in ± 45
+    folds.begin(20.0, 15.0)
+    assert folds.remainder(3.7e16) == 40.0  # folded -5; 40 is the nearest of -5 + 15 n to 5 + 18 m, which has 41
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"span_mps": np.full(15, 1e-9)}, "plots.csv:2: velocity_mps: its σ before, 300.002 m/s, leaves more than 1e"),
+        ({"t_s": np.append(np.arange(14.0) * 10, 1e15)}, "plots.csv:16: velocity_mps: "),
+        ({"span_mps": np.zeros(15)}, "plots.csv:2:4: span_mps: must be > 0, got 0"),
+        ({"span_mps": np.full(15, -5.0)}, "plots.csv:2:4: span_mps: must be > 0, got -5"),
+    ],
+)
+def test_plots_with_too_many_folds_are_a_fault_of_their_row(tmp_path, change, words):
+    experiment = load("ambiguous_rls4", ["filters=[{name: memory, doppler: folded, manoeuvre_variance: 1e-3}]"])
+    t = np.arange(15) * 10.0
+    plots.write_columns({"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t} | change, tmp_path / "plots.csv")
+    with pytest.raises(ConfigError) as error:
+        follow.track(experiment, tmp_path / "plots.csv")
+    assert words in str(error.value)
+
+
+def test_plots_with_too_many_folds_have_no_likelihood():
+    case = load("ambiguous_rls4").cases[0]
+    t = np.arange(15) * 10.0
+    columns = {"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t, "span_mps": np.full(15, 1e-9)}
+    likelihood = track.PlotLikelihood(case, case.spec.filters[5], [columns])
+    assert likelihood(likelihood.stated) == -np.inf
+    with pytest.raises(ConfigError, match="filter memory cannot take the plots"):
+        fit.fitted(likelihood)
+
+
+def test_sequences_of_folds_are_counted_before_they_are_made():
+    folds = followers.Folds(load("ambiguous_rls4").cases[0].spec.radar)
+    folds.begin(0.0, 18.0)
+    most = (followers.MOST_LOOKED_AT / 2) ** 2 * 4  # a reach of half as many spans as may be, to either side
+    assert folds.innovations(np.zeros(1), np.array([most * 0.999])).shape[1] <= followers.MOST_LOOKED_AT + 1
+    for e, S in ((np.zeros(1), most * 1.001), (np.zeros(300), most / 299**2), (np.zeros(1), np.nan), (np.zeros(1), 0)):
+        with pytest.raises(PlotFault, match="velocity_mps"):
+            folds.innovations(e, np.array([S]))
