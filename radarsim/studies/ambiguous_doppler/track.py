@@ -79,8 +79,9 @@ def stepped(one: Any, rows: Sequence[tuple[float, ...]]) -> list[followers.Row]:
     """What rows made of a filter, one after the other; raises PlotFault with the row."""
     made: list[followers.Row] = []
     try:
-        for row in rows:
-            made.append(one.step(*row))
+        with np.errstate(invalid="ignore"):  # a variance lost in rounding: not-a-number, which whoever follows refuses
+            for row in rows:
+                made.append(one.step(*row))
     except PlotFault as fault:
         fault.row = len(made)
         raise

@@ -1,5 +1,7 @@
 """Tables, figures, sentences and recorded plots of a small run."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -208,7 +210,7 @@ def test_plots_with_too_many_folds_are_a_fault_of_their_row(tmp_path, change, wo
     experiment = load("ambiguous_rls4", ["filters=[{name: memory, doppler: folded, manoeuvre_variance: 1e-3}]"])
     t = np.arange(15) * 10.0
     plots.write_columns({"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t} | change, tmp_path / "plots.csv")
-    with pytest.raises(ConfigError) as error:
+    with warnings.catch_warnings(action="error"), pytest.raises(ConfigError) as error:
         follow.track(experiment, tmp_path / "plots.csv")
     assert words in str(error.value)
 
