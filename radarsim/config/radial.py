@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Protocol, Self
 
 from pydantic import Field
 
@@ -14,6 +14,7 @@ from radarsim.config.fields import (
     Model,
     Name,
     NonNegative,
+    NotRead,
     Number,
     Positive,
     Whole,
@@ -64,9 +65,59 @@ class Radar(Model):
 
     @cross_check
     def _in_its_band(self) -> Iterator[At]:
-        limits = outside_band(self.band, self.wavelength_m)
-        if limits is not None:
-            yield at("band", f"{self.band} is {' to '.join(map(short, limits))} m, not {short(self.wavelength_m)}")
+        yield from band_faults(self)
+
+
+class InBand(Protocol):
+    """A radar whose band must hold its wavelength."""
+
+    @property
+    def band(self) -> Band | None: ...
+    @property
+    def wavelength_m(self) -> float: ...
+
+
+def band_faults(radar: InBand) -> Iterator[At]:
+    """The fault of a wavelength that is not in the radar's band."""
+    limits = outside_band(radar.band, radar.wavelength_m)
+    if limits is not None:
+        yield at("band", f"{radar.band} is {' to '.join(map(short, limits))} m, not {short(radar.wavelength_m)}")
+
+
+class Scanned(Protocol):
+    """An experiment whose length is given as a number of scans, or as a time in its place."""
+
+    @property
+    def scans(self) -> int | None: ...
+    @property
+    def duration_s(self) -> float | None: ...
+    @property
+    def radar(self) -> Any: ...
+
+
+def number_of_scans(spec: Scanned) -> int:
+    """How many scans there are: as given, or to the last scan within the duration."""
+    if spec.duration_s is None:
+        if spec.scans is None:
+            raise NotRead("scans")
+        return spec.scans
+    return int(spec.duration_s / spec.radar.scan_period_s * (1 + 1e-12)) + 1
+
+
+def length_faults(spec: Scanned, most: int) -> Iterator[At]:
+    """The fault of a length that is missing, given twice, or out of bounds."""
+    if spec.scans is None and spec.duration_s is None:
+        yield at("scans", "required key is missing, or duration_s in its place")
+    elif spec.scans is not None and spec.duration_s is not None:
+        yield at("duration_s", "stands in place of scans: give one of them")
+    elif not 2 <= (made := number_of_scans(spec)) <= most:
+        yield at("duration_s", f"must be 2 to {most} scans of radar.scan_period_s, makes {made}")
+
+
+def with_either_length(schema: dict[str, Any]) -> dict[str, Any]:
+    """A JSON schema that asks for either length."""
+    length = {"oneOf": [{"required": ["scans"]}, {"required": ["duration_s"]}]}
+    return schema | {"allOf": [*schema.get("allOf", []), length]}
 
 
 class Polynomial(Model):

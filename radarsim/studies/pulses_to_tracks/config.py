@@ -26,12 +26,24 @@ from radarsim.config.fields import (
     of_each,
     unique_names,
 )
-from radarsim.config.radial import NEAREST_M, AccelerationStart, FlyBy, Polynomial, Recorded, Starting, Turn
-from radarsim.physics.bands import Band, outside_band
+from radarsim.config.radial import (
+    NEAREST_M,
+    AccelerationStart,
+    FlyBy,
+    Polynomial,
+    Recorded,
+    Starting,
+    Turn,
+    band_faults,
+    length_faults,
+    number_of_scans,
+    with_either_length,
+)
+from radarsim.physics.bands import Band
 
 MOST_SCANS = 1000  # each scan has windows of its own
 FEWEST_PULSES, MOST_PULSES = 4, 4096
-SIGMAS = 3.0  # of the prior that the checks of spans and rates reckon with
+SIGMAS = 3.0  # of the prior, in the checks of spans and rates
 MOST_DERIVATIVES = 1
 SEQUENCES = ("sequence", "dense", "cured")
 USES = {"gated": {"gate_probability": 0.999}, "mixture": {"lock_probability": 0.95}}  # keys of a use, and defaults
@@ -57,9 +69,7 @@ class Radar(Model):
 
     @cross_check
     def _in_its_band(self) -> Iterator[At]:
-        limits = outside_band(self.band, self.wavelength_m)
-        if limits is not None:
-            yield at("band", f"{self.band} is {' to '.join(map(short, limits))} m, not {short(self.wavelength_m)}")
+        yield from band_faults(self)
 
 
 class Burst(Model):
@@ -274,8 +284,7 @@ class Keys(Study):
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         schema = super().__get_pydantic_json_schema__(core_schema, handler)
-        length = {"oneOf": [{"required": ["scans"]}, {"required": ["duration_s"]}]}
-        return schema | {"allOf": [*schema.get("allOf", []), length]}
+        return with_either_length(schema)
 
     @property
     def pulses(self) -> int:
@@ -300,11 +309,7 @@ class Keys(Study):
     @property
     def plots(self) -> int:
         """How many scans there are, given or by the duration."""
-        if self.duration_s is None:
-            if self.scans is None:
-                raise NotRead("scans")
-            return self.scans
-        return int(self.duration_s / self.radar.scan_period_s * (1 + 1e-12)) + 1
+        return number_of_scans(self)
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
@@ -315,12 +320,7 @@ class Keys(Study):
 
     @cross_check
     def _length_given(self) -> Iterator[At]:
-        if self.scans is None and self.duration_s is None:
-            yield at("scans", "required key is missing, or duration_s in its place")
-        elif self.scans is not None and self.duration_s is not None:
-            yield at("duration_s", "stands in place of scans: give one of them")
-        elif not 2 <= self.plots <= MOST_SCANS:
-            yield at("duration_s", f"must be 2 to {MOST_SCANS} scans of radar.scan_period_s, makes {self.plots}")
+        yield from length_faults(self, MOST_SCANS)
 
     @cross_check
     def _pulses_in_bounds(self) -> Iterator[At]:

@@ -15,7 +15,6 @@ from radarsim.config.fields import (
     Name,
     NameIn,
     NonNegative,
-    NotRead,
     Number,
     Positive,
     Probability,
@@ -37,7 +36,10 @@ from radarsim.config.radial import (
     Recorded,
     Starting,
     Turn,
+    length_faults,
+    number_of_scans,
     polynomial_reach_m,
+    with_either_length,
 )
 
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
@@ -207,8 +209,7 @@ class Keys(Study):
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         schema = super().__get_pydantic_json_schema__(core_schema, handler)
-        length = {"oneOf": [{"required": ["scans"]}, {"required": ["duration_s"]}]}
-        return schema | {"allOf": [*schema.get("allOf", []), length]}
+        return with_either_length(schema)
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
@@ -218,20 +219,11 @@ class Keys(Study):
     @property
     def plots(self) -> int:
         """How many scans there are, given or by the duration."""
-        if self.duration_s is None:
-            if self.scans is None:
-                raise NotRead("scans")
-            return self.scans
-        return int(self.duration_s / self.radar.scan_period_s * (1 + 1e-12)) + 1
+        return number_of_scans(self)
 
     @cross_check
     def _length_given(self) -> Iterator[At]:
-        if self.scans is None and self.duration_s is None:
-            yield at("scans", "required key is missing, or duration_s in its place")
-        elif self.scans is not None and self.duration_s is not None:
-            yield at("duration_s", "stands in place of scans: give one of them")
-        elif not 2 <= self.plots <= MOST_SCANS:
-            yield at("duration_s", f"must be 2 to {MOST_SCANS} scans of radar.scan_period_s, makes {self.plots}")
+        yield from length_faults(self, MOST_SCANS)
 
     @cross_check
     def _long_enough(self) -> Iterator[At]:
