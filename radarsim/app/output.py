@@ -1,5 +1,6 @@
 """From finished cases to files: tables, figures, claims, run.json and report.html of one experiment."""
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -80,7 +81,8 @@ def _banded(made: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:
 class Written:
     """What was written: the folder, its files by their path in it, the tables, and the sentences of the answer.
 
-    removed are files of an earlier run that this one did not write.
+    removed are files of an earlier run that this one did not write. seconds: what drawing took, and writing with the
+    report.
     """
 
     folder: Path
@@ -88,6 +90,7 @@ class Written:
     removed: tuple[str, ...]
     tables: Mapping[str, "pd.DataFrame"] = field(repr=False)
     answer: tuple[str, ...]
+    seconds: Mapping[str, float]
 
 
 ALWAYS = ("curves", "gains")  # tables written without a row too; others only where they have one
@@ -114,6 +117,7 @@ def write(
 
     made = tables(results, stem=experiment.stem) if made is None else made
     contents = {f"{name}.csv": common.to_csv(table) for name, table in made.items() if len(table) or name in ALWAYS}
+    began = time.perf_counter()
     described = figures(results, made, experiment) if draw else {}
     if draw:
         from radarsim.report import figures as drawing  # Matplotlib
@@ -125,6 +129,7 @@ def write(
             saved = drawing.save(figure, formats, width_mm, made_by)
             contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
         contents["figures/captions.md"] = captions(described).encode()
+    drawn = time.perf_counter()
     own = study(experiment.study)
     answer = tuple(own.answer(results, made))
     described_by = machine.described()
@@ -144,7 +149,8 @@ def write(
     contents["run.json"] = provenance.to_json(provenance.with_output(record, "report.html", contents["report.html"]))
     removed = sorted(set(provenance.outputs(folder)) - set(contents))
     files.replace_all(folder, contents, stale=provenance.outputs)
-    return Written(folder, tuple(sorted(contents)), tuple(removed), made, answer)
+    seconds = {"drawing": drawn - began, "writing": time.perf_counter() - drawn}
+    return Written(folder, tuple(sorted(contents)), tuple(removed), made, answer, seconds)
 
 
 def captions(described: Mapping[str, Figure]) -> str:

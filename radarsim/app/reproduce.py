@@ -12,10 +12,10 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
 
@@ -30,13 +30,17 @@ LOOK_S = 0.1  # how often a signal is looked for
 
 @dataclass(frozen=True)
 class Done:
-    """One config: its seconds, a summary of what it made; its faults and their exit code, if it has any."""
+    """One config: its seconds, a summary of what it made; its faults and their exit code, if it has any.
+
+    stages: the seconds that simulation, drawing and writing took; what is left of all is statistics.
+    """
 
     stem: str
     seconds: float
     summary: str
     faults: tuple[str, ...] = ()
     code: int = 0
+    stages: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -182,17 +186,19 @@ def _run(task: Task, stop: Signals) -> Done:
     started = time.perf_counter()
     faults: tuple[str, ...] = ()
     code = 0
+    stages: dict[str, float] = {}
     try:
         result = experiment.run(task.stem, overrides=task.overrides, out=task.out, stop=stop, figures=task.figures)
         verdicts = ", ".join(f"{len(names)} {verdict}" for verdict, names in result.verdicts().items())
         drawn = sum(name.endswith(".svg") for name in result.written.files) if result.written else 0
         made = [plural(drawn, "figure")] if task.figures else []
         made += [f"claims: {verdicts}"] if verdicts else []
+        stages = {"simulation": result.facts["seconds"]} | dict(result.written.seconds if result.written else {})
     except Interrupted:
         raise
     except RadarsimError as error:
         made, faults, code = [f"FAILED: {error.lines[0]}"], error.lines, error.exit_code
-    return Done(task.stem, time.perf_counter() - started, "; ".join(made), faults, code)
+    return Done(task.stem, time.perf_counter() - started, "; ".join(made), faults, code, stages)
 
 
 def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
@@ -212,6 +218,18 @@ def summary(done: Sequence[Done], out: str, seconds: float) -> list[str]:
         f"claims   {sum(classes.values())}: {page.counted(rows)}",
         f"time     {clock(seconds)} for {plural(len(done), 'config')}, "
         f"the longest {longest.stem}, {longest.seconds:.0f} s",
+        *_stages(done),
         f"where    {Path(out) / 'index.html'} leads to every report{hint}",
         *([f"failed   {', '.join(failed)}"] if failed else []),
     ]
+
+
+def _stages(done: Sequence[Done]) -> list[str]:
+    """The line that says where the time went, added up over both processes; none where nothing was run."""
+    of = {name: sum(one.stages.get(name, 0.0) for one in done) for name in ("simulation", "drawing", "writing")}
+    whole = sum(one.seconds for one in done if one.stages)
+    if not whole:
+        return []
+    of = {"simulation": of["simulation"], "statistics": whole - sum(of.values())} | of
+    parts = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in of.items())
+    return [f"         {parts}: added up over {PROCESSES} processes"]

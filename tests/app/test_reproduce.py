@@ -22,6 +22,10 @@ def test_a_line_each_and_a_summary(tmp_path):
     summary = reproduce.summary(done, str(tmp_path), 1.0)
     assert any(line.startswith("claims   ") and "not run" in line for line in summary)
     assert any(line.startswith("time     0:00:01") and "2 configs" in line for line in summary)
+    (parts,) = [line for line in summary if "statistics" in line]
+    seconds = [float(part.split()[1]) for part in parts.split(":")[0].split(",")]
+    assert sum(seconds) == pytest.approx(sum(one.seconds for one in done), abs=2)  # four numbers rounded to seconds
+    assert all(one.stages["simulation"] > 0 and one.stages["writing"] > 0 for one in done)
     index = (tmp_path / "index.html").read_text()
     assert "rls2/report.html" in index
     assert "rls4/report.html" in index
@@ -33,6 +37,7 @@ def test_a_fault_is_told_and_the_rest_runs(tmp_path):
     done = reproduce.reproduce(["rls2", "rls4"], str(tmp_path), told.append, overrides=SMALL, figures=False)
     assert any("rls2" in line and "FAILED: " in line for line in told)
     assert {one.stem: (bool(one.faults), one.code) for one in done} == {"rls2": (True, 4), "rls4": (False, 0)}
+    assert not done[0].stages or not done[1].stages  # the one that failed has no part in where the time went
     assert "failed   rls2" in reproduce.summary(done, str(tmp_path), 1.0)
 
 
