@@ -21,7 +21,9 @@ from radarsim.report.claims.declared import Claim
 from radarsim.report.claims.joint import Joint, joint
 from radarsim.report.claims.over import Over, Under, columns, depth, rows, under
 from radarsim.report.claims.readings import PaperReadings, Reading, Seen, Unreadable
+from radarsim.report.claims.rule import UNDECIDED
 from radarsim.report.claims.search import Search
+from radarsim.report.precision import looks
 from radarsim.studies import registry
 
 Progress = Callable[[int, int, int], None]
@@ -48,11 +50,15 @@ class Read:
 
 @dataclass
 class Done:
-    """What `readings` made: of each paper asked for, and the files written, by their path under `folder`."""
+    """What `readings` made: of each paper asked for, and the files written, by their path under `folder`.
+
+    left has a line for each claim that was to be decided and is not.
+    """
 
     read: list[Read]
     folder: Path
     files: tuple[str, ...] = field(default=())
+    left: tuple[str, ...] = field(default=())
 
 
 def papers() -> dict[str, Paper]:
@@ -149,6 +155,7 @@ def readings(
     *,
     out: str | Path,
     realisations: int | None = None,
+    decide: bool = False,
     options: RunOptions | None = None,
     progress: Progress | None = None,
     figures: bool = True,
@@ -157,21 +164,44 @@ def readings(
     """Judge claims under every reading and write table and specification curves into out/readings.
 
     wanted is of `asked`. realisations of each run, where runs are needed; default: what the paper's readings declare.
-    Runs go through the store of blocks under out, so that a second call continues. Raises TargetUnmet where a time
-    limit left something undone, Interrupted where `stop` saw a signal.
+    decide: the runs on which an undecided claim hangs grow on, to 2000·2^m realisations, until it is decided;
+    `realisations` is then the most. Runs go through the store of blocks under out, so that a second call continues.
+    Raises TargetUnmet where a time limit left something undone, Interrupted where `stop` saw a signal.
     """
     options = replace(options or RunOptions(), out=out)
-    plans = [Plan(one, realisations or one.paper.readings.realisations) for one in wanted]
+    plans = [Plan(one, _first(one.paper.readings, realisations, decide)) for one in wanted]
     total, done = sum(plan.total for plan in plans), 0
-    read = []
+    read, left = [], []
     for plan, one in zip(plans, wanted, strict=True):
         over = plan.judged(options, _after(progress, done, total), stop)
+        if decide:
+            over = plan.decided(over, realisations or one.paper.readings.most, options, progress, stop)
+            left += [line for each in over if (line := _left(each))]
         done += plan.total
         read.append(Read(one.paper, over, _counted(one.paper, over) if one.whole and not one.only else None))
-    made = Done(read, Path(out) / FOLDER)
+    made = Done(read, Path(out) / FOLDER, left=tuple(left))
     if not any(one.only for one in wanted):
         made.files = _write(made, figures)
     return made
+
+
+def _first(of: PaperReadings, realisations: int | None, decide: bool) -> int:
+    """Realisations of the first runs: those asked for, or declared; to decide, at most those asked for."""
+    if realisations is None:
+        return of.realisations
+    return min(of.realisations, realisations) if decide else realisations
+
+
+def _left(over: Over) -> str:
+    """What is to be said of a claim that is not decided: under how many readings, and what it would take."""
+    if over.outcome is None or over.outcome.kind != UNDECIDED:
+        return ""
+    open_ = over.undecided
+    n = min((judged.n for one in open_ for _, judged in one.parts), default=0)
+    needed = [one.outcome.needed for one in open_ if one.outcome]
+    known = [one for one in needed if one is not None]
+    would = f"about {max(known):,} would" if len(known) == len(needed) else "a value lies on a border: no number would"
+    return f"{over.claim.id} not yet decided under {len(open_)} readings at {n:,} realisations; {would}"
 
 
 def _counted(paper: Paper, over: list[Over]) -> Search | Joint:
@@ -227,19 +257,61 @@ class Plan:
         done = 0
         for key, pairs in self._jobs.items():
             try:
-                self._seen[key] = self._run(key[0], pairs, options, _shifted(progress, done))
+                self._see(key, pairs, options, _shifted(progress, done), stop)
             except ConfigError as error:
                 self._fail(key, error.lines[0])
-            except TargetUnmet:
-                if stop is not None:
-                    stop.raise_if_received()
-                raise
             done += len(pairs) * self._n
         contradicting = frozenset(choice.key for choice in self._paper.readings.choices if choice.contradicts)
         return [
             Over(claim, tuple(self._under(claim, one) for one in self._wanted.readings(claim)), contradicting)
             for claim in self._wanted.claims
         ]
+
+    def decided(
+        self, over: list[Over], most: int, options: RunOptions, progress: Progress | None, stop: Signals | None
+    ) -> list[Over]:
+        """The claims again, those that are not decided by longer runs of the readings that leave them so.
+
+        They look at declared numbers only, as `run --decide` does; each claim is judged at its own last look, so that
+        what else was asked for changes nothing.
+        """
+        for n in (n for n in looks(most) if n > self._n):
+            open_ = {
+                one.claim.id: [each.reading for each in one.undecided]
+                for one in over
+                if one.outcome is not None and one.outcome.kind == UNDECIDED
+            }
+            keys = dict.fromkeys(self._key[claim, reading] for claim, own in open_.items() for reading in own)
+            if not keys:
+                break
+            self._n, total, done = n, sum(len(self._jobs[key]) for key in keys) * n, 0
+            for key in keys:
+                pairs = [(case, replace(changed, realisations=n)) for case, changed in self._jobs[key]]
+                self._see(key, pairs, options, _shifted(progress, done, total), stop)
+                done += len(pairs) * n
+            over = [self._again(one, set(open_.get(one.claim.id, ()))) for one in over]
+        return over
+
+    def _again(self, over: Over, readings: set[Reading]) -> Over:
+        """A claim with these readings judged anew."""
+        under = (self._under(over.claim, one.reading) if one.reading in readings else one for one in over.under)
+        return replace(over, under=tuple(under)) if readings else over
+
+    def _see(
+        self,
+        key: tuple[str, ...],
+        pairs: Sequence[tuple[Case, Case]],
+        options: RunOptions,
+        progress: Progress | None,
+        stop: Signals | None,
+    ) -> None:
+        """Run the cases of a key, or continue them."""
+        try:
+            self._seen[key] = self._run(key[0], pairs, options, progress)
+        except TargetUnmet:
+            if stop is not None:
+                stop.raise_if_received()
+            raise
 
     def _run(
         self, config: str, pairs: Sequence[tuple[Case, Case]], options: RunOptions, progress: Progress | None
@@ -268,14 +340,15 @@ class Plan:
         if why is None:
             try:
                 seen = None if of.exact(claim, reading) else self._seen[self._key[claim.id, reading]]
-                return under(of, claim, reading, of.evidence(claim, reading, seen, self._paper.claims))
+                evidence = of.evidence(claim, reading, seen, self._paper.claims)
+                return under(of, claim, reading, evidence, min(one.count for one in seen.ran) if seen else 0)
             except Unreadable as error:
                 why = str(error)
         return Under(claim, reading, of.name(reading), of.kind(reading), why=why)
 
 
-def _shifted(progress: Progress | None, before: int) -> Progress | None:
-    return progress and (lambda done, total, held: progress(before + done, total, before + held))
+def _shifted(progress: Progress | None, before: int, of: int = 0) -> Progress | None:
+    return progress and (lambda done, total, held: progress(before + done, of or total, before + held))
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
@@ -322,7 +395,8 @@ def _table(done: Done) -> str:
     names = columns(paper.readings for paper in papers().values())
     own = {over.claim.id for read in done.read for over in read.over}
     kept = [row for row in stored_readings(done.folder.parent) if row["claim"] not in own]
-    new = [row for read in done.read for over in read.over for one in over.under for row in rows(one, names)]
+    every_over = [over for read in done.read for over in read.over]
+    new = [row for over in every_over for one in over.under for row in rows(one, names, over.outcome)]
     text = io.StringIO(newline="")
     table = csv.writer(text, lineterminator="\n")
     table.writerow(names)

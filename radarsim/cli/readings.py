@@ -11,6 +11,11 @@ from radarsim.cli.group import Positive, figures_option, json_option, main, out_
 @click.option(
     "--only", "only", multiple=True, metavar="CHOICE=VALUE", help="Readings that take this alone; writes no file."
 )
+@click.option(
+    "--decide",
+    is_flag=True,
+    help="Longer runs, of at most N realisations, until each claim is decided over all readings.",
+)
 @click.option("--threads", type=click.IntRange(1, 1024), metavar="T", help="Threads; default: all cores.")
 @click.option("--time-limit", type=Positive("SECONDS"), metavar="SECONDS", help="Stop cleanly then, keep what is done.")
 @out_option
@@ -22,6 +27,7 @@ def readings(
     names: tuple[str, ...],
     realisations: int | None,
     only: tuple[str, ...],
+    decide: bool,
     threads: int | None,
     time_limit: float | None,
     out: str,
@@ -43,10 +49,12 @@ def readings(
       radarsim readings P1
       radarsim readings P1.4                          with every reading of this claim
       radarsim readings P2 -n 200 --threads 2         a quick look; the same with more continues
+      radarsim readings P2 --decide -n 3.2e4          as long as it takes, up to 32 000; what is left: exit code 3
       radarsim readings P1.4 --only start=unweighted
       radarsim readings P1 --json | jq '.[] | select(.depends_on != [])'
     """
     from radarsim.engine import stopping
+    from radarsim.errors import TargetUnmet
 
     limit = stopping.time_limit(time_limit) if time_limit else None
     with stopping.Signals() as stop:
@@ -63,6 +71,7 @@ def readings(
                 wanted,
                 out=out,
                 realisations=realisations,
+                decide=decide,
                 options=options,
                 progress=progress.update,
                 figures=not no_figures,
@@ -74,3 +83,5 @@ def readings(
             click.echo(app.pages(done), nl=False)
         elif not quiet:
             console.print_readings(done, detailed=any("." in name for name in names))
+        if done.left:
+            raise TargetUnmet(*done.left)

@@ -205,6 +205,54 @@ def test_a_reading_as_shipped_measures_what_a_run_of_the_config_does(ran, tmp_pa
         assert judged.measured == stored["P1.8", part.what, f"rls{part.cases[0]}"]
 
 
+class Margins(Velocities):
+    """Two velocities of which one leaves a gain near the limit of 50 %, so that few realisations leave it open."""
+
+    realisations = 60
+    choices = (
+        Choice(
+            *("sigma_velocity", "How accurate the velocity is", "nothing", "nothing"),
+            (Alternative("shipped", rule.UNSTATED, "as in the table"), Alternative("worse", rule.UNSTATED, "by 1.1")),
+        ),
+    )
+
+    def changed(self, claim, case, reading):
+        factor = {"shipped": 1.0, "worse": 1.1}[reading["sigma_velocity"]]
+        radar = case.spec.radar.model_copy(update={"sigma_velocity_mps": factor * case.spec.radar.sigma_velocity_mps})
+        return dataclasses.replace(case, spec=case.spec.model_copy(update={"radar": radar}))
+
+
+def test_what_is_undecided_runs_on_until_it_is_decided(ran, tmp_path):
+    wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, readings=Margins()))
+    few = app.readings([wanted], out=tmp_path, figures=False)
+    before = few.read[0].over[0]
+    assert before.outcome.kind == rule.UNDECIDED
+    assert before.undecided
+    assert not few.left
+    little = app.readings([wanted], out=tmp_path, realisations=60, decide=True, figures=False)
+    assert little.read[0].over[0].outcome == before.outcome  # the most is what it began with
+    assert f"P1.8 not yet decided under {len(before.undecided)} readings at 60 realisations; " in little.left[0]
+    decided = app.readings([wanted], out=tmp_path, realisations=64_000, decide=True, figures=False)
+    (over,) = decided.read[0].over
+    assert over.outcome.kind != rule.UNDECIDED
+    assert not decided.left
+    counts = {judged.n for one in over.under for _, judged in one.parts}
+    assert counts - {60} <= {2000 * 2**m for m in range(6)}
+    open_ = {one.reading for one in before.undecided}
+    for one in over.under:  # those that were decided are left as they were
+        assert ({judged.n for _, judged in one.parts} == {60}) == (one.reading not in open_)
+    assert {int(row["n"]) for row in table(tmp_path)} == counts
+    assert {row["over"] for row in table(tmp_path)} == {over.outcome.kind}
+
+
+def test_what_is_left_undecided_is_exit_code_3(tmp_path):
+    """Eight bursts a reading leave P4.4 open."""
+    command = ["readings", "P4.4", "-n", "8", "--decide", "--only", "curvature=before", "--no-figures"]
+    done = CliRunner().invoke(main, [*command, "--out", str(tmp_path)])
+    assert done.exit_code == 3, done.output
+    assert "P4.4 not yet decided under " in done.stderr
+
+
 def test_a_time_limit_stops_cleanly(ran, tmp_path):
     with pytest.raises(TargetUnmet, match="the same command continues"):
         app.readings([ran], out=tmp_path, options=RunOptions(stop=lambda: "time limit reached"), figures=False)

@@ -38,6 +38,17 @@ def test_readings_leave_alone_what_was_not_run_and_other_claims():
     assert with_readings([row(kind=CONTRADICTORY)], stored)[0]["class"] == CONTRADICTORY
 
 
+def test_a_print_that_contradicts_itself_over_its_readings_does_so_beside_the_claims():
+    """The run's own reading confirms it; that others do under values printed otherwise is known to the readings alone."""
+    stored = [
+        reading("a", CONFIRMED, noise="9") | {"over": CONTRADICTORY},
+        reading("b", REFUTED, noise="2.25") | {"over": CONTRADICTORY},
+    ]
+    (joined,) = with_readings([row(kind=CONFIRMED, worst_miss=0.9)], stored)
+    assert (joined["class"], joined["overall"]) == (CONTRADICTORY, CONTRADICTORY)
+    assert page.verdict_of([joined]) == f"{CONTRADICTORY} (in 1 of 2 readings)"  # within the margin: no miss is said
+
+
 def test_headline_counts_classes_and_leaves_extensions_out():
     rows = [row(), row("P9.2", CONFIRMED), row("P9.3", CONFIRMED, extension="true")]
     assert page.counts(rows) == ({CONFIRMED: 1, REFUTED: 1}, 1)

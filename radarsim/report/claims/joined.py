@@ -1,6 +1,7 @@
 """Verdicts over all readings that a paper allows, beside those of the default one: from the rows of readings.csv."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from radarsim.report.claims import rule
@@ -11,7 +12,7 @@ from radarsim.report.claims.rule import Outcome, Reading
 FIXED = frozenset(
     (
         *("claim", "part", "reading", "kind", "measured", "lo", "hi", "exact", "expected_lo", "expected_hi", "margin"),
-        *("verdict", "unit", "what", "outcome", "miss", "n", "reason"),
+        *("verdict", "unit", "what", "outcome", "miss", "n", "reason", "over"),
     )
 )
 
@@ -19,13 +20,15 @@ FIXED = frozenset(
 def with_readings(rows: Sequence[Mapping[str, Any]], stored: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Rows of claims.csv with holds, of, depends_on and the class filled in from rows of readings.csv.
 
-    A claim of which no reading is stored stays as it is, and so does one that was not judged.
+    A claim of which no reading is stored stays as it is, and so does one that was not judged. Where the readings say
+    that the print contradicts itself, which hangs on more than how each of them comes out, so does the row.
     """
     by_claim: dict[str, list[Mapping[str, Any]]] = {}
     for row in stored:
         by_claim.setdefault(str(row["claim"]), []).append(row)
     found = {claim: _readings(own) for claim, own in by_claim.items()}
-    return [dict(row) | _over(row, found.get(str(row["claim"]), [])) for row in rows]
+    torn = {claim for claim, own in by_claim.items() if any(row.get("over") == rule.CONTRADICTORY for row in own)}
+    return [dict(row) | _over(row, found.get(str(row["claim"]), []), str(row["claim"]) in torn) for row in rows]
 
 
 def _readings(rows: Sequence[Mapping[str, Any]]) -> list[Reading]:
@@ -37,11 +40,13 @@ def _readings(rows: Sequence[Mapping[str, Any]]) -> list[Reading]:
     return list(found.values())
 
 
-def _over(row: Mapping[str, Any], readings: Sequence[Reading]) -> dict[str, Any]:
+def _over(row: Mapping[str, Any], readings: Sequence[Reading], torn: bool) -> dict[str, Any]:
     if not readings or row["class"] in (NOT_RUN, NOT_JUDGED):
         return {}
     over = rule.over_readings(Outcome(row["class"], 0, 0, 0, 0.0), readings)
     if over.readings is None:
         return {}
+    if torn:
+        over = replace(over, kind=rule.CONTRADICTORY)
     on = ", ".join(over.depends_on)
     return {"class": over.kind, "overall": over.words, "holds": over.holds_in, "of": over.readings, "depends_on": on}

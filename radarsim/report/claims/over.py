@@ -15,7 +15,7 @@ NOTHING = "there is nothing to measure it by"
 FIRST = ("claim", "part", "reading", "kind")
 LAST = (
     *("measured", "lo", "hi", "exact", "expected_lo", "expected_hi", "margin", "verdict"),
-    *("unit", "what", "outcome", "miss", "n", "reason"),
+    *("unit", "what", "outcome", "miss", "n", "reason", "over"),
 )
 
 
@@ -45,18 +45,18 @@ class Under:
         return rule.Reading(self.name, self.kind, dict(self.reading.taken), outcome)
 
 
-def under(of: PaperReadings, claim: Claim, reading: Reading, evidence: Evidence) -> Under:
-    """Judge a claim by the evidence of a reading."""
+def under(of: PaperReadings, claim: Claim, reading: Reading, evidence: Evidence, n: int = 0) -> Under:
+    """Judge a claim by the evidence of a reading, which has n realisations; 0 where nothing was run."""
     name, kind = of.name(reading), of.kind(reading)
     try:
-        parts = tuple((part, _judged(part, evidence, of.exact(claim, reading))) for part in of.parts(claim, reading))
+        parts = tuple((part, _judged(part, evidence, of.exact(claim, reading), n)) for part in of.parts(claim, reading))
     except Missing as missing:
         return Under(claim, reading, name, kind, why=missing.why or NOTHING)
     outcome = rule.claim([judged for _, judged in parts], **claim.how)
     return Under(claim, reading, name, kind, parts, outcome)
 
 
-def _judged(part: Part, seen: Evidence, exact: bool) -> Judged:
+def _judged(part: Part, seen: Evidence, exact: bool, n: int) -> Judged:
     """A part with its numbers; which variant it is of, and whether that is against the print, the reading says."""
     found, nothing = part.measure(seen), math.nan
     measured, lo, hi = (nothing,) * 3 if exact else (float(found.value), float(found.lo), float(found.hi))
@@ -64,6 +64,7 @@ def _judged(part: Part, seen: Evidence, exact: bool) -> Judged:
         measured,
         lo,
         hi,
+        n=n,
         expected_lo=part.expected.lo,
         expected_hi=part.expected.hi,
         margin=part.expected.margin * (part.scale(seen) if part.scale else 1.0),
@@ -111,6 +112,11 @@ class Over:
         return [one for one in judged if own and one.outcome and one.outcome.kind != own.kind]
 
     @property
+    def undecided(self) -> list[Under]:
+        """The readings that the paper allows and under which it is not decided."""
+        return [one for one in self.under if one.counted and one.outcome and one.outcome.kind == rule.UNDECIDED]
+
+    @property
     def impossible(self) -> list[Under]:
         """The readings that were not judged, which say why."""
         return [one for one in self.under if one.outcome is None]
@@ -137,11 +143,15 @@ def columns(every: Iterable[PaperReadings]) -> tuple[str, ...]:
     return (*FIRST, *choices, *LAST)
 
 
-def rows(one: Under, names: Sequence[str]) -> list[dict[str, Any]]:
-    """Rows of readings.csv: one a part; one alone with the reason where it was not judged."""
+def rows(one: Under, names: Sequence[str], over: Outcome | None = None) -> list[dict[str, Any]]:
+    """Rows of readings.csv: one a part; one alone with the reason where it was not judged.
+
+    over: what the claim comes to over all its readings, the class of which stands in each row.
+    """
     choices = dict(one.reading.taken)
     blank: dict[str, Any] = dict.fromkeys(names, "") | {"claim": one.claim.id, "reading": one.name, "kind": one.kind}
     blank |= {key: value for key, value in choices.items() if key in names}
+    blank["over"] = over.kind if over else ""
     if one.outcome is None:
         return [blank | {"verdict": "not possible", "reason": one.why}]
     many = sum(judged.sampled for _, judged in one.parts)
@@ -151,7 +161,7 @@ def rows(one: Under, names: Sequence[str]) -> list[dict[str, Any]]:
             **{name: _cell(getattr(judged, name), never=True) for name in ("measured", "lo", "hi", "exact")},
             **{name: _cell(getattr(judged, name)) for name in ("expected_lo", "expected_hi", "margin")},
             **{"part": number, "what": part.what, "unit": part.unit, "verdict": rule.verdict(judged, many)},
-            **{"outcome": one.outcome.kind, "miss": _cell(rule.miss(judged))},
+            **{"outcome": one.outcome.kind, "miss": _cell(rule.miss(judged)), "n": judged.n or ""},
         }
         for number, (part, judged) in enumerate(one.parts, 1)
     ]

@@ -114,7 +114,7 @@ def verdict_of(parts: Sequence[Mapping]) -> str:
     if said in MARKS:
         text = MARKS[said].replace(said, text)
     notes = []
-    if first["class"] in (REFUTED, CONTRADICTORY) and number(first["worst_miss"]) is not None:
+    if first["class"] in (REFUTED, CONTRADICTORY) and (number(first["worst_miss"]) or 0.0) > 1:
         notes.append(tr("by {miss:.3g} margins", miss=number(first["worst_miss"])))
     if first["class"] == UNDECIDED and number(first["needed"]) is not None:
         notes.append(tr("{needed:.2g} realisations would decide", needed=number(first["needed"])))

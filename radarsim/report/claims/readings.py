@@ -87,6 +87,7 @@ class PaperReadings(ABC):
     paper: str  # P1
     choices: tuple[Choice, ...]
     realisations: int = 1000  # of each run, where none are asked for
+    most: int = 16_000  # of a run that is to decide a claim, where none are asked for
 
     # ---- the readings --------------------------------------------------------------------------------------------
     def declared(self) -> Sequence[Reading]:

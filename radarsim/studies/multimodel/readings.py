@@ -9,12 +9,11 @@ from radarsim.config.experiment import Case
 from radarsim.report.claims import Evidence
 from radarsim.report.claims.declared import Claim, PaperClaims
 from radarsim.report.claims.readings import Alternative, Choice, PaperReadings, Reading, Seen
-from radarsim.report.claims.rule import AGAINST, UNSTATED
+from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED
 from radarsim.studies.multimodel import measures, tables
 from radarsim.studies.multimodel.flights import FLIGHTS
 
 OF_FLIGHT = tuple(f"P2.{n}" for n in (1, 2, 3, 5, 6, 7, 8, 9, 10, 12, 13))
-OF_SIX = ("P2.1", "P2.2", "P2.3", "P2.5")  # the six algorithms, cheap enough for every combination
 AERODYNAMIC = "P2.4"  # speaks of another target than the lost flight
 ESTIMATES = tuple(f"P2.{n}" for n in (1, 6, 7, 8, 9, 10, 12, 13))
 SHIPPED = "aeroballistic"
@@ -48,12 +47,13 @@ CHOICES = (
     Choice(
         "output",
         "How the hypotheses become one estimate",
-        "Полное объединение гипотез … производится только для выдачи информации на выход фильтра.",
-        "The full merge of hypotheses is made only to give information to the filter's output; by which rule is left "
-        "open for the combined one.",
+        "Для выдачи результата работы алгоритма на выход используется алгоритм объединения гипотез (5). Такой алгоритм "
+        "объединения гипотез будем называть комбинированным.",
+        "To give the algorithm's result to the output the rule (5) is used. Such an algorithm of merging hypotheses "
+        "will be called combined.",
         (
-            Alternative("best", UNSTATED, "the most probable hypothesis"),
-            Alternative("moment", UNSTATED, "the mean weighted by probability"),
+            Alternative("best", EQUIVALENT, "the most probable hypothesis, as (5) says"),
+            Alternative("moment", AGAINST, "the mean weighted by probability: (4), where (5) is printed"),
         ),
         ESTIMATES,
     ),
@@ -89,14 +89,6 @@ class Readings(PaperReadings):
 
     paper = "P2"
     choices = CHOICES
-    realisations = 1000
-
-    def of_claim(self, claim: str) -> list[Reading]:
-        """Every flight with every unstated σ_A for the six algorithms, else singly; every other alternative singly."""
-        own = {choice.key: choice for choice in self.choices if choice.bears_on(claim)}
-        crossed = [own[key] for key in ("flight", "sigma_acceleration") if key in own and claim in OF_SIX]
-        singly = [self.reading(**{choice.key: one.name}) for choice in own.values() for one in choice.alternatives[1:]]
-        return list(dict.fromkeys([self.reading(), *self.combined(crossed), *singly]))
 
     def changed(self, claim: Claim, case: Case, reading: Reading) -> Case | None:
         """The case with the flight, the banks, the output and the start of a reading."""

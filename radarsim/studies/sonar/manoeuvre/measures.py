@@ -13,6 +13,7 @@ from radarsim.studies.sonar.manoeuvre.config import Filter
 from radarsim.studies.sonar.measures import CaseKey, Evidence, Measure
 
 USUAL = 0.01  # false alarms a test
+ENOUGH = (4, 5)  # plots, over which n is not worth while
 AT_ONE = 0.31731050786291415  # false alarms a test at k = 1: a Gaussian outside one σ
 
 
@@ -121,14 +122,19 @@ def delays_ratio(key: CaseKey, more: int, few: int, delay: Delay, rate: float) -
     return lambda seen: ratio(delay(seen.case(key), more, rate), delay(seen.case(key), few, rate))
 
 
-def further(key: CaseKey, plots: int, delay: Delay, rate: float) -> Measure:
-    """Least mean delay of detectors of more plots over that of so many, less 1, in %; taken as independent."""
+def further(key: CaseKey, enough: Sequence[int], delay: Delay, rate: float) -> Measure:
+    """Least mean delay of detectors of more plots than `enough`, over the least of these, less 1, in %; as independent.
+
+    Negative where more plots see it sooner.
+    """
 
     def measure(seen: Evidence) -> Estimate:
         result = seen.case(key)
-        more = [delay(result, n, rate) for n in _plots_at(result, rate) if n > plots]
-        of = ratio(min(more, key=lambda one: one.value), delay(result, plots, rate), 100)
-        return Estimate(*(part - 100 for part in of))
+        of = {n: delay(result, n, rate) for n in _plots_at(result, rate)}
+        more = [one for n, one in of.items() if n > max(enough)]
+        few = [one for n, one in of.items() if n in enough]
+        least = [min(ones, key=lambda one: one.value) for ones in (more, few)]
+        return Estimate(*(part - 100 for part in ratio(least[0], least[1], 100)))
 
     return measure
 

@@ -179,7 +179,7 @@ def _delay(part: Part, reading: Reading) -> Part:
     if part.statement == "time":
         return replace(part, measure=measures.delays_ratio(part.cases[0], 8, 5, delay, rate))
     if part.statement == "not worth while":
-        return replace(part, measure=measures.fastest(part.cases[0], delay, rate))
+        return replace(part, measure=measures.further(part.cases[0], measures.ENOUGH, delay, rate))
     return part
 
 
