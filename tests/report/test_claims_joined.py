@@ -39,7 +39,7 @@ def test_readings_leave_alone_what_was_not_run_and_other_claims():
 
 
 def test_a_print_that_contradicts_itself_over_its_readings_does_so_beside_the_claims():
-    """The run's own reading confirms it; that others do under values printed otherwise is known to the readings alone."""
+    """The run's own reading confirms it; what the print has otherwise is known to the readings alone."""
     stored = [
         reading("a", CONFIRMED, noise="9") | {"over": CONTRADICTORY},
         reading("b", REFUTED, noise="2.25") | {"over": CONTRADICTORY},
