@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.report import notes
+from radarsim.report import notes, statistics
 from radarsim.report.statistics import FEW, FEW_EFFECTIVE, FEW_EVENTS, FEW_HEAVY
 
 
@@ -95,6 +95,37 @@ def test_a_gain_of_all_there_is_divides_by_nothing():
     with np.errstate(all="raise"):
         noted = notes.noted({"curves": curves, "gains": gains}, [])["gains"]
     assert list(noted.get("note", [""])) == [""]
+
+
+@pytest.mark.parametrize("foretold", [True, False])
+def test_a_calibration_is_marked_by_what_is_foretold(foretold, monkeypatch):
+    """Bins of 16 to 24 events to come: marked by those that came, the bins left are those of chance's excess."""
+    import pandas as pd
+
+    if not foretold:
+        monkeypatch.setattr(notes, "SHARES", {"calibration": ("right",)})
+        monkeypatch.setattr(notes, "FORETOLD", {})
+    rng, n = np.random.default_rng(3), 1000
+    truth = np.repeat([0.016, 0.018, 0.02, 0.022, 0.024], 4000)
+    right = statistics.rate(rng.binomial(n, truth), float(n))
+    table = pd.DataFrame({"case": "a", "n": n, **dict(zip(("right", "right_lo", "right_hi"), right, strict=True))})
+    made = {"curves": pd.DataFrame(), "calibration": table.assign(expected=truth)}
+    free = notes.noted(made, [])["calibration"]["note"].eq("").to_numpy()
+    share = ((right.lo <= truth) & (truth <= right.hi))[free].mean()
+    if foretold:
+        np.testing.assert_array_equal(free, truth >= 0.02)
+        assert abs(share - 0.95) < 0.01  # Wilson's own unevenness; 12 000 bins tell it to 0.002
+    else:
+        assert share < 0.93
+
+
+def test_bins_of_few_realisations_have_no_tails():
+    """Of yes or no alone nothing is heavy: 300 of the 1000 that a mean would want are enough."""
+    import pandas as pd
+
+    row = {"case": "a", "n": 300, "right": 0.5, "right_lo": 0.44, "right_hi": 0.56, "expected": 0.5}
+    made = {"curves": pd.DataFrame(), "calibration": pd.DataFrame([row, row | {"n": 100}])}
+    assert list(notes.noted(made, [])["calibration"]["note"]) == ["", f"under {FEW} realisations"]
 
 
 def test_a_table_keeps_the_notes_that_it_brings():
