@@ -37,9 +37,9 @@ SHARES = {
     "probabilities": ("probability",),
     "orders": ("weight",),
 }
-# Columns that foretell a share, where a table has one: rows are marked by these events in place of those that were
-# seen. Where about twenty are to come, a row that is marked by what came is unmarked when chance brought more: such rows
-# of `ambiguous_doppler`'s calibration, 200 × 1000 realisations, cover 93.9 %, and 95.0 % when marked by what is foretold.
+# Columns that foretell a share, where a table has one: rows are marked by these events in place of those that came.
+# Where about twenty are to come, a row that is marked by what came is unmarked when chance brought more: such rows of
+# `ambiguous_doppler`'s calibration, 200 × 1000 realisations, cover 93.9 %, and 95.0 % when marked by what is foretold.
 FORETOLD = {"calibration": ("expected",)}
 BOUNDED = {"calibration"}  # tables of yes or no alone, of realisations of their own: no tails
 

@@ -111,12 +111,14 @@ def test_a_calibration_is_marked_by_what_is_foretold(foretold, monkeypatch):
     table = pd.DataFrame({"case": "a", "n": n, **dict(zip(("right", "right_lo", "right_hi"), right, strict=True))})
     made = {"curves": pd.DataFrame(), "calibration": table.assign(expected=truth)}
     free = notes.noted(made, [])["calibration"]["note"].eq("").to_numpy()
-    share = ((right.lo <= truth) & (truth <= right.hi))[free].mean()
+    held = (right.lo <= truth) & (truth <= right.hi)
     if foretold:
         np.testing.assert_array_equal(free, truth >= 0.02)
-        assert abs(share - 0.95) < 0.01  # Wilson's own unevenness; 12 000 bins tell it to 0.002
+        assert abs(held[free].mean() - 0.95) < 0.01  # Wilson's own unevenness; 12 000 bins tell it to 0.002
     else:
-        assert share < 0.93
+        few = free & (truth < 0.02)
+        assert few.sum() > 1000
+        assert held[few].mean() < 0.9
 
 
 def test_bins_of_few_realisations_have_no_tails():
