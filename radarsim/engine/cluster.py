@@ -20,6 +20,7 @@ from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from radarsim.engine.blocks import Node, Partial, Work
+from radarsim.engine.certificate import self_signed
 from radarsim.engine.executors import Outcome, attempted
 from radarsim.errors import ClusterError, ConfigError, Interrupted
 
@@ -29,8 +30,10 @@ if TYPE_CHECKING:
 CONNECT_S = 10
 WORKERS_S = 30  # how long a scheduler may be without a worker
 DEATHS = 20  # of workers under one task, after which it is taken for their cause
+RESULT_S = 60  # how long the sums of a block may take from a worker
 LOOK_S = 1.0
 SCHEMES = ("tcp", "tls")
+ROLES = ("client", "scheduler", "worker")
 LOOPBACK = "127.0.0.1"  # what this machine starts for itself listens to nobody else
 HINT = "--workers and --scheduler need Dask: pip install 'radarsim[cluster]'"
 QUIET = ("distributed", "distributed.nanny", "distributed.worker", "distributed.scheduler", "distributed.comm")
@@ -64,11 +67,16 @@ def trust(address: str) -> str | None:
 
 
 def _security(distributed: ModuleType) -> "Security | None":
-    """Keys and certificates of one run, made for it; None without the package `cryptography`, which makes them."""
+    """Keys and certificates of one run, made for it; None without the package `cryptography`, which makes them.
+
+    Those of `Security.temporary` begin at the time of day and end within a year: a clock set back locks workers out.
+    """
     try:
-        return distributed.Security.temporary()
+        key, certificate = self_signed()
     except ImportError:
         return None
+    roles = {f"tls_{role}_{part}": text for role in ROLES for part, text in (("key", key), ("cert", certificate))}
+    return distributed.Security(require_encryption=True, tls_ca_file=certificate, **roles)
 
 
 def _configured(distributed: ModuleType, address: str) -> "Security | None":
@@ -198,8 +206,14 @@ class Cluster:
             return []
         self._running.discard(key)
         if future.status == "finished":
-            with contextlib.suppress(Exception):  # the worker died before it was asked: once more
-                return [future.result()]
+            try:
+                return [future.result(timeout=RESULT_S)]
+            except TimeoutError as late:
+                raise ClusterError(
+                    f"{self._place}: a worker does not send its sums within {RESULT_S} s; what was done is stored"
+                ) from late
+            except Exception:  # the worker died before it was asked: once more
+                pass
             self.submit(*task[1:])
             return []
         if future.status == "cancelled":

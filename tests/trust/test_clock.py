@@ -1,0 +1,113 @@
+"""A clock that is set back or forward under a run: nothing waits for it, nothing is thrown away by it."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+# The time of day, as every call of the C library tells it, moved by STEP_S seconds once the file STEP_ONCE is there.
+SHIM = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdlib.h>
+#include <sys/time.h>
+#include <time.h>
+#include <unistd.h>
+
+static long step(void) {
+    static int moved = 0;
+    moved = moved || access(getenv("STEP_ONCE"), F_OK) == 0;
+    return moved ? atol(getenv("STEP_S")) : 0;
+}
+
+int clock_gettime(clockid_t clock, struct timespec *to) {
+    static int (*real)(clockid_t, struct timespec *);
+    if (!real) real = dlsym(RTLD_NEXT, "clock_gettime");
+    int code = real(clock, to);
+    if (clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE) to->tv_sec += step();
+    return code;
+}
+
+time_t time(time_t *to) {
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    if (to) *to = now.tv_sec;
+    return now.tv_sec;
+}
+
+int gettimeofday(struct timeval *to, void *zone) {
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    to->tv_sec = now.tv_sec;
+    to->tv_usec = now.tv_nsec / 1000;
+    return 0;
+}
+"""
+YEAR_S = 366 * 86400
+TEN_DAYS_S = 10 * 86400
+
+
+@pytest.fixture(scope="module")
+def shim(tmp_path_factory):
+    """The library that moves the clock of a process that loads it first."""
+    if not sys.platform.startswith("linux") or not (compiler := shutil.which("cc")):
+        pytest.skip("needs Linux and a C compiler")
+    place = tmp_path_factory.mktemp("clock")
+    (place / "shim.c").write_text(SHIM)
+    command = [compiler, "-shared", "-fPIC", "-o", place / "shim.so", place / "shim.c", "-ldl"]
+    subprocess.run(command, check=True)
+    return place / "shim.so"
+
+
+def run(shim, out, step_s, *more):
+    """A run of the command whose clock steps, in all its processes, when the folder of its blocks appears."""
+    environment = os.environ | {"LD_PRELOAD": str(shim), "STEP_S": str(step_s), "STEP_ONCE": str(out / ".blocks")}
+    shell = [sys.executable, "-m", "radarsim", "run", "rls2", "--no-figures", "--out", str(out), *map(str, more)]
+    return subprocess.run(shell, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=300)
+
+
+@pytest.fixture(scope="module")
+def untouched(tmp_path_factory):
+    """The table of the same run with the clock left alone."""
+    out = tmp_path_factory.mktemp("untouched")
+    shell = [sys.executable, "-m", "radarsim", "run", "rls2", "--no-figures", "--out", str(out), "-n", "300000"]
+    subprocess.run(shell, cwd=ROOT, check=True, capture_output=True)
+    return (out / "rls2/curves.csv").read_bytes()
+
+
+@pytest.mark.parametrize("step_s", [-YEAR_S, -3600, YEAR_S])
+def test_a_run_and_its_continuation(shim, untouched, tmp_path, step_s):
+    """A step while it runs, and files of the future when it goes on: the same bytes, nothing computed twice."""
+    first = run(shim, tmp_path, step_s, "-n", 150_000)
+    assert (first.returncode, first.stderr) == (0, "")
+    second = run(shim, tmp_path, -step_s, "-n", 300_000)
+    assert (second.returncode, second.stderr) == (0, "")
+    assert (tmp_path / "rls2/curves.csv").read_bytes() == untouched
+    facts = json.loads((tmp_path / "rls2/run.json").read_text())
+    ended = datetime.fromisoformat(facts["finished"]) - datetime.now(UTC)
+    assert ended.total_seconds() == pytest.approx(-step_s, abs=600)  # so the clock did step
+    assert facts["realisations_from_store"] >= 131_072  # whole nodes; what is left of a cut one is computed again
+
+
+def test_a_time_limit_is_not_of_the_day(shim, tmp_path):
+    """A clock set forward by ten days reaches no limit; one set back does not stretch it."""
+    done = run(shim, tmp_path / "forward", TEN_DAYS_S, "-n", 20_000, "--time-limit", 250)
+    assert (done.returncode, done.stderr) == (0, "")
+    done = run(shim, tmp_path / "back", -TEN_DAYS_S, "-n", "1e10", "--time-limit", 2)
+    assert done.returncode == 3, done.stderr
+    assert "time limit of 2 s" in done.stderr
+
+
+@pytest.mark.parametrize("step_s", [-3600, TEN_DAYS_S])
+def test_workers(shim, untouched, tmp_path, step_s):
+    """Certificates made for the run hold on either side of the step."""
+    pytest.importorskip("distributed")
+    done = run(shim, tmp_path, step_s, "-n", 300_000, "--workers", 1)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "rls2/curves.csv").read_bytes() == untouched
