@@ -81,7 +81,7 @@ def untouched(tmp_path_factory):
     return (out / "rls2/curves.csv").read_bytes()
 
 
-@pytest.mark.parametrize("step_s", [-YEAR_S, -3600, YEAR_S])
+@pytest.mark.parametrize("step_s", [-YEAR_S, *(pytest.param(s, marks=pytest.mark.slow) for s in (-3600, YEAR_S))])
 def test_a_run_and_its_continuation(shim, untouched, tmp_path, step_s):
     """A step while it runs, and files of the future when it goes on: the same bytes, nothing computed twice."""
     first = run(shim, tmp_path, step_s, "-n", 150_000)
@@ -104,7 +104,7 @@ def test_a_time_limit_is_not_of_the_day(shim, tmp_path):
     assert "time limit of 2 s" in done.stderr
 
 
-@pytest.mark.parametrize("step_s", [-3600, TEN_DAYS_S])
+@pytest.mark.parametrize("step_s", [-3600, pytest.param(TEN_DAYS_S, marks=pytest.mark.slow)])
 def test_workers(shim, untouched, tmp_path, step_s):
     """Certificates made for the run hold on either side of the step."""
     pytest.importorskip("distributed")

@@ -1,0 +1,134 @@
+"""Folders that another user owns: what may be read is read, what may not be written is refused in a line, whole.
+
+The other user is this process without the right to pass over permissions, which root has: so the tests are the same for
+root and for anybody else.
+"""
+
+import ctypes
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PR_CAPBSET_DROP, PASS_OVER = 24, (1, 2)  # CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
+NO_FIGURES = ("-n", "4000", "--no-figures")
+
+pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="rights of root are dropped as Linux does")
+
+
+def drop():
+    """In the child, before it starts the command: permissions hold for it whoever it is."""
+    if os.geteuid() == 0:
+        library = ctypes.CDLL(None, use_errno=True)
+        for right in PASS_OVER:
+            if library.prctl(PR_CAPBSET_DROP, right, 0, 0, 0) != 0:
+                raise OSError(ctypes.get_errno(), "PR_CAPBSET_DROP")
+
+
+def command(*words):
+    """What the command answers to somebody for whom permissions hold."""
+    shell = [sys.executable, "-m", "radarsim", *map(str, words)]
+    done = subprocess.run(shell, cwd=ROOT, capture_output=True, text=True, check=False, preexec_fn=drop)
+    assert "Traceback" not in done.stderr
+    return done
+
+
+def contents(folder):
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.fixture
+def closed():
+    """Close folders, with all that is in them, against writing; they are opened again at the end."""
+    opened = []
+
+    def close(*folders):
+        for folder in folders:
+            for place, _, names in os.walk(folder):
+                for path in (Path(place), *(Path(place) / name for name in names)):
+                    opened.append((path, path.stat().st_mode))
+                    path.chmod(path.stat().st_mode & ~0o222)
+
+    yield close
+    for path, mode in reversed(opened):
+        if path.exists():
+            path.chmod(mode)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Results of another user."""
+    out = tmp_path_factory.mktemp("another") / "results"
+    assert command("run", "rls2", *NO_FIGURES, "--out", out).returncode == 0
+    return out
+
+
+def test_the_other_user_may_not_write(closed, tmp_path):
+    """The test's own premise."""
+    closed(tmp_path)
+    shell = [sys.executable, "-c", f"open({str(tmp_path / 'file')!r}, 'w')"]
+    done = subprocess.run(shell, capture_output=True, text=True, check=False, preexec_fn=drop)
+    assert "PermissionError" in done.stderr
+
+
+def test_a_run_into_a_closed_folder(closed, tmp_path):
+    closed(tmp_path)
+    done = command("run", "rls2", *NO_FIGURES, "--out", tmp_path)
+    assert (done.returncode, done.stdout) == (4, "")
+    (line,) = done.stderr.splitlines()
+    assert str(tmp_path) in line
+    assert "ermission denied" in line
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("part", "more"), [("rls2", 5000), (".blocks", 9000), ("", 9000)])
+def test_results_of_another_user_stay_whole(closed, made, part, more):
+    """Their tables, their blocks or both: more realisations than they have cannot be stored there."""
+    before = contents(made / part)
+    closed(made / part)
+    done = command("run", "rls2", "-n", more, "--no-figures", "--out", made)
+    assert done.returncode == 4, done.stderr
+    assert "ermission denied" in done.stderr
+    assert contents(made / part) == before
+
+
+def test_they_can_be_read(closed, made, tmp_path):
+    closed(made)
+    before = contents(made)
+    assert command("doctor", made / "rls2").returncode == 0
+    listed = command("claims", "rls2", "--out", made)
+    assert (listed.returncode, listed.stderr) == (0, "")
+    assert "P1." in listed.stdout
+    compared = command("compare", made / "rls2", made / "rls2", "--no-figures", "--out", tmp_path / "compared")
+    assert compared.returncode == 0, compared.stderr
+    loaded = f"import radarsim; print(len(radarsim.load('rls2', out={str(made)!r}).curves))"
+    shell = [sys.executable, "-c", loaded]
+    done = subprocess.run(shell, cwd=ROOT, capture_output=True, text=True, check=False, preexec_fn=drop)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert int(done.stdout) > 50
+    assert contents(made) == before
+
+
+def test_a_report_that_cannot_be_written_again(closed, made):
+    closed(made)
+    done = command("report", "rls2", "--out", made, "--no-figures")
+    assert done.returncode == 4
+    (line,) = done.stderr.splitlines()
+    assert str(made) in line
+
+
+def test_results_that_may_not_be_read(closed, made):
+    """A table closed to everybody is named, not taken for damaged."""
+    table = made / "rls2/curves.csv"
+    mode = table.stat().st_mode
+    table.chmod(0)
+    try:
+        done = command("doctor", made / "rls2")
+    finally:
+        table.chmod(mode)
+    assert done.returncode != 0
+    assert "curves.csv" in done.stdout + done.stderr
+    assert "ermission denied" in done.stdout + done.stderr
