@@ -15,6 +15,7 @@ BRACKETS = f"{HERE}/test_exact.py::test_range_only_and_oracle_are_exact"
 NEAREST = f"{HERE}/test_exact.py::test_nearest_fold_is_right_as_often_as_the_product_says"
 REMAINDERS = f"{HERE}/test_exact.py::test_remainders_of_two_scans_are_right_as_often_as_calculated"
 CALIBRATED = f"{HERE}/test_exact.py::test_probabilities_of_the_best_hypothesis_are_calibrated"
+LIST = "studies/pulses_to_tracks/test_folds.py::test_hypotheses_are_the_textbooks_list"
 FOLLOWED = f"{HERE}/test_results.py::test_track_follows_combined_orders_as_the_study_does"
 STUDY = "radarsim/studies/ambiguous_doppler"
 
@@ -35,8 +36,12 @@ FOLDS = (
         f"{STUDY}/kernels/hypotheses.py",
         ("put(w, i, get(w, i) - weight * (e * e))", "put(w, i, get(w, i))", MANY),
         ("lists.parents[i] == right and abs(", "abs(", MANY),
-        ("if side * e[i] <= 0.0:", "if side * e[i] >= 0.0:", MANY),
         ("to[PROBABILITY * WIDTH] = 1.0 / sum_", "to[PROBABILITY * WIDTH] = 0.5 / sum_", f"{MANY} {CALIBRATED}"),
+    ),
+    *mutants(
+        "radarsim/kernels/hypotheses.py",
+        ("if side * e[i] <= 0.0:", "if side * e[i] >= 0.0:", f"{MANY} {LIST}"),
+        ("weight = w[i] - c[i] * f * f", "weight = w[i] - c[0] * f * f", LIST),
     ),
     *mutants(
         f"{STUDY}/kernels/orders.py",

@@ -178,7 +178,19 @@ RUNS = (
 )
 CHAIN, BURSTS = "studies/pulses_to_tracks/test_kernels.py", "studies/pulses_to_tracks/test_study.py"
 TEXTBOOK = f"{CHAIN}::test_the_chain_is_the_textbooks"
+LIST = "studies/pulses_to_tracks/test_folds.py::test_hypotheses_are_the_textbooks_list"
 PULSES = (
+    *mutants(
+        "radarsim/studies/pulses_to_tracks/kernels/folds.py",
+        ("weights[h] -= 0.5 * (e * e / S + math.log(S))", "weights[h] -= 0.5 * (e * e / S)", LIST),
+        ("weight -= 0.5 * (off * off / S", "weight += 0.5 * (off * off / S", LIST),
+        ("right, taken, wrong = 0.0 if off else right,", "right, taken, wrong = right,", LIST),
+        (
+            "lists.parents[made] = held.weights[i, h] + lost, 0.0, -1 - h",
+            "lists.parents[made] = lost, 0.0, -1 - h",
+            LIST,
+        ),
+    ),
     *mutants(
         "radarsim/studies/pulses_to_tracks/kernels/steps.py",
         ("u * P[1] + w * Q[1] + v * d[0] * d[1]", "u * P[1] + w * Q[1]", TEXTBOOK),

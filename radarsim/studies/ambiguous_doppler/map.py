@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from radarsim.config.experiment import Case
+from radarsim.kernels.hypotheses import COLUMNS
 from radarsim.kernels.lanes import WIDTH
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
 from radarsim.studies.ambiguous_doppler.study import prepare
@@ -37,7 +38,7 @@ def fan(case: Case, number: int, scans: int) -> Fan:
         plots, out, listed = sums.simulated_lists(world, plan.banks, 0)
         count = int(out[0, -1, records.COUNT, LANE])
         which = int(plots[:, records.CAME, LANE].sum()) % 2  # each plot is written from one list into the other
-        own = listed.reshape(10, -1)[4 * which : 4 * which + 4, :count]
+        own = listed.reshape(COLUMNS, -1)[4 * which : 4 * which + 4, :count]
         weight = np.exp(own[3] - own[3].max(initial=-np.inf))
         order = np.argsort(-weight, kind="stable")
         lists.append((own[1][order], own[2][order], weight[order] / weight.sum()))

@@ -18,6 +18,7 @@ from radarsim.config.fields import (
     NotRead,
     Number,
     Positive,
+    Probability,
     Scenario,
     Study,
     Whole,
@@ -45,6 +46,8 @@ MOST_SCANS = 1000  # each scan has windows of its own
 FEWEST_PULSES, MOST_PULSES = 4, 4096
 SIGMAS = 3.0  # of the prior, in the checks of spans and rates
 MOST_DERIVATIVES = 1
+MOST_HYPOTHESES = 1000
+UNFOLDING = {"prune_below": 1e-6, "estimate": "mean"}  # keys of several hypotheses, and defaults
 SEQUENCES = ("sequence", "dense", "cured")
 USES = {"gated": {"gate_probability": 0.999}, "mixture": {"lock_probability": 0.95}}  # keys of a use, and defaults
 Target = Annotated[Polynomial | AccelerationStart | Turn | FlyBy | Recorded, Field(discriminator="kind")]
@@ -198,6 +201,24 @@ class Filter(Model):
         description="mixture: probability before it is seen that an estimate has locked; default: 0.95",
     )
 
+    hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = Field(
+        None,
+        title="hypotheses kept",
+        description="most hypotheses that it keeps of the folds of its velocities (and, as a mixture, of the bursts "
+        "that locked), as folded velocity does; default: 1, the fold nearest to the prediction",
+    )
+    prune_below: Annotated[Probability, Field(lt=1)] | None = Field(
+        None,
+        title="ratio under which a hypothesis is dropped",
+        description="several hypotheses: ratio to the probability of the best, under which one is dropped; 0: none is; "
+        "default: 1e-6",
+    )
+    estimate: Literal["best", "mean"] | None = Field(
+        None,
+        title="estimate",
+        description="several hypotheses: the best one, or the mean of all by their probabilities; default: mean",
+    )
+
     @property
     def takes(self) -> int:
         """How many numbers of the burst it takes: none, the velocity, or the acceleration too."""
@@ -212,7 +233,8 @@ class Filter(Model):
     @cross_check
     def _keys_have_an_effect(self) -> Iterator[At]:
         if self.observes == ("range",):
-            for key in ("estimator", "forecast", "derivatives", "use", "gate_probability", "lock_probability"):
+            own = ("estimator", "forecast", "derivatives", "use", "gate_probability", "lock_probability")
+            for key in (*own, "hypotheses", *UNFOLDING):
                 if getattr(self, key) is not None:
                     yield at(key, "has no effect on range alone; leave it out")
             return
@@ -224,6 +246,19 @@ class Filter(Model):
             for key in keys:
                 if getattr(self, key) is not None and self.use != use:
                     yield at(key, f"has no effect without use: {use}; leave it out")
+
+    @cross_check
+    def _folds_by_hypotheses(self) -> Iterator[At]:
+        if not self.takes:
+            return
+        if self.estimator == "fisher_bound" and self.hypotheses is not None:
+            yield at("hypotheses", "has no effect with estimator: fisher_bound, which has the true fold; leave it out")
+        several = (self.hypotheses or 1) > 1
+        if several and self.use == "gated":
+            yield at("use", "must be as_measured or mixture with several hypotheses, which weigh what a gate would cut")
+        for key in UNFOLDING:
+            if getattr(self, key) is not None and not several:
+                yield at(key, "has no effect without hypotheses: 2 or more; leave it out")
 
     @cross_check
     def _acceleration_is_estimated(self) -> Iterator[At]:
@@ -239,6 +274,8 @@ class Filter(Model):
         if (self.estimator or "cured") in SEQUENCES:
             defaults["forecast"] = "track"
         defaults |= USES.get(self.use or "", {})
+        if self.estimator != "fisher_bound":
+            defaults |= {"hypotheses": 1} | (UNFOLDING if (self.hypotheses or 1) > 1 else {})
         missing = {key: value for key, value in defaults.items() if getattr(self, key) is None}
         return self.model_copy(update=missing) if missing else self
 
@@ -249,6 +286,7 @@ class Keys(Study):
     figure_names = (
         *(f"{kind}_{component}" for component in ("r", "Vr", "ar") for kind in ("sigma", "gain", "dynamic")),
         "locks",
+        "folds",
         "measured",
         "losses",
         "threshold",

@@ -119,6 +119,16 @@ def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     return Panel(panels.time_axis(), Axis(tr("P(locked)"), limits=(None, 1.0)), tuple(marks), _title(result))
 
 
+def folds_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
+    """How often the best hypothesis has no wrong fold against time, a line for each filter that keeps several."""
+    rows = common.groups(made["folds"][made["folds"]["case"] == result.name], "filter")
+    marks = []
+    for n, ((name,), own) in enumerate(rows.items()):
+        x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", "right", "right_lo", "right_hi"))
+        marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, hi))
+    return Panel(panels.time_axis(), Axis(tr("P(no wrong fold)"), limits=(0, 1)), tuple(marks), _title(result))
+
+
 def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """Errors of the measured velocity of all bursts against time, and the Fisher bound."""
     table = made["estimates"]
@@ -157,6 +167,14 @@ OWN: dict[str, tuple[Draw, str, str]] = {
         term(
             "Share of bursts whose velocity (and acceleration, where it is taken) is within five Fisher "
             "bounds of the truth. Bands: 95 % intervals. Estimators that always lock are left out."
+        ),
+    ),
+    "folds": (
+        folds_panel,
+        term("Folds that are right"),
+        term(
+            "How often the best hypothesis of a filter has taken no velocity in a wrong fold so far. Bands: 95 % "
+            "intervals. Filters that take the nearest fold are left out."
         ),
     ),
     "measured": (

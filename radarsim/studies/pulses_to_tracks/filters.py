@@ -25,6 +25,7 @@ from radarsim.studies.pulses_to_tracks.kernels import records
 RATIOS = (math.sqrt(2.0), 2.0)  # of neighbouring standard deviations of a menu: velocity, acceleration
 MOST_LEVELS = (40, 16)
 STILL = 0.02  # turns at the ends of the burst, left by an acceleration: below it none is designed for
+BOTTOMLESS = 10.0**300  # the depth of a list that nothing is dropped from
 BLOCKS_PER_WINDOW = 20  # as the discriminator's
 UNKNOWN_RAD = 2.0 * math.pi  # the phase's spread before a burst
 KINDS = {None: records.NONE, "fisher_bound": records.BOUND, "spectrum": records.SPECTRUM}
@@ -99,7 +100,8 @@ def menu(burst: Burst, one: Any, widest: tuple[float, float]) -> Menu:
 def widest(spec: Any, one: Any) -> tuple[float, float]:
     """The largest standard deviations of velocity and acceleration that a forecast of the track may have.
 
-    Those of range alone: a burst only adds to what is known.
+    Those of range alone: a burst only adds to what is known. Of a velocity no more is left open than where in the span
+    it lies.
     """
     dt = spec.radar.scan_period_s
     F, Q = transition(dt), process_noise(one.process_noise, one.manoeuvre_variance, dt)
@@ -113,7 +115,7 @@ def widest(spec: Any, one: Any) -> tuple[float, float]:
             P = P - np.outer(P[0], P[0]) / (P[0, 0] + spec.radar.sigma_range_m**2)
         found.append(np.sqrt(np.diag(P)[1:]))
     largest = np.max(found, axis=0)
-    return float(largest[0]), float(largest[1])
+    return min(float(largest[0]), spec.span_mps / math.sqrt(12.0)), float(largest[1])
 
 
 def start_scans(one: Any) -> int:
@@ -230,6 +232,10 @@ def _filter(spec: Any, one: Any, own: Menu | None) -> np.void:
         made["lock"], made["density"] = one.lock_probability, 1.0 / spec.span_mps
         if one.takes == 2:
             made["density"] /= spec.span_mps / spec.burst_s
+    made["kept"] = one.hypotheses or 1
+    if made["kept"] > 1:
+        made["deepest"] = -math.log(one.prune_below) if one.prune_below > 0 else BOTTOMLESS
+        made["mean"] = one.estimate == "mean"
     if own is not None:
         made["top"], made["levels"], made["ratio"] = own.top, own.levels, np.log(RATIOS)
         made["fixed"] = own.top if one.forecast != "track" else 0.0

@@ -9,7 +9,15 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import panels, statistics
 from radarsim.report import tables as common
 from radarsim.studies.pulses_to_tracks.axes import PulsesAxes
-from radarsim.studies.pulses_to_tracks.kernels.records import LOCKED, LOCKED_3, TAKEN, WRONG_FOLD
+from radarsim.studies.pulses_to_tracks.kernels.records import (
+    LISTED,
+    LOCKED,
+    LOCKED_3,
+    NUMBER,
+    RIGHT,
+    TAKEN,
+    WRONG_FOLD,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,6 +34,7 @@ ESTIMATES = (
 )
 LOSSES = ("case", "filter", "component", "unit", "k", "t_s", "since_loss", "n", "sigma", "sigma_lo", "sigma_hi")
 IDEAL = ("case", "filter", "ideal", "component", "unit", "k", "t_s", "over_ideal", "over_ideal_lo", "over_ideal_hi")
+FOLDS = ("case", "filter", "k", "t_s", "n", "right", "right_lo", "right_hi", "listed", "hypotheses")
 PASSES = ("case", "filter", "passes", "passes_lo", "passes_hi")
 
 
@@ -37,6 +46,7 @@ def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
         "estimates": common.joined([_estimates(result) for result in results], ESTIMATES),
         "losses": common.joined([_losses(result) for result in results], LOSSES),
         "idealisations": common.joined([_ideal(result) for result in results], IDEAL),
+        "folds": common.joined([_folds(result) for result in results], FOLDS),
         "passes": common.joined([_passes(result) for result in results], PASSES),
     }
 
@@ -101,6 +111,22 @@ def _ideal(result: Result) -> dict[str, np.ndarray]:
     return {
         **common.leading(result, f, k, ideal=common.names(axes.filters, axes.ideal[f]), **common.components(result, c)),
         **common.interval("over_ideal", statistics.Estimate(*(end / exact for end in of))),
+    }
+
+
+def _folds(result: Result) -> dict[str, np.ndarray]:
+    """Of filters that keep several hypotheses: how often the best one has taken no velocity in a wrong fold.
+
+    listed is how often any of the list has taken none, hypotheses the mean number of them.
+    """
+    f, k = _scans(result, np.array([(one.hypotheses or 1) > 1 for one in result.spec.filters]))
+    of, n = np.asarray(result.sums["folds"])[f, k], np.full(f.size, float(result.count))
+    return {
+        **common.leading(result, f, k),
+        "n": n.astype(np.int64),
+        **common.interval("right", statistics.Estimate(*statistics.rate(of[:, RIGHT], n))),
+        "listed": of[:, LISTED] / n,
+        "hypotheses": of[:, NUMBER] / n,
     }
 
 

@@ -17,12 +17,12 @@ ALIKE = 1.05  # σ over its idealisation's, up to which the idealisation holds
 
 
 def warnings(experiment: Experiment) -> list[str]:
-    """Forecasts wider than the span of velocity: no estimator of one burst can tell the fold."""
+    """Forecasts wider than the span of velocity, where a filter takes the nearest fold: no burst alone can tell it."""
     lines: dict[str, None] = {}
     for case in experiment.cases:
         spec = case.spec
         reach = 3 * spec.prior.sigma_velocity_mps
-        if reach > spec.span_mps / 2 and any(one.takes for one in spec.filters):
+        if reach > spec.span_mps / 2 and any(one.hypotheses == 1 for one in spec.filters):
             half = f"half the span of {spec.span_mps:g} m/s"
             words = f"3 σ of the velocity, {reach:g} m/s, are over {half}: first bursts may be taken in a wrong fold"
             lines[f"{case.stem}: prior.sigma_velocity_mps: {words}"] = None

@@ -19,6 +19,13 @@ FAULTS = [
     (["filters.2.gate_probability=0.9"], "filters.2.gate_probability: has no effect without use: gated; leave it out"),
     (["filters.2.observes=[velocity]"], "filters.2.observes: must be [range]"),
     ([f"filters.2.observes={ALL}", "filters.2.derivatives=0"], "filters.2.derivatives: must be >= 1"),
+    (["filters.0.hypotheses=3"], "filters.0.hypotheses: has no effect on range alone; leave it out"),
+    (["filters.1.hypotheses=3"], "filters.1.hypotheses: has no effect with estimator: fisher_bound, which has"),
+    (["filters.5.hypotheses=3"], "filters.5.use: must be as_measured or mixture with several hypotheses"),
+    (["filters.2.hypotheses=0"], "filters.2.hypotheses: must be"),
+    (["filters.2.prune_below=0.1"], "filters.2.prune_below: has no effect without hypotheses: 2 or more; leave it out"),
+    (["filters.2.hypotheses=1", "filters.2.estimate=best"], "filters.2.estimate: has no effect without hypotheses: 2"),
+    (["filters.2.hypotheses=3", "filters.2.prune_below=1"], "filters.2.prune_below: must be"),
     (["prior.sigma_velocity_mps=1e9"], "prior.sigma_velocity_mps: out of proportion"),
     (["radar.band=L"], "radar.band: L is"),
 ]  # fmt: skip
@@ -37,6 +44,9 @@ def test_defaults_are_written_out():
     assert (cured.forecast, cured.derivatives, cured.use, cured.gate_probability) == ("track", 0, "as_measured", None)
     assert (gated.gate_probability, mixture.lock_probability) == (0.999, 0.95)
     assert spec.filters[0].estimator is None
+    assert [one.hypotheses for one in spec.filters] == [None, None, 1, 1, 1, 1, 1]
+    many = load("pulses", ["filters.6.hypotheses=9"]).cases[0].spec.filters[6]
+    assert (many.hypotheses, many.prune_below, many.estimate) == (9, 1e-6, "mean")
     assert spec.span_mps == pytest.approx(300.0)
 
 
@@ -52,6 +62,10 @@ def test_a_forecast_wider_than_the_span_is_warned_of():
     (line,) = words.warnings(load("pulses", ["prior.sigma_velocity_mps=100"]))
     assert line.startswith(
         "pulses: prior.sigma_velocity_mps: 3 σ of the velocity, 300 m/s, are over half the span of 300 m/s"
+    )
+    many = [f"filters.{n}.hypotheses=9" for n in (2, 3, 4, 6)] + ["filters.5.use=as_measured", "filters.5.hypotheses=9"]
+    assert (
+        words.warnings(load("pulses", ["prior.sigma_velocity_mps=100", "filters.5.gate_probability=null", *many])) == []
     )
 
 

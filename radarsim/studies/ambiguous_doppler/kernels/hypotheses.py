@@ -9,11 +9,8 @@ leaves possible, and drops what is too far below the best or beyond the number t
     c            1/(2S) of it
 """
 
-from typing import NamedTuple
-
-import numpy as np
-
 from radarsim.kernels.compile import inline, part
+from radarsim.kernels.hypotheses import FALL, INNOVATION, NEAR, NOTHING, branched, column, greatest
 from radarsim.kernels.lanes import WIDTH, exponential, full, get, nearest, put, row, total, where_greater
 from radarsim.kernels.symmetric import predicted_axis
 from radarsim.studies.ambiguous_doppler.kernels.records import (
@@ -36,40 +33,7 @@ from radarsim.studies.ambiguous_doppler.kernels.records import (
     VELOCITY_GAIN,
     WEIGHT,
 )
-from radarsim.studies.ambiguous_doppler.kernels.steps import FARTHEST, motion
-
-NOTHING = -1e300  # logarithm of the weight of a place that holds no hypothesis
-
-
-class Lists(NamedTuple):
-    """Room for hypotheses, by addresses (`room`, `most`: numbers per column).
-
-    columns    two lists of r, v, a, w, `room` numbers each; then the innovations e and the weights with the nearest
-               fold, of the list that is branched
-    children   logarithms of weights and innovations of what branches, then a copy of the weights; `most` numbers each
-    parents    of which hypothesis each is a branch
-    """
-
-    columns: np.ndarray
-    children: np.ndarray
-    parents: np.ndarray
-    room: int
-    most: int
-
-
-@inline
-def column(lists, which, number):
-    """Address of column `number` of list `which`."""
-    return row(lists.columns, (4 * which + number) * (lists.room // WIDTH))
-
-
-@inline
-def greatest(x):
-    """The greatest of eight lanes, as all of them; by a row of memory."""
-    most = x[0]
-    for i in range(1, WIDTH):
-        most = max(most, x[i])
-    return most
+from radarsim.studies.ambiguous_doppler.kernels.steps import motion
 
 
 @part
@@ -89,96 +53,20 @@ def moved_and_weighed(lists, which, count, F, z, scan):
 
 @part
 def nearest_folds(lists, which, count, z, D, c):
-    """Innovations with the nearest folds and the weights with them, columns 8 and 9; the greatest of these weights."""
+    """Innovations with the nearest folds and the weights with them, as `branched` reads them; the greatest weight."""
     v, w = column(lists, which, 1), column(lists, which, 3)
-    to_e, to_w = column(lists, 2, 0), column(lists, 2, 1)
-    best = full(NOTHING)
+    to_e, to_w, to_c = column(lists, 2, INNOVATION), column(lists, 2, NEAR), column(lists, 2, FALL)
+    best, fall = full(NOTHING), full(c)
     for i in range((count + WIDTH - 1) // WIDTH):
         e = z - get(v, i)
         e = e - D * nearest(e / D)
         near = get(w, i) - c * (e * e)
         put(to_e, i, e)
         put(to_w, i, near)
+        put(to_c, i, fall)
         best = where_greater(near, best, near, best)
     put(to_w, lists.room // WIDTH - 1, best)  # the last row of a column is free
     return greatest(row(to_w, lists.room // WIDTH - 1))
-
-
-@part
-def least_kept(weights, count, copy, most):
-    """The `most`-th greatest of `count` weights (Hoare's selection on a copy); most < count."""
-    for i in range(count):
-        copy[i] = weights[i]
-    low, high, wanted = 0, count - 1, most - 1
-    while low < high:
-        pivot = copy[(low + high) // 2]
-        i, j = low, high
-        while i <= j:
-            while copy[i] > pivot:
-                i += 1
-            while copy[j] < pivot:
-                j -= 1
-            if i <= j:
-                copy[i], copy[j] = copy[j], copy[i]
-                i += 1
-                j -= 1
-        if wanted <= j:
-            high = j
-        elif wanted >= i:
-            low = i
-        else:
-            break
-    return copy[wanted]
-
-
-@part
-def keep_greatest(lists, count, most):
-    """Of `count` children keep the `most` with the greatest weights, of equal ones the first; their least weight."""
-    weights, found = lists.children, row(lists.children, lists.most // WIDTH)
-    least = least_kept(weights, count, row(lists.children, 2 * lists.most // WIDTH), most)
-    above = 0
-    for i in range(count):
-        above += 1 if weights[i] > least else 0
-    equal, kept = most - above, 0
-    for i in range(count):
-        take = weights[i] > least
-        if weights[i] == least and equal > 0:
-            take, equal = True, equal - 1
-        if take:
-            weights[kept], found[kept], lists.parents[kept] = weights[i], found[i], lists.parents[i]
-            kept += 1
-    return least
-
-
-@part
-def branched(lists, which, count, D, c, best, deepest, most):
-    """Branch `count` hypotheses over their folds, down to best - deepest and FARTHEST, the `most` best: how many."""
-    e, near, w = column(lists, 2, 0), column(lists, 2, 1), column(lists, which, 3)
-    weights, found = lists.children, row(lists.children, lists.most // WIDTH)
-    least, made = best - deepest, 0
-    for i in range(count):
-        if near[i] < least:
-            continue
-        floor = max(least, near[i] - 0.5 * FARTHEST)
-        for n in range(2 * lists.most):
-            side = 1.0 if (n & 1) == 1 else -1.0  # folds 0, 1, -1, 2, -2, …
-            f = e[i] + side * ((n + 1) // 2) * D
-            weight = w[i] - c * f * f
-            if weight < floor:
-                if side * e[i] <= 0.0:  # the nearer side of the pair: all that follow are farther
-                    break
-                continue
-            if made == lists.most:
-                least = max(least, keep_greatest(lists, made, most))
-                floor, made = max(least, floor), most
-                if weight < floor:
-                    continue
-            weights[made], found[made], lists.parents[made] = weight, f, i
-            made += 1
-    if made > most:
-        keep_greatest(lists, made, most)
-        made = most
-    return made
 
 
 @part
@@ -253,7 +141,7 @@ def run_remembering(design, most, deepest, spans, plots, gains, out, lists):
         if count > 0 and plot[CAME * WIDTH] > 0.0:
             c = 0.5 / scan[VARIANCE * WIDTH]
             top = nearest_folds(lists, which, count, plot[VELOCITY * WIDTH], D, c)
-            made = branched(lists, which, count, D, c, top, deepest, most)
+            made = branched(lists, which, count, D, top, deepest, most)
             right = child_that_is_right(lists, which, made, right, plot[UNFOLDED * WIDTH], D)
             best = inherited(lists, which, made, top, scan)
             which, count = 1 - which, made

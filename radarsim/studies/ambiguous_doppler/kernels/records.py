@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.hypotheses import COLUMNS
 from radarsim.kernels.lanes import WIDTH, rows
 
 # A scan's plot and truth: range and folded velocity; the velocity before it was folded; 1 where there is a plot, where
@@ -100,8 +101,8 @@ class Banks(NamedTuple):
 class Memory(NamedTuple):
     """Work arrays for a group of eight realisations.
 
-    plots (K × PLOT rows), gains (D × K × GAINS), out (B × K × OUTPUT), and room for hypotheses, see `hypotheses.Lists`
-    and `together`.
+    plots (K × PLOT rows), gains (D × K × GAINS), out (B × K × OUTPUT), and room for hypotheses, see
+    `kernels.hypotheses.Lists` and `together`.
     """
 
     random: np.ndarray
@@ -171,7 +172,7 @@ def memory(scans: int, banks: Banks) -> Memory:
         gains=rows(len(banks.designs) * scans * GAINS),
         out=rows(len(banks.kind) * scans * OUTPUT),
         counted=rows(1),
-        listed=rows(10 * room // WIDTH),
+        listed=rows(COLUMNS * room // WIDTH),
         children=rows(3 * children // WIDTH),
         parents=np.zeros(children, dtype=np.int64),
         interacting=rows(2 * 3 * 12),

@@ -12,6 +12,7 @@ range. Letters, each of eight lanes:
 """
 
 from radarsim.kernels.compile import inline, part
+from radarsim.kernels.hypotheses import FARTHEST
 from radarsim.kernels.lanes import any_greater, exponential, full, get, nearest, put, root, row, where_greater
 from radarsim.kernels.symmetric import predicted_axis, predicted_own
 from radarsim.studies.ambiguous_doppler.kernels.records import (
@@ -43,8 +44,6 @@ from radarsim.studies.ambiguous_doppler.kernels.records import (
     VELOCITY_GAIN,
     WEIGHT,
 )
-
-FARTHEST = 80.0  # squared deviations, in variances, up to which folds are looked at: exp(-40) of the nearest's weight
 
 
 @inline

@@ -3,8 +3,9 @@
 import numpy as np
 
 from radarsim.kernels.compile import inline, kernel, part
+from radarsim.kernels.hypotheses import Lists
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, total, where_greater
-from radarsim.studies.ambiguous_doppler.kernels.hypotheses import Lists, run_remembering
+from radarsim.studies.ambiguous_doppler.kernels.hypotheses import run_remembering
 from radarsim.studies.ambiguous_doppler.kernels.orders import Orders, run_choosing, run_interacting, run_weighing
 from radarsim.studies.ambiguous_doppler.kernels.plots import fill_plots
 from radarsim.studies.ambiguous_doppler.kernels.records import (
@@ -194,7 +195,7 @@ def simulated(world: World, banks: Banks, first: int) -> tuple[np.ndarray, np.nd
 
 
 def simulated_lists(world: World, banks: Banks, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """As `simulated`, and the columns that the last list of hypotheses is left in, see `hypotheses.Lists`."""
+    """As `simulated`, and the columns that the last list of hypotheses is left in, see `kernels.hypotheses.Lists`."""
     scans, work = len(world.t), memory(len(world.t), banks)
     fill_outputs(world, banks, work, first)
     shape = (len(banks.kind), scans, OUTPUT, WIDTH)

@@ -15,8 +15,8 @@ covariances depend on the data, so that each hypothesis has its own; lanes are e
 import math
 
 from radarsim.kernels.compile import part
+from radarsim.kernels.hypotheses import FARTHEST, column, keep_greatest
 from radarsim.kernels.lanes import WIDTH, exponential, full, get, nearest, put, root, row, total, where_greater
-from radarsim.studies.ambiguous_doppler.kernels.hypotheses import column, keep_greatest
 from radarsim.studies.ambiguous_doppler.kernels.orders import (
     BEFORE,
     COVARIANCE,
@@ -47,7 +47,7 @@ from radarsim.studies.ambiguous_doppler.kernels.records import (
     WEIGHTS,
 )
 from radarsim.studies.ambiguous_doppler.kernels.records import PROBABILITY as OF_THE_BEST
-from radarsim.studies.ambiguous_doppler.kernels.steps import FARTHEST, moved, prior, put_three, three, velocity_taken
+from radarsim.studies.ambiguous_doppler.kernels.steps import moved, prior, put_three, three, velocity_taken
 
 GROUP = 3 * ROWS  # rows of eight hypotheses: of three orders, as `kernels.orders` has them
 BROAD = PLOT + 3  # rows of a plot in all lanes, then the numbers 0 … 7, and two rows of branches

@@ -12,56 +12,44 @@ from radarsim.bursts.kernels.lanes import PASSES, lane
 from radarsim.kernels.compile import inline, kernel
 from radarsim.kernels.lanes import WIDTH
 from radarsim.kernels.random import normals
-from radarsim.kernels.symmetric import predicted_axis, predicted_own
 from radarsim.studies.pulses_to_tracks.kernels.estimate import estimate, room_for
+from radarsim.studies.pulses_to_tracks.kernels.folds import ranges_to_hypotheses, take_folds
 from radarsim.studies.pulses_to_tracks.kernels.records import (
     AGES,
     AS_MEASURED,
     BOUND,
     GATED,
-    LOCKED,
-    LOCKED_3,
     TAKEN,
     WRONG_FOLD,
+    Work,
+    hypotheses,
 )
 from radarsim.studies.pulses_to_tracks.kernels.steps import (
     acceleration_taken,
+    begun,
+    folded,
     lock_weight,
     mixed,
+    predicted,
+    put_state,
     range_taken,
+    scored,
+    state_of,
     velocity_taken,
 )
-
-
-@inline
-def state_of(row):
-    """x (3) and P (6) of a row (9,)."""
-    return (row[0], row[1], row[2]), (row[3], row[4], row[5], row[6], row[7], row[8])
-
-
-@inline
-def put_state(row, x, P):
-    """Write x and P into a row (9,)."""
-    row[0], row[1], row[2] = x
-    row[3], row[4], row[5], row[6], row[7], row[8] = P
 
 
 @kernel
 def take_ranges(world, own, k, first, tracks):
     """Predict all tracks (n, 9) to scan k and take its range; the first sets it, and draws the designation."""
-    missed, variance, Q = world.missed[k], world.sigma_r**2, own.noise
+    variance = world.sigma_r**2
     for i in range(tracks.shape[0]):
         noise = world.sigma_r * normals(world.keys[0, 0], world.keys[0, 1], first + i, k)[0]
         if k == 0:
-            v, a = normals(world.keys[2, 0], world.keys[2, 1], first + i, 0)
-            x = noise, world.prior[0] * v, world.prior[1] * a
-            P = variance, 0.0, 0.0, world.prior[0] ** 2, 0.0, world.prior[1] ** 2
+            x, P = begun(world, first + i, noise)
         else:
             x, P = state_of(tracks[i])
-            x = predicted_axis(x, world.motion)
-            x = x[0] + missed[0], x[1] + missed[1], x[2] + missed[2]
-            q = (Q[0], Q[1], Q[2], Q[3], Q[4], Q[5]) if k >= own.start else (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-            P = predicted_own(P, world.motion, q)
+            x, P = predicted(world, own, k, x, P)
             x, P = range_taken(x, P, noise, variance)
         put_state(tracks[i], x, P)
 
@@ -74,11 +62,15 @@ def level(own, c, sigma):
 
 
 @kernel
-def make_forecasts(world, own, k, first, tracks, forecasts, entries):
-    """Errors (n, 2) of the forecasts of velocity and acceleration, and entries (n,) of the menu."""
+def make_forecasts(world, own, k, first, work):
+    """Errors (n, 2) of the forecasts of velocity and acceleration, and entries (n,) of the menu.
+
+    A burst knows of a velocity what is left of whole spans.
+    """
+    tracks, forecasts, entries = work.tracks, work.forecasts, work.entries
     for i in range(tracks.shape[0]):
         if own.track:
-            forecasts[i, 0], forecasts[i, 1] = tracks[i, 1], tracks[i, 2]
+            forecasts[i, 0], forecasts[i, 1] = folded(tracks[i, 1], world.span), tracks[i, 2]
             v, a = level(own, 0, math.sqrt(tracks[i, 6])), level(own, 1, math.sqrt(tracks[i, 8]))
             entries[i] = a * own.levels[0] + v
         else:
@@ -87,9 +79,10 @@ def make_forecasts(world, own, k, first, tracks, forecasts, entries):
 
 
 @kernel
-def estimate_all(world, filters, f, k, first, forecasts, entries, room, measured):
-    """Estimates (n, 2) of the bursts of scan k, less the truth, an entry at a time. Returns passes, and squared."""
+def estimate_all(world, filters, f, k, first, work, sums):
+    """Estimates (n, 2) of the bursts of scan k, less the truth, an entry at a time; passes are counted."""
     who, eight, found = np.empty(WIDTH, np.int64), np.empty((WIDTH, 2)), np.empty((WIDTH, 2))
+    entries, measured = work.entries, work.measured
     order = np.argsort(entries, kind="mergesort")
     begin, passes, squares = 0, 0.0, 0.0
     while begin < order.size:
@@ -98,38 +91,29 @@ def estimate_all(world, filters, f, k, first, forecasts, entries, room, measured
             end += 1
         for n in range(WIDTH):
             i = order[min(begin + n, end - 1)]  # a strip that is not full repeats its last
-            who[n], eight[n, 0], eight[n, 1] = first + i, forecasts[i, 0], forecasts[i, 1]
-        estimate(world, filters, f, k, entry, who, eight, room, found)
+            who[n], eight[n, 0], eight[n, 1] = first + i, work.forecasts[i, 0], work.forecasts[i, 1]
+        estimate(world, filters, f, k, entry, who, eight, work.room, found)
         for n in range(end - begin):
             measured[order[begin + n], 0], measured[order[begin + n], 1] = found[n, 0], found[n, 1]
-            own = room[0][lane(PASSES, n)]
+            own = work.room[0][lane(PASSES, n)]
             passes, squares = passes + own, squares + own * own
         begin = end
-    return passes, squares
-
-
-@inline
-def folded(x, span):
-    """x, less the nearest whole number of spans."""
-    return x - span * np.rint(x / span)
+    sums.passes[f, 0] += passes
+    sums.passes[f, 1] += squares
 
 
 @kernel
-def take_estimates(world, own, sigma, measured, tracks, ages, locks, of_measured):
-    """Take the estimates (n, 2) of a scan into the tracks; counts and errors of them are added to the sums.
-
-    sigma (2,) are the Fisher bounds, which the filter believes in; ages (n,) scans since a burst was lost.
-    """
-    span, takes = world.span, own.takes
+def take_estimates(world, filters, f, k, work, sums):
+    """Take the estimates (n, 2) of a scan into the tracks; counts and errors of them are added to the sums."""
+    own, sigma, span, tracks = filters.filters[f], filters.sigma[f, k], world.span, work.tracks
+    locks, takes = sums.locks[f, k], own.takes
     for i in range(tracks.shape[0]):
         x, P = state_of(tracks[i])
-        v, a = measured[i, 0], measured[i, 1]
+        v, a = work.measured[i, 0], work.measured[i, 1]
         e = v - x[1] if own.kind == BOUND else folded(v - x[1], span)
         wrong = 1.0 if abs(e + x[1]) > 0.5 * span else 0.0
         v = v if own.kind == BOUND else folded(v, span)
-        worst = abs(v) / sigma[0]
-        if takes == 2:
-            worst = max(worst, abs(a) / sigma[1])
+        scored(sigma, takes, v, a, i, work.ages, locks, sums.measured[f, k])
         y, R, S = velocity_taken(x, P, e, sigma[0] ** 2)
         distance, determinant = e * e / S, S
         if takes == 2:
@@ -146,18 +130,8 @@ def take_estimates(world, own, sigma, measured, tracks, ages, locks, of_measured
         elif weight > 0.0:
             x, P = mixed(x, P, y, R, weight)
         put_state(tracks[i], x, P)
-        locked = worst < 5.0
-        ages[i] = min(ages[i] + 1, AGES - 1) if locked else 0
-        locks[LOCKED] += 1.0 if locked else 0.0
-        locks[LOCKED_3] += 1.0 if worst < 3.0 else 0.0
         locks[TAKEN] += weight
         locks[WRONG_FOLD] += wrong * weight
-        for c in range(takes):
-            square = v * v if c == 0 else a * a
-            of_measured[c, 1, 0] += square
-            of_measured[c, 1, 1] += square * square
-            of_measured[c, 0, 0] += square if locked else 0.0
-            of_measured[c, 0, 1] += square * square if locked else 0.0
 
 
 @kernel
@@ -178,22 +152,22 @@ def add_errors(tracks, ages, takes, errors, error, age, loss):
 
 
 @kernel
-def run_filter(world, filters, f, first, room, tracks, errors, sums):
+def run_filter(world, filters, f, first, work, errors, sums):
     """A filter over all scans of realisations first, first + 1, …; errors (K, n, 3) are written."""
-    own, n = filters.filters[f], tracks.shape[0]
-    forecasts, measured = np.zeros((n, 2)), np.zeros((n, 2))
-    entries, ages = np.zeros(n, np.int64), np.full(n, AGES - 1)
+    own, tracks, ages = filters.filters[f], work.tracks, work.ages
+    ages[:] = AGES - 1
     for k in range(world.missed.shape[0]):
-        take_ranges(world, own, k, first, tracks)
+        if own.kept > 1:
+            ranges_to_hypotheses(world, own, k, first, work)
+        else:
+            take_ranges(world, own, k, first, tracks)
         if own.takes:
-            make_forecasts(world, own, k, first, tracks, forecasts, entries)
-            passes, squares = estimate_all(world, filters, f, k, first, forecasts, entries, room, measured)
-            sums.passes[f, 0] += passes
-            sums.passes[f, 1] += squares
-            take_estimates(
-                *(world, own, filters.sigma[f, k], measured, tracks, ages),
-                *(sums.locks[f, k], sums.measured[f, k]),
-            )
+            make_forecasts(world, own, k, first, work)
+            estimate_all(world, filters, f, k, first, work, sums)
+            if own.kept > 1:
+                take_folds(world, filters, f, k, work, sums)
+            else:
+                take_estimates(world, filters, f, k, work, sums)
         add_errors(tracks, ages, own.takes, errors[k], sums.error[f, k], sums.ages[f, k], sums.losses[f, k])
 
 
@@ -207,10 +181,10 @@ def add_pairs(errors, base, paired):
 
 
 @kernel
-def run_block(world, filters, first, room, tracks, errors, sums):
+def run_block(world, filters, first, work, errors, sums):
     """`simulate_block` with its work arrays."""
     for f in range(filters.filters.size):
-        run_filter(world, filters, f, first, room, tracks, errors[f], sums)
+        run_filter(world, filters, f, first, work, errors[f], sums)
     for f in range(filters.filters.size):
         add_pairs(errors[f], errors[filters.baseline], sums.paired[f])
 
@@ -219,6 +193,14 @@ def simulate_block(world, filters, sums, first, count) -> np.ndarray:
     """Add realisations first … first + count − 1 to the sums; gives their errors (F, K, count, 3)."""
     scans = world.missed.shape[0]
     errors = np.zeros((filters.filters.size, scans, count, 3))
-    room = room_for(world.mean.shape[0], world.reversed.size)
-    run_block(world, filters, first, room, np.zeros((count, 9)), errors, sums)
+    work = Work(
+        tracks=np.zeros((count, 9)),
+        forecasts=np.zeros((count, 2)),
+        entries=np.zeros(count, np.int64),
+        measured=np.zeros((count, 2)),
+        ages=np.zeros(count, np.int64),
+        room=room_for(world.mean.shape[0], world.reversed.size),
+        held=hypotheses(count, int(filters.filters["kept"].max())),
+    )
+    run_block(world, filters, first, work, errors, sums)
     return errors

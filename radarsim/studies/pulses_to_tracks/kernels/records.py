@@ -7,11 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.hypotheses import COLUMNS
+from radarsim.kernels.lanes import WIDTH, rows
+
 NONE, BOUND, SEQUENCE, SPECTRUM = 0, 1, 2, 3  # how a filter's bursts are estimated
 AS_MEASURED, GATED, MIXTURE = 0, 1, 2  # what it does with an estimate
 # Counted of the estimates of a scan: within 5 and 3 bounds of the truth; the weight with which they were taken; those
 # taken in a fold that is not the truth's.
 LOCKED, LOCKED_3, TAKEN, WRONG_FOLD, COUNTS = 0, 1, 2, 3, 4
+# Of a filter that keeps hypotheses: realisations whose best one has no wrong fold, whose list holds one that has none,
+# hypotheses.
+RIGHT, LISTED, NUMBER, FOLDS = 0, 1, 2, 3
 AGES = 7  # scans since the last burst that was lost: 0 … 5, then six and more, or none was lost so far
 
 FILTER = np.dtype(
@@ -29,6 +35,9 @@ FILTER = np.dtype(
         ("ratio", np.float64, 2),  # logarithm of the ratio of neighbouring ones
         ("levels", np.int64, 2),  # how many
         ("noise", np.float64, 6),  # Q, packed
+        ("kept", np.int64),  # hypotheses kept at most; 1: the nearest fold
+        ("deepest", np.float64),  # logarithm of the ratio to the best weight, below which one is dropped
+        ("mean", np.int64),  # 1: estimates are the mean of all; 0: the best one
     ],
     align=True,
 )
@@ -98,6 +107,64 @@ class Filters(NamedTuple):
     baseline: int
 
 
+class Hypotheses(NamedTuple):
+    """Up to H hypotheses of each of n realisations, H a whole number of lanes.
+
+    states  (n, H, 9)  see `steps.state_of`
+    weights (n, H)     logarithms, the best one's 0
+    count   (n,)       how many there are
+    right   (n, H)     1 of those that have taken no velocity in a wrong fold, else 0
+    fresh   (H, 10)    room for states, and whether they are right
+    columns, children, parents  see `kernels.hypotheses.Lists`
+    """
+
+    states: np.ndarray
+    weights: np.ndarray
+    count: np.ndarray
+    right: np.ndarray
+    fresh: np.ndarray
+    columns: np.ndarray
+    children: np.ndarray
+    parents: np.ndarray
+
+
+def hypotheses(realisations: int, most: int) -> Hypotheses:
+    """Room for so many of each realisation; for none where only the nearest fold is taken."""
+    room = -(-most // WIDTH) * WIDTH if most > 1 else 0
+    children = 4 * room + 64
+    return Hypotheses(
+        states=np.zeros((realisations, room, 9)),
+        weights=np.zeros((realisations, room)),
+        count=np.zeros(realisations, np.int64),
+        right=np.zeros((realisations, room)),
+        fresh=np.zeros((room, 10)),
+        columns=rows(COLUMNS * room // WIDTH),
+        children=rows(3 * children // WIDTH),
+        parents=np.zeros(children, np.int64),
+    )
+
+
+class Work(NamedTuple):
+    """Work arrays for n realisations.
+
+    tracks    (n, 9)  states and covariances, see `steps.state_of`; of several hypotheses the best before the burst
+    forecasts (n, 2)  errors of the forecasts of velocity and acceleration
+    entries   (n,)    of the menu
+    measured  (n, 2)  the bursts' velocity and acceleration, less the truth
+    ages      (n,)    scans since the last burst that was lost
+    room              see `estimate.room_for`
+    held              of filters that keep several
+    """
+
+    tracks: np.ndarray
+    forecasts: np.ndarray
+    entries: np.ndarray
+    measured: np.ndarray
+    ages: np.ndarray
+    room: tuple[np.ndarray, ...]
+    held: Hypotheses
+
+
 class Sums(NamedTuple):
     """Sums over realisations; e = estimate − truth.
 
@@ -108,6 +175,7 @@ class Sums(NamedTuple):
     ages     (F, K, AGES)        realisations by the scans since the last burst that was lost
     losses   (F, K, AGES, 3, 2)  e², e⁴ of these
     passes   (F, 2)              passes over a window's data a burst, and their squares
+    folds    (F, K, FOLDS)       see above
     """
 
     error: np.ndarray
@@ -117,6 +185,7 @@ class Sums(NamedTuple):
     ages: np.ndarray
     losses: np.ndarray
     passes: np.ndarray
+    folds: np.ndarray
 
 
 def shapes(filters: int, scans: int) -> dict[str, tuple[int, ...]]:
@@ -130,4 +199,5 @@ def shapes(filters: int, scans: int) -> dict[str, tuple[int, ...]]:
         "ages": (*each, AGES),
         "losses": (*each, AGES, 3, 2),
         "passes": (filters, 2),
+        "folds": (*each, FOLDS),
     }

@@ -7,7 +7,70 @@ subtracted from itself, of which rounding would leave a negative number where th
 
 import math
 
+import numpy as np
+
 from radarsim.kernels.compile import inline
+from radarsim.kernels.random import normals
+from radarsim.kernels.symmetric import predicted_axis, predicted_own
+from radarsim.studies.pulses_to_tracks.kernels.records import AGES, LOCKED, LOCKED_3
+
+
+@inline
+def state_of(row):
+    """x (3) and P (6) of a row (9,)."""
+    return (row[0], row[1], row[2]), (row[3], row[4], row[5], row[6], row[7], row[8])
+
+
+@inline
+def put_state(row, x, P):
+    """Write x and P into a row (9,)."""
+    row[0], row[1], row[2] = x
+    row[3], row[4], row[5], row[6], row[7], row[8] = P
+
+
+@inline
+def begun(world, realisation, noise):
+    """State and covariance after the first range, which errs by noise, and the designation, which is drawn."""
+    v, a = normals(world.keys[2, 0], world.keys[2, 1], realisation, 0)
+    x = noise, world.prior[0] * v, world.prior[1] * a
+    return x, (world.sigma_r**2, 0.0, 0.0, world.prior[0] ** 2, 0.0, world.prior[1] ** 2)
+
+
+@inline
+def predicted(world, own, k, x, P):
+    """State and covariance a scan later, at scan k."""
+    missed, Q = world.missed[k], own.noise
+    x = predicted_axis(x, world.motion)
+    x = x[0] + missed[0], x[1] + missed[1], x[2] + missed[2]
+    q = (Q[0], Q[1], Q[2], Q[3], Q[4], Q[5]) if k >= own.start else (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return x, predicted_own(P, world.motion, q)
+
+
+@inline
+def folded(x, span):
+    """x, less the nearest whole number of spans."""
+    return x - span * np.rint(x / span)
+
+
+@inline
+def scored(sigma, takes, v, a, i, ages, locks, of_measured):
+    """Count a burst of realisation i whose estimates err by v and a: whether it locked, and the errors' powers.
+
+    sigma (2,) are the Fisher bounds; ages (n,) scans since a burst was lost.
+    """
+    worst = abs(v) / sigma[0]
+    if takes == 2:
+        worst = max(worst, abs(a) / sigma[1])
+    locked = worst < 5.0
+    ages[i] = min(ages[i] + 1, AGES - 1) if locked else 0
+    locks[LOCKED] += 1.0 if locked else 0.0
+    locks[LOCKED_3] += 1.0 if worst < 3.0 else 0.0
+    for c in range(takes):
+        square = v * v if c == 0 else a * a
+        of_measured[c, 1, 0] += square
+        of_measured[c, 1, 1] += square * square
+        of_measured[c, 0, 0] += square if locked else 0.0
+        of_measured[c, 0, 1] += square * square if locked else 0.0
 
 
 @inline
