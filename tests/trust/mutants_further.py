@@ -194,14 +194,19 @@ PULSES = (
     *mutants(
         "radarsim/studies/pulses_to_tracks/kernels/steps.py",
         ("u * P[1] + w * Q[1] + v * d[0] * d[1]", "u * P[1] + w * Q[1]", TEXTBOOK),
-    ),
-    *mutants(
-        "radarsim/studies/pulses_to_tracks/kernels/chain.py",
         ("if k >= own.start else", "if k > own.start else", TEXTBOOK),
         (
             "ages[i] = min(ages[i] + 1, AGES - 1) if locked else 0",
             "ages[i] = min(ages[i] + 1, AGES - 1) if locked else 1",
             f"{BURSTS}::test_ages_count_the_realisations_once",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/pulses_to_tracks/kernels/chain.py",
+        (
+            "locks[TAKEN] += weight",
+            "locks[TAKEN] += 1.0",
+            f"{BURSTS}::test_a_narrow_gate_takes_nothing_and_leaves_range_alone",
         ),
     ),
     *mutants(

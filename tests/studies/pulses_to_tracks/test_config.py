@@ -63,10 +63,9 @@ def test_a_forecast_wider_than_the_span_is_warned_of():
     assert line.startswith(
         "pulses: prior.sigma_velocity_mps: 3 σ of the velocity, 300 m/s, are over half the span of 300 m/s"
     )
-    many = [f"filters.{n}.hypotheses=9" for n in (2, 3, 4, 6)] + ["filters.5.use=as_measured", "filters.5.hypotheses=9"]
-    assert (
-        words.warnings(load("pulses", ["prior.sigma_velocity_mps=100", "filters.5.gate_probability=null", *many])) == []
-    )
+    many = [f"filters.{n}.hypotheses=9" for n in (2, 3, 4, 6)]
+    gated = "filters.5={name: many, observes: [range, velocity], manoeuvre_variance: 1e-3, hypotheses: 9}"
+    assert words.warnings(load("pulses", ["prior.sigma_velocity_mps=100", gated, *many])) == []
 
 
 def test_no_windows_lead_there():
