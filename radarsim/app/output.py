@@ -144,6 +144,7 @@ def write(
         inputs=own.inputs(results),
         cost=own.cost(made, run),
         agreement=agreement.agreement(made["curves"]) if own.exact_errors else None,
+        drawn_from=own.drawn_from(),
     )
     contents["report.html"] = page.encode()
     contents["run.json"] = provenance.to_json(provenance.with_output(record, "report.html", contents["report.html"]))

@@ -125,6 +125,14 @@ def listed(names: Sequence[str]) -> str:
     return tr("{first} and {last}", first=", ".join(names[:-1]), last=names[-1])
 
 
+def few(names: Sequence[str], most: int = 4) -> str:
+    """Names in a sentence, of more than so many the first ones and how many there are besides."""
+    if len(names) <= most + 1:
+        return listed(names)
+    first = ", ".join(names[:most])
+    return plural("{first} and {count} more", "{first} and {count} more", len(names) - most, first=first)
+
+
 class _Filled(Formatter):
     """Fills places: numbers in the way of the language, words translated, in the form that the place asks for."""
 

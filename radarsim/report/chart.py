@@ -1,7 +1,9 @@
 """Draws report/drawing.py's figures for the page: small SVGs, one a panel, and the numbers that a pointer reads off.
 
 Panels stand apart so that a narrow screen can set them one below the other. Colours come from the page's style sheet
-in a light and a dark form. Text is escaped here; nothing else from outside gets into the markup.
+in a light and a dark form. Text is escaped here; nothing else from outside gets into the markup. A panel of lines is
+drawn again by the page's script where a reader looks closer: what that needs beside the numbers (limits, what ticks,
+references and notes stand at) is kept with them and in attributes.
 """
 
 from dataclasses import dataclass
@@ -22,6 +24,7 @@ WIDTH, HEIGHT = 440.0, 280.0  # of a panel, in units of the SVG
 LETTER = 0.62 * SIZE  # mean width of one
 RIGHT, BOTTOM = 12.0, 44.0
 MARKED = 16  # at most about so many markers or crosses a line
+FEWER = 6  # points of a line for each marker, at least: where lines are drawn of few points, for a small page
 POINTS = 400  # of a line; a panel is as many units wide
 Heats = dict[str, tuple[float, float, bool]]  # of maps with the same words: least, largest value, logarithmic or not
 SEEN = 0.7  # units from the line from which its band is drawn
@@ -111,6 +114,16 @@ class _Frame:
         ends = [[s.log, *(float(f"{v:.9g}") for v in (s.low, s.high, s.start, s.end))] for s in (self.x, self.y)]
         labels = {"xl": spoken(panel.x.label), "yl": spoken(panel.y.label)}
         self.data: dict[str, Any] = {"x": ends[0], "y": ends[1], **labels, "xs": [], "lines": []}
+        if any(isinstance(mark, Line) for mark in panel.marks) and not any(
+            isinstance(mark, Heat | Bars) for mark in panel.marks
+        ):
+            self.data["draw"] = self._redrawn(panel)
+
+    def _redrawn(self, panel: Panel) -> dict[str, Any]:
+        """What the page's script needs to draw the panel with other limits: those given, whether ticks are given and
+        whether both axes have one scale."""
+        limits = [panel.x.limits, panel.y.limits]
+        return {"lim": limits, "ticks": [bool(panel.x.ticks), bool(panel.y.ticks)], "equal": panel.equal}
 
     def inside(self) -> tuple[float, float, float, float]:
         """Left, top, width and height of the plot, a little wider than the axes for markers at their ends."""
@@ -119,19 +132,19 @@ class _Frame:
     def axes(self) -> Markup:
         """Grid, axes, ticks and labels."""
         left, right, top, bottom = self.left, WIDTH - RIGHT, self.top, HEIGHT - BOTTOM
-        xs = [(float(self.x.place(v)), text) for v, text in self.x_ticks]
-        ys = [(float(self.y.place(v)), text) for v, text in self.y_ticks]
-        xs = [(x, text) for x, text in xs if left - 1 <= x <= right + 1]
-        ys = [(y, text) for y, text in ys if top - 1 <= y <= bottom + 1]
-        grid = "".join(f"M{x:.1f} {top:.1f}V{bottom:.1f}" for x, _ in xs)
-        grid += "".join(f"M{left:.1f} {y:.1f}H{right:.1f}" for y, _ in ys)
+        xs = [(float(self.x.place(v)), text, v) for v, text in self.x_ticks]
+        ys = [(float(self.y.place(v)), text, v) for v, text in self.y_ticks]
+        xs = [(x, text, v) for x, text, v in xs if left - 1 <= x <= right + 1]
+        ys = [(y, text, v) for y, text, v in ys if top - 1 <= y <= bottom + 1]
+        grid = "".join(f"M{x:.1f} {top:.1f}V{bottom:.1f}" for x, _, _ in xs)
+        grid += "".join(f"M{left:.1f} {y:.1f}H{right:.1f}" for y, _, _ in ys)
         made = Markup('<path class="grid" d="{}"/>').format(grid)
         made += Markup('<path class="axis" d="M{:.1f} {:.1f}V{:.1f}H{:.1f}"/>').format(left, top, bottom, right)
-        for x, text in xs:
-            made += pieces.text(x, bottom + 1.25 * SIZE, text, "middle")
-        for y, text in ys:
-            made += pieces.text(left - 5, y + 0.35 * SIZE, text, "end")
-        deep = max((len(text.split("\n")) for _, text in xs), default=1)
+        for x, text, v in xs:
+            made += pieces.text(x, bottom + 1.25 * SIZE, text, "middle", data=("x", v))
+        for y, text, v in ys:
+            made += pieces.text(left - 5, y + 0.35 * SIZE, text, "end", data=("y", v))
+        deep = max((len(text.split("\n")) for _, text, _ in xs), default=1)
         made += pieces.text(
             (left + right) / 2, bottom + (1.4 + 1.05 * deep) * SIZE, self.panel.x.label, "middle", "lab"
         )
@@ -162,7 +175,7 @@ class _Frame:
             made += self._interval(x, y, whole, line.style)
         if line.style.dash is not None:
             made += Markup('<path class="l" d="{}"{}/>').format(pieces.path(x, y), pieces.dashed(line.style))
-        step = 1 if line.style.dash is None else max(1, -(-len(x) // MARKED))
+        step = 1 if line.style.dash is None else max(1, -(-len(x) // min(MARKED, max(1, points // FEWER))))
         if line.style.marker is not None:
             made += pieces.markers(pieces.places(x[::step], y[::step]), line.style)
         if "exact" in whole:
@@ -208,10 +221,12 @@ class _Frame:
         if mark.across == "y":
             y = float(self.y.place(mark.value))
             made = Markup('<path class="ref" d="M{:.1f} {:.1f}H{:.1f}"/>').format(left, y, right)
-            return made + (pieces.text(right - 3, y - 3, mark.label, "end", "soft") if mark.label else Markup(""))
-        x = float(self.x.place(mark.value))
-        made = Markup('<path class="ref" d="M{:.1f} {:.1f}V{:.1f}"/>').format(x, bottom, top)
-        return made + (pieces.text(x - 3, bottom - 4, mark.label, "end", "soft") if mark.label else Markup(""))
+            made += pieces.text(right - 3, y - 3, mark.label, "end", "soft") if mark.label else Markup("")
+        else:
+            x = float(self.x.place(mark.value))
+            made = Markup('<path class="ref" d="M{:.1f} {:.1f}V{:.1f}"/>').format(x, bottom, top)
+            made += pieces.text(x - 3, bottom - 4, mark.label, "end", "soft") if mark.label else Markup("")
+        return Markup('<g data-{}="{:.9g}">{}</g>').format(Markup(mark.across), mark.value, made)
 
     def _bars(self, bars: Bars) -> Markup:
         where, zero = np.arange(float(len(bars.names))), float(self.y.place(0.0))
@@ -255,4 +270,5 @@ class _Frame:
         x, y = float(self.x.place(note.x)), float(self.y.place(note.y))
         right = "e" in note.place
         place = (x + (5 if right else -5), y - 5 if "n" in note.place else y + SIZE)
-        return pieces.text(*place, note.text, "start" if right else "end")
+        text = pieces.text(*place, note.text, "start" if right else "end")
+        return Markup('<g data-x="{:.9g}" data-y="{:.9g}">{}</g>').format(note.x, note.y, text)

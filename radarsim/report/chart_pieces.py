@@ -113,9 +113,10 @@ def short(values: np.ndarray) -> list[float | None]:
     return [float(format(v, DIGITS)) if np.isfinite(v) else None for v in np.asarray(values, dtype=float).tolist()]
 
 
-def text(x: float, y: float, text: str, anchor: str, css: str = "") -> Markup:
-    """Text at a place, a line below the other."""
+def text(x: float, y: float, text: str, anchor: str, css: str = "", data: tuple[str, float] | None = None) -> Markup:
+    """Text at a place, a line below the other; data: the axis and the value that it is the tick of."""
     named = Markup(' class="{}"').format(css) if css else Markup("")
+    named += Markup(' data-{}="{:.9g}"').format(Markup(data[0]), data[1]) if data else Markup("")
     return Markup("").join(
         Markup('<text x="{:.1f}" y="{:.1f}" text-anchor="{}"{}>{}</text>').format(
             x, y + 1.15 * n * SIZE, anchor, named, tspans(line, SIZE)

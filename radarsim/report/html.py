@@ -9,14 +9,16 @@ import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
 from importlib import resources
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from radarsim.config.experiment import Experiment
 from radarsim.config.load import as_yaml
 from radarsim.language import current, numeral, plural, term, tr
-from radarsim.report import asked, chart, provenance, text
+from radarsim.report import asked, chart, links, provenance, text
 from radarsim.report.chart_text import spoken
 from radarsim.report.claims import page as claims_page
+from radarsim.report.claims.judge import LOOKED
 from radarsim.report.drawing import Figure, Line
 
 if TYPE_CHECKING:
@@ -25,11 +27,16 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 NOT_SETTLED = term("not settled in the run")
-SCRIPT = (term("Light page"), term("Dark page"), term("exact"), term("Copied"), term("Not allowed here"))
+SCRIPT = (
+    *(term("Light page"), term("Dark page"), term("exact"), term("Copied"), term("Not allowed here")),
+    *(term("Logarithmic x"), term("Logarithmic y"), term("Show all")),
+)
 ROWS = 200  # of a table shown in the page
-ALL_ROWS = 1200  # of all of them together: the page stays under 1.5 MB
+ALL_ROWS = 800  # of all of them together: the page stays under 1.5 MB
 MOST_POINTS = 16_000  # of all curves of a page together, which keeps it small
-LEAST_POINTS = 60  # of one curve, however many there are
+LEAST_POINTS = 50  # of one curve, however many there are
+MOST_SEEN = 200  # letters of an answer above its figure
+LONG = 300  # letters of a sentence that is shown in its clauses
 MOST_CASES = 12  # written out as YAML
 SHOWN_FACTS = ("threads", "seconds", "kernel_seconds", "realisations_computed", "realisations_from_store")
 
@@ -45,18 +52,23 @@ def page(
     inputs: "pd.DataFrame | None" = None,
     agreement: "pd.DataFrame | None" = None,
     cost: "pd.DataFrame | None" = None,
+    drawn_from: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> str:
     """The page of an experiment: question, answer, what was asked, figures, claims, exact values, tables, provenance.
 
     figures are described ones (none with --no-figures); record is run.json's; inputs, agreement and cost (against
-    accuracy) are tables, or None.
+    accuracy) are tables, or None. drawn_from: of the study, see `Study.drawn_from`.
     """
-    claims = _claims(made["claims"])
+    written = {name for name, table in made.items() if f"{name}.csv" in record["outputs"] and len(table)}
+    sources = {one.name: links.tables_of(one.name, drawn_from, written) for one in figures}
+    claims = _claims(made["claims"], sources, written)
+    answer = in_clauses(answer)
     return whole(
         "report.html.j2",
         experiment=experiment,
         question=question,
         answer=answer,
+        shown=seen_at_once(answer),
         inputs=None if inputs is None else told(tr("inputs"), inputs),
         asked=[told(title, table) for title, table in asked.asked(experiment.cases).items()],
         agreement=None if agreement is None else told(tr("exact against Monte-Carlo"), agreement),
@@ -68,10 +80,25 @@ def page(
         verdicts=claims_page.counted(made["claims"].to_dict("records")),
         figures=_figures(figures),
         files=_files(figures, record["outputs"]),
+        sources=sources,
+        titles={one.name: spoken(one.title) for one in figures},
+        judged={name: [one["id"] for one in claims if name in one["figures"]] for name in sources},
         tables=_tables({name: table for name, table in made.items() if name != "claims" and len(table)}),
         facts=[(name.replace("_", " "), number(record[name])) for name in SHOWN_FACTS if name in record],
         command=command(experiment, record),
     )
+
+
+def in_clauses(answer: Sequence[str]) -> list[str]:
+    """The sentences of an answer, a long one in its clauses."""
+    parts = [sentence.split("; ") if len(sentence) > LONG else [sentence] for sentence in answer]
+    return [f"{part};" if part is not own[-1] else part for own in parts for part in own]
+
+
+def seen_at_once(answer: Sequence[str]) -> int:
+    """How many sentences of an answer stand above its figure: the first one, others while they are short together."""
+    lengths = [sum(len(sentence) for sentence in answer[: n + 1]) for n in range(len(answer))]
+    return max(1, sum(length <= MOST_SEEN for length in lengths))
 
 
 def comparison(
@@ -198,15 +225,25 @@ def _css(verdict: str) -> str:
     return next((one for one in known if verdict.startswith(one)), "unclear")
 
 
-def _claims(table: "pd.DataFrame") -> list[dict[str, Any]]:
-    """Claims with their parts, from claims.csv's rows."""
+def _claims(
+    table: "pd.DataFrame", sources: Mapping[str, Sequence[str]], written: Collection[str]
+) -> list[dict[str, Any]]:
+    """Claims with their parts, from claims.csv's rows, with the figures and tables that each is judged from.
+
+    sources: the tables of each figure; written: the tables that are files.
+    """
     found = []
-    for parts in claims_page.grouped(table.to_dict("records")):
+    looked = table.attrs.get(LOOKED, [()] * len(table))
+    rows = [row | {LOOKED: own} for row, own in zip(table.to_dict("records"), looked, strict=True)]
+    for parts in claims_page.grouped(rows):
         same = {
             key: parts[0][key] for key in ("statement", "paper", "place", "reading", "original", "overall", "class")
         }
         found.append({"id": parts[0]["claim"], **same, "said": claims_page.verdict_of(parts), "parts": parts})
         found[-1]["said"] = str(found[-1]["said"]).replace("*", "")
+        own = list(dict.fromkeys(one for part in parts for one in part[LOOKED]))
+        found[-1]["figures"] = links.figures_of(own, sources)
+        found[-1]["tables"] = list(dict.fromkeys(name for name, _ in own if name in written))
     return found
 
 

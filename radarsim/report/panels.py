@@ -447,15 +447,15 @@ def per_component(
     quantities: Mapping[str, Quantity],
     chosen: Callable[[str], Sequence[str]],
 ) -> dict[str, Figure]:
-    """sigma_<component> and gain_<component> of every component.
+    """gain_<component> and sigma_<component> of every component.
 
     chosen(name) gives the case names that a figure shows.
     """
     made = {}
     for component, of in quantities.items():
         for kind, draw, rows in (
-            ("sigma", sigma_figure, curves),
             ("gain", gain_figure, gains),
+            ("sigma", sigma_figure, curves),
             ("dynamic", dynamic_figure, curves),
         ):
             name = f"{kind}_{component}"

@@ -17,6 +17,7 @@ A study that follows this declares an object and writes no class:
 | `prepare`, `simulate` | functions of `study` |
 | `tables`; if offered `curves`, `gains`, `inputs`, `cost` | functions of `tables` |
 | `figures` | the function of `figures` |
+| `drawn_from` | `figures.DRAWN_FROM`, where there is one |
 | `question`, `answer` | functions of `words` |
 | `warnings`, if offered | the function of `words` |
 | `claims`, if there is a paper | `claims.CLAIMS`, judged by `measures.Evidence` |
@@ -118,6 +119,9 @@ class StudyFolder(Study):
         self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
         return self.file("figures").figures(results, made, experiment)
+
+    def drawn_from(self) -> Mapping[str, Sequence[str]]:
+        return getattr(self.file("figures"), "DRAWN_FROM", {})
 
     def question(self, experiment: "Experiment") -> str:
         return self.file("words").question(experiment)

@@ -230,6 +230,13 @@ class Study(ABC):
     ) -> "dict[str, Figure]":
         """The figures, described, by the stem of their file, from results and from all tables made of them."""
 
+    def drawn_from(self) -> Mapping[str, Sequence[str]]:
+        """The tables that figures are drawn from, by how the figure's name begins. Default: none named.
+
+        Not needed of a figure with the name of its table, nor where the name begins with sigma, gain or sweep.
+        """
+        return {}
+
     @abstractmethod
     def question(self, experiment: "Experiment") -> str:
         """What an experiment asks, in one sentence."""

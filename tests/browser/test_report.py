@@ -1,9 +1,13 @@
 """report.html in Chromium: it loads offline without a word in the console; sorting, hovering, switching work."""
 
 import base64
+import math
 import re
 
 import pytest
+
+from radarsim.app import run as experiment
+from radarsim.report import figures as drawing
 
 pytestmark = pytest.mark.slow
 LARGEST = 1_500_000  # bytes
@@ -210,11 +214,54 @@ def test_anchors_land_where_they_point(page, results, anchor):
     assert abs(page.evaluate(f"document.getElementById('{anchor}').getBoundingClientRect().top")) < 2
 
 
-@pytest.mark.parametrize("name", ["rls2", "range_doppler"])
-def test_the_answer_and_its_figure_are_on_the_first_screen(page, results, name):
-    page.open(results / name / "report.html", width=1400, height=900)
-    assert page.evaluate("document.querySelector('.answer').getBoundingClientRect().bottom") < 500
-    assert page.evaluate("document.querySelector('svg.chart').getBoundingClientRect().top") < 700
+STUDIES = (  # a config of each study, and of each part of the sonar's
+    *("rls2", "range_doppler", "multimodel_1hz", "sonar_asynchronous", "sonar_manoeuvre", "sonar_clutter"),
+    *("discriminator_paper", "pulses", "ambiguous_rls2"),
+)
+
+
+@pytest.fixture(scope="session")
+def every(tmp_path_factory):
+    """A page of each study, of few realisations; no figure is written to a file."""
+    out = tmp_path_factory.mktemp("every")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(drawing, "save", lambda *_, **__: {})
+        for name in STUDIES:
+            experiment.run(name, realisations=200, out=out)
+    return out
+
+
+@pytest.mark.parametrize(("width", "height"), [(360, 800), (800, 1000), (1400, 900)])
+@pytest.mark.parametrize("name", STUDIES)
+def test_the_answer_and_its_figure_are_on_the_first_screen(page, every, name, width, height):
+    report = every / name / "report.html"
+    assert report.stat().st_size < LARGEST
+    page.open(report, width=width, height=height)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate("document.querySelector('.answer').getBoundingClientRect().bottom") < 0.6 * height
+    top, bottom = page.evaluate(
+        "(({top, bottom}) => [top, bottom])(document.querySelector('svg.chart').getBoundingClientRect())"
+    )
+    assert height - top > 0.6 * (bottom - top)  # most of its first panel
+    assert page.complaints() == []
+
+
+@pytest.mark.parametrize("dark", THEMES)
+@pytest.mark.parametrize("name", STUDIES[2:])
+def test_names_and_contrast_of_every_study(page, every, name, dark):
+    page.open(every / name / "report.html", dark=dark)
+    page.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true; })")
+    assert page.evaluate(NAMES) == []
+    assert page.evaluate(CONTRAST) == []
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_every_study_prints_in_few_pages(page, every, name):
+    page.open(every / name / "report.html", media="print")
+    printed = base64.b64decode(page.call("Page.printToPDF")["data"])
+    panels = page.evaluate("document.querySelectorAll('svg.chart').length")
+    claims = page.evaluate("document.querySelectorAll('#table-claims tr').length")
+    assert len(re.findall(rb"/Type\s*/Page[^s]", printed)) <= 5 + panels / 4 + claims / 14
 
 
 def tip(page):
@@ -253,6 +300,133 @@ def test_a_reading_tells_every_curve_the_highest_first(page, results):
     assert values == sorted(values, reverse=True)
 
 
+TICKS = """
+[...document.querySelector('svg.chart').querySelectorAll(':scope > text')]
+  .filter((t) => t.style.display !== 'none' && !t.classList.contains('lab'))
+  .map((t) => [t.textContent, Number(t.getAttribute('x')), Number(t.getAttribute('y'))])
+"""
+CURVES = "[...document.querySelectorAll('svg.chart')[0].querySelectorAll('path.l')].map((p) => p.getAttribute('d'))"
+
+
+def ticks(page):
+    """Values of the first panel's ticks on x and on y."""
+    found = page.evaluate(TICKS)
+    lowest = max(y for _, _, y in found)
+    numbers = [(float(text.replace("−", "-")), y == lowest) for text, _, y in found]
+    return [v for v, on_x in numbers if on_x], [v for v, on_x in numbers if not on_x]
+
+
+def points(path):
+    """The points of a path that a script has drawn, or the page's own."""
+    x = y = 0.0
+    found = []
+    for kind, a, b in re.findall(r"([MLl])(-?[\d.e]+) (-?[\d.e]+)", path):
+        x, y = (x + float(a), y + float(b)) if kind == "l" else (float(a), float(b))
+        found.append((x, y))
+    return found
+
+
+@pytest.mark.parametrize("touch", [False, True])
+def test_a_drag_looks_closer_and_a_double_click_at_all_again(page, results, touch):
+    page.open(results / "rls2" / "report.html")
+    assert ticks(page)[0] == [0, 25, 50, 75, 100, 125]
+    before = page.evaluate(CURVES)
+    x, y, width = first_panel(page)
+    page.drag((x - 0.1 * width, y), (x + 0.1 * width, y + 2), touch)
+    seen, _ = ticks(page)
+    assert 5 < seen[0] < seen[-1] < 130
+    assert seen[-1] - seen[0] < 35
+    assert page.evaluate("getComputedStyle(document.querySelector('.tools button:last-child')).display") != "none"
+    page.click("svg.chart", times=2)
+    assert ticks(page)[0] == [0, 25, 50, 75, 100, 125]
+    for own, drawn in zip(before, page.evaluate(CURVES), strict=True):
+        assert points(drawn) == [pytest.approx(point, abs=0.11) for point in points(own)]
+    assert page.evaluate("document.querySelector('.tools button:last-child').hidden")
+    assert page.complaints() == []
+
+
+def test_a_drag_up_and_across_marks_both_axes_and_escape_takes_it_back(page, results):
+    page.open(results / "rls2" / "report.html")
+    x, y, width = first_panel(page)
+    whole = ticks(page)
+    page.drag((x - 0.1 * width, y - 40), (x + 0.1 * width, y + 40))
+    (low, *_, high), (bottom, *_, top) = ticks(page)
+    assert high - low < whole[0][-1] / 3
+    assert top - bottom < (whole[1][-1] - whole[1][0]) / 2
+    page.evaluate("document.querySelector('svg.chart').focus()")
+    page.key("Escape")
+    assert ticks(page) == whole
+
+
+def test_the_keyboard_looks_closer_goes_along_and_back(page, results):
+    page.open(results / "rls2" / "report.html")
+    page.evaluate("document.querySelector('svg.chart').focus()")
+    whole = ticks(page)[0]
+    for _ in range(8):
+        page.key("ArrowRight")
+    assert "s: 70" in tip(page)
+    page.key("+")
+    page.key("+")
+    near = ticks(page)[0]
+    assert near[-1] - near[0] < 0.3 * whole[-1]
+    assert near[0] < 70 < near[-1]
+    page.key("ArrowRight", shift=True)
+    assert ticks(page)[0][0] > near[0]
+    for _ in range(7):
+        page.key("ArrowRight")
+    assert "s: 140" in tip(page)
+    assert ticks(page)[0][-1] >= 140  # the view goes with the reading
+    page.key("Enter")
+    page.evaluate("document.querySelector('svg.chart').blur()")
+    assert "s: 140" in tip(page)
+    page.evaluate("document.querySelector('svg.chart').focus()")
+    page.key("0")
+    assert ticks(page)[0] == whole
+
+
+def test_axes_fit_the_curves_that_are_left(page, results):
+    page.open(results / "range_doppler" / "report.html")
+    before, whole = ticks(page), page.evaluate(CURVES)
+    nth = page.evaluate(
+        "[...document.querySelectorAll('.switches')[0].querySelectorAll('button')].map((b) => b.textContent)"
+    )
+    for name in ("RLS 4", "RLS 5"):
+        page.click(".switches button", nth.index(name))
+    assert ticks(page)[1][-1] < before[1][-1]
+    for name in ("RLS 4", "RLS 5"):
+        page.click(".switches button", nth.index(name))
+    assert ticks(page) == before
+    for own, drawn in zip(whole, page.evaluate(CURVES), strict=True):
+        assert points(drawn) == [pytest.approx(point, abs=0.11) for point in points(own)]
+
+
+def test_an_axis_is_made_logarithmic_where_all_is_above_zero(page, results):
+    page.open(results / "rls2" / "report.html")
+    words = "[...f.querySelectorAll('.tools button')].map((b) => b.textContent)"
+    names = f"[...document.querySelectorAll('figure')].map((f) => [f.id, {words}])"
+    tools = dict(page.evaluate(names))
+    assert tools["figure-sigma_r"] == ["Logarithmic y", "Show all"]
+    assert tools["figure-gain_r"] == ["Show all"]  # gains may be below zero
+    y = (
+        "[...document.querySelectorAll('#figure-sigma_r svg.chart')[0].querySelectorAll('path.l')]"
+        ".map((p) => p.getAttribute('d'))"
+    )
+    linear = page.evaluate(y)
+    button = "#figure-sigma_r .tools button"
+    page.click(button)
+    assert page.evaluate(f"document.querySelector('{button}').getAttribute('aria-pressed')") == "true"
+    logarithmic = page.evaluate(y)
+    rows = [row.split(",") for row in (results / "rls2" / "curves.csv").read_text().splitlines()[1:]]
+    values = [float(row[7]) for row in rows if row[2] == "r" and row[1] == rows[0][1]]
+    places = [at for _, at in points(logarithmic[0])]
+    slope = (places[-1] - places[0]) / (math.log(values[-1]) - math.log(values[0]))
+    for value, at in zip(values, places, strict=True):
+        assert at == pytest.approx(places[0] + slope * (math.log(value) - math.log(values[0])), abs=0.2)
+    page.click(button)
+    for own, drawn in zip(linear, page.evaluate(y), strict=True):
+        assert points(drawn) == [pytest.approx(point, abs=0.11) for point in points(own)]
+
+
 @pytest.mark.parametrize("width", [360, 800, 1400])
 def test_it_is_whole_at_every_width_and_in_forced_colours(page, results, width):
     page.open(results / "range_doppler" / "report.html", width=width)
@@ -270,6 +444,11 @@ def test_claims_have_an_address_and_lead_to_their_table_and_figure(page, results
     assert page.evaluate("document.querySelectorAll('tr[id^=claim-P1]').length") > 10
     shown = page.evaluate("document.querySelector('#figure-sigma_r .links a').getAttribute('href')")
     assert (results / "range_doppler" / shown).is_file()
+    own = "[...document.querySelectorAll('#claim-P1\\\\.4 .links a')].map((a) => a.getAttribute('href'))"
+    assert page.evaluate(own) == ["#figure-gain_r", "gains.csv"]
+    back = page.evaluate("[...document.querySelectorAll('#figure-gain_r .links a')].map((a) => a.getAttribute('href'))")
+    assert {"gains.csv", "#claim-P1.4"} <= set(back)
+    assert "#claim-P1.6" not in back  # which is of the velocity
 
 
 def test_the_index_leads_to_every_run(page, results):

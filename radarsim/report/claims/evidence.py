@@ -138,6 +138,23 @@ def certain(value: float) -> Certain:
     return Certain(float(value), float(value), float(value))
 
 
+class _Watched(Mapping):
+    """Tables that note which of them is looked at."""
+
+    def __init__(self, made: Mapping, looked: set[tuple[str, str]]):
+        self._made, self._looked = made, looked
+
+    def __getitem__(self, name: str) -> Any:
+        self._looked.add((name, ""))
+        return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._made)
+
+    def __len__(self) -> int:
+        return len(self._made)
+
+
 class Evidence:
     """What an experiment measured, as the claims of its study ask for it. Studies say in `case` what a key means.
 
@@ -147,7 +164,9 @@ class Evidence:
     def __init__(self, results: Sequence[CaseResult], made: Mapping, places: Mapping[str, Mapping[str, set[int]]]):
         """places: by the name of a case and the key of a list, which of its members are the paper's."""
         self.results: list[CaseResult] = list(results)
-        self.tables, self._places = made, places
+        self.looked: set[tuple[str, str]] = set()  # tables, and their components, since it was last emptied
+        self.tables: Mapping = _Watched(made, self.looked)
+        self._places = places
         self._exact, self._factor = False, 1.0
         self._groups: dict[str, Mapping] = {}
 
@@ -197,6 +216,7 @@ class Evidence:
 
     def _series(self, table: str, key: Any, filter_name: str, component: str, names: tuple[str, ...]) -> Series:
         rows = self._grouped(table).get((self.case(key).name, filter_name, component))
+        self.looked.add((table, component))
         if rows is None:
             raise Missing(key)
         value, lo, hi, exact = (rows[name].to_numpy(dtype=float) for name in names)
@@ -211,6 +231,7 @@ class Evidence:
     def row(self, table: str, **equal: object) -> Mapping[str, Any]:
         """The one row of a table with these values; raises Missing."""
         rows = self.tables[table]
+        self.looked.add((table, str(equal.get("component", ""))))
         for name, value in equal.items():
             rows = rows[rows[name] == value]
         if not len(rows):

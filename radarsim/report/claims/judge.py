@@ -69,7 +69,12 @@ def judged(
         papers = _Papers(of, results, made, shipped)
         for claim in of.claims:
             rows += _rows(claim, of.paper, papers, own=of.holds(claim, stem))
-    return common.frame({name: [row[name] for row in rows] for name in CLAIMED})
+    table = common.frame({name: [row[name] for row in rows] for name in CLAIMED})
+    table.attrs[LOOKED] = [row[LOOKED] for row in rows]
+    return table
+
+
+LOOKED = "looked"  # beside the rows of claims.csv, not in them: the tables, with their components, that a part is from
 
 
 class _Papers:
@@ -128,6 +133,7 @@ class _Tried:
     judged: Judged | None = None
     old: str = ""
     why: str = ""
+    looked: tuple[tuple[str, str], ...] = ()
 
 
 def _rows(claim: Claim, paper: str, papers: _Papers, own: bool) -> list[dict[str, Any]]:
@@ -148,6 +154,7 @@ def _tried(part: Part, seen: Evidence | None, changed: str) -> _Tried:
     """Measure a part; say why where it cannot be."""
     if seen is None:
         return _Tried(part, why=f"not the paper's experiment: {changed}")
+    seen.looked.clear()
     try:
         measured = part.measure(seen)
         cases = [seen.case(key) for key in part.cases]
@@ -158,6 +165,7 @@ def _tried(part: Part, seen: Evidence | None, changed: str) -> _Tried:
         reason = missing.why or other
         return _Tried(part, why=reason)
     value, lo, hi = (float(one) for one in measured)
+    looked = tuple(sorted(seen.looked))
     of = Judged(
         value,
         lo,
@@ -176,7 +184,8 @@ def _tried(part: Part, seen: Evidence | None, changed: str) -> _Tried:
         asserted=part.asserted,
     )
     names = ", ".join(dict.fromkeys(case.name for case in cases))
-    return _Tried(part, names, of, verdict(measured, part.expected.strict), disagreement(part, seen, of))
+    old = verdict(measured, part.expected.strict)
+    return _Tried(part, names, of, old, disagreement(part, seen, of), looked)
 
 
 def exact(part: Part, seen: Evidence, measured: Estimate) -> float:
@@ -235,6 +244,7 @@ def _row(claim: Claim, paper: str, one: _Tried, outcome: Outcome | None, many: i
         "needed": outcome.needed if outcome and outcome.needed else math.nan,
         "verdict": NOT_JUDGED,
         "why": one.why,
+        LOOKED: one.looked,
     }
     if of is None:
         return row

@@ -22,6 +22,7 @@ QUANTITIES = {
     "Vr": panels.Quantity("$V_r$", term("radial velocity")),
     "ar": panels.Quantity("$a_r$", term("radial acceleration")),
 }
+DRAWN_FROM = {"right": ("folds",), "lost": ("folds",)}
 
 
 def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:

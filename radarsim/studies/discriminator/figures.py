@@ -30,6 +30,7 @@ WINDOW = term("window length, s")
 MOST_LINES = 10
 MOST_TICKS = 8
 SURE = 0.99
+DRAWN_FROM = {"accuracy": ("curves",), "lock": ("locks",), "residuals": ("residuals", "windows")}
 
 
 def figures(results: Sequence[CaseResult], made: Mapping, experiment: Experiment) -> dict[str, Figure]:
@@ -41,7 +42,7 @@ def figures(results: Sequence[CaseResult], made: Mapping, experiment: Experiment
         return [result for result in among if result.name in wanted]
 
     plain = [result for result in results if not result.swept]
-    for name, draw in (("residuals", residuals), ("locks", locks), ("accuracy", accuracy)):
+    for name, draw in (("locks", locks), ("accuracy", accuracy), ("residuals", residuals)):
         for n, result in enumerate(chosen(name, plain)):
             figure = draw(result, made)
             named = figure if n == 0 else of_case(figure, result.name)

@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language import listed, numeral, plural, tr
+from radarsim.language import few, numeral, plural, tr
 from radarsim.report import panels, text
 from radarsim.report import tables as common
 
@@ -21,7 +21,7 @@ def question(experiment: Experiment) -> str:
     return tr(
         "How often do {estimators} lock onto the Doppler frequency and its derivatives, and how accurate are they "
         "then?",
-        estimators=listed(names),
+        estimators=few(names),
     )
 
 

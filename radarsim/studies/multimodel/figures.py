@@ -24,6 +24,7 @@ RULES = ("moment", "best", "combined", "modified_combined")
 FAMILIES = {"gpb1": "MMA1", "imm": "MMA2", "gpb2": "MMA3"}
 SPREAD = 0.5  # of the points of a stage, stages being one apart
 MOST_LOOKS = 8  # filters, each of a colour, dash and marker of its own
+DRAWN_FROM = {"families": ("stages",), "cost": ("stages", "operations")}
 
 
 def figures(
@@ -34,9 +35,10 @@ def figures(
     def chosen(name: str) -> list[CaseResult]:
         return panels.shown(results, [case.name for case in experiment.shown_in(name)])[0]
 
-    drawn = {"trajectory": trajectory(chosen("trajectory"))}
+    drawn: dict[str, Figure | None] = {}
     for component in SIGMAS:
         drawn[f"sigma_{component}"] = sigma(chosen(f"sigma_{component}"), made["curves"], component)
+    drawn["trajectory"] = trajectory(chosen("trajectory"))
     drawn["probabilities"] = probabilities(chosen("probabilities"), made["probabilities"])
     drawn["families"] = families(chosen("families"), made)
     drawn["cost"] = cost(chosen("cost"), made)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language import listed, numeral, plural, term, tr
+from radarsim.language import few, numeral, plural, term, tr
 from radarsim.report import panels, text
 
 
@@ -13,12 +13,12 @@ def question(experiment: Experiment) -> str:
     filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
     cases = len(experiment.cases)
     if cases == 1:
-        return tr("How accurately do {filters} track the target?", filters=listed(filters))
+        return tr("How accurately do {filters} track the target?", filters=few(filters))
     return plural(
         "How accurately do {filters} track the target in {count} case?",
         "How accurately do {filters} track the target in {count} cases?",
         cases,
-        filters=listed(filters),
+        filters=few(filters),
     )
 
 

@@ -24,6 +24,7 @@ QUANTITIES = {
 }
 FEW = 30  # realisations behind a point
 WIDE = 15  # largest over least σ from which its axis is logarithmic
+DRAWN_FROM = {"threshold": ("locks", "curves"), "measured": ("estimates",)}
 
 
 def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:

@@ -85,10 +85,15 @@ class Sonar(Study):
     ) -> "dict[str, Figure]":
         from radarsim.studies.sonar import figures
 
-        drawn: dict[str, Figure | None] = {**figures.figures(results, made, experiment)}
-        for part, chosen in by_part(results):
-            drawn |= part.figures(chosen, made)
+        common: dict[str, Figure | None] = {**figures.figures(results, made, experiment)}
+        drawn: dict[str, Figure | None] = {}
+        for part, chosen in reversed(by_part(results)):  # first what answers the question, which is the last part's
+            own = part.figures(chosen, made)
+            drawn |= common | own if part.answers_with_sigma else own | common
         return {name: figure for name, figure in drawn.items() if figure}
+
+    def drawn_from(self) -> Mapping[str, Sequence[str]]:
+        return {name: tables for part in parts().values() for name, tables in part.drawn_from().items()}
 
     def question(self, experiment: "Experiment") -> str:
         part, cases = by_part(experiment.cases)[-1]

@@ -29,12 +29,14 @@ COMMON = __name__.rpartition(".")[0]
 class SonarPart:
     """A part.
 
-    package is its folder as Python imports it. claimed: whether the paper makes claims about it. tracker_in and
-    simulated_in are the packages whose module `track` contains its `Tracker` and its `simulated`.
+    package is its folder as Python imports it. claimed: whether the paper makes claims about it. answers_with_sigma:
+    whether the figures of σ answer its question, so that they come before its own. tracker_in and simulated_in are the
+    packages whose module `track` contains its `Tracker` and its `simulated`.
     """
 
     package: str
     claimed: bool = True
+    answers_with_sigma: bool = False
     tracker_in: str = COMMON
     simulated_in: str = COMMON
 
@@ -51,6 +53,10 @@ class SonarPart:
     ) -> "dict[str, Figure | None]":
         """The figures of such cases, in addition to common ones; None where there is nothing to draw."""
         return self.file("figures").figures(results, made)
+
+    def drawn_from(self) -> Mapping[str, Sequence[str]]:
+        """The tables that its figures are drawn from, by how the figure's name begins."""
+        return getattr(self.file("figures"), "DRAWN_FROM", {})
 
     def question(self, specs: Sequence[Any]) -> str:
         """The question of such cases, in one sentence."""

@@ -23,6 +23,7 @@ KEYS = {  # columns of the table of tracking, and the keys that they hold
     "gate_probability": "gate_probability",
 }
 Results = Sequence[CaseResult[ClutterAxes]]
+DRAWN_FROM = {"confirmation": ("tracks",), "track_life": ("tracking", "curves"), "false_tracks": ("tracking",)}
 
 
 def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, Figure | None]:

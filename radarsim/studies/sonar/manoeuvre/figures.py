@@ -27,6 +27,7 @@ SYMBOLS = {
 RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # ticks of a measured over a believed σ
 STRENGTHS = ("acceleration_mps2", "rate_radps")  # keys that say how strong a manoeuvre is
 Results = Sequence[CaseResult[ManoeuvreAxes]]
+DRAWN_FROM = {"roc": ("detections",), "detection": ("detections",), "delay": ("delays",), "response": ("curves",)}
 
 
 def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, Figure | None]:
@@ -37,8 +38,8 @@ def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, F
     drawn: dict[str, Figure | None] = {}
     if moving:
         some, left = shown(moving)
-        drawn["roc"] = _said(roc_figure(some, made["detections"]), left)
         drawn["detection"] = detection_figure(measured, made["detections"])
+        drawn["roc"] = _said(roc_figure(some, made["detections"]), left)
         drawn["delay"] = _said(delay_figure(some, made["delays"]), left)
     if responding:
         some, left = shown(responding)

@@ -2,4 +2,4 @@
 
 from radarsim.studies.sonar.part import SonarPart
 
-PART = SonarPart(__name__)
+PART = SonarPart(__name__, answers_with_sigma=True)

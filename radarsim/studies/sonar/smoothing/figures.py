@@ -16,6 +16,8 @@ from radarsim.studies.sonar.figures import QUANTITIES, SIGMA, line
 if TYPE_CHECKING:
     import pandas as pd
 
+DRAWN_FROM = {"missed": ("curves",), "believed": ("believed", "consistency")}
+
 
 def figures(
     results: Sequence[CaseResult[GivenPlotsAxes]], made: "Mapping[str, pd.DataFrame]"

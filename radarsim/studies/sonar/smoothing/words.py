@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from radarsim.engine.results import CaseResult
-from radarsim.language import tr
+from radarsim.language import few, tr
 from radarsim.report import panels, text
 from radarsim.studies.sonar.axes import SonarAxes
 from radarsim.studies.sonar.config import Keys, correlation_of
@@ -25,7 +25,7 @@ def question(specs: Sequence[Keys]) -> str:
     if any(spec.sensor.detection_probability < 1 or spec.sensor.missed_scans for spec in specs):
         return tr("What does a missed plot cost?")
     names = list(dict.fromkeys(f.name for spec in specs for f in spec.filters))
-    return tr("How accurate are range and bearing smoothed by {filters}?", filters=", ".join(names))
+    return tr("How accurate are range and bearing smoothed by {filters}?", filters=few(names))
 
 
 def answer(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:

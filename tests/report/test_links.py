@@ -1,0 +1,39 @@
+"""What belongs to what in a report: figures to tables, claims to figures."""
+
+from radarsim.report import html, links
+
+MADE = ("curves", "gains", "locks", "detections", "consistency")
+
+
+def test_a_figure_has_the_tables_that_its_study_declares_or_those_of_its_name():
+    declared = {"lock": ("locks",), "detection": ("detections",), "accuracy": ("curves",), "cost": ("stages",)}
+    found = {
+        name: links.tables_of(name, declared, MADE)
+        for name in ("sigma_r", "gain_Vr", "sweep_dt", "dynamic_r", "locks", "lock_noise", "detection", "cost", "map")
+    }
+    assert found == {
+        **{"sigma_r": ("curves",), "gain_Vr": ("gains",), "sweep_dt": ("curves",), "dynamic_r": ("curves",)},
+        **{"locks": ("locks",), "lock_noise": ("locks",), "detection": ("detections",), "cost": (), "map": ()},
+    }
+
+
+def test_a_claim_leads_to_the_figure_of_its_component():
+    drawn = {
+        "gain_r": ("gains",),
+        "gain_Vr": ("gains",),
+        "sigma_r": ("curves",),
+        "missed": ("curves",),
+        "locks": ("locks",),
+    }
+    assert links.figures_of([("gains", "Vr")], drawn) == ["gain_Vr"]
+    assert links.figures_of([("curves", "r"), ("gains", "r")], drawn) == ["sigma_r", "gain_r"]
+    assert links.figures_of([("curves", "ar")], drawn) == ["sigma_r", "missed"]  # its own is not drawn
+    assert links.figures_of([("locks", ""), ("none", "")], drawn) == ["locks"]
+    assert links.figures_of([], drawn) == []
+
+
+def test_of_an_answer_so_much_stands_above_its_figure_that_both_are_seen():
+    short, long = "a" * 90, "; ".join(["b" * 150] * 3)
+    assert html.in_clauses([short, long]) == [short, "b" * 150 + ";", "b" * 150 + ";", "b" * 150]
+    assert html.seen_at_once([short, short, short]) == 2
+    assert html.seen_at_once([long]) == 1
