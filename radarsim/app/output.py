@@ -133,7 +133,7 @@ def write(
     own = study(experiment.study)
     answer = tuple(own.answer(results, made))
     described_by = machine.described()
-    record = provenance.record(experiment, results, run, contents, answer, described_by, made["curves"])
+    record = provenance.record(experiment, results, run, contents, answer, described_by, made)
     page = html.page(
         experiment,
         made,

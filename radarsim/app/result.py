@@ -199,6 +199,7 @@ class Result:
     @property
     def warnings(self) -> list[str]:
         """What a reader of the numbers must know: damaged or mixed blocks, too few realisations."""
-        from radarsim.report import provenance
+        from radarsim.report import provenance, rare
 
-        return [*self.facts["warnings"], *provenance.few(self.cases, self._tables["curves"])]
+        weak = rare.warnings(self._tables.get("rare"))
+        return [*self.facts["warnings"], *provenance.few(self.cases, self._tables["curves"]), *weak]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
+from radarsim.report import rare
 from radarsim.report.statistics import FEW, FEW_EFFECTIVE, FEW_EVENTS, FEW_HEAVY
 
 if TYPE_CHECKING:
@@ -58,10 +59,15 @@ def _noted(
     table = table.copy(deep=False)
     if not len(table) or "case" not in table or not any(str(column).endswith("_lo") for column in table):
         return table
+    if name == "rare":
+        notes = np.where(rare.weak(table), f"under {FEW_EVENTS} effective events", "").astype(object)
+        return table.assign(note=notes) if any(notes) else table
     n, effective, nearby = _realisations(table, made, results)
     columns = [column for column in (*SHARES.get(name, ()), *FORETOLD.get(name, ())) if column in table]
     shares = [table[column].to_numpy(dtype=float) for column in columns]
     events = np.min([n * np.minimum(share, 1 - share) for share in shares], axis=0) if shares else np.inf
+    if "rare" in made:
+        events = rare.of_rows(table, made["rare"], events)
     if name in BOUNDED:
         effective = np.full(n.shape, np.inf)
     notes = notes_on(n, events, effective, None if name in BOUNDED else nearby)

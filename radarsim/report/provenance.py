@@ -7,12 +7,13 @@ import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, plural, tr
-from radarsim.report import files, notes
+from radarsim.report import files, notes, rare
 from radarsim.report.statistics import FEW, FEW_EFFECTIVE, FEW_HEAVY
 
 if TYPE_CHECKING:
@@ -29,17 +30,17 @@ def record(
     contents: Mapping[str, bytes],
     answer: Sequence[str],
     machine: Mapping[str, object],
-    curves: "pd.DataFrame | None" = None,
+    made: "Mapping[str, pd.DataFrame]" = MappingProxyType({}),
 ) -> dict[str, Any]:
     """All of run.json but the report's own hash.
 
     run gives the facts of the run (stop reason, threads, times, warnings, identities …), kept as they are; contents
-    are the outputs, by path; machine describes the one they were made on. Realisations asked and done are sums over
-    the cases, which may differ in both.
+    are the outputs, by path; machine describes the one they were made on; made are the tables.
+    Realisations asked and done are sums over the cases, which may differ in both.
     """
     facts = dict(run)
     stop = facts.pop("stop", "done")
-    warnings = [*facts.pop("warnings", ()), *few(results, curves)]
+    warnings = [*facts.pop("warnings", ()), *few(results, made.get("curves")), *rare.warnings(made.get("rare"))]
     done = {result.name: result.count for result in results}
     return {
         "config": experiment.stem,

@@ -226,9 +226,37 @@ def probability(total: Values, square: Values, n: Values) -> Estimate:
     with np.errstate(divide="ignore", invalid="ignore"):
         trials = np.where(variance > 0, n * np.clip(p * (1 - p), 0, None) / variance, n)
         trials = np.maximum(trials, n)
+    return _wilson(p, trials)
+
+
+def _wilson(p: Values, trials: Values) -> Estimate:
+    """A share p with Wilson's score interval, of so many yes-or-no trials."""
+    with np.errstate(divide="ignore", invalid="ignore"):
         zz = Z95**2 / trials
         middle, half = (p + zz / 2) / (1 + zz), np.sqrt(np.maximum(zz * p * (1 - p), 0) + zz**2 / 4) / (1 + zz)
     return Estimate(p, np.clip(middle - half, 0, 1), np.clip(middle + half, 0, 1))
+
+
+def weighted_rate(total: Values, square: Values, n: Values, plain: Values) -> Estimate:
+    """Share of realisations in which something happens, from some that another law drew, with weights w.
+
+    total and square are Σw and Σw² over those of n in which it happened. Wilson's interval at the number of yes-or-no
+    trials that would tell as much, p(1 − p) over the variance of the mean. `plain` of the n were drawn from the law
+    itself: where nothing happened, they alone say how rare it is.
+    """
+    n, plain = np.asarray(n, dtype=float), np.asarray(plain, dtype=float)
+    p = np.clip(_per_one(total, n), 0, 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        variance = np.maximum(_per_one(square, n) - p**2, 0) / np.maximum(n - 1, 1)
+        trials = p * (1 - p) / variance
+    return _wilson(p, np.where((p > 0) & (p < 1) & (variance > 0), trials, plain))
+
+
+def effective_events(total: Values, square: Values) -> Values:
+    """How many events of equal weight stand behind a weighted share: (Σw)²/Σw² over the events, 0 of none (Kish)."""
+    total, square = np.asarray(total, dtype=float), np.asarray(square, dtype=float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(square > 0, total**2 / square, 0.0)
 
 
 def rate(count: Values, n: Values) -> Estimate:

@@ -8,6 +8,7 @@ term, a bound one off. A test of the ordinary suite keeps the list in step with 
 from tests.trust.mutant import mutants
 from tests.trust.mutants_folds import FOLDS
 from tests.trust.mutants_further import FURTHER
+from tests.trust.mutants_rare import RARE
 
 LINEAR, RANDOM = "kernels/test_linear.py", "kernels/test_random.py"
 TEXTBOOK = f"{LINEAR}::test_estimates_are_the_textbook_filter"
@@ -335,4 +336,4 @@ ENGINE = (
     ),
 )
 
-ALL = (*KERNELS, *FILTERS, *FRAMES_AND_MODELS, *EXACT_VALUES, *NUMBERS, *ENGINE, *FURTHER, *FOLDS)
+ALL = (*KERNELS, *FILTERS, *FRAMES_AND_MODELS, *EXACT_VALUES, *NUMBERS, *ENGINE, *FURTHER, *FOLDS, *RARE)

@@ -139,6 +139,7 @@ DISCRIMINATOR = {
     "realisations": 10,
 }
 COMPLEX = {"burst": DISCRIMINATOR["burst"] | {"samples": "complex"}}
+SHIFTED = {"estimators": [{"name": "a", "schedule": [6.4e-4], "steps": 4}], "rare": {"estimator": "a"}}
 ESTIMATED = {"estimators": [{"name": "estimated", "schedule": [6.4e-4], "amplitude": "estimated"}]}
 RIVAL = {"estimators": [{"name": "ridge", "method": "ridge"}]}
 RIVAL["burst"] = COMPLEX["burst"] | {"pulse_length_s": 1e-6, "pulses": 1024}
@@ -180,6 +181,7 @@ RUNS = {
     "multimodel irregular": ("multimodel_irregular", SHORT, 8),
     "multimodel at prediction": ("multimodel_covariance", SWEPT, 8),
     "discriminator on block sums": (DISCRIMINATOR | {"engine": "block_sums", "blocks_per_window": 8}, [], 8),
+    "discriminator shifted": (DISCRIMINATOR | SHIFTED | {"engine": "block_sums", "blocks_per_window": 8}, [], 8),
     "discriminator demodulated": (DISCRIMINATOR | {"engine": "demodulated", "blocks_per_window": 8}, [], 2),
     "discriminator on samples": (DISCRIMINATOR | {"engine": "samples"}, [], 2),
     "discriminator complex": (DISCRIMINATOR | COMPLEX | ESTIMATED | {"engine": "samples"}, [], 2),

@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, Strict
 
 from radarsim.config.fields import (
+    Added,
     At,
     Design,
     Display,
@@ -246,6 +247,20 @@ class Estimator(Model):
             yield at("schedule", "window lengths must rise")
 
 
+class Rare(Model):
+    """Losses of lock that are rare: bursts shifted towards them, and weights that make up for it."""
+
+    estimator: Name = Field(
+        title="estimator", description="the estimator whose losses of lock at its last window are sought"
+    )
+    plain_share: Annotated[float, Strict(), Field(ge=0.01, le=0.9)] = Field(
+        0.1,
+        title="share of plain bursts",
+        json_schema_extra={"symbol": "α_0"},
+        description="share of the bursts that are drawn as they are, no unit; no weight is over one divided by it",
+    )
+
+
 class Keys(Study):
     """Doppler frequency and its derivatives from one burst."""
 
@@ -271,6 +286,11 @@ class Keys(Study):
         title="blocks per window",
         description="a block is a window over this; default: 20, or 24 where the Doppler frequency is near zero; "
         "32 for demodulated",
+    )
+    rare: Annotated[Rare | None, Design(), Added()] = Field(
+        None,
+        title="rare losses of lock",
+        description="importance sampling of losses of lock, for sequences that lock almost always: rare.csv",
     )
 
     @cross_check
@@ -306,6 +326,19 @@ class Keys(Study):
     def _engine_fits(self, i: int, estimator: Estimator) -> Iterator[At]:
         if self.engine == "block_sums" and self.needs_samples(estimator):
             yield at("engine", f"block_sums cannot serve estimator {estimator.name}: it needs the samples")
+
+    @cross_check
+    def _rare_fits(self) -> Iterator[At]:
+        if self.rare is None:
+            return
+        sequences = [e.name for e in self.estimators if e.method == "sequence"]
+        if self.rare.estimator not in sequences:
+            yield at("rare.estimator", f"must be the name of a sequence: {', '.join(sequences) or 'there is none'}")
+        samples = [e.name for e in self.estimators if self.needs_samples(e)]
+        if self.engine not in ("auto", "block_sums"):
+            yield at("rare", f"needs engine block_sums, got {self.engine}")
+        elif samples:
+            yield at("rare", f"needs block sums, which cannot serve estimator {samples[0]}: it needs the samples")
 
     def needs_samples(self, estimator: Estimator) -> bool:
         """Whether an estimator looks at more than the block sums tell."""

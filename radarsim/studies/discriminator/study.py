@@ -18,7 +18,9 @@ from radarsim.config.experiment import Case
 from radarsim.engine.moments import Layout
 from radarsim.engine.results import Axes
 from radarsim.errors import ConfigError
+from radarsim.studies.discriminator import rare as rare_losses
 from radarsim.studies.discriminator.config import Estimator, Keys
+from radarsim.studies.discriminator.kernels import rare as rare_kernels
 from radarsim.studies.discriminator.kernels import sums as sums_of
 from radarsim.studies.noise import noise_key
 
@@ -73,6 +75,7 @@ class Plan:
     potential: np.ndarray
     posterior: np.ndarray
     ridges: tuple[int, ...]
+    mixture: rare_kernels.Mixture | None = None
     block: int = BLOCK
     gaussian = False
 
@@ -184,13 +187,14 @@ def prepared(case: Case) -> Plan:
     if not (np.isfinite(potential).all() and np.isfinite(posterior).all()):
         raise ConfigError(f"{case.name}: truth: the samples of a window do not determine the {size} parameters")
     count, most = records.shape
-    return Plan(
+    plan = Plan(
         layout=Layout(
             error=(count, most, size, 4),
             error_all=(count, most, size, 4),
             locks=(count, most, len(sums_of.LOCKS)),
             residuals=(count, most, size, sums_of.BINS),
             passes=(count, 2),
+            **({} if spec.rare is None else {"losses": (count, most, len(sums_of.LOCKS), 3), "drawn": (3,)}),
         ),
         axes=axes(spec, burst, windows, phase, sigma, potential, posterior),
         world=world,
@@ -204,6 +208,14 @@ def prepared(case: Case) -> Plan:
         posterior=padded(posterior, 1.0) * whole,
         ridges=tuple(i for i, e in enumerate(spec.estimators) if e.method == "ridge"),
     )
+    if spec.rare is None:
+        return plan
+    sought = [e.name for e in spec.estimators].index(spec.rare.estimator)
+    keys = np.concatenate([plan.keys, [noise_key(case, "rare")]])
+    try:
+        return replace(plan, keys=keys, mixture=rare_losses.mixture(plan, sought, spec.rare.plain_share))
+    except rare_losses.NoLoss as error:
+        raise ConfigError(f"{case.name}: rare: {spec.rare.estimator} {error}") from None
 
 
 def padded(values: np.ndarray, filling: float = 0.0) -> np.ndarray:
@@ -295,10 +307,18 @@ def doppler_error(burst: model.Burst, phase: Phase) -> float:
 
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
-    """Sums of one block, in the order of the plan's layout."""
-    errors, passes = estimate(plan, first, count)
+    """Sums of one block, in the order of the plan's layout; with `rare` the common ones are of the plain bursts."""
     values = np.zeros(plan.layout.size)
-    sums = sums_of.Sums(**plan.layout.unpack(values))
+    arrays = plan.layout.unpack(values)
+    sums = sums_of.Sums(**{name: arrays[name] for name in sums_of.Sums._fields})
+    if plan.mixture is None:
+        errors, passes = estimate(plan, first, count)
+    else:
+        errors, passes, weights, plain = rare_losses.estimate(plan, first, count)
+        bounds = plan.potential, plan.posterior
+        sums_of.accumulate_losses(errors, plan.options, *bounds, weights, arrays["losses"])
+        arrays["drawn"][:] = plain.sum(), weights.sum(), (weights**2).sum()
+        errors, passes = errors[plain], passes[plain]
     sums_of.accumulate(errors, plan.options, plan.potential, plan.posterior, sums)
     sums.passes[:, 0], sums.passes[:, 1] = passes.sum(axis=0), (passes**2).sum(axis=0)
     return values

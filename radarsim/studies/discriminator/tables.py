@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.bursts import fisher as exact
 from radarsim.engine.results import CaseResult
-from radarsim.report import statistics
+from radarsim.report import rare, statistics
 from radarsim.report import tables as common
 from radarsim.studies.discriminator.kernels.sums import LOCKS as COUNTED
 from radarsim.studies.discriminator.kernels.sums import bin_edges
@@ -20,7 +20,7 @@ QUANTILES = (0.05, 0.5, 0.95)
 
 
 def tables(results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
-    """curves and gains in place of the common ones, and locks, windows, residuals, bounds, motion, passes."""
+    """curves and gains in place of the common ones, and locks, windows, residuals, bounds, motion, passes; rare."""
     return {
         "curves": curves(results),
         "gains": common.frame({name: [] for name in common.GAINS}),
@@ -30,7 +30,13 @@ def tables(results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
         "bounds": common.joined([_bounds(result) for result in results], BOUNDS),
         "motion": common.joined([_motion(result) for result in results], MOTION),
         "passes": common.joined([_passes(result) for result in results], PASSES),
+        **rare.table([_rare(result) for result in results if "losses" in result.sums]),
     }
+
+
+def plain(result: CaseResult) -> int:
+    """How many bursts were drawn as they are: all, but where rare losses of lock are sought."""
+    return int(result.sums["drawn"][0]) if "drawn" in result.sums else result.count
 
 
 CURVES = (*common.CURVES, "sigma_all", "posterior_sigma")
@@ -48,7 +54,7 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
     n, bound = result.sums["locks"][f, k, COUNTED.index("lock")], axes.exact_sigma[at]
     moments = result.sums["error"][at]
     of = statistics.errors(moments, n)
-    every = statistics.errors(result.sums["error_all"][at], result.count)
+    every = statistics.errors(result.sums["error_all"][at], plain(result))
     return {
         **_labels(result, f, k, c),
         "n": n.astype(np.int64),
@@ -88,6 +94,11 @@ def _locks(result: CaseResult) -> dict[str, np.ndarray]:
     f, k = _at_windows(result)
     count = result.sums["locks"][f, k]
     rates = {name: statistics.rate(count[:, i], result.count) for i, name in enumerate(COUNTED)}
+    if "losses" in result.sums:
+        every = (losses(result, (f, k, np.full(f.size, i))) for i in range(len(COUNTED)))
+        rates = {
+            name: rare.complement(rare.rate(lost, drawn(result))) for name, lost in zip(COUNTED, every, strict=True)
+        }
     lock, always, always_posterior = rates["lock"], rates["always_three"], rates["always_posterior_three"]
     return {
         **_labels(result, f, k),
@@ -102,6 +113,25 @@ def _locks(result: CaseResult) -> dict[str, np.ndarray]:
     }
 
 
+def drawn(result: CaseResult) -> rare.Drawn:
+    """How the bursts of a case with rare losses of lock were drawn."""
+    return rare.Drawn(result.count, *result.sums["drawn"])
+
+
+def losses(result: CaseResult, at: tuple[np.ndarray, ...]) -> rare.Counted:
+    """Of what LOCKS counts the bursts that fail it, at filters, windows and, if given, entry of LOCKS."""
+    return rare.Counted(*np.moveaxis(result.sums["losses"][at], -1, 0))
+
+
+def _rare(result: CaseResult) -> dict[str, np.ndarray]:
+    """Loss of lock at the last window of each estimator, by the weights of the bursts."""
+    windows = np.array([len(own) for own in result.axes.pulses])
+    f, k = np.arange(len(windows)), windows - 1
+    lost = losses(result, (f, k, np.full(f.size, COUNTED.index("lock"))))
+    sought = np.array([e.name == result.spec.rare.estimator for e in result.spec.estimators])
+    return rare.rows(_labels(result, f, k), "loss of lock", sought, lost, drawn(result))
+
+
 RESIDUALS = ("case", "filter", "component", "unit", "k", "t_s", "n", "q05", "median", "q95", "posterior_sigma")
 
 
@@ -112,7 +142,7 @@ def _residuals(result: CaseResult) -> dict[str, np.ndarray]:
     low, middle, high = quantiles(result.sums["residuals"][at], bin_edges(), QUANTILES)
     return {
         **_labels(result, f, k, c),
-        "n": np.full(f.size, result.count),
+        "n": np.full(f.size, plain(result)),
         "q05": low * bound,
         "median": middle * bound,
         "q95": high * bound,
@@ -197,7 +227,7 @@ PASSES = ("case", "filter", "n", "passes", "passes_lo", "passes_hi")
 
 def _passes(result: CaseResult) -> dict[str, np.ndarray]:
     """Passes over a window's data a burst, the measure of an estimator's cost: mean with its interval."""
-    n, total = result.count, result.sums["passes"]
+    n, total = plain(result), result.sums["passes"]
     of = statistics.mean(total[:, 0], total[:, 1], n)
     count = len(of.value)
     return {

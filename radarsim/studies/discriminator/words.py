@@ -10,6 +10,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import few, numeral, plural, tr
 from radarsim.report import panels, text
 from radarsim.report import tables as common
+from radarsim.studies.discriminator.kernels.sums import LOCKS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,6 +29,8 @@ def question(experiment: Experiment) -> str:
 def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
     """Sentences with numbers: by case where nothing is swept, else the range of lock of each estimator."""
     plain = [result for result in results if not result.swept]
+    if any(result.spec.rare is not None for result in results):
+        plain = list(results)  # what is sought is said of each
     if not plain and len(results) > 1:
         return [_over(results, made, name) for name in results[0].axes.filters]
     told = plain or list(results)
@@ -38,7 +41,8 @@ def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
     """Lock and accuracy of the first estimator at its last window, and the locks of the others."""
     first, *others = result.axes.filters
     row = _last(made, result, first)
-    k, n = int(row["k"]), max(row["lock_rate"] * row["n"], 1)
+    k = int(row["k"])
+    n = max(result.sums["locks"][0, k - 1, LOCKS.index("lock")], 1)  # of the plain bursts, where some are shifted
     said = {"estimator": first, "lock": _lock(row), "bursts": result.count}
     words = [
         before
@@ -65,6 +69,8 @@ def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
                 **said,
             )
         ]
+    if result.spec.rare is not None:
+        words.append(before + _rare(common.groups(made["rare"], "case")[(result.name,)]))
     if others:
         locks = ", ".join(f"{name} {_lock(_last(made, result, name))}" for name in others)
         words.append(before + tr("the others lock in: {locks}.", locks=locks))
@@ -100,3 +106,18 @@ def _lock(row: "pd.Series") -> str:
     if 0 < value < 100:
         return text.estimate((value, low, high), "%", ".2f")
     return f"{value:.0f} % {text.interval(numeral(f'{low:.3f}'), numeral(f'{high:.3f}'))}"
+
+
+def _rare(rows: "pd.DataFrame") -> str:
+    """How often lock is lost, by importance sampling, of the estimator for which it is sought."""
+    row = rows[rows["sought"]].iloc[0]
+    return tr(
+        "{estimator}: lock is lost in {rate:.3g} [{low:.3g}, {high:.3g}] of the bursts, by importance sampling from "
+        "{events:,} losses, {n_eff:,.0f} effective ones.",
+        estimator=row["filter"],
+        rate=row["rate"],
+        low=row["rate_lo"],
+        high=row["rate_hi"],
+        events=row["events"],
+        n_eff=row["n_eff"],
+    )

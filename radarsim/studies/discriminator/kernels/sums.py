@@ -58,6 +58,30 @@ def add_component(e, within, potential, posterior, error, error_all, residuals):
 
 
 @kernel
+def judge(errors, potential, posterior, windows, met):
+    """Which of LOCKS hold, 1 or 0, into met (n, K, 6), of errors (n, K, 6) of an estimator of so many windows.
+
+    potential and posterior (K, C) are the bounds without and with the prior, of the C components that count.
+    """
+    for i in range(errors.shape[0]):
+        always = always_posterior = 1.0
+        for k in range(windows):
+            worst = worst_posterior = 0.0
+            for j in range(potential.shape[1]):
+                x = abs(errors[i, k, j])
+                worst = max(worst, x * (1.0 / potential[k, j]))
+                worst_posterior = max(worst_posterior, x * (1.0 / posterior[k, j]))
+            always *= 1.0 if worst < 3.0 else 0.0
+            always_posterior *= 1.0 if worst_posterior < 3.0 else 0.0
+            met[i, k, 0] = 1.0 if worst < 5.0 else 0.0
+            met[i, k, 1] = 1.0 if worst < 3.0 else 0.0
+            met[i, k, 2] = 1.0 if worst_posterior < 5.0 else 0.0
+            met[i, k, 3] = 1.0 if worst_posterior < 3.0 else 0.0
+            met[i, k, 4] = always
+            met[i, k, 5] = always_posterior
+
+
+@kernel
 def accumulate(errors, options, potential, posterior, sums):
     """Sums over errors (n, F, K, 6), in turns over the burst, of locked and of all realisations.
 
@@ -65,27 +89,38 @@ def accumulate(errors, options, potential, posterior, sums):
     which `passes` stays as it is.
     """
     n, size = errors.shape[0], sums.error.shape[2]
-    e, within = np.empty((size, n)), np.empty(n)
-    always, always_posterior = np.empty(n), np.empty(n)
+    e, within, met = np.empty(n), np.empty(n), np.empty((n, errors.shape[2], len(LOCKS)))
     for f in range(options.size):
-        always[:], always_posterior[:] = 1.0, 1.0
+        judge(errors[:, f], potential[f, :, :size], posterior[f, :, :size], options[f].windows, met)
         for k in range(options[f].windows):
-            a, b, own = 1.0 / potential[f, k], 1.0 / posterior[f, k], sums.locks[f, k]
             for i in range(n):
-                worst = worst_posterior = 0.0
-                for j in range(size):
-                    x = errors[i, f, k, j]
-                    e[j, i] = x
-                    worst, worst_posterior = max(worst, abs(x) * a[j]), max(worst_posterior, abs(x) * b[j])
-                within[i] = 1.0 if worst < 5.0 else 0.0
-                always[i] *= 1.0 if worst < 3.0 else 0.0
-                always_posterior[i] *= 1.0 if worst_posterior < 3.0 else 0.0
-                own[0] += within[i]
-                own[1] += 1.0 if worst < 3.0 else 0.0
-                own[2] += 1.0 if worst_posterior < 5.0 else 0.0
-                own[3] += 1.0 if worst_posterior < 3.0 else 0.0
-                own[4] += always[i]
-                own[5] += always_posterior[i]
+                within[i] = met[i, k, 0]
+                for lock in range(len(LOCKS)):
+                    sums.locks[f, k, lock] += met[i, k, lock]
             for j in range(size):
+                for i in range(n):
+                    e[i] = errors[i, f, k, j]
                 error, error_all, residuals = sums.error[f, k, j], sums.error_all[f, k, j], sums.residuals[f, k, j]
-                add_component(e[j], within, a[j], b[j], error, error_all, residuals)
+                add_component(
+                    e, within, 1.0 / potential[f, k, j], 1.0 / posterior[f, k, j], error, error_all, residuals
+                )
+
+
+@kernel
+def accumulate_losses(errors, options, potential, posterior, weights, losses):
+    """Adds to losses (F, K, 6, 3), of what LOCKS counts, the bursts that fail it: Σw, Σw², their number.
+
+    errors (n, F, K, 6), potential and posterior as for `accumulate`; weights (n,) of the bursts. Components that
+    are not used have no error.
+    """
+    n = errors.shape[0]
+    met = np.empty((n, errors.shape[2], len(LOCKS)))
+    for f in range(options.size):
+        judge(errors[:, f], potential[f], posterior[f], options[f].windows, met)
+        for k in range(options[f].windows):
+            for i in range(n):
+                for lock in range(len(LOCKS)):
+                    if met[i, k, lock] == 0.0:
+                        losses[f, k, lock, 0] += weights[i]
+                        losses[f, k, lock, 1] += weights[i] * weights[i]
+                        losses[f, k, lock, 2] += 1.0

@@ -1,0 +1,132 @@
+"""Rare events by importance sampling: the table `rare`, and warnings where the weights do not bear what it says.
+
+Realisations are drawn from a law under which the event is frequent, and each counts with its weight w, the ratio of the
+laws: the mean of w over those with the event is its probability, whatever the law (docs/rare.md). A share of them is
+drawn from the law itself, so that no weight is over one divided by it.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from radarsim.language import tr
+from radarsim.report import statistics
+from radarsim.report import tables as common
+from radarsim.report.statistics import FEW_EVENTS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLUMNS = (
+    *("case", "filter", "k", "t_s", "event", "sought", "n", "rate", "rate_lo", "rate_hi", "events", "n_eff"),
+    *("variance_factor", "plain", "mean_weight", "mean_weight_se"),
+)
+ERRORS = 4.0  # standard errors of the mean weight beyond which it is not one
+
+
+class Drawn(NamedTuple):
+    """How realisations were drawn: all of them, how many from the law itself, Σw and Σw²."""
+
+    n: int
+    plain: float
+    weight: float
+    squared: float
+
+
+class Counted(NamedTuple):
+    """Of an event the realisations that have it: Σw, Σw² and their number, arrays of one shape."""
+
+    weight: np.ndarray
+    squared: np.ndarray
+    number: np.ndarray
+
+
+def rate(of: Counted, drawn: Drawn) -> statistics.Estimate:
+    """The probability of the event with its interval, from the weights."""
+    return statistics.weighted_rate(of.weight, of.squared, drawn.n, drawn.plain)
+
+
+def complement(of: statistics.Estimate) -> statistics.Estimate:
+    """One less a probability."""
+    return statistics.Estimate(1 - of.value, 1 - of.hi, 1 - of.lo)
+
+
+def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted, drawn: Drawn) -> dict[str, Any]:
+    """Columns of the table from labels (case, filter, k, t_s) of n rows; sought (n,): whether it is drawn for these.
+
+    variance_factor is how many times more plain realisations would know the probability as well.
+    """
+    estimate, size = rate(of, drawn), len(sought)
+    variance = of.squared / drawn.n - estimate.value**2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = np.where(of.number > 0, estimate.value * (1 - estimate.value) / variance, np.nan)
+    mean = drawn.weight / drawn.n
+    spread = np.sqrt(max(drawn.squared / drawn.n - mean**2, 0) / max(drawn.n - 1, 1))
+    return {
+        **labels,
+        "event": np.full(size, event, dtype=object),
+        "sought": sought,
+        "n": np.full(size, drawn.n),
+        **common.interval("rate", estimate),
+        "events": of.number.astype(np.int64),
+        "n_eff": statistics.effective_events(of.weight, of.squared),
+        "variance_factor": factor,
+        "plain": np.full(size, int(drawn.plain)),
+        "mean_weight": np.full(size, mean),
+        "mean_weight_se": np.full(size, spread),
+    }
+
+
+def table(parts: "list[dict[str, Any]]") -> "dict[str, pd.DataFrame]":
+    """The table `rare` of cases' columns, under its name; nothing where no case has any."""
+    return {"rare": common.joined(parts, COLUMNS)} if parts else {}
+
+
+def weak(made: "pd.DataFrame") -> np.ndarray:
+    """Which rows of the table rest on too few effective events for their interval."""
+    return np.asarray(made["n_eff"].to_numpy(dtype=float) < FEW_EVENTS)
+
+
+def warnings(made: "pd.DataFrame | None") -> list[str]:
+    """Where the weights fail: an event that was sought and hardly found, or weights whose mean is not one."""
+    said: list[str] = []
+    if made is None or not len(made):
+        return said
+    for row in made[weak(made) & made["sought"].to_numpy(dtype=bool)].to_dict("records"):
+        said.append(
+            tr(
+                "{case}: {filter}: the rate of a rare event rests on {n_eff:.1f} effective events, under {least}: its "
+                "interval is rough",
+                case=row["case"],
+                filter=row["filter"],
+                n_eff=row["n_eff"],
+                least=FEW_EVENTS,
+            )
+        )
+    for case, own in common.groups(made, "case").items():
+        mean, error = (float(own[name].iloc[0]) for name in ("mean_weight", "mean_weight_se"))
+        if abs(mean - 1) > ERRORS * error:
+            said.append(
+                tr(
+                    "{case}: the mean weight is {mean:.4g} ± {error:.2g}, not one: no rate of a rare event is right "
+                    "here",
+                    case=case[0] if isinstance(case, tuple) else case,
+                    mean=mean,
+                    error=error,
+                )
+            )
+    return said
+
+
+def of_rows(table: "pd.DataFrame", made: "pd.DataFrame", events: "np.ndarray | float") -> np.ndarray:
+    """Events (rows,) behind the shares of a table by realisations, those of cases with weights from the table `rare`.
+
+    Where it has no row for the filter and scan, nothing is said of them: infinite.
+    """
+    keys = ["case", "filter", "k"]
+    if not set(keys) <= set(table):
+        return np.asarray(events)
+    known = table[keys].merge(made[[*keys, "n_eff"]], on=keys, how="left")["n_eff"].to_numpy(dtype=float)
+    weighted = table["case"].isin(made["case"]).to_numpy()
+    return np.asarray(np.where(weighted, np.where(np.isnan(known), np.inf, known), events))

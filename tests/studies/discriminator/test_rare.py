@@ -1,0 +1,314 @@
+"""Rare losses of lock: weights and directions against exact laws, rates against Gaussian integrals and brute force."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import ndtr
+
+from radarsim.app.configs import load
+from radarsim.bursts.kernels import lanes
+from radarsim.bursts.kernels import strip as strips
+from radarsim.config.identity import canonical
+from radarsim.errors import ConfigError
+from radarsim.kernels.random import fill_normal_strip, stream
+from radarsim.report import rare as report
+from radarsim.report import statistics
+from radarsim.studies.discriminator import rare, study
+from radarsim.studies.discriminator.kernels import rare as kernels
+from tests.studies.discriminator.test_study import BASE, FROM_TRUTH
+
+RARELY = {"name": "a", "tail": "exact", "lock_probability": 0.999}
+
+
+def case_of(*estimators, sought="a", **other):
+    """A case whose losses of lock are sought; `sought` None: one of plain bursts."""
+    config = BASE | {"estimators": list(estimators)} | other
+    config |= {} if sought is None else {"rare": {"estimator": sought}}
+    return load(config).cases[0]
+
+
+def plan_of(*estimators, **other):
+    return study.prepare(case_of(*estimators, **other))
+
+
+def reseeded(plan, seed):
+    """The plan under other noise."""
+    return replace(plan, keys=np.stack([stream(seed, str(i)) for i in range(len(plan.keys))]))
+
+
+def losses(plan, n, batch=512):
+    """Weights (n,), and whether estimator 0 lost its lock at its last window (n,)."""
+    k, weights, lost = int(plan.options[0]["windows"]) - 1, [], []
+    for first in range(0, n, batch):
+        errors, _, some, _ = rare.estimate(plan, first, min(batch, n - first))
+        weights.append(some)
+        lost.append((np.abs(errors[:, 0, k]) >= 5 * plan.potential[0, k]).any(axis=1))
+    return np.concatenate(weights), np.concatenate(lost)
+
+
+def brute(plan, n, batch=2048):
+    """The share of n plain bursts that lost their lock, and its standard error."""
+    k, lost = int(plan.options[0]["windows"]) - 1, 0
+    for first in range(0, n, batch):
+        errors, _ = study.estimate(plan, first, min(batch, n - first))
+        lost += (np.abs(errors[:, 0, k]) >= 5 * plan.potential[0, k]).any(axis=1).sum()
+    return lost / n, math.sqrt(max(lost, 1)) / n
+
+
+def share(weights, lost):
+    """The weighted share and its standard error."""
+    x = weights * lost
+    return x.mean(), x.std() / math.sqrt(len(x))
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return plan_of(RARELY)
+
+
+def test_errors_are_linear_in_the_normals_near_the_truth():
+    """The rows of the maps have the posterior bound as their length, and take small noise to the errors that follow."""
+    plan = plan_of(RARELY, burst=BASE["burst"] | {"samples": "complex"})
+    maps = rare.linear(plan, 0)
+    lengths = np.sqrt((maps.errors**2).sum(axis=2)) / plan.posterior[0, :, :5]
+    assert lengths == pytest.approx(1, abs=5e-4)
+    room, small = rare.Room(plan), 1e-3
+    z = small * np.random.default_rng(1).standard_normal((8, maps.forecast.shape[1]))
+    z[:, 5] = 0.0  # no sixth component
+    for j in range(6):
+        room.row(strips.PRIOR + j)[:] = z[:, j] * plan.prior_sigma[j]
+    normals = z[:, 6:].reshape(8, -1, 4)
+    room.a[:] = normals[:, :, [0, 2]].reshape(8, -1).T.ravel()
+    room.b[:] = normals[:, :, [1, 3]].reshape(8, -1).T.ravel()
+    room.put()
+    errors = np.zeros((8, plan.windows.shape[1], 6))
+    room.follow(0, errors)
+    expected = np.einsum("kcd,nd->nkc", maps.errors, z)
+    assert np.abs((errors[:, :, :5] - expected) / (small * plan.posterior[0, :, :5]))[:, 3:].max() < 0.05
+
+
+def test_directions_are_unit_vectors_of_the_hand_overs(plan):
+    units = rare.directions(plan, 0)
+    assert len(units) == plan.options[0]["windows"] + 5
+    assert np.linalg.norm(units, axis=1) == pytest.approx(1, rel=1e-12)
+    table = plan.tables[0].reshape(-1, lanes.COLUMNS)
+    for k, window in enumerate(plan.windows[0]):
+        within = int(table[window["table"] + window["blocks"] - 1, lanes.END])
+        used = np.abs(units[k, 6:].reshape(-1, 4)).sum(axis=1)
+        assert used[:within].max() > 0
+        assert not used[within:].any()  # what comes after the window is not in its estimate
+
+
+def mixture_draws(plan, count):
+    """Projections (M, n) of shifted draws on the mixture's directions, and their weights (n,)."""
+    law, room = plan.mixture, rare.Room(plan)
+    chosen, weights = np.zeros(count, np.int64), np.empty(count)
+    kernels.choose(plan.keys[2], 0, law.cumulative, chosen)
+    along = np.empty((len(law.shift), count))
+    for start in range(0, count, 8):
+        strips.draw_forecasts(plan.keys[1], start, plan.prior_sigma, room.work)
+        fill_normal_strip(plan.keys[0], start, 0, room.a, room.b)
+        kernels.move(law, chosen[start : start + 8], room.work, room.a, room.b)
+        kernels.weigh(law, room.work, room.a, room.b, room.along, weights[start : start + 8])
+        forecasts = room.work[8 * strips.PRIOR : 8 * (strips.PRIOR + 6)].reshape(6, 8)
+        along[:, start : start + 8] = (
+            law.weight @ forecasts + law.first @ room.a.reshape(-1, 8) + law.second @ room.b.reshape(-1, 8)
+        )
+    return along, weights, chosen
+
+
+def test_weights_bring_back_the_normal_law_on_either_side(plan):
+    """The mean weight is one, and P(±uᵀz > t) is Φ(−t) along every direction that is shifted to about t."""
+    along, weights, chosen = mixture_draws(plan, 20_000)
+    assert abs(weights.mean() - 1) < 4 * weights.std() / math.sqrt(len(weights))
+    assert weights.max() <= 1 / plan.mixture.cumulative[0]
+    looked = 0
+    for m, shift in enumerate(plan.mixture.shift):
+        if np.count_nonzero(np.abs(chosen) == m + 1) < 500:
+            continue
+        for side in (1, -1):
+            mean, error = share(weights, side * along[m] > shift)
+            assert abs(mean - ndtr(-shift)) < 4 * error
+            assert error < 0.2 * ndtr(-shift)
+            looked += 1
+    assert looked >= 10
+
+
+@pytest.mark.slow
+def test_the_mean_weight_is_one_on_twenty_seeds(plan):
+    z = []
+    for seed in range(20):
+        _, weights, _ = mixture_draws(reseeded(plan, seed), 20_000)
+        z.append((weights.mean() - 1) / (weights.std() / math.sqrt(len(weights))))
+    assert np.abs(z).max() < 3.5
+    assert abs(np.mean(z)) < 3.5 / math.sqrt(20)
+
+
+def beyond(correlation, limits):
+    """P(|x| > a or |y| > b) of unit normals with a correlation: an integral over x of the tails of y given x."""
+    a, b = limits
+    spread = math.sqrt(1 - correlation**2)
+
+    def outside(x):
+        middle = correlation * x
+        tails = ndtr((-b - middle) / spread) + ndtr((middle - b) / spread)
+        return tails * math.exp(-0.5 * x * x) / math.sqrt(2 * math.pi)
+
+    return 2 * ndtr(-a) + quad(outside, -a, a, points=[0.0], epsabs=1e-14, limit=200)[0]
+
+
+def test_a_lone_window_loses_as_its_gaussian_integral_says():
+    """Phase and frequency from the truth on: errors are Gaussian, and five bounds are passed once in a million."""
+    burst = BASE["burst"] | {"pulses": 2000, "noise_variance": 0.1, "samples": "complex"}
+    keys = {
+        "burst": burst,
+        "truth": {"doppler_derivatives": [10e3]},
+        "prior": {"spread_over_potential": [100.0, 100.0]},
+    }
+    plan = plan_of({**FROM_TRUTH, "name": "a", "schedule": [0.02]}, blocks_per_window=100, **keys)
+    maps = rare.linear(plan, 0).errors[0]
+    spread = np.linalg.norm(maps, axis=1)
+    correlation = float(maps[0] @ maps[1] / spread.prod())
+    assert correlation == pytest.approx(-math.sqrt(3) / 2, rel=1e-3)
+    assert spread == pytest.approx(plan.potential[0, 0, :2], rel=1e-3)
+    exactly = beyond(correlation, 5 * plan.potential[0, 0, :2] / spread)
+    assert exactly == pytest.approx(beyond(-math.sqrt(3) / 2, (5, 5)), rel=0.03)
+    mean, error = share(*losses(plan, 20_000))
+    assert error < 0.04 * exactly
+    assert abs(mean - exactly) < 4 * error
+
+
+def test_losses_are_those_of_plain_bursts(plan):
+    """Once in a thousand, against fifty thousand plain bursts of other noise."""
+    mean, error = share(*losses(plan, 4_000))
+    plain, plain_error = brute(reseeded(plan, 11), 50_000)
+    assert error < 0.1 * mean
+    assert abs(mean - plain) < 4 * math.hypot(error, plain_error)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("probability", "bursts"), [(0.999, 100_000), (0.9999, 300_000)])
+def test_losses_are_those_of_plain_bursts_on_twenty_seeds(probability, bursts):
+    """At 10⁻³ and 10⁻⁴: every difference within three standard errors, and these no wider than they are."""
+    plan = plan_of({**RARELY, "lock_probability": probability})
+    z, rates = [], []
+    for seed in range(20):
+        mean, error = share(*losses(reseeded(plan, seed), 20_000))
+        plain, plain_error = brute(reseeded(plan, 100 + seed), bursts)
+        z.append((mean - plain) / math.hypot(error, plain_error))
+        rates.append(mean)
+    assert np.abs(z).max() < 3
+    assert abs(np.mean(z)) < 3 / math.sqrt(20)
+
+
+@pytest.mark.slow
+def test_a_millionth_is_known_to_a_fifth(plan):
+    """Twenty runs of 20 000 bursts scatter as their intervals say, by less than 20 %."""
+    plan = plan_of({**RARELY, "lock_probability": 0.999999})
+    found = np.array([share(*losses(reseeded(plan, seed), 20_000)) for seed in range(20)])
+    assert found[:, 0].mean() < 5e-6
+    assert found[:, 0].std() < 0.2 * found[:, 0].mean()
+    z = (found[:, 0] - found[:, 0].mean()) / found[:, 1]
+    assert 0.3 < np.mean(z**2) < 2.5
+
+
+def test_sums_are_those_of_the_weights_and_add_up(plan):
+    case = case_of(RARELY)
+    sums = plan.layout.unpack(study.simulate(plan, 100, 64))
+    parts = study.simulate(plan, 100, 37) + study.simulate(plan, 137, 27)
+    assert plan.layout.pack(**sums) == pytest.approx(parts, rel=1e-12)
+    errors, passes, weights, plain = rare.estimate(plan, 100, 64)
+    last = int(plan.options[0]["windows"]) - 1
+    lost = (np.abs(errors[:, 0, last]) >= 5 * plan.potential[0, last]).any(axis=1)
+    assert sums["losses"][0, last, 0] == pytest.approx([weights @ lost, weights**2 @ lost, lost.sum()])
+    assert sums["drawn"] == pytest.approx([plain.sum(), weights.sum(), weights @ weights])
+    assert sums["passes"][0, 0] == passes[plain].sum()
+    assert sums["locks"][0, last, 0] == (~lost[plain]).sum()
+    alone = study.estimate(study.prepare(replace(case, spec=case.spec.model_copy(update={"rare": None}))), 100, 64)[0]
+    assert np.array_equal(errors[plain], alone[plain])  # plain bursts have the noise that they would have
+
+
+def result_of(n, *estimators, **other):
+    import radarsim
+
+    config = BASE | {"estimators": list(estimators), "rare": {"estimator": "a"}} | other
+    return radarsim.run(config, realisations=n)
+
+
+def test_tables_tell_the_rate_and_how_well_it_is_known():
+    result = result_of(3000, RARELY, {"name": "wide", "first_windows": 1})
+    table = result.tables["rare"]
+    assert list(table.columns[: len(report.COLUMNS)]) == list(report.COLUMNS)
+    row = table.iloc[0]
+    sums = result.cases[0].sums
+    last = int(row["k"]) - 1
+    weight, square, number = sums["losses"][0, last, 0]
+    assert row["rate"] == weight / 3000
+    assert row["events"] == number
+    assert row["n_eff"] == pytest.approx(weight**2 / square)
+    assert row["rate_lo"] < row["rate"] < row["rate_hi"]
+    assert row["variance_factor"] > 5
+    assert list(table["sought"]) == [True, False]
+    locks = result.tables["locks"]
+    at = locks[(locks["filter"] == "a") & (locks["k"] == row["k"])].iloc[0]
+    assert at["lock_rate"] == pytest.approx(1 - row["rate"], rel=1e-15)
+    assert at["lock_hi"] == pytest.approx(1 - row["rate_lo"], rel=1e-15)
+    curves = result.curves
+    assert curves["n"].max() <= row["plain"]
+    assert "by importance sampling" in " ".join(result.answer)
+    assert not any("rare event" in line for line in result.warnings)
+
+
+def test_a_rate_that_rests_on_few_events_is_told():
+    result = result_of(60, RARELY)
+    assert any("the rate of a rare event rests on" in line for line in result.warnings)
+    assert result.tables["rare"]["note"].str.contains("effective events").all()
+
+
+def test_weights_whose_mean_is_not_one_are_told():
+    made = result_of(300, RARELY).tables["rare"]
+    assert not any("not one" in line for line in report.warnings(made))
+    assert any("not one" in line for line in report.warnings(made.assign(mean_weight=1.5, mean_weight_se=0.1)))
+
+
+def test_a_weighted_rate_is_wilsons_where_all_weights_are_one():
+    plain, weighted = statistics.rate(7.0, 1000.0), statistics.weighted_rate(7.0, 7.0, 1000.0, 1000.0)
+    assert np.array(weighted) == pytest.approx(np.array(plain), rel=2e-3)  # n for n − 1
+    none = statistics.weighted_rate(0.0, 0.0, 1000.0, 100.0)
+    assert np.array(none) == pytest.approx(np.array(statistics.rate(0.0, 100.0)))
+
+
+def test_without_the_key_a_case_is_the_one_it_was():
+    case = case_of(RARELY, sought=None)
+    assert "rare" not in canonical(case.spec)
+    assert "rare" in canonical(case_of(RARELY).spec)
+    assert "losses" not in study.prepare(case).layout.shapes
+    plain = plan_of(RARELY)
+    assert np.array_equal(plain.keys[:2], study.prepare(case).keys)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"rare": {"estimator": "b"}}, "rare.estimator: must be the name of a sequence: a"),
+        ({"rare": {"estimator": "a", "plain_share": 1.0}}, "rare.plain_share: must be <= 0.9, got 1"),
+        ({"rare": {"estimator": "a", "plain_share": 0}}, "rare.plain_share: must be >= 0.01"),
+        ({"rare": {"estimator": "a", "shift": 3}}, "rare.shift: unknown key"),
+        ({"rare": {"estimator": "a"}, "engine": "samples"}, "rare: needs engine block_sums, got samples"),
+        ({"rare": {}}, "rare.estimator: "),
+        ({"rare": 3}, "rare: "),
+    ],
+)
+def test_wrong_values_are_told_by_their_key(keys, words):
+    with pytest.raises(ConfigError) as error:
+        load(BASE | {"estimators": [RARELY]} | keys)
+    assert any(words in line for line in error.value.lines), error.value.lines
+
+
+def test_a_sequence_that_never_loses_its_lock_is_refused():
+    """Far better known beforehand than the burst could tell, nothing is lost within eight standard deviations."""
+    with pytest.raises(ConfigError, match=r"rare: a loses no lock within 8 σ"):
+        plan_of({**FROM_TRUTH, "name": "a"}, prior={"spread_over_potential": [0.01] * 5})

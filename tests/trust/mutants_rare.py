@@ -1,0 +1,42 @@
+"""Planted faults of rare events: weights dropped, mixtures with one side, shifts and losses not those meant."""
+
+from tests.trust.mutant import mutants
+
+LOCKS = "studies/discriminator/test_rare.py"
+EITHER_SIDE = f"{LOCKS}::test_weights_bring_back_the_normal_law_on_either_side"
+SUMS = f"{LOCKS}::test_sums_are_those_of_the_weights_and_add_up"
+
+LOSSES = (
+    *mutants(
+        "radarsim/studies/discriminator/kernels/rare.py",
+        ("weights[n] = 1.0 / density[n]", "weights[n] = 1.0", EITHER_SIDE),
+        ("chosen[i] = m if side < 0.5 else -m", "chosen[i] = m", EITHER_SIDE),
+        ("half * (math.exp(up - level) + math.exp(-up - level))", "half * 2.0 * math.exp(up - level)", EITHER_SIDE),
+        ("b[lane(r, n)] += step * mixture.second[m, r]", "b[lane(r, n)] += 0.0", EITHER_SIDE),
+    ),
+    *mutants(
+        "radarsim/studies/discriminator/kernels/sums.py",
+        ("losses[f, k, lock, 1] += weights[i] * weights[i]", "losses[f, k, lock, 1] += weights[i]", SUMS),
+    ),
+    *mutants(
+        "radarsim/studies/discriminator/study.py",
+        ("errors, passes = errors[plain], passes[plain]", "errors, passes = errors, passes", SUMS),
+    ),
+    *mutants(
+        "radarsim/studies/discriminator/rare.py",
+        (
+            "zeroth * g[1] + first * g[6]",
+            "zeroth * g[1]",
+            f"{LOCKS}::test_errors_are_linear_in_the_normals_near_the_truth",
+        ),
+    ),
+    *mutants(
+        "radarsim/report/statistics.py",
+        (
+            "np.where((p > 0) & (p < 1) & (variance > 0), trials, plain)",
+            "np.where((p > 0) & (p < 1) & (variance > 0), n, plain)",
+            f"{LOCKS}::test_tables_tell_the_rate_and_how_well_it_is_known",
+        ),
+    ),
+)
+RARE = LOSSES
