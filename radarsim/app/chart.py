@@ -34,10 +34,12 @@ def chart(
     *,
     overrides: Sequence[str] = (),
     formats: Sequence[str] = ("svg", "png"),
+    width_mm: float | None = None,
 ) -> Drawn:
     """Draw the chart of the configs' study, with their cases on it, into `out`/chart; nothing is simulated.
 
-    Without configs, of the study that has a chart, with its paper's own devices. Raises ConfigError where the study
+    Without configs, of the study that has a chart, with its paper's own devices. width_mm is the width of the figures'
+    files in place of their own. Raises ConfigError where the study
     has none, configs are of several, or two have one name.
     """
     arguments.directory(out)
@@ -50,7 +52,7 @@ def chart(
         from radarsim.report import figures as drawing  # Matplotlib
 
         for name, figure in made.figures.items():
-            contents |= {f"{name}.{kind}": data for kind, data in drawing.save(figure, formats).items()}
+            contents |= {f"{name}.{kind}": data for kind, data in drawing.save(figure, formats, width_mm).items()}
     folder = Path(out) / FOLDER
     files.replace_all(folder, contents)
     return Drawn(folder, tuple(sorted(contents)), made.sentences, tuple(made.table.to_dict("records")))

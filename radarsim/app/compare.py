@@ -55,11 +55,13 @@ def compare(
     out: str | os.PathLike[str] = "results",
     *,
     formats: Sequence[str] = ("svg", "png"),
+    width_mm: float | None = None,
 ) -> Compared:
     """Put stored results side by side: tables, figures and one page in `out`/compare; nothing is simulated.
 
     A source is a config (path, or name of a shipped one), whose results are looked for under `out`, or the folder of a
-    result. The first is what the others are compared with. Raises ConfigError where one is missing, with the command
+    result. The first is what the others are compared with. width_mm is the width of the figures' files in place of
+    their own. Raises ConfigError where one is missing, with the command
     that computes it, or where they share nothing; StoreError where a stored table is damaged.
     """
     arguments.directory(out)
@@ -80,7 +82,8 @@ def compare(
         from radarsim.report import figures as drawing  # Matplotlib
 
         for name, figure in described.items():
-            contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.save(figure, formats).items()}
+            saved = drawing.save(figure, formats, width_mm)
+            contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
     contents["compare.html"] = _page(runs, told, notes, warnings, list(described.values()), made, contents).encode()
     contents["compare.json"] = provenance.to_json(_record(runs, contents))
     files.replace_all(folder, contents, stale=_earlier)

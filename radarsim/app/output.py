@@ -11,7 +11,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine import machine
 from radarsim.engine.results import CaseResult
 from radarsim.language import tr
-from radarsim.report import agreement, claims, controlled, files, notes, provenance, sweeps
+from radarsim.report import agreement, claims, controlled, files, notes, provenance, seen, sweeps
 from radarsim.report import tables as common
 from radarsim.report.chart_text import spoken
 from radarsim.report.claims import forest
@@ -56,9 +56,9 @@ def figures(
         drawn = {
             name: _said(figure) if name.startswith(("sigma", "gain")) else figure for name, figure in drawn.items()
         }
-    if own.draws_sweeps:
-        return drawn
-    return drawn | sweeps.figures(results, common.groups(made["curves"], "case", "filter", "component"))
+    if not own.draws_sweeps:
+        drawn |= sweeps.figures(results, common.groups(made["curves"], "case", "filter", "component"))
+    return {name: seen.crossed(figure) for name, figure in drawn.items()}
 
 
 def _said(figure: Figure) -> Figure:

@@ -238,14 +238,20 @@ def tornado(found: Sensitivity) -> Figure:
     return Figure("tornado", title, caption, tuple(made), len(made), PAGE_MM, height)
 
 
-def write(found: Sensitivity, out: str | os.PathLike[str], formats: Sequence[str]) -> tuple[str, ...]:
-    """sensitivity.csv and the tornado figure, into `out`/sensitivity/CONFIG; their paths."""
+def write(
+    found: Sensitivity, out: str | os.PathLike[str], formats: Sequence[str], width_mm: float | None = None
+) -> tuple[str, ...]:
+    """sensitivity.csv and the tornado figure, into `out`/sensitivity/CONFIG; their paths.
+
+    width_mm is the figure's width in place of its own.
+    """
     arguments.directory(out)
     contents = {"sensitivity.csv": common.to_csv(table(found))}
     if formats and found.rows:
         from radarsim.report import figures as drawing  # Matplotlib
 
-        contents |= {f"tornado.{kind}": data for kind, data in drawing.save(tornado(found), formats).items()}
+        saved = drawing.save(tornado(found), formats, width_mm)
+        contents |= {f"tornado.{kind}": data for kind, data in saved.items()}
     folder = Path(out) / FOLDER / found.stem
     files.replace_all(folder, contents)
     return tuple(str(folder / name) for name in contents)

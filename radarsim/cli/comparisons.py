@@ -2,7 +2,7 @@
 
 import click
 
-from radarsim.cli.group import completed, figures_option, format_option, json_option, main, out_option
+from radarsim.cli.group import completed, figures_option, format_option, json_option, main, out_option, width_option
 
 
 @main.command()
@@ -10,8 +10,16 @@ from radarsim.cli.group import completed, figures_option, format_option, json_op
 @out_option
 @figures_option
 @format_option
+@width_option
 @json_option
-def compare(sources: tuple[str, ...], out: str, no_figures: bool, formats: tuple[str, ...], as_json: bool) -> None:
+def compare(
+    sources: tuple[str, ...],
+    out: str,
+    no_figures: bool,
+    formats: tuple[str, ...],
+    width_mm: float | None,
+    as_json: bool,
+) -> None:
     """Runs side by side on common axes: differences with intervals; computes nothing.
 
     Each of A, B, … is a config, whose stored result is read from DIR, or the folder of a result: two radars, two
@@ -32,7 +40,7 @@ def compare(sources: tuple[str, ...], out: str, no_figures: bool, formats: tuple
     if len(sources) < 2:
         raise click.UsageError(f"compare takes two results or more, got {len(sources)}")
     chosen = () if no_figures else formats or ("svg", "png")
-    compared = comparing.compare(sources, out, formats=chosen)
+    compared = comparing.compare(sources, out, formats=chosen, width_mm=width_mm)
     if as_json:
         click.echo(documents.text(documents.fields(compared)))
     else:

@@ -15,6 +15,7 @@ from radarsim.cli.group import (
     realisations_option,
     seed_option,
     set_option,
+    width_option,
 )
 
 if TYPE_CHECKING:
@@ -139,6 +140,7 @@ def asked(kinds: "dict[str, str | None]", filter_name: str | None, at_s: float |
 @out_option
 @figures_option
 @format_option
+@width_option
 @json_option
 def chart(
     configs: tuple[str, ...],
@@ -146,6 +148,7 @@ def chart(
     out: str,
     no_figures: bool,
     formats: tuple[str, ...],
+    width_mm: float | None,
     as_json: bool,
 ) -> None:
     """What Doppler gains for every radar, and yours on it; simulates nothing.
@@ -164,7 +167,7 @@ def chart(
     from radarsim.cli import answers
 
     kinds = () if no_figures else formats or ("svg", "png")
-    drawn = drawing.chart(configs, out, overrides=overrides, formats=kinds)
+    drawn = drawing.chart(configs, out, overrides=overrides, formats=kinds, width_mm=width_mm)
     if as_json:
         click.echo(documents.text(documents.drawn(drawn)))
     else:
@@ -183,6 +186,7 @@ def chart(
 @out_option
 @figures_option
 @format_option
+@width_option
 @json_option
 def sensitivity(
     config: str,
@@ -196,6 +200,7 @@ def sensitivity(
     out: str,
     no_figures: bool,
     formats: tuple[str, ...],
+    width_mm: float | None,
     as_json: bool,
 ) -> None:
     """What +10 % of each key changes: σ and gain, the largest effect first.
@@ -227,7 +232,7 @@ def sensitivity(
         found = finding.sensitivity(
             config, overrides=experiment.merged(overrides, None, seed), progress=progress.update, **asked_for
         )
-    written = finding.write(found, out, () if no_figures else formats or ("svg", "png"))
+    written = finding.write(found, out, () if no_figures else formats or ("svg", "png"), width_mm)
     if as_json:
         click.echo(documents.text(documents.fields(found) | {"files": written}))
     else:

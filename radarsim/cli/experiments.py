@@ -63,7 +63,7 @@ def run(
     out: str,
     no_figures: bool,
     formats: tuple[str, ...],
-    width: str | None,
+    width_mm: float | None,
     quiet: bool,
     as_json: bool,
 ) -> None:
@@ -105,16 +105,11 @@ def run(
             means |= {"time_limit": limit, "stop": stop}
             figures = False if no_figures else formats or True
             compute: Callable[..., Result | Shares]
-            draw = partial(experiment.run, figures=figures, width_mm=millimetres(width))
+            draw = partial(experiment.run, figures=figures, width_mm=width_mm)
             compute = partial(draw, overrides=overrides, precision=precision, decide=decide)
             if shard:
                 compute = partial(experiment.share, part=shard)
             _compute_each(loaded, partial(compute, **means), out, quiet, as_json)
-
-
-def millimetres(width: str | None) -> float | None:
-    """The width that was asked for; None where each figure has its own."""
-    return None if width is None else float(width)
 
 
 def _refuse_together(shard: object, precision: object, cluster: object, threads: object) -> None:
@@ -238,7 +233,7 @@ def report(
     out: str,
     no_figures: bool,
     formats: tuple[str, ...],
-    width: str | None,
+    width_mm: float | None,
     as_json: bool,
 ) -> None:
     """Tables, figures and report from what is stored; computes nothing.
@@ -256,7 +251,7 @@ def report(
     made = []
     for one in experiment.load_all(configs, overrides):
         figures = False if no_figures else formats or True
-        result = experiment.report(one, out=out, overrides=overrides, figures=figures, width_mm=millimetres(width))
+        result = experiment.report(one, out=out, overrides=overrides, figures=figures, width_mm=width_mm)
         made.append(documents.result(result))
         if not as_json:
             console.print_result(result)

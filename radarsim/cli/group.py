@@ -263,8 +263,9 @@ format_option = click.option(
 )
 width_option = click.option(
     "--width",
-    "width",
+    "width_mm",
     type=click.Choice(["85", "120", "175"]),
+    callback=lambda _context, _option, chosen: None if chosen is None else float(chosen),
     metavar="85|120|175",
     help="Width of the figures' files, mm; letters keep their size. Default: each its own.",
 )

@@ -78,16 +78,19 @@ def decades(low: float, high: float, wanted: int) -> list[tuple[float, str]]:
     """Powers of ten, and 2 and 5 times as well where these are not many more than wanted."""
     first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
     stride = max(1, -(-(last - first + 1) // MOST_DECADES))
-    ticks = [(10.0**n, power(n)) for n in range(first, last + 1, stride)]
+    ticks = list(
+        zip((10.0**n for n in range(first, last + 1, stride)), powers(range(first, last + 1, stride)), strict=True)
+    )
     fine = [m * 10.0**n for n in range(first - 1, last + 1) for m in (2, 5) if low <= m * 10.0**n <= high]
     if stride > 1 or len(ticks) + len(fine) > wanted + FURTHER:
         return ticks
     return sorted([*ticks, *((v, tick_text(v)) for v in fine)])
 
 
-def power(n: int) -> str:
-    """10ⁿ in figures where short."""
-    return tick_text(10.0**n) if -3 <= n <= 4 else power_of_ten(n)
+def powers(exponents: Sequence[int]) -> list[str]:
+    """Powers of ten, all in figures where each is short, else all raised but 1 and 10."""
+    short = all(-4 <= n <= 4 for n in exponents)
+    return [tick_text(10.0**n) if short or n in (0, 1) else power_of_ten(n) for n in exponents]
 
 
 def tick_text(value: float) -> str:

@@ -5,10 +5,12 @@ on the data and on the versions of Matplotlib and its fonts alone.
 """
 
 import io
+import math
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import matplotlib
@@ -22,6 +24,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.text import Annotation
 from matplotlib.ticker import FuncFormatter, Locator, NullFormatter
+from matplotlib.transforms import ScaledTranslation
 
 from radarsim.report import chart_look, legends
 from radarsim.report.chart_look import contrast
@@ -40,6 +43,10 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", "h", ">", "d", "p")  # n
 POINTS = 2000  # of a line; longer ones are drawn at every n-th scan
 TITLE_LETTERS_PER_MM = 0.45  # of a panel's cell with its axis, in the bold of titles
 LABEL_LETTERS_PER_MM = 0.62  # of an axis' side, in the letters of labels
+AXIS_MM = 9.0  # of the ticks and the label of an axis of x
+SIDE_MM = 14.0  # of those of an axis of y, with the gap to the next panel
+LETTER_EM = 0.62  # of a number, in its size: how wide a figure of the font is
+TICK_GAP_PT = 3.0  # between numbers of ticks
 MARKED = 16  # at most about so many markers or crosses a line
 WHOLE = (0, 1)  # limits of a share
 EXACT: dict[str, Any] = {
@@ -98,9 +105,11 @@ def _laid_out(figure: Figure) -> Canvas:
     height = rows * figure.panel_height_mm
     free = rows * columns > len(plan.panels)  # a cell: the legend has it, where it is large enough
     common = plan.common
-    inside = common is not None and free and common.height_mm(figure.width_mm / columns) < figure.panel_height_mm
+    cell = figure.width_mm / columns - SIDE_MM  # the room of a legend in a panel's place
+    inside = common is not None and free and common.height_mm(cell) < figure.panel_height_mm
     if common is not None and not inside and not plan.beside:
         height += common.height_mm(figure.width_mm)
+    height += rows * max([one.height_mm(figure.width_mm / columns) for one in plan.own if one is not None], default=0.0)
     layout = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.05)
     canvas = Canvas(figsize=(figure.width_mm * MM, height * MM), dpi=PNG_DPI, layout=layout)
     FigureCanvasAgg(canvas)
@@ -113,13 +122,13 @@ def _laid_out(figure: Figure) -> Canvas:
         fitted = replace(panel, title=wrapped(panel.title, letters), x=x, y=y)
         _draw(axes, fitted, maps)
         ended.append(_at_ends(axes, panel) if plan.at_ends[n] else [])
-        _legend(axes, plan.own[n], 1, loc="best")
+        _legend_below(axes, plan.own[n], figure.width_mm / columns)
     for axes in grid.flat[len(plan.panels) :]:
         axes.set_axis_off()
     if plan.beside:
         _legend(grid.flat[0], common, 1, loc="upper left", bbox_to_anchor=(1.01, 1.0))
     elif inside and common is not None:
-        _legend(grid.flat[len(plan.panels)], common, common.columns(figure.width_mm / columns), loc="center")
+        _legend(grid.flat[len(plan.panels)], common, common.columns(cell), loc="center")
     elif common is not None:
         _legend(canvas, common, common.columns(figure.width_mm), loc="outside lower center")
     layout.execute(canvas)
@@ -145,6 +154,8 @@ def wrapped(text: str, letters: float, mark: str = ", ") -> str:
             lines[-1] += f"{mark}{part}"
         else:
             lines.append(part)
+    if mark != " ":
+        lines = [wrapped(line, letters, " ") for line in lines]
     return f"{mark.rstrip()}\n".join(lines)
 
 
@@ -197,7 +208,8 @@ def _draw(axes: Axes, panel: Panel, maps: Colours) -> None:
         if limits != (None, None):
             put(*limits)
     if panel.equal:
-        axes.set_aspect("equal", adjustable="datalim")
+        whole = (*panel.x.limits, *panel.y.limits)
+        axes.set_aspect("equal", adjustable="datalim" if None in whole else "box")
     placed = any(isinstance(mark, Bars | Heat) for mark in panel.marks)
     _ticks(axes.xaxis, panel.x, placed)
     _ticks(axes.yaxis, panel.y, any(isinstance(mark, Heat) for mark in panel.marks))
@@ -214,16 +226,21 @@ def _ticks(side: XAxis | YAxis, axis: Ends, placed: bool) -> None:
         where, labels = zip(*axis.ticks, strict=True)
         side.set_ticks(where, labels)
     elif not placed:
-        side.set_major_locator(Round(axis.scale == "log", 6 if side.axis_name == "x" else 5))
-        side.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
+        chosen = Round(axis.scale == "log", 6 if side.axis_name == "x" else 5)
+        side.set_major_locator(chosen)
+        side.set_major_formatter(FuncFormatter(lambda value, _: chosen.words.get(value, tick_text(value))))
     side.set_minor_formatter(NullFormatter())
 
 
 class Round(Locator):
-    """Ticks at the round values that the page's charts have too (report/chart_scale.py)."""
+    """Ticks at the round values that the page's charts have too (report/chart_scale.py).
+
+    Of an axis of x so many, at most, that their numbers stand apart. words are the numbers of the last ones.
+    """
 
     def __init__(self, log: bool, wanted: int):
         self.log, self.wanted = log, wanted
+        self.words: dict[float, str] = {}
 
     def __call__(self) -> list[float]:
         assert self.axis is not None  # Matplotlib sets it before it asks
@@ -232,7 +249,33 @@ class Round(Locator):
     def tick_values(self, vmin: float, vmax: float) -> list[float]:
         """The ticks between two ends."""
         low, high = sorted((float(vmin), float(vmax)))
-        return [value for value, _ in Scale(self.log, low, high, 0.0, 1.0).ticks(self.wanted)]
+        scale = Scale(self.log, low, high, 0.0, self._length_pt())
+        ticks = scale.ticks(self.wanted)
+        for wanted in range(self.wanted - 1, 1, -1):
+            if apart(scale, ticks):
+                break
+            ticks = scale.ticks(wanted)
+        while not apart(scale, ticks):
+            ticks = ticks[::2]
+        self.words = dict(ticks)
+        return list(self.words)
+
+    def _length_pt(self) -> float:
+        """How long an axis of x is, points; of another as long as need be."""
+        if not isinstance(self.axis, XAxis):
+            return math.inf
+        axes = self.axis.axes
+        return float(axes.get_window_extent().width) * 72 / axes.figure.dpi
+
+
+def apart(scale: Scale, ticks: Sequence[tuple[float, str]]) -> bool:
+    """Whether the numbers of ticks beside each other leave a gap; scale ends at the axis' length in points."""
+    if math.isinf(scale.end):
+        return True
+    half = [LETTER_EM * STYLE["xtick.labelsize"] * len(words) / 2 for _, words in ticks]
+    places = [float(scale.place(value)) for value, _ in ticks]
+    edges = zip(pairwise(places), pairwise(half), strict=True)
+    return all(after - before >= left + right + TICK_GAP_PT for (before, after), (left, right) in edges)
 
 
 def _colour(style: Style) -> str | tuple[float, float, float, float]:
@@ -347,11 +390,12 @@ def _at_ends(axes: Axes, panel: Panel) -> list[Annotation]:
     texts = []
     for m in legends.lines(panel):
         last = np.flatnonzero(np.isfinite(m.y))[-1]
+        y = float(np.clip(m.y[last], *sorted(axes.get_ylim())))  # a line may end beyond an axis that is cut
         texts.append(
             axes.annotate(
                 m.label,
-                (m.x[last], m.y[last]),
-                xytext=(1.015, m.y[last]),
+                (m.x[last], y),
+                xytext=(1.015, y),
                 textcoords=axes.get_yaxis_transform(),
                 va="center",
                 color=readable(_colour(m.style)),
@@ -370,6 +414,15 @@ def _legend(where: Axes | Canvas, legend: legends.Legend | None, columns: int, *
     drawn = where.legend(handles, list(legend.keys), title=legend.title or None, alignment="left", **place, **room)
     # Inside a panel it may not push it to nothing; beside it, it takes its room.
     drawn.set_in_layout(isinstance(where, Canvas) or "bbox_to_anchor" in place)
+
+
+def _legend_below(axes: Axes, legend: legends.Legend | None, width_mm: float) -> None:
+    """A legend of a panel's own, below its axis, no wider than its cell."""
+    if legend is None:
+        return
+    place = axes.transAxes + ScaledTranslation(0, -AXIS_MM * MM, axes.figure.dpi_scale_trans)
+    columns = legend.columns(width_mm)
+    _legend(axes, legend, columns, loc="upper left", bbox_to_anchor=(0.0, 0.0), bbox_transform=place)
 
 
 def _spread(texts: list[Annotation]) -> None:

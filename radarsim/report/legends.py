@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from radarsim.language import tr
+from radarsim.report.chart_text import spoken
 from radarsim.report.drawing import Figure, Line, Panel, Style
 
 LONGEST_AT_END = 28  # letters of a name that may stand at a line's end
+NAMES_SHARE = 0.3  # of a panel's cell that names at the ends of its lines may take
 AT_ENDS_MM = 4.4  # of a panel's height for each name at a line's end
 ROW_MM, LETTER_MM, SAMPLE_MM = 3.5, 1.45, 12.0  # of a legend: a row, a letter, the sample of a line with its gaps
 LEAST_PANEL_MM = 55.0  # wide, of a figure whose width is chosen
@@ -30,7 +32,7 @@ class Legend:
 
     def columns(self, width_mm: float) -> int:
         """How many columns of names fit into a width."""
-        longest = max(len(words) for words in self.keys)
+        longest = max(len(spoken(words)) for words in self.keys)
         return max(1, min(len(self.keys), int(width_mm / (LETTER_MM * longest + SAMPLE_MM))))
 
     def height_mm(self, width_mm: float) -> float:
@@ -53,7 +55,9 @@ class Named:
 def named(figure: Figure) -> Named:
     """How the lines of a figure are named."""
     panels = tuple(panel for panel in figure.panels if panel.marks)
-    at_ends = tuple(_fits(panel, figure.panel_height_mm) for panel in panels)
+    cell = figure.width_mm / min(figure.columns, max(1, len(panels)))
+    narrow = any(LETTER_MM * _longest(panel) > NAMES_SHARE * cell for panel in panels if panel.direct)
+    at_ends = tuple(not narrow and _fits(panel, figure.panel_height_mm) for panel in panels)
     crossed: set[str] = set()
     keys = [_keys(panel, ends, crossed) for panel, ends in zip(panels, at_ends, strict=True)]
     apart = [dict(panel.keys) for panel in figure.panels if not panel.marks]
@@ -62,6 +66,9 @@ def named(figure: Figure) -> Named:
     clash = len(titles) > 1
     for one in (*keys, *apart):
         clash |= any(not _alike(merged.get(words, look), look) for words, look in one.items())
+        clash |= any(
+            _alike(look, other) and words not in one for words, other in merged.items() for look in one.values()
+        )
         merged |= one
     none: tuple[Legend | None, ...] = (None,) * len(panels)
     if clash:
@@ -80,6 +87,10 @@ def _alike(one: Style | None, other: Style | None) -> bool:
 def lines(panel: Panel) -> list[Line]:
     """The lines of a panel that have a name and a point."""
     return [m for m in panel.marks if isinstance(m, Line) and m.label and np.isfinite(m.y).any()]
+
+
+def _longest(panel: Panel) -> int:
+    return max((len(spoken(line.label)) for line in lines(panel)), default=0)
 
 
 def _fits(panel: Panel, height_mm: float) -> bool:

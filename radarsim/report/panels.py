@@ -11,7 +11,7 @@ from radarsim.config.labels import Label
 from radarsim.config.labels import label as label_of
 from radarsim.engine.results import CaseResult
 from radarsim.language import plural, tr
-from radarsim.report import text
+from radarsim.report import seen, text
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.report.statistics import Z95
 
@@ -22,10 +22,17 @@ WIDE_MM = 120.0  # one panel of many lines
 MOST_AT_ENDS = 6  # lines of one panel named at their ends; more by colour and dash
 MOST = 8  # cases of a panel; more are named in its caption
 MOST_PANELS = 12
-WIDE = 30  # largest over least value from which an axis is logarithmic
+WIDE = 20  # largest over least value from which an axis is logarithmic
+MOST_LINES = 12  # of a panel that several cases of more than FEW_FILTERS share
+FEW_FILTERS = 3  # told apart by dash, while shades tell the cases apart
+LONG = 5  # powers of ten from this one on are written raised
+NEAR_ZERO = 1e-5  # of the largest σ: below it a logarithmic axis would show rounding
+LOSS = 100.0  # per cent at which gains far below are cut
+ALIKE = 0.97  # of the points of two panels: so many intervals overlap where the panels show the same
 LONGEST_INSIDE = 28  # letters of a name that may stand in a legend inside a panel of many lines
 GREEK = {"b": "\\beta", "e": "\\varepsilon"}  # bearing and elevation, as the components' names begin or end
 DEGREES = 180 / np.pi
+FEW_DIGITS = 3  # of an angle that was given in radians
 POWERS = ("manoeuvre_variance",)  # swept keys that are read as powers of ten
 
 
@@ -44,10 +51,14 @@ def number(value: object, powers: bool = False) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{literal(str(key))} {number(one)}" for key, one in value.items())
     if not isinstance(value, int | float) or isinstance(value, bool):
-        return literal(str(value))
-    power = f"{value:.0e}".partition("e")[2]
-    if value != 0 and float(f"1e{power}") == value and (abs(int(power)) > 1 or (powers and int(power) < 0)):
-        return text.power_of_ten(int(power))
+        return literal(str(value).replace("_", " "))  # of a list of choices, of a scenario
+    power = int(f"{value:.0e}".partition("e")[2])
+    if (
+        value != 0
+        and float(f"1e{power}") == value
+        and (power >= (2 if powers else LONG) or power < (0 if powers else -1))
+    ):
+        return text.power_of_ten(power)
     return text.number(value)
 
 
@@ -73,8 +84,11 @@ def swept(result: CaseResult) -> str:
 
 def with_its_unit(result: CaseResult, key: str, value: object) -> str:
     """A value of a key with the key's unit, but for one that would have to stand in brackets."""
-    own = key_label(result, key).unit if isinstance(value, int | float) and not isinstance(value, bool) else ""
-    return " ".join(filter(None, (number(value, is_power(key)), own if not own.startswith("(") else "")))
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return number(value)
+    factor, own = in_degrees(key_label(result, key).unit)
+    shown = number(value, is_power(key)) if factor == 1.0 else text.number(factor * value, FEW_DIGITS)
+    return f"{shown}{own}" if own.startswith("°") else " ".join(filter(None, (shown, own.partition("(")[0])))
 
 
 def key_label(result: CaseResult, key: str) -> Label:
@@ -100,9 +114,14 @@ def symbol_of(result: CaseResult, key: str) -> str:
 
 
 def axis_of(result: CaseResult, key: str) -> str:
-    """A key of a case as an axis names it: name, letter, unit."""
+    """A key of a case as an axis names it: name, letter, unit; values stand there times `axis_factor`."""
     found = key_label(result, key)
-    return with_unit(" ".join(filter(None, (found.text, mathematical(found.symbol)))), found.unit)
+    return with_unit(" ".join(filter(None, (found.text, mathematical(found.symbol)))), in_degrees(found.unit)[1])
+
+
+def axis_factor(result: CaseResult, key: str) -> float:
+    """By what the values of a key are multiplied on its axis: angles are given in radians and shown in degrees."""
+    return in_degrees(key_label(result, key).unit)[0]
 
 
 def sigma_of(symbol: str, unit: str) -> str:
@@ -211,8 +230,11 @@ def families(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
     return found
 
 
-def by_panel(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
-    """Cases that share a panel, by its title: those of a config, and of several swept keys all but the last alike."""
+def by_panel(results: Sequence[CaseResult], most: float = MOST_LINES) -> dict[str, list[CaseResult]]:
+    """Cases that share a panel, by its title: those of a config, and of several swept keys all but the last alike.
+
+    Cases of many filters have a panel each where they would make more than so many lines together.
+    """
     found: dict[str, list[CaseResult]] = {}
     several = len(families(results)) > 1
     for result in results:
@@ -221,7 +243,16 @@ def by_panel(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
         of = (device(result) if several or not words else "", words)
         found.setdefault("\0".join((stem(result), *filter(None, of))), []).append(result)
     titles = [key.partition("\0")[2].replace("\0", ", ") for key in found]
-    return dict(zip(titles if len(set(titles)) == len(titles) else found, found.values(), strict=True))
+    groups = dict(zip(titles if len(set(titles)) == len(titles) else found, found.values(), strict=True))
+    parted: dict[str, list[CaseResult]] = {}
+    for title, members in groups.items():
+        counts = [len(result.axes.filters) for result in members]
+        if sum(counts) <= most or max(counts) <= FEW_FILTERS or len(members) == 1:
+            parted[title] = members
+        else:
+            start = [device(members[0])] if several else []
+            parted |= {", ".join([*start, swept(result) or result.name]): [result] for result in members}
+    return parted
 
 
 def spread_out(items: Sequence[Any], most: int) -> list[Any]:
@@ -278,9 +309,48 @@ def shown_families(results: Sequence[CaseResult], names: Sequence[str]) -> tuple
 def fitting_axis(label: str, marks: Sequence[Mark]) -> Axis:
     """An axis of values above zero: logarithmic where the least would else lie on zero."""
     values = np.concatenate([np.asarray(mark.y, float) for mark in marks if isinstance(mark, Line)] or [np.ones(1)])
-    least = values[values > 0].min(initial=np.inf)
-    wide = (values[np.isfinite(values)] > WIDE * least).any()
-    return Axis(label, "log") if wide else Axis(label, limits=(0, None))
+    values = values[np.isfinite(values) & (values > 0)]
+    if not values.size or values.max() <= WIDE * values.min():
+        return Axis(label, limits=(0, None))
+    low = NEAR_ZERO * float(values.max())
+    return Axis(label, "log", (float(values[values > low].min()) / 2, None) if values.min() < low else (None, None))
+
+
+def one_scale(drawn: Sequence[Panel]) -> list[Panel]:
+    """Panels side by side, all with a logarithmic axis of y where one has it."""
+    if all(panel.y.scale == "linear" for panel in drawn):
+        return list(drawn)
+    return [
+        panel if panel.y.scale == "log" else replace(panel, y=replace(panel.y, scale="log", limits=(None, None)))
+        for panel in drawn
+    ]
+
+
+def differing(drawn: Sequence[Panel]) -> tuple[list[Panel], str]:
+    """The panels, or the first alone where all show the same within their intervals; and words on that."""
+    if len(drawn) < 2 or not all(_same(drawn[0], other) for other in drawn[1:]):
+        return list(drawn), ""
+    said = tr("Alike within the intervals in all {count} cases: the first is shown.", count=len(drawn))
+    return [replace(drawn[0], title="")], f" {said}"
+
+
+def _same(one: Panel, other: Panel) -> bool:
+    """Whether two panels have the same lines within their intervals."""
+    pairs = list(zip(*([m for m in panel.marks if isinstance(m, Line)] for panel in (one, other)), strict=False))
+    if len(one.marks) != len(other.marks) or not pairs:
+        return False
+    found = [_overlapping(a, b) for a, b in pairs]
+    return all(part.size for part in found) and bool(np.mean(np.concatenate(found)) >= ALIKE)
+
+
+def _overlapping(one: Line, other: Line) -> np.ndarray:
+    """At each point whether the intervals of two lines overlap; nothing where they cannot be compared."""
+    ends = (one.lo, one.hi, other.lo, other.hi)
+    if any(end is None for end in ends) or not np.array_equal(one.x, other.x):
+        return np.zeros(0, dtype=bool)
+    lo, hi, other_lo, other_hi = (np.asarray(end, dtype=float) for end in ends)
+    known = np.isfinite(lo) & np.isfinite(hi) & np.isfinite(other_lo) & np.isfinite(other_hi)
+    return ((lo <= other_hi) & (other_lo <= hi))[known]
 
 
 def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity) -> Figure:
@@ -293,12 +363,18 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
     panels = [panel for panel in panels if panel.marks]
     caption = tr(
         "Root-mean-square error of the {quantity} about the truth against time, of {realisations}. "
-        "Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact values.",
+        "Bands: 95 % intervals, where not seen narrower than the line.",
         quantity=of.name,
         realisations=realisations(results),
     )
     title = tr("σ of the {quantity}", quantity=of.name)
-    return in_columns(Figure(name, title, caption, tuple(panels)))
+    figure = in_columns(Figure(name, title, caption, tuple(one_scale(panels))))
+    return seen.begun(figure, seen.at_the_end(figure, unit_in(curves, component)))
+
+
+def unit_in(curves: Mapping, component: str) -> str:
+    """The unit of a component in a table's rows by case, filter and component."""
+    return next((rows["unit"].iloc[0] for key, rows in curves.items() if key[2] == component), "")
 
 
 def in_columns(figure: Figure) -> Figure:
@@ -311,18 +387,15 @@ def in_columns(figure: Figure) -> Figure:
 
 
 def _sigma_panel(title: str, members: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity) -> Panel:
-    marks = _lines_of(members, curves, component, _sigma_line)
-    unit = next((rows["unit"].iloc[0] for key, rows in curves.items() if key[2] == component), "")
-    y = fitting_axis(with_unit(tr("$\\sigma$ of {symbol}", symbol=of.symbol), unit), marks)
-    return _keyed(Panel(time_axis(), y, tuple(marks), title), members)
+    marks = lines_of(members, curves, component, _sigma_line)
+    y = fitting_axis(sigma_of(of.symbol, unit_in(curves, component)), marks)
+    return keyed(Panel(time_axis(), y, tuple(marks), title), members)
 
 
-def _lines_of(
-    members: Sequence[CaseResult], rows: Mapping, component: str, draw: Callable[..., Line], first: int = 0
-) -> list[Mark]:
+def lines_of(members: Sequence[CaseResult], rows: Mapping, component: str, draw: Callable[..., Line]) -> list[Mark]:
     """A line for each filter of each case of a panel: named by the filter of a lone case, by the value of a swept one.
 
-    rows by case, filter and component; first: the first filter of those that a legend has beside them.
+    rows by case, filter and component. A filter looks the same in every figure of its cases.
     """
     filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
     marks: list[Mark] = []
@@ -331,13 +404,21 @@ def _lines_of(
             own = rows.get((result.name, f, component))
             if own is None:
                 continue
-            style = look(filters.index(f) - first, i, len(members))
+            style = look(filters.index(f), i, len(members))
             if len(members) == 1:
                 marks.append(draw(own, literal(f), style, literal(f)))
             else:
                 key, value = result.swept[-1] if result.swept else ("", device(result))
-                marks.append(draw(own, number(value, is_power(key)), style, f"{literal(f)}, {swept(result)}"))
+                words = _shown_value(result, key, value) if key else number(value)
+                marks.append(draw(own, words, style, f"{literal(f)}, {swept(result)}"))
     return marks
+
+
+def _shown_value(result: CaseResult, key: str, value: object) -> str:
+    """A value of a key without its unit, as its axis has it."""
+    factor = axis_factor(result, key)
+    turned = factor != 1.0 and isinstance(value, int | float) and not isinstance(value, bool)
+    return text.number(factor * float(str(value)), FEW_DIGITS) if turned else number(value, is_power(key))
 
 
 def family_panel(title: str, members: Sequence[CaseResult], rows: Mapping, words: str) -> Panel:
@@ -347,16 +428,23 @@ def family_panel(title: str, members: Sequence[CaseResult], rows: Mapping, words
         return Line(own["t_s"].to_numpy(float), own[column].to_numpy(float), label, style, name=name)
 
     column = next(key[2] for key in rows)
-    marks = _lines_of(members, rows, column, draw)
-    return _keyed(Panel(time_axis(), fitting_axis(words, marks), (Reference(1), *marks), title), members)
+    marks = lines_of(members, rows, column, draw)
+    return keyed(Panel(time_axis(), fitting_axis(words, marks), (Reference(1), *marks), title), members)
 
 
-def _keyed(panel: Panel, members: Sequence[CaseResult], first: int = 0) -> Panel:
-    """A panel whose legend explains dashes by filter and colours by swept value; few lines are named at their ends."""
+def keyed(panel: Panel, members: Sequence[CaseResult], baseline: bool = True) -> Panel:
+    """A panel whose legend explains dashes by filter and colours by swept value; few lines are named at their ends.
+
+    baseline: whether the filter that others are compared with is drawn.
+    """
     if len(members) == 1:
         return panel
-    filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))[first:]
-    dashes = tuple((literal(f), Style(0, n, n)) for n, f in enumerate(filters)) if len(filters) > 1 else ()
+    filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
+    shown = {
+        f for result in members for n, f in enumerate(result.axes.filters) if baseline or n != result.axes.baseline
+    }
+    dashes = tuple((literal(f), Style(0, n, n)) for n, f in enumerate(filters) if f in shown)
+    dashes = dashes if len(dashes) > 1 else ()
     title = key_title(members[0]) if members[0].swept else ""
     if sum(isinstance(mark, Line) for mark in panel.marks) > MOST_AT_ENDS:
         return _by_colour(panel, dashes, title)
@@ -366,7 +454,7 @@ def _keyed(panel: Panel, members: Sequence[CaseResult], first: int = 0) -> Panel
 def key_title(result: CaseResult) -> str:
     """What a legend of values of a case's last swept key is headed: its letter or name, and its unit."""
     key = result.swept[-1][0]
-    return with_unit(symbol_of(result, key), key_label(result, key).unit)
+    return with_unit(symbol_of(result, key), in_degrees(key_label(result, key).unit)[1])
 
 
 def _by_colour(panel: Panel, dashes: tuple, title: str) -> Panel:
@@ -400,7 +488,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
     base = results[0].axes.filters[results[0].axes.baseline]
     caption = tr(
         "Relative gain in σ of the {quantity} against filter {base}, paired on common noise, of {realisations}. "
-        "Bands: 95 % intervals. Crosses: exact values. Below zero: a loss.",
+        "Bands: 95 % intervals. Below zero: a loss.",
         quantity=of.name,
         base=base,
         realisations=realisations(results),
@@ -409,15 +497,15 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
         Axis(tr("gain in $\\sigma$ of {symbol}, %", symbol=of.symbol)),
         tr("Gain in σ of the {quantity}", quantity=of.name),
     )
-    if any(result.swept for result in results):
+    several = any(len(result.axes.filters) > 2 for result in results)
+    if any(result.swept for result in results) or (several and len(results) > 1):
         drawn = []
         for words, members in by_panel(results).items():
-            lines = _lines_of(members, gains, component, _gain_line, 1)
-            panel = Panel(time_axis(), y, (Reference(0), *lines), words)
-            drawn += [_keyed(panel, members, 1)] if lines else []
-        return in_columns(Figure(name, title, caption, tuple(drawn)))
-    marks: list[Mark] = [Reference(0)]
-    several = any(len(result.axes.filters) > 2 for result in results)
+            lines = lines_of(members, gains, component, _gain_line)
+            panel = Panel(time_axis(), *_cut(y, lines), words)
+            drawn += [keyed(panel, members, baseline=False)] if lines else []
+        return _gains_said(in_columns(Figure(name, title, caption, tuple(drawn))))
+    marks: list[Mark] = []
     for i, result in enumerate(results):
         for n, f in enumerate(result.axes.filters):
             rows = gains.get((result.name, f, component))
@@ -427,10 +515,25 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
                 mark = n if several else i
                 marks.append(_gain_line(rows, words, Style(i if len(results) > 1 else n, mark, mark), words))
     # Many long names would cover the lines: they stand beside the panel.
-    long = len(marks) > 4 and any(isinstance(mark, Line) and len(mark.label) > LONGEST_INSIDE for mark in marks)
-    panel = Panel(time_axis(), y, tuple(marks), direct=not long, legend="right" if long else "best")
+    long = len(marks) > 3 and any(isinstance(mark, Line) and len(mark.label) > LONGEST_INSIDE for mark in marks)
+    panel = Panel(time_axis(), *_cut(y, marks), direct=not long, legend="right" if long else "best")
     width = PAGE_MM if long else COLUMN_MM if len(results) < 3 else WIDE_MM
-    return Figure(name, title, caption, (panel,), width_mm=width)
+    figure = Figure(name, title, caption, (panel,), width_mm=width)
+    return _gains_said(figure)
+
+
+def _gains_said(figure: Figure) -> Figure:
+    """A figure of gains with what is to be seen, and that losses are cut, where they are."""
+    if any(panel.y.limits[0] == -LOSS for panel in figure.panels):
+        words = tr("Losses of over {loss:g} % lie below the axis.", loss=LOSS)
+        figure = replace(figure, caption=f"{figure.caption} {words}")
+    return seen.begun(figure, seen.most(figure))
+
+
+def _cut(y: Axis, lines: Sequence[Mark]) -> tuple[Axis, tuple[Mark, ...]]:
+    """The axis of gains and its marks: losses far beyond all of σ would hide everything else, and are cut."""
+    least = min((float(np.nanmin(mark.y)) for mark in lines if isinstance(mark, Line)), default=0.0)
+    return replace(y, limits=(-LOSS, 100.0)) if least < -2 * LOSS else y, (Reference(0), *lines)
 
 
 def _gain_line(rows: "pd.DataFrame", label: str, style: Style, name: str) -> Line:
@@ -506,6 +609,6 @@ def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Quantity) -> 
         marks.append(Line(t, rows["spread"].to_numpy(), "", Style(n, 1, n), name=tr("{name}: spread", name=name)))
     keys = [(literal(f), Style(n, None, n)) for n, (f, _) in enumerate(found)]
     keys += [(tr("bias"), Style(0, 0)), (tr("spread"), Style(0, 1))]
-    title = ", ".join(number(value, is_power(key)) for key, value in result.swept) or device(result)
+    title = swept(result) or device(result)
     y = Axis(with_unit(tr("error of {symbol}", symbol=of.symbol), unit))
     return Panel(time_axis(), y, tuple(marks), title, tuple(keys))

@@ -6,7 +6,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import tr
-from radarsim.report import panels
+from radarsim.report import panels, seen, text
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Heat, Line, Panel, Style
 
 WIDE = 20  # largest over least swept value from which the axis is logarithmic
@@ -52,7 +52,7 @@ def places(result: CaseResult, key: str, values: Sequence) -> tuple[np.ndarray, 
     """
     label = panels.axis_of(result, key)
     if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
-        x = np.array(values, dtype=float)
+        x = panels.axis_factor(result, key) * np.array(values, dtype=float)
         return x, Axis(label, "log" if x.min() > 0 and x.max() / x.min() > WIDE else "linear")
     ticks = tuple((float(i), panels.number(v if isinstance(v, str) else str(v))) for i, v in enumerate(values))
     return np.arange(float(len(values))), Axis(label, ticks=ticks)
@@ -88,23 +88,27 @@ def line_figure(name: str, key: str, members: Sequence[CaseResult], curves: Mapp
     if not made:
         return None
     caption = tr(
-        "σ at the last scan against the {key}, of {realisations} each. "
-        "Bands: 95 % intervals. Crosses: exact values, where known.",
+        "σ at the last scan against the {key}, of {realisations} each. Bands: 95 % intervals.",
         key=panels.key_label(members[0], key).text,
         realisations=panels.realisations(members),
     )
     columns = min(3 if len(made) != 4 else 2, len(made))
     width = COLUMN_MM if columns == 1 else PAGE_MM
     title = tr("σ over the {key}", key=panels.key_label(members[0], key).text)
-    return Figure(name, title, caption, tuple(made), columns, width, 60)
+    figure = Figure(name, title, caption, tuple(made), columns, width, 60)
+    return seen.begun(figure, seen.over(figure, components(members[0])[0][1]))
 
 
 def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], curves: Mapping) -> Figure | None:
     """σ of the first component at the last scan over two keys: a map for each filter."""
+    component, unit = members[0].axes.components[0]
+    members = [result for result in members if component in dict(result.axes.components)]
+    shown = [key for key in keys if len({_hashable(dict(r.swept)[key]) for r in members}) > 1]
+    if len(shown) < 2:  # the component is of one value of a key alone
+        return line_figure(name, shown[0], members, curves) if shown else None
     values = [list(dict.fromkeys(_hashable(dict(r.swept)[key]) for r in members)) for key in keys]
     ranked = [sorted(v, key=lambda one: (isinstance(one, str), one)) for v in values]
     (x, x_axis), (y, y_axis) = (places(members[0], key, v) for key, v in zip(keys, ranked, strict=True))
-    component, unit = members[0].axes.components[0]
     made = []
     filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
     for f in filters[:MOST_PANELS]:
@@ -116,7 +120,14 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
             heat = Heat(
                 x, y, grid, panels.with_unit(tr("$\\sigma$ of {symbol}", symbol=panels.letter(component)), unit)
             )
-            ticks = [tuple((float(i), panels.number(v)) for i, v in enumerate(values)) for values in ranked]
+            factors = [panels.axis_factor(members[0], key) for key in keys]
+            ticks = [
+                tuple(
+                    (float(i), panels.number(v) if factor == 1.0 else text.number(factor * float(v), panels.FEW_DIGITS))
+                    for i, v in enumerate(values)
+                )
+                for factor, values in zip(factors, ranked, strict=True)
+            ]
             columns_axis, rows_axis = (Axis(one.label, ticks=t) for one, t in zip((x_axis, y_axis), ticks, strict=True))
             made.append(Panel(columns_axis, rows_axis, (heat,), panels.literal(f)))
     if not made:
@@ -133,7 +144,9 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
         caption += " " + tr("{count} further filters are in the tables alone.", count=len(filters) - MOST_PANELS)
     title = tr("σ over the {first} and the {second}", first=first, second=second)
     columns = min(2, len(made))
-    return Figure(name, title, caption, tuple(made), columns, panels.WIDE_MM if columns == 1 else PAGE_MM, 62)
+    width = panels.WIDE_MM if columns == 1 else PAGE_MM
+    figure = Figure(name, title, caption, tuple(made), columns, width, 62)
+    return seen.begun(figure, seen.over(figure, unit))
 
 
 def _hashable(value: object) -> int | float | str:

@@ -6,10 +6,16 @@ from collections.abc import Iterable
 from radarsim.language import numeral, term, tr
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-UNITS = {"m/s2": "m/s²", "rad/s2": "rad/s²", "m/s3": "m/s³", "hz": "Hz"}  # of tables, as people write them
+UNITS = {
+    "m/s2": "m/s²",
+    "rad/s2": "rad/s²",
+    "°/s2": "°/s²",
+    "m/s3": "m/s³",
+    "hz": "Hz",
+}  # of tables, as people write them
 SAID = (  # units that a language may write otherwise
     *(term("m"), term("s"), term("m/s"), term("m/s²"), term("rad"), term("rad/s"), term("rad/s²")),
-    *(term("Hz"), term("Hz/s"), term("Hz/s²"), term("Hz/s³"), term("Hz/s⁴"), term("km"), term("°/s")),
+    *(term("Hz"), term("Hz/s"), term("Hz/s²"), term("Hz/s³"), term("Hz/s⁴"), term("km"), term("°/s"), term("°/s²")),
 )
 PLAIN = 6  # digits before the point that are still written out
 

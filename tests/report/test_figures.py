@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarsim.report import chart, chart_look, figures, panels, tables
+from radarsim.report import chart, chart_look, figures, panels, sweeps, tables
 from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.studies.range_doppler import figures as range_doppler_figures
 from radarsim.studies.range_doppler import tables as range_doppler
@@ -88,6 +88,18 @@ def test_panels_that_name_different_things_alike_keep_their_legends():
     canvas = figures.render(Figure("f", "", "", (first, other), columns=2))
     assert not canvas.legends
     assert all(len(axes.get_legend().get_texts()) == 1 for axes in canvas.axes)
+    for axes in canvas.axes:
+        assert axes.get_legend().get_window_extent().y1 < axes.get_window_extent().y0
+
+
+def test_panels_that_name_one_look_otherwise_keep_their_legends():
+    one, other = (
+        Panel(Axis("x"), Axis("y"), (Line(np.arange(3.0), np.arange(3.0), name, Style(0)),), direct=False)
+        for name in ("uniform 5", "uniform 30")
+    )
+    canvas = figures.render(Figure("f", "", "", (one, other), columns=2))
+    assert not canvas.legends
+    assert [axes.get_legend().get_texts()[0].get_text() for axes in canvas.axes] == ["uniform 5", "uniform 30"]
 
 
 def test_log_axes_have_round_ticks():
@@ -102,6 +114,20 @@ def test_log_axes_have_round_ticks():
     assert ticks(6, 95) == ["10", "20", "50", "100"]
     assert ticks(0.91, 0.99) == ["0.92", "0.94", "0.96", "0.98"]
     assert ticks(1e-4, 1) == ["0.0001", "0.001", "0.01", "0.1", "1"]
+    assert ticks(1e-5, 0.1) == ["10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²", "10⁻¹"]  # all raised, not some
+
+
+@pytest.mark.parametrize("width", [30, 45, 85])
+@pytest.mark.parametrize(("low", "high"), [(0.0015, 0.35), (1e-5, 0.1), (20, 4e5)])
+def test_numbers_at_an_axis_stand_apart_however_narrow_it_is(width, low, high):
+    values = Line(np.geomspace(low, high, 5), np.arange(5.0))
+    axes = figures.render(Figure("f", "", "", (Panel(Axis("x", "log"), Axis("y"), (values,)),), width_mm=width)).axes[0]
+    axes.figure.canvas.draw()
+    left, right = axes.get_xlim()
+    boxes = [t.get_window_extent() for t in axes.get_xticklabels() if left <= t.get_position()[0] <= right]
+    assert len(boxes) >= 1
+    for one, other in pairwise(boxes):
+        assert other.x0 > one.x1
 
 
 def test_a_share_is_drawn_whole_up_to_one():
@@ -135,6 +161,16 @@ def test_labels_at_ends_do_not_overlap():
     boxes = [text.get_window_extent() for text in axes.texts]
     for lower, upper in pairwise(boxes):
         assert upper.y0 >= lower.y0 + 0.9 * lower.height
+
+
+def test_a_line_that_leaves_a_cut_axis_keeps_its_name_within_the_panel():
+    low = Line(np.arange(3.0), np.array([0.0, -50.0, -3e4]), "lost")
+    panel = Panel(Axis("x"), Axis("y", limits=(-100.0, 100.0)), (low, replace(low, y=np.ones(3), label="kept")))
+    canvas = figures.render(Figure("f", "", "", (panel,)))
+    (axes,) = canvas.axes
+    box = axes.get_window_extent()
+    assert box.height > 0.6 * canvas.bbox.height  # laid out
+    assert all(box.y0 - 1 <= text.get_window_extent().y0 <= box.y1 for text in axes.texts)
 
 
 @pytest.mark.parametrize("wanted", [[0.0, 0.1, 0.2], [0.0, 5.0, 5.1, 9.9], [9.0, 9.1], [3.0]])
@@ -180,7 +216,7 @@ def test_any_name_can_be_drawn(name, expected_radar):
     ]
     results = [expected_radar("rls2", filters=filters, radar={"name": name})]
     made = {"curves": tables.curves(results), "gains": tables.gains(results), **range_doppler.tables(results)}
-    shown = SimpleNamespace(shown_in=lambda figure: [SimpleNamespace(name=results[0].name)])
+    shown = SimpleNamespace(stem="mine", shown_in=lambda figure: [SimpleNamespace(name=results[0].name)])
     drawn = range_doppler_figures.figures(results, made, shown)
     for figure in (drawn["sigma_r"], drawn["gain_r"]):
         saved = figures.save(figure, ("svg",))["svg"].decode()
@@ -190,9 +226,87 @@ def test_any_name_can_be_drawn(name, expected_radar):
 
 def test_numbers_for_people():
     assert [panels.number(v, powers=True) for v in (1e-3, 0.1, 1, 250.0)] == ["10⁻³", "10⁻¹", "1", "250"]
-    assert [panels.number(v) for v in (1e-3, 0.1, 1, 10, 1e5, 250.0, 0.00025, -2.5, "turn", True)] == [
-        *("10⁻³", "0.1", "1", "10", "10⁵", "250", "0.00025", "−2.5", "turn", "True")
+    assert [panels.number(v) for v in (1e-3, 0.1, 1, 100, 1000.0, 1e5, 250.0, 0.00025, -2.5, "fly_by", True)] == [
+        *("10⁻³", "0.1", "1", "100", "1000", "10⁵", "250", "0.00025", "−2.5", "fly by", "True")
     ]
+
+
+def test_angles_given_in_radians_are_shown_in_degrees():
+    result = SimpleNamespace(spec=None, swept=(("target.turn.rate_radps", 0.00873),))
+    assert panels.swept(result).endswith("= 0.5°/s")
+    assert panels.axis_of(result, "target.turn.rate_radps").endswith(", °/s")
+    x, axis = sweeps.places(result, "target.turn.rate_radps", [0.0, 0.01745])
+    assert axis.label.endswith(", °/s")
+    np.testing.assert_allclose(x, [0, 0.01745 * 180 / np.pi])
+    assert panels.in_degrees("rad/s2")[1] == "°/s2"
+    assert panels.with_unit("a", "°/s2") == "a, °/s²"
+
+
+def shown_together(*values, log=False):
+    """A panel a value, of one line with an interval of ± 0.1."""
+    t = np.arange(4.0)
+    axis = Axis("σ", "log") if log else Axis("σ", limits=(0, None))
+    lines = [Line(t, np.full(4, v), "r", lo=np.full(4, v - 0.1), hi=np.full(4, v + 0.1)) for v in values]
+    return [Panel(Axis("t"), axis, (one,), f"panel {n}") for n, one in enumerate(lines)]
+
+
+def test_panels_that_show_the_same_are_drawn_once():
+    kept, said = panels.differing(shown_together(1.0, 1.1, 1.05))
+    assert len(kept) == 1
+    assert "all 3 cases" in said
+    apart, said = panels.differing(shown_together(1.0, 1.3))
+    assert (len(apart), said) == (2, "")
+    without = [replace(panel, marks=(replace(panel.marks[0], lo=None),)) for panel in shown_together(1.0, 1.0)]
+    assert len(panels.differing(without)[0]) == 2  # nothing is known of their intervals
+
+
+def test_panels_side_by_side_have_one_kind_of_scale():
+    linear, log = shown_together(1.0)[0], shown_together(2.0, log=True)[0]
+    assert [panel.y.scale for panel in panels.one_scale([linear, log])] == ["log", "log"]
+    assert panels.one_scale([linear, linear])[0].y == linear.y
+
+
+def test_an_axis_of_sigma_shows_no_rounding():
+    sigma = Line(np.arange(4.0), np.array([1e-9, 0.5, 5.0, 50.0]))
+    axis = panels.fitting_axis("σ", [sigma])
+    assert axis.scale == "log"
+    assert axis.limits == (0.25, None)
+    assert panels.fitting_axis("σ", [replace(sigma, y=np.array([0.0, 1.0, 2.0, 15.0]))]).scale == "linear"
+
+
+def test_cases_of_many_filters_have_a_panel_each_where_lines_would_be_too_many(expected_radar, monkeypatch):
+    results = [expected_radar("rls2", 10.0**-n, f"rls2 D={n}") for n in range(1, 8)]
+    assert [len(members) for members in panels.by_panel(results).values()] == [7]  # of two filters each
+    monkeypatch.setattr(panels, "FEW_FILTERS", 1)
+    groups = panels.by_panel(results)
+    assert [len(members) for members in groups.values()] == [1] * 7
+    assert len(set(groups)) == 7
+    assert [len(members) for members in panels.by_panel(results[:6]).values()] == [6]
+    assert len(panels.by_panel(results, np.inf)) == 1
+
+
+def test_losses_far_below_are_cut_and_the_caption_says_so():
+    def gains(least):
+        rows = {"t_s": [0.0, 1.0], "gain_percent": [10.0, least], "gain_lo": [9.0, least], "gain_hi": [11.0, least]}
+        return tables.frame(rows | {"exact_percent": [np.nan, np.nan]})
+
+    result = SimpleNamespace(
+        name="a",
+        swept=(),
+        count=100,
+        spec=SimpleNamespace(device="A"),
+        axes=SimpleNamespace(filters=("r", "v"), baseline=0),
+    )
+    drawn = {
+        least: panels.gain_figure(
+            "gain_r", [result], {("a", "v", "r"): gains(least)}, "r", panels.Quantity("r", "range")
+        )
+        for least in (-150.0, -30000.0)
+    }
+    assert drawn[-30000.0].panels[0].y.limits == (-100.0, 100.0)
+    assert "below the axis" in drawn[-30000.0].caption
+    assert drawn[-150.0].panels[0].y.limits == (None, None)
+    assert "below the axis" not in drawn[-150.0].caption
 
 
 def test_scattered_points_are_all_drawn():
@@ -245,11 +359,13 @@ def test_up_to_sixteen_points_measured_and_exact_stand_together():
         assert (marked == set(crosses.get_xdata())) is together
 
 
-def test_titles_are_broken_after_commas_alone():
+def test_titles_are_broken_after_commas_and_long_parts_between_words():
     words = "gate_probability = 0.5, sensor.detection_probability = 0.7, $D_M$ = 1"
     assert figures.wrapped(words, 200) == words
     assert figures.wrapped(words, 50) == "gate_probability = 0.5,\nsensor.detection_probability = 0.7, $D_M$ = 1"
-    assert figures.wrapped(words, 5) == words.replace(", ", ",\n")
+    assert figures.wrapped("σ = 0.5°, frame of coordinates = cartesian unbiased", 26) == (
+        "σ = 0.5°,\nframe of coordinates =\ncartesian unbiased"
+    )
     assert figures.wrapped("", 5) == ""
 
 

@@ -60,7 +60,7 @@ def figure(rows: Sequence[Mapping]) -> Figure | None:
         title=tr("Claims, in margins of what their papers say"),
         caption=tr(
             "Of each claim the part that lies furthest from the paper's words: measured, with its 95 % interval, and "
-            "exactly (crosses), in margins of that part, cut at ± {furthest:g}. Under 0 it is as the words say, up to "
+            "exactly, in margins of that part, cut at ± {furthest:g}. Under 0 it is as the words say, up to "
             "1 within their margin. The mark is the class of the claim, over all readings where these are known.",
             furthest=FURTHEST,
         ),

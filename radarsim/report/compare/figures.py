@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.language import term, tr
+from radarsim.report import seen
 from radarsim.report.compare.sides import SERIES, Series, Side
 from radarsim.report.compare.table import filters_of
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
@@ -63,14 +64,14 @@ def _figure(
     caption = (
         tr(
             "Left: {words} of {value} on common axes. Right: the {of} against {against} at common times. "
-            "Bands: 95 % intervals. Crosses: exact values, where known.",
+            "Bands: 95 % intervals.",
             words=series.words,
             value=", ".join(side.label for side in some),
             of=of,
             against=against,
         )
     ) + (tr(" {left} further cases are in comparison.csv alone.", left=left) if left > 0 else "")
-    return Figure(name, tr("{what} side by side", what=what), caption, panels, 2, PAGE_MM, HEIGHT_MM)
+    return seen.crossed(Figure(name, tr("{what} side by side", what=what), caption, panels, 2, PAGE_MM, HEIGHT_MM))
 
 
 def _values(series: Series, side: Side, n: int, filters: Sequence[str], component: str, model: str) -> list[Mark]:

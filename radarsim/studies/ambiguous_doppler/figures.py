@@ -49,8 +49,8 @@ SHARES = {  # figure: column of folds.csv, what it is, caption
         term("P(all folds right)"),
         term(
             "Share of realisations in which all folds so far are right, of the best hypothesis. Bands: "
-            "95 % intervals. Crosses: exact, of the nearest fold where truth and filter agree, and of the Chinese "
-            "remainder of two scans."
+            "95 % intervals. Exact values are known of the nearest fold where truth and filter agree, and of the "
+            "Chinese remainder of two scans."
         ),
     ),
     "lost": (
@@ -69,31 +69,22 @@ def share_figure(
     of is a value of SHARES: the column of the table, the axis, the caption.
     """
     rows = common.groups(table, "case", "filter")
-    drawn = [_share_panel(members, rows, of[:2]) for members in panels.by_panel(results).values()]
+    drawn = [_share_panel(title, members, rows, of[:2]) for title, members in panels.by_panel(results).items()]
     drawn = [panel for panel in drawn if panel.marks]
     if not drawn:
         return None
-    if len(drawn) > 1 or any(len(panel.marks) > panels.MOST_AT_ENDS for panel in drawn):
-        drawn = panels.in_legend(drawn)
-    columns = min(3, len(drawn))
-    width = COLUMN_MM if columns == 1 else PAGE_MM
-    return Figure(name, of[1], of[2], tuple(drawn), columns, width)
+    return panels.in_columns(Figure(name, of[1], of[2], tuple(drawn)))
 
 
-def _share_panel(members: Sequence[Result], rows: Mapping, of: tuple[str, str]) -> Panel:
-    marks: list = []
-    shown = [(i, result, f) for i, result in enumerate(members) for f in result.axes.filters]
-    shown = [one for one in shown if (one[1].name, one[2]) in rows]
-    names = list(dict.fromkeys(f for _, _, f in shown))
-    for i, result, f in shown:
-        own = rows[(result.name, f)]
-        words = ", ".join(filter(None, (panels.literal(f) if len(names) > 1 else "", panels.swept(result))))
-        x, y, lo, hi = (own[name].to_numpy() for name in ("t_s", of[0], f"{of[0]}_lo", f"{of[0]}_hi"))
+def _share_panel(title: str, members: Sequence[Result], rows: Mapping, of: tuple[str, str]) -> Panel:
+    def draw(own: "pd.DataFrame", label: str, style: Style, name: str) -> Line:
+        x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", of[0], f"{of[0]}_lo", f"{of[0]}_hi"))
         exact = own["exact_right"].to_numpy() if of[0] == "right" else np.full(x.shape, np.nan)
-        style = panels.look(names.index(f), i, len(members))
-        marks.append(Line(x, y, words or panels.literal(f), style, lo, hi, exact if np.isfinite(exact).any() else None))
-    y_axis = Axis(of[1], limits=(0, 1))
-    return Panel(panels.time_axis(), y_axis, tuple(marks), panels.device(members[0]))
+        return Line(x, y, label, style, lo, hi, exact if np.isfinite(exact).any() else None, name)
+
+    marks = panels.lines_of(members, {(*key, of[0]): own for key, own in rows.items()}, of[0], draw)
+    panel = Panel(panels.time_axis(), Axis(of[1], limits=(0, 1)), tuple(marks), title)
+    return panels.keyed(panel, members)
 
 
 def hypotheses_figure(cases: Sequence[Case]) -> dict[str, Figure]:

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from radarsim.config.experiment import Experiment
+from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
-from radarsim.report import panels
+from radarsim.report import panels, seen
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
+from radarsim.studies.discriminator.map import one_burst
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,7 +43,12 @@ def figures(results: Sequence[CaseResult], made: Mapping, experiment: Experiment
         return [result for result in among if result.name in wanted]
 
     plain = [result for result in results if not result.swept]
-    for name, draw in (("locks", locks), ("accuracy", accuracy), ("residuals", residuals)):
+    cases = {case.name: case for case in experiment.cases}
+
+    def errors(result: CaseResult, made: Mapping) -> Figure:
+        return residuals(result, made, cases[result.name])
+
+    for name, draw in (("locks", locks), ("accuracy", accuracy), ("residuals", errors)):
         for n, result in enumerate(chosen(name, plain)):
             figure = draw(result, made)
             named = figure if n == 0 else of_case(figure, result.name)
@@ -78,8 +84,8 @@ def swept_families(results: Sequence[CaseResult]) -> dict[tuple[str, ...], list[
     return found
 
 
-def residuals(result: CaseResult, made: Mapping) -> Figure:
-    """The paper's figure 2 over all realisations: window lengths, and |error| of each component against them."""
+def residuals(result: CaseResult, made: Mapping, case: Case) -> Figure:
+    """The paper's figure 2, of one burst and over all: window lengths, and |error| of each component against them."""
     name = result.axes.filters[0]
     rows = common.groups(made["residuals"], "case", "filter", "component")
     windows = common.groups(made["windows"], "case", "filter")[(result.name, name)]
@@ -93,7 +99,8 @@ def residuals(result: CaseResult, made: Mapping) -> Figure:
             direct=False,
         )
     ]
-    for letter, (component, _) in zip("bcdefg", result.axes.components, strict=False):
+    burst = one_burst(case, 0)
+    for n, (letter, (component, _)) in enumerate(zip("bcdefg", result.axes.components, strict=False)):
         own = rows[(result.name, name, component)]
         t, middle, low, high, bound = (
             own[column].to_numpy(float) for column in ("t_s", "median", "q05", "q95", "posterior_sigma")
@@ -101,6 +108,7 @@ def residuals(result: CaseResult, made: Mapping) -> Figure:
         marks = (
             Line(t, middle, tr("median"), Style(0, 0, 0), low, high),
             Line(t, 3.0 * bound, "3σ", Style(1, 1)),
+            Line(t, burst[:, n], tr("one burst"), Style(2, 2, 2, size_pt=2.4)),
         )
         drawn.append(
             Panel(
@@ -114,11 +122,28 @@ def residuals(result: CaseResult, made: Mapping) -> Figure:
     caption = tr(
         "Windows of the estimator {name!r} and the absolute error of each component against the "
         "window's length: median and the band from 5 to 95 % of {count:,} bursts, locked or not. "
-        "Dashed: three times the potential spread of the window, prior included, the paper's limit.",
+        "Dashed: three times the potential spread of the window, prior included, the paper's limit. Dotted: one "
+        "burst, the first of the run, as the paper's figure 2 shows one.",
         name=name,
         count=result.count,
     )
-    return Figure("residuals", tr("Errors against the window (figure 2)"), caption, tuple(drawn), 3, PAGE_MM, 52.0)
+    rows = made["locks"]
+    last = rows[(rows["case"] == result.name) & (rows["filter"] == name)].iloc[-1]
+    sentence = tr(
+        "From the first window to the whole burst the median error falls {times:.3g} times in {component}; at the end "
+        "{share:.4g} % of the bursts are locked.",
+        **{"times": _fall(made["residuals"], result, name), "component": tr(SYMBOLS[result.axes.components[1][0]][1])},
+        share=100 * float(last["lock_rate"]),
+    )
+    title = tr("Errors against the window (figure 2)")
+    return seen.begun(Figure("residuals", title, caption, tuple(drawn), 3, PAGE_MM, 52.0), sentence)
+
+
+def _fall(table: "pd.DataFrame", result: CaseResult, name: str) -> float:
+    """How many times less the median error of the Doppler frequency is at the last window than at the first."""
+    own = table[(table["case"] == result.name) & (table["filter"] == name)]
+    median = own.loc[own["component"] == result.axes.components[1][0], "median"].to_numpy(float)
+    return float(median[0] / median[-1])
 
 
 def _with_unit(words: str) -> str:
@@ -152,7 +177,8 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
         tuple(replace(m, label="", name=m.label) for m in marks),
         direct=False,
     )
-    return Figure("locks", tr("Locked bursts against the window"), caption, (whole, upper), 2, PAGE_MM, 80.0)
+    figure = Figure("locks", tr("Locked bursts against the window"), caption, (whole, upper), 2, PAGE_MM, 80.0)
+    return seen.begun(figure, seen.at_the_end(replace(figure, panels=(whole,))))
 
 
 def accuracy(result: CaseResult, made: Mapping) -> Figure:
@@ -214,14 +240,9 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
         tuple(marks),
         direct=False,
     )
-    return Figure(
-        name,
-        tr("Lock against the {called}", called=called),
-        caption,
-        (panel,),
-        width_mm=panels.WIDE_MM,
-        panel_height_mm=70.0,
-    )
+    title = tr("Lock against the {called}", called=called)
+    figure = Figure(name, title, caption, (panel,), width_mm=panels.WIDE_MM, panel_height_mm=70.0)
+    return seen.begun(figure, seen.at_the_end(figure))
 
 
 def _called(key: str, result: CaseResult) -> str:
@@ -253,7 +274,8 @@ def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], ma
         sure=SURE,
     )
     columns = min(2, len(drawn))
-    return Figure(name, tr("Where the sequence locks"), caption, tuple(drawn), columns, PAGE_MM, 70.0)
+    figure = Figure(name, tr("Where the sequence locks"), caption, tuple(drawn), columns, PAGE_MM, 70.0)
+    return seen.begun(figure, seen.over(figure))
 
 
 def region(keys: tuple[str, ...], members: Sequence[CaseResult], made: Mapping, x: np.ndarray, y: np.ndarray) -> Panel:

@@ -10,7 +10,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
-from radarsim.report import panels
+from radarsim.report import panels, seen
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
 
@@ -131,10 +131,10 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
     ]
     drawn[0] = replace(drawn[0], marks=(*drawn[0].marks, *_landmarks(lines[0])), equal=True)
     caption = tr(
-        "The true flight (the paper's figures 1 to 4): the ground track from its start, at one scale "
+        "The true flight: the ground track from its start, at one scale "
         "north and east, with the radar at the origin. Dotted: ends of the stages."
     )
-    return _several("trajectory", tr("Flight"), caption, drawn, 56)
+    return _of_the_paper(_several("trajectory", tr("Flight"), caption, drawn, 56), results, "1 … 4")
 
 
 def _landmarks(tracks: Sequence[Line]) -> list[Line | Note]:
@@ -190,14 +190,17 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
         quantity=quantity,
         count=results[0].count if results else 0,
     )
-    number = _of_the_paper(results, {"y": 5, "vy": 6}[component])
-    title = tr("σ of {quantity}", quantity=quantity)
-    return _several(f"sigma_{component}", f"{title}{number}", caption, drawn, 76)
+    figure = _several(f"sigma_{component}", tr("σ of {quantity}", quantity=quantity), caption, drawn, 76)
+    if figure is None:
+        return None
+    figure = seen.begun(figure, seen.at_the_end(figure, unit))
+    return _of_the_paper(figure, results, {"y": "5", "vy": "6"}[component])
 
 
-def _of_the_paper(results: Sequence[CaseResult], number: int) -> str:
-    """The paper's number of a figure, where it is of the paper's own experiment."""
-    return tr(" (figure {number})", number=number) if all(result.name == "multimodel" for result in results) else ""
+def _of_the_paper(figure: Figure | None, results: Sequence[CaseResult], number: str) -> Figure | None:
+    """The figure with its number in the paper, where it is of the paper's own experiment."""
+    own = figure is not None and all(result.name == "multimodel" for result in results)
+    return seen.numbered(figure, number) if figure and own else figure
 
 
 def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure | None:
@@ -228,12 +231,11 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
         drawn = panels.in_legend(drawn)
     caption = (
         tr(
-            "Mean posterior probabilities of the models{of_the_paper}; the numbers behind the motions "
-            "are the spreads of the random acceleration, m/s². Dotted: ends of the stages.",
-            of_the_paper=_of_the_paper(results, 7),
+            "Mean posterior probabilities of the models; the numbers behind the motions "
+            "are the spreads of the random acceleration, m/s². Dotted: ends of the stages."
         )
     ) + (tr(" {left} further filters are in probabilities.csv alone.", left=left) if left > 0 else "")
-    return _several("probabilities", tr("Probabilities of the models"), caption, drawn, 58)
+    return _of_the_paper(_several("probabilities", tr("Probabilities of the models"), caption, drawn, 58), results, "7")
 
 
 def families(results: Sequence[CaseResult], made: Mapping) -> Figure | None:

@@ -77,7 +77,7 @@ def threshold_figure(results: Sequence[Result], made: "Mapping[str, pd.DataFrame
     caption = tr(
         "Left: share of bursts that lock at the scan where fewest do: velocity (and acceleration, "
         "where it is taken) within five Fisher bounds of the truth. Right: σ of the range at the "
-        "last scan. Bands: 95 % intervals. Crosses: exact values."
+        "last scan. Bands: 95 % intervals."
     )
     figure = Figure("threshold", tr("The threshold"), caption, tuple(panels.in_legend(drawn)), 3, PAGE_MM, 60)
     return {"threshold": figure}

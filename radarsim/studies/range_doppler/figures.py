@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import term, tr
-from radarsim.report import panels
+from radarsim.report import panels, seen
 from radarsim.report import tables as common
 from radarsim.report.drawing import GREY, Axis, Figure, Line, Note, Panel, Reference, Style
 from radarsim.studies.range_doppler.tables import PERIODS, Result
@@ -23,6 +23,13 @@ QUANTITIES = {
 DRAWN_FROM = {"settling": ("steady",)}
 
 
+OF_THE_PAPER = "range_doppler"  # the config whose figures show what the paper's show
+NUMBERS = {
+    **{"sigma_r": "1a", "gain_r": "1b", "sigma_Vr": "2a", "gain_Vr": "2b"},
+    **{"sigma_ar": "3a", "gain_ar": "3b"},
+}
+
+
 def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
     """sigma_r … gain_ar (the paper's figures 1a … 3b), and `settling` where the manoeuvre variance is swept."""
     curves = common.groups(made["curves"], "case", "filter", "component")
@@ -32,6 +39,8 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
         return [case.name for case in experiment.shown_in(name)]
 
     drawn = panels.per_component(results, curves, gains, QUANTITIES, chosen)
+    if experiment.stem == OF_THE_PAPER:
+        drawn = {name: seen.numbered(one, NUMBERS[name]) if name in NUMBERS else one for name, one in drawn.items()}
     some = [result for result in results if result.name in set(chosen("settling"))]
     figure = settling_figure(some, made["steady"])
     drawn |= {"settling": figure} if figure else {}
@@ -78,7 +87,7 @@ def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure 
     """Steady σ of the range against its settling time over D_M, with the ten-period line and the best D_M named."""
     rows = table[table["component"] == "r"]
     drawn: list[Panel] = []
-    for title, members in panels.by_panel(results).items():
+    for title, members in panels.by_panel(results, np.inf).items():
         own = rows[rows["case"].isin([r.name for r in members])].drop_duplicates(["filter", "manoeuvre_variance"])
         if own["manoeuvre_variance"].nunique() > 1:
             drawn.append(_settling_panel(title, members[0], own))

@@ -8,7 +8,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import term, tr
-from radarsim.report import panels
+from radarsim.report import panels, seen
 from radarsim.report import tables as common
 from radarsim.report.drawing import Figure, Line, Panel, Style
 from radarsim.studies.sonar.axes import SonarAxes
@@ -90,14 +90,16 @@ def sigma_figure(
             drawn.append(Panel(panels.time_axis(), y, tuple(marks), panels.swept(result), direct=False))
     if not drawn:
         return None
+    drawn, same = panels.differing(panels.one_scale(drawn))
     caption = (
         tr(
             "Root-mean-square error of the {name} about the truth against time, of {count:,} "
-            "realisations. Bands: 95 % intervals, where not seen narrower than the line. Crosses: exact "
-            "values.",
+            "realisations. Bands: 95 % intervals, where not seen narrower than the line.",
             name=quantity.name,
             count=results[0].count,
         )
+        + same
         + left_out
     )
-    return panels.in_columns(Figure(name, tr("σ of the {name}", name=quantity.name), caption, tuple(drawn)))
+    figure = panels.in_columns(Figure(name, tr("σ of the {name}", name=quantity.name), caption, tuple(drawn)))
+    return seen.begun(figure, seen.at_the_end(figure, unit))

@@ -92,8 +92,7 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
     caption = (
         tr(
             "Probability that a track of the target was confirmed by that time, of {realisations}; thin "
-            "lines: that a confirmed track is there and on the target. Bands: 95 % intervals. Crosses: "
-            "exact.",
+            "lines: that a confirmed track is there and on the target. Bands: 95 % intervals.",
             realisations=panels.realisations(results),
         )
     ) + panels.left_out(left)

@@ -133,7 +133,7 @@ def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | N
     drawn = []
     for others, members in families.items():
         members.sort(key=lambda r: dict(r.swept)[key])
-        strength = np.array([dict(r.swept)[key] for r in members], dtype=float)
+        strength = panels.axis_factor(members[0], key) * np.array([dict(r.swept)[key] for r in members], dtype=float)
         marks = []
         for n, name in enumerate(every_scan(members[0])):
             points = [_at_strongest(r, detections, name) for r in members]
@@ -146,8 +146,7 @@ def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | N
     caption = tr(
         "Probability of an alarm of detectors in the range at about {usual:g} false alarms a test, "
         "at the last scan of the manoeuvre (of a steady target, at the last of all), against the "
-        "manoeuvre's strength. Bands: 95 % intervals, where not seen narrower than the line. "
-        "Crosses: exact laws.",
+        "manoeuvre's strength. Bands: 95 % intervals, where not seen narrower than the line.",
         usual=USUAL,
     )
     return _figure("detection", tr("Detection over the strength of the manoeuvre"), caption, drawn)
@@ -176,7 +175,7 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
             drawn.append(Panel(x, y, tuple(marks), _title(result), direct=False))
     caption = tr(
         "Probability that the first alarm of a detector in the range has come, against the time "
-        "since the manoeuvre began, at about {usual:g} false alarms a test. Crosses: exact, where "
+        "since the manoeuvre began, at about {usual:g} false alarms a test. It is known exactly where "
         "windows are apart and tests independent; overlapping windows have no closed law. Bands: 95 "
         "% intervals.",
         usual=USUAL,
@@ -195,7 +194,7 @@ def response_figure(results: Results, curves: "pd.DataFrame") -> Figure | None:
         drawn.append(Panel(panels.time_axis(), y, marks, _title(result), direct=False))
     caption = tr(
         "Root-mean-square error of the first coordinate about the truth on the same plots, of "
-        "{count:,} realisations. Dotted: the manoeuvre begins and ends. Crosses: exact values.",
+        "{count:,} realisations. Dotted: the manoeuvre begins and ends.",
         count=results[0].count,
     )
     return _figure("response", tr("Filters through a manoeuvre"), caption, drawn)

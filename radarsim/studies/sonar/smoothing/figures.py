@@ -48,11 +48,11 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
     right = Axis(tr("bought by the n-th plot, %"), limits=(0, None))
     drawn = (
         Panel(x_axis, left, tuple(accuracy), key_title="measured", direct=False, crosses=tr("the paper's formula")),
-        Panel(x_axis, right, tuple(bought), direct=False),
+        Panel(x_axis, right, tuple(bought), direct=False, crosses=tr("the paper's formula")),
     )
     caption = tr(
         "Left: σ of the position at the last plot (smoothed) and one scan ahead (extrapolated) in σ "
-        "of a single plot, growing memory of degree 1. Crosses: the paper's formulas. Right: by how "
+        "of a single plot, growing memory of degree 1. Right: by how "
         "much the n-th plot lowers that σ."
     )
     return Figure("plots", tr("What each further plot buys"), caption, drawn, 2, PAGE_MM)
@@ -68,7 +68,7 @@ def gains_figure(table: "pd.DataFrame") -> Figure:
     ]
     caption = tr(
         "Weights of the residual in position and velocity of growing memory, from the measured "
-        "errors (var r / σ² and T₀ cov(r, v) / σ²). Crosses: the paper's (14). They go to zero: new "
+        "errors (var r / σ² and T₀ cov(r, v) / σ²). They go to zero: new "
         "plots count less and less."
     )
     if table["case"].nunique() > 1:
@@ -108,7 +108,7 @@ def believed_figure(
     caption = tr(
         "Left: σ of the {name} at plot {last} in σ of a plot, true (lines) and as the filter "
         "believes it (markers alone, where they differ by over 5 %). Right: normalised squared error "
-        "per component, 1 for a consistent filter; crosses: by calculation.",
+        "per component, 1 for a consistent filter.",
         name=QUANTITIES[component].name,
         last=last,
     )
@@ -143,7 +143,7 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
     gap = cases[0].spec.sensor.missed_scans
     caption = tr(
         "σ of the {name} for several detection probabilities (legend), one panel a filter, of "
-        "{count:,} realisations. Crosses: exact values, means over all patterns of misses where "
+        "{count:,} realisations. Exact values are means over all patterns of misses, where "
         "these can be enumerated.",
         name=QUANTITIES[component].name,
         count=cases[0].count,
@@ -165,7 +165,7 @@ def conversion_figure(table: "pd.DataFrame") -> Figure | None:
         marks.append(line(rows, ("across_m", *names), label, n))
     caption = tr(
         "Mean error of the converted plot along the line of sight, in σ of the range, over range × σ "
-        "of the bearing. Bands: 95 % intervals. Crosses: (exp(−σ²/2) − 1) r, and zero. The plain "
+        "of the bearing. Bands: 95 % intervals. Exact: (exp(−σ²/2) − 1) r, and zero. The plain "
         "conversion pulls the target in."
     )
     x, y = Axis(tr("range × σ of the bearing, m"), limits=(0, None)), Axis(tr("bias / σ of the range"))

@@ -1,0 +1,71 @@
+"""What captions say is to be seen: the lines that end lowest and highest, what intervals leave open, crosses."""
+
+import numpy as np
+
+from radarsim.report import seen
+from radarsim.report.drawing import Axis, Figure, Heat, Line, Panel
+
+T = np.arange(5.0)
+
+
+def line(name, last, half=0.1, exact=None):
+    y = np.linspace(9.0, last, 5)
+    ends = (y - half, y + half) if half is not None else (None, None)
+    return Line(T, y, name, lo=ends[0], hi=ends[1], exact=exact)
+
+
+def figure(*panels, title="σ of the range"):
+    return Figure("f", title, "How.", tuple(Panel(Axis("t"), Axis("y"), lines) for lines in panels))
+
+
+def test_of_one_panel_the_lowest_and_the_highest_with_their_values():
+    made = figure((line("r", 3.0), line("r+Vr", 1.0), line("none", 2.0)))
+    assert seen.at_the_end(made, "m/s2") == ("σ of the range, at the end: lowest r+Vr (1 m/s²), highest r (3 m/s²).")
+
+
+def test_lines_whose_intervals_overlap_are_told_together():
+    made = figure((line("a", 1.0), line("b", 1.15), line("c", 3.0)))
+    assert "lowest a and b (1)" in seen.at_the_end(made)
+    assert "highest c (3)" in seen.at_the_end(made)
+    level = figure((line("a", 1.0), line("b", 1.1)))
+    assert seen.at_the_end(level) == "σ of the range: at the end all within each other's intervals."
+
+
+def test_an_unknown_interval_is_no_difference():
+    nothing = np.full(5, np.nan)
+    made = figure((line("a", 1.0), Line(T, np.linspace(9.0, 3.0, 5), "b", lo=nothing, hi=nothing)))
+    assert "within each other's intervals" in seen.at_the_end(made)
+
+
+def test_of_several_panels_how_often_which():
+    low, high = (line("a", 1.0), line("b", 3.0)), (line("a", 3.0), line("b", 1.0))
+    assert seen.at_the_end(figure(low, low)) == "σ of the range, at the end: lowest a in every panel."
+    assert seen.at_the_end(figure(low, low, high)).endswith("lowest a in 2 and b in 1 of 3 panels.")
+    assert seen.at_the_end(figure((line("a", 1.0),))) == ""
+
+
+def test_gains_and_maps():
+    gain = Line(T, np.array([0.0, 30.0, 35.0, 20.0, 18.0]), "r+Vr")
+    assert seen.most(figure((gain,), title="Gain")) == "Gain: at most 35 %, r+Vr, at 2 s, and 18 % at the end."
+    heat = Heat(T[:2], T[:2], np.array([[0.5, np.nan], [0.25, 1.0]]), "share")
+    assert seen.over(figure((heat,), title="Lock")) == "Lock: from 0.25 to 1."
+
+
+def test_crosses_are_told_of_where_there_are_any():
+    without, with_some = figure((line("a", 1.0),)), figure((line("a", 1.0, exact=T),))
+    assert seen.crossed(without).caption == "How."
+    assert seen.crossed(with_some).caption == "How. Crosses: exact values."
+    hidden = figure((line("a", 1.0, exact=np.full(5, np.nan)),))
+    assert seen.crossed(hidden).caption == "How."
+
+
+def test_every_figure_of_a_run_tells_of_its_crosses_and_of_nothing_else(tmp_path):
+    from radarsim.app import output
+    from radarsim.app.run import run
+
+    for config in ("rls2", "sonar_asynchronous"):
+        result = run(config, realisations=400)
+        for name, one in output.figures(result.cases, result.tables, result.experiment).items():
+            lines = [m for panel in one.panels for m in panel.marks if isinstance(m, Line) and m.exact is not None]
+            crossed = any(np.isfinite(m.exact).any() for m in lines)
+            assert ("Crosses" in one.caption) is crossed, name
