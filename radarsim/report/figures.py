@@ -390,7 +390,8 @@ def _at_ends(axes: Axes, panel: Panel) -> list[Annotation]:
     texts = []
     for m in legends.lines(panel):
         last = np.flatnonzero(np.isfinite(m.y))[-1]
-        y = float(np.clip(m.y[last], *sorted(axes.get_ylim())))  # a line may end beyond an axis that is cut
+        low, high = sorted(axes.get_ylim())
+        y = float(np.clip(m.y[last], low, high))  # a line may end beyond an axis that is cut
         texts.append(
             axes.annotate(
                 m.label,

@@ -8,9 +8,10 @@ import pytest
 
 from radarsim.app import run as experiment
 from radarsim.report.drawing import Line
-from radarsim.studies.discriminator import claims, measures, words
+from radarsim.studies.discriminator import claims, measures, study, words
 from radarsim.studies.discriminator import tables as report
 from radarsim.studies.discriminator.kernels.sums import bin_edges
+from radarsim.studies.discriminator.map import one_burst
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +78,17 @@ def test_figures_show_the_paper_and_the_locks(made):
     assert made.figures == ("residuals", "locks", "accuracy")
     panels = made._described["residuals"].panels
     assert len(panels) == 6
-    assert [mark.label for mark in panels[1].marks] == ["median", "3σ"]
+    assert [mark.label for mark in panels[1].marks] == ["median", "3σ", "one burst"]
+
+
+def test_the_burst_that_is_drawn_is_the_first_of_the_run():
+    case = experiment.load("discriminator").cases[0]
+    plan = study.prepare(case)
+    number = plan.axes.filters.index("cured")
+    squares = plan.layout.unpack(study.simulate(plan, 0, 1))["error_all"][number, ..., 1]
+    drawn = one_burst(case, number)
+    windows = len(plan.axes.pulses[number])
+    np.testing.assert_allclose(drawn, (np.sqrt(squares) * plan.axes.exact_sigma[number])[:windows], rtol=1e-12)
 
 
 def test_swept_cases_are_drawn_against_their_key():

@@ -16,9 +16,9 @@ def made_of(results):
     return {"curves": tables.curves(results), "gains": tables.gains(results), **range_doppler.tables(results)}
 
 
-def drawn_of(results, made=None):
+def drawn_of(results, made=None, stem="mine"):
     """Its figures, each showing every case."""
-    everything = SimpleNamespace(shown_in=lambda name: [SimpleNamespace(name=r.name) for r in results])
+    everything = SimpleNamespace(stem=stem, shown_in=lambda name: [SimpleNamespace(name=r.name) for r in results])
     return range_doppler_figures.figures(results, made or made_of(results), everything)
 
 
@@ -105,6 +105,15 @@ def test_bounds_of_the_normalised_error(paper):
     share = 0.025 / 15  # of fifteen scans
     assert row["nees_bound_lo"] == pytest.approx(chdtri(freedom, 1 - share) / freedom, rel=1e-7)
     assert row["nees_bound_hi"] == pytest.approx(chdtri(freedom, share) / freedom, rel=1e-7)
+
+
+def test_captions_have_the_papers_figure_numbers_where_they_are_of_its_experiment(expected_radar):
+    results = [expected_radar("rls2")]
+    numbers = {"sigma_r": "1a", "gain_r": "1b", "sigma_Vr": "2a", "gain_Vr": "2b", "sigma_ar": "3a", "gain_ar": "3b"}
+    for name, one in drawn_of(results, stem="range_doppler").items():
+        told = f"Figure {numbers[name]} of the paper." if name in numbers else "of the paper."
+        assert (told in one.caption) is (name in numbers)
+    assert not any("of the paper." in one.caption for one in drawn_of(results).values())
 
 
 def test_figures_have_the_contracts_names(paper, swept):
