@@ -75,7 +75,7 @@ def test_residuals_lie_under_three_bounds(made):
 
 
 def test_figures_show_the_paper_and_the_locks(made):
-    assert made.figures == ("residuals", "locks", "accuracy")
+    assert made.figures == ("locks", "accuracy", "residuals")
     panels = made._described["residuals"].panels
     assert len(panels) == 6
     assert [mark.label for mark in panels[1].marks] == ["median", "3σ", "one burst"]
