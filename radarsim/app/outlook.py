@@ -81,7 +81,8 @@ def outlook(
         count = case.realisations if need is None else ending(need, case.realisations)
         axes = work.plan.axes
         cases.append(CaseOutlook(case.name, ", ".join(axes.filters), len(axes.k), count, each * count, need))
-        control |= experiment.control_variate and controls(axes)
+        of = registry.study(case.study)
+        control |= experiment.control_variate and (of.own_controls or (of.exact_errors and controls(axes)))
         largest = max(largest, work.size)
         if progress is not None:
             progress(done, len(experiment.cases), 0)

@@ -31,7 +31,7 @@ def tables(results: Sequence[CaseResult], control_variate: bool = False, stem: s
     """
     of = study(results[0].study)
     made = measured(results)
-    if control_variate and of.exact_errors:
+    if control_variate and of.exact_errors and not of.own_controls:
         made["controlled"] = controlled.controlled(results)
     made["claims"] = claims.judged(of.claims(), results, made, configs.shipped, stem)
     return notes.noted(made, results)

@@ -143,10 +143,10 @@ class Result:
 
         figures may name the formats of their files: svg, png, pdf; width_mm is their width in place of their own. What
         was written comes back. Raises DisagreementError, with all written, where an exact value of a claim and its
-        simulation differ beyond chance.
+        simulation differ beyond chance, or values with and without controls.
         """
         from radarsim.app import arguments, output
-        from radarsim.report import claims, index, provenance
+        from radarsim.report import claims, controlled, index, provenance
 
         folder = Path(out) / self.experiment.stem
         self._join_readings(Path(out))
@@ -156,7 +156,7 @@ class Result:
         write = partial(output.write, draw=bool(formats), formats=formats, width_mm=width_mm)
         self.written = write(self.experiment, self.cases, folder, facts, made=self.tables)
         index.write(Path(out))
-        if errors := claims.errors(self._tables["claims"]):
+        if errors := [*claims.errors(self._tables["claims"]), *controlled.faults(self._tables)]:
             raise DisagreementError(*errors)
         return self.written
 

@@ -16,7 +16,7 @@ class Case:
 
     name is the stem of its config with ` key=value` for each swept key. spec holds the study's own keys, an object of
     its subclass of `radarsim.config.fields.Study`. noise_of, where given, are the keys of another case, whose noise
-    this one shares although its world is another: common random numbers.
+    this one shares although its world is another: common random numbers. control_variate: as of the experiment.
     """
 
     name: str
@@ -27,11 +27,13 @@ class Case:
     realisations: int
     seed: int
     noise_of: Any = None
+    control_variate: bool = False
 
     def resolved(self) -> dict[str, Any]:
         """The case as plain JSON-able data, names included."""
         common = {"case": self.name, "swept": dict(self.swept), "realisations": self.realisations, "seed": self.seed}
-        return common | complete(self.spec)
+        asked = {"control_variate": True} if self.control_variate else {}
+        return common | asked | complete(self.spec)
 
 
 @dataclass(frozen=True)

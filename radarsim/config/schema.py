@@ -38,7 +38,7 @@ class Common(Model):
     control_variate: Flag = Field(
         False,
         title="table with a control variate",
-        description="a further table, controlled.csv: σ of each filter with the baseline, exactly known, as control",
+        description="a further table, controlled.csv: σ with controls known exactly: the baseline, or filters beside",
     )
 
 

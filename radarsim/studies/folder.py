@@ -67,6 +67,7 @@ class StudyFolder(Study):
     paper: Paper | None = None
     offers: tuple[OptionalPart, ...] = ()
     exact_errors: bool = True
+    own_controls: bool = False
     draws_sweeps: bool = False
 
     def __post_init__(self) -> None:

@@ -43,7 +43,9 @@ def identity(case: Case) -> str:
     """What a case's numbers depend on, as SHA-256 in hexadecimal."""
     from radarsim.kernels import random  # the compiler, which takes half a second, is not loaded for `radarsim list`
 
-    shared = {} if case.noise_of is None else {"noise_of": world(case.noise_of)}
+    shared: dict[str, object] = {} if case.noise_of is None else {"noise_of": world(case.noise_of)}
+    if case.control_variate and study(case.study).own_controls:
+        shared["control_variate"] = True
     return digest(
         shared
         | {

@@ -31,8 +31,9 @@ def test_one_realisation():
     [
         (["rls2", "--set", "control_variate=true"], False),
         (["rls2"], False),
-        (["multimodel_1hz", "--set", "control_variate=true"], True),
-        (["multimodel_1hz"], False),
+        (["multimodel_1hz", "--set", "control_variate=true"], False),
+        (["discriminator_pair", "--set", "control_variate=true"], True),
+        (["discriminator_pair"], False),
     ],
 )
 def test_a_control_variate_without_effect_is_told_as_by_a_run(words, warned):

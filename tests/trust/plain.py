@@ -51,6 +51,11 @@ def total(x):
     return x[0]
 
 
+def add_totals(pointer, number, *values):
+    for i, value in enumerate(values):
+        pointer[number + i] += total(value)
+
+
 LANES = {
     "where_greater": lambda x, y, yes, no: np.where(x > y, yes, no),
     "any_greater": lambda x, y: bool(np.any(x > y)),
@@ -59,6 +64,7 @@ LANES = {
     "nearest": np.rint,
     "power_of_two": lambda x: np.ldexp(1.0, x.astype(int)),
     "total": total,
+    "add_totals": add_totals,
     "address": lambda array: Pointer(array.reshape(-1)),
     "row": lambda pointer, number: Pointer(pointer.array, pointer.start + WIDTH * number),
     "get": lambda pointer, row: pointer.array[pointer.row(row)].copy(),
@@ -147,6 +153,8 @@ RIVAL["burst"] = COMPLEX["burst"] | {"pulse_length_s": 1e-6, "pulses": 1024}
 # Angles as rough as ranges: the plots' covariance is of a condition near 50 and not 3·10⁶, which multiplies rounding.
 EVEN = ["sensor.sigma_range_m=2500", "sensor.sigma_elevation_deg=2", "sensor.sigma_azimuth_deg=2"]
 SHORT = ["scans=9", "report_every=3", *EVEN]
+ONE = "filters=[{name: a, family: kalman, models: [{motion: accelerated, sigma_acceleration_mps2: 20}]}]"
+CONTROLLED = ["control_variate=true", "scans=8", *EVEN, ONE]
 SWEPT = [word if "elevation" not in word else "sweep.sensor.sigma_elevation_deg=[2]" for word in SHORT]
 NEAR = "target={kind: polynomial, frame: polar, range_m: [900, -4], bearing_deg: [2, 0.01]}"
 DETECTORS = "{name: a, plots: 4, false_alarm_probability: [0.1]}, {name: b, plots: 4, test_every: 4, threshold_k: [2]}"
@@ -179,6 +187,7 @@ RUNS = {
     "sonar clutter": ("sonar_clutter", ["scans=8", "sweep.sensor.false_plots_per_km2=[0.3]"], 9),
     "multimodel families": ("multimodel_families", SHORT, 8),
     "multimodel irregular": ("multimodel_irregular", SHORT, 8),
+    "multimodel controls": ("multimodel_irregular", CONTROLLED, 8),
     "multimodel at prediction": ("multimodel_covariance", SWEPT, 8),
     "discriminator on block sums": (DISCRIMINATOR | {"engine": "block_sums", "blocks_per_window": 8}, [], 8),
     "discriminator shifted": (DISCRIMINATOR | SHIFTED | {"engine": "block_sums", "blocks_per_window": 8}, [], 8),
@@ -220,9 +229,11 @@ class Work:
 
 
 def work(config, overrides):
-    """The last case of a config."""
+    """The last case of a config; a pilot of it takes few realisations."""
     from radarsim.app.configs import load
+    from radarsim.studies.multimodel import controls
 
+    controls.PILOT = 40
     return Work(load(config, overrides).cases[-1])
 
 

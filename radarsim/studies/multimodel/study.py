@@ -8,7 +8,7 @@ from radarsim.config.experiment import Case
 from radarsim.engine.moments import Layout
 from radarsim.engine.results import Axes
 from radarsim.kernels.lanes import WIDTH, rows
-from radarsim.studies.multimodel import filters
+from radarsim.studies.multimodel import controls, filters
 from radarsim.studies.multimodel.config import Keys
 from radarsim.studies.multimodel.kernels import plots, records, sums
 from radarsim.studies.multimodel.world import intervals, plot_truth, sensor_frame, truth
@@ -41,12 +41,13 @@ class FlightAxes(Axes):
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a block needs; see `kernels.records` for the arrays."""
+    """All that a block needs; see `kernels.records` for the arrays. The controls are made for the first block."""
 
     layout: Layout
     axes: FlightAxes
     world: records.World
     banks: records.Banks
+    controls: controls.Once
     block: int = BLOCK
     gaussian = False
 
@@ -100,8 +101,14 @@ def prepare(case: Case) -> Plan:
         lengths=lengths,
         weights=filters.start_weights(t[: records.START], spec.start_acceleration_mps2),
     )
-    shapes = records.shapes(len(spec.filters), int(reported.sum()), len(lengths))
-    return Plan(Layout(**shapes), axes(spec, t, x, reported, lengths), world, banks(spec, times))
+    sizes = len(spec.filters), int(reported.sum()), len(lengths)
+    shapes, members = records.shapes(*sizes), banks(spec, times)
+    beside = controls.Once(lambda: controls.none(len(spec.filters)))
+    if case.control_variate:
+        shapes |= records.controlled_shapes(*sizes)
+        other = world._replace(keys=np.stack([noise_key(case, "pilot plots"), noise_key(case, "pilot detections")]))
+        beside = controls.Once(lambda: controls.piloted(spec, other, members))
+    return Plan(Layout(**shapes), axes(spec, t, x, reported, lengths), world, members, beside)
 
 
 def axes(spec: Keys, t: np.ndarray, x: np.ndarray, reported: np.ndarray, lengths: np.ndarray) -> FlightAxes:
@@ -126,9 +133,11 @@ def axes(spec: Keys, t: np.ndarray, x: np.ndarray, reported: np.ndarray, lengths
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
     values = np.zeros(plan.layout.size)
-    arrays = records.Sums(**plan.layout.unpack(values))
+    arrays = plan.layout.unpack(values)
+    plain = records.Sums(*(arrays[name] for name in records.Sums._fields))
     memory = sums.memory(len(plan.banks.numbers), len(plan.world.lengths))
-    sums.simulate_block(plan.world, plan.banks, memory, arrays, plan.axes.baseline, first, count)
+    beside = controls.beside(plan.controls(), arrays)
+    sums.simulate_block(plan.world, plan.banks, memory, plain, plan.axes.baseline, first, count, beside)
     return values
 
 
