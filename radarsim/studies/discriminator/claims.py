@@ -1,4 +1,4 @@
-"""P4.1 … P4.10: what Uss, Baryshev & Djavad (2010) say, read from their words alone.
+"""P4.1 … P4.17: what Uss, Baryshev & Djavad (2010) say, read from their words alone.
 
 Places are the article's sections (Aviacionno-kosmicheskaya tehnika i tehnologiya 2010, no. 6): 3 holds the method, 4
 the experiment. Its numbers are judged in both readings of its noise and threshold, see discriminator_measures.
@@ -24,7 +24,7 @@ from radarsim.report.claims import (
     same,
     within,
 )
-from radarsim.report.statistics import Estimate
+from radarsim.report.statistics import Estimate, difference
 from radarsim.studies.discriminator.measures import (
     COMPONENTS,
     COMPUTED,
@@ -35,6 +35,7 @@ from radarsim.studies.discriminator.measures import (
     Evidence,
     OfReading,
     accuracy_of,
+    closed_over_sum,
     doppler_of_polynomial,
     doppler_of_speed,
     efficient,
@@ -229,7 +230,7 @@ CLAIMS = (
     _claim(
         7,
         "section 3",
-        "A wide discriminator alone has a lower accuracy",
+        "A wide discriminator alone loses the signal less often, and has a lower accuracy",
         *(
             part
             for component in COMPONENTS[:2]
@@ -238,6 +239,15 @@ CLAIMS = (
                 "",
                 wide_over_whole(component),
                 greater(),
+            )
+        ),
+        *(
+            replace(part, statement="lock")
+            for part in _both(
+                "share of bursts locked by the first window alone less that by the whole burst alone",
+                "",
+                lambda seen, key: difference(seen.lock(key, "wide"), seen.lock(key, "narrow")),
+                above(0, 0.01),
             )
         ),
         original="Для широкой дискриминационной характеристики ситуация меняется на обратную: снижается вероятность "
@@ -391,7 +401,50 @@ CLAIMS = (
         original="… радиальная скорость меняется соответственно от 0 до 350 м/c, далее от 350 м/c до 450 м/c и от 450 "
         "м/c до 475 м/c. … Пересчитывая мгновенную радиальную скорость в доплеровскую частоту и аппроксимируя ее … "
         "полиномом …, получим, что f_0 = 10·10³ Гц, f_1 ≈ 180·10³ Гц², f_2 ≈ −750·10³ Гц³, f_3 ≈ 1000·10³ Гц⁴.",
-        reading="2v/λ at the ends of the stated intervals; approximate: 10 %, and 1 kHz where the speed is nil",
+        reading="2v/λ at the ends of the stated intervals; approximate: 10 %, and 1 kHz where the speed is nil. If the "
+        "10 kHz are the offset to which the receiver moves the signal, it fails at the other three by 8 to 9 kHz",
         internal=True,
+    ),
+    _claim(
+        16,
+        "section 3, after (6)",
+        "The closed form of the Fisher matrix approximates that of the burst",
+        *(
+            Part(
+                (PRINTED,),
+                f"potential spread of {component} by the closed form over the sum over the pulses",
+                "",
+                closed_over_sum(component),
+                same(1, 0.01),
+            )
+            for component in COMPONENTS
+        ),
+        original="Для рассматриваемого сигнала в виде когерентной пачки импульсов … можно получить следующие "
+        "приближенные выражения: Φ_1,1 = 2μ; …",
+        reading="approximates: spreads within 1 %",
+    ),
+    _claim(
+        17,
+        "section 4",
+        "The amplitude estimated by (7) from the simulated burst is 1.17",
+        *(
+            replace(part, number="amplitude", variant=part.cases[0], against_print=part.cases[0] == COMPUTED)
+            for part in _both(
+                "share of bursts whose (7) lies as far from its mean",
+                "",
+                lambda seen, key: certain(seen.as_far(key, ESTIMATE)),
+                above(0.05),
+            )
+        ),
+        *_both(
+            "the same, were 1.17 the root of (7)",
+            "",
+            lambda seen, key: certain(seen.as_far(key, ESTIMATE**2)),
+            above(0.05),
+            asserted=False,
+        ),
+        original="На первом этапе оценивается амплитуда сигнала по выражению (7): Â = 1,17.",
+        reading="one burst: it contradicts the parameters if fewer than one in twenty is as far from A = 1. (7) as "
+        "printed gives the square; of the samples within pulses",
     ),
 )

@@ -5,6 +5,7 @@ one it states, and then its threshold c is the 1 of (14); its first window follo
 0.5 of (11). Both readings are judged: "computed" and "printed".
 """
 
+import math
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
@@ -111,6 +112,17 @@ class Evidence(claims.Evidence):
         found = exact.spreads(exact.fisher_sums(burst, len(COMPONENTS), [burst.pulses - 1])[0])
         return certain(found[COMPONENTS.index(component)])
 
+    def as_far(self, key: Key, value: float) -> float:
+        """Share of bursts whose (7), the square of the amplitude, lies as far from its mean as a value, either way.
+
+        The sum of so many squares is Gaussian: of N samples with noise σ² it has a variance N (2σ⁴ + 2σ²A²).
+        """
+        burst = self.case(key).spec.burst
+        samples, noise = burst.pulses * round(burst.pulse_length_s / burst.sampling_period_s), burst.noise_variance
+        square = burst.amplitude**2
+        spread = 2 * math.sqrt((2 * noise**2 + 2 * noise * square) / samples)
+        return math.erfc(abs(value - square) / spread / math.sqrt(2))
+
     def efficient(self, key: Key) -> float:
         """What an efficient estimator would score in `always`, over the windows of the sequence."""
         result, i = self.case(key), self.estimator(key, "sequence")
@@ -147,6 +159,14 @@ OfReading = Callable[[Evidence, str], Estimate]
 def potential_of(component: str) -> OfReading:
     """Potential spread of a component."""
     return lambda seen, key: seen.potential(key, component)
+
+
+def closed_over_sum(component: str) -> Measure:
+    """Potential spread of a component by the closed form over that by the sum over the pulses."""
+    c = COMPONENTS.index(component)
+    return lambda seen: certain(
+        seen.case(PRINTED).axes.potential_closed_form[c] / seen.potential(PRINTED, component).value
+    )
 
 
 def accuracy_of(component: str) -> OfReading:

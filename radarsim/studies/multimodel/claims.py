@@ -1,4 +1,4 @@
-"""P2.1 … P2.14: what Sychev & Osipov (2023) say, read from their words alone.
+"""P2.1 … P2.15: what Sychev & Osipov (2023) say, read from their words alone.
 
 Places are the sections of the article (Trudy MAI, 2023, no. 129). The paper's trajectory is lost: claims on it are
 judged on the shipped `aeroballistic`, which was chosen before any filter ran on it; where a claim speaks of flights
@@ -10,7 +10,7 @@ of climb.
 from collections.abc import Callable
 from dataclasses import replace
 
-from radarsim.report.claims import Claim, Part, above, at_least, below, certain, greater, kept, less, same
+from radarsim.report.claims import Claim, Part, above, at_least, at_most, below, certain, greater, kept, less, same
 from radarsim.report.statistics import Estimate
 from radarsim.studies.multimodel.measures import (
     AEROBALLISTIC,
@@ -20,11 +20,13 @@ from radarsim.studies.multimodel.measures import (
     MMA2_122,
     RIVALS,
     Evidence,
+    cost_of_merging_early,
     cost_part,
     gain_part,
     growth_of_change,
     largest_fault_of_powers,
     lead_part,
+    merged_early,
     probability_part,
     rival_parts,
 )
@@ -352,5 +354,30 @@ CLAIMS = (
         original="Рассматривая процесс смены типа движения воздушного объекта как Марковскую цепь несложно прийти к "
         "выводу, что вероятность смены типа движения растет при увеличении интервала времени Δt.",
         reading="algebra of the matrices in use",
+    ),
+    _claim(
+        "15",
+        "part 1, last sentences",
+        "MMA2 is the IMM algorithm: merging before extrapolation gives the same, at a lower cost",
+        Part(
+            (PAPER,),
+            "largest relative difference of merging before and after extrapolation",
+            "",
+            lambda seen: certain(merged_early(seen, PAPER, MMA2_122)),
+            at_most(1e-9),
+            statement="same",
+        ),
+        Part(
+            (PAPER,),
+            "operations of extrapolating what is merged over those of merging what is extrapolated",
+            "",
+            lambda seen: certain(cost_of_merging_early(seen, PAPER, MMA2_122)),
+            less(),
+            statement="cost",
+        ),
+        original="Поэтому появляется возможность … провести с учетом этого вычисление объединенных вектора состояния и "
+        "его ковариационной матрицы, а только потом провести их экстраполяцию. В результате ММА2 полностью "
+        "соответствует описанию алгоритма IMM [1]. Это позволяет дополнительно сократить вычислительные затраты.",
+        reading="algebra of the models of MMA2-122, on hypotheses drawn at random; operations are counted",
     ),
 )

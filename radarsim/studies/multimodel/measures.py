@@ -14,7 +14,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import claims
 from radarsim.report.claims import Part, Range, certain
 from radarsim.report.statistics import Estimate
-from radarsim.studies.multimodel import filters, tables
+from radarsim.studies.multimodel import cost, filters, tables
 
 BANK_122 = ("uniform 0.05", "accelerated 0.05", "accelerated 30")
 BANK_11 = ("uniform 5", "uniform 30")
@@ -149,6 +149,49 @@ def largest_fault_of_powers(seen: Evidence, key: tuple, tenfold: bool) -> float:
         product = np.linalg.multi_dot([T] * 10) if len(T) > 1 else T
         faults.append(np.abs(ten - product if tenfold else near - np.eye(len(T))).max())
     return float(max(faults))
+
+
+def merged_early(seen: Evidence, key: tuple, wanted: tuple) -> float:
+    """The largest relative difference of merging hypotheses before a model extrapolates them and after, on an axis.
+
+    The hypotheses are drawn at random; weights are those of (7), merged by moments (4).
+    """
+    options = seen.case(key).spec.filters[seen.filter(key, wanted)]
+    T = filters.transition_matrix(options.transition)
+    dt = float(seen.case(key).spec.sensor.scan_period_s)
+    rng = np.random.default_rng(1)
+    p = rng.dirichlet(np.ones(len(T)))
+    x, root = rng.normal(size=(len(T), 3)), rng.normal(size=(len(T), 3, 3))
+    P = root @ np.swapaxes(root, 1, 2)
+    faults = []
+    for n, model in enumerate(options.models):
+        moves, accelerates = filters.MOTIONS[model.motion]
+        F = np.array([[1, moves * dt, accelerates * dt**2 / 2], [0, 1, accelerates * dt], [0, 0, accelerates]])
+        G = np.array([dt**2 / 2, dt, accelerates])
+        Q = model.sigma_acceleration_mps2**2 * np.outer(G, G)
+        weight = T[n] * p / (T[n] @ p)
+        early, late = _moments(weight, x, P), _moments(weight, x @ F.T, F @ P @ F.T + Q)
+        for one, other in ((F @ early[0], late[0]), (F @ early[1] @ F.T + Q, late[1])):
+            faults.append(float(np.abs(one - other).max() / np.abs(other).max()))
+    return max(faults)
+
+
+def _moments(weight: np.ndarray, x: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (3,) and covariance (3, 3) of hypotheses (n, 3), (n, 3, 3) by (4)."""
+    mean = weight @ x
+    apart = x - mean
+    return mean, np.einsum("i,ijk->jk", weight, P + apart[:, :, None] * apart[:, None, :])
+
+
+def cost_of_merging_early(seen: Evidence, key: tuple, wanted: tuple) -> float:
+    """Operations of a scan of a filter that extrapolates what is merged, over one that merges what is extrapolated."""
+    options = seen.case(key).spec.filters[seen.filter(key, wanted)]
+    fixed, merge, once = cost.operations_of(options)
+    whole = fixed + merge * np.count_nonzero(filters.transition_matrix(options.transition)) + once
+    sources = np.count_nonzero(filters.transition_matrix(options.transition), axis=1)
+    accelerates = [filters.MOTIONS[model.motion][1] > 0 for model in options.models]
+    more = sum((n - 1) * cost.PREDICT[a] for n, a in zip(sources, accelerates, strict=True))
+    return float(whole / (whole + more))
 
 
 def rival_parts(key: tuple, stages: tuple[str, ...], expected: Range) -> tuple[Part, ...]:

@@ -593,4 +593,48 @@ CLAIMS = (
         "измерения дальности, радиальной скорости и периода обзора.",
         reading="depends: by more than a point; each of the four is a sentence of its own",
     ),
+    _claim(
+        33,
+        "figures, after figure 3",
+        "The acceleration gain depends on how the accuracies of range and velocity compare",
+        *(
+            Part(
+                (more, less),
+                f"final acceleration gain of RLS {more} less that of RLS {less}, of a smaller σ_r / σ_V",
+                "points",
+                measured.least_minus_largest("ar", (more,), (less,), "last", strict=True),
+                above(0),
+            )
+            for more, less in ((4, 2), (2, 1))
+        ),
+        original="Анализ относительного выигрыша в точности фильтрации радиального ускорения … для каждого типа "
+        "гипотетической РЛС подчеркивает его зависимость от соотношения точности оценок дальности и оценок радиальной "
+        "скорости.",
+        reading="radars of one period, whose σ_r / σ_V is 5, 16.7, 50 s: the gain grows with it, by more than a point",
+    ),
+    _claim(
+        34,
+        "conclusion, ambiguity",
+        "The Doppler frequency is ambiguous in the centimetre band, and not in the metre band",
+        Part(
+            (4,),
+            "Doppler frequency of 300 m/s in repetition rates, centimetre band",
+            "",
+            measured.doppler(4),
+            above(0.5),
+            statement="centimetre",
+        ),
+        Part(
+            (1,),
+            "Doppler frequency of 300 m/s in repetition rates, metre band",
+            "",
+            measured.doppler(1),
+            below(0.5),
+            statement="metre",
+        ),
+        original="… для сантиметровых станций возникает эффект неоднозначности оценки частоты Доплера. … В метровых "
+        "станциях данное явление не возникает …",
+        reading="of the paper's own example, 300 m/s at 1 kHz; ambiguous: over half of the repetition rate, on either "
+        "side of zero",
+    ),
 )

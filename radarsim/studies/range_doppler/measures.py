@@ -29,6 +29,8 @@ Key = int | tuple[int, float]  # a radar at D_M = 10⁻³, or a radar and its D_
 class Evidence(claims.Evidence):
     """Finds the paper's radars, and its two filters, by what they are."""
 
+    extremum = 1.0  # point of gain: what differs by less is no material difference, of two times either
+
     def case(self, key: Any) -> CaseResult:
         """key: the number of a radar (at D_M = 10⁻³), or (number, D_M)."""
         radar, variance = key if isinstance(key, tuple) else (key, VARIANCE)
@@ -137,19 +139,19 @@ def gain_raised(seen: Evidence, slow: int, fast: int) -> Estimate:
     return minus(*common_times(seen.k_gain(fast, "r"), seen.k_gain(slow, "r"))).least()
 
 
-EXTREMUM = 1.0  # point of gain: what differs by less is no material difference, of two times either
-
-
 def extrema_apart(seen: Evidence, slow: int, fast: int) -> Estimate:
-    """Time from one radar's largest range gain to the other's, s; each is all times within a point of the largest."""
-    return apart_in_time(*(_extremum(seen.k_gain(radar, "r")) for radar in (fast, slow)))
+    """Time from one radar's largest range gain to the other's, s; each is all times within a point of the largest.
+
+    Or within as much as the evidence takes for one: 0 for the largest value alone.
+    """
+    return apart_in_time(*(_extremum(seen.k_gain(radar, "r"), seen.extremum) for radar in (fast, slow)))
 
 
-def _extremum(gain: Series) -> tuple[Estimate, Estimate]:
-    """First and last time at which a gain is within a point of its largest; with intervals, at which it may be."""
+def _extremum(gain: Series, within: float) -> tuple[Estimate, Estimate]:
+    """First and last time at which a gain is so near its largest; with intervals, at which it may be."""
     top = gain.largest()
-    sure = gain.t[gain.value >= top.value - EXTREMUM]
-    likely = gain.t[gain.hi >= top.lo - EXTREMUM]
+    sure = gain.t[gain.value >= top.value - within]
+    likely = gain.t[gain.hi >= top.lo - within]
     return Estimate(sure[0], likely[0], sure[0]), Estimate(sure[-1], sure[-1], likely[-1])
 
 

@@ -18,7 +18,7 @@ from radarsim.studies.range_doppler import measures, recursion
 from radarsim.studies.range_doppler.claims import CLAIMS
 from radarsim.studies.range_doppler.measures import RADARS
 
-ALGEBRA = ("P1.16", "P1.31")  # of the table of radars alone
+ALGEBRA = ("P1.16", "P1.31", "P1.34")  # of the table of radars alone
 NUMBERS = tuple(claim.id for claim in CLAIMS if claim.id not in ALGEBRA)
 FAST = tuple(  # those that look at a radar of Δt = 5 s
     claim.id
@@ -81,6 +81,17 @@ CHOICES = (
             Alternative("100 s", UNSTATED, "the time to which the passage speaks"),
         ),
         FALLS,
+    ),
+    Choice(
+        "extremum",
+        "What an extremum of a gain is",
+        "Экстремум выигрыша при разных периодах повторения достигается примерно в одно время.",
+        "The extremum of the gain is reached at about the same time with different periods.",
+        (
+            Alternative("within a point", UNSTATED, "every time at which the gain is within a point of its largest"),
+            Alternative("the largest value", UNSTATED, "the one point that is largest, by however little"),
+        ),
+        ("P1.11",),
     ),
     Choice(
         "settled_within",
@@ -221,6 +232,7 @@ class ExactEvidence(measures.Evidence):
     def __init__(self, reading: Reading, limit_s: float = np.inf):
         super().__init__((), {}, {})
         self._reading, self._limit_s = reading, limit_s
+        self.extremum = 0.0 if reading["extremum"] == "the largest value" else measures.Evidence.extremum
         self._own = float(reading["manoeuvre_variance"])
         self._cases: dict[Any, _Radar] = {}
         self._curves: dict[tuple[Any, str, str], Series] = {}

@@ -1,4 +1,4 @@
-"""P3.1 … P3.7, P3.11 … P3.13: what Butyrskiy says of smoothing, from his words alone, before anything was measured.
+"""P3.1 … P3.7, P3.11 … P3.17: what Butyrskiy says of smoothing, from his words alone, before anything was measured.
 
 The paper has no experiment and prints few numbers, so most statements are formulas. A formula holds when what is
 measured is within 1 % of it in σ, within 2 % in a variance or covariance; an identity, to 10⁻⁹. Places are the
@@ -22,8 +22,9 @@ def _claim(
     original: str,
     reading: str = "",
     config: str = "sonar_smoothing",
+    internal: bool = False,
 ) -> Claim:
-    return Claim(f"P3.{number}", place, statement, parts, reading, config, original)
+    return Claim(f"P3.{number}", place, statement, parts, reading, config, original, internal=internal)
 
 
 def _formula(what: str, n: int) -> Part:
@@ -248,5 +249,42 @@ CLAIMS = (
         reading="on the shipped course whose velocity walks at random: the Kalman-Bucy filter (11) with process noise "
         "against the recursion without it",
         config="sonar_fluctuating",
+    ),
+    _claim(
+        16,
+        "after (12)",
+        "Over an interval of any length g_n is g_{n−1} + f_n Δt/T₀",
+        *(
+            Part(
+                (TEXTBOOK,),
+                f"g_{n} of this formula at equal intervals over the closed form n(n−1)/2",
+                "",
+                measured.printed_sum(n),
+                SAME,
+            )
+            for n in (2, 5, 20)
+        ),
+        original="Если экстраполяция производится на произвольный интервал времени Δt_э, формулы для h_n и g_n "
+        "приобретают вид: … g_n = g_{n−1} + f_n(Δt_э/T_0).",
+        reading="an interval of T₀ is one of any length: (12) has f_{n−1} there, and step 5 the closed form",
+        internal=True,
+    ),
+    _claim(
+        17,
+        "correlated errors, after (15)",
+        "The predictable part of correlated errors lets them be forecast and smoothed",
+        *(
+            Part(
+                (correlated(rho),),
+                f"σ of the range after 20 plots at ρ = {rho:g}, errors taken as independent over errors estimated",
+                "",
+                measured.ignored(rho),
+                greater(),
+            )
+            for rho in (-0.5, 0.6, 0.9)
+        ),
+        original="Наличие предсказуемой части позволяет прогнозировать и сглаживать ошибки измерения.",
+        reading="it pays: the filter that estimates the errors is better than one that takes them as independent",
+        config="sonar_correlated",
     ),
 )

@@ -160,6 +160,25 @@ def _difference(seen: Evidence, key: CaseKey, one: str, other: str) -> Estimate:
     return certain(largest)
 
 
+def ignored(rho: float) -> Measure:
+    """σ of the range at the end, of the Kalman filter that takes errors as independent over the augmented one's."""
+
+    def measure(seen: Evidence) -> Estimate:
+        key = correlated(rho)
+        naive, own = (seen.curve(key, seen.filter(key, kind), "r").last() for kind in ("kalman", "kalman_augmented"))
+        return ratio(naive, own)
+
+    return measure
+
+
+def printed_sum(n: int) -> Measure:
+    """g after n plots of equal weight and interval by the print's formula for any interval, over its closed form."""
+    g = 0.0
+    for f in range(2, n + 1):  # f is the number of plots, the new one with them
+        g += f
+    return lambda seen: certain(g / (n * (n - 1) / 2))
+
+
 def at_a_miss(kind: str) -> Measure:
     """σ of the range at the first missed scan over σ extrapolated to it from the scan before: of the same
     realisations.

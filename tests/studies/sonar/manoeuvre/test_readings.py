@@ -49,3 +49,16 @@ def test_a_part_on_delays_asks_for_the_readings_rate():
     parts = OF.parts(CLAIMS["P3.8"], OF.reading(false_alarms="0.01", seen="beginning"))
     assert all(part.asserted for part in parts)
     assert {part.statement for part in parts} == {"threshold", "time", "not worth while"}
+
+
+def test_more_plots_can_be_worth_while_under_a_reading(tmp_path):
+    """At 0.01 false alarms eight plots see the weakest manoeuvre sooner than four or five; in %, as the words want."""
+    from radarsim.app import readings as app
+
+    wanted = app.asked(["P3.8"], ["false_alarms=0.01", "manoeuvre=80 s", "seen=beginning", "tests=sliding"])
+    done = app.readings(wanted, out=tmp_path, realisations=200, figures=False)
+    shipped, other = done.read[0].over[0].under
+    weak = [one.parts[4][1] for one in (shipped, other)]
+    assert all(one.parts[4][0].unit == "%" for one in (shipped, other))
+    assert -100 < weak[1].measured < -10 < weak[0].measured < 100
+    assert other.outcome.kind == "refuted"
