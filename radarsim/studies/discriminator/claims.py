@@ -402,7 +402,7 @@ CLAIMS = (
         "м/c до 475 м/c. … Пересчитывая мгновенную радиальную скорость в доплеровскую частоту и аппроксимируя ее … "
         "полиномом …, получим, что f_0 = 10·10³ Гц, f_1 ≈ 180·10³ Гц², f_2 ≈ −750·10³ Гц³, f_3 ≈ 1000·10³ Гц⁴.",
         reading="2v/λ at the ends of the stated intervals; approximate: 10 %, and 1 kHz where the speed is nil. If the "
-        "10 kHz are the offset to which the receiver moves the signal, it fails at the other three by 8 to 9 kHz",
+        "10 kHz are the offset to which the receiver moves the signal, it fails at the other three by 7 to 9 kHz",
         internal=True,
     ),
     _claim(
