@@ -270,7 +270,7 @@ def too_narrow(row: Any) -> str:
     """A mark behind an interval, of a row of curves, that rests, there or nearby, on too few effective realisations."""
     from radarsim.report import notes
 
-    marks = {notes.THIN: f" ({row.n_eff:.0f} effective)", notes.NEAR: " (heavy tails)"}
+    marks = {notes.THIN: f" ({row.n_eff:.0f} effective)", notes.NEAR: " (heavy tails)", notes.UNSEEN: " (heavy tails)"}
     return marks.get(getattr(row, "note", ""), "")
 
 

@@ -145,7 +145,7 @@ def few(results: Sequence[CaseResult], curves: "pd.DataFrame | None" = None) -> 
                 )
             )
         return said
-    marked = curves[notes.thin(curves) & ~curves["case"].isin(rough).to_numpy()]
+    marked = curves[notes.heavy(curves) & ~curves["case"].isin(rough).to_numpy()]
     if len(marked):
         names = list(dict.fromkeys(marked["case"]))
         least = marked["n_eff"].min()

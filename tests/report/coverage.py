@@ -40,15 +40,25 @@ RARE = 1e-5  # a row that covers just LOW, or HIGH, is called wrong so often
 
 
 class Kept(NamedTuple):
-    """Of the rows (n,) of an interval: runs in which each was unmarked, and of these those that held the truth."""
+    """Of the rows (n,) of an interval: runs in which each was unmarked, and of these those that held the truth.
+
+    by_run (runs, 2) has both counts of each run, over its rows.
+    """
 
     unmarked: np.ndarray
     held: np.ndarray
+    by_run: np.ndarray
 
     @property
     def share(self) -> float:
         """Held, of all unmarked."""
         return self.held.sum() / self.unmarked.sum()
+
+    @property
+    def error(self) -> float:
+        """Standard error of `share` from how it varies between runs: the rows of one run share their noise."""
+        unmarked, held = self.by_run.T
+        return float(np.sqrt(np.sum(np.square(held - self.share * unmarked))) / unmarked.sum())
 
     def wrong(self, runs: int, high: float = HIGH) -> np.ndarray:
         """Rows, unmarked in half of the runs or more, whose share is no chance of 93 … 97 %."""
@@ -69,8 +79,9 @@ def kept(experiment: Experiment, n: int, runs: int) -> dict[tuple[str, str], Kep
     found = {}
     for name, table in whole.items():
         for value, *_ in _intervals(name, table):
-            found[name, value] = Kept(np.zeros(len(table), dtype=int), np.zeros(len(table), dtype=int))
-    for own in sums:
+            zeros = np.zeros((2, len(table)), dtype=int)
+            found[name, value] = Kept(zeros[0], zeros[1], np.zeros((runs, 2), dtype=int))
+    for run, own in enumerate(sums):
         for name, table in _tables(experiment, works, own, n).items():
             if not len(table) or not any(True for _ in _intervals(name, table)):
                 continue
@@ -82,7 +93,9 @@ def kept(experiment: Experiment, n: int, runs: int) -> dict[tuple[str, str], Kep
                 size = SAME * max(np.nanmedian(abs(truth)), np.finfo(float).tiny)
                 by_chance = unmarked & (hi > lo + size) & np.isfinite(truth[place])
                 found[name, value].unmarked[place] += by_chance
-                found[name, value].held[place] += by_chance & (lo <= truth[place]) & (truth[place] <= hi)
+                held = by_chance & (lo <= truth[place]) & (truth[place] <= hi)
+                found[name, value].held[place] += held
+                found[name, value].by_run[run] += (by_chance.sum(), held.sum())
     return {key: one for key, one in found.items() if one.unmarked.any()}
 
 

@@ -2,7 +2,7 @@
 
 Of one row 200 seeds tell a coverage to 1.5 % only (binomial): a row that covers 93 % is seen under 86.4 % once in 10⁵.
 A row is called wrong where its share is so unlikely for any coverage from 93 to 97 %; the mean over the rows of a table
-has to lie between the two as it is.
+has to lie between the two, but for two of its own standard errors: of a table of three rows it is known to 1 % only.
 """
 
 import math
@@ -63,15 +63,17 @@ DISCRETE = {("steady", "settling_s")}
 FURTHER = ("rls2", "multimodel_1hz", "multimodel_families_1hz", "sonar_missed", "sonar_conversion", "orders")
 
 
-def right(experiment, n, seeds):
-    """Every interval of every table: what is unmarked covers 93 … 97 %."""
+def right(experiment, n, seeds, but=()):
+    """Every interval of every table but those: what is unmarked covers 93 … 97 %."""
     found = kept(experiment, n, seeds)
     assert ("curves", "sigma") in found
     for key, one in found.items():
         high = 1.0 if key in DISCRETE else HIGH
+        if key[0] in but:
+            continue
         assert not one.wrong(seeds, high).size, (key, one.held[one.wrong(seeds, high)])
         if one.unmarked.sum() >= len(one.held) * seeds / 20:  # what is left of a table that is marked is a choice of it
-            assert LOW <= one.share <= high, (key, one.share)
+            assert LOW - 2 * one.error <= one.share <= high + 2 * one.error, (key, one.share, one.error)
 
 
 def test_unmarked_intervals_cover_in_the_first_study():
@@ -81,12 +83,15 @@ def test_unmarked_intervals_cover_in_the_first_study():
 # A lock that is lost once in 10⁴ bursts throws an estimate off by so much that it decides σ: of 1000 realisations most
 # hold no such burst, and nothing in them tells of it. docs/trust.md says so.
 OF_RARER_EVENTS = {"pulses_to_tracks"}
+# Cells by stage of a flight of twelve seconds, of six scans: what one of 1500 realisations does in one of them decides,
+# and sums over a stage do not tell bias from spread. Those of the flights of three minutes are not left out.
+OF_SHORT_STAGES = {"multimodel": ("stages",)}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", sorted(set(CASES) - OF_RARER_EVENTS))
 def test_unmarked_intervals_of_every_study_cover(case):
-    right(CASES[case].loaded(N), N, SEEDS)
+    right(CASES[case].loaded(N), N, SEEDS, OF_SHORT_STAGES.get(case, ()))
 
 
 @pytest.mark.slow

@@ -130,6 +130,53 @@ def test_bins_of_few_realisations_have_no_tails():
     assert list(notes.noted(made, [])["calibration"]["note"]) == ["", f"under {FEW} realisations"]
 
 
+def curves_of(errors):
+    """curves.csv of errors (realisations, scans) of one filter and component, and the case that it is of."""
+    from types import SimpleNamespace
+
+    from radarsim.report import tables
+
+    n, scans = errors.shape
+    sums = np.stack([(errors**p).sum(axis=0) for p in (1, 2, 3, 4)], axis=-1)[None, :, None, :]
+    axes = SimpleNamespace(
+        available=np.full((1, scans, 1), True),
+        filters=("f",),
+        components=(("x", "m"),),
+        k=np.arange(1, scans + 1),
+        t_s=np.arange(scans),
+        exact_sigma=np.full((1, scans, 1), np.nan),
+    )
+    result = SimpleNamespace(name="a", count=n, sums={"error": sums}, axes=axes)
+    return tables.curves([result]), [result]
+
+
+def test_an_error_of_most_bias_is_marked_by_what_makes_its_spread():
+    """A bias of ten spreads, of which five of 1000 realisations depart: of the errors themselves no tail shows."""
+    rng = np.random.default_rng(5)
+    errors = 10 + rng.normal(size=(1000, 40))
+    errors[:5, 20] -= 10
+    curves, results = curves_of(errors)
+    assert curves["n_eff"].min() > 5000
+    noted = notes.noted({"curves": curves}, results)["curves"]
+    assert list(noted.columns[:-1]) == list(curves.columns)
+    np.testing.assert_array_equal(noted["n_eff"], curves["n_eff"])  # the table says what it said
+    assert noted["note"].iloc[20] == notes.THIN
+    assert set(noted["note"].iloc[17:24]) == {notes.THIN, notes.NEAR}
+    assert noted["note"].iloc[30] == ""  # departures by ten spreads, of three in 1000, are lost in ten of bias
+
+
+def test_large_errors_at_one_scan_mark_those_whose_sample_may_lack_them():
+    """Five of 1000 realisations err by 30 σ at one scan: three of them elsewhere would more than double σ."""
+    rng = np.random.default_rng(6)
+    errors = rng.normal(size=(1000, 40))
+    errors[:5, 5] += 30
+    noted = notes.noted(*(lambda made, results: ({"curves": made}, results))(*curves_of(errors)))["curves"]
+    assert noted["note"].iloc[5] == notes.THIN
+    assert set(noted["note"].iloc[12:]) == {notes.UNSEEN}
+    plain, results = curves_of(rng.normal(size=(1000, 40)))
+    assert "note" not in notes.noted({"curves": plain}, results)["curves"]
+
+
 def test_a_table_keeps_the_notes_that_it_brings():
     import pandas as pd
 
