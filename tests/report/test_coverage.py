@@ -80,16 +80,13 @@ def test_unmarked_intervals_cover_in_the_first_study():
     right(load("rls2", ["scans=5", f"realisations={N}"]), N, 25)
 
 
-# A lock that is lost once in 10⁴ bursts throws an estimate off by so much that it decides σ: of 1000 realisations most
-# hold no such burst, and nothing in them tells of it. docs/trust.md says so.
-OF_RARER_EVENTS = {"pulses_to_tracks"}
 # Cells by stage of a flight of twelve seconds, of six scans: what one of 1500 realisations does in one of them decides,
 # and sums over a stage do not tell bias from spread. Those of the flights of three minutes are not left out.
 OF_SHORT_STAGES = {"multimodel": ("stages",)}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", sorted(set(CASES) - OF_RARER_EVENTS))
+@pytest.mark.parametrize("case", sorted(CASES))
 def test_unmarked_intervals_of_every_study_cover(case):
     right(CASES[case].loaded(N), N, SEEDS, OF_SHORT_STAGES.get(case, ()))
 

@@ -164,6 +164,8 @@ DRAWN = "target={kind: polynomial, coefficients: [1e5, -250, 4], sigma_coefficie
 MISSES = ["scans=9", "radar.detection_probability=0.7", "radar.sigma_bias_range_m=20", DRAWN]
 FEW = "filters=[{name: H 3, doppler: folded, manoeuvre_variance: 1e-3, hypotheses: 3}]"
 PULSES = "filters.5={name: a, observes: [range, velocity, acceleration], manoeuvre_variance: 1, use: mixture}"
+CLOSE = "prior.sigma_velocity_mps=20"
+LOCKS = "[range, velocity, acceleration], manoeuvre_variance: 1, estimator: spectrum, use: mixture, hypotheses: 9"
 ORDERS = "orders: [1, 2], manoeuvre_variance: [100, 1e-3], combine: likelihood"
 TOGETHER = f"filters=[{{name: few, doppler: folded, hypotheses: 12, {ORDERS}}}]"
 REMAINDER = "{name: remainder, doppler: remainder, manoeuvre_variance: 1e-3}"
@@ -176,6 +178,7 @@ RUNS = {
     "orders": ("orders", ["scans=6"], 8),
     "pulses": ("pulses", ["scans=3"], 8),
     "pulses fixed": ("pulses_forecast", ["scans=2", PULSES], 8),
+    "pulses folds": ("pulses_folds", ["scans=2", f"filters=[{{name: a, observes: {LOCKS}}}]", CLOSE], 8),
     "folds and orders": ("ambiguous_orders", ["scans=4", "target.start_s=5", TOGETHER], 8),
     "remainders": ("ambiguous_turns", ["scans=4", f"filters=[{REMAINDER}]"], 8),
     "sonar alike": ("sonar_smoothing", ["scans=9"], 9),

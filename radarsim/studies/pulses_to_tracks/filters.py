@@ -235,7 +235,7 @@ def _filter(spec: Any, one: Any, own: Menu | None) -> np.void:
     made["kept"] = one.hypotheses or 1
     if made["kept"] > 1:
         made["deepest"] = -math.log(one.prune_below) if one.prune_below > 0 else BOTTOMLESS
-        made["mean"] = one.estimate == "mean"
+        made["averages"] = one.estimate == "mean"
     if own is not None:
         made["top"], made["levels"], made["ratio"] = own.top, own.levels, np.log(RATIOS)
         made["fixed"] = own.top if one.forecast != "track" else 0.0

@@ -125,7 +125,11 @@ def axes(spec: Any, t: np.ndarray, bursts: list[Burst], made: records.Filters, m
     """Labels, Fisher bounds, and the exact values where all errors are Gaussian."""
     shape = (len(spec.filters), spec.scans, 3)
     sigma, bias, bound = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape[:2], 2), np.nan)
+    losses, most_lost = np.zeros(shape), np.zeros(len(spec.filters))
     for f, one in enumerate(spec.filters):
+        if not exact.known(one):
+            losses[f] = exact.of_losses(spec, one, made.sigma[f])
+            most_lost[f] = exact.most_lost(bursts, one)
         if one.takes:
             bound[f, :, : one.takes] = made.sigma[f, :, : one.takes]
         if exact.known(one):
@@ -144,6 +148,8 @@ def axes(spec: Any, t: np.ndarray, bursts: list[Burst], made: records.Filters, m
         takes=np.array([one.takes for one in spec.filters]),
         energy_db=10.0 * np.log10([energy_ratio(one, one.duration_s) for one in bursts]),
         ideal=np.array([idealisation(spec, one) for one in spec.filters]),
+        losses=losses,
+        most_lost=most_lost,
     )
 
 

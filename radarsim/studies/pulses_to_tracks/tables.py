@@ -1,6 +1,6 @@
 """The study's own tables: locks, what was measured, what a loss costs, and the idealisation beside each filter."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,14 +38,55 @@ FOLDS = ("case", "filter", "k", "t_s", "n", "right", "right_lo", "right_hi", "li
 PASSES = ("case", "filter", "passes", "passes_lo", "passes_hi")
 
 
+# A lost burst is rare and decides σ: where it is missing in a sample, nothing else in that tells of it. As many more
+# are supposed as the sample leaves possible (95 %); what they would add is marked from half of the interval on.
+UNSEEN = "bursts lost more rarely than seen here may decide"
+UNSEEN_SHARE = 0.5
+
+
+def unseen(result: Result) -> np.ndarray:
+    """The probability (F,) of a lost burst, beyond what was seen, that is the greatest the sample leaves possible."""
+    from scipy.special import chdtri
+
+    lost = (result.count - np.asarray(result.sums["locks"])[..., LOCKED]).sum(axis=1)
+    most = 0.5 * chdtri(2.0 * (lost + 1.0), 0.05) - lost
+    return np.minimum(most / (result.count * result.axes.k.size), result.axes.most_lost)
+
+
+def marks(results: Sequence[Result]) -> dict[tuple[str, str, str, int], str]:
+    """The notes on σ, by case, filter, component and scan, where losses that were not seen may decide."""
+    found = {}
+    for result in results:
+        axes, (_, squares, _, fourths) = result.axes, np.moveaxis(np.asarray(result.sums["error"]), -1, 0)
+        of = statistics.root_mean_square(squares, fourths, np.full(squares.shape, float(result.count)))
+        added = unseen(result)[:, None, None] * axes.losses
+        for f, k, c in zip(*np.nonzero(added > UNSEEN_SHARE * (of.hi**2 - of.value**2)), strict=True):
+            found[result.name, axes.filters[f], axes.components[c][0], int(axes.k[k])] = UNSEEN
+    return found
+
+
+def noted(table: "pd.DataFrame", found: Mapping[tuple[str, str, str, int], str]) -> "pd.DataFrame":
+    """A table with the notes of its filters, or of what they are compared with."""
+    if not found or not len(table):
+        return table
+    of = [table[label] for label in ("case", "filter", "component", "k")]
+    notes = [found.get(row, "") for row in zip(*of, strict=True)]
+    if "baseline" in table:
+        of[1] = table["baseline"]
+        notes = [note or found.get(row, "") for note, row in zip(notes, zip(*of, strict=True), strict=True)]
+    return table.assign(note=notes) if any(notes) else table
+
+
 def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
-    """The tables beyond curves and gains."""
+    """Curves and gains, marked where losses that were not seen may decide, and the study's own tables."""
+    found = marks(results)
     return {
-        "gains": common.gains(results),
+        "curves": noted(common.curves(results), found),
+        "gains": noted(common.gains(results), found),
         "locks": common.joined([_locks(result) for result in results], LOCKS),
-        "estimates": common.joined([_estimates(result) for result in results], ESTIMATES),
-        "losses": common.joined([_losses(result) for result in results], LOSSES),
-        "idealisations": common.joined([_ideal(result) for result in results], IDEAL),
+        "estimates": noted(common.joined([_estimates(result) for result in results], ESTIMATES), found),
+        "losses": noted(common.joined([_losses(result) for result in results], LOSSES), found),
+        "idealisations": noted(common.joined([_ideal(result) for result in results], IDEAL), found),
         "folds": common.joined([_folds(result) for result in results], FOLDS),
         "passes": common.joined([_passes(result) for result in results], PASSES),
     }
@@ -132,9 +173,10 @@ def _folds(result: Result) -> dict[str, np.ndarray]:
 
 def _passes(result: Result) -> dict[str, np.ndarray]:
     """Mean passes over a window's data that a burst takes: the measure of cost."""
-    f = np.flatnonzero(result.axes.takes > 0)
-    of, n = np.asarray(result.sums["passes"])[f], np.full(f.size, float(result.count * result.axes.k.size))
-    return {**common.leading(result, f), **common.interval("passes", statistics.mean(of[:, 0], of[:, 1], n))}
+    f, scans = np.flatnonzero(result.axes.takes > 0), result.axes.k.size
+    of, n = np.asarray(result.sums["passes"])[f], np.full(f.size, float(result.count))
+    found = statistics.mean(of[:, 0] / scans, of[:, 1] / scans**2, n)
+    return {**common.leading(result, f), **common.interval("passes", found)}
 
 
 INPUTS = ("radar", "σ_r, m", "Δt, s", "λ, m", "F, Hz", "pulses", "burst, ms", "SNR a pulse, dB", "energy, dB", "D, m/s")

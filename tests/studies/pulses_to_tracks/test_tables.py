@@ -6,6 +6,9 @@ import pytest
 import radarsim
 from radarsim.app.configs import load
 from radarsim.studies import registry
+from radarsim.studies.pulses_to_tracks import study
+from tests.studies.pulses_to_tracks import naive
+from tests.studies.pulses_to_tracks.conftest import CURED, made
 
 
 @pytest.fixture(scope="module")
@@ -89,3 +92,36 @@ def test_the_threshold_is_seen(swept):
     rate = locks.groupby(["case", "filter"])["lock_rate"].min()
     low, high = (f"pulses_snr burst.snr_db={value}" for value in (-4, 14))
     assert rate[low, "spectrum"] < 0.95 < 0.99 < rate[high, "spectrum"]
+
+
+def test_losses_that_a_sample_may_lack_are_marked(found):
+    """1500 tracks may lack the lost burst that decides σ: sequences are marked, what is known to lock is not."""
+    curves = found.tables["curves"].fillna({"note": ""})
+    marked = curves[curves["k"] > 1].groupby("filter")["note"].agg(lambda notes: (notes != "").mean())
+    assert (marked[["r", "ideal", "spectrum"]] == 0).all()
+    assert (marked[["sequence", "cured", "cured, gated", "cured, mixture"]] == 1).all()
+    for name in ("gains", "idealisations", "estimates"):
+        notes = found.tables[name].fillna({"note": ""}).groupby("filter")["note"]
+        assert notes.agg(lambda own: (own != "").any())[["cured", "cured, mixture"]].all()
+
+
+def test_what_a_lost_burst_adds():
+    """The answers of a textbook filter to an error of one burst, or of all from one on, squared and summed."""
+    fixed = CURED | {"name": "fixed", "forecast": {"sigma_velocity_mps": 10.0, "sigma_acceleration_mps2": 5.0}}
+    case = made([CURED, fixed], scans=6)
+    plan = study.prepare(case)
+    bound, prior = plan.axes.bound[0, :, 0], (30.0, 5.0)
+
+    def ends(errors):
+        track = naive.Track(50.0, 0.0, [0.0, 0.0], prior)
+        for k in range(6):
+            if k:
+                track.predict(10.0, 1e-3 if k >= 2 else 0.0, 0.0)
+                track.take([0], -track.x[:1], [2500.0])
+            track.take([1], errors[k] - track.x[1:2], [bound[k] ** 2])
+        return track.x
+
+    for f, until in ((0, 6), (1, 1)):
+        answers = [ends([1.0 if j <= k < j + until else 0.0 for k in range(6)]) for j in range(6)]
+        expected = np.square(answers).sum(axis=0) * 300.0**2 / 12
+        np.testing.assert_allclose(plan.axes.losses[f, -1], expected, rtol=1e-6)

@@ -79,12 +79,12 @@ def make_forecasts(world, own, k, first, work):
 
 
 @kernel
-def estimate_all(world, filters, f, k, first, work, sums):
+def estimate_all(world, filters, f, k, first, work):
     """Estimates (n, 2) of the bursts of scan k, less the truth, an entry at a time; passes are counted."""
     who, eight, found = np.empty(WIDTH, np.int64), np.empty((WIDTH, 2)), np.empty((WIDTH, 2))
     entries, measured = work.entries, work.measured
     order = np.argsort(entries, kind="mergesort")
-    begin, passes, squares = 0, 0.0, 0.0
+    begin = 0
     while begin < order.size:
         entry, end = entries[order[begin]], begin
         while end < order.size and end - begin < WIDTH and entries[order[end]] == entry:
@@ -95,11 +95,8 @@ def estimate_all(world, filters, f, k, first, work, sums):
         estimate(world, filters, f, k, entry, who, eight, work.room, found)
         for n in range(end - begin):
             measured[order[begin + n], 0], measured[order[begin + n], 1] = found[n, 0], found[n, 1]
-            own = work.room[0][lane(PASSES, n)]
-            passes, squares = passes + own, squares + own * own
+            work.passes[order[begin + n]] += work.room[0][lane(PASSES, n)]
         begin = end
-    sums.passes[f, 0] += passes
-    sums.passes[f, 1] += squares
 
 
 @kernel
@@ -155,7 +152,7 @@ def add_errors(tracks, ages, takes, errors, error, age, loss):
 def run_filter(world, filters, f, first, work, errors, sums):
     """A filter over all scans of realisations first, first + 1, …; errors (K, n, 3) are written."""
     own, tracks, ages = filters.filters[f], work.tracks, work.ages
-    ages[:] = AGES - 1
+    ages[:], work.passes[:] = AGES - 1, 0.0
     for k in range(world.missed.shape[0]):
         if own.kept > 1:
             ranges_to_hypotheses(world, own, k, first, work)
@@ -163,12 +160,15 @@ def run_filter(world, filters, f, first, work, errors, sums):
             take_ranges(world, own, k, first, tracks)
         if own.takes:
             make_forecasts(world, own, k, first, work)
-            estimate_all(world, filters, f, k, first, work, sums)
+            estimate_all(world, filters, f, k, first, work)
             if own.kept > 1:
                 take_folds(world, filters, f, k, work, sums)
             else:
                 take_estimates(world, filters, f, k, work, sums)
         add_errors(tracks, ages, own.takes, errors[k], sums.error[f, k], sums.ages[f, k], sums.losses[f, k])
+    for passes in work.passes:
+        sums.passes[f, 0] += passes
+        sums.passes[f, 1] += passes * passes
 
 
 @kernel
@@ -199,6 +199,7 @@ def simulate_block(world, filters, sums, first, count) -> np.ndarray:
         entries=np.zeros(count, np.int64),
         measured=np.zeros((count, 2)),
         ages=np.zeros(count, np.int64),
+        passes=np.zeros(count),
         room=room_for(world.mean.shape[0], world.reversed.size),
         held=hypotheses(count, int(filters.filters["kept"].max())),
     )

@@ -135,7 +135,7 @@ def put_estimate(own, held, i, best, whole, to):
     """The best hypothesis of realisation i, or the mean of all by their weights, of sum `whole`, into to (3)."""
     for c in range(3):
         to[c] = held.states[i, best, c]
-        if own.mean == 1:
+        if own.averages == 1:
             total = 0.0
             for h in range(held.count[i]):
                 total += math.exp(held.weights[i, h]) * held.states[i, h, c]

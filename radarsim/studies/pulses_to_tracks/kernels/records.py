@@ -37,7 +37,7 @@ FILTER = np.dtype(
         ("noise", np.float64, 6),  # Q, packed
         ("kept", np.int64),  # hypotheses kept at most; 1: the nearest fold
         ("deepest", np.float64),  # logarithm of the ratio to the best weight, below which one is dropped
-        ("mean", np.int64),  # 1: estimates are the mean of all; 0: the best one
+        ("averages", np.int64),  # 1: estimates are the mean of all; 0: the best one
     ],
     align=True,
 )
@@ -152,6 +152,7 @@ class Work(NamedTuple):
     entries   (n,)    of the menu
     measured  (n, 2)  the bursts' velocity and acceleration, less the truth
     ages      (n,)    scans since the last burst that was lost
+    passes    (n,)    passes over a window's data so far
     room              see `estimate.room_for`
     held              of filters that keep several
     """
@@ -161,6 +162,7 @@ class Work(NamedTuple):
     entries: np.ndarray
     measured: np.ndarray
     ages: np.ndarray
+    passes: np.ndarray
     room: tuple[np.ndarray, ...]
     held: Hypotheses
 
@@ -174,7 +176,7 @@ class Sums(NamedTuple):
     locks    (F, K, COUNTS)      see above
     ages     (F, K, AGES)        realisations by the scans since the last burst that was lost
     losses   (F, K, AGES, 3, 2)  e², e⁴ of these
-    passes   (F, 2)              passes over a window's data a burst, and their squares
+    passes   (F, 2)              passes over a window's data of all bursts of a realisation, and their squares
     folds    (F, K, FOLDS)       see above
     """
 
