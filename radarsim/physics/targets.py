@@ -52,6 +52,24 @@ def turn(
     in); acceleration_g the lateral acceleration in standard gravities, positive to the left; start and duration in s.
     Gives range, radial velocity and acceleration (K, 3) at times t (K,).
     """
+    position, velocity, acceleration = _turning(range_0, speed, aspect, acceleration_g, start, duration, t)
+    r = np.hypot(position[:, 0], position[:, 1])
+    radial_velocity = np.sum(position * velocity, axis=1) / r
+    radial_acceleration = (speed**2 - radial_velocity**2 + np.sum(position * acceleration, axis=1)) / r
+    return np.stack([r, radial_velocity, radial_acceleration], axis=1)
+
+
+def turn_in_space(
+    range_0: float, speed: float, aspect: float, acceleration_g: float, start: float, duration: float, t: np.ndarray
+) -> np.ndarray:
+    """The flight of `turn` in its plane, the radar at the origin: (K, 9) as (x, vx, ax, y, vy, ay, z, vz, az)."""
+    return _states(_turning(range_0, speed, aspect, acceleration_g, start, duration, t))
+
+
+def _turning(
+    range_0: float, speed: float, aspect: float, acceleration_g: float, start: float, duration: float, t: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position, velocity and acceleration of `turn` in its plane, each (K, 2)."""
     rate = acceleration_g * STANDARD_GRAVITY_MPS2 / speed
     turned = rate * np.clip(t - start, 0.0, duration)
     heading = aspect + turned
@@ -62,10 +80,15 @@ def turn(
     before = np.minimum(t, start)[:, None] * speed * np.array([math.cos(aspect), math.sin(aspect)])
     after = np.maximum(t - start - duration, 0.0)[:, None] * velocity
     position = np.array([range_0, 0.0]) + before + _arc(speed, rate, aspect, np.clip(t - start, 0.0, duration)) + after
-    r = np.hypot(position[:, 0], position[:, 1])
-    radial_velocity = np.sum(position * velocity, axis=1) / r
-    radial_acceleration = (speed**2 - radial_velocity**2 + np.sum(position * acceleration, axis=1)) / r
-    return np.stack([r, radial_velocity, radial_acceleration], axis=1)
+    return position, velocity, acceleration
+
+
+def _states(motion: Sequence[np.ndarray]) -> np.ndarray:
+    """States (K, 9), axis by axis, of position, velocity and acceleration (K, 2) in a plane."""
+    states = np.zeros((len(motion[0]), 9))
+    for order, part in enumerate(motion):
+        states[:, order], states[:, 3 + order] = part.T
+    return states
 
 
 def fly_by(distance: float, speed: float, start_range: float, t: np.ndarray) -> np.ndarray:
@@ -77,6 +100,14 @@ def fly_by(distance: float, speed: float, start_range: float, t: np.ndarray) -> 
     along = speed * t - math.sqrt((start_range - distance) * (start_range + distance))
     r = np.hypot(along, distance)
     return np.stack([r, speed * along / r, speed**2 * distance**2 / r**3], axis=1)
+
+
+def fly_by_in_space(distance: float, speed: float, start_range: float, t: np.ndarray) -> np.ndarray:
+    """The flight of `fly_by` in its plane, the radar at the origin: (K, 9) as (x, vx, ax, y, vy, ay, z, vz, az)."""
+    states = np.zeros((len(t), 9))
+    states[:, 0] = speed * t - math.sqrt((start_range - distance) * (start_range + distance))
+    states[:, 1], states[:, 3] = speed, distance
+    return states
 
 
 def _arc(speed: float, rate: float, aspect: float, elapsed: np.ndarray) -> np.ndarray:

@@ -234,4 +234,31 @@ PULSES = (
         ),
     ),
 )
-FURTHER = (*MANOEUVRES, *FALSE_PLOTS, *SCORES, *LAWS_EXACT, *RUNS, *PULSES)
+P1_WORLD = "studies/range_doppler/test_world.py"
+DRAWN_FLIGHTS = (
+    *mutants(
+        "radarsim/studies/range_doppler/kernels/missed.py",
+        (
+            "y = flight[3] + shift[1, i] + t * shift[4, i]",
+            "y = flight[3] + shift[1, i]",
+            f"{P1_WORLD}::test_a_drawn_flight_begins_elsewhere_and_flies_the_same_accelerations",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/range_doppler/world.py",
+        (
+            "np.linalg.eigh(products - np.outer(total, total))",
+            "np.linalg.eigh(products)",
+            f"{P1_WORLD}::test_sums_over_drawn_flights_agree_with_the_exact_errors",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/range_doppler/propagation.py",
+        (
+            "self.Y = back(self.Y, dt) + np.einsum",
+            "self.Y = back(self.Y, dt) - np.einsum",
+            f"{P1_WORLD}::test_with_few_misses_drawn_flights_are_as_without",
+        ),
+    ),
+)
+FURTHER = (*MANOEUVRES, *FALSE_PLOTS, *SCORES, *LAWS_EXACT, *RUNS, *PULSES, *DRAWN_FLIGHTS)

@@ -169,10 +169,14 @@ LOCKS = "[range, velocity, acceleration], manoeuvre_variance: 1, estimator: spec
 ORDERS = "orders: [1, 2], manoeuvre_variance: [100, 1e-3], combine: likelihood"
 TOGETHER = f"filters=[{{name: few, doppler: folded, hypotheses: 12, {ORDERS}}}]"
 REMAINDER = "{name: remainder, doppler: remainder, manoeuvre_variance: 1e-3}"
+FLIGHT = (
+    "{kind: fly_by, distance_m: 2e4, speed_mps: 300, start_range_m: 5e4, sigma_position_m: 2e3, sigma_velocity_mps: 9}"
+)
 # What is run: name → config, overrides, realisations; of several cases the last.
 RUNS = {
     "linear": ("rls2", ["scans=9"], 11),
     "linear with misses": ("rls2", MISSES, 11),
+    "linear, drawn flight": ("rls2", ["scans=4", f"target={FLIGHT}"], 11),
     "folds": ("ambiguous_depth", ["scans=4", FEW], 8),
     "folds missed": ("ambiguous_missed", ["scans=5"], 8),
     "orders": ("orders", ["scans=6"], 8),

@@ -14,7 +14,8 @@ AGREED = 1e-12
 # Runs that multiply rounding more. Covariances of each realisation's own, from a start of κ near 10⁴, so κε = 2·10⁻¹²;
 # weights of hypotheses are exponentials of up to −50, which multiplies a relative error by 50. A likelihood begins
 # with variances of 10⁹ beside plots of 1 … 10⁴.
-OWN = dict.fromkeys(("linear with misses", "folds", "folds missed", "orders", "folds and orders", "tracks"), 1e-10)
+MISSING = "linear with misses", "linear, drawn flight"
+OWN = dict.fromkeys((*MISSING, "folds", "folds missed", "orders", "folds and orders", "tracks"), 1e-10)
 ROOT = Path(__file__).parents[2]
 MOMENTS = ("error", "error_all", "ahead")  # Σe, Σe², Σe³, Σe⁴ in the last axis
 

@@ -9,11 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Where Δt/τ₁ and Δt/τ₂ are at most SMALL and c at most LARGEST, gains are within LIMIT_POINTS of the recursion's, and
-# with the first order of the period within ERROR_POINTS. Beyond LARGEST the fastest root of the error, ~ √2 c^(1/4)/τ₂,
-# is no longer slow against a scan.
-SMALL, LARGEST = 0.05, 1000.0
-LIMIT_POINTS, ERROR_POINTS = 0.55, 0.11
+# Where Δt/τ₁ and Δt/τ₂ are at most SMALL and c at most LARGEST, gains with the first order of the period are within
+# ERROR_POINTS of the recursion's, up to c of MODERATE within MODERATE_POINTS. As functions of c alone, without it, they
+# are within LIMIT_POINTS. What grows with c is the error in acceleration: the fastest root, ~ √2 c^(1/4)/τ₂, is no
+# longer slow against a scan.
+SMALL, LARGEST, MODERATE = 0.05, 5e4, 1000.0
+LIMIT_POINTS, ERROR_POINTS, MODERATE_POINTS = 0.55, 0.5, 0.11
 
 
 class Groups(NamedTuple):

@@ -32,10 +32,7 @@ from radarsim.config.radial import (
     HARDEST_MPS2,
     MOST_SCANS,
     Coefficients,
-    FlyBy,
-    Recorded,
     Starting,
-    Turn,
     length_faults,
     number_of_scans,
     polynomial_reach_m,
@@ -114,6 +111,36 @@ class JerkPulse(Starting):
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
         return polynomial_reach_m(self.coefficients, t) + abs(self.jerk_mps3) * t**3 / 6
+
+
+Displaced = Annotated[NonNegative, Added()]
+
+
+class Flying(Model):
+    """A flight in space of which the first state is drawn: it is displaced, and flies the same accelerations."""
+
+    sigma_position_m: Displaced = Field(
+        0.0,
+        title="σ of the first position",
+        description="standard deviation of each coordinate of its first position, drawn for each realisation, m",
+    )
+    sigma_velocity_mps: Displaced = Field(
+        0.0,
+        title="σ of the first velocity",
+        description="standard deviation of each coordinate of its first velocity, drawn for each realisation, m/s",
+    )
+
+
+class Turn(Flying, radial.Turn):
+    """Straight flight in a plane through the radar, a turn of constant load, straight flight again."""
+
+
+class FlyBy(Flying, radial.FlyBy):
+    """Straight flight at a constant speed past the radar, at a distance."""
+
+
+class Recorded(Flying, radial.Recorded):
+    """A flight recorded in a file, smoothed by a spline whose derivatives are the true velocity and acceleration."""
 
 
 Target = Annotated[Polynomial | AccelerationStart | JerkPulse | Turn | FlyBy | Recorded, Field(discriminator="kind")]

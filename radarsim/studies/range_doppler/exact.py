@@ -63,6 +63,22 @@ def bias_response(weights: np.ndarray, gains: np.ndarray, observes: int, dt: flo
     return response
 
 
+def defect_response(
+    weights: np.ndarray, gains: np.ndarray, observes: int, defects: np.ndarray, dt: float
+) -> np.ndarray:
+    """The errors (K, 3, C) that truths lead to which leave the model by defects (K, 3, C), F x − x⁺, scan by scan."""
+    scans, start = len(gains), weights.shape[2]
+    F, H = transition(dt), np.eye(3)[:observes]
+    response, truth = np.zeros_like(defects), np.zeros((start, *defects.shape[1:]))
+    for k in range(1, start):  # from zero, as the start forgets what a filter of the model can follow
+        truth[k] = F @ truth[k - 1] - defects[k]
+    response[start - 1] = np.einsum("ijk,kjc->ic", weights, truth[:, :2]) - truth[-1]
+    for k in range(start, scans):
+        kept = np.eye(3) - gains[k, :, :observes] @ H
+        response[k] = kept @ (F @ response[k - 1] + defects[k])
+    return response
+
+
 def steady_state(
     observes: int, manoeuvre_variance: float, sigma: np.ndarray, dt: float, noise: str = "random_jerk"
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.studies.range_doppler.propagation import Errors, Information, Plots
+from radarsim.studies.range_doppler.propagation import Errors, Information, Plots, defects
 
 KEPT = (512, 2048, 8192)  # patterns side by side, each compared with the one before; the most: thirteen scans
 CLOSE = 4e-4  # of σ, between the two; so the finer one is right to about a ten-thousandth
@@ -127,10 +127,14 @@ def mixture(
     dt: float,
     most: int = KEPT[-1],
     beside: Sequence[Design] = (),
+    drawn: np.ndarray | None = None,
 ) -> Mixture:
-    """Means over all patterns of plots, of a filter on the truth (K, 3) at scans dt (s) apart; beside it others."""
+    """Means over all patterns of plots, of a filter on the truth (K, 3) at scans dt (s) apart; beside it others.
+
+    drawn: of a truth that is drawn, as `propagation.defects` takes it.
+    """
     scans, columns = len(truth), plots.inputs.shape[1]
-    defect = np.concatenate([np.zeros((1, 3)), predicted(truth[:-1], dt) - truth[1:]])
+    defect = defects(truth, dt, plots, drawn)
     made = Mixture.empty(len(beside), scans)
     enough = max(one.start for one in (design, *beside))
     empty, nothing = Errors(*(np.zeros((3, n, 0)) for n in (3, 3, columns))), np.zeros(0, dtype=int)
@@ -148,11 +152,6 @@ def mixture(
         if len(started.weight) > most:
             started = _merged(started[started.weight > NEGLIGIBLE], most)
     return made
-
-
-def predicted(x: np.ndarray, dt: float) -> np.ndarray:
-    """F x of states (K, 3)."""
-    return np.stack([x[:, 0] + dt * (x[:, 1] + dt / 2 * x[:, 2]), x[:, 1] + dt * x[:, 2], x[:, 2]], axis=1)
 
 
 class _Seen(NamedTuple):

@@ -3,7 +3,8 @@
 Three things run together: P, the covariance that a filter believes, which gives its gains; S, the covariance of what
 the noise of the plots puts into its error; and E (3, C, B), the parts of the error that do not change from plot to
 plot. Column 0 is the mean error; each further column is what one drawn bias of unit variance leads to. So the second
-moment of the error is S + E Eᵀ.
+moment of the error is S + E Eᵀ. The last columns are of a truth that is drawn, by how its motion leaves that of the
+middle.
 """
 
 from dataclasses import dataclass
@@ -14,18 +15,20 @@ import numpy as np
 
 class Plots(NamedTuple):
     """What plots are: standard deviations sigma, mean errors bias, and standard deviations sigma_bias of the errors
-    that are drawn once a realisation, each (2,) of range in m and velocity in m/s; the probability of detection."""
+    that are drawn once a realisation, each (2,) of range in m and velocity in m/s; the probability of detection; how
+    many columns of E are of a drawn truth."""
 
     sigma: np.ndarray
     bias: np.ndarray
     sigma_bias: np.ndarray
     detection: float
+    of_truth: int = 0
 
     @property
     def inputs(self) -> np.ndarray:
         """What the plots add to the columns of E, (2, C): their mean error, and a column for each bias drawn."""
         drawn = np.diag(self.sigma_bias)[:, self.sigma_bias > 0]
-        return np.concatenate([self.bias[:, None], drawn], axis=1)
+        return np.concatenate([self.bias[:, None], drawn, np.zeros((2, self.of_truth))], axis=1)
 
 
 @dataclass
@@ -37,11 +40,10 @@ class Errors:
     E: np.ndarray
 
     def predict(self, dt: float, Q: np.ndarray, defect: np.ndarray) -> None:
-        """Go to the next scan, dt (s) later, in place: Q (3, 3, B or 1); defect (3,) is F x − x⁺ of the truth x."""
+        """Go to the next scan, dt (s) later, in place: Q (3, 3, B or 1); defect (3, C) is F x − x⁺ of the truth x."""
         self.P = congruent(self.P, dt) + Q
         self.S = congruent(self.S, dt)
-        self.E = moved(self.E, dt)
-        self.E[:, 0] += defect[:, None]
+        self.E = moved(self.E, dt) + defect[:, :, None]
 
     def update(self, plots: Plots, observes: int) -> None:
         """Take in a plot, in place, one number after the other: the noises are independent, so the order is free.
@@ -58,6 +60,19 @@ class Errors:
     def second_moments(self) -> np.ndarray:
         """E eeᵀ (3, 3, B)."""
         return self.S + np.einsum("icb,jcb->ijb", self.E, self.E)
+
+
+def defects(x: np.ndarray, dt: float, plots: Plots, drawn: np.ndarray | None) -> np.ndarray:
+    """F x − x⁺ of the truth x (K, 3) at every scan from the one before, for the columns of E: (K, 3, C).
+
+    drawn (K, 3, 1 + of_truth): beside x, the mean and the columns of a truth that is drawn; None: it is not.
+    """
+    made = np.zeros((len(x), 3, plots.inputs.shape[1]))
+    made[1:, :, 0] = moved(x[:-1].T, dt).T - x[1:]
+    if drawn is not None:
+        made[:, :, 0] += drawn[:, :, 0]
+        made[:, :, made.shape[2] - plots.of_truth :] = drawn[:, :, 1:]
+    return made
 
 
 def moved(M: np.ndarray, dt: float) -> np.ndarray:
@@ -96,10 +111,9 @@ class Information:
         return made
 
     def predict(self, dt: float, defect: np.ndarray) -> None:
-        """Refer to the next scan, in place: L ← F⁻ᵀ L F⁻¹; the error's mean gains the defect (3,) of the truth."""
+        """Refer to the next scan, in place: L ← F⁻ᵀ L F⁻¹; the error's columns gain the defect (3, C) of the truth."""
         self.L = back(back(self.L, dt).swapaxes(0, 1), dt)
-        self.Y = back(self.Y, dt)
-        self.Y[:, 0] += np.einsum("ijb,j->ib", self.L, defect)
+        self.Y = back(self.Y, dt) + np.einsum("ijb,jc->icb", self.L, defect)
 
     def update(self, plots: Plots, observes: int) -> None:
         """Take in a plot, in place."""

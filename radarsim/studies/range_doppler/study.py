@@ -70,11 +70,15 @@ class Plan:
 
 @dataclass(frozen=True)
 class Designed:
-    """A case's filters and what they see: truth x (K, 3) at times t (K,), plots, D_M (F,), gains of full detection."""
+    """A case's filters and what they see: truth x (K, 3) at times t (K,), plots, D_M (F,), gains of full detection.
+
+    drawn (K, 3, 1 + C): how the truth of realisations leaves the model beyond x, as `world.drawn_defects` has it.
+    """
 
     spec: Keys
     t: np.ndarray
     x: np.ndarray
+    drawn: np.ndarray
     plots: Plots
     variances: tuple[float, ...]
     filters: tuple[filters.LinearFilter, ...]
@@ -96,16 +100,17 @@ def designed(case: Case) -> Designed:
     spec: Keys = case.spec
     dt = spec.radar.scan_period_s
     t, x = world.true_motion(case)
-    plots = plots_of(spec)
+    drawn = world.drawn_defects(spec.target, t, x)
+    plots = plots_of(spec)._replace(of_truth=drawn.shape[2] - 1)
     try:
-        variances = tuning.manoeuvre_variances(spec.filters, plots, x, dt)
+        variances = tuning.manoeuvre_variances(spec.filters, tuning.Seen(plots, x, dt, drawn))
     except ValueError as error:
         raise ConfigError(f"{case.name}: filters: manoeuvre_variance: {error}") from None
     made = (
         filters.design(len(f.observes), f.plots_to_start, variance, plots.sigma, dt, len(t), f.process_noise)
         for f, variance in zip(spec.filters, variances, strict=True)
     )
-    return Designed(spec, t, x, plots, variances, tuple(made))
+    return Designed(spec, t, x, drawn, plots, variances, tuple(made))
 
 
 def plots_of(spec: Keys) -> Plots:
@@ -124,7 +129,7 @@ def prepare(case: Case) -> Plan:
     made = designed(case)
     labels = axes(made)
     count, scans = len(made.filters), len(made.t)
-    if labels.plain and not world.sigma_state(made.spec.target).any():
+    if labels.plain and not world.is_drawn(made.spec.target):
         return Plan(Layout(**linear.shapes(count, scans)), labels, shared_gains(case, made, labels).plain(), True)
     return Plan(Layout(**missed.shapes(count, scans)), labels, own_gains(case, made, labels).plain(), False)
 
@@ -170,6 +175,8 @@ def own_gains(case: Case, made: Designed, labels: RangeDopplerAxes) -> missed.Pr
         bias=made.plots.bias,
         sigma_bias=made.plots.sigma_bias,
         sigma_state=world.sigma_state(made.spec.target),
+        sigma_flight=world.sigma_flight(made.spec.target),
+        flight=world.flight(made.spec.target, made.t),
         detection=made.plots.detection,
         dt=made.dt,
         observes=labels.observes,
@@ -231,6 +238,12 @@ def exact_values(made: Designed, baseline: int) -> Known:
         of = np.stack([exact.bias_response(d.weights, d.gains, d.observes, made.dt) for d in made.filters])
         bias = bias + of @ plots.bias
         covariance = covariance + np.einsum("fkic,c,fkjc->fkij", of, plots.sigma_bias**2, of)
+    if made.drawn.any():
+        of = np.stack(
+            [exact.defect_response(d.weights, d.gains, d.observes, made.drawn, made.dt) for d in made.filters]
+        )
+        bias = bias + of[..., 0]
+        covariance = covariance + np.einsum("fkic,fkjc->fkij", of[..., 1:], of[..., 1:])
     available, believed = (np.stack([getattr(d, what) for d in made.filters]) for what in ("available", "believed"))
     moment = covariance + bias[..., :, None] * bias[..., None, :]
     root = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3) + bias**2)
@@ -275,7 +288,9 @@ class Means:
 
 def means(design: patterns.Design, beside: Sequence[patterns.Design], made: Designed) -> Means:
     """The means of one filter over the patterns, of which as many are kept as it takes."""
-    mixtures = (patterns.mixture(design, made.plots, made.x, made.dt, most, beside) for most in patterns.KEPT)
+    mixtures = (
+        patterns.mixture(design, made.plots, made.x, made.dt, most, beside, made.drawn) for most in patterns.KEPT
+    )
     coarse, fine = next(mixtures), next(mixtures)
     while not patterns.settled(fine, coarse) and (finer := next(mixtures, None)) is not None:
         coarse, fine = fine, finer

@@ -6,13 +6,14 @@ which lie within the flat bottom of the curve and are the same on every machine.
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from radarsim.physics.motion import process_noise
 from radarsim.studies.range_doppler.config import Best, Filter
-from radarsim.studies.range_doppler.patterns import Design, mixture, predicted
-from radarsim.studies.range_doppler.propagation import Errors, Information, Plots
+from radarsim.studies.range_doppler.patterns import Design, mixture
+from radarsim.studies.range_doppler.propagation import Errors, Information, Plots, defects
 
 LEAST, MOST = 1e-12, 1e8  # D_M Δt⁶/σ_r²; the least is lowered for long runs
 TO_VELOCITY = 1e12  # most of D_M Δt⁴/σ_V², as the config's check has it
@@ -22,29 +23,36 @@ ALIKE = 1e-9
 COMPONENTS = {"sigma_r": 0, "sigma_Vr": 1, "sigma_ar": 2}
 
 
-def manoeuvre_variances(filters: tuple[Filter, ...], plots: Plots, x: np.ndarray, dt: float) -> tuple[float, ...]:
-    """D_M of each filter, (m/s³)²: as given, or the best on the truth x (K, 3) at scans dt (s) apart."""
+class Seen(NamedTuple):
+    """What filters see: plots, of a truth x (K, 3) at scans dt (s) apart, drawn as `propagation.defects` takes it."""
+
+    plots: Plots
+    x: np.ndarray
+    dt: float
+    drawn: np.ndarray | None = None
+
+
+def manoeuvre_variances(filters: tuple[Filter, ...], seen: Seen) -> tuple[float, ...]:
+    """D_M of each filter, (m/s³)²: as given, or the best on what is seen."""
     return tuple(
-        best(one, one.manoeuvre_variance, plots, x, dt)
-        if isinstance(one.manoeuvre_variance, Best)
-        else one.manoeuvre_variance
+        best(one, one.manoeuvre_variance, seen) if isinstance(one.manoeuvre_variance, Best) else one.manoeuvre_variance
         for one in filters
     )
 
 
-def best(one: Filter, wanted: Best, plots: Plots, x: np.ndarray, dt: float) -> float:
-    """The manoeuvre variance that a filter's config asks for, (m/s³)², on the truth x (K, 3)."""
-    low, high = limits(len(x), plots.sigma, dt)
-    whole = plots._replace(detection=1.0)
+def best(one: Filter, wanted: Best, seen: Seen) -> float:
+    """The manoeuvre variance that a filter's config asks for, (m/s³)², on what is seen."""
+    low, high = limits(len(seen.x), seen.plots.sigma, seen.dt)
+    whole = seen._replace(plots=seen.plots._replace(detection=1.0))
 
-    def cost(logs: np.ndarray, seen: Plots) -> np.ndarray:
-        return objective(wanted, errors(one, 10.0**logs, seen, x, dt))
+    def cost(logs: np.ndarray, of: Seen) -> np.ndarray:
+        return objective(wanted, errors(one, 10.0**logs, of))
 
     grid = np.linspace(low, high, round((high - low) * A_DECADE) + 1)
     middle = closer(grid, lambda logs: cost(logs, whole), CLOSER)
-    if plots.detection < 1:
+    if seen.plots.detection < 1:
         near = np.arange(-ABOUT, ABOUT + 1e-9, 1 / A_DECADE_FEW)
-        middle = closer(np.clip(middle + near, low, high), lambda logs: cost(logs, plots), 1)
+        middle = closer(np.clip(middle + near, low, high), lambda logs: cost(logs, seen), 1)
     return float(f"{10.0**middle:.4g}")
 
 
@@ -81,31 +89,33 @@ def objective(wanted: Best, sigma: np.ndarray) -> np.ndarray:
     return np.asarray(np.nanmax(of, axis=1) if wanted.over == "worst" else np.nanmean(of, axis=1))
 
 
-def errors(one: Filter, variances: np.ndarray, plots: Plots, x: np.ndarray, dt: float) -> np.ndarray:
+def errors(one: Filter, variances: np.ndarray, seen: Seen) -> np.ndarray:
     """σ (B, K, 3) of a filter with each of the manoeuvre variances (B,); not-a-number where it has no estimate."""
     observes, start = len(one.observes), one.plots_to_start
-    Q = np.stack([process_noise(one.process_noise, float(v), dt) for v in variances], axis=2)
-    if plots.detection < 1:
+    Q = np.stack([process_noise(one.process_noise, float(v), seen.dt) for v in variances], axis=2)
+    if seen.plots.detection < 1:
         designs = (Design(observes, start, Q[..., i]) for i in range(len(variances)))
-        return np.stack([np.sqrt(mixture(design, plots, x, dt, FEW).moment) for design in designs])
-    return side_by_side(observes, start, Q, plots, x, dt)
+        found = (mixture(design, seen.plots, seen.x, seen.dt, FEW, drawn=seen.drawn) for design in designs)
+        return np.stack([np.sqrt(one.moment) for one in found])
+    return side_by_side(observes, start, Q, seen)
 
 
-def side_by_side(observes: int, start: int, Q: np.ndarray, plots: Plots, x: np.ndarray, dt: float) -> np.ndarray:
-    """σ (B, K, 3) of filters that differ in Q (3, 3, B), on the truth x (K, 3), every scan with its plot."""
-    count, defect = Q.shape[2], predicted(x[:-1], dt) - x[1:]
-    information, sigma = Information(plots.inputs.shape[1]), np.full((count, len(x), 3), np.nan)
+def side_by_side(observes: int, start: int, Q: np.ndarray, seen: Seen) -> np.ndarray:
+    """σ (B, K, 3) of filters that differ in Q (3, 3, B), every scan with its plot."""
+    plots, count, scans = seen.plots, Q.shape[2], len(seen.x)
+    defect = defects(seen.x, seen.dt, plots, seen.drawn)
+    information, sigma = Information(plots.inputs.shape[1]), np.full((count, scans, 3), np.nan)
     of_plot = np.sqrt(plots.sigma**2 + plots.bias**2 + plots.sigma_bias**2)
     for k in range(start):
         if k > 0:
-            information.predict(dt, defect[k - 1])
+            information.predict(seen.dt, defect[k])
         information.update(plots, observes)
         sigma[:, k, :observes] = of_plot[:observes]
     one = information.errors()
     running = Errors(*(np.repeat(part, count, axis=2) for part in (one.P, one.S, one.E)))
     sigma[:, start - 1] = np.sqrt(np.einsum("iib->bi", running.second_moments()))
-    for k in range(start, len(x)):
-        running.predict(dt, Q, defect[k - 1])
+    for k in range(start, scans):
+        running.predict(seen.dt, Q, defect[k])
         running.update(plots, observes)
         sigma[:, k] = np.sqrt(np.einsum("iib->bi", running.second_moments()))
     return sigma

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from radarsim.app.configs import load
+from radarsim.errors import ConfigError
+from radarsim.kernels.random import fill_normal_pairs
 from radarsim.physics.motion import process_noise
 from radarsim.studies.range_doppler import patterns, study, tuning
 from radarsim.studies.range_doppler.kernels import missed
@@ -26,6 +28,7 @@ TURN = {
     "acceleration_g": 1,
     "duration_s": 20,
 }
+DRAWN = {"sigma_position_m": 2000, "sigma_velocity_mps": 25}
 FLY_BY = {"kind": "fly_by", "distance_m": 15e3, "speed_mps": 300, "start_range_m": 40e3}
 SIGMA, DT, VARIANCE = np.array([60.0, 2.0]), 10.0, 0.05
 
@@ -89,6 +92,8 @@ def textbook(plots, observes, start, Q, dt=DT, sigma=SIGMA):
         {"radar": {"bias_range_m": 100, "sigma_bias_velocity_mps": 3, "sigma_bias_range_m": 50}},
         {"target": {"kind": "polynomial", "coefficients": [5e4, -200], "sigma_coefficients": [1000, 50, 3]}},
         {"radar": {"detection_probability": 0.5, "scan_period_s": 0.01}, "scans": 30},
+        {"target": TURN | DRAWN, "radar": {"detection_probability": 0.7}},
+        {"target": FLY_BY | DRAWN},
     ],
 )
 def test_each_realisation_is_that_of_a_textbook_filter(changes):
@@ -126,6 +131,8 @@ def test_with_every_plot_both_kernels_agree():
         bias=np.zeros(2),
         sigma_bias=np.zeros(2),
         sigma_state=np.zeros(3),
+        sigma_flight=np.zeros(6),
+        flight=np.zeros((0, 9)),
         detection=1.0,
         dt=DT,
         observes=plain.problem.observes,
@@ -302,6 +309,131 @@ def test_a_recorded_flight_is_seen_from_the_origin(tmp_path, monkeypatch):
     recorded = prepared(target={"kind": "recorded", "file": "flight.csv"}).problem.truth
     flown = prepared(target=FLY_BY).problem.truth
     np.testing.assert_allclose(recorded[:, :2], flown[:, :2], rtol=1e-5, atol=0.05)
+
+
+# ---- flights that are drawn ------------------------------------------------------------------------------------------
+
+
+def shifts_of(problem, count):
+    """What the kernel draws of a flight for realisations 0, 1, …: (count, 6)."""
+    made = np.zeros((6, 1024))
+    for pair in range(3):
+        fill_normal_pairs(problem.keys[2], 0, 3 + pair, made[2 * pair], made[2 * pair + 1])
+    return made.T[:count] * problem.sigma_flight
+
+
+@pytest.mark.parametrize("kind", ["turn", "fly_by"])
+def test_a_drawn_flight_begins_elsewhere_and_flies_the_same_accelerations(kind):
+    """Truth by integrating the plane motion of the textbook from the drawn position and velocity."""
+    problem = prepared(target={"turn": TURN, "fly_by": FLY_BY}[kind] | DRAWN).problem
+    shifts = shifts_of(problem, 2)
+    assert (np.abs(shifts[:, [0, 1, 3, 4]]) > 0).all()
+    assert not shifts[:, [2, 5]].any()
+    for realisation, shift in enumerate(shifts):
+        if kind == "turn":
+            position, velocity = np.array([TURN["range_m"], 0.0]), np.array([-TURN["speed_mps"], 0.0])
+            rate, begin = TURN["acceleration_g"] * 9.80665 / TURN["speed_mps"], TURN["start_s"]
+        else:
+            along = np.sqrt(FLY_BY["start_range_m"] ** 2 - FLY_BY["distance_m"] ** 2)
+            position, velocity = np.array([-along, FLY_BY["distance_m"]]), np.array([FLY_BY["speed_mps"], 0.0])
+            rate, begin = 0.0, 0.0
+        position, velocity, middle = position + shift[:2], velocity + shift[3:5], velocity
+        _, truth = missed.simulate_plots(problem, realisation)
+        step = 0.02
+        for k, (r, radial, _) in enumerate(truth):
+            np.testing.assert_allclose(np.hypot(*position), r, rtol=0, atol=0.02)
+            np.testing.assert_allclose(position @ velocity / np.hypot(*position), radial, rtol=0, atol=0.02)
+            for n in range(round(DT / step)):
+                t = k * DT + (n + 0.5) * step
+                turning = kind == "turn" and begin <= t < begin + TURN["duration_s"]
+                heading = np.arctan2(middle[1], middle[0]) + rate * np.clip(t - begin, 0, 20)
+                pull = np.hypot(*middle) * rate * np.array([-np.sin(heading), np.cos(heading)]) * turning
+                position = position + step * velocity + step**2 / 2 * pull
+                velocity = velocity + step * pull
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"target": TURN | DRAWN},
+        {"target": TURN | {"sigma_velocity_mps": 30}, "every_filter": {"initial_scans": 5}},
+        {"target": FLY_BY | DRAWN, "radar": {"bias_velocity_mps": 1, "sigma_bias_range_m": 30}},
+        {"target": TURN | DRAWN, "radar": {"detection_probability": 0.8, "sigma_bias_velocity_mps": 1}},
+        {"target": {"kind": "recorded"} | DRAWN},
+    ],
+)
+def test_sums_over_drawn_flights_agree_with_the_exact_errors(changes, tmp_path, monkeypatch):
+    if changes["target"]["kind"] == "recorded":
+        monkeypatch.chdir(tmp_path)
+        t = np.arange(0, 95.0, 5.0)
+        rows = [f"{a},{30e3 - 250 * a},{9000 + 40 * a},{3000 + a**2}" for a in t]
+        (tmp_path / "flight.csv").write_text("t_s,x_m,y_m,z_m\n" + "\n".join(rows) + "\n")
+        changes = {"target": changes["target"] | {"file": "flight.csv"}}
+    plan, count = prepared(**changes), 60_000
+    sums, axes = sums_of(plan, count), plan.axes
+    there = sums["estimates"] > 0
+    n, moment, fourth = sums["estimates"][there], sums["error"][there][:, 1], sums["error"][there][:, 3]
+    sigma = np.sqrt(moment / n)
+    spread = np.sqrt((fourth / n / sigma**4 - 1) / (4 * n))
+    assert (np.abs(sigma / axes.exact_sigma[there] - 1) < SIGMAS * spread).all()
+    assert (np.abs(sums["error"][there][:, 0] / n - axes.exact_bias[there]) < SIGMAS * sigma / np.sqrt(n)).all()
+    fixed = prepared(**changes | {"target": changes["target"] | dict.fromkeys(DRAWN, 0)}).axes
+    assert np.abs(axes.exact_sigma[there] / fixed.exact_sigma[there] - 1).max() > 1e-3  # what is drawn matters
+
+
+def test_the_mean_over_drawn_flights_has_settled(monkeypatch):
+    """As widely drawn as is allowed, two more nodes in each number change it by less than the stated millionth."""
+    from radarsim.studies.range_doppler import world
+
+    widest = TURN | {"sigma_position_m": 4000, "sigma_velocity_mps": 10}
+    for target in (widest, FLY_BY | {"sigma_position_m": 2400}):
+        plans = [prepared(target=target)]
+        with monkeypatch.context() as more:
+            more.setattr(world, "NODES", {count: nodes + 2 for count, nodes in world.NODES.items()})
+            plans.append(prepared(target=target))
+        one, other = (plan.axes.exact_sigma for plan in plans)
+        np.testing.assert_allclose(one, other, rtol=1e-6)
+
+
+def test_with_few_misses_drawn_flights_are_as_without():
+    """The mean over patterns tends to the recursion of full detection."""
+    whole = prepared(target=TURN | DRAWN).axes
+    missing = prepared(target=TURN | DRAWN, radar={"detection_probability": 1 - 1e-9}).axes
+    there = whole.available
+    np.testing.assert_allclose(missing.exact_sigma[there], whole.exact_sigma[there], rtol=1e-5)
+    np.testing.assert_allclose(missing.exact_bias[there], whole.exact_bias[there], rtol=1e-4, atol=1e-3)
+
+
+def test_the_best_variance_on_a_drawn_flight():
+    wanted = {"minimise": "sigma_r", "over": "worst", "from_k": 4}
+    one = {"name": "a", "observes": ["range", "velocity"], "process_noise": "white_jerk"}
+    target = TURN | {"sigma_velocity_mps": 30}
+    found = float(prepared(filters=[one | {"manoeuvre_variance": wanted}], target=target).axes.manoeuvre_variance[0])
+
+    def cost(variance):
+        filters = [one | {"manoeuvre_variance": variance}]
+        return prepared(filters=filters, target=target).axes.exact_sigma[0, 3:, 0].max()
+
+    assert cost(found) <= min(cost(10.0**power) for power in np.arange(-4, 3, 0.2)) * (1 + 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [
+        (FLY_BY | {"sigma_position_m": 3000}, "at 100 s it is 1.659e"),
+        (TURN | {"sigma_velocity_mps": 200}, "6 standard deviations are"),
+        (TURN | {"sigma_position_m": -1}, "must be >= 0"),
+    ],
+)
+def test_a_flight_that_may_meet_the_radar_is_refused(target, words):
+    with pytest.raises(ConfigError, match=words):
+        prepared(target=target, scans=14)
+
+
+def test_exact_errors_of_a_long_drawn_run_are_not_given():
+    plan = prepared(target=FLY_BY | DRAWN, radar={"scan_period_s": 0.2}, scans=301)
+    assert np.isnan(plan.axes.exact_sigma[:, 3:]).all()
+    assert np.isfinite(sums_of(plan, 10)["error"]).all()
 
 
 # ---- D_M that is looked for -----------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ counted from the realisation's first plot, so that they are well conditioned how
 Covariances are packed, p = (00, 01, 02, 11, 12, 22).
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,9 @@ class Problem(NamedTuple):
     sigma_bias   (2,)          standard deviations of the errors that are drawn once a realisation
     sigma_state  (3,)          standard deviations of the differences from the truth's first range, velocity and
                                acceleration, drawn once a realisation
+    sigma_flight (6,)          standard deviations of x, y, z and of vx, vy, vz at the first scan of a flight in space,
+                               drawn once a realisation
+    flight       (K or 0, 9)   that flight, (x, vx, ax, y, …), of which truth is the motion in range; none: not drawn
     detection                  probability that a scan has its plot
     dt                         scan period, s
     observes     (F,)          1: the filter observes the range alone; 2: range and velocity
@@ -47,6 +51,8 @@ class Problem(NamedTuple):
     bias: np.ndarray
     sigma_bias: np.ndarray
     sigma_state: np.ndarray
+    sigma_flight: np.ndarray
+    flight: np.ndarray
     detection: float
     dt: float
     observes: np.ndarray
@@ -64,6 +70,8 @@ class Problem(NamedTuple):
             plain(self.bias, 2),
             plain(self.sigma_bias, 2),
             plain(self.sigma_state, 3),
+            plain(self.sigma_flight, 6),
+            plain(self.flight, len(self.flight), 9),
             float(self.detection),
             float(self.dt),
             plain(self.observes, filters, dtype=np.int64),
@@ -113,9 +121,10 @@ class Work(NamedTuple):
 
     plots (2, n) range and velocity; came (n,) 1 where the scan has a plot; other (n,) for the pair of numbers drawn
     with it; count (n,) plots so far; first (n,) the scan of the first; offset (2, n) the biases; state (3, n) the drawn
-    difference of the truth, moved on; x (F, 3, n) and p (F, 6, n) of filters that have started; normal (F, 9, n) the
-    sums of the starts in the making, six of the matrix and three of the right-hand side; e (F, 3, n) errors, zero where
-    there is no estimate; has (F, 3, n) 1 where there is one, v (F, 3, n) its believed variance.
+    difference of the truth, moved on; shift (6, n) the displacement that is drawn of a flight; x (F, 3, n) and
+    p (F, 6, n) of filters that have started; normal (F, 9, n) the sums of the starts in the making, six of the matrix
+    and three of the right-hand side; e (F, 3, n) errors, zero where there is no estimate; has (F, 3, n) 1 where there
+    is one, v (F, 3, n) its believed variance.
     """
 
     plots: np.ndarray
@@ -125,6 +134,7 @@ class Work(NamedTuple):
     first: np.ndarray
     offset: np.ndarray
     state: np.ndarray
+    shift: np.ndarray
     x: np.ndarray
     p: np.ndarray
     normal: np.ndarray
@@ -135,7 +145,7 @@ class Work(NamedTuple):
 
 def work(filters: int) -> Work:
     """Arrays of one chunk."""
-    rows = ((2,), (), (), (), (), (2,), (3,), (filters, 3), (filters, 6), (filters, 9), *[(filters, 3)] * 3)
+    rows = ((2,), (), (), (), (), (2,), (3,), (6,), (filters, 3), (filters, 6), (filters, 9), *[(filters, 3)] * 3)
     return Work(*(aligned_zeros(*row, CHUNK) for row in rows))
 
 
@@ -398,8 +408,8 @@ def add_sums(made, n, k, start, baseline, whole, sums):
 
 
 @part
-def draw_once(keys, first, made, bias, sigma_bias, sigma_state):
-    """Biases and the start's difference of realisations first, first + 1, …"""
+def draw_once(keys, first, made, bias, sigma_bias, sigma_state, sigma_flight):
+    """Biases, the start's difference and the flight's displacement of realisations first, first + 1, …"""
     fill_normal_pairs(keys[2], first, 0, made.offset[0], made.offset[1])
     fill_normal_pairs(keys[2], first, 1, made.state[0], made.state[1])
     fill_normal_pairs(keys[2], first, 2, made.state[2], made.other)
@@ -409,6 +419,43 @@ def draw_once(keys, first, made, bias, sigma_bias, sigma_state):
     for c in range(3):
         for i in range(made.other.size):
             made.state[c, i] = sigma_state[c] * made.state[c, i]
+    for c in range(3):
+        fill_normal_pairs(keys[2], first, 3 + c, made.shift[2 * c], made.shift[2 * c + 1])
+    for c in range(6):
+        for i in range(made.other.size):
+            made.shift[c, i] = sigma_flight[c] * made.shift[c, i]
+
+
+@part
+def advance_state(state, dt):
+    """The drawn difference of the truth one scan later, in place: a square of the time; by its address."""
+    for i in range(EIGHTS):
+        put3(state, i, extrapolated(get(state, i), get(state, EIGHTS + i), get(state, 2 * EIGHTS + i), dt))
+
+
+@part
+def displace(made, flight, truth, t):
+    """The difference of the truth (3,) at a time t (s) that the displacement of its flight (9,) makes, into state."""
+    shift, state = made.shift, made.state
+    for i in range(made.other.size):
+        vx, vy, vz = flight[1] + shift[3, i], flight[4] + shift[4, i], flight[7] + shift[5, i]
+        x = flight[0] + shift[0, i] + t * shift[3, i]
+        y = flight[3] + shift[1, i] + t * shift[4, i]
+        z = flight[6] + shift[2, i] + t * shift[5, i]
+        r = math.sqrt(x * x + y * y + z * z)
+        v = (x * vx + y * vy + z * vz) / r
+        pull = x * flight[2] + y * flight[5] + z * flight[8]
+        state[0, i], state[1, i] = r - truth[0], v - truth[1]
+        state[2, i] = (vx * vx + vy * vy + vz * vz + pull - v * v) / r - truth[2]
+
+
+@part
+def move_truth(made, k, dt, flight, truth):
+    """What is drawn of the truth (K, 3), in state, brought to scan k."""
+    if flight.shape[0] > 0:
+        displace(made, flight[k], truth[k], k * dt)
+    elif k > 0:
+        advance_state(address(made.state), dt)
 
 
 @part
@@ -418,13 +465,6 @@ def observe(keys, first, k, made, truth, sigma):
     plots, state, offset = address(made.plots), address(made.state), address(made.offset)
     for i in range(2 * EIGHTS):
         put(plots, i, get(plots, i) + get(state, i) + get(offset, i))
-
-
-@part
-def advance_state(state, dt):
-    """The drawn difference of the truth one scan later, in place: a square of the time; by its address."""
-    for i in range(EIGHTS):
-        put3(state, i, extrapolated(get(state, i), get(state, EIGHTS + i), get(state, 2 * EIGHTS + i), dt))
 
 
 @summing
@@ -455,9 +495,9 @@ def advance(made, f, k, dt, observes, start, Q, R):
 
 
 @part
-def begin_chunk(keys, first, made, bias, sigma_bias, sigma_state):
+def begin_chunk(keys, first, made, bias, sigma_bias, sigma_state, sigma_flight):
     """A new chunk: nothing has come yet, and what is drawn once a realisation is drawn; whether anything is."""
-    drawn = np.any(sigma_bias > 0.0) or np.any(sigma_state > 0.0)
+    drawn = np.any(sigma_bias > 0.0) or np.any(sigma_state > 0.0) or np.any(sigma_flight > 0.0)
     made.count[:] = 0.0
     made.first[:] = 0.0
     made.x[:] = 0.0
@@ -467,22 +507,23 @@ def begin_chunk(keys, first, made, bias, sigma_bias, sigma_state):
     for m in range(2):
         made.offset[m, :] = bias[m]
     if drawn:
-        draw_once(keys, first, made, bias, sigma_bias, sigma_state)
+        draw_once(keys, first, made, bias, sigma_bias, sigma_state, sigma_flight)
     return drawn
 
 
 @kernel
 def add_block(made, first, count, problem, sums):
     """`simulate_block` for a plain problem, with the work arrays of one chunk."""
-    keys, truth, sigma, bias, sigma_bias, sigma_state, detection, dt, observes, start, Q, baseline = problem
+    keys, truth, sigma, bias, sigma_bias, sigma_state, sigma_flight, flight, detection, dt = problem[:10]
+    observes, start, Q, baseline = problem[10:]
     R = sigma * sigma
     for done in range(0, count, CHUNK):
         # A partial chunk is computed whole and summed in part, so each realisation goes through the same instructions.
         n = min(CHUNK, count - done)
-        drawn = begin_chunk(keys, first + done, made, bias, sigma_bias, sigma_state)
+        drawn = begin_chunk(keys, first + done, made, bias, sigma_bias, sigma_state, sigma_flight)
         for k in range(truth.shape[0]):
-            if k > 0 and drawn:
-                advance_state(address(made.state), dt)
+            if drawn:
+                move_truth(made, k, dt, flight, truth)
             observe(keys, first + done, k, made, truth[k], sigma)
             count_plots(keys, first + done, k, detection, made.came, made.other, made.count, made.first)
             whole = True
@@ -499,10 +540,11 @@ def add_block(made, first, count, problem, sums):
 @kernel
 def fill_simulated(made, first, problem, plots, came, truth):
     """Realisation `first`: plots (K, 2), came (K,) 1 where there is one, truth (K, 3); made: work arrays."""
-    drawn = begin_chunk(problem.keys, first, made, problem.bias, problem.sigma_bias, problem.sigma_state)
+    spread = problem.sigma_bias, problem.sigma_state, problem.sigma_flight
+    drawn = begin_chunk(problem.keys, first, made, problem.bias, *spread)
     for k in range(plots.shape[0]):
-        if k > 0 and drawn:
-            advance_state(address(made.state), problem.dt)
+        if drawn:
+            move_truth(made, k, problem.dt, problem.flight, problem.truth)
         observe(problem.keys, first, k, made, problem.truth[k], problem.sigma)
         count_plots(problem.keys, first, k, problem.detection, made.came, made.other, made.count, made.first)
         plots[k, 0], plots[k, 1], came[k] = made.plots[0, 0], made.plots[1, 0], made.came[0]
