@@ -113,10 +113,14 @@ def unit(quantity: Quantity, axes: Axes) -> str:
     return quantity.of.unit or text.unit(dict(axes.components)[str(quantity.component)])
 
 
+def shortened(quantity: Quantity, case: Case) -> Case:
+    """The case as far as a quantity asks for it. Raises ConfigError where the whole case cannot be."""
+    return registry.study(case.study).shortened(case, quantity.at_s, quantity.at_k)
+
+
 def labels(quantity: Quantity, case: Case) -> Axes:
     """The labels of a case's plan, with the exact errors as far as a quantity asks for them. Raises ConfigError."""
-    study = registry.study(case.study)
-    return study.prepare(study.shortened(case, quantity.at_s, quantity.at_k)).axes
+    return registry.study(case.study).prepare(shortened(quantity, case)).axes
 
 
 def exact(quantity: Quantity, case: Case, axes: Axes) -> float:
@@ -149,6 +153,26 @@ def sampled(quantity: Quantity, result: CaseResult) -> tuple[Estimate, float]:
         at(quantity, Series(k, t_s, Estimate(*values))),
         float(at(quantity, Series(k, t_s, Estimate(exactly, exactly, exactly))).value),
     )
+
+
+def noted(quantity: Quantity, result: CaseResult) -> str:
+    """What the tables note of the interval there: why it rests on too little; empty where it does not."""
+    from radarsim.report import notes
+
+    study, name = registry.study(result.study), quantity.of.table
+    made = {"curves": study.curves([result]), "gains": study.gains([result])} | study.tables([result])
+    table = notes.noted({key: made[key] for key in {"curves", name}}, [result])[name]
+    if "note" not in table:
+        return ""
+    rows = table[table["filter"] == quantity.filter]
+    if quantity.component is not None:
+        rows = rows[rows["component"] == quantity.component]
+    if quantity.at_k is not None:
+        rows = rows[rows["k"] == quantity.at_k]
+    elif quantity.at_s is not None and "t_s" in rows:
+        t_s = rows["t_s"].to_numpy(dtype=float)
+        rows = rows[(t_s <= quantity.at_s) | (np.arange(len(t_s)) <= np.searchsorted(t_s, quantity.at_s))]
+    return str(rows["note"].iloc[-1]) if len(rows) else ""
 
 
 def of_table(quantity: Quantity, table: "pd.DataFrame") -> float:

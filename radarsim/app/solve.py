@@ -8,6 +8,7 @@ true value as often as that interval covers.
 import math
 import os
 import shlex
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -23,9 +24,10 @@ from radarsim.config import numeric
 from radarsim.config.experiment import Case
 from radarsim.config.lookup import did_you_mean
 from radarsim.engine.collect import collect
-from radarsim.engine.results import Axes
+from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError
 from radarsim.report.statistics import Estimate
+from radarsim.studies import registry
 
 FACTOR = 1000.0  # the search goes from a thousandth of a positive key's value to a thousand times it
 NEAR = 1e-4  # of a value: the step of a derivative
@@ -34,6 +36,8 @@ MOST_NAMED = 6  # cases that a message lists
 JUMP = 1e-4  # of a quantity: more than means over patterns of plots may jump where others are merged
 JUMPS = "the quantity jumps over the target there"
 SAME = 1e-12  # of a quantity: what rounding may make of no change
+TO_CLOSE = 12  # values, beside those of the scan, that bring a root from its bracket to rounding, and its slope
+LONG_S = 2.0  # of an answer, from which it is foretold what it takes
 
 Config = str | os.PathLike[str] | Mapping[str, Any]
 
@@ -116,12 +120,14 @@ def solve(
     threads: int | None = None,
     sampled: bool = False,
     progress: Callable[[int, int, int], None] | None = None,
+    told: Callable[[str], None] | None = None,
 ) -> Answer:
     """The value of a key at which a quantity equals `equals`, in the quantity's unit (gains and rates in per cent).
 
     between: what is searched; by default what the key allows, and of one that has no two bounds a thousandth to a
     thousand times its value. realisations: behind each sampled value, by default the config's. sampled: simulate also
-    what is known exactly.
+    what is known exactly. told is called with a line, before the search, that says what it will do, if that takes some
+    seconds.
 
     Raises ConfigError for a wrong config, key, filter or component, and for a key without effect.
     """
@@ -135,7 +141,8 @@ def solve(
     curve = Curve(cases, key, quantity, threads, progress, realisations or cases.base.realisations)
     now = found[0].value if len({one.value for one in found}) == 1 else None
     question = Question(cases, key, quantity, equals, over, now, quantities.unit(quantity, axes), tuple(overrides))
-    return _exactly(question, curve) if not sampled and curve.exact(axes) else _by_sampling(question, curve)
+    work = _exactly if not sampled and curve.exact(axes) else _by_sampling
+    return work(question, curve, told or (lambda line: None))
 
 
 @dataclass(frozen=True)
@@ -229,6 +236,11 @@ class Curve:
         """The quantity with its interval, from so many realisations."""
         return self._kept(value, realisations, lambda case: self._sampled(case, realisations)[0])
 
+    def noted(self, value: float) -> tuple[str, ...]:
+        """What the tables note of the interval at a value, in words."""
+        note = quantities.noted(self.quantity, self._result(self.cases.at(self.key, value), self.realisations))
+        return (f"the interval is too narrow: {note}; more realisations, -n, mend that",) if note else ()
+
     def _kept(self, value: float | None, count: int, of: Callable[[Case], Estimate]) -> Estimate:
         place = (math.nan if value is None else value, count)
         if place in self.known:
@@ -254,14 +266,21 @@ class Curve:
         return Estimate(value, value, value)
 
     def _sampled(self, case: Case, realisations: int) -> tuple[Estimate, float]:
+        return quantities.sampled(self.quantity, self._result(case, realisations))
+
+    def _result(self, case: Case, realisations: int) -> CaseResult:
         work = CaseWork(case)
-        done = collect(work, realisations, threads=self.threads)
-        return quantities.sampled(self.quantity, result_of(case, work, done))
+        return result_of(case, work, collect(work, realisations, threads=self.threads))
 
 
-def _exactly(asked: Question, curve: Curve) -> Answer:
+def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answer:
     """The answer where the quantity is exact."""
+    begun = time.monotonic()
     attained_now = curve.exactly(None)
+    curve.expected = len(asked.over.grid()) + TO_CLOSE
+    near = registry.study(asked.cases.base.study).exact_but_for(quantities.shortened(asked.quantity, asked.cases.base))
+    what = f"computes the {asked.quantity.words} at about {curve.expected} values of {asked.key}"
+    foretell(told, f"{what}{f', each {near}' if near else ''}", curve.expected * (time.monotonic() - begun))
 
     def missing(x: float) -> float:
         return curve.exactly(x) - asked.equals
@@ -285,8 +304,16 @@ def _exactly(asked: Question, curve: Curve) -> Answer:
         **{"value": value, "lo": value, "hi": value, "attained": attained},
         slope=None if jumps else slope(curve.exactly, value, asked.over),
         others=tuple(x for x in values if x != value),
-        notes=((JUMPS,) if jumps else ()) + ((WHOLE,) if asked.over.whole and attained != asked.equals else ()),
+        notes=((JUMPS,) if jumps else ())
+        + ((WHOLE,) if asked.over.whole and attained != asked.equals else ())
+        + ((f"σ is {near}",) if near else ()),
     )
+
+
+def foretell(told: Callable[[str], None], what: str, seconds: float) -> None:
+    """Say what a search will do and about how long it takes, where that is long."""
+    if seconds > LONG_S:
+        told(f"{what}: about {seconds:.0f} s")
 
 
 def _answer(asked: Question, attained_now: float, **given: Any) -> Answer:
@@ -374,21 +401,26 @@ def boundary(asked: Question, curve: Curve, x: float) -> tuple[str, ...]:
 # ---- by sampling ----------------------------------------------------------------------------------------------------
 PILOT_SHARE, PILOT_LEAST = 16, 200  # realisations of the scan: a share of all, but not fewer
 PILOT_POINTS = 13
+WITH_ALL = 13  # values with all realisations: a bracket, the value, both ends of its interval
 MOST_STEPS = 3  # of the scan, by which the pilot's noise may have moved a crossing
 RESIDUE = 0.02  # of its interval: how near a sampled quantity is brought to the target, so that the noise decides
 
 
-def _by_sampling(asked: Question, curve: Curve) -> Answer:
+def _by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answer:
     """The answer where the quantity is simulated, with the same noise at every value."""
     over, count = asked.over, curve.realisations
     grid, pilot = over.grid(PILOT_POINTS), min(count, max(PILOT_LEAST, count // PILOT_SHARE))
-    curve.expected = len(grid) + PILOT_POINTS
+    curve.expected = len(grid) + WITH_ALL
+    curve.simulated(None, 1)  # compiles
+    begun = time.monotonic()
+    attained_now = curve.simulated(None, count).value
+    what = f"simulates {len(grid)} values of {asked.key} with {pilot} realisations, then about {WITH_ALL} with {count}"
+    foretell(told, what, (WITH_ALL + len(grid) * pilot / count) * (time.monotonic() - begun))
     scanned = [(x, curve.simulated(x, pilot).value - asked.equals) for x in grid]
     known = [one for one in scanned if not math.isnan(one[1])]
     if not known:
         raise nowhere(asked, curve)
     refuse_without_effect(asked, [y for _, y in known])
-    attained_now = curve.simulated(None, count).value
     answer = partial(_answer, asked, attained_now, exact=False)
     best, _ = min(known, key=lambda one: abs(one[1]))
     places = _changes(scanned) or [grid.index(best)]
@@ -406,7 +438,7 @@ def _by_sampling(asked: Question, curve: Curve) -> Answer:
         **{"value": value, "lo": own.lo, "hi": own.hi, "attained": curve.simulated(value, count).value},
         slope=_sampled_slope(curve, own),
         others=tuple(one.value for one in found if not own.lo <= one.value <= own.hi),
-        notes=(WHOLE,) if over.whole else (),
+        notes=((WHOLE,) if over.whole else ()) + curve.noted(value),
     )
 
 

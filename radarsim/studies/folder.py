@@ -22,7 +22,7 @@ A study that follows this declares an object and writes no class:
 | `warnings`, if offered | the function of `words` |
 | `claims`, if there is a paper | `claims.CLAIMS`, judged by `measures.Evidence` |
 | `seconds_per_update`, if offered | the function of `cost` |
-| `shortened`, if offered | the function of `study` |
+| `shortened`, `exact_but_for`, if offered | functions of `study` |
 | `readings`, if offered | an object of the class `readings.Readings` |
 | `recorded`, if offered | an object of the class `track.Recorded` |
 | `chart`, if offered | the function of `chart` |
@@ -95,6 +95,10 @@ class StudyFolder(Study):
     def shortened(self, case: "Case", at_s: float | None, at_k: int | None) -> "Case":
         offered = "shortened" in self.offers
         return self.file("study").shortened(case, at_s, at_k) if offered else super().shortened(case, at_s, at_k)
+
+    def exact_but_for(self, case: "Case") -> str:
+        offered = "exact_but_for" in self.offers
+        return self.file("study").exact_but_for(case) if offered else super().exact_but_for(case)
 
     def seconds_per_update(self, plan: Any) -> Mapping[str, float]:
         offered = "seconds_per_update" in self.offers

@@ -154,7 +154,7 @@ class Paper(NamedTuple):
 
 
 Beside = Literal["readings", "recorded", "shipped", "chart", "shortened"]
-OptionalPart = Literal["curves", "gains", "inputs", "cost", "seconds_per_update", "warnings", Beside]
+OptionalPart = Literal["curves", "gains", "inputs", "cost", "seconds_per_update", "warnings", "exact_but_for", Beside]
 
 
 class Study(ABC):
@@ -199,6 +199,13 @@ class Study(ABC):
         Raises ConfigError where the whole case cannot be.
         """
         return case
+
+    def exact_but_for(self, case: "Case") -> str:
+        """What the values called exact of a case are, in words, where they are exact but for less than one prints.
+
+        Default: nothing, they are exact.
+        """
+        return ""
 
     def relabelled(self, axes: "Axes", case: "Case") -> "Axes":
         """The axes of a plan with the display names of a case that has the same identity. Default: names of filters."""

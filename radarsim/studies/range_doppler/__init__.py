@@ -21,5 +21,5 @@ STUDY = StudyFolder(
             "manoeuvre_variance": tuple(f"P1.{number}" for number in range(1, 33)),
         },
     ),
-    offers=("gains", "inputs", "readings", "recorded", "chart", "shortened"),
+    offers=("gains", "inputs", "readings", "recorded", "chart", "shortened", "exact_but_for"),
 )

@@ -149,6 +149,14 @@ def shortened(case: Case, at_s: float | None, at_k: int | None) -> Case:
     return replace(case, spec=spec.model_copy(update={"scans": scans}))
 
 
+def exact_but_for(case: Case) -> str:
+    """What σ of missed plots is, where not every pattern of plots is followed on its own."""
+    spec: Keys = case.spec
+    if spec.radar.detection_probability == 1 or 2**spec.plots <= patterns.KEPT[1]:
+        return ""
+    return "a mean over patterns of plots, of which nearly equal ones are merged: right to about a ten-thousandth"
+
+
 def shared_gains(case: Case, made: Designed, labels: RangeDopplerAxes) -> linear.Problem:
     """The paper's world for the kernel in which all realisations share the gains."""
     longest = max(d.start for d in made.filters)
