@@ -8,7 +8,7 @@ SMOKE := $(VENV)/smoke
 # Drawing takes twice as long as all the rest: `make smoke SMOKE_FLAGS=` draws too.
 SMOKE_FLAGS ?= --no-figures
 
-.PHONY: run test slow machines mutants lint smoke reproduce-figures claims-page readings-pages bench schema known docs docs-numbers docs-examples docs-house messages clean
+.PHONY: run test slow machines mutants lint smoke reproduce-figures claims-page readings-pages bench schema known docs docs-numbers docs-pictures docs-examples docs-house messages clean
 
 run: $(VENV)/installed
 	$(RADARSIM) run configs/rls2.yaml
@@ -60,6 +60,7 @@ bench: $(VENV)/installed
 
 schema: $(VENV)/installed
 	$(RADARSIM) schema > docs/schema.json
+	PYTHONPATH=docs $(BIN)/python -m making.keys
 
 # The tables that `radarsim doctor` compares with: made anew after a change that is meant to change numbers.
 known: $(VENV)/installed
@@ -73,6 +74,10 @@ docs: $(VENV)/documented
 # The numbers between marks in the pages, from what reproduce-figures left.
 docs-numbers: $(VENV)/installed
 	PYTHONPATH=docs $(BIN)/python -m making.numbers results
+
+# The pictures in the pages, from the same.
+docs-pictures: $(VENV)/installed
+	PYTHONPATH=docs $(BIN)/python -m making.pictures results
 
 # What the commands in the pages' examples print.
 docs-examples: $(VENV)/installed

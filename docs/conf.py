@@ -1,6 +1,6 @@
 """Sphinx over the whole repository, so that links between pages are ordinary relative ones, here as on a file view.
 
-`make docs` builds into docs/_build/html. What can be read off the program (commands, YAML keys, Python) is generated
+`make docs` builds into docs/_build/html. Commands and Python are read off the program
 while building: see making/.
 """
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from making import chart, contents, generated, modules
+from making import chart, contents, formulas, generated, modules
 
 import radarsim
 
@@ -23,6 +23,9 @@ root_doc = "docs/README"
 include_patterns = ["README.md", "CHANGELOG.md", "docs/**.md", "benchmarks/README.md", "results/README.md"]
 exclude_patterns = ["docs/_build", ".venv", ".git", "results/.blocks", "radarsim", "tests"]
 myst_heading_anchors = 4
+myst_enable_extensions = ["dollarmath"]
+myst_dmath_allow_digits = False  # a price is no formula
+html_math_renderer = "mathml"
 
 default_role = "code"  # of single backticks in docstrings
 autodoc_member_order = "bysource"
@@ -55,10 +58,12 @@ html_show_sourcelink = False
 html_show_copyright = False
 html_static_path = ["style"]
 html_css_files = ["page.css"]
+html_search_scorer = str(Path(__file__).parent / "style" / "search.js")
 
 
 def setup(app):
     """What is made while building: the contents from the index, pages from the program, a front page."""
+    formulas.setup(app)
     app.connect("source-read", contents.add)
     app.connect("source-read", generated.fill)
     app.connect("env-get-outdated", generated.outdated)

@@ -1,4 +1,4 @@
-"""The chart of every radar, drawn into the built pages: the figures that docs/chart.md shows, and the live page."""
+"""The chart of every radar, written into the built pages: the live page that docs/chart.md leads to."""
 
 from pathlib import Path
 
@@ -8,4 +8,4 @@ from radarsim.app.chart import chart
 def drawn(app, exception) -> None:
     """docs/chart/ beside the page, when it is built as HTML."""
     if exception is None and app.builder.format == "html":
-        chart([], Path(app.outdir, "docs"), formats=("svg",))
+        chart([], Path(app.outdir, "docs"), formats=())

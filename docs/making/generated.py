@@ -3,12 +3,11 @@
 import re
 from pathlib import Path
 
-from making import commands, keys, modules
+from making import commands, modules
 
 MARK = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
 PARTS = {
     "commands": commands.markdown,
-    "keys": keys.markdown,
     "modules": modules.markdown,
 }
 

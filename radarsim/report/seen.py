@@ -37,16 +37,19 @@ def crossed(figure: Figure) -> Figure:
 
 
 def at_the_end(figure: Figure, unit: str = "") -> str:
-    """Which line ends lowest and which highest, of each panel; nothing for a figure without two lines."""
-    drawn = [lines for panel in figure.panels if len(lines := _ending(panel)) > 1]
-    what = spoken(figure.title)
+    """Which line ends lowest and which highest, of each panel; nothing for a figure without two lines.
+
+    A line whose interval is not known at its end is neither.
+    """
+    ending = ([line for line in _ending(panel) if all(np.isfinite(_interval(line)))] for panel in figure.panels)
+    drawn = [lines for lines in ending if len(lines) > 1]
     if len(drawn) == 1:
         low, high = _lowest(drawn[0], 1), _lowest(drawn[0], -1)
         if len(low) == len(drawn[0]):
-            return tr("{what}: at the end all within each other's intervals.", what=what)
+            return tr("At the end all are within each other's intervals.")
         return tr(
-            "{what}, at the end: lowest {lowest} ({low}), highest {highest} ({high}).",
-            **{"what": what, "lowest": _listed(low), "low": _valued(low[0].y, unit)},
+            "At the end lowest: {lowest} ({low}); highest: {highest} ({high}).",
+            **{"lowest": _listed(low), "low": _valued(low[0].y, unit)},
             **{"highest": _listed(high), "high": _valued(high[0].y, unit)},
         )
     if not drawn:
@@ -54,11 +57,9 @@ def at_the_end(figure: Figure, unit: str = "") -> str:
     found = [_listed(_lowest(lines, 1)) for lines in drawn]
     counted = sorted(dict.fromkeys(found), key=lambda names: -found.count(names))
     if len(counted) == 1:
-        return tr("{what}, at the end: lowest {lowest} in every panel.", what=what, lowest=counted[0])
+        return tr("At the end lowest in every panel: {lowest}.", lowest=counted[0])
     told = [tr("{names} in {count}", names=names, count=found.count(names)) for names in counted[:MOST_NAMES]]
-    return tr(
-        "{what}, at the end: lowest {lowest} of {panels} panels.", what=what, lowest=listed(told), panels=len(drawn)
-    )
+    return tr("At the end lowest: {lowest} of {panels} panels.", lowest=listed(told), panels=len(drawn))
 
 
 def most(figure: Figure, unit: str = "%") -> str:
@@ -69,8 +70,8 @@ def most(figure: Figure, unit: str = "%") -> str:
     line = max(lines, key=lambda one: float(np.nanmax(one.y)))
     at = int(np.nanargmax(line.y))
     return tr(
-        "{what}: at most {most}, {name}, at {t_s:g} s, and {last} at the end.",
-        **{"what": spoken(figure.title), "name": _name(line), "t_s": float(line.x[at])},
+        "At most {most} ({name}, at {t_s:g} s); {last} at the end.",
+        **{"name": _name(line), "t_s": float(line.x[at])},
         **{"most": _valued(line.y[at : at + 1], unit), "last": _valued(line.y, unit)},
     )
 
@@ -84,7 +85,7 @@ def over(figure: Figure, unit: str = "") -> str:
     if not found.size:
         return ""
     low, high = text.number(float(found.min()), DIGITS), _valued(found[[found.argmax()]], unit)
-    return tr("{what}: from {low} to {high}.", what=spoken(figure.title), low=low, high=high)
+    return tr("From {low} to {high}.", low=low, high=high)
 
 
 def _has_crosses(panel: Panel) -> bool:
@@ -107,11 +108,10 @@ def _lowest(lines: Sequence[Line], sign: int) -> list[Line]:
 
 
 def _interval(line: Line) -> tuple[float, float]:
-    """The interval of a line's last point: the point where it has none, everything where it is not known."""
+    """The interval of a line's last point: the point where it has none, not-a-number where it is not known."""
     if line.lo is None or line.hi is None:
         return float(line.y[-1]), float(line.y[-1])
-    low, high = float(line.lo[-1]), float(line.hi[-1])
-    return (low, high) if np.isfinite([low, high]).all() else (-np.inf, np.inf)
+    return float(line.lo[-1]), float(line.hi[-1])
 
 
 def _listed(lines: Sequence[Line]) -> str:

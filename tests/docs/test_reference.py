@@ -82,10 +82,18 @@ def test_arrays_are_told_with_their_shapes():
 
 
 def test_reference_holds_every_key_and_every_command():
-    made = keys.markdown()
-    assert not [key for _, key in KEYS if f"`{key}`" not in made]
+    text = keys.PAGE.read_text(encoding="utf-8")
+    assert not [key for _, key in KEYS if f"`{key}`" not in text]
     made = commands.markdown()
     assert not [name for name in main.commands if f"## radarsim {name}\n" not in made]
+
+
+def test_the_page_of_keys_is_that_of_todays_schema():
+    """`make schema` writes it."""
+    text = keys.PAGE.read_text(encoding="utf-8")
+    assert keys.filled(text) == text
+    assert text.count("\n## study: ") == len(registry.names())
+    assert keys.filled("a\n<!-- keys -->\nold\n<!-- end -->\nz") != "a\n<!-- keys -->\nold\n<!-- end -->\nz"
 
 
 def test_marks_are_replaced_and_unknown_ones_refused():

@@ -20,35 +20,37 @@ def figure(*panels, title="σ of the range"):
 
 def test_of_one_panel_the_lowest_and_the_highest_with_their_values():
     made = figure((line("r", 3.0), line("r+Vr", 1.0), line("none", 2.0)))
-    assert seen.at_the_end(made, "m/s2") == ("σ of the range, at the end: lowest r+Vr (1 m/s²), highest r (3 m/s²).")
+    assert seen.at_the_end(made, "m/s2") == ("At the end lowest: r+Vr (1 m/s²); highest: r (3 m/s²).")
 
 
 def test_lines_whose_intervals_overlap_are_told_together():
     made = figure((line("a", 1.0), line("b", 1.15), line("c", 3.0)))
-    assert "lowest a and b (1)" in seen.at_the_end(made)
-    assert "highest c (3)" in seen.at_the_end(made)
+    assert "lowest: a and b (1)" in seen.at_the_end(made)
+    assert "highest: c (3)" in seen.at_the_end(made)
     level = figure((line("a", 1.0), line("b", 1.1)))
-    assert seen.at_the_end(level) == "σ of the range: at the end all within each other's intervals."
+    assert seen.at_the_end(level) == "At the end all are within each other's intervals."
 
 
-def test_an_unknown_interval_is_no_difference():
+def test_a_line_of_unknown_interval_is_neither_lowest_nor_highest():
     nothing = np.full(5, np.nan)
-    made = figure((line("a", 1.0), Line(T, np.linspace(9.0, 3.0, 5), "b", lo=nothing, hi=nothing)))
-    assert "within each other's intervals" in seen.at_the_end(made)
+    unknown = Line(T, np.linspace(9.0, 0.5, 5), "b", lo=nothing, hi=nothing)
+    assert seen.at_the_end(figure((line("a", 1.0), unknown))) == ""
+    told = seen.at_the_end(figure((line("a", 1.0), unknown, line("c", 3.0))))
+    assert told == "At the end lowest: a (1); highest: c (3)."
 
 
 def test_of_several_panels_how_often_which():
     low, high = (line("a", 1.0), line("b", 3.0)), (line("a", 3.0), line("b", 1.0))
-    assert seen.at_the_end(figure(low, low)) == "σ of the range, at the end: lowest a in every panel."
-    assert seen.at_the_end(figure(low, low, high)).endswith("lowest a in 2 and b in 1 of 3 panels.")
+    assert seen.at_the_end(figure(low, low)) == "At the end lowest in every panel: a."
+    assert seen.at_the_end(figure(low, low, high)) == "At the end lowest: a in 2 and b in 1 of 3 panels."
     assert seen.at_the_end(figure((line("a", 1.0),))) == ""
 
 
 def test_gains_and_maps():
     gain = Line(T, np.array([0.0, 30.0, 35.0, 20.0, 18.0]), "r+Vr")
-    assert seen.most(figure((gain,), title="Gain")) == "Gain: at most 35 %, r+Vr, at 2 s, and 18 % at the end."
+    assert seen.most(figure((gain,), title="Gain")) == "At most 35 % (r+Vr, at 2 s); 18 % at the end."
     heat = Heat(T[:2], T[:2], np.array([[0.5, np.nan], [0.25, 1.0]]), "share")
-    assert seen.over(figure((heat,), title="Lock")) == "Lock: from 0.25 to 1."
+    assert seen.over(figure((heat,), title="Lock")) == "From 0.25 to 1."
 
 
 def test_crosses_are_told_of_where_there_are_any():
