@@ -52,7 +52,7 @@ CLAIMS = (
         *(
             Part(
                 (_radar(n),),
-                "all folds right at the last scan",
+                f"all folds right at the last scan: {name}",
                 "",
                 measures.right_at_the_end(_radar(n), name),
                 below(0.5),

@@ -34,6 +34,21 @@ def test_there_are_two_dozen_readings_of_the_main_claim():
     assert {OF.kind(one) for one in every} == {"E", "U", "N"}
 
 
+def test_every_combination_of_what_bears_on_a_claim_is_declared():
+    """14 flights, σ_A read in two ways, three starts; of P2.13 two kinds of banks: the joint search has them all."""
+    allowed = {claim: [one for one in OF.of_claim(claim) if OF.kind(one) != "N"] for claim in CLAIMS}
+    assert len(allowed["P2.1"]) == len(allowed["P2.7"]) == len(allowed["P2.12"]) == 14 * 2 * 3
+    assert len(allowed["P2.13"]) == 14 * 2 * 3 * 2
+    assert len(allowed["P2.4"]) == 2 * 3
+    assert {one["output"] for one in allowed["P2.7"]} == {"best"}  # (5) is printed
+
+
+def test_the_printed_output_is_the_default():
+    output = next(one for one in OF.choices if one.key == "output")
+    assert "(5)" in output.original
+    assert [one.kind for one in output.alternatives] == ["E", "N"]
+
+
 def test_a_flight_takes_the_place_of_the_lost_one_alone(case):
     changed = OF.changed(CLAIMS["P2.1"], case, OF.reading(flight="pull-up 250"))
     assert changed.spec.target == FLIGHTS["pull-up 250"]
