@@ -76,6 +76,13 @@ def test_what_is_known_of_the_first_paper(first):
     assert search.count(granular=False)[search.place] == search.count(granular=False).max() == 25
 
 
+def test_what_falls_may_rise_by_the_tolerance_of_the_reading(first):
+    out, done = first
+    rows = [row for row in table(out) if row["claim"] == "P1.27" and row["kind"] in "EU"]
+    assert {(row["settled_within"], float(row["margin"])) for row in rows} == {("5 %", 5), ("2 %", 2), ("10 %", 10)}
+    assert "settled_within" in next(one for one in done.read[0].over if one.claim.id == "P1.27").outcome.depends_on
+
+
 def test_the_readings_agree_with_the_stored_run_of_the_shipped_config(first, tmp_path):
     """Exact values as shipped against the exact columns of a run: the two recursions are apart."""
     import radarsim

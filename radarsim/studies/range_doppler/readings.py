@@ -1,15 +1,15 @@
 """What P1 leaves open, and its claims under each reading: all by the exact recursion, nothing is run."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from radarsim.report.claims import Series
-from radarsim.report.claims.declared import Claim, PaperClaims
+from radarsim.report.claims import Series, same
+from radarsim.report.claims.declared import Claim, PaperClaims, Part
 from radarsim.report.claims.readings import Alternative, Choice, PaperReadings, Reading, Seen
 from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED
 from radarsim.report.claims.search import Search
@@ -28,7 +28,8 @@ FAST = tuple(  # those that look at a radar of Δt = 5 s
     if keys & {3, 5}
 )
 FALLS = ("P1.5", "P1.6")
-SETTLES = ("P1.14", "P1.15")
+FALLING = ("P1.26", "P1.27")  # as far as a settled curve may rise again
+SETTLES = ("P1.14", "P1.15", *FALLING)
 SWEPT = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # D_M of the config manoeuvre_variance
 FIFTEEN = 15  # points, as printed
 LONG = 250  # scans after which a filter is taken as steady
@@ -156,6 +157,13 @@ class Readings(PaperReadings):
     def exact(self, claim: Claim, reading: Reading) -> bool:
         return True
 
+    def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
+        """All; what falls to a steady value may rise by as much as the reading's tolerance."""
+        if claim.id not in FALLING:
+            return claim.parts
+        wide = same(0, _tolerance(reading, 100))
+        return [replace(part, expected=wide) for part in claim.parts]
+
     def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> "ExactEvidence":
         return _evidence(reading)
 
@@ -172,6 +180,11 @@ class Readings(PaperReadings):
             for variance in (float(one["manoeuvre_variance"]), *SWEPT):
                 found[form, variance, start] = None
         return list(found)
+
+
+def _tolerance(reading: Reading, of: float) -> float:
+    """How near the steady value counts as settled, of so much."""
+    return of * float(reading["settled_within"].split()[0]) / 100
 
 
 @cache
@@ -288,7 +301,7 @@ class ExactEvidence(measures.Evidence):
         sigma = self.curve(key, self.filter(key, observes), component)
         radar = self.case(key)
         steady = self._sigma(key)[len(observes) - 1][-1, self._place(component)]
-        wide = float(self._reading["settled_within"].split()[0]) / 100
+        wide = _tolerance(self._reading, 1)
         wrong = np.flatnonzero(~(abs(sigma.value / steady - 1) <= wide))
         first = wrong[-1] + 1 if wrong.size else 0
         when = sigma.t[first] / radar.axes.scan_period_s if first < len(sigma.t) else np.inf

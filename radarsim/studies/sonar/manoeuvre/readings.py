@@ -1,7 +1,7 @@
 """What P3 leaves open about manoeuvres, and its claims on them under each reading.
 
 Times to see a manoeuvre are runs of the shipped config. Switching the degree of a window of a few plots is exact, and
-so is a single test. What P3 says of smoothing is formulas, which leave nothing open.
+so is a single test. What P3 says of smoothing is formulas, which leave nothing open but what a high accuracy is.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from radarsim.studies.sonar.manoeuvre import exact, measures
 from radarsim.studies.sonar.manoeuvre.switched import switched_window
 from radarsim.studies.sonar.measures import Evidence as SonarEvidence
 
-DETECTS, SINGLE, SWITCHES = "P3.8", "P3.9", "P3.10"
+ENOUGH, DETECTS, SINGLE, SWITCHES = "P3.3", "P3.8", "P3.9", "P3.10"
 RATES = {"k = 1": measures.AT_ONE, "0.1": 0.1, "0.03": 0.03, "0.01": 0.01, "0.003": 0.003, "0.001": 0.001}
 SHIFTS = {"one σ_a": 1.0, "1.456 σ_a": 1.456, "half σ_a": 0.5, "two σ_a": 2.0}
 MEMORIES = {"six plots": 6, "five plots": 5}
@@ -31,6 +31,21 @@ BEGIN_AND_END = (
 NOTHING = "nothing"
 
 CHOICES = (
+    Choice(
+        "high_accuracy",
+        "From which accuracy on it is high",
+        "… для получения высокой точности оценки координат необходим одновременный учет большого числа (5-6) "
+        "предыдущих наблюдений.",
+        "… for a high accuracy of the estimated coordinates a large number (5–6) of the preceding observations has to "
+        "be taken into account at once.",
+        (
+            Alternative("foretold as measured", UNSTATED, "the position a scan ahead is as good as a plot"),
+            Alternative("half the variance", UNSTATED, "the smoothed position has half of a plot's"),
+            Alternative("under 5 % more", UNSTATED, "a further plot lowers the smoothed σ by less"),
+            Alternative("two thirds", UNSTATED, "the smoothed σ is two thirds of a plot's"),
+        ),
+        (ENOUGH,),
+    ),
     Choice(
         "seen",
         "What of a manoeuvre has to be seen",
@@ -124,13 +139,16 @@ class Readings(PaperReadings):
     realisations = 5000
 
     def exact(self, claim: Claim, reading: Reading) -> bool:
-        return claim.id == SINGLE or reading["memory"] in MEMORIES
+        return claim.id in (ENOUGH, SINGLE) or reading["memory"] in MEMORIES
 
     def of_claim(self, claim: str) -> list[Reading]:
         """All combinations of what bears on a claim."""
         return list(self.combined([choice for choice in self.choices if choice.bears_on(claim)]))
 
     def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
+        if claim.id == ENOUGH:
+            plots = _enough(reading["high_accuracy"])
+            return [replace(part, measure=lambda seen: certain(plots)) for part in claim.parts]
         if claim.id == SINGLE:
             probability = float(exact.detection(1.0, SHIFTS[reading["strength"]]))
             return [replace(part, measure=lambda seen: certain(probability), exact=None) for part in claim.parts]
@@ -158,6 +176,19 @@ class Readings(PaperReadings):
         if seen is None:
             return SonarEvidence((), {}, {})
         return super().evidence(claim, reading, seen, of)
+
+
+def _enough(criterion: str) -> int:
+    """Fewest plots that meet a criterion of high accuracy, by the closed forms after (2)."""
+    n = np.arange(2, 100)
+    smoothed, ahead = 2 * (2 * n - 1) / (n * (n + 1)), 2 * (2 * n + 1) / (n * (n - 1))  # variances, of a plot's
+    met = {
+        "foretold as measured": ahead <= 1,
+        "half the variance": smoothed <= 0.5,
+        "under 5 % more": np.append(np.sqrt(smoothed[1:] / smoothed[:-1]) > 0.95, True),
+        "two thirds": smoothed <= (2 / 3) ** 2,
+    }
+    return int(n[met[criterion]][0])
 
 
 EXTREMES = (measures.WEAK, measures.STRONG)

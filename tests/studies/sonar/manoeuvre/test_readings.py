@@ -24,6 +24,14 @@ def test_the_probability_of_a_single_test_hangs_on_the_manoeuvre():
     assert values("P3.9", strength="two σ_a") == [pytest.approx(0.8427, abs=5e-4)]
 
 
+def test_how_many_plots_are_enough_hangs_on_what_is_enough():
+    """By the table of σ/σ_x at n = 2…8: 1, .913, .837, .775, .724, .681, .646; a scan ahead 1.049, .931 at 5, 6."""
+    assert values("P3.3") == [6]
+    assert values("P3.3", high_accuracy="half the variance") == [7]  # .724 > √½ > .681
+    assert values("P3.3", high_accuracy="two thirds") == [8]
+    assert values("P3.3", high_accuracy="under 5 % more") == [8]  # 0.6146 at nine plots
+
+
 def test_switching_within_the_papers_own_six_plots():
     found = values("P3.10", memory="six plots")
     assert found == pytest.approx([0.975, 1.188, 1.867, 1.101], abs=2e-3)
