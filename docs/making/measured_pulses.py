@@ -1,8 +1,12 @@
 """Numbers of docs/pulses_to_tracks.md."""
 
+import math
+
 from making.numbers import Results
 from making.pick import bounded, rows
+from radarsim.app.configs import load
 
+SIGMA_V = (5, 15, 15, 1, 1)  # of P1's radars, m/s
 SHOWN_SNR = (-4, -2, 0, 2, 4, 6, 10, 14)
 
 
@@ -106,7 +110,72 @@ def acceleration(results: Results) -> list[tuple]:
     return made
 
 
+def tracks(results: Results) -> str:
+    """How many tracks the table of the measured acceleration rests on."""
+    return str(rows(results, "pulses_acceleration", "curves")["n"].iloc[0])
+
+
+def accuracy(results: Results) -> str:
+    """The Fisher bound of velocity in the long bursts, mm/s."""
+    return f"{1e3 * rows(results, 'pulses_acceleration', 'estimates', component='Vr').iloc[0]['bound']:.2g}"
+
+
+def radars(results: Results) -> list[tuple]:
+    """A burst of each radar of P1 whose Fisher bound is its σ_V, and what the track makes of it."""
+    made: list[tuple] = [
+        (
+            *("radar", "λ, m", "σ_V, m/s", "T √E, ms", "T at 15 dB, ms", "pulses at 1 kHz"),
+            *("simulated: F, kHz", "locked, %", "σ_r over ideal", "σ_V over ideal"),
+        )
+    ]
+    for n, sigma in enumerate(SIGMA_V, start=1):
+        case = f"pulses_rls{n}"
+        spec = load(case).cases[0].spec
+        whole = math.sqrt(6) * spec.radar.wavelength_m / (4 * math.pi * sigma)
+        longest = whole / math.sqrt(10**1.5)
+        needed = (f"{1e3 * whole:.3g}", f"{1e3 * longest:.2g}", math.floor(1e3 * longest) or "none")
+        last = [over(results, "pulses_radars", case, "spectrum", component) for component in ("r", "Vr")]
+        locked = worst(results, "pulses_radars", case, "spectrum")
+        rate = f"{spec.burst.repetition_rate_hz / 1e3:.3g}"
+        made.append((f"RLS {n}", f"{spec.radar.wavelength_m:g}", sigma, *needed, rate, locked, *last))
+    return made
+
+
+def folds(results: Results) -> list[tuple]:
+    """Folds by hypotheses at 1 kHz: how often they are right, and σ over the idealisation's."""
+    made: list[tuple] = [
+        (
+            "SNR of a pulse, dB",
+            "filter",
+            "no wrong fold at k = 3 / 5 / 15, %",
+            "σ_r over ideal at 140 s",
+            "σ_V over ideal",
+        )
+    ]
+    for snr in (0, 5.24):
+        case = f"pulses_folds burst.snr_db={snr}"
+        for name in ("nearest", "hypotheses", "hypotheses, mixture"):
+            found = results.table("pulses_folds", "folds")
+            found = found[(found["case"] == case) & (found["filter"] == name)].set_index("k")["right"]
+            right = " / ".join(f"{100 * found[k]:.3g}" for k in (3, 5, 15)) if len(found) else ""
+            last = [over(results, "pulses_folds", case, name, component) for component in ("r", "Vr")]
+            made.append((snr, name, right, *last))
+    return made
+
+
+def jerk(results: Results) -> str:
+    """What a jerk of 20 m/s³ puts into the velocity of the long bursts, j T_p² (3N² − 7)/120, beside their bound."""
+    spec = load("pulses_acceleration").cases[0].spec
+    off = 20 * (3 * spec.pulses**2 - 7) / 120 / spec.burst.repetition_rate_hz**2
+    return f"{1e3 * off:.2g} mm/s beside a bound of {accuracy(results)} mm/s"
+
+
 MEASURED = {
+    "pulses_tracks": tracks,
+    "pulses_accuracy": accuracy,
+    "pulses_radars": radars,
+    "pulses_folds": folds,
+    "pulses_jerk": jerk,
     "pulses_filters": filters,
     "pulses_threshold": threshold,
     "pulses_energy": energy,

@@ -73,6 +73,13 @@ def test_multimodel(run):
 
 
 @pytest.mark.slow
+def test_pulses(run):
+    for stem in ("", "_snr", "_forecast", "_energy", "_radars", "_folds", "_acceleration"):
+        results = run(f"pulses{stem}", 300)
+    check("pulses", results)
+
+
+@pytest.mark.slow
 def test_sonar(run):
     for stem in SONAR:
         results = run(f"sonar_{stem}", 1000)

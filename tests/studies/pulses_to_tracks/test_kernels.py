@@ -129,6 +129,17 @@ def test_lines_lie_where_they_do_beside_the_true_frequency(plan):
     np.testing.assert_allclose(lines, np.rint(lines), atol=1e-7)
 
 
+def test_a_jerk_within_a_burst_looks_like_a_velocity(plan):
+    """The number that the page gives of what is left out: j T_p² (3N² − 7)/120, and no acceleration."""
+    pulses, period, hard = 64, 1 / 4e3, 40.0
+    t = (np.arange(pulses) - (pulses - 1) / 2) * period
+    samples = np.exp(2j * math.pi * 2 / 0.03 * hard / 6 * t**3)
+    x = naive.scored((samples, pulses), 1e-6, np.zeros(6), np.zeros(6), np.zeros(6), 3, True)
+    velocity, acceleration = plan.world.measured @ x
+    assert velocity == pytest.approx(hard * period**2 * (3 * pulses**2 - 7) / 120, rel=1e-6)
+    assert abs(acceleration) < 1e-9
+
+
 def normals(plan, which, pair, n):
     """The two unit normals of a draw pair of realisations 0 … n − 1 of a stream."""
     a, b = np.empty(n), np.empty(n)
