@@ -6,24 +6,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from radarsim.app.simulation import NO_CONTROL, check_precision, result_of
+from radarsim.app.simulation import NO_CONTROL, check_precision, result_of, table_of, unknown
 from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Experiment
 from radarsim.engine.collect import collect
 from radarsim.engine.machine import available_cores
 from radarsim.engine.results import Axes
+from radarsim.errors import ConfigError
 from radarsim.studies import registry
 
 PILOT_S = 0.3  # of all cases together, unless single realisations take longer
 LADDER, FOR_NOTHING = 8, 1.2  # so many times more realisations at a look; times as good as equal
 SHORT_S = 0.01
+CONTROLLED = ("sigma", "gain")  # what has intervals with control variates
 PILOT_OF_PRECISION_S, LEAST, MOST = 1.0, 256, 16_384  # realisations that a precision is judged from
 
 
 @dataclass(frozen=True)
 class Need:
     """What a precision takes: realisations (None beyond all bounds), from `exact` values or a `pilot` of how many, and
-    the name of the σ that reaches it last."""
+    the name of what reaches it last."""
 
     realisations: int | None
     known_by: str
@@ -32,7 +34,11 @@ class Need:
 
 @dataclass(frozen=True)
 class CaseOutlook:
-    """What running a case would take: labels, counts, seconds of one thread's work."""
+    """What running a case would take: labels, counts, seconds of one thread's work.
+
+    need is what a precision takes by the plain intervals, controlled by those with control variates, where the config
+    asks for these; beside each the seconds of one thread until then. The run ends at the earlier.
+    """
 
     name: str
     filters: str
@@ -40,6 +46,9 @@ class CaseOutlook:
     realisations: int
     seconds: float
     need: Need | None = None
+    controlled: Need | None = None
+    seconds_plain: float | None = None
+    seconds_controlled: float | None = None
 
 
 @dataclass(frozen=True)
@@ -51,6 +60,7 @@ class Outlook:
     seconds: float
     memory_mb: float
     precision: float | None = None
+    of: str = "sigma"
     warnings: tuple[str, ...] = ()
 
 
@@ -59,15 +69,16 @@ def outlook(
     threads: int | None = None,
     precision: float | None = None,
     progress: Callable[[int, int, int], None] | None = None,
+    of: str = "sigma",
 ) -> Outlook:
     """Prepare every case and time a few realisations of it, compiled beforehand, and say what the whole would take.
 
-    With a precision, in per cent: a case ends when that is reached, or at the last look before its N. progress(done,
+    With a precision, in per cent, of a kind of quantity: a case ends when that is reached, or at its N. progress(done,
     total, 0) is called after each case.
     """
     threads = threads or available_cores()
     if precision is not None:
-        check_precision([experiment], precision)
+        check_precision([experiment], precision, of)
     cases: list[CaseOutlook] = []
     largest, preparing, control = 0, 0.0, False
     registry.study(experiment.study).prepare(experiment.cases[0])  # what it loads is not to be timed
@@ -77,12 +88,19 @@ def outlook(
         preparing += time.perf_counter() - started
         work.simulate(0, 1)
         each = seconds_each(work, case.realisations, PILOT_S / len(experiment.cases))
-        need = None if precision is None else needed(work, precision, each)
-        count = case.realisations if need is None else ending(need, case.realisations)
-        axes = work.plan.axes
-        cases.append(CaseOutlook(case.name, ", ".join(axes.filters), len(axes.k), count, each * count, need))
-        of = registry.study(case.study)
-        control |= experiment.control_variate and (of.own_controls or (of.exact_errors and controls(axes)))
+        axes, need, controlled = work.plan.axes, None, None
+        study = registry.study(case.study)
+        has_controls = experiment.control_variate and (study.own_controls or (study.exact_errors and controls(axes)))
+        if precision is not None:
+            need = needed(experiment, work, precision, each, of)
+            if of in CONTROLLED and has_controls:
+                controlled = needed(experiment, work, precision, each, of, controls=True)
+        ends = [ending(one, case.realisations) for one in (need, controlled) if one is not None]
+        count = min(ends, default=case.realisations)
+        taken = [None if one is None else each * one for one in (*ends, None, None)[:2]]
+        labels = case.name, ", ".join(axes.filters), len(axes.k)
+        cases.append(CaseOutlook(*labels, count, each * count, need, controlled, *taken))
+        control |= has_controls
         largest = max(largest, work.size)
         if progress is not None:
             progress(done, len(experiment.cases), 0)
@@ -92,7 +110,7 @@ def outlook(
     warnings = [*registry.study(experiment.study).warnings(experiment)]
     if experiment.control_variate and not control:
         warnings.append(NO_CONTROL)
-    return Outlook(tuple(cases), threads, seconds, memory, precision, tuple(warnings))
+    return Outlook(tuple(cases), threads, seconds, memory, precision, of, tuple(warnings))
 
 
 def controls(axes: Axes) -> bool:
@@ -101,25 +119,33 @@ def controls(axes: Axes) -> bool:
     return bool((np.delete(axes.available, axes.baseline, axis=0) & known).any())
 
 
-def needed(work: CaseWork, percent: float, seconds_each: float) -> Need:
-    """How many realisations a precision takes: from exact values, where errors are Gaussian with these, else from a
-    pilot."""
+def needed(
+    experiment: Experiment, work: CaseWork, percent: float, seconds_each: float, of: str, controls: bool = False
+) -> Need:
+    """How many realisations a precision takes, by plain intervals or by those with control variates.
+
+    From exact values for σ, where errors are Gaussian with these, else from a pilot. Raises ConfigError where the case
+    has no such quantity.
+    """
     from radarsim.report import precision
 
-    exact, curves = work.plan.gaussian, registry.study(work.case.study).curves
+    exact, table = work.plan.gaussian and of == "sigma" and not controls, table_of(experiment, of, controls)
     count = LEAST if exact else min(max(LEAST, int(PILOT_OF_PRECISION_S / seconds_each)), MOST)
     result = result_of(work.case, work, collect(work, count))
     if exact:
         result = precision.gaussian(result)
         axes = result.axes
         exact = bool(np.isfinite(axes.exact_sigma[axes.available]).all())
-    n, cell = precision.needed(result, percent, curves), precision.worst(result, curves)
-    last = "no sigma in this case" if cell is None else f"{cell.filter}, {cell.component}, k = {cell.k}"
+    n = precision.needed(result, percent, table, of, work.case.realisations)
+    cell = precision.worst(result, table, of)
+    if cell is None and of != "sigma":
+        raise ConfigError(unknown(work.case, of))
+    last = "no sigma in this case" if cell is None else cell.last()
     return Need(n, "exact" if exact else f"pilot of {count:,}", last)
 
 
 def ending(need: Need, most: int) -> int:
-    """Realisations at which a run to a precision would end: where it is reached, or at the last look before N."""
+    """Realisations at which a run to a precision would end: where it is reached, or at N."""
     from radarsim.report import precision
 
     return max(n for n in precision.looks(most) if need.realisations is None or n <= need.realisations)

@@ -12,11 +12,14 @@ RESULTS = "results"  # the command's default directory
 SHORT = {"realisations": "-n", "seed": "--seed"}
 
 
-def repeated(asked: Experiment, done: Mapping[str, int], overrides: Sequence[str], precision: float | None) -> str:
+Precision = tuple[float, str]  # in per cent, and of which kind of quantity
+
+
+def repeated(asked: Experiment, done: Mapping[str, int], overrides: Sequence[str], precision: Precision | None) -> str:
     """The command that makes the same tables, or a sentence that says why there is none.
 
     asked is the experiment as config and overrides give it, done the realisations of each case that the tables hold;
-    precision, in per cent, decided where the cases ended, unless it is None.
+    precision decided where the cases ended, unless it is None.
     """
     if asked.path is None:
         return "none: the config was given in Python, and stands below"
@@ -33,7 +36,7 @@ def repeated(asked: Experiment, done: Mapping[str, int], overrides: Sequence[str
 
 
 def command(
-    experiment: Experiment, overrides: Sequence[str], out: str | os.PathLike, precision: float | None = None
+    experiment: Experiment, overrides: Sequence[str], out: str | os.PathLike, precision: Precision | None = None
 ) -> str:
     """The command that runs an experiment; a shipped config by its stem."""
     # In a checkout the shipped folder is a link to configs/.
@@ -43,7 +46,9 @@ def command(
     for override in overrides:
         key, _, value = override.partition("=")
         words += [SHORT[key], value] if key in SHORT else ["--set", override]
-    words += [] if precision is None else ["--precision", f"{precision:.17g}"]
+    if precision is not None:
+        percent, of = precision
+        words += ["--precision", f"{percent:.17g}", *(["--of", of] if of != "sigma" else [])]
     return shlex.join(words + (["--out", str(out)] if str(out) != RESULTS else []))
 
 

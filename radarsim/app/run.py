@@ -76,6 +76,7 @@ def run(
     seed: int | None = None,
     overrides: Sequence[str] = (),
     precision: float | None = None,
+    of: str = "sigma",
     decide: bool = False,
     time_limit: float | Stop | None = None,
     threads: int | None = None,
@@ -92,9 +93,10 @@ def run(
 
     config is a path, the name of a shipped config, a dict as YAML would give it, or an Experiment loaded with these
     overrides. overrides are texts `key=value` with dotted keys. With a precision, in per cent, a case ends at the first
-    of 2000, 4000, 8000 … realisations at which the 95 % half-width of every σ is under it. decide: all cases end at the
-    first of these at which every claim of the config is decided. time_limit is in seconds, or
-    a condition that runs already. `result.unmet` says what of the two was not reached. workers are processes of this
+    of 2000, 4000, 8000 …, N realisations at which the 95 % half-width of every σ is under it, or of every quantity of
+    another kind, `of`: gain, lock, lost, right, wrong, loss, false_tracks. decide: all cases end at the first of
+    these at which every claim of the config is decided. time_limit is in seconds, tables and figures counted in, or a
+    condition that runs already. `result.unmet` says what of the two was not reached. workers are processes of this
     machine, scheduler the address of a Dask scheduler, executor one that is open already.
     width_mm is the width of the figures' files in place of their own.
 
@@ -115,11 +117,15 @@ def run(
     overrides = merged(overrides, realisations, seed)
     experiment = config if isinstance(config, Experiment) else load(config, overrides)
     if precision is not None:
-        simulation.check_precision([experiment], precision)
+        simulation.check_precision([experiment], precision, of)
     if decide:
         deciding.check(experiment)
     limit = time_limit if time_limit is None or callable(time_limit) else stopping.time_limit(time_limit)
-    started = time.perf_counter()
+    started, kept = time.perf_counter(), None
+    if out is not None and isinstance(limit, stopping.TimeLimit):
+        from radarsim.app.writing import seconds as writing_s
+
+        limit = limit.reserving(kept := writing_s(experiment, figures, width_mm))
     renewed = made_by_other_code(experiment, Path(out)) if out is not None else []
     with cluster(workers, scheduler) if executor is None else nullcontext(executor) as pool:
         threads = pool.workers if pool else int(threads or available_cores())
@@ -127,17 +133,19 @@ def run(
         if decide:
             simulated = deciding.simulated(experiment, options, progress)
         else:
-            simulated = simulation.simulated(experiment, options, progress=progress, precision=precision)
+            simulated = simulation.simulated(experiment, options, progress=progress, precision=precision, of=of)
         if stop is not None:
             stop.raise_if_received()
     if not simulated.cases:
         raise TargetUnmet(f"{experiment.stem}: {simulated.stopped}: nothing was done by then")
     facts = facts_of(simulated, threads, time.perf_counter() - started)
     facts["warnings"] += renewed
+    if kept is not None:
+        facts["seconds_kept_for_writing"] = kept
     if decide:
         left = deciding.undecided(deciding.rows_of(experiment, simulated))
         facts |= {"unmet": [*facts["unmet"], *left], "stop": "; ".join((*facts["unmet"], *left)) or "done"}
-    ended_by = None if simulated.stopped else precision
+    ended_by = None if simulated.stopped or precision is None else (precision, of)
     result = result_of(experiment, simulated, facts, repeated(experiment, simulated.done, overrides, ended_by))
     if out is not None:
         result.write(out, figures, width_mm)

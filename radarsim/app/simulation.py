@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Case, Experiment
@@ -19,7 +19,7 @@ from radarsim.errors import ConfigError
 from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
-    from radarsim.report.precision import Cell
+    from radarsim.report.precision import Cell, Table
 
 Progress = Callable[[int, int, int], None]
 NO_CONTROL = "control_variate: no filter beside a baseline whose sigma is known exactly: no controlled.csv"
@@ -29,7 +29,8 @@ NO_CONTROL = "control_variate: no filter beside a baseline whose sigma is known 
 class SimulatedCases:
     """Of each case that has a realisation done, in the experiment's order, its work and sums.
 
-    stopped is why not all is done; precision is what was asked for, cells are the widest σ of each case looked at.
+    stopped is why not all is done; precision is what was asked for, cells hold the widest interval of each case that
+    was looked at.
     """
 
     cases: list[tuple[Case, CaseWork, Collected]] = field(default_factory=list)
@@ -44,15 +45,18 @@ class SimulatedCases:
 
     @property
     def unmet(self) -> list[str]:
-        """The targets of time and precision that were not reached, a text each, with the widest σ of all."""
+        """The targets of time and precision that were not reached, a text each, with the widest interval of all."""
         reasons = [] if self.stopped is None else [self.stopped]
         if self.precision is None:
             return reasons
+        from radarsim.report.precision import OF
+
         wide = [cell for cell in self.cells.values() if cell.percent >= self.precision]
         cases = f" in {len(wide)} of {len(self.cells)} cases" if len(self.cells) > 1 else ""
         if wide:
             worst = max(wide, key=lambda cell: cell.percent)
-            reasons.append(f"precision of {self.precision:g} % not reached{cases}; worst: {worst}")
+            unit = "%" if OF[worst.of].relative else "points"
+            reasons.append(f"precision of {self.precision:g} {unit} not reached{cases}; worst: {worst}")
         return reasons
 
 
@@ -91,11 +95,17 @@ class RunOptions:
 
 
 def simulated(
-    experiment: Experiment, options: RunOptions, *, progress: Progress | None = None, precision: float | None = None
+    experiment: Experiment,
+    options: RunOptions,
+    *,
+    progress: Progress | None = None,
+    precision: float | None = None,
+    of: str = "sigma",
 ) -> SimulatedCases:
     """Collect every case in turn, cases of one identity once; progress(done, total, from_store) is over all of them.
 
-    precision is in per cent: a case ends at the first look (report.precision) at which every σ is known so well.
+    precision is in per cent: a case ends at the first look at which every quantity `of` that kind (both
+    report.precision) is known so well. Raises ConfigError where a case has none of that kind.
     """
     total = sum(case.realisations for case in experiment.cases)
     made: dict[tuple[str, int], tuple[CaseWork, Collected, Cell | None]] = {}
@@ -113,7 +123,8 @@ def simulated(
             key = (work.identity, case.realisations)
             if key not in made:
                 collector = _collector(work, options, over_all)
-                made[key] = work, *_collected(case, work, precision, collector)
+                wanted = None if precision is None else Wanted(precision, of, table_of(experiment, of))
+                made[key] = work, *_collected(case, work, wanted, collector)
             work, collected, cell = made[key]
             if collected.count:
                 simulation.cases.append((case, work, collected))
@@ -140,11 +151,40 @@ def _collector(work: CaseWork, options: RunOptions, progress: Progress) -> Calla
     )
 
 
+class Wanted(NamedTuple):
+    """A precision in per cent, of which kind of quantity, and the table that holds it."""
+
+    percent: float
+    of: str
+    table: "Table"
+
+
+def table_of(experiment: Experiment, of: str, controls: bool = True) -> "Table":
+    """The table of a study that holds a kind of quantity, from results; with control variates where a run has them.
+
+    Empty where the study makes no such table.
+    """
+    from radarsim.report import controlled, tables
+    from radarsim.report.precision import OF, narrowed
+
+    own = study(experiment.study)
+    if of not in ("sigma", "gain"):
+        return lambda results: own.tables(results).get(OF[of].table, tables.frame({}))
+    plain = own.gains if of == "gain" else own.curves
+    if not (controls and experiment.control_variate):
+        return plain
+    if own.own_controls:
+        return lambda results: narrowed(plain(results), own.tables(results)["controlled"], of)
+    if of == "gain" or not own.exact_errors:
+        return plain
+    return lambda results: narrowed(plain(results), controlled.controlled(results), of)
+
+
 def _collected(
-    case: Case, work: CaseWork, precision: float | None, collector: Callable[[int], Collected]
+    case: Case, work: CaseWork, wanted: Wanted | None, collector: Callable[[int], Collected]
 ) -> "tuple[Collected, Cell | None]":
-    """The sums of a case, and the cell of its widest σ where a precision is asked for."""
-    if precision is None:
+    """The sums of a case, and the cell of its widest interval where a precision is asked for."""
+    if wanted is None:
         return collector(case.realisations), None
     from radarsim.report.precision import looks, worst
 
@@ -155,8 +195,10 @@ def _collected(
         # Stopped on the way to a look, a run may hold less without a gap than at the look before.
         if best is None or looked[-1].count > best.count:
             best = looked[-1]
-            cell = worst(result_of(case, work, best), study(case.study).curves) if best.count else None
-        if looked[-1].stopped or cell is None or cell.percent < precision:
+            cell = worst(result_of(case, work, best), wanted.table, wanted.of) if best.count else None
+            if cell is None and best.count and wanted.of != "sigma":
+                raise ConfigError(unknown(case, wanted.of))
+        if looked[-1].stopped or cell is None or cell.percent < wanted.percent:
             break
     assert best is not None  # there is a look at every number of realisations that check_precision lets pass
     computed = sum(one.computed for one in looked)
@@ -173,15 +215,25 @@ def _collected(
     return whole, cell
 
 
-def check_precision(experiments: Sequence[Experiment], percent: float) -> None:
+def unknown(case: Case, of: str) -> str:
+    """The line for a case that has no quantity of a kind."""
+    from radarsim.report.precision import OF
+
+    return f"{case.name}: of: must be what the case has, got {of}: no {OF[of].words} in {OF[of].table}.csv"
+
+
+def check_precision(experiments: Sequence[Experiment], percent: float, of: str = "sigma") -> None:
     """ConfigError for an invalid precision, and for every case of too few realisations ever to be looked at."""
-    from radarsim.report.precision import FIRST
+    from radarsim.report.precision import FIRST, OF
+
+    if of not in OF:
+        raise ConfigError(f"of: must be one of {', '.join(OF)}, got {of!r}")
 
     if not 0 < percent <= 100:
         raise ConfigError(f"precision: must be > 0 and ≤ 100 %, got {percent:g}")
     faults = [
         f"{experiment.path or experiment.stem}: realisations: must be at least {FIRST} for a precision ({FIRST}, "
-        f"{2 * FIRST}, {4 * FIRST}, … are looked at), got {case.realisations} in {case.name}"
+        f"{2 * FIRST}, {4 * FIRST}, … and the last are looked at), got {case.realisations} in {case.name}"
         for experiment in experiments
         for case in experiment.cases
         if case.realisations < FIRST

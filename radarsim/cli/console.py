@@ -298,13 +298,23 @@ def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
 def print_needs(experiment: "Experiment", outlook: "Outlook") -> None:
     """How many realisations a precision takes, and whether the run may do so many."""
     asked = {case.name: case.realisations for case in experiment.cases}
-    needs = {case.name: case.need for case in outlook.cases if case.need is not None}
+    needs = {case.name: need for case in outlook.cases if (need := case.controlled or case.need) is not None}
+    ways = [("", case.need, case.seconds_plain, case.name) for case in outlook.cases]
+    ways += [(", control variate", case.controlled, case.seconds_controlled, case.name) for case in outlook.cases]
     rows = [
-        (name, "out of reach" if need.realisations is None else f"{need.realisations:,}", need.known_by, need.last)
-        for name, need in needs.items()
+        (
+            f"{name}{way}",
+            "out of reach" if need.realisations is None else f"{need.realisations:,}",
+            f"{seconds or 0:.3g} s",
+            need.known_by,
+            need.last,
+        )
+        for way, need, seconds, name in ways
+        if need is not None
     ]
-    columns = ("case", f"for ± {outlook.precision:g} %", "known from", "last to get there")
-    show("", columns, rows, right=columns[1:2], spare=columns[3:])
+    unit = "points" if outlook.of == "gain" else "%"
+    columns = ("case", f"for ± {outlook.precision:g} {unit}", "one thread", "known from", "last to get there")
+    show("", columns, rows, right=columns[1:3], spare=columns[4:])
     short = [name for name, need in needs.items() if need.realisations is None or need.realisations > asked[name]]
     if short:
         most = max((need.realisations or math.inf) for need in needs.values())

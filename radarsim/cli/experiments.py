@@ -15,6 +15,7 @@ from radarsim.cli.group import (
     format_option,
     json_option,
     main,
+    of_option,
     out_option,
     precision_option,
     realisations_option,
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 @seed_option
 @set_option
 @precision_option
+@of_option
 @click.option("--decide", is_flag=True, help="Until each claim of the config is decided, at most N realisations.")
 @click.option("--time-limit", type=Positive("SECONDS"), metavar="SECONDS", help="Stop cleanly then, keep what is done.")
 @click.option("--shard", type=Share(), metavar="i/n", help="Compute this share of the blocks only; no tables.")
@@ -54,6 +56,7 @@ def run(
     seed: int | None,
     overrides: tuple[str, ...],
     precision: float | None,
+    of: str,
     decide: bool,
     time_limit: float | None,
     shard: tuple[int, int] | None,
@@ -79,6 +82,8 @@ def run(
       radarsim run range_doppler -n 1e6 --threads 2
       radarsim run rls2 --set radar.sigma_range_m=300 --set filters.0.manoeuvre_variance=1e-4
       radarsim run rls2 -n 1e7 --precision 0.5          until every σ is known to ± 0.5 %
+      radarsim run rls2 -n 1e7 --precision 0.5 --of gain   every gain to ± 0.5 points
+      radarsim run discriminator_rare -n 1e6 --precision 10 --of lost   every rate of lost locks to ± 10 % of it
       radarsim run multimodel -n 1e5 --time-limit 600   for ten minutes; the same again continues
       radarsim run discriminator_paper -n 1e6 --decide  which claims are left, and what N they would take: exit code 3
       radarsim run rls2 -n 1e8 --shard 2/3              on the second of three machines
@@ -86,6 +91,8 @@ def run(
       radarsim run rls2 --json | jq '.[0].last_scan[0].sigma'
     """
     _refuse_together(shard, precision, workers or scheduler, threads)
+    if of != "sigma" and precision is None:
+        raise click.UsageError("--of says what a precision is of: give --precision too")
     if decide and (shard or precision):
         raise click.UsageError("--decide goes with neither --shard nor --precision: claims are judged on all blocks")
     if workers and scheduler:
@@ -97,7 +104,7 @@ def run(
         from radarsim.app import run as experiment
 
         overrides = experiment.merged(overrides, realisations, seed)
-        loaded = _loaded(configs, overrides, precision, decide)
+        loaded = _loaded(configs, overrides, None if precision is None else (precision, of), decide)
         if scheduler and not quiet and (line := experiment.trust(scheduler)):
             click.echo(f"note: {line}", err=True)
         with experiment.cluster(workers, scheduler) as pool:
@@ -106,7 +113,7 @@ def run(
             figures = False if no_figures else formats or True
             compute: Callable[..., Result | Shares]
             draw = partial(experiment.run, figures=figures, width_mm=width_mm)
-            compute = partial(draw, overrides=overrides, precision=precision, decide=decide)
+            compute = partial(draw, overrides=overrides, precision=precision, of=of, decide=decide)
             if shard:
                 compute = partial(experiment.share, part=shard)
             _compute_each(loaded, partial(compute, **means), out, quiet, as_json)
@@ -121,7 +128,7 @@ def _refuse_together(shard: object, precision: object, cluster: object, threads:
 
 
 def _loaded(
-    configs: tuple[str, ...], overrides: tuple[str, ...], precision: float | None, decide: bool
+    configs: tuple[str, ...], overrides: tuple[str, ...], precision: tuple[float, str] | None, decide: bool
 ) -> "list[Experiment]":
     """The experiments, all checked, with what their claims and a precision ask for."""
     from radarsim.app import decide as deciding
@@ -129,7 +136,7 @@ def _loaded(
 
     loaded = run.load_all(configs, overrides)
     if precision is not None:
-        simulation.check_precision(loaded, precision)
+        simulation.check_precision(loaded, *precision)
     for one in loaded if decide else ():
         deciding.check(one)
     return loaded
@@ -180,6 +187,7 @@ def _compute_each(
 @seed_option
 @set_option
 @precision_option
+@of_option
 @json_option
 def check(
     configs: tuple[str, ...],
@@ -187,12 +195,13 @@ def check(
     seed: int | None,
     overrides: tuple[str, ...],
     precision: float | None,
+    of: str,
     as_json: bool,
 ) -> None:
     """Validate configs; say what would run: cases, filters, realisations, time, memory.
 
-    With a precision, also how many realisations it takes: from exact values where the filters are linear, else from a
-    pilot of a second or two.
+    With a precision, also how many realisations it takes, and how long: from exact values where the filters are linear,
+    else from a pilot of a second or two; where the config asks for a control variate, by these intervals too.
 
     \b
     Examples
@@ -207,7 +216,7 @@ def check(
     made = []
     for one in experiment.load_all(configs, experiment.merged(overrides, realisations, seed)):
         with console.Progress(one.stem, quiet=as_json, what="cases") as bar:
-            outlook = overview.outlook(one, precision=precision, progress=bar.update)
+            outlook = overview.outlook(one, precision=precision, progress=bar.update, of=of)
         made.append(documents.outlook(one, outlook))
         if not as_json:
             console.print_outlook(one, outlook)

@@ -251,7 +251,16 @@ precision_option = click.option(
     "--precision",
     type=Positive("PCT", most=100),
     metavar="PCT",
-    help="Run until the 95 % half-width of every σ is under PCT %, at most N; looks at 2000, 4000, 8000, …",
+    help="Run until the 95 % half-width of every σ is under PCT %, at most N; looks at 2000, 4000, 8000, …, N.",
+)
+OF = ("sigma", "gain", "lock", "lost", "right", "wrong", "loss", "false_tracks")
+of_option = click.option(
+    "--of",
+    type=click.Choice(OF),
+    metavar="WHAT",
+    default="sigma",
+    help="What --precision is of, default sigma: gain (in points); lock, lost, right, wrong (at the last scan); "
+    "loss, false_tracks (an hour).",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout in place of text.")
 format_option = click.option(

@@ -13,10 +13,30 @@ from radarsim.errors import Interrupted
 Stop = Callable[[], str | None]
 
 
-def time_limit(seconds: float) -> Stop:
+class TimeLimit:
+    """Stop when that many seconds have passed from `begun`, by default now; `less` earlier, for what comes after."""
+
+    def __init__(self, seconds: float, begun: float | None = None, less: float = 0.0) -> None:
+        self.seconds = seconds
+        self.begun = time.monotonic() if begun is None else begun
+        self._end = self.begun + seconds - less
+
+    def __call__(self) -> str | None:
+        return f"time limit of {self.seconds:g} s" if time.monotonic() >= self._end else None
+
+    @property
+    def left(self) -> float:
+        """Seconds until then, none after it."""
+        return max(0.0, self._end - time.monotonic())
+
+    def reserving(self, seconds: float) -> "TimeLimit":
+        """The limit that leaves so many seconds of its time over, at most half of what is left of it."""
+        return TimeLimit(self.seconds, self.begun, min(seconds, 0.5 * self.left))
+
+
+def time_limit(seconds: float) -> TimeLimit:
     """Stop when that many seconds have passed from now."""
-    end = time.monotonic() + seconds
-    return lambda: f"time limit of {seconds:g} s" if time.monotonic() >= end else None
+    return TimeLimit(seconds)
 
 
 class Either:

@@ -1,13 +1,14 @@
-"""How wide the intervals of σ are, and how many realisations make them narrow enough.
+"""How wide the intervals of a quantity are, and how many realisations make them narrow enough.
 
-`--precision` looks at declared numbers of realisations only, 2000·2^m. Were it to look after every block, it would
-stop at the first one at which chance made the intervals narrow, and where that is would depend on the machine.
+`--precision` looks at declared numbers of realisations only, 2000·2^m below N and N itself. Were it to look after every
+block, it would stop at the first one at which chance made the intervals narrow, and where that is would depend on the
+machine.
 """
 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,15 +17,48 @@ from radarsim.engine.results import CaseResult
 if TYPE_CHECKING:
     import pandas
 
-Curves = Callable[[Sequence[CaseResult]], "pandas.DataFrame"]  # a study's table of curves
+Table = Callable[[Sequence[CaseResult]], "pandas.DataFrame"]  # of a study: that which holds the quantity
 FIRST = 2000
 EQUAL = 1e-9  # relative difference of widths that is rounding
+APART = 3.0  # standard errors between plain and controlled, beyond which the plain one counts
 MOST = 10**12  # realisations, as in a config
+
+
+class Of(NamedTuple):
+    """A quantity that a precision may be asked of: the table that holds it, and the columns of value and interval.
+
+    relative: its half-width counts in per cent of it, else it is one of per cent. last: only the last scan or window of
+    each filter counts. rest: what is left of one is meant, the losses of a lock rate.
+    """
+
+    words: str
+    table: str
+    columns: tuple[str, str, str]
+    relative: bool = True
+    last: bool = False
+    rest: bool = False
+
+
+LOCKS, FOLDS = ("lock_rate", "lock_lo", "lock_hi"), ("right", "right_lo", "right_hi")
+OF = {
+    "sigma": Of("sigma", "curves", ("sigma", "sigma_lo", "sigma_hi")),
+    "gain": Of("gain", "gains", ("gain_percent", "gain_lo", "gain_hi"), relative=False),
+    "lock": Of("lock rate", "locks", LOCKS, last=True),
+    "lost": Of("rate of lost locks", "locks", LOCKS, last=True, rest=True),
+    "right": Of("rate of right folds", "folds", FOLDS, last=True),
+    "wrong": Of("rate of wrong folds", "folds", FOLDS, last=True, rest=True),
+    "loss": Of("ends of a track an hour", "tracking", ("ends_per_hour", "ends_lo", "ends_hi")),
+    "false_tracks": Of("false tracks an hour", "tracking", ("false_tracks_per_hour", "false_lo", "false_hi")),
+}
+SIGMA = OF["sigma"]
 
 
 @dataclass(frozen=True)
 class Cell:
-    """The 95 % half-width of one σ, in per cent of it (infinite where σ is not known), and which σ that is."""
+    """The 95 % half-width of a quantity, in per cent (infinite where it is not known), and which one that is.
+
+    component is empty and k zero where the quantity has none.
+    """
 
     percent: float
     case: str
@@ -32,55 +66,86 @@ class Cell:
     component: str
     k: int
     count: int
+    of: str = "sigma"
 
     def __str__(self) -> str:
-        width = f"± {self.percent:.3g} %" if math.isfinite(self.percent) else "not known"
-        where = f"filter {self.filter!r}, component {self.component}, k = {self.k}"
-        return f"{self.case}: {where}: sigma {width} at {self.count:,} realisations"
+        unit = "%" if OF[self.of].relative else "points"
+        width = f"± {self.percent:.3g} {unit}" if math.isfinite(self.percent) else "not known"
+        return f"{self.case}: filter {self.place()}: {OF[self.of].words} {width} at {self.count:,} realisations"
+
+    def place(self) -> str:
+        """Filter, component and scan, as far as it has them."""
+        component = f", component {self.component}" if self.component else ""
+        return f"{self.filter!r}{component}" + (f", k = {self.k}" if self.k else "")
+
+    def last(self) -> str:
+        """The same in short."""
+        return ", ".join(filter(None, (self.filter, self.component, f"k = {self.k}" if self.k else "")))
 
 
 def looks(most: int) -> Iterator[int]:
-    """The numbers of realisations, up to `most`, at which a precision is looked at.
+    """The numbers of realisations, up to `most`, at which a precision is looked at: of 2000 and more it is the last.
 
     >>> list(looks(10_000))
-    [2000, 4000, 8000]
+    [2000, 4000, 8000, 10000]
     """
     n = FIRST
-    while n <= most:
+    while n < most:
         yield n
         n *= 2
+    if most >= FIRST:
+        yield most
 
 
-def worst(result: CaseResult, table: Curves) -> Cell | None:
-    """The σ of a case with the widest interval relative to itself; None where a case has no σ."""
-    curves = table([result])
-    if not len(curves):
+def worst(result: CaseResult, table: Table, of: str = "sigma") -> Cell | None:
+    """The quantity of a case with the widest interval; None where the case has none."""
+    what, made = OF[of], table([result])
+    if what.last and len(made):
+        made = made.groupby(["case", "filter"], sort=False).tail(1)
+    if not len(made):
         return None
-    sigma, lo, hi = (curves[name].to_numpy(dtype=float) for name in ("sigma", "sigma_lo", "sigma_hi"))
+    value, lo, hi = (made[name].to_numpy(dtype=float) for name in what.columns)
+    if what.rest:
+        value, lo, hi = 1 - value, 1 - hi, 1 - lo
     with np.errstate(divide="ignore", invalid="ignore"):
-        percent = np.where(hi == lo, 0.0, 50 * (hi - lo) / sigma)
-    percent = np.where(np.isnan(percent) | np.isnan(sigma), np.inf, percent)
+        percent = np.where(hi == lo, 0.0, 50 * (hi - lo) / value if what.relative else 0.5 * (hi - lo))
+    percent = np.where(np.isnan(percent) | np.isnan(value), np.inf, percent)
     # Of equal ones the first: Gaussian errors without bias are all known equally well, up to rounding.
-    row = int(np.flatnonzero(percent >= percent.max() * (1 - EQUAL))[0])
-    case, name, component = (str(curves[column].iloc[row]) for column in ("case", "filter", "component"))
-    return Cell(float(percent.max()), case, name, component, int(curves["k"].iloc[row]), result.count)
+    row = made.iloc[int(np.flatnonzero(percent >= percent.max() * (1 - EQUAL))[0])]
+    component, k = str(row.get("component", "")), int(row.get("k", 0))
+    return Cell(float(percent.max()), str(row["case"]), str(row["filter"]), component, k, result.count, of)
 
 
-def needed(result: CaseResult, percent: float, table: Curves) -> int | None:
-    """At which look the precision is likely met, from the sums of a pilot; None if beyond all bounds.
+def narrowed(plain: "pandas.DataFrame", controlled: "pandas.DataFrame", of: str = "sigma") -> "pandas.DataFrame":
+    """Curves or gains with value and interval from a table with control variates, where that has the narrower one.
 
-    The sums are taken as those of more realisations, in proportion.
+    Not where the two differ by more than three standard errors, in the table's column `apart`.
     """
-    cell = worst(result, table)
+    keys, columns = ["case", "filter", "component", "k"], list(OF[of].columns)
+    _, lo, hi = columns
+    further = [name for name in ("apart",) if name in controlled]
+    other = plain[keys].merge(controlled[[*keys, *columns, *further]], on=keys, how="left").set_axis(plain.index)
+    narrower = (other[hi] - other[lo]) < (plain[hi] - plain[lo])
+    if further:
+        narrower &= other["apart"].abs() <= APART
+    return plain.assign(**{name: plain[name].mask(narrower, other[name]) for name in columns})
+
+
+def needed(result: CaseResult, percent: float, table: Table, of: str = "sigma", most: int = MOST) -> int | None:
+    """At which look the precision is likely met, with one at `most`; None if beyond all bounds.
+
+    From the sums of a pilot, taken as those of more realisations, in proportion.
+    """
+    cell = worst(result, table, of)
     if cell is None:
         return FIRST
     if not math.isfinite(cell.percent):
         return None
-    for n in looks(MOST):
+    for n in sorted({*looks(MOST), most}):
         # Half-widths go with 1/√n: what is far from enough need not be looked at.
         if cell.percent * math.sqrt(result.count / n) >= 2 * percent:
             continue
-        wide = worst(grown(result, n), table)
+        wide = worst(grown(result, n), table, of)
         if wide is not None and wide.percent < percent:
             return n
     return None

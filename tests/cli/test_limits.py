@@ -10,6 +10,12 @@ import pytest
 
 import radarsim
 from radarsim.app import outlook as overview
+from radarsim.app import output, writing
+from radarsim.app.configs import load
+from radarsim.app.simulation import result_of
+from radarsim.app.work import CaseWork
+from radarsim.engine import stopping
+from radarsim.engine.collect import collect
 from radarsim.errors import ConfigError, TargetUnmet
 from tests.cli.test_run import csv_bytes
 from tests.cli.test_run import radarsim as command
@@ -20,6 +26,14 @@ PLAIN = ("--no-figures", "--quiet")
 def record(folder):
     """What run.json holds."""
     return json.loads((folder / "run.json").read_text())
+
+
+def few(case):
+    """A result of a case from few realisations, its tables, and the experiment of it alone."""
+    one = load("range_doppler", ["realisations=2000"])
+    work = CaseWork(case)
+    result = result_of(case, work, collect(work, 2))
+    return [result], output.tables([result], stem=one.stem), one
 
 
 def half_widths(folder):
@@ -54,10 +68,55 @@ def test_an_unmet_precision_names_the_worst_cell_and_writes_what_is_done(tmp_pat
     row = pd.read_csv(tmp_path / "rls2" / "curves.csv").iloc[int(np.argmax(widths))]
     assert result.stderr == (
         f"rls2: precision of 0.1 % not reached; worst: rls2: filter '{row['filter']}', component {row.component}, "
-        f"k = {row.k}: sigma ± {widths.max():.3g} % at 4,000 realisations\n"
+        f"k = {row.k}: sigma ± {widths.max():.3g} % at 5,000 realisations\n"
     )
     assert record(tmp_path / "rls2")["stop"].startswith("precision of 0.1 % not reached")
     command("report", "rls2", "--no-figures", "--out", tmp_path)
+
+
+def test_n_itself_is_the_last_look(tmp_path):
+    """64 000 are too few and 128 000 more than may be: 10⁵ do."""
+    command("run", "rls2", "-n", "1e5", "--precision", 0.5, *PLAIN, "--out", tmp_path)
+    done = record(tmp_path / "rls2")
+    assert (done["stop"], done["realisations_done"]) == ("done", 100_000)
+    assert half_widths(tmp_path / "rls2").max() < 0.5
+    (check,) = json.loads(command("check", "rls2", "-n", "1e5", "--precision", 0.5, "--json").stdout)
+    assert check["cases"][0]["need"]["realisations"] == check["cases"][0]["realisations"] == 100_000
+
+
+def test_a_precision_of_gains_is_in_points(tmp_path):
+    command("run", "rls2", "-n", "1e5", "--precision", 2, "--of", "gain", *PLAIN, "--out", tmp_path)
+    gains = pd.read_csv(tmp_path / "rls2" / "gains.csv")
+    assert 0.5 * (gains["gain_hi"] - gains["gain_lo"]).max() < 2
+    done = record(tmp_path / "rls2")
+    assert done["precision"]["widest"]["rls2"]["of"] == "gain"
+    assert done["realisations_done"] < 100_000
+    unmet = command("run", "rls2", "-n", 2_000, "--precision", 0.1, "--of", "gain", *PLAIN, "--out", tmp_path, code=3)
+    assert "precision of 0.1 points not reached" in unmet.stderr
+    assert ": gain ± " in unmet.stderr
+
+
+def test_a_precision_of_rates_is_relative_and_of_the_last_window(tmp_path):
+    fewer = ("--set", "sweep.estimators.0.lock_probability=[0.999]", *PLAIN, "--out", tmp_path)
+    command("run", "discriminator_rare", "-n", "1e5", "--precision", 20, "--of", "lost", *fewer)
+    rare = pd.read_csv(tmp_path / "discriminator_rare" / "rare.csv").iloc[0]
+    assert 50 * (rare["rate_hi"] - rare["rate_lo"]) / rare["rate"] < 20
+    assert rare["n"] < 100_000
+    (foretold,) = json.loads(
+        command("check", "discriminator_rare", "--precision", 20, "--of", "lost", "--json", *fewer[:2]).stdout
+    )
+    assert 0.5 <= foretold["cases"][0]["need"]["realisations"] / rare["n"] <= 2
+    refused = command("run", "rls2", "-n", 4_000, "--precision", 1, "--of", "lock", *PLAIN, "--out", tmp_path, code=2)
+    assert refused.stderr == "rls2: of: must be what the case has, got lock: no lock rate in locks.csv\n"
+
+
+def test_controlled_intervals_count_and_check_foretells_both_ways():
+    words = ("ambiguous_rls3", "-n", "1e6", "--precision", 1, "--set", "control_variate=true")
+    (case,) = json.loads(command("check", *words, "--json").stdout)[0]["cases"]
+    assert case["controlled"]["realisations"] <= case["need"]["realisations"]
+    assert case["realisations"] == case["controlled"]["realisations"]
+    assert case["seconds_controlled"] <= case["seconds_plain"]
+    assert "control variate" in command("check", *words).stdout
 
 
 def test_all_cases_count_for_a_precision(tmp_path):
@@ -101,6 +160,41 @@ def test_a_limit_too_short_for_a_block_says_that_nothing_was_done(tmp_path):
     assert not (tmp_path / "rls1").exists()
 
 
+def test_a_limit_leaves_time_for_tables_and_figures(monkeypatch):
+    """As much as they take, and at most half of what is left."""
+    clock = [100.0]
+    monkeypatch.setattr(stopping.time, "monotonic", lambda: clock[0])
+    limit = stopping.time_limit(60.0)
+    for reserve, end in ((10.0, 150.0), (45.0, 130.0)):
+        clock[0] = 100.0
+        kept = limit.reserving(reserve)
+        clock[0] = end - 0.1
+        assert kept() is None
+        clock[0] = end + 0.1
+        assert kept() == "time limit of 60 s"
+    clock[0] = 170.0
+    assert limit.left == 0.0
+    assert limit.reserving(5.0)() == "time limit of 60 s"
+
+
+@pytest.mark.parametrize("figures", [True, False])
+def test_what_writing_takes_is_measured_by_case_and_figure(monkeypatch, figures):
+    ticks = iter(range(100))
+    monkeypatch.setattr(writing.time, "perf_counter", lambda: float(next(ticks)))
+    saved = []
+    monkeypatch.setattr("radarsim.report.figures.save", lambda *given: saved.append(given) or {})
+    experiment = load("range_doppler", ["realisations=2000"])
+    found = writing.seconds(experiment, figures, None)
+    assert len(saved) == 2 * figures
+    names = len(output.figures(*few(experiment.cases[0])))
+    assert found == pytest.approx(1.25 * (len(experiment.cases) + (0.5 * names if figures else 0)))
+
+
+def test_what_was_kept_for_writing_is_told(tmp_path):
+    command("run", "rls2", "-n", 3_000, "--time-limit", 600, *PLAIN, "--out", tmp_path)
+    assert record(tmp_path / "rls2")["seconds_kept_for_writing"] > 0
+
+
 def test_a_run_that_ends_in_time_is_done(tmp_path):
     command("run", "rls2", "-n", 3_000, "--time-limit", 600, *PLAIN, "--out", tmp_path)
     assert record(tmp_path / "rls2")["stop"] == "done"
@@ -136,6 +230,8 @@ def test_a_share_may_be_limited_in_time(tmp_path):
         (["--precision", "-1"], "must be a number > 0"),
         (["--precision", "nan"], "must be a number > 0"),
         (["--precision", "101"], "≤ 100"),
+        (["--of", "gain"], "--of says what a precision is of"),
+        (["--precision", "1", "--of", "speed"], "is not one of"),
         (["--precision", "1", "-n", "1999"], "rls2.yaml: realisations: must be at least 2000 for a precision"),
         (["--time-limit", "0"], "must be a number > 0"),
         (["--time-limit", "inf"], "must be a number > 0"),

@@ -41,7 +41,7 @@ def test_the_worst_cell_is_the_widest_of_the_table(results, study):
 def test_looks_are_declared_doublings_up_to_n():
     assert list(looks(FIRST - 1)) == []
     assert list(looks(2_000)) == [2_000]
-    assert list(looks(15_999)) == [2_000, 4_000, 8_000]
+    assert list(looks(15_999)) == [2_000, 4_000, 8_000, 15_999]
 
 
 def test_what_is_needed_is_the_first_look_that_suffices(results):
@@ -60,6 +60,41 @@ def test_gaussian_errors_need_as_many_as_their_chi_square_says(results):
     exact = grown(gaussian(case), 1_000_000)
     widths = worst(exact, curves).percent
     assert widths == pytest.approx(100 * 1.959964 / np.sqrt(2e6), rel=1e-4)
+
+
+def test_controlled_rows_take_the_place_of_wider_ones(results):
+    from radarsim.report.controlled import controlled
+
+    (case,) = results["range_doppler"]
+    plain, other = curves([case]), controlled([case])
+    both = precision.narrowed(plain, other)
+    keys = ["filter", "component", "k"]
+    beside = both.merge(plain, on=keys, suffixes=("", "_plain")).merge(other, on=keys, suffixes=("", "_other"))
+    width = beside["sigma_hi"] - beside["sigma_lo"]
+    for name in ("_plain", "_other"):
+        assert (width <= beside[f"sigma_hi{name}"] - beside[f"sigma_lo{name}"]).all()
+    assert (beside["sigma"] == beside["sigma_other"]).any()
+    assert len(both) == len(plain)
+
+
+def test_losses_are_what_locks_leave(results):
+    import pandas as pd
+
+    table = pd.DataFrame(
+        {
+            "case": "a",
+            "filter": "f",
+            "k": [1, 2],
+            "lock_rate": [0.5, 0.9],
+            "lock_lo": [0.1, 0.85],
+            "lock_hi": [0.9, 0.95],
+        }
+    )
+    (case,) = results["range_doppler"]
+    lock, lost = (worst(case, lambda _: table, of) for of in ("lock", "lost"))
+    assert (lock.k, lost.k) == (2, 2)  # the last
+    assert lock.percent == pytest.approx(50 * 0.1 / 0.9)
+    assert lost.percent == pytest.approx(50 * 0.1 / 0.1)
 
 
 def test_what_is_not_known_is_never_reached(results):
