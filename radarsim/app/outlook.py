@@ -18,7 +18,6 @@ from radarsim.studies import registry
 PILOT_S = 0.3  # of all cases together, unless single realisations take longer
 LADDER, FOR_NOTHING = 8, 1.2  # so many times more realisations at a look; times as good as equal
 SHORT_S = 0.01
-CONTROLLED = ("sigma", "gain")  # what has intervals with control variates
 PILOT_OF_PRECISION_S, LEAST, MOST = 1.0, 256, 16_384  # realisations that a precision is judged from
 
 
@@ -93,7 +92,7 @@ def outlook(
         has_controls = experiment.control_variate and (study.own_controls or (study.exact_errors and controls(axes)))
         if precision is not None:
             need = needed(experiment, work, precision, each, of)
-            if of in CONTROLLED and has_controls:
+            if has_controls and (of == "sigma" or (of == "gain" and study.own_controls)):
                 controlled = needed(experiment, work, precision, each, of, controls=True)
         ends = [ending(one, case.realisations) for one in (need, controlled) if one is not None]
         count = min(ends, default=case.realisations)

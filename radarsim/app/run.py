@@ -35,6 +35,8 @@ from radarsim.studies import registry
 if TYPE_CHECKING:
     from radarsim.report.claims import PaperClaims
 
+WORTH_MEASURING_S = 20.0  # of a time limit: within less, measuring what tables and figures take would be most of it
+
 
 def load_all(sources: Sequence[str | os.PathLike[str]], overrides: Sequence[str] = ()) -> list[Experiment]:
     """Every config checked before any runs; raises one ConfigError with the faults of all."""
@@ -122,7 +124,7 @@ def run(
         deciding.check(experiment)
     limit = time_limit if time_limit is None or callable(time_limit) else stopping.time_limit(time_limit)
     started, kept = time.perf_counter(), None
-    if out is not None and isinstance(limit, stopping.TimeLimit):
+    if out is not None and isinstance(limit, stopping.TimeLimit) and limit.left >= WORTH_MEASURING_S:
         from radarsim.app.writing import seconds as writing_s
 
         limit = limit.reserving(kept := writing_s(experiment, figures, width_mm))
