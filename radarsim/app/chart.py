@@ -1,7 +1,7 @@
 """`radarsim chart`: one chart for every device, with the cases of some configs marked on it."""
 
 import os
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,15 +35,16 @@ def chart(
     overrides: Sequence[str] = (),
     formats: Sequence[str] = ("svg", "png"),
     width_mm: float | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
 ) -> Drawn:
     """Draw the chart of the configs' study, with their cases on it, into `out`/chart; nothing is simulated.
 
-    Without configs, of the study that has a chart, with its paper's own devices. width_mm is the width of the figures'
-    files in place of their own. Raises ConfigError where the study
-    has none, configs are of several, or two have one name.
+    Without configs, of the study that has a chart, with its paper's own devices; a config that is given twice counts
+    once. width_mm is the width of the figures' files in place of their own. progress is told of each figure. Raises
+    ConfigError where the study has none, configs are of several, or two have one name.
     """
     arguments.directory(out)
-    experiments = [load(config, overrides) for config in configs]
+    experiments = [load(config, overrides) for config in dict.fromkeys(configs)]
     if faults := namesakes(experiments):
         raise ConfigError(*faults)
     made = described([case for one in experiments for case in one.cases])
@@ -51,8 +52,10 @@ def chart(
     if formats:
         from radarsim.report import figures as drawing  # Matplotlib
 
-        for name, figure in made.figures.items():
+        for n, (name, figure) in enumerate(made.figures.items()):
             contents |= {f"{name}.{kind}": data for kind, data in drawing.save(figure, formats, width_mm).items()}
+            if progress is not None:
+                progress(n + 1, len(made.figures), 0)
     folder = Path(out) / FOLDER
     files.replace_all(folder, contents)
     return Drawn(folder, tuple(sorted(contents)), made.sentences, tuple(made.table.to_dict("records")))

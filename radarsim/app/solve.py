@@ -425,6 +425,12 @@ def _by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> 
     best, _ = min(known, key=lambda one: abs(one[1]))
     places = _changes(scanned) or [grid.index(best)]
     brackets = [pair for pair in map(partial(_bracket, asked, curve, grid), places) if pair is not None]
+    if not brackets:  # the pilot may have been far off, as where its errors have heavy tails
+        whole = [(x, curve.simulated(x, count).value - asked.equals) for x in grid]
+        brackets = [(whole[i], whole[i + 1]) for i in _changes(whole)]
+        best = min((one for one in whole if not math.isnan(one[1])), key=lambda one: abs(one[1]), default=(best, 0.0))[
+            0
+        ]
     found = [_interval(asked, curve, *pair) for pair in dict.fromkeys(brackets)]
     if not found:
         limit = curve.simulated(best, count)

@@ -165,10 +165,13 @@ def chart(
     """
     from radarsim.app import chart as drawing
     from radarsim.app import documents
-    from radarsim.cli import answers
+    from radarsim.cli import answers, console
 
     kinds = () if no_figures else formats or ("svg", "png")
-    drawn = drawing.chart(configs, out, overrides=overrides, formats=kinds, width_mm=width_mm)
+    with console.Progress("chart", quiet=as_json, what="figures") as progress:
+        drawn = drawing.chart(
+            configs, out, overrides=overrides, formats=kinds, width_mm=width_mm, progress=progress.update
+        )
     if as_json:
         click.echo(documents.text(documents.drawn(drawn)))
     else:

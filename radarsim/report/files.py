@@ -71,7 +71,9 @@ def replace_all(
             for temporary in written.values():
                 temporary.unlink(missing_ok=True)
     except OSError as error:
-        raise StoreError(f"{error.filename or folder}: cannot be written: {error.strerror or error}") from error
+        meant = {str(temporary): path for path, temporary in written.items()}  # what was to be made of it
+        named = meant.get(str(error.filename), error.filename or folder)
+        raise StoreError(f"{named}: cannot be written: {error.strerror or error}") from error
 
 
 def create(path: Path, data: bytes) -> None:

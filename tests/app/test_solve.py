@@ -382,3 +382,18 @@ def test_an_interval_that_rests_on_heavy_tails_says_so():
     assert any(note.startswith("the interval is too narrow: under 200 effective") for note in early.notes)
     late = solve("rls2", "radar.sigma_velocity_mps", GAIN, 30, **given | {"overrides": [], "between": (4, 40)})
     assert late.notes == ()
+
+
+def test_a_pilot_that_is_far_off_hides_no_root(monkeypatch):
+    """Where the first look with few realisations crosses the target elsewhere, all of them are asked everywhere."""
+    plain = Curve.simulated
+
+    def misled(self, value, realisations):
+        found = plain(self, value, realisations)
+        shift = 40 if realisations < self.realisations and value is not None else 0
+        return type(found)(*(part + shift for part in found))
+
+    monkeypatch.setattr(Curve, "simulated", misled)
+    found = solve("rls2", "radar.sigma_velocity_mps", GAIN, 45, sampled=True, realisations=1000, between=(4, 40))
+    exact = solve("rls2", "radar.sigma_velocity_mps", GAIN, 45, between=(4, 40))
+    assert found.value == pytest.approx(exact.value, rel=0.3)

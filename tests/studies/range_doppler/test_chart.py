@@ -195,3 +195,18 @@ def test_two_configs_of_one_name_could_not_be_told_apart(tmp_path):
         (tmp_path / folder / "mine.yaml").write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match="rename one, or run them apart"):
         chart([tmp_path / "one" / "mine.yaml", tmp_path / "other" / "mine.yaml"], tmp_path, formats=[])
+
+
+def test_a_file_in_the_place_of_the_folder_is_named_and_not_what_is_written_beside_it(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    ended = CliRunner().invoke(main, ["chart", "rls4", "--no-figures", "--out", str(tmp_path / "file")])
+    assert ended.exit_code == 4
+    assert ended.stderr == f"{tmp_path / 'file' / 'chart' / 'chart.csv'}: cannot be written: Not a directory\n"
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_a_config_given_twice_counts_once_and_figures_are_told(tmp_path):
+    said = []
+    drawn = chart(["rls4", "rls4"], tmp_path, formats=["svg"], progress=lambda *done: said.append(done))
+    assert len(drawn.sentences) == 1
+    assert said == [(1, 3, 0), (2, 3, 0), (3, 3, 0)]
