@@ -140,7 +140,9 @@ def solve(
     over = range_of(found, key, between)
     curve = Curve(cases, key, quantity, threads, progress, realisations or cases.base.realisations)
     now = found[0].value if len({one.value for one in found}) == 1 else None
-    question = Question(cases, key, quantity, equals, over, now, quantities.unit(quantity, axes), tuple(overrides))
+    question = Question(
+        cases, key, quantity, equals, over, now, quantities.unit(quantity, axes), tuple(overrides), realisations
+    )
     work = _exactly if not sampled and curve.exact(axes) else _by_sampling
     return work(question, curve, told or (lambda line: None))
 
@@ -157,12 +159,15 @@ class Question:
     now: float | None
     unit: str
     overrides: tuple[str, ...]
+    realisations: int | None = None
 
     def command(self, value: float) -> str:
-        """The run that shows what a value attains."""
+        """The run that shows what a value attains, of noise of its own, with as many realisations as were asked for."""
         name = self.cases.config if isinstance(self.cases.config, str | os.PathLike) else "CONFIG.yaml"
         settings = [*self.overrides, f"{self.key}={number(value)}"]
-        return shlex.join(["radarsim", "run", os.fspath(name), *(part for one in settings for part in ("--set", one))])
+        count = [] if self.realisations is None else ["-n", str(self.realisations)]
+        parts = [part for one in settings for part in ("--set", one)]
+        return shlex.join(["radarsim", "run", os.fspath(name), *parts, *count])
 
 
 def number(value: float) -> str:

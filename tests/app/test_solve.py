@@ -397,3 +397,13 @@ def test_a_pilot_that_is_far_off_hides_no_root(monkeypatch):
     found = solve("rls2", "radar.sigma_velocity_mps", GAIN, 45, sampled=True, realisations=1000, between=(4, 40))
     exact = solve("rls2", "radar.sigma_velocity_mps", GAIN, 45, between=(4, 40))
     assert found.value == pytest.approx(exact.value, rel=0.3)
+
+
+def test_a_sampled_answer_names_a_run_of_as_many_realisations():
+    found = solve("rls2", "radar.sigma_velocity_mps", GAIN, 30, sampled=True, realisations=400, between=(4, 40))
+    words = shlex.split(found.command)
+    assert words[-2:] == ["-n", "400"]
+    result = radarsim.run(words[2], overrides=[words[4]], realisations=400)
+    row = result.gains.query("component == 'r' and t_s == 60").iloc[0]
+    half = (row["gain_hi"] - row["gain_lo"]) / 2
+    assert abs(row["gain_percent"] - 30) < 2 * math.sqrt(2) * half  # four standard errors of a difference

@@ -147,5 +147,5 @@ def test_names_contrast_and_themes(page, live, dark):
 
 
 def test_a_phone_reads_it_without_scrolling_sideways(page, live):
-    page.open(live, width=390, height=800)
-    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    page.open(live, width=360, height=740)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 360
