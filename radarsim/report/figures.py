@@ -241,6 +241,7 @@ class Round(Locator):
     def __init__(self, log: bool, wanted: int):
         self.log, self.wanted = log, wanted
         self.words: dict[float, str] = {}
+        self._asked: tuple[float, float, float] | None = None
 
     def __call__(self) -> list[float]:
         assert self.axis is not None  # Matplotlib sets it before it asks
@@ -249,7 +250,13 @@ class Round(Locator):
     def tick_values(self, vmin: float, vmax: float) -> list[float]:
         """The ticks between two ends."""
         low, high = sorted((float(vmin), float(vmax)))
-        scale = Scale(self.log, low, high, 0.0, self._length_pt())
+        asked = (low, high, self._length_pt())
+        if asked != self._asked:  # asked for several times a drawing
+            self._asked, self.words = asked, dict(self._chosen(Scale(self.log, low, high, 0.0, asked[2])))
+        return list(self.words)
+
+    def _chosen(self, scale: Scale) -> list[tuple[float, str]]:
+        """As many as wanted, or fewer that stand apart."""
         ticks = scale.ticks(self.wanted)
         for wanted in range(self.wanted - 1, 1, -1):
             if apart(scale, ticks):
@@ -257,8 +264,7 @@ class Round(Locator):
             ticks = scale.ticks(wanted)
         while not apart(scale, ticks):
             ticks = ticks[::2]
-        self.words = dict(ticks)
-        return list(self.words)
+        return ticks
 
     def _length_pt(self) -> float:
         """How long an axis of x is, points; of another as long as need be."""
