@@ -27,7 +27,8 @@ class Tolerance:
     """By how much a study's numbers may differ between platforms, in σ: those of samples, and exact ones.
 
     Spreads, standard errors and half-widths of intervals are compared by their squares, as each is the root of a
-    difference of sums: where all realisations err alike, a rounding ε of σ² makes √(2ε) |bias| of the spread.
+    difference of sums: where all realisations err alike, a rounding ε of σ² makes √(2ε) |bias| of the spread. Notes are
+    not compared: each turns at a threshold, that on filters alike at a difference of none.
     """
 
     sampled: float = 1e-12
@@ -122,7 +123,7 @@ def distances(table: str, one: bytes, other: bytes) -> tuple[float, float]:
     for a, b in zip(first, second, strict=True):
         columns = list(b)
         numbers = [name for name in columns[columns.index(FIRST_NUMBER[table]) :] if name != "note"]
-        if any(a.get(name) != b[name] for name in columns if name not in numbers):
+        if any(a.get(name) != b[name] for name in columns if name not in (*numbers, "note")):
             return LABELS_DIFFER
         centre = FIRST_NUMBER[table]
         scale = float(b["sigma"] or 1) if table == "curves" else 100.0  # ends of intervals may lie far above σ

@@ -28,7 +28,7 @@ DRAWN_FROM = {"threshold": ("locks", "curves"), "measured": ("estimates",)}
 
 
 def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
-    """sigma_r … gain_ar; locks, measured, losses of what is not swept, threshold of what is."""
+    """sigma_r … gain_ar; folds; locks, measured, losses of what is not swept, threshold of what is."""
     curves = common.groups(made["curves"], "case", "filter", "component")
     gains = common.groups(made["gains"], "case", "filter", "component")
 
@@ -40,8 +40,9 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
         for name, figure in panels.per_component(results, curves, gains, QUANTITIES, chosen).items()
     }
     for name, (draw, title, caption) in OWN.items():
-        some, left_out = panels.shown(panels.unswept(results), chosen(name))
-        found = [panel for result in some if not result.swept and (panel := draw(result, made)).marks]
+        unswept = [result for result in panels.unswept(results) if not result.swept]
+        some, left_out = panels.shown(results if name == "folds" else unswept, chosen(name))
+        found = [panel for result in some if (panel := draw(result, made)).marks]
         if found:
             drawn[name] = _figure(name, tr(title), tr(caption) + left_out, found)
     return drawn | threshold_figure(results, made)
@@ -113,9 +114,10 @@ def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """Share of bursts that locked against time, a line for each estimator."""
     rows = common.groups(made["locks"][made["locks"]["case"] == result.name], "filter")
     marks = []
+    ideal = {one.name for one in result.spec.filters if one.estimator == "fisher_bound"}
     for n, ((name,), own) in enumerate(rows.items()):
         x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
-        if (y < 1).any():
+        if (y < 1).any() and name not in ideal:
             marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, hi))
     return Panel(panels.time_axis(), Axis(tr("P(locked)"), limits=(None, 1.0)), tuple(marks), _title(result))
 
@@ -167,7 +169,7 @@ OWN: dict[str, tuple[Draw, str, str]] = {
         term("Bursts that lock"),
         term(
             "Share of bursts whose velocity (and acceleration, where it is taken) is within five Fisher "
-            "bounds of the truth. Bands: 95 % intervals. Estimators that always lock are left out."
+            "bounds of the truth. Bands: 95 % intervals. Estimators that always lock are left out, and idealisations."
         ),
     ),
     "folds": (
