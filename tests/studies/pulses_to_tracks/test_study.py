@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from radarsim.app.configs import load
+from radarsim.app.quantities import Quantity
+from radarsim.app.solve import solve
 from radarsim.bursts.burst import LIGHT_MPS, Burst
 from radarsim.studies import registry
 from radarsim.studies.pulses_to_tracks import exact, filters, study, world
@@ -149,3 +151,16 @@ def test_exact_is_known_of_range_and_idealisations_alone():
     assert np.isnan(axes.exact_sigma[2]).all()
     assert np.isfinite(axes.exact_sigma[:2]).all()
     assert axes.ideal.tolist() == [-1, -1, 1]
+
+
+def test_the_signal_to_noise_ratio_for_a_gain_is_solved_for():
+    """As the page has it: exact of the idealisation, whose gain there is the one that was asked for."""
+    pair = ["{name: r, observes: [range], manoeuvre_variance: 1e-3}"]
+    pair.append("{name: ideal, observes: [range, velocity], manoeuvre_variance: 1e-3, estimator: fisher_bound}")
+    filters_ = f"filters=[{', '.join(pair)}]"
+    asked = Quantity("gain", "ideal", "r", 60.0)
+    found = solve("pulses", "burst.snr_db", asked, 30.0, overrides=[filters_], between=(-10.0, 10.0))
+    assert found.exact
+    assert found.value == pytest.approx(-3.775, abs=0.02)  # powers are of a hundredth of a decibel
+    axes = study.prepare(load("pulses", [filters_, f"burst.snr_db={found.value}"]).cases[0]).axes
+    assert 100 * (1 - axes.exact_sigma[1, 6, 0] / axes.exact_sigma[0, 6, 0]) == pytest.approx(30.0, abs=0.2)
