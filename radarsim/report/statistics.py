@@ -192,11 +192,15 @@ def furthest(looks: Values) -> float:
     return NormalDist().inv_cdf(1 - TOGETHER / 2 / max(int(looks), 1))
 
 
-def narrower(plain: Estimate, controlled: Controlled) -> Estimate:
-    """The narrower of two estimates of the same, where they agree within three standard errors; else the plain one."""
-    of = controlled.estimate
-    better = (of.hi - of.lo < plain.hi - plain.lo) & (np.abs(controlled.apart) <= 3)
-    return Estimate(*(np.where(better, ours, theirs) for ours, theirs in zip(of, plain, strict=True)))
+def trusted(of: Controlled) -> Values:
+    """Where values with and without controls agree within three standard errors and enough realisations count."""
+    return (np.abs(of.apart) <= 3) & (np.asarray(of.effective) >= FEW_EFFECTIVE)
+
+
+def narrower(plain: Estimate, controlled: Estimate, trust: Values) -> Estimate:
+    """The narrower of two estimates of the same, where the one with controls is trusted; else the plain one."""
+    better = trust & (np.subtract(controlled.hi, controlled.lo) < np.subtract(plain.hi, plain.lo))
+    return Estimate(*(np.where(better, ours, theirs)[()] for ours, theirs in zip(controlled, plain, strict=True)))
 
 
 def errors(moments: Values, n: Values) -> ErrorStatistics:

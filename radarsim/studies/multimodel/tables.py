@@ -146,6 +146,27 @@ def controlled_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> tu
         return gain, float(np.divide(before, spread))
 
 
+def best_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> statistics.Estimate:
+    """Paired gain over a stage, %: with controls where the case has some, both ways agree and these are narrower."""
+    plain = stage_gain(result, f, base, s, c)
+    if "controlled_stage" not in result.sums:
+        return plain
+    trust = all(statistics.trusted(controlled_sigma(result, i, s, c)) for i in (f, base))
+    return statistics.narrower(plain, controlled_gain(result, f, base, s, c)[0], trust)
+
+
+def best_stages(made: "Mapping[str, pd.DataFrame]") -> "pd.DataFrame":
+    """The rows of `stages`, σ and its interval with controls where there are some, as `best_gain` has it."""
+    rows = made["stages"]
+    if "controlled_stages" not in made:
+        return rows
+    ends, beside = ["sigma", "sigma_lo", "sigma_hi"], made["controlled_stages"]  # row by row of the same
+    plain, ours = (statistics.Estimate(*(table[end].to_numpy() for end in ends)) for table in (rows, beside))
+    told = (beside[name].to_numpy() for name in ("variance_factor", "apart", "n_eff"))
+    found = statistics.narrower(plain, ours, statistics.trusted(statistics.Controlled(ours, *told)))
+    return rows.assign(**dict(zip(ends, found, strict=True)))
+
+
 def _controls(result: CaseResult) -> list[tuple]:
     rows, axes, b, names = [], result.axes, result.axes.baseline, control_names(result)
     places = {name: s for s, name in enumerate(stage_names(result))}

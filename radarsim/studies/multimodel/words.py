@@ -1,11 +1,13 @@
 """What the report of P2's experiments asks and answers, in sentences."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, numeral, plural, term, tr
 from radarsim.report import panels, text
+from radarsim.studies.multimodel import tables
 
 
 def question(experiment: Experiment) -> str:
@@ -28,12 +30,13 @@ def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
     shown, others = panels.told(results, 4)
     height = [f"{panels.plain_label(result)}: {_least(result, made, 'y', term('the height'))}" for result in shown]
     climb = [f"{panels.plain_label(results[0])}: {_least(results[0], made, 'vy', term('the rate of climb'))}"]
-    return [*height, *(climb if len(results) == 1 else []), *others]
+    controls = [tr("Intervals are those with controls where both ways agree and these are narrower.")]
+    return [*height, *(climb if len(results) == 1 else []), *others, *(controls if "controlled_stages" in made else [])]
 
 
 def _least(result: CaseResult, made: Mapping, component: str, quantity: str) -> str:
     """The filter of the least σ in each stage, with the interval."""
-    rows = made["stages"]
+    rows: Any = tables.best_stages(made)
     rows = rows[(rows["case"] == result.name) & (rows["component"] == component)]
     parts = []
     for stage, own in rows.groupby("stage", sort=False):
