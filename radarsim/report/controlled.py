@@ -31,42 +31,59 @@ def sigma(result: CaseResult) -> statistics.Controlled | None:
     return statistics.residual(result.sums["controlled"], error[..., 1], error[..., 3], common.realisations(result))
 
 
-RESIDUAL = (
-    *(*CONTROLLED, "n_eff", "apart"),
-    *("baseline", "gain_percent", "gain_lo", "gain_hi", "gain_factor"),
-)
+RESIDUAL = (*CONTROLLED, "n_eff", "apart")
 
 
 def residuals(results: Sequence[CaseResult], names: Callable[[CaseResult], Sequence[str]]) -> "pd.DataFrame":
-    """σ and paired gain of each filter with the controls that a study simulates; names: of each filter's controls."""
+    """σ of each filter with the controls that a study simulates; names: of each filter's controls."""
     return common.joined([_residuals(result, names(result)) for result in results], RESIDUAL)
 
 
 def _residuals(result: CaseResult, names: Sequence[str]) -> dict[str, np.ndarray]:
-    axes, b, n = result.axes, result.axes.baseline, result.count
     of = sigma(result)
     assert of is not None  # asked for of cases with controls alone
     at = f, k, c = common.shown(result)
-    sums, plain, pairs = (np.asarray(result.sums[name]) for name in ("controlled", "error", "controlled_pairs"))
-    gain, spread = statistics.residual_gain(sums[at], sums[b, k, c], pairs[at], n)
-    cross = np.asarray(result.sums["paired"])[at]
-    own, other = plain[at], plain[b, k, c]
-    before = statistics.log_variance(own[:, 1], own[:, 3], other[:, 1], other[:, 3], cross, n)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        factor = np.where(f == b, np.nan, before / spread)
     return {
         **common.leading(result, f, k, control=common.names(names, f), **common.components(result, c)),
-        "n": np.full(f.size, n),
+        "n": np.full(f.size, result.count),
         **common.interval("sigma", statistics.Estimate(*(end[at] for end in of.estimate))),
         "variance_factor": of.factor[at],
-        "exact_sigma": np.asarray(axes.exact_sigma, dtype=float)[at],
+        "exact_sigma": np.asarray(result.axes.exact_sigma, dtype=float)[at],
         "n_eff": of.effective[at],
         "apart": of.apart[at],
-        "baseline": np.full(f.size, axes.filters[b], dtype=object),
-        **common.interval(
-            "gain_percent", statistics.Estimate(*(np.where(f == b, np.nan, end) for end in gain)), "gain"
-        ),
-        "gain_factor": factor,
+    }
+
+
+RESIDUAL_GAINS = (
+    *("case", "filter", "baseline", "component", "k", "t_s", "n", "gain_percent", "gain_lo", "gain_hi"),
+    *("variance_factor", "n_eff"),
+)
+
+
+def residual_gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
+    """Paired gains with the controls that a study simulates; n_eff is the fewer of both filters."""
+    return common.joined([_residual_gains(result) for result in results], RESIDUAL_GAINS)
+
+
+def _residual_gains(result: CaseResult) -> dict[str, np.ndarray]:
+    axes, b, n, of = result.axes, result.axes.baseline, result.count, sigma(result)
+    assert of is not None  # asked for of cases with controls alone
+    mask = np.array(axes.available)
+    mask[b] = False
+    at = f, k, c = common.shown(result, mask)
+    sums, plain = np.asarray(result.sums["controlled"]), np.asarray(result.sums["error"])
+    gain, spread = statistics.residual_gain(sums[at], sums[b, k, c], np.asarray(result.sums["controlled_pairs"])[at], n)
+    own, other, cross = plain[at], plain[b, k, c], np.asarray(result.sums["paired"])[at]
+    before = statistics.log_variance(own[:, 1], own[:, 3], other[:, 1], other[:, 3], cross, n)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = before / spread
+    return {
+        **common.leading(result, f, k, baseline=np.full(f.size, axes.filters[b], dtype=object)),
+        "component": common.components(result, c)["component"],
+        "n": np.full(f.size, n),
+        **common.interval("gain_percent", gain, "gain"),
+        "variance_factor": factor,
+        "n_eff": np.fmin(of.effective[at], of.effective[b, k, c]),
     }
 
 

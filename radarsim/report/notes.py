@@ -41,6 +41,7 @@ ALIKE = "filters nearly alike: rare differences decide"
 INDEPENDENT = 0.3
 ROUNDING = 1e-9  # of a σ: filters that differ by no more are the same
 PAIRED = {"gain": -1, "above_oracle": 1}  # columns NAME_percent, and the sign with which it adds to the baseline's σ
+GAINS = {"gains": "curves", "controlled_gains": "controlled"}  # tables of gains, and those of their σ
 SAME = ["case", "filter", "component", "k"]
 # Columns that hold shares of realisations, by table: rare events make their intervals' coverage uneven.
 SHARES = {
@@ -125,8 +126,8 @@ def _noted(
     if name in BOUNDED:
         effective = np.full(n.shape, np.inf)
     notes = notes_on(n, events, effective, None if name in BOUNDED else nearby)
-    if name == "gains":
-        notes = np.where((notes == "") & _alike(table, made["curves"]), ALIKE, notes)
+    if name in GAINS:
+        notes = np.where((notes == "") & _alike(table, made[GAINS[name]]), ALIKE, notes)
     if "unseen" in table:
         notes = np.where((notes == "") & table["unseen"].to_numpy(dtype=bool), UNSEEN, notes)
     if "note" in table:
@@ -193,7 +194,7 @@ def _alike(gains: "pd.DataFrame", curves: "pd.DataFrame") -> np.ndarray:
             with np.errstate(invalid="ignore", divide="ignore"):  # a gain of 100 % leaves nothing to be alike
                 width = (high - low) / share
             found |= (width < INDEPENDENT * independent) & (width > ROUNDING)
-    return found & gains["exact_percent"].isna().to_numpy()
+    return found & (gains["exact_percent"].isna().to_numpy() if "exact_percent" in gains else True)
 
 
 def _realisations(

@@ -29,7 +29,11 @@ def tables(results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
         "operations": operations(results),
     }
     if all("controlled" in result.sums for result in results):
-        made |= {"controlled": controlled.residuals(results, control_names), "controlled_stages": controls(results)}
+        made |= {
+            "controlled": controlled.residuals(results, control_names),
+            "controlled_gains": controlled.residual_gains(results),
+            "controlled_stages": controls(results),
+        }
     return made
 
 
