@@ -1,0 +1,48 @@
+"""`--width` of every command that writes figures: the files have it, and letters keep their size."""
+
+import io
+
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+
+from radarsim.app.run import run
+from radarsim.cli import main
+from radarsim.report.figures import MM, PNG_DPI
+
+WIDTHS = ("85", "120")
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    """A folder with two radars."""
+    made = tmp_path_factory.mktemp("results")
+    for name in ("rls2", "rls4"):
+        run(name, realisations=400, out=made, figures=False)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("command", "folder"),
+    [
+        (["compare", "rls2", "rls4"], "compare/figures"),
+        (["chart"], "chart"),
+        (["sensitivity", "rls2", "--at", "60"], "sensitivity/rls2"),
+    ],
+    ids=lambda part: part[0] if isinstance(part, list) else "",
+)
+def test_the_files_have_the_width_asked_for(command, folder, out):
+    for width in WIDTHS:
+        given = [*command, "--out", str(out), "--format", "png", "--width", width]
+        done = CliRunner().invoke(main, given, catch_exceptions=False)
+        assert done.exit_code == 0, done.output
+        drawn = list((out / folder).glob("*.png"))
+        assert drawn
+        for path in drawn:
+            assert Image.open(io.BytesIO(path.read_bytes())).width == pytest.approx(float(width) * MM * PNG_DPI, abs=1)
+
+
+def test_another_width_is_refused_with_those_there_are(out):
+    done = CliRunner().invoke(main, ["chart", "--out", str(out), "--width", "90"])
+    assert done.exit_code == 2
+    assert all(width in done.output for width in ("85", "120", "175"))
