@@ -261,4 +261,42 @@ DRAWN_FLIGHTS = (
         ),
     ),
 )
-FURTHER = (*MANOEUVRES, *FALSE_PLOTS, *SCORES, *LAWS_EXACT, *RUNS, *PULSES, *DRAWN_FLIGHTS)
+MARKS = "report/test_notes.py"
+SAID = (
+    *mutants(
+        "radarsim/report/notes.py",
+        (
+            "largest = tail.max(axis=1, keepdims=True)",
+            "largest = tail",
+            f"{MARKS}::test_large_errors_at_one_scan_mark_those_whose_sample_may_lack_them",
+        ),
+        (
+            "m4 - 4 * m1 * m3 + 6 * m1**2 * m2 - 3 * m1**4",
+            "m4",
+            f"{MARKS}::test_an_error_of_most_bias_is_marked_by_what_makes_its_spread",
+        ),
+        (
+            'FORETOLD = {"calibration"',
+            'FORETOLD = {"orders"',
+            f"{MARKS}::test_a_calibration_is_marked_by_what_is_foretold",
+        ),
+    ),
+    *mutants(
+        "radarsim/report/claims/joined.py",
+        (
+            "over = replace(over, kind=rule.CONTRADICTORY)",
+            "over = replace(over)",
+            "report/test_claims_joined.py"
+            "::test_a_print_that_contradicts_itself_over_its_readings_does_so_beside_the_claims",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/sonar/manoeuvre/readings.py",
+        (
+            "measure=measures.further(part.cases[0], measures.ENOUGH, delay, rate)",
+            "measure=measures.fastest(part.cases[0], delay, rate)",
+            "studies/sonar/manoeuvre/test_readings.py::test_more_plots_can_be_worth_while_under_a_reading",
+        ),
+    ),
+)
+FURTHER = (*MANOEUVRES, *FALSE_PLOTS, *SCORES, *LAWS_EXACT, *RUNS, *PULSES, *DRAWN_FLIGHTS, *SAID)
