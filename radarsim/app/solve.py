@@ -187,6 +187,11 @@ def range_of(found: Sequence[numeric.NumericKey], name: str, between: tuple[floa
         low, high = between
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise ConfigError(f"--between: must be two rising numbers, got {low:g} {high:g}")
+        if key.whole:
+            low, high = float(math.ceil(low)), float(math.floor(high))
+            if low > high:
+                ends = " ".join(f"{end:g}" for end in between)
+                raise ConfigError(f"--between: {name} takes whole numbers, and there is none from {ends}")
         return search.searched(low, high, key.whole)
     if math.isfinite(key.low) and math.isfinite(key.high) and not key.whole:
         return search.searched(key.low, key.high)

@@ -225,6 +225,15 @@ def test_a_range_that_is_none(between):
         solve("rls2", "radar.sigma_range_m", GAIN, 30, between=between)
 
 
+def test_a_range_without_a_whole_number_is_refused_and_another_ends_at_whole_ones():
+    quantity = Quantity("sigma", "r", "r")
+    with pytest.raises(ConfigError, match="takes whole numbers, and there is none"):
+        solve("rls2", "filters.0.initial_scans", quantity, 180, between=(3.2, 3.8))
+    found = solve("rls2", "filters.0.initial_scans", quantity, 180, between=(3.2, 14.7))
+    assert (found.low, found.high) == (4, 14)
+    assert float(found.value).is_integer()
+
+
 # ---- the command -----------------------------------------------------------------------------------------------------
 def test_the_command_says_value_slope_and_check():
     ended = command(
