@@ -30,7 +30,7 @@ def found() -> dict[tuple[str, str, str], list[str]]:
     """Context, text and plural of every message, with the places that say it."""
     said: dict[tuple[str, str, str], list[str]] = {}
     for text, plural, place in (*in_sources(), *in_templates(), *in_schemas(), *in_claims(), *in_scenarios()):
-        if re.search("[A-Za-z]", text):
+        if re.search("[A-Za-zσ]", text):
             places = said.setdefault(("", text, plural), [])
             if place not in places:
                 places.append(place)

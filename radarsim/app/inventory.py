@@ -5,6 +5,7 @@ from pathlib import Path
 
 from radarsim.app.configs import lookup
 from radarsim.errors import ConfigError
+from radarsim.language import term
 from radarsim.studies import registry
 
 Inventory = Sequence[tuple[str, Sequence[str], Sequence[tuple[str, ...]]]]  # title, columns, rows
@@ -33,10 +34,10 @@ def inventory() -> Inventory:
     about += [(name, f"cannot be used: {words}") for name, words in registry.unusable().items()]
     filters = [(name, key, words) for name, (_, of) in studies.items() for key, words in of.items()]
     return [
-        ("Configs (radarsim run NAME)", ("name", "what it is"), configs),
-        ("Scenarios (target: NAME)", ("name", "what it is"), scenarios),
-        ("Studies (study: NAME)", ("name", "paper and question"), about),
-        ("Filters", ("study", "keys", "what it is"), filters),
+        (term("Configs (radarsim run NAME)"), ("name", "what it is"), configs),
+        (term("Scenarios (target: NAME)"), ("name", "what it is"), scenarios),
+        (term("Studies (study: NAME)"), ("name", "paper and question"), about),
+        (term("Filters"), ("study", "keys", "what it is"), filters),
     ]
 
 

@@ -13,6 +13,7 @@ from radarsim.engine.collect import collect
 from radarsim.engine.machine import available_cores
 from radarsim.engine.results import Axes
 from radarsim.errors import ConfigError
+from radarsim.language import tr
 from radarsim.studies import registry
 
 PILOT_S = 0.3  # of all cases together, unless single realisations take longer
@@ -139,8 +140,8 @@ def needed(
     cell = precision.worst(result, table, of)
     if cell is None and of != "sigma":
         raise ConfigError(unknown(work.case, of))
-    last = "no sigma in this case" if cell is None else cell.last()
-    return Need(n, "exact" if exact else f"pilot of {count:,}", last)
+    last = tr("no sigma in this case") if cell is None else cell.last()
+    return Need(n, tr("exact") if exact else tr("pilot of {count:,}", count=count), last)
 
 
 def ending(need: Need, most: int) -> int:

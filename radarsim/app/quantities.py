@@ -13,6 +13,7 @@ from radarsim.config.experiment import Case
 from radarsim.config.lookup import did_you_mean
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError
+from radarsim.language import term, tr
 from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
 
@@ -52,6 +53,12 @@ KINDS = {
 }
 
 
+SAID = (  # the kinds, their units, and which units keys have
+    *(term("gain"), term("lock rate"), term("right folds"), term("ends of a track an hour"), term("/h")),
+    *(term("false tracks an hour"), term("σ")),
+)
+
+
 @dataclass(frozen=True)
 class Quantity:
     """What is asked for: a kind of `KINDS`, of a filter, for gain and sigma of a component.
@@ -76,6 +83,15 @@ class Quantity:
         at = f" at {self.at_s:g} s" if self.at_s is not None else ""
         at = f" at k = {self.at_k}" if self.at_k is not None else at
         return f"{self.of.words} of {self.filter}{component}{at}"
+
+    @property
+    def said(self) -> str:
+        """The same in the language spoken."""
+        told = {"kind": term(self.of.words), "filter": self.filter, "component": self.component or ""}
+        what = tr("{kind} of {filter} in {component}", **told) if self.component else tr("{kind} of {filter}", **told)
+        if self.at_k is not None:
+            return tr("{what} at k = {k}", what=what, k=str(self.at_k))
+        return what if self.at_s is None else tr("{what} at {t_s:g} s", what=what, t_s=self.at_s)
 
 
 class Series(NamedTuple):

@@ -22,6 +22,7 @@ from radarsim.config.experiment import Case
 from radarsim.config.lookup import did_you_mean
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError
+from radarsim.language import tr
 from radarsim.report import files, panels, statistics
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
@@ -110,8 +111,8 @@ def more(key: numeric.NumericKey) -> float:
 def when(asked: Quantity) -> str:
     """At which time or scan, in words."""
     if asked.at_k is not None:
-        return f"at k = {asked.at_k}"
-    return "at the last scan" if asked.at_s is None else f"at {asked.at_s:g} s"
+        return tr("at k = {k}", k=str(asked.at_k))
+    return tr("at the last scan") if asked.at_s is None else tr("at {t_s:g} s", t_s=asked.at_s)
 
 
 def size(rows: Sequence[dict[Hashable, Any]], path: str, leading: str) -> tuple[float, float]:
@@ -213,8 +214,8 @@ def tornado(found: Sensitivity) -> Figure:
     keys = list(dict.fromkeys(row["key"] for row in rows))[:MOST_BARS][::-1]
     filters = list(dict.fromkeys(row["filter"] for row in rows))
     gaining = any(math.isfinite(row["gain_change_points"]) for row in rows)
-    kinds = [("sigma_change", "percent", "change of $\\sigma$, %")]
-    kinds += [("gain_change", "points", "change of gain, points")] if gaining else []
+    kinds = [("sigma_change", "percent", tr("change of $\\sigma$, %"))]
+    kinds += [("gain_change", "points", tr("change of gain, points"))] if gaining else []
     made = []
     for n, (name, ending, words) in enumerate(kinds):
         marks: list[Mark] = [Reference(0.0, "x")]
@@ -233,8 +234,13 @@ def tornado(found: Sensitivity) -> Figure:
         names = [(panels.literal(one), Style(i, 0, width_pt=4.0, flat=True)) for i, one in enumerate(filters)]
         styles = tuple(names) if n == len(kinds) - 1 else ()
         made.append(Panel(Axis(words), y_axis, tuple(marks), keys=styles, direct=False, legend="right"))
-    caption = f"Change of σ and gain of {found.leading} {found.at} for a tenth more of each key, the largest first."
-    title, height = f"What a tenth more of each key changes, {found.stem}", 24 + 6.5 * max(3, len(keys))
+    caption = tr(
+        "Change of σ and gain of {component} {when} for a tenth more of each key, the largest first.",
+        component=found.leading,
+        when=found.at,
+    )
+    title = tr("What a tenth more of each key changes, {stem}", stem=found.stem)
+    height = 24 + 6.5 * max(3, len(keys))
     return Figure("tornado", title, caption, tuple(made), len(made), PAGE_MM, height)
 
 

@@ -26,15 +26,16 @@ from radarsim.config.lookup import did_you_mean
 from radarsim.engine.collect import collect
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError
+from radarsim.language import term, tr
 from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
 
 FACTOR = 1000.0  # the search goes from a thousandth of a positive key's value to a thousand times it
 NEAR = 1e-4  # of a value: the step of a derivative
-WHOLE = "of whole numbers the one beside the target that does at least as well"
+WHOLE = term("of whole numbers the one beside the target that does at least as well")
 MOST_NAMED = 6  # cases that a message lists
 JUMP = 1e-4  # of a quantity: more than means over patterns of plots may jump where others are merged
-JUMPS = "the quantity jumps over the target there"
+JUMPS = term("the quantity jumps over the target there")
 SAME = 1e-12  # of a quantity: what rounding may make of no change
 TO_CLOSE = 12  # values, beside those of the scan, that bring a root from its bracket to rounding, and its slope
 LONG_S = 2.0  # of an answer, from which it is foretold what it takes
@@ -403,9 +404,9 @@ def slope(of: Callable[[float], float], value: float, over: search.Range) -> flo
 def boundary(asked: Question, curve: Curve, x: float) -> tuple[str, ...]:
     """Whether the nearest value lies at an end of what was searched, or of what the config allows, in words."""
     if x in (asked.over.low, asked.over.high):
-        return ("the end of what was searched; --between LO HI searches elsewhere",)
+        return (term("the end of what was searched; --between LO HI searches elsewhere"),)
     beyond = [other for other in curve.refused if abs(other - x) <= 0.05 * abs(x)]
-    return ("the end of what the config allows",) if beyond else ()
+    return (term("the end of what the config allows"),) if beyond else ()
 
 
 # ---- by sampling ----------------------------------------------------------------------------------------------------
@@ -445,7 +446,12 @@ def _by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> 
     if not found:
         limit = curve.simulated(best, count)
         near = limit.lo <= asked.equals <= limit.hi
-        doubt = f"its 95 % interval, {limit.lo:.4g} to {limit.hi:.4g} {asked.unit}, holds the target: -n decides"
+        doubt = tr(
+            "its 95 % interval, {lo:.4g} to {hi:.4g} {unit}, holds the target: -n decides",
+            lo=limit.lo,
+            hi=limit.hi,
+            unit=tr(asked.unit),
+        )
         notes = (doubt,) if near else boundary(asked, curve, best)
         return answer(limit=limit.value, limit_at=best, notes=notes)
     value = nearest([one.value for one in found], asked)

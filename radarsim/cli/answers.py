@@ -4,7 +4,8 @@ import math
 from collections.abc import Hashable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from radarsim.cli.console import say, show
+from radarsim.cli.console import command, field, say, show
+from radarsim.language import term, tr
 from radarsim.report.text import significant_digits
 
 if TYPE_CHECKING:
@@ -22,19 +23,19 @@ def print_answer(answer: "Answer") -> None:
     assert value is not None  # what is not attained is no answer
     assert lo is not None
     assert hi is not None
-    interval = "exact" if answer.exact else f"95 % {_number(lo)} … {_number(hi)}"
+    interval = tr("exact") if answer.exact else f"95 % {_number(lo)} … {_number(hi)}"
     say(f"{answer.key} = {_with_unit(value, answer.unit)}   {interval}")
     attained = math.nan if answer.attained is None else answer.attained
     if abs(attained - answer.equals) < SAME * max(abs(answer.equals), abs(answer.attained_now)):
         attained = answer.equals  # of a root at zero rounding is all that is left
-    say(f"attains  {answer.quantity.words}: {_quantity(answer, attained)}{_now(answer)}")
+    field("attains", f"{answer.quantity.said}: {_quantity(answer, attained)}{_now(answer)}")
     if answer.slope is not None:
-        say(f"slope    {slope(answer)}")
+        field("slope", slope(answer))
     if answer.others:
-        say(f"also at  {', '.join(_with_unit(other, answer.unit) for other in answer.others)}")
+        field("also at", ", ".join(_with_unit(other, answer.unit) for other in answer.others))
     for note in answer.notes:
-        say(f"note     {note}")
-    say(f"check    {answer.command}")
+        field("note", tr(note))
+    command("check", answer.command)
 
 
 def unattained(answer: "Answer") -> list[str]:
@@ -42,13 +43,18 @@ def unattained(answer: "Answer") -> list[str]:
     limit, at = answer.limit, answer.limit_at
     assert limit is not None
     assert at is not None
-    bound = "at most" if limit < answer.equals else "at least"
-    lines = [
-        f"{answer.quantity.words}: {_quantity(answer, answer.equals)} is not attainable by {answer.key} from "
-        f"{_number(answer.low)} to {_with_unit(answer.high, answer.unit)}: {bound} {_quantity(answer, limit)}, at "
-        f"{_with_unit(at, answer.unit)}"
-    ]
-    return [*lines, *(f"note: {note}" for note in answer.notes)]
+    told = {
+        **{"quantity": answer.quantity.said, "key": answer.key, "wanted": _quantity(answer, answer.equals)},
+        **{"low": _number(answer.low), "high": _with_unit(answer.high, answer.unit)},
+        **{"limit": _quantity(answer, limit), "at": _with_unit(at, answer.unit)},
+    }
+    most = limit < answer.equals
+    line = tr(AT_MOST, **told) if most else tr(AT_LEAST, **told)
+    return [line, *(tr("note: {words}", words=tr(note)) for note in answer.notes)]
+
+
+AT_MOST = term("{quantity}: {wanted} is not attainable by {key} from {low} to {high}: at most {limit}, at {at}")
+AT_LEAST = term("{quantity}: {wanted} is not attainable by {key} from {low} to {high}: at least {limit}, at {at}")
 
 
 def print_drawn(drawn: "Drawn") -> None:
@@ -57,9 +63,9 @@ def print_drawn(drawn: "Drawn") -> None:
         say(line)
     kinds = sorted(name for name in drawn.files if name.endswith((".svg", ".png", ".pdf")))
     if kinds:
-        say(f"figures  {drawn.folder} ({', '.join(kinds)})")
-    say(f"table    {drawn.folder / 'chart.csv'}")
-    say(f"page     {drawn.folder / 'chart.html'}")
+        field("figures", f"{drawn.folder} ({', '.join(kinds)})")
+    field("table", str(drawn.folder / "chart.csv"))
+    field("page", str(drawn.folder / "chart.html"))
 
 
 def print_sensitivity(found: "Sensitivity", written: "Sequence[str]") -> None:
@@ -77,13 +83,17 @@ def print_sensitivity(found: "Sensitivity", written: "Sequence[str]") -> None:
         line += [_change(own.get(one), "sigma_change", "percent", "%") for one in filters]
         line += [_change(own.get(one), "gain_change", "points", "") for one in gaining]
         cells.append(line)
-    columns = ["key", "value", *(f"σ of {one}" for one in filters), *(f"gain of {one}, points" for one in gaining)]
-    show(f"{found.stem}: change of {found.leading} {found.at} for +10 %", columns, cells, right=columns[1:])
+    columns = ["key", "value", *(tr("σ of {name}", name=one) for one in filters)]
+    columns += [tr("gain of {name}, points", name=one) for one in gaining]
+    title = tr(
+        "{stem}: change of {component} {when} for +10 %", stem=found.stem, component=found.leading, when=found.at
+    )
+    show(title, columns, cells, right=columns[1:], spare=columns[:1:-1])
     if found.without_effect:
-        say(f"no effect  {', '.join(found.without_effect)}")
+        field("no effect", ", ".join(found.without_effect))
     for key, reason in found.left_out.items():
-        say(f"left out   {key}: {reason}")
-    say(f"files      {', '.join(written)}")
+        field("left out", f"{key}: {reason}")
+    field("files", ", ".join(written))
 
 
 def _change(row: "dict[Hashable, Any] | None", name: str, ending: str, unit: str) -> str:
@@ -104,24 +114,30 @@ def slope(answer: "Answer") -> str:
     step = max(step, 1.0) if float(value).is_integer() and step >= 0.5 else step
     change = per_unit * step
     better = (change > 0) == answer.quantity.of.more_is_better
-    verb = ("brings" if better else "costs") if answer.quantity.of.more_is_better else ("adds", "takes off")[better]
-    unit = "points" if answer.quantity_unit == "%" else answer.quantity_unit
-    return f"{_with_unit(step, answer.unit, PLAIN)} more {verb} {_number(abs(change), '#.3g')} {unit}"
+    size = _number(abs(change), "#.3g")
+    points = tr("{size} points", size=size)
+    changed = points if answer.quantity_unit == "%" else f"{size} {tr(answer.quantity_unit)}"
+    told = {"step": _with_unit(step, answer.unit, PLAIN), "change": changed}
+    if answer.quantity.of.more_is_better:
+        return tr("{step} more brings {change}", **told) if better else tr("{step} more costs {change}", **told)
+    return tr("{step} more takes off {change}", **told) if better else tr("{step} more adds {change}", **told)
 
 
 def _now(answer: "Answer") -> str:
     if math.isnan(answer.attained_now):
         return ""
-    own = "as the config is" if answer.now is None else f"at {_with_unit(answer.now, answer.unit, PLAIN)}"
-    return f" ({own}: {_quantity(answer, answer.attained_now)})"
+    value = _quantity(answer, answer.attained_now)
+    if answer.now is None:
+        return tr(" (as the config is: {value})", value=value)
+    return tr(" (at {at}: {value})", at=_with_unit(answer.now, answer.unit, PLAIN), value=value)
 
 
 def _quantity(answer: "Answer", value: float) -> str:
-    return f"{_number(value, '.4g')} {answer.quantity_unit}"
+    return f"{_number(value, '.4g')} {tr(answer.quantity_unit)}"
 
 
 def _with_unit(value: float, unit: str, form: str = PLAIN) -> str:
-    return f"{_number(value, form)} {unit}".rstrip()
+    return f"{_number(value, form)} {tr(unit)}".rstrip()
 
 
 def _number(value: float, form: str = PLAIN) -> str:

@@ -3,6 +3,7 @@
 import math
 import os
 import re
+import shutil
 import sys
 import textwrap
 import threading
@@ -10,9 +11,11 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TextIO
 
-from radarsim.report.text import clock, known, plural, printable, significant_digits
+from radarsim.language import Term, few, listed, numeral, plural, term, tr
+from radarsim.report.text import clock, known, labelled, printable, significant_digits
+from radarsim.report.text import unit as unit_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,6 +37,23 @@ if TYPE_CHECKING:
 SILENT_S = 0.7  # a run shorter than this shows no progress
 PIPED_WIDTH = 10_000  # whatever reads it wraps it, or not
 ROOMY = 110  # columns of a terminal from which claims are shown with place and config
+COLUMNS = (  # of tables
+    *(term("case"), term("filter"), term("component"), term("at"), term("sigma"), term("exact"), term("gain")),
+    *(term("95 % of gain"), term("of"), term("σ against"), term("change"), term("filters"), term("scans")),
+    *(term("realisations"), term("one thread"), term("known from"), term("last to get there"), term("claim")),
+    *(term("statement"), term("place"), term("measured and expected"), term("class"), term("config"), term("key")),
+    *(term("value"), term("name"), term("what it is"), term("paper and question"), term("study"), term("keys")),
+)
+TITLES = (term("reading"), term("tracking"), term("judging"), term("fitting"))  # of what has no known end
+WHAT = (
+    term("likelihoods"),
+    term("realisations"),
+    term("cases"),
+    term("values"),
+    term("keys"),
+    term("records"),
+    term("rows"),
+)
 MOST_ROWS = 36  # of the last scan's table; of a larger experiment the answer and the files are enough
 
 
@@ -53,7 +73,7 @@ class Progress:
     """
 
     def __init__(self, title: str, quiet: bool, what: str = "realisations"):
-        self.title, self.quiet, self.what = title, quiet, what
+        self.title, self.quiet, self.what = title, quiet, tr(what)
         self.started = time.monotonic()
         self.bar: Bar | None = None
         self.task: TaskID
@@ -87,7 +107,8 @@ class Progress:
         assert self.bar is not None  # it has just begun
         rate = (done - from_store) / elapsed
         left = clock((total - done) / rate) if rate > 0 else "–"
-        told = f"{done / max(total, 1):6.1%}  {rate:,.0f} {self.what}/s  {left} left".replace("%", " %", 1)
+        share, speed = numeral(f"{100 * done / max(total, 1):5.1f}"), numeral(f"{rate:,.0f}")
+        told = tr("{share} %  {rate} {what}/s  {left} left", share=share, rate=speed, what=self.what, left=left)
         self.bar.update(self.task, total=total, completed=done, told=told)
 
     def _begun(self) -> "Bar":
@@ -96,7 +117,7 @@ class Progress:
 
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[told]}"))
         bar = Bar(*columns, console=console(stderr=True), transient=True)
-        self.task = bar.add_task(self.title, total=None, told="begins")
+        self.task = bar.add_task(self.title, total=None, told=tr("begins"))
         bar.start()
         return bar
 
@@ -105,7 +126,7 @@ class Counter:
     """How much is done of what has no known end, on stderr if that is a terminal, once it has lasted two seconds."""
 
     def __init__(self, title: str, what: str):
-        self.title, self.what, self.started = title, what, time.monotonic()
+        self.title, self.what, self.started = tr(title), tr(what), time.monotonic()
         self.status: Status | None = None
 
     def __enter__(self) -> Self:
@@ -123,7 +144,15 @@ class Counter:
         if self.status is None:
             self.status = console(stderr=True).status("")
             self.status.start()
-        self.status.update(f"{self.title}: {done:,} {self.what}, {done / elapsed:,.0f}/s")
+        self.status.update(
+            tr(
+                "{title}: {done:,} {what}, {rate:,.0f}/s",
+                title=self.title,
+                done=done,
+                what=self.what,
+                rate=done / elapsed,
+            )
+        )
 
 
 def show(
@@ -140,11 +169,12 @@ def show(
 
     screen = console()
     cells = [["\n".join(map(printable, str(cell).split("\n"))) for cell in row] for row in rows]
-    shown = fitting(columns, cells, spare, screen.width)
+    shown = fitting(columns, cells, spare, screen.width, [tr(name) for name in columns])
     terminal = sys.stdout.isatty()
-    table = Table(title=title or None, title_justify="left", box=box.SIMPLE_HEAD if terminal else None, pad_edge=False)
+    style: dict[str, Any] = {"box": box.SIMPLE_HEAD, "padding": (0, 1, 0, 0)} if terminal else {"box": None}
+    table = Table(title=title or None, title_justify="left", pad_edge=False, **style)
     for i in shown:
-        table.add_column(columns[i], justify="right" if columns[i] in right else "left", no_wrap=not terminal)
+        table.add_column(tr(columns[i]), justify="right" if columns[i] in right else "left", no_wrap=not terminal)
     for row in cells:
         table.add_row(*(Text(row[i]) for i in shown))
     with screen.capture() as captured:
@@ -152,14 +182,21 @@ def show(
     for line in captured.get().rstrip("\n").split("\n"):
         sys.stdout.write(line.rstrip() + "\n")
     if missing := [columns[i] for i in range(len(columns)) if i not in shown]:
-        say(f"         left out at {screen.width} columns: {', '.join(missing)}")
+        said = ", ".join(map(tr, missing))
+        field("", tr("left out at {width} columns: {columns}", width=screen.width, columns=said))
 
 
-def fitting(columns: Sequence[str], cells: Sequence[Sequence[str]], spare: Sequence[str], width: int) -> list[int]:
-    """The places of the columns that fit into a width, the spare ones left out one by one."""
+def fitting(
+    columns: Sequence[str],
+    cells: Sequence[Sequence[str]],
+    spare: Sequence[str],
+    width: int,
+    heads: Sequence[str] | None = None,
+) -> list[int]:
+    """The places of the columns that fit into a width, the spare ones left out one by one; heads: as they are shown."""
     wide = [
         max(len(line) for text in (name, *(row[i] for row in cells)) for line in text.split("\n"))
-        for i, name in enumerate(columns)
+        for i, name in enumerate(heads or columns)
     ]
     places, leave = list(range(len(columns))), list(spare)
     while leave and sum(wide[i] + 2 for i in places) > width:
@@ -169,14 +206,28 @@ def fitting(columns: Sequence[str], cells: Sequence[Sequence[str]], spare: Seque
 
 def say(line: str) -> None:
     """Print one line: to a terminal in as many as its width takes, broken between words; else never broken."""
-    text = printable(line)
-    for part in wrapped(text, console().width) if sys.stdout.isatty() else [text]:
+    for part in broken(printable(line), sys.stdout):
         sys.stdout.write(part + "\n")
+
+
+def command(label: str, text: str) -> None:
+    """Print a command under a label, in one line, however long, so that it can be copied."""
+    sys.stdout.write(printable(labelled(label, text)) + "\n")
+
+
+def broken(text: str, stream: TextIO) -> list[str]:
+    """A line as a stream takes it: of a terminal in as many lines as its width asks for; else whole."""
+    return wrapped(text, shutil.get_terminal_size().columns) if stream.isatty() else [text]
+
+
+def field(label: str, text: str) -> None:
+    """Print a line under a label; without one it stands under the line before."""
+    say(labelled(label, text))
 
 
 def wrapped(line: str, width: int) -> list[str]:
     """A line broken between words, a unit kept with its number; what follows stands under its first words."""
-    label = re.match(r"\S* {2,}|", line)
+    label = re.match(r"(\S+( \S+)?)? {2,}|", line)
     indent = " " * len(label[0]) if label and len(label[0]) < width // 2 else ""
     kept = re.sub(r"(?<=\d) (?=(%|°|m|s|km|Hz|rad|m/s²?|rad/s²?)(\W|$))", "\N{NO-BREAK SPACE}", line)
     broken = textwrap.wrap(
@@ -195,26 +246,29 @@ def print_result(result: "Result") -> None:
     verdicts = result.verdicts()
     if verdicts:
         for verdict, names in verdicts.items():
-            say(f"claims   {len(names)} {verdict}: {', '.join(names)}")
+            field("claims", tr("{count} {kind}: {names}", count=len(names), kind=Term(verdict), names=", ".join(names)))
         for reason, names in result.unjudged().items():
-            say(f"         not judged: {', '.join(names)}: {reason}")
-        say(f"         `radarsim claims {result.experiment.stem}` says what each of them is")
+            field("", tr("not judged: {names}: {reason}", names=", ".join(names), reason=reason))
+        field("", tr("`radarsim claims {stem}` says what each of them is", stem=result.experiment.stem))
     drawn = [Path(name) for name in written.files if name.startswith("figures/") and not name.endswith(".md")]
-    say(f"tables   {written.folder / 'curves.csv'} and {sum(n.endswith('.csv') for n in written.files) - 1} more there")
+    others = sum(name.endswith(".csv") for name in written.files) - 1
+    field("tables", tr("{file} and {count} more there", file=str(written.folder / "curves.csv"), count=others))
     if drawn:
-        kinds = " and ".join(sorted({path.suffix[1:].upper() for path in drawn}, reverse=True))
-        say(f"figures  {written.folder / 'figures'} ({len({path.stem for path in drawn})}, each as {kinds})")
-    say(f"report   {written.folder / 'report.html'}")
+        kinds = listed(sorted({path.suffix[1:].upper() for path in drawn}, reverse=True))
+        told = {"folder": str(written.folder / "figures"), "count": len({path.stem for path in drawn}), "kinds": kinds}
+        field("figures", tr("{folder} ({count}, each as {kinds})", **told))
+    field("report", str(written.folder / "report.html"))
     if written.removed:
-        more = f" and {len(written.removed) - 3} more" if len(written.removed) > 3 else ""
-        say(f"removed  of an earlier run, not made by this one: {', '.join(written.removed[:3])}{more}")
+        gone = few(written.removed, 3)
+        field("removed", tr("of an earlier run, not made by this one: {names}", names=gone))
     print_warnings(result.warnings)
 
 
 def print_warnings(warnings: Iterable[str]) -> None:
     """One line each, on the error stream."""
     for warning in warnings:
-        sys.stderr.write(f"warning: {printable(warning)}\n")
+        for part in broken(tr("warning: {words}", words=printable(warning)), sys.stderr):
+            sys.stderr.write(part + "\n")
 
 
 def show_last_scan(last: "pd.DataFrame") -> None:
@@ -224,8 +278,8 @@ def show_last_scan(last: "pd.DataFrame") -> None:
     found: Iterable[Any] = last.itertuples()  # named by column, which pandas' stubs do not know
     rows = [
         (
-            *(row.case, row.filter, row.component, f"{row.t_s:g} s"),
-            f"{significant_digits(row.sigma)} {row.unit.replace('s2', 's²')}",
+            *(row.case, row.filter, row.component, tr("{t_s:g} s", t_s=row.t_s)),
+            f"{significant_digits(row.sigma)} {tr(unit_of(row.unit))}",
             f"{significant_digits(row.sigma_lo)} … {significant_digits(row.sigma_hi)}" + too_narrow(row),
             known(row.exact_sigma),
             known(row.gain_percent, ".2f", " %"),
@@ -244,8 +298,8 @@ def print_comparison(compared: "Compared") -> None:
     rows = [
         (
             f"{row['label']}, {row['filter']}",
-            *(row["component"] or str(row["model"]), f"{row['t_s']:g} s"),
-            *(f"{words.value(row[key])} {row['unit'].replace('s2', 's²')}" for key in ("value", "against")),
+            *(row["component"] or str(row["model"]), tr("{t_s:g} s", t_s=row["t_s"])),
+            *(f"{words.value(row[key])} {tr(unit_of(row['unit']))}" for key in ("value", "against")),
             words.change(row),
         )
         for row in compared.last
@@ -253,16 +307,23 @@ def print_comparison(compared: "Compared") -> None:
     ]
     if len(rows) <= MOST_ROWS:
         against = {row["against_label"] for row in compared.last}
-        columns = ("", "of", "at", "σ", f"σ of {against.pop()}" if len(against) == 1 else "σ against", "change")
+        columns = (
+            "",
+            "of",
+            "at",
+            "σ",
+            tr("σ of {name}", name=against.pop()) if len(against) == 1 else "σ against",
+            "change",
+        )
         show("", columns, rows, right=columns[2:5], spare=("at",))
     for line in compared.sentences if len(rows) > MOST_ROWS else ():
         say(line)
     for line in compared.notes:
-        say(f"note     {line}")
-    say(f"table    {compared.folder / 'comparison.csv'}")
+        field("note", line)
+    field("table", str(compared.folder / "comparison.csv"))
     if drawn := {Path(name).stem for name in compared.files if name.startswith("figures/")}:
-        say(f"figures  {compared.folder / 'figures'} ({len(drawn)})")
-    say(f"page     {compared.folder / 'compare.html'}")
+        field("figures", f"{compared.folder / 'figures'} ({len(drawn)})")
+    field("page", str(compared.folder / "compare.html"))
     print_warnings(compared.warnings)
 
 
@@ -270,28 +331,44 @@ def too_narrow(row: Any) -> str:
     """A mark behind an interval, of a row of curves, that rests, there or nearby, on too few effective realisations."""
     from radarsim.report import notes
 
-    marks = {notes.THIN: f" ({row.n_eff:.0f} effective)", notes.NEAR: " (heavy tails)", notes.UNSEEN: " (heavy tails)"}
+    tails = tr(" (heavy tails)")
+    marks = {notes.THIN: tr(" ({n_eff:.0f} effective)", n_eff=row.n_eff), notes.NEAR: tails, notes.UNSEEN: tails}
     return marks.get(getattr(row, "note", ""), "")
 
 
 def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
     """What a run would do."""
-    say(f"{experiment.path or experiment.stem}: valid")
+    say(tr("{config}: valid", config=str(experiment.path or experiment.stem)))
     rows = [
-        (case.name, case.filters, f"{case.scans}", f"{case.realisations:,}", f"{case.seconds:.3g} s")
+        (
+            case.name,
+            case.filters,
+            str(case.scans),
+            numeral(f"{case.realisations:,}"),
+            tr("{t_s:.3g} s", t_s=case.seconds),
+        )
         for case in outlook.cases
     ]
     columns = ("case", "filters", "scans", "realisations", "one thread")
-    show("", columns, rows, right=columns[2:])
+    show("", columns, rows, right=columns[2:], spare=("scans",))
     if outlook.precision is not None:
         print_needs(experiment, outlook)
-    seconds = "under a second" if outlook.seconds < 1 else "about " + clock(outlook.seconds)
-    realisations = sum(case.realisations for case in outlook.cases)
-    say(
-        f"total    {plural(len(outlook.cases), 'case')}, {realisations:,} realisation{'s' * (realisations != 1)}, "
-        f"{seconds} on {plural(outlook.threads, 'thread')}, {outlook.memory_mb:.0f} MB; "
-        "figures and tables take some seconds more"
+    short = outlook.seconds < 1
+    seconds = tr("under a second") if short else tr("about {time}", time=clock(outlook.seconds))
+    told = {
+        "cases": counted_cases(len(outlook.cases)),
+        "realisations": plural(
+            "{count:,} realisation", "{count:,} realisations", sum(case.realisations for case in outlook.cases)
+        ),
+        "threads": plural("{count} thread", "{count} threads", outlook.threads),
+    }
+    words = tr(
+        "{cases}, {realisations}, {seconds} on {threads}, {memory:.0f} MB; figures and tables take some seconds more",
+        **told,
+        seconds=seconds,
+        memory=outlook.memory_mb,
     )
+    field("total", words)
     print_warnings(outlook.warnings)
 
 
@@ -300,59 +377,90 @@ def print_needs(experiment: "Experiment", outlook: "Outlook") -> None:
     asked = {case.name: case.realisations for case in experiment.cases}
     needs = {case.name: need for case in outlook.cases if (need := case.controlled or case.need) is not None}
     ways = [("", case.need, case.seconds_plain, case.name) for case in outlook.cases]
-    ways += [(", control variate", case.controlled, case.seconds_controlled, case.name) for case in outlook.cases]
+    ways += [(tr(", control variate"), case.controlled, case.seconds_controlled, case.name) for case in outlook.cases]
     rows = [
         (
             f"{name}{way}",
-            "out of reach" if need.realisations is None else f"{need.realisations:,}",
-            f"{seconds or 0:.3g} s",
+            tr("out of reach") if need.realisations is None else numeral(f"{need.realisations:,}"),
+            tr("{t_s:.3g} s", t_s=float(seconds or 0)),
             need.known_by,
             need.last,
         )
         for way, need, seconds, name in ways
         if need is not None
     ]
-    unit = "points" if outlook.of == "gain" else "%"
-    columns = ("case", f"for ± {outlook.precision:g} {unit}", "one thread", "known from", "last to get there")
+    unit = tr("points") if outlook.of == "gain" else "%"
+    wanted = tr("for ± {percent:g} {unit}", percent=outlook.precision, unit=unit)
+    columns = ("case", wanted, "one thread", "known from", "last to get there")
     show("", columns, rows, right=columns[1:3], spare=columns[4:])
     short = [name for name, need in needs.items() if need.realisations is None or need.realisations > asked[name]]
     if short:
         most = max((need.realisations or math.inf) for need in needs.values())
-        cure = f"; -n {most} would do" if math.isfinite(most) else ""
-        say(f"precision not within reach of {plural(len(short), 'case')}: {', '.join(short[:3])}{cure}")
+        cure = tr("; -n {most} would do", most=str(most)) if math.isfinite(most) else ""
+        cases = counted_cases(len(short))
+        say(
+            tr(
+                "precision not within reach of {cases}: {names}{cure}",
+                cases=cases,
+                names=", ".join(short[:3]),
+                cure=cure,
+            )
+        )
 
 
 def print_share(share: "Shares", out: str | os.PathLike[str]) -> None:
     """What was done of a share of an experiment, and what to do with it."""
     done = sum(one.done for one in share.cases.values())
     held = sum(one.from_store for one in share.cases.values())
-    say(f"share    {share.number} of {share.of} of {share.config}: {done:,} realisations, {held:,} were stored before")
-    say(f"blocks   {Path(out) / '.blocks'}; copy all shares into one, and `radarsim run` finds them")
+    told = {"number": share.number, "of": share.of, "config": share.config, "done": done, "held": held}
+    field("share", tr("{number} of {of} of {config}: {done:,} realisations, {held:,} were stored before", **told))
+    folder = str(Path(out) / ".blocks")
+    field("blocks", tr("{folder}; copy all shares into one, and `radarsim run` finds them", folder=folder))
     print_warnings(share.warnings)
+
+
+def counted_cases(count: int) -> str:
+    """1 case, 2 cases."""
+    return plural("{count} case", "{count} cases", count)
 
 
 def print_facts(facts: Mapping[str, str]) -> None:
     """Labels and their facts, a line each."""
-    width = max(map(len, facts))
+    width = max(len(tr(label)) for label in facts)
     for label, fact in facts.items():
-        say(f"{label:<{width}}  {fact}")
+        say(f"{tr(label):<{width}}  {fact}")
 
 
 def print_inspection(found: "Inspection") -> None:
     """What an inspection of a result found; its faults are reported as errors."""
-    say(f"{found.folder}: {plural(found.outputs, 'output')} and {plural(found.pieces, 'stored piece')} checked")
+    outputs = plural("{count} output", "{count} outputs", found.outputs)
+    pieces = plural("{count} stored piece", "{count} stored pieces", found.pieces)
+    say(tr("{folder}: {outputs} and {pieces} checked", folder=str(found.folder), outputs=outputs, pieces=pieces))
     if found.recomputed:
-        pieces = plural(len(found.recomputed), "piece")
-        say(f"computed again: {pieces}, {found.realisations:,} realisations")
+        pieces = plural("{count} piece", "{count} pieces", len(found.recomputed))
+        say(tr("computed again: {pieces}, {count:,} realisations", pieces=pieces, count=found.realisations))
     for note in found.notes:
-        say(f"note: {note}")
-    say("all whole" if not found.faults else f"{plural(len(found.faults), 'fault')} found")
+        say(tr("note: {words}", words=note))
+    say(
+        tr("all whole")
+        if not found.faults
+        else plural("{count} fault found", "{count} faults found", len(found.faults))
+    )
 
 
 def print_cleaned(cleaned: "Cleaned", dry_run: bool) -> None:
     """How much was dropped, or would be."""
-    what = f"{plural(cleaned.files, 'file')} of {plural(cleaned.identities, 'case')}, {cleaned.size / 1e6:.1f} MB"
-    say(f"{'would drop' if dry_run else 'dropped'} {what} in {cleaned.path}")
+    told = {
+        "files": plural("{count} file", "{count} files", cleaned.files),
+        "cases": counted_cases(cleaned.identities),
+        "size": cleaned.size / 1e6,
+        "folder": str(cleaned.path),
+    }
+    would, done = tr("would drop {files} of {cases}, {size:.1f} MB in {folder}", **told), tr(DROPPED, **told)
+    say(would if dry_run else done)
+
+
+DROPPED = term("dropped {files} of {cases}, {size:.1f} MB in {folder}")
 
 
 def print_claims(rows: Sequence[dict[str, Any]]) -> None:
@@ -367,25 +475,35 @@ def print_claims(rows: Sequence[dict[str, Any]]) -> None:
         for own in page.grouped(rows):
             first, done = own[0], own[0]["class"] != "not run"
             measured = "\n".join(map(_measured, own)) if done else f"radarsim run {first['config']}"
-            said = first["statement"] + (f"\n«{first['original']}»" if first["original"] else "")
-            cells.append((first["claim"], said, first["place"], measured, page.verdict_of(own), first["config"]))
+            said = tr(first["statement"]) + (f"\n«{first['original']}»" if first["original"] else "")
+            verdict = page.verdict_of(own).replace("*", "")
+            cells.append((first["claim"], said, tr(first["place"]), measured, verdict, first["config"]))
         columns = ("claim", "statement", "place", "measured and expected", "class", "config")
         show("", columns, cells, spare=() if console().width >= ROOMY else ("place", "config"))
     else:
         for own in page.grouped(rows):
             _print_claim(own)
-    say(page.counted(rows) or "no claims are judged by this")
+    say(page.counted(rows) or tr("no claims are judged by this"))
     if rows and all(row["class"] == "not run" for row in rows):
-        say("nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has the results at full size")
+        say(tr(NOTHING_RUN))
+
+
+NOTHING_RUN = term(
+    "nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has the results at full size"
+)
 
 
 def _measured(row: Mapping[str, Any]) -> str:
     """What was measured for a part of a claim: its name, its value, what was expected."""
     from radarsim.report.claims import page
 
-    name = f"{row['case']}: {row['what']}" if row["case"] else str(row["what"])
-    expected = f"; expected {row['expected']}" if row["expected"] else ""
-    return f"{name}: {page.shown(row)}{expected}"
+    expected = tr("; expected {words}", words=page.expected(row["expected"])) if row["expected"] else ""
+    return f"{_named(row)}: {page.shown(row)}{expected}"
+
+
+def _named(row: Mapping[str, Any]) -> str:
+    """What a part of a claim measures, in which case."""
+    return ": ".join(filter(None, (str(row["case"]), tr(str(row["what"])))))
 
 
 def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
@@ -394,39 +512,44 @@ def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
 
     first = parts[0]
     verdict = page.verdict_of(parts).replace("*", "")
-    say(f"{first['claim']:<6} {verdict:<20} {first['statement']}  [{first['paper']}, {first['place']}]")
+    place = f"{tr(first['paper'])}, {tr(first['place'])}"
+    say(f"{first['claim']:<6} {verdict:<20} {tr(first['statement'])}  [{place}]")
     if first["original"]:
         say(f"       «{first['original']}»")
     if first["class"] == "not run":
         say(f"       radarsim run {first['config']}")
         return
     for row in parts:
-        said = [f"{row['case']}: {row['what']}" if row["case"] else str(row["what"])]
+        said = [_named(row)]
         if page.number(row["measured"]) is not None:
-            said.append(f"{page.measured(row)}; expected {row['expected']}")
+            said.append(page.measured(row) + tr("; expected {words}", words=page.expected(row["expected"])))
         if (exact := page.number(row["exact"])) is not None:
-            said.append(f"exactly {page.plain(exact)}")
+            said.append(tr("exactly {value}", value=page.plain(exact)))
         if (missed := page.number(row["miss"])) is not None and missed:
-            said.append(f"misses by {missed:.3g} margins")
+            said.append(tr("misses by {miss:.3g} margins", miss=missed))
         if row["verdict"] == "not judged here":
-            said.append(str(row["why"]))
-        say(f"       {row['verdict']:<20} {'; '.join(said)}")
+            said.append(tr(str(row["why"])))
+        say(f"       {tr(row['verdict']):<20} {'; '.join(said)}")
 
 
 def print_readings(done: "Done", detailed: bool) -> None:
     """A line a claim, of single claims a line a reading too, and what the joint search came to."""
+    from radarsim.report.claims import page
+
     for read in done.read:
         for over in read.over:
             if detailed:
                 for one in over.under:
-                    outcome = one.outcome.kind if one.outcome else f"not possible: {one.why}"
+                    outcome = tr(one.outcome.kind) if one.outcome else tr("not possible: {why}", why=one.why)
                     say(f"       {one.kind}  {outcome:<24} {one.name}")
             found = over.outcome
-            say(f"{over.claim.id:<6} {found.words if found else 'not judged':<24} {over.sentence()}")
+            words = page.class_words(found.words) if found else tr("not judged")
+            say(f"{over.claim.id:<6} {words:<24} {over.sentence()}")
         if read.counted is not None:
             say(f"{read.paper.readings.paper}: {read.counted.sentence()}")
     if done.files:
-        say(f"table    {done.folder / 'readings.csv'}; curves: {plural(len(done.files) - 1, 'figure')} drawn again")
+        drawn = plural("{count} figure drawn again", "{count} figures drawn again", len(done.files) - 1)
+        field("table", tr("{file}; curves: {drawn}", file=str(done.folder / "readings.csv"), drawn=drawn))
 
 
 def print_inventory(inventory: "Inventory") -> None:
@@ -434,4 +557,4 @@ def print_inventory(inventory: "Inventory") -> None:
     for n, (title, columns, rows) in enumerate(reversed(inventory)):
         if n:
             say("")
-        show(title, columns, rows)
+        show(tr(title), columns, [tuple(tr(cell) for cell in row) for row in rows])

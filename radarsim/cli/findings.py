@@ -2,12 +2,14 @@
 
 import sys
 from collections.abc import Iterable, Sequence
+from typing import TextIO
 
+from radarsim.language import plural, tr
 from radarsim.recorded import accuracy, fit, words
 from radarsim.recorded.advice import Advice
 from radarsim.recorded.fit import Fit
 from radarsim.recorded.follow import Followed
-from radarsim.report.text import plural, printable, significant_digits
+from radarsim.report.text import interval, labelled, printable, significant_digits
 
 
 def echo(rows: Iterable[Sequence[str]]) -> None:
@@ -21,24 +23,45 @@ def report(followed: Followed, judged: Sequence[accuracy.Judged], advised: Advic
     """Print what was found; to stderr where the track itself goes to stdout. advised: where a likelihood is known."""
     stream = sys.stderr if stderr else sys.stdout
     for line in words.sentences(followed, judged, advised):
-        stream.write(printable(line) + "\n")
+        write(stream, line)
+
+
+def write(stream: TextIO, line: str) -> None:
+    """A line, to a terminal broken between words."""
+    from radarsim.cli.console import broken
+
+    for part in broken(printable(line), stream):
+        stream.write(part + "\n")
 
 
 def report_fit(found: Fit) -> None:
     """Print what was fitted, and the options that put it into the config."""
-    lines = [f"plots    {plural(found.rows, 'row')} of {plural(found.tracks, 'track')}; filter {found.filter}"]
+    tracks = plural("{count} track", "{count} tracks", found.tracks)
+    told = tr("{rows} of {tracks}; filter {filter}", rows=words.counted(found.rows), tracks=tracks, filter=found.filter)
+    lines = [labelled("plots", told)]
     for one in found.keys:
         value, stated = significant_digits(one.value), significant_digits(one.stated)
-        lo, hi = significant_digits(one.lo), "no upper end" if one.hi == float("inf") else significant_digits(one.hi)
-        doubt = (
-            "" if one.identifiable else "; the plots do not tell it from " + ("zero" if one.lo == 0 else "larger ones")
+        lo, hi = (
+            significant_digits(one.lo),
+            tr("no upper end") if one.hi == float("inf") else significant_digits(one.hi),
         )
-        lines.append(f"{one.key}: {value} [{lo}, {hi}], stated {stated}{doubt}")
+        least = one.lo == 0
+        doubt = (
+            tr("; the plots do not tell it from zero") if least else tr("; the plots do not tell it from larger ones")
+        )
+        line = tr(
+            "{key}: {value} {interval}, stated {stated}",
+            key=one.key,
+            value=value,
+            interval=interval(lo, hi),
+            stated=stated,
+        )
+        lines.append(line + ("" if one.identifiable else doubt))
     if found.outliers is not None:
-        lines.append(f"outliers: {significant_digits(100 * found.outliers, '#.2g')} % of the plots")
+        lines.append(tr("outliers: {share} % of the plots", share=significant_digits(100 * found.outliers, "#.2g")))
     settings = " ".join(f"--set {key}={value:g}" for key, value in fit.settings(found).items())
-    lines.append(f"         the stated values are less likely by a factor of exp({found.gain:.1f})")
+    lines.append(labelled("", tr("the stated values are less likely by a factor of exp({gain:.1f})", gain=found.gain)))
     if settings:
-        lines.append(f"         to use what the plots tell: {settings}")
+        lines.append(labelled("", tr("to use what the plots tell: {settings}", settings=settings)))
     for line in lines:
-        sys.stdout.write(printable(line) + "\n")
+        write(sys.stdout, line)

@@ -101,8 +101,11 @@ def stoppable() -> Iterator[None]:
 
 def fail(error: RadarsimError) -> NoReturn:
     """Report a fault, a line each, and leave with its exit code."""
+    from radarsim.cli.console import broken
+
     for line in dict.fromkeys(error.lines):
-        click.echo(line, err=True)
+        for part in broken(line, sys.stderr):
+            click.echo(part, err=True)
     if isinstance(error, Interrupted):
         # The interpreter's orderly end takes most of a second, which whoever sent the signal need not wait for.
         os._exit(error.exit_code)

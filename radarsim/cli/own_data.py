@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 import click
 
 from radarsim.cli.group import Count, completed, config_argument, main, set_option
+from radarsim.language import plural, tr
+from radarsim.report.text import labelled
 
 if TYPE_CHECKING:
     from typing import Any
@@ -34,10 +36,11 @@ def new(name: str, like: str) -> None:
       radarsim new mine --like rls2
     """
     from radarsim.app import configs
+    from radarsim.cli import console
 
     path = configs.new(name, like)
-    click.echo(f"config   {path}")
-    click.echo(f"         change its numbers, then `radarsim check {path}` and `radarsim run {path}`")
+    console.field("config", str(path))
+    console.field("", tr("change its numbers, then `radarsim check {path}` and `radarsim run {path}`", path=str(path)))
 
 
 @main.command(name="new-study")
@@ -56,10 +59,12 @@ def new_study(name: str) -> None:
       radarsim run my_paper
     """
     from radarsim.app.new_study import new_study as write
+    from radarsim.cli import console
 
     path = write(name)
-    click.echo(f"package  {path}")
-    click.echo(f"         `pip install -e {path}`, then `radarsim run {name}`; {path / 'README.md'} says what is where")
+    console.field("package", str(path))
+    told = {"path": str(path), "name": name, "readme": str(path / "README.md")}
+    console.field("", tr("`pip install -e {path}`, then `radarsim run {name}`; {readme} says what is where", **told))
 
 
 @main.command()
@@ -87,7 +92,8 @@ def simulate(config: str, output: str, realisation: int, overrides: tuple[str, .
     columns = recorded.simulated(loaded, realisation)
     plots.write_columns(columns, output, loaded.path)
     count = len(next(iter(columns.values())))
-    click.echo(f"plots    {output} ({count} rows: {', '.join(columns)})")
+    rows = plural("{count} row", "{count} rows", count)
+    console.field("plots", f"{output} ({rows}: {', '.join(columns)})")
     console.print_warnings(experiment.cache_troubles())
 
 
@@ -144,7 +150,6 @@ def import_(
     """
     from radarsim.cli import console
     from radarsim.recorded.formats import importing, site
-    from radarsim.report.text import plural
 
     options = importing.Options(
         kind,
@@ -159,8 +164,11 @@ def import_(
     with console.Counter("reading", "records") as counter:
         done = importing.import_recording(recording, output, options, counter.update)
     count = len([name for name in done.tracks if name])
-    click.echo(f"plots    {output} ({plural(done.rows, 'row')} of {plural(count, 'track')}: {', '.join(done.columns)})")
-    click.echo(f"         {done.format}, {plural(done.records, 'record')} read")
+    rows, of = plural("{count} row", "{count} rows", done.rows), plural("{count} track", "{count} tracks", count)
+    told = {"file": output, "rows": rows, "tracks": of, "columns": ", ".join(done.columns)}
+    console.field("plots", tr("{file} ({rows} of {tracks}: {columns})", **told))
+    records = plural("{count} record read", "{count} records read", done.records)
+    console.field("", f"{done.format}, {records}")
     for line in (*(f"{what} left out" for what in done.skipped), *done.notes):
         click.echo(f"         {line}", err=True)
 
@@ -239,12 +247,12 @@ def track(
     if not quiet:
         findings.report(followed, judged, advised, stderr=output is None)
     if output:
-        click.echo(f"track    {output}")
+        console.field("track", output)
     if drawn:
-        click.echo(f"figures  {figures} ({', '.join(drawn)})")
+        console.field("figures", f"{figures} ({', '.join(drawn)})")
     if folder:
         page.write(followed, loaded, plots, judged, advised, folder, sources)
-        click.echo(f"report   {Path(folder) / page.NAME}", err=output is None)
+        click.echo(labelled("report", str(Path(folder) / page.NAME)), err=output is None)
     console.print_warnings(experiment.cache_troubles())
 
 
@@ -286,4 +294,4 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: "Any") -
     if options["write"]:
         path = Path(options["write"])
         made = configs.new(path.name, loaded.path or config, path.parent, fitting.settings(found))
-        click.echo(f"config   {made}", err=options["as_json"])
+        click.echo(labelled("config", str(made)), err=options["as_json"])

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 
+from radarsim.language import numeral, plural, term, tr
 from radarsim.recorded import accuracy, advice
 from radarsim.recorded.advice import Advice, Finding
 from radarsim.recorded.follow import Followed
-from radarsim.report.text import plural, significant_digits
+from radarsim.report.text import labelled, significant_digits, unit
 
 CLEAR = 3.0  # of the logarithm of a likelihood, twenty times: from there on one filter is clearly the best
 
@@ -24,46 +25,76 @@ def verdict(judged: Sequence[accuracy.Judged], advised: Advice | None) -> list[s
 def rows(followed: Followed) -> list[str]:
     """How many rows and tracks there are, over what time, what is missing, and the gaps."""
     span = followed.last_s - followed.first_s
-    lines = [f"plots    {plural(followed.rows, 'row')} over {span:g} s, from {followed.first_s:g} s"]
+    told = {"rows": counted(followed.rows), "span": span, "first": followed.first_s}
+    lines = [labelled("plots", tr("{rows} over {span:g} s, from {first:g} s", **told))]
     if followed.tracks:
-        longest_rows = max(one.rows for one in followed.tracks.values())
-        lines.append(f"tracks   {len(followed.tracks)}, the longest of {plural(longest_rows, 'row')}")
+        longest = counted(max(one.rows for one in followed.tracks.values()))
+        lines.append(labelled("tracks", tr("{count}, the longest of {rows}", count=len(followed.tracks), rows=longest)))
     if followed.passed_over:
-        lines.append(f"passed   {plural(followed.passed_over, 'row')} of no track")
-    missing = ", ".join(f"{count} of {name}" for name, count in followed.missing.items() if count)
+        lines.append(labelled("passed", tr("{rows} of no track", rows=counted(followed.passed_over))))
+    missing = [tr("{count} of {name}", count=count, name=name) for name, count in followed.missing.items() if count]
     if missing:
-        lines.append(f"missing  {missing}")
+        lines.append(labelled("missing", ", ".join(missing)))
     if followed.silent:
-        lines.append(f"no rows  {', '.join(followed.silent)}: never an estimate from these plots")
+        names = ", ".join(followed.silent)
+        lines.append(labelled("no rows", tr("{names}: never an estimate from these plots", names=names)))
     if followed.gaps:
-        longest = f"the longest {followed.longest_gap_s:g} s, after {followed.longest_gap_at_s:g} s"
-        lines.append(
-            f"gaps     {followed.gaps} of over three times the usual interval, {followed.median_s:g} s; {longest}"
+        words = tr(
+            "{count} of over three times the usual interval, {usual:g} s; the longest {longest:g} s, after {at:g} s",
+            count=followed.gaps,
+            usual=followed.median_s,
+            longest=followed.longest_gap_s,
+            at=followed.longest_gap_at_s,
         )
+        lines.append(labelled("gaps", words))
     return lines
+
+
+def counted(rows: int) -> str:
+    """1 row, 2 rows."""
+    return plural("{count} row", "{count} rows", rows)
 
 
 def errors(followed: Followed) -> list[str]:
     """What the filters missed the truth by, where the file has it."""
     return [
-        f"{one.filter}, {one.component}: error against the truth {significant_digits(one.rms)} {one.unit} RMS, "
-        f"{significant_digits(one.ratio, '#.3g')} of what the filter believes ({one.count} estimates)"
+        plural(
+            "{filter}, {component}: error against the truth {rms} {unit} RMS, {ratio} of what the filter believes "
+            "({count} estimate)",
+            "{filter}, {component}: error against the truth {rms} {unit} RMS, {ratio} of what the filter believes "
+            "({count} estimates)",
+            one.count,
+            filter=one.filter,
+            component=one.component,
+            rms=significant_digits(one.rms),
+            unit=tr(unit(one.unit)),
+            ratio=significant_digits(one.ratio, "#.3g"),
+        )
         for one in followed.errors.values()
         if one.count
     ]
 
 
+FINDINGS = {
+    accuracy.FITS: term("the stated σ fits"),
+    accuracy.SMALL: term("the stated σ is too small, or the target manoeuvres harder than the filter allows"),
+    accuracy.LARGE: term("the stated σ is too large, or the filter allows for harder manoeuvres than there are"),
+    accuracy.UNKNOWN: term("too few plots to decide"),
+}
+
+
 def tested(one: accuracy.Judged, cured: bool) -> str:
     """One test; cured: with the σ under which it would be passed, where it is not."""
-    finding = {
-        accuracy.FITS: "the stated σ fits",
-        accuracy.SMALL: "the stated σ is too small, or the target manoeuvres harder than the filter allows",
-        accuracy.LARGE: "the stated σ is too large, or the filter allows for harder manoeuvres than there are",
-        accuracy.UNKNOWN: "too few plots to decide",
-    }[one.verdict]
-    bounds = f"NIS {one.nis:.3g} of {plural(one.tests, 'plot')}, 95 % of right filters [{one.lo:.3g}, {one.hi:.3g}]"
-    better = ", ".join(f"{key} {value:.4g}" for key, value in one.better.items())
-    return f"{one.filter}, {one.name}: {bounds}: {finding}" + (f"; {better} would" if better and cured else "")
+    bounds = tr(
+        "NIS {nis:.3g} of {plots}, 95 % of right filters [{lo:.3g}, {hi:.3g}]",
+        nis=one.nis,
+        plots=plural("{count} plot", "{count} plots", one.tests),
+        lo=one.lo,
+        hi=one.hi,
+    )
+    better = ", ".join(f"{key} {numeral(f'{value:.4g}')}" for key, value in one.better.items())
+    cure = tr("; {better} would", better=better) if better and cured else ""
+    return f"{one.filter}, {one.name}: {bounds}: {tr(FINDINGS[one.verdict])}{cure}"
 
 
 def nearest(judged: Sequence[accuracy.Judged]) -> list[str]:
@@ -72,14 +103,16 @@ def nearest(judged: Sequence[accuracy.Judged]) -> list[str]:
     for one in judged:
         verdicts.setdefault(one.filter, set()).add(one.verdict)
     if fitting := [name for name, found in verdicts.items() if found == {accuracy.FITS}]:
-        return [f"         {', '.join(fitting)}: all tests fit"] if len(fitting) < len(verdicts) else []
+        words = tr("{names}: all tests fit", names=", ".join(fitting))
+        return [labelled("", words)] if len(fitting) < len(verdicts) else []
     wrong = [one for one in judged if one.better]
     if not wrong or len({one.filter for one in wrong}) < 2:
         return []
     best = min((one for one in wrong), key=lambda one: abs(one.nis - 1))
     own = {key: value for one in wrong if one.filter == best.filter for key, value in one.better.items()}
     settings = " ".join(f"--set {key}={value:.4g}" for key, value in own.items())
-    return [f"         nearest is {best.filter}; with its better values: {settings}"]
+    words = tr("nearest is {filter}; with its better values: {settings}", filter=best.filter, settings=settings)
+    return [labelled("", words)]
 
 
 def likely(advised: Advice) -> list[str]:
@@ -87,20 +120,32 @@ def likely(advised: Advice) -> list[str]:
     compared, lines = advised.compared, []
     if len(compared.behind) > 1:
         behind = sorted((name, gap) for name, gap in compared.behind.items() if name != compared.best)
-        others = ", ".join(f"exp({-gap:.1f}) times under {name}" for name, gap in behind)
-        clear = "" if min(gap for _, gap in behind) > CLEAR else " (not clearly)"
-        lines.append(f"best     {compared.best}{clear}; elsewhere the plots are less likely: {others}")
+        others = ", ".join(tr("exp({gap:.1f}) times under {name}", gap=-gap, name=name) for name, gap in behind)
+        best = compared.best
+        if min(gap for _, gap in behind) <= CLEAR:
+            best = tr("{name} (not clearly)", name=best)
+        lines.append(
+            labelled("best", tr("{best}; elsewhere the plots are less likely: {others}", best=best, others=others))
+        )
     if not advised.findings:
-        lines.append(f"advice   nothing is wrong with the stated numbers, as far as {plural(advised.rows, 'row')} tell")
+        words = plural(
+            "nothing is wrong with the stated numbers, as far as {count} row tell",
+            "nothing is wrong with the stated numbers, as far as {count} rows tell",
+            advised.rows,
+        )
+        lines.append(labelled("advice", words))
     for one in advised.findings:
-        lines.append(f"advice   {_explained(one)}; the plots are then more likely by exp({one.gain:.1f})")
+        words = tr("{what}; the plots are then more likely by exp({gain:.1f})", what=_explained(one), gain=one.gain)
+        lines.append(labelled("advice", words))
     return lines
 
 
 def _explained(one: Finding) -> str:
     """What is wrong, in words."""
     if one.what == advice.OUTLIERS:
-        return f"outliers: {significant_digits(100 * one.value, '#.2g')} % of the plots err by ten times their σ"
+        share = significant_digits(100 * one.value, "#.2g")
+        return tr("outliers: {share} % of the plots err by ten times their σ", share=share)
     if one.what == advice.BIAS:
-        return f"the measured velocities are off by {significant_digits(one.value, '#.3g')} of their σ, all alike"
+        size = significant_digits(one.value, "#.3g")
+        return tr("the measured velocities are off by {size} of their σ, all alike", size=size)
     return f"--set {one.what}={one.value:.4g}"

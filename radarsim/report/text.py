@@ -17,7 +17,24 @@ SAID = (  # units that a language may write otherwise
     *(term("m"), term("s"), term("m/s"), term("m/s²"), term("rad"), term("rad/s"), term("rad/s²")),
     *(term("Hz"), term("Hz/s"), term("Hz/s²"), term("Hz/s³"), term("Hz/s⁴"), term("km"), term("°/s"), term("°/s²")),
 )
+SPACES = "\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}"  # which a language may put into numbers
 PLAIN = 6  # digits before the point that are still written out
+
+
+LABELS = (  # of lines
+    *(term("claims"), term("tables"), term("figures"), term("report"), term("removed"), term("note"), term("table")),
+    *(term("page"), term("total"), term("share"), term("blocks"), term("attains"), term("slope"), term("also at")),
+    *(term("check"), term("config"), term("package"), term("plots"), term("track"), term("tracks"), term("passed")),
+    *(term("missing"), term("no rows"), term("gaps"), term("best"), term("advice")),
+    *(term("no effect"), term("left out"), term("files")),
+)
+LONG = 8  # letters of an English label from which it does not set the width of all
+
+
+def labelled(label: str, text: str) -> str:
+    """A line under a label; without one it stands under the line before."""
+    said, width = tr(label), max(len(tr(one)) for one in LABELS if len(one) < LONG) + 2
+    return f"{said:<{width}}{text}" if len(said) <= width - 2 else f"{said}  {text}"
 
 
 def clock(seconds: float) -> str:
@@ -72,7 +89,12 @@ def unit(name: str) -> str:
 
 def printable(text: str) -> str:
     """Text without control characters: what a config names must not steer the terminal."""
-    return "".join(c if c.isprintable() else "�" for c in text)
+    return "".join(c if c.isprintable() or c in SPACES else "�" for c in text)
+
+
+def in_a_row(numbers: Iterable[str]) -> str:
+    """Numbers one after the other, parted by semicolons where the language writes a decimal comma."""
+    return (", " if numeral("0.5") == "0.5" else "; ").join(numbers)
 
 
 def significant_digits(value: float, form: str = "#.4g") -> str:

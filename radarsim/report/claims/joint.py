@@ -8,6 +8,7 @@ rounds to, under the granular one if it lies within the margin of its words.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from radarsim.language import term, tr
 from radarsim.report.claims import rule
 from radarsim.report.claims.declared import Part
 from radarsim.report.claims.over import Over, Under
@@ -15,6 +16,9 @@ from radarsim.report.claims.readings import PaperReadings, Reading
 from radarsim.report.claims.rule import Judged
 
 Key = tuple[str, str]  # the claim, and the number within it
+
+TO_THE_PRINT = term("to the print {count} of {of} numbers come out as shipped")
+WITHIN = term("within the margins of the words {count} of {of} numbers come out as shipped")
 
 
 @dataclass(frozen=True)
@@ -88,15 +92,17 @@ class Joint:
     def sentence(self) -> str:
         """What the search comes to."""
         said = []
-        for granular, words in ((False, "to the print"), (True, "within the margins of the words")):
+        for granular, words in ((False, TO_THE_PRINT), (True, WITHIN)):
             own, best = self.shipped, self.best(granular)
-            text = f"{words} {own.count(granular)} of {len(own.came)} numbers come out as shipped"
+            text = tr(words, count=own.count(granular), of=len(own.came))
             if best.count(granular) > own.count(granular):
-                text += f", {best.count(granular)} of {len(best.came)} with {best.name}"
+                text += tr(
+                    ", {count} of {of} with {name}", count=best.count(granular), of=len(best.came), name=best.name
+                )
             else:
-                text += ", and no reading that the paper allows gives more"
+                text += tr(", and no reading that the paper allows gives more")
             said.append(text)
-        return f"{len(self.every):,} readings: {'; '.join(said)}."
+        return tr("{count:,} readings: {said}.", count=len(self.every), said="; ".join(said))
 
     def windows(self, key: str) -> dict[Key, str]:
         """The alternatives of a choice, all others as shipped, under which each number comes out to the print."""

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from radarsim.language import tr
 from radarsim.report.claims import rule
 from radarsim.report.claims.declared import Claim, Part
 from radarsim.report.claims.evidence import Evidence, Missing
@@ -125,15 +126,16 @@ class Over:
         """One line: in how many readings it holds, on what it depends, what would have to be changed."""
         found = self.outcome
         if found is None:
-            return f"not judged: {self.under[0].why}"
-        words = [f"holds in {found.holds_in or 0} of {found.readings or 0} readings"]
+            return tr("not judged: {why}", why=self.under[0].why)
+        words = [tr("holds in {holds} of {of} readings", holds=found.holds_in or 0, of=found.readings or 0)]
         if found.depends_on:
-            words.append(f"depends on: {', '.join(found.depends_on)}")
+            words.append(tr("depends on: {choices}", choices=", ".join(found.depends_on)))
         held = [one for one in self.against_print if one.outcome and one.outcome.kind == rule.CONFIRMED]
         if held and found.holds_in == 0:
-            words.append(f"against the print it holds with {' | '.join(one.name for one in held)}")
+            names = " | ".join(one.name for one in held)
+            words.append(tr("against the print it holds with {readings}", readings=names))
         if self.impossible:
-            words.append(f"{len(self.impossible)} not possible")
+            words.append(tr("{count} not possible", count=len(self.impossible)))
         return "; ".join(words)
 
 

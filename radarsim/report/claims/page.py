@@ -18,6 +18,7 @@ from radarsim.report.claims.rule import (
     UNJUDGEABLE,
     VOID,
 )
+from radarsim.report.text import interval
 
 HEAD = """# The papers' claims
 
@@ -109,8 +110,7 @@ def verdict_of(parts: Sequence[Mapping]) -> str:
     """A claim's class in words, with the miss of one that is refuted and what would decide one that is not."""
     first = parts[0]
     said = str(first["overall"])
-    keys = said.removeprefix(DEPENDS).strip()
-    text = tr("depends on {keys}", keys=keys) if said.startswith(DEPENDS) and keys else tr(said)
+    text = class_words(said)
     if said in MARKS:
         text = MARKS[said].replace(said, text)
     notes = []
@@ -126,6 +126,12 @@ def verdict_of(parts: Sequence[Mapping]) -> str:
     if extension(parts):
         notes.append(tr("extension, not counted"))
     return f"{text} ({'; '.join(notes)})" if notes else text
+
+
+def class_words(said: str) -> str:
+    """A claim's class as the rule words it, in the language spoken."""
+    keys = said.removeprefix(DEPENDS).strip()
+    return tr("depends on {keys}", keys=keys) if said.startswith(DEPENDS) and keys else tr(said)
 
 
 def number(value: Any) -> float | None:
@@ -196,7 +202,8 @@ def shown(row: Mapping) -> str:
     exact = number(row["exact"])
     if number(row["measured"]) is None:
         return "–"
-    return measured(row) if exact is None else f"{plain(exact)} {row['unit']}".rstrip() + " exactly"
+    unit = tr(str(row["unit"]))
+    return measured(row) if exact is None else tr("{value} exactly", value=f"{plain(exact)} {unit}".rstrip())
 
 
 def expected(words: str) -> str:
@@ -217,13 +224,13 @@ def measured(row: Mapping) -> str:
     value, lo, hi = (float(row[name]) for name in ("measured", "lo", "hi"))
     half = (hi - lo) / 2
     if not 0 < half < math.inf:
-        text = f"{value:.4g}".replace("inf", "∞")
+        text = numeral(f"{value:.4g}").replace("inf", "∞")
     else:
         whole = all(one == round(one) for one in (value, lo, hi))
         place = 0 if whole else max(0, 1 - math.floor(math.log10(half)))
-        middle, low, high = (f"{round(one, place) + 0.0:.{place}f}" for one in (value, lo, hi))
-        text = f"{middle} [{low}, {high}]"
-    return f"{text} {row['unit']}".rstrip().replace("-", "\N{MINUS SIGN}")
+        middle, low, high = (numeral(f"{round(one, place) + 0.0:.{place}f}") for one in (value, lo, hi))
+        text = f"{middle} {interval(low, high)}"
+    return f"{text} {tr(str(row['unit']))}".rstrip().replace("-", "\N{MINUS SIGN}")
 
 
 def _cell(text: str) -> str:

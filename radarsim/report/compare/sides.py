@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from radarsim.language import term
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -24,7 +26,7 @@ class Series(NamedTuple):
 SERIES = (
     Series("curves", "sigma", "sigma_lo", "sigma_hi", "exact_sigma", "σ", "", True),
     Series("gains", "gain_percent", "gain_lo", "gain_hi", "exact_percent", "gain", "%", False),
-    Series("locks", "lock_rate", "lock_lo", "lock_hi", "", "rate of locks", "", False),
+    Series("locks", "lock_rate", "lock_lo", "lock_hi", "", term("rate of locks"), "", False),
     Series("probabilities", "probability", "probability_lo", "probability_hi", "", "probability", "", False),
 )
 LABELS = ("filter", "component", "model")  # that say which line a row is of; the time says where on it

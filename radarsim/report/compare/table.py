@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from radarsim.language import term
 from radarsim.report import tables as common
 from radarsim.report.compare.sides import LABELS, SERIES, Pair, Series, Side
 from radarsim.report.statistics import Estimate, difference
@@ -27,10 +28,10 @@ COLUMNS = (
 )
 INDEPENDENT, LINKED, UNLINKED, SAME = "independent", "paired", "common noise", "same numbers"
 MEANING = {
-    INDEPENDENT: "independent noise",
-    LINKED: "paired on common noise through the common baseline; the interval covers 95 % or more",
-    UNLINKED: "common noise but no common baseline filter; the interval holds whatever the correlation",
-    SAME: "the same numbers",
+    INDEPENDENT: term("independent noise"),
+    LINKED: term("paired on common noise through the common baseline; the interval covers 95 % or more"),
+    UNLINKED: term("common noise but no common baseline filter; the interval holds whatever the correlation"),
+    SAME: term("the same numbers"),
 }
 DIGITS = 9  # of a time, by which rows find one another
 

@@ -2,9 +2,10 @@
 
 from typing import TYPE_CHECKING, Any
 
+from radarsim.language import plural, tr
 from radarsim.report.compare.sides import SERIES
 from radarsim.report.compare.table import MEANING
-from radarsim.report.text import UNITS, significant_digits
+from radarsim.report.text import UNITS, interval, significant_digits
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,7 +24,17 @@ def sentences(made: "pd.DataFrame") -> list[str]:
         if series.ratio:
             break  # gains and shares of the same filters stand in the table
     left = len(told) - MOST
-    return told[:MOST] + ([f"{left} further comparisons: in comparison.csv."] if left > 0 else [])
+    return told[:MOST] + (
+        [
+            plural(
+                "{count} further comparison: in comparison.csv.",
+                "{count} further comparisons: in comparison.csv.",
+                left,
+            )
+        ]
+        if left > 0
+        else []
+    )
 
 
 def at_the_end(made: "pd.DataFrame") -> "pd.DataFrame":
@@ -33,28 +44,36 @@ def at_the_end(made: "pd.DataFrame") -> "pd.DataFrame":
 
 
 def _sentence(words: str, row: dict[Any, Any]) -> str:
-    what = " of ".join(filter(None, (words, str(row["component"] or row["model"]))))
-    at, unit = f"at {row['t_s']:g} s", UNITS.get(row["unit"], row["unit"])
-    own = f"{row['label']}, {row['filter']}: {what} {at} {value(row['value'])} {unit}".rstrip()
+    of = str(row["component"] or row["model"])
+    unit = tr(UNITS.get(row["unit"], row["unit"]))
     other = f"{row['against_label']}" + ("" if row["against_filter"] == row["filter"] else f", {row['against_filter']}")
-    against = f"against {value(row['against'])} {unit}".rstrip()
-    return f"{own} {against} of {other}: {change(row)}."
+    return tr(
+        "{label}, {filter}: {what} at {t_s:g} s {value} against {against} of {other}: {change}.",
+        label=row["label"],
+        filter=row["filter"],
+        what=tr("{quantity} of {symbol}", quantity=tr(words), symbol=of) if of else tr(words),
+        t_s=row["t_s"],
+        value=f"{value(row['value'])} {unit}".rstrip(),
+        against=f"{value(row['against'])} {unit}".rstrip(),
+        other=other,
+        change=change(row),
+    )
 
 
 def change(row: dict[Any, Any]) -> str:
     """By how much a value differs, with its interval, and the exact change where it is known."""
     if row["percent"] != row["percent"]:
-        text = f"{signed(row['difference'])} {row['unit']}".rstrip()
-        return f"{text} [{signed(row['difference_lo'])}, {signed(row['difference_hi'])}]"
+        text = f"{signed(row['difference'])} {tr(UNITS.get(row['unit'], row['unit']))}".rstrip()
+        return f"{text} {interval(signed(row['difference_lo']), signed(row['difference_hi']))}"
     exact = row["exact_percent"]
-    known = f", exactly {percent(exact)}" if exact == exact else ""
-    return f"{percent(row['percent'])} [{percent(row['percent_lo'])}, {percent(row['percent_hi'])}]{known}"
+    known = tr(", exactly {value}", value=percent(exact)) if exact == exact else ""
+    return f"{percent(row['percent'])} {interval(percent(row['percent_lo']), percent(row['percent_hi']))}{known}"
 
 
 def percent(value: float) -> str:
     """A change in per cent with its sign; from four times on as a multiple."""
     if value >= 300:
-        return f"{significant_digits(1 + value / 100, '.3g')} times"
+        return tr("{factor} times", factor=significant_digits(1 + value / 100, ".3g"))
     return f"{signed(value, '.3g')} %"
 
 
@@ -73,5 +92,8 @@ def pairings(made: "pd.DataFrame") -> list[str]:
     """How the differences are paired, a line each kind."""
     kinds = made.loc[made["quantity"] == "sigma", "pairing"].tolist()
     counts = {words: kinds.count(kind) for kind, words in MEANING.items()}
-    total = f"{len(kinds):,} differences of σ"
-    return [f"{count:,} of {total}: {words}" for words, count in counts.items() if count]
+    return [
+        tr("{count:,} of {total:,} differences of σ: {words}", count=count, total=len(kinds), words=tr(words))
+        for words, count in counts.items()
+        if count
+    ]

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.config.experiment import Case
+from radarsim.language import listed, tr
 from radarsim.report import html, panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Chart, Figure, Line, Mark, Note, Panel, Reference, Style
-from radarsim.report.text import significant_digits
+from radarsim.report.text import in_a_row, significant_digits
 from radarsim.studies.range_doppler import closed_form, exact, filters, steady
 from radarsim.studies.range_doppler.study import COMPONENTS, RangeDopplerAxes, prepare
 
@@ -59,7 +60,7 @@ def chart(cases: Sequence[Case], references: Sequence[Case]) -> Chart:
     own = [place for _, place in found if place is not None]
     known = [place for place in known if all(place.of != one.of for one in own)]
     drawn = [over_time(own or known), in_the_long_run(own, known), over_groups(own, known)]
-    without = "no place on the chart without a filter of the range and one of range and velocity"
+    without = tr("no place on the chart without a filter of the range and one of range and velocity")
     sentences = [f"{case.name}: {without}" if place is None else sentence(place) + aside(case) for case, place in found]
     sentences = sentences or [sentence(place) for place in known]
     return Chart({figure.name: figure for figure in drawn}, table([*own, *known]), tuple(sentences), page(own, known))
@@ -94,26 +95,39 @@ def sentence(place: Place) -> str:
     """Where a radar lies, and what the velocity does for it in the long run."""
     r, V, a = (round(float(gain), 1) for gain in place.exact)
     c, last = significant_digits(place.of.c, ".2g"), place.gain[-1]
-    verbs = [f"takes {r:g} % off the range" if r >= 0 else f"adds {-r:g} % to the range"]
-    verbs += [f"{V:g} % off the velocity" if V >= 0 else f"adds {-V:g} % to the velocity"]
-    acceleration = f"the acceleration gains {a:g} %" if a >= 0 else f"the acceleration loses {-a:g} %"
-    times = f"τ₁ = {place.tau_1_s:.3g} s, τ₂ = {place.tau_2_s:.3g} s"
+    verbs = [
+        tr("takes {size:g} % off the range", size=r) if r >= 0 else tr("adds {size:g} % to the range", size=-r),
+        tr("{size:g} % off the velocity", size=V) if V >= 0 else tr("adds {size:g} % to the velocity", size=-V),
+    ]
+    gained = tr("the acceleration gains {size:g} %", size=a)
+    acceleration = gained if a >= 0 else tr("the acceleration loses {size:g} %", size=-a)
     away = significant_digits(float(np.abs(place.exact - place.limit).max()), ".2g")
     period = place.inputs[2]
-    return (
-        f"{place.name}: c = {c} ({times}): Doppler {' and '.join(verbs)} in the long run; {acceleration}. "
-        f"At its last scan, {place.t_s[-1]:g} s: {', '.join(significant_digits(float(g), '.3g') for g in last)} %. "
-        f"With Δt/τ₁ = {period / place.tau_1_s:.2g} and Δt/τ₂ = {period / place.tau_2_s:.2g} "
-        f"the curve of short periods is up to {away} points off."
+    return tr(
+        "{name}: c = {c} (τ₁ = {tau_1:.3g} s, τ₂ = {tau_2:.3g} s): Doppler {verbs} in the long run; {acceleration}. "
+        "At its last scan, {t_s:g} s: {gains} %. With Δt/τ₁ = {first:.2g} and Δt/τ₂ = {second:.2g} the curve of short "
+        "periods is up to {away} points off.",
+        name=place.name,
+        c=c,
+        tau_1=place.tau_1_s,
+        tau_2=place.tau_2_s,
+        verbs=listed(verbs),
+        acceleration=acceleration,
+        t_s=float(place.t_s[-1]),
+        gains=in_a_row(significant_digits(float(g), ".3g") for g in last),
+        first=period / place.tau_1_s,
+        second=period / place.tau_2_s,
+        away=away,
     )
 
 
 def aside(case: Case) -> str:
     """What of a case the chart leaves out of account, as a further sentence; nothing where there is nothing."""
-    left = [] if case.spec.radar.as_the_papers else ["missed plots and biases"]
-    left += [] if case.spec.target.kind == "polynomial" else ["the target's manoeuvre"]
-    left += [] if all(one.process_noise == "random_jerk" for one in case.spec.filters) else ["another process noise"]
-    return f" Left out of account in the long run: {', '.join(left)}." if left else ""
+    left = [] if case.spec.radar.as_the_papers else [tr("missed plots and biases")]
+    left += [] if case.spec.target.kind == "polynomial" else [tr("the target's manoeuvre")]
+    usual = all(one.process_noise == "random_jerk" for one in case.spec.filters)
+    left += [] if usual else [tr("another process noise")]
+    return tr(" Left out of account in the long run: {what}.", what=", ".join(left)) if left else ""
 
 
 def table(places: Sequence[Place]) -> "pd.DataFrame":

@@ -1,0 +1,111 @@
+"""What commands show on a terminal of 80 columns, in English and in Russian: whole lines, and nothing in English."""
+
+import io
+import re
+
+import pytest
+
+from radarsim.cli import console, main
+from radarsim.language import VARIABLE
+from tests.language.test_russian import NAMES, untranslated
+
+WIDTH = 80
+FIRST = "rls2"
+COMMANDS = {
+    "run": ["run", FIRST, "-n", "3000", "--no-figures"],
+    "report": ["report", FIRST, "-n", "3000", "--no-figures"],
+    "check": ["check", FIRST, "-n", "1e5"],
+    "precision": ["check", "rls4", "--precision", "2"],
+    "claims": ["claims", FIRST],
+    "solve": ["solve", FIRST, "radar.sigma_velocity_mps", "--gain", "r", "--at", "60", "--equals", "30"],
+    "unattained": ["solve", FIRST, "radar.sigma_velocity_mps", "--gain", "r", "--at", "60", "--equals", "99"],
+    "sensitivity": ["sensitivity", FIRST, "--no-figures"],
+    "chart": ["chart", FIRST, "--no-figures"],
+    "compare": ["compare", FIRST, "rls4", "--no-figures"],
+    "clean": ["clean", "--dry-run"],
+    "doctor": ["doctor", f"results/{FIRST}"],
+    "list": ["list", "sonar"],
+    "new": ["new", "mine", "--like", FIRST],
+    "simulate": ["simulate", FIRST, "-o", "plots.csv"],
+    "track": ["track", FIRST, "plots.csv", "-o", "track.csv"],
+}
+KEPT = NAMES | {  # what a user types and names of the config's own
+    *("radarsim", "run", "check", "claims", "rls", "track", "plots", "mine", "yaml", "results", "new", "study"),
+    *("must", "got"),  # faults of a config are told in English
+    *("target", "sonar", "with", "set", "between", "make", "reproduce", "figures", "compare", "chart", "blocks"),
+}
+
+
+class Terminal(io.StringIO):
+    """A stream that says that it is a terminal."""
+
+    def isatty(self):
+        return True
+
+
+def shown(monkeypatch, *arguments):
+    """What a command writes to both streams of a terminal, without colours and bars."""
+    out, err = Terminal(), Terminal()
+    with monkeypatch.context() as patch:
+        patch.setattr("sys.stdout", out)
+        patch.setattr("sys.stderr", err)
+        patch.setattr(console, "SILENT_S", 1e6)
+        with pytest.raises(SystemExit):
+            main(list(arguments))
+    return [re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", one.getvalue()) for one in (out, err)]
+
+
+@pytest.fixture
+def results(tmp_path, monkeypatch):
+    """A folder of its own, with results of two radars and plots."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", str(WIDTH))
+    for name in (FIRST, "rls4"):
+        shown(monkeypatch, "run", name, "-n", "3000", "--no-figures", "-q")
+    shown(monkeypatch, "simulate", FIRST, "-o", "plots.csv")
+    return tmp_path
+
+
+@pytest.mark.parametrize("language", ["en", "ru"])
+def test_every_command_is_whole_at_eighty_columns(results, monkeypatch, language):
+    monkeypatch.setenv(VARIABLE, language)
+    told = {name: shown(monkeypatch, *arguments) for name, arguments in COMMANDS.items()}
+    for name, (out, err) in told.items():
+        assert out or err, name
+        for line in (out + err).split("\n"):
+            whole = line.startswith(("check ", "проверка "))  # a command, to be copied
+            assert len(line) <= WIDTH or whole or "/" in line, (name, line)
+        assert "�" not in out, name
+    rows = [line for line in told["run"][0].split("\n") if line.startswith(f" {FIRST} ")]
+    assert len(rows) == 6
+    assert all(re.search(r" … [\d,.]+", row) for row in rows)  # no interval is broken
+    if language == "ru":
+        left = {
+            name: found
+            for name, (out, _) in told.items()
+            if name != "list"  # whose lines are the files' own
+            and (found := untranslated(re.sub(r"\S*[/=_.]\S*|--\w+", " ", out), KEPT))
+        }
+        assert left == {}
+
+
+def test_what_is_piped_stays_in_one_line_and_speaks_english(results, monkeypatch, capsys):
+    with pytest.raises(SystemExit):
+        main(["claims", FIRST])
+    lines = capsys.readouterr().out.splitlines()
+    assert any(len(line) > WIDTH for line in lines)
+    assert lines[0].startswith("P1.18  ")
+    assert re.search(r"misses by [\d.]+ margins$", lines[2])
+
+
+def test_a_bar_says_in_the_language_what_is_left(monkeypatch):
+    screen = Terminal()
+    monkeypatch.setenv(VARIABLE, "ru")
+    monkeypatch.setattr("sys.stderr", screen)
+    monkeypatch.setattr(console, "SILENT_S", 0.0)
+    with console.Progress(FIRST, quiet=False) as progress:
+        progress.update(50, 200, 0)
+        told = progress.bar.tasks[0].fields["told"]
+    assert told.startswith(" 25,0 %")
+    assert "реализации/с" in told
+    assert "осталось" in told
