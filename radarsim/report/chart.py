@@ -187,21 +187,23 @@ class _Frame:
         return Markup('<g data-g="{}"{}>{}</g>').format(group, pieces.ink(line.style), made)
 
     def _interval(self, x: np.ndarray, y: np.ndarray, whole: dict[str, np.ndarray], style: Style) -> Markup:
-        """A band where it can be seen, whiskers of single points."""
+        """A band where it can be seen, whiskers of single points; nothing where neither end is known."""
+        known = np.isfinite(whole["lo"]) | np.isfinite(whole["hi"])
         edge = 10 * HEIGHT  # an end that is infinite is beyond the panel
         with np.errstate(invalid="ignore"):
             lo = np.clip(np.nan_to_num(self.y.place(whole["lo"]), nan=edge, posinf=edge, neginf=edge), -edge, edge)
             hi = np.clip(np.nan_to_num(self.y.place(whole["hi"]), nan=-edge, posinf=-edge, neginf=-edge), -edge, edge)
-        there = np.isfinite(x) & np.isfinite(y)
+        there = np.isfinite(x) & np.isfinite(y) & known
         if style.dash is None:
             parts = [f"M{a:.1f} {b:.1f}V{c:.1f}" for a, b, c in zip(x[there], lo[there], hi[there], strict=True)]
             return Markup('<path class="w" d="{}"/>').format("".join(parts))
         if not there.any() or np.max(lo[there] - hi[there]) < 2 * SEEN:
             return Markup("")
-        outline = np.concatenate([hi[there], lo[there][::-1]])
-        return Markup('<path class="b" d="{}z"/>').format(
-            pieces.path(np.concatenate([x[there], x[there][::-1]]), outline)
-        )
+        d = ""
+        for run in pieces.runs(there):
+            outline = np.concatenate([hi[run], lo[run][::-1]])
+            d += pieces.path(np.concatenate([x[run], x[run][::-1]]), outline) + "z"
+        return Markup('<path class="b" d="{}"/>').format(d)
 
     def _keep(self, name: str, whole: dict[str, np.ndarray], group: int, style: Style) -> None:
         """Numbers for the pointer; times that curves share are kept once."""

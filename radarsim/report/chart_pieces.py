@@ -108,6 +108,12 @@ def path(x: np.ndarray, y: np.ndarray) -> str:
     return "".join(parts)
 
 
+def runs(there: np.ndarray) -> list[np.ndarray]:
+    """The places of each unbroken run of true values."""
+    places = np.flatnonzero(there)
+    return [part for part in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if part.size]
+
+
 def short(values: np.ndarray) -> list[float | None]:
     """Numbers for the pointer: five digits, nothing where not finite."""
     return [float(format(v, DIGITS)) if np.isfinite(v) else None for v in np.asarray(values, dtype=float).tolist()]

@@ -93,6 +93,16 @@ def own_names(result):
         yield from (case.name, case.spec.device or "", *case.axes.filters, *(str(value) for _, value in case.swept))
         yield from (name for name, _ in case.axes.components)
         yield from (one.name for one in getattr(case.spec, "detectors", ()))
+        yield from typed(case.spec.model_dump())
+
+
+def typed(value):
+    """All texts that stand as values in a config."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict | list | tuple):
+        for one in value.values() if isinstance(value, dict) else value:
+            yield from typed(one)
 
 
 @pytest.mark.parametrize("stem", QUICK)

@@ -175,3 +175,16 @@ def test_contrast_is_that_of_the_standard():
 def test_paths_are_short():
     x = np.arange(100.0)
     assert len(chart_pieces.path(x, np.sin(x) * 50 + 100)) < 12 * len(x)
+
+
+def test_where_neither_end_is_known_there_is_no_band():
+    x, y, nothing = np.arange(6.0), np.full(6, 5.0), np.full(6, np.nan)
+    assert 'class="b"' not in one(Line(x, y, "a", lo=nothing, hi=nothing)).panels[0].svg
+    lo, hi = y - 2, y + 2
+    lo[2], hi[2] = np.nan, np.nan
+    band = re.search(r'class="b" d="([^"]*)"', one(Line(x, y, "a", lo=lo, hi=hi)).panels[0].svg)[1]
+    assert band.count("M") == band.count("z") == 2
+    open_end = re.search(r'class="b" d="([^"]*)"', one(Line(x, y, "a", lo=y - 2, hi=np.full(6, np.inf))).panels[0].svg)[
+        1
+    ]
+    assert open_end.count("M") == 1

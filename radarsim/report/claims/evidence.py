@@ -164,7 +164,7 @@ class Evidence:
     def __init__(self, results: Sequence[CaseResult], made: Mapping, places: Mapping[str, Mapping[str, set[int]]]):
         """places: by the name of a case and the key of a list, which of its members are the paper's."""
         self.results: list[CaseResult] = list(results)
-        self.looked: set[tuple[str, str]] = set()  # tables, and their components, since it was last emptied
+        self.looked: set[tuple[str, str]] = set()  # tables, with or without a component, since it was last emptied
         self.tables: Mapping = _Watched(made, self.looked)
         self._places = places
         self._exact, self._factor = False, 1.0

@@ -165,7 +165,8 @@ def _tried(part: Part, seen: Evidence | None, changed: str) -> _Tried:
         reason = missing.why or other
         return _Tried(part, why=reason)
     value, lo, hi = (float(one) for one in measured)
-    looked = tuple(sorted(seen.looked))
+    closer = {table for table, component in seen.looked if component}
+    looked = tuple(sorted(one for one in seen.looked if one[1] or one[0] not in closer))
     of = Judged(
         value,
         lo,

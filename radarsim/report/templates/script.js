@@ -487,12 +487,15 @@ class Panel {
     if (node.querySelector(".x")) put("x", sprinkled(at("e"), step > 1 ? step >> 1 : 0, shape.cross));
     if (!line.l || !line.h) return;
     const edge = (key, end) => at(key).map((v) => (Number.isFinite(v) ? v : end));
-    const low = edge("l", 1e4), high = edge("h", -1e4), there = xs.map((_, i) => i).filter((i) => good[i]);
+    const low = edge("l", 1e4), high = edge("h", -1e4), known = (i) => line.l[i] !== null || line.h[i] !== null;
+    const there = xs.map((_, i) => i).filter((i) => good[i] && known(i));
     if (line.p) put("w", there.map((i) => `M${round(xs[i])} ${round(low[i])}V${round(high[i])}`).join(""));
     else {
       const broad = there.some((i) => low[i] - high[i] >= 2 * SEEN);
-      const ring = [...there.map((i) => [xs[i], high[i]]), ...there.reverse().map((i) => [xs[i], low[i]])];
-      put("b", broad ? `M${ring.map(([a, b]) => `${round(a)} ${round(b)}`).join("L")}z` : "");
+      const runs = [];
+      there.forEach((i, n) => { if (n && there[n - 1] === i - 1) runs.at(-1).push(i); else runs.push([i]); });
+      const rings = runs.map((run) => [...run.map((i) => [xs[i], high[i]]), ...run.reverse().map((i) => [xs[i], low[i]])]);
+      put("b", broad ? rings.map((ring) => `M${ring.map(([a, b]) => `${round(a)} ${round(b)}`).join("L")}z`).join("") : "");
     }
   }
 
