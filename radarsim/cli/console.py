@@ -220,6 +220,12 @@ def broken(text: str, stream: TextIO) -> list[str]:
     return wrapped(text, shutil.get_terminal_size().columns) if stream.isatty() else [text]
 
 
+def say_aside(line: str) -> None:
+    """Print one line on the error stream, to a terminal broken between words."""
+    for part in broken(printable(line), sys.stderr):
+        sys.stderr.write(part + "\n")
+
+
 def field(label: str, text: str) -> None:
     """Print a line under a label; without one it stands under the line before."""
     say(labelled(label, text))
@@ -267,8 +273,7 @@ def print_result(result: "Result") -> None:
 def print_warnings(warnings: Iterable[str]) -> None:
     """One line each, on the error stream."""
     for warning in warnings:
-        for part in broken(tr("warning: {words}", words=printable(warning)), sys.stderr):
-            sys.stderr.write(part + "\n")
+        say_aside(tr("warning: {words}", words=printable(warning)))
 
 
 def show_last_scan(last: "pd.DataFrame") -> None:

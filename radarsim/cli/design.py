@@ -107,7 +107,7 @@ def solve(
             realisations=realisations,
             threads=threads,
             progress=progress.update,
-            told=None if as_json else lambda line: click.echo(line, err=True),
+            told=None if as_json else console.say_aside,
         )
     if as_json:
         click.echo(documents.text(documents.answer(answer)))
