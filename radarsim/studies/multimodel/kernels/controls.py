@@ -191,7 +191,7 @@ def follow(state, errors, of, random, frame, span):
 
 # ---- what they explain --------
 class Rows(NamedTuple):
-    """By addresses: y and its regressors x, `count` of these; which realisations count, and how many do."""
+    """By addresses: y and its regressors x (1 + count rows); which realisations count (8,), and how many do."""
 
     x: np.ndarray
     count: int
@@ -202,9 +202,9 @@ class Rows(NamedTuple):
 class Places(NamedTuple):
     """Where the numbers of one filter lie, by addresses, and how many controls it has, one a model.
 
-    own: the controls of its models; errors: their d at the scan; parts: their sums over the first part of the stage,
-    `width` rows a control; variances: what is expected of squares, at the scan or over the parts, `stride` numbers a
-    control, from `first` on.
+    own (MOST,): the controls of its models; errors: their d at the scan; parts: their sums over the first part of the
+    stage, `width` rows a control; variances: what is expected of squares, at the scan or over the parts, `stride`
+    numbers a control, from `first` on.
     """
 
     own: np.ndarray
