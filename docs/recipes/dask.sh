@@ -15,5 +15,11 @@ for host in $HOSTS; do
     $RSH "$host" dask worker "tcp://$SCHEDULER" --nworkers "$WORKERS" --nthreads 1 --no-dashboard 2>/dev/null &
     started="$started $!"
 done
-sleep "${PATIENCE:-5}"                 # the scheduler must answer before the run asks for it
+waited=0                               # the scheduler must answer before the run asks for it
+until python3 -c "import socket, sys; socket.create_connection((sys.argv[1], int(sys.argv[2])), 1)" \
+    "${SCHEDULER%:*}" "${SCHEDULER##*:}" 2>/dev/null; do
+    waited=$((waited + 1))
+    [ "$waited" -le "${PATIENCE:-60}" ] || { echo "no scheduler answers at $SCHEDULER" >&2; exit 1; }
+    sleep 1
+done
 radarsim run "$CONFIG" -n "$N" --scheduler "tcp://$SCHEDULER" --out "$OUT"

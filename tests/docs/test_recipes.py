@@ -98,7 +98,7 @@ def test_a_dask_cluster(tmp_path, expected):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    places = {"SCHEDULER": f"127.0.0.1:{port}", "HOSTS": "a b", "WORKERS": "1", "PATIENCE": "8"}
+    places = {"SCHEDULER": f"127.0.0.1:{port}", "HOSTS": "a b", "WORKERS": "1"}
     run(["sh", RECIPES / "dask.sh"], tmp_path, **places)
     assert csv_bytes(tmp_path / "out" / "rls2") == expected
 
