@@ -1,6 +1,6 @@
 """The messages that a catalogue translates, found in the sources; and the catalogues, brought up to date.
 
-`python -m making.messages` writes every catalogue anew: its translations kept, messages that nothing says any more left
+`python -m making.messages` rewrites every catalogue: its translations kept, messages that nothing says any more left
 out, new ones added empty, each with the file that says it. `python -m making.messages ru` lists what is not translated.
 """
 

@@ -101,7 +101,7 @@ def shown(page: Path, parts: list[tuple[str, Figure, Path]]) -> str:
 
 
 def main(results: str) -> None:
-    """Draw every picture that the pages show, write the marks anew, remove pictures that no page shows."""
+    """Draw every picture that the pages show, write the marks again, remove pictures that no page shows."""
     FOLDER.mkdir(exist_ok=True)
     made: dict[tuple[str, str, float | None], tuple[Figure, Path]] = {}
     for config, wanted in every().items():

@@ -74,7 +74,7 @@ def compare(
     if not len(made):
         raise ConfigError(f"{' and '.join(run.label for run in runs)} share no filter and component to compare")
     folder = Path(out) / FOLDER
-    told, notes = words.sentences(made), [*words.pairings(made), *alone]
+    sentences, notes = words.sentences(made), [*words.pairings(made), *alone]
     warnings = [line for run in runs for line in _stale(run)] + _replaced(folder, runs)
     described = figures.figures([side for run in _labelled(every) for side in run], made)
     contents = {"comparison.csv": common.to_csv(made)}
@@ -84,12 +84,14 @@ def compare(
         for name, figure in described.items():
             saved = drawing.save(figure, formats, width_mm)
             contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
-    contents["compare.html"] = _page(runs, told, notes, warnings, list(described.values()), made, contents).encode()
+    contents["compare.html"] = _page(
+        runs, sentences, notes, warnings, list(described.values()), made, contents
+    ).encode()
     contents["compare.json"] = provenance.to_json(_record(runs, contents))
     files.replace_all(folder, contents, stale=_earlier)
     last = words.at_the_end(made)
     kept = (tuple(rows.to_dict("records")) for rows in (made, last))
-    return Compared(folder, tuple(sorted(contents)), tuple(told), tuple(notes), tuple(warnings), *kept)
+    return Compared(folder, tuple(sorted(contents)), tuple(sentences), tuple(notes), tuple(warnings), *kept)
 
 
 def _found(sources: Sequence[str | os.PathLike[str]], out: Path) -> list[Run]:
@@ -209,7 +211,7 @@ def _record(runs: Sequence[Run], contents: "dict[str, bytes]") -> dict[str, Any]
 
 def _page(
     runs: Sequence[Run],
-    told: Sequence[str],
+    sentences: Sequence[str],
     notes: Sequence[str],
     warnings: Sequence[str],
     described: "Sequence[Any]",
@@ -224,7 +226,7 @@ def _page(
     unique = len(set(names)) == len(names) and len({case.study for case in cases}) == 1
     differing = asked.asked(cases) if unique else {}
     labels = [run.label for run in runs]
-    return html.comparison(labels, told, notes, warnings, described, made, differing, outputs)
+    return html.comparison(labels, sentences, notes, warnings, described, made, differing, outputs)
 
 
 def _cases(run: Run) -> list[Case]:

@@ -114,7 +114,7 @@ def _closed(paper: Paper, names: Sequence[str]) -> list[str]:
     """Faults of claims that are asked for by name, and on which nothing bears that the paper leaves open."""
     kept = [one.id for one in paper.claims.claims if _open(paper, one)]
     return [
-        f"readings: {one.id} hangs on nothing that its paper leaves open; claims that do: {', '.join(kept)}"
+        f"readings: {one.id} depends on nothing that its paper leaves open; claims that do: {', '.join(kept)}"
         for one in paper.claims.claims
         if one.id in names and one.id not in kept
     ]
@@ -293,7 +293,7 @@ class Plan:
         return over
 
     def _again(self, over: Over, readings: set[Reading]) -> Over:
-        """A claim with these readings judged anew."""
+        """A claim with these readings judged again."""
         under = (self._under(over.claim, one.reading) if one.reading in readings else one for one in over.under)
         return replace(over, under=tuple(under)) if readings else over
 

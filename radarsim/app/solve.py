@@ -38,7 +38,7 @@ JUMP = 1e-4  # of a quantity: more than means over patterns of plots may jump wh
 JUMPS = term("the quantity jumps over the target there")
 SAME = 1e-12  # of a quantity: what rounding may make of no change
 TO_CLOSE = 12  # values, beside those of the scan, that bring a root from its bracket to rounding, and its slope
-LONG_S = 2.0  # of an answer, from which it is foretold what it takes
+LONG_S = 2.0  # of an answer, from which it is predicted what it takes
 
 Config = str | os.PathLike[str] | Mapping[str, Any]
 
@@ -291,7 +291,7 @@ def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answ
     curve.expected = len(asked.over.grid()) + TO_CLOSE
     near = registry.study(asked.cases.base.study).exact_but_for(quantities.shortened(asked.quantity, asked.cases.base))
     what = f"computes the {asked.quantity.words} at about {curve.expected} values of {asked.key}"
-    foretell(told, f"{what}{f', each {near}' if near else ''}", curve.expected * (time.monotonic() - begun))
+    predict(told, f"{what}{f', each {near}' if near else ''}", curve.expected * (time.monotonic() - begun))
 
     def missing(x: float) -> float:
         return curve.exactly(x) - asked.equals
@@ -321,7 +321,7 @@ def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answ
     )
 
 
-def foretell(told: Callable[[str], None], what: str, seconds: float) -> None:
+def predict(told: Callable[[str], None], what: str, seconds: float) -> None:
     """Say what a search will do and about how long it takes, where that is long."""
     if seconds > LONG_S:
         told(f"{what}: about {seconds:.0f} s")
@@ -426,7 +426,7 @@ def _by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> 
     begun = time.monotonic()
     attained_now = curve.simulated(None, count).value
     what = f"simulates {len(grid)} values of {asked.key} with {pilot} realisations, then about {WITH_ALL} with {count}"
-    foretell(told, what, (WITH_ALL + len(grid) * pilot / count) * (time.monotonic() - begun))
+    predict(told, what, (WITH_ALL + len(grid) * pilot / count) * (time.monotonic() - begun))
     scanned = [(x, curve.simulated(x, pilot).value - asked.equals) for x in grid]
     known = [one for one in scanned if not math.isnan(one[1])]
     if not known:

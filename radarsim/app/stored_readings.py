@@ -23,5 +23,5 @@ def stored_readings(out: Path) -> list[dict[str, Any]]:
     except (OSError, ValueError, csv.Error) as error:
         raise StoreError(f"{path}: cannot be read: {error}") from error
     if not names >= NEEDED:
-        raise StoreError(f"{path}: is no table of readings; remove it, `radarsim readings` makes it anew")
+        raise StoreError(f"{path}: is no table of readings; remove it, `radarsim readings` makes it again")
     return rows

@@ -35,7 +35,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Compared:
-    """How much better than each filter the best one foretells the plots: differences of the logarithm of the likelihood
+    """How much better than each filter the best one predicts the plots: differences of the logarithm of the likelihood
     of the numbers that all of them take."""
 
     best: str
@@ -112,7 +112,7 @@ def findings(likelihood: Likelihood, progress: Progress = silent) -> list[Findin
 
 
 def compared(likelihoods: Sequence[Likelihood]) -> Compared:
-    """Which filter foretells the plots best, as stated."""
+    """Which filter predicts the plots best, as stated."""
     sums = {one.filter: one.by_number(np.asarray(one.stated)) for one in likelihoods}
     common = set.intersection(*(set(parts) for parts in sums.values()))
     totals = {name: sum(parts[number] for number in common) for name, parts in sums.items()}

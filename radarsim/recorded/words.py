@@ -116,7 +116,7 @@ def nearest(judged: Sequence[accuracy.Judged]) -> list[str]:
 
 
 def likely(advised: Advice) -> list[str]:
-    """Which filter foretells the plots best, and what is wrong with its numbers."""
+    """Which filter predicts the plots best, and what is wrong with its numbers."""
     compared, lines = advised.compared, []
     if len(compared.behind) > 1:
         behind = sorted((name, gap) for name, gap in compared.behind.items() if name != compared.best)

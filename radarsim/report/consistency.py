@@ -20,7 +20,7 @@ BELIEVED = (
     *("case", "filter", "component", "unit", "k", "t_s", "n"),
     *("sigma", "believed_sigma", "ratio", "ratio_lo", "ratio_hi", "note"),
 )
-# Where the believed σ hangs on the plots (a filter that adapts, interacting models, what is computed at an estimate)
+# Where the believed σ depends on the plots (a filter that adapts, interacting models, what is computed at an estimate)
 # its mean has a chance of its own. Measured: such intervals cover as little as 2 %, most of them 70 … 90 %.
 VARIES = "interval of sigma alone: the believed one varies from one realisation to the next"
 

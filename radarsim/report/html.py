@@ -69,10 +69,10 @@ def page(
         question=question,
         answer=answer,
         shown=seen_at_once(answer),
-        inputs=None if inputs is None else told(tr("inputs"), inputs),
-        asked=[told(title, table) for title, table in asked.asked(experiment.cases).items()],
-        agreement=None if agreement is None else told(tr("exact against Monte-Carlo"), agreement),
-        cost=None if cost is None else told(tr("cost against accuracy"), cost),
+        inputs=None if inputs is None else table_in_words(tr("inputs"), inputs),
+        asked=[table_in_words(title, table) for title, table in asked.asked(experiment.cases).items()],
+        agreement=None if agreement is None else table_in_words(tr("exact against Monte-Carlo"), agreement),
+        cost=None if cost is None else table_in_words(tr("cost against accuracy"), cost),
         yaml=yaml_of(record["resolved"]),
         record=record,
         extent=provenance.extent(record),
@@ -124,7 +124,7 @@ def comparison(
         warnings=warnings,
         figures=_figures(figures),
         files=_files(figures, outputs),
-        asked=[told(title, table) for title, table in differing.items()],
+        asked=[table_in_words(title, table) for title, table in differing.items()],
         table=_table("comparison", made.drop(columns=["label", "against_label"])),
         version=provenance.versions()["radarsim"],
     )
@@ -260,7 +260,7 @@ def _tables(made: "Mapping[str, pd.DataFrame]") -> list[dict[str, Any]]:
     return [_table(name, table, most) for name, table in made.items()]
 
 
-def told(name: str, table: "pd.DataFrame") -> dict[str, Any]:
+def table_in_words(name: str, table: "pd.DataFrame") -> dict[str, Any]:
     """A table that stands in the page alone, in words; one that is a file of its own is shown as it is there."""
     made = _table(name, table)
     for column in made["columns"]:

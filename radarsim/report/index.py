@@ -47,8 +47,8 @@ def _run(path: Path) -> dict | None:
 
 def _finished(record: Mapping, path: Path) -> str:
     """When the run ended, UTC, to the second: as run.json says, else when that was written."""
-    told = record.get("finished")
-    when = datetime.fromisoformat(told) if told else datetime.fromtimestamp(path.stat().st_mtime, UTC)
+    finished = record.get("finished")
+    when = datetime.fromisoformat(finished) if finished else datetime.fromtimestamp(path.stat().st_mtime, UTC)
     return when.astimezone(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 

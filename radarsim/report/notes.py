@@ -33,7 +33,7 @@ TAIL, MISSED, MOVED = 5.0, 3.0, 0.5
 # Of `multimodel_1hz`, 200 × 1000 realisations, rows that their own scan alone marks cover 16 … 100 % where unmarked;
 # with a tenth of the run on either side no row can be told from 95 %; with a twentieth five of `sonar_missed` can.
 NEARBY = 0.1
-# A paired gain of two filters that err nearly alike hangs on the few realisations in which they do not, of which the
+# A paired gain of two filters that err nearly alike depends on the few realisations in which they do not, of which the
 # moments of either tell nothing. Of `multimodel_families_1hz`, 200 × 1000 realisations, intervals that are under a
 # tenth of what independent filters would have cover 53 … 91 %, to 0.2 of it 92 %, to 0.3 and over 95 %. Gaussian errors
 # need no such mark: they are those of filters that are known exactly.
@@ -49,9 +49,9 @@ SHARES = {
     "probabilities": ("probability",),
     "orders": ("weight",),
 }
-# Columns that foretell a share, where a table has one: rows are marked by these events in place of those that came.
+# Columns that predict a share, where a table has one: rows are marked by these events in place of those that came.
 # Where about twenty are to come, a row that is marked by what came is unmarked when chance brought more: such rows of
-# `ambiguous_doppler`'s calibration, 200 × 1000 realisations, cover 93.9 %, and 95.0 % when marked by what is foretold.
+# `ambiguous_doppler`'s calibration, 200 × 1000 realisations, cover 93.9 %, and 95.0 % when marked by what is predicted.
 FORETOLD = {"calibration": ("expected",)}
 BOUNDED = {"calibration"}  # tables of yes or no alone, of realisations of their own: no tails
 

@@ -204,7 +204,7 @@ def at_its_place(result: CaseResult, sentence: str) -> str:
     return f"{where}: {sentence}" if where else sentence
 
 
-def told(results: Sequence[CaseResult], most: int = 3) -> tuple[list[CaseResult], list[str]]:
+def reported(results: Sequence[CaseResult], most: int = 3) -> tuple[list[CaseResult], list[str]]:
     """The cases that an answer tells: all, or of more than so many the first and the last; and words on the others."""
     if len(results) <= most:
         return list(results), []

@@ -1,4 +1,4 @@
-"""What `radarsim check` foretells, beside numbers of realisations: what is out of reach, what will have no effect."""
+"""What `radarsim check` predicts, beside numbers of realisations: what is out of reach, what will have no effect."""
 
 import json
 

@@ -196,7 +196,7 @@ def test_readings_that_are_run(ran, tmp_path):
     _part, judged = by_name["shipped"].parts[0]
     assert judged.lo < judged.measured < judged.hi
     computed = seen[-1]
-    assert computed[0] == computed[1]  # all that was foreseen is done
+    assert computed[0] == computed[1]  # all that was predicted is done
     again = []
     app.readings([ran], out=tmp_path, figures=False, progress=lambda *of: again.append(of))
     assert again[-1][2] == again[-1][1]  # all of it from the store

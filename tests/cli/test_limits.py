@@ -102,10 +102,10 @@ def test_a_precision_of_rates_is_relative_and_of_the_last_window(tmp_path):
     rare = pd.read_csv(tmp_path / "discriminator_rare" / "rare.csv").iloc[0]
     assert 50 * (rare["rate_hi"] - rare["rate_lo"]) / rare["rate"] < 20
     assert rare["n"] < 100_000
-    (foretold,) = json.loads(
+    (predicted,) = json.loads(
         command("check", "discriminator_rare", "--precision", 20, "--of", "lost", "--json", *fewer[:2]).stdout
     )
-    assert 0.5 <= foretold["cases"][0]["need"]["realisations"] / rare["n"] <= 2
+    assert 0.5 <= predicted["cases"][0]["need"]["realisations"] / rare["n"] <= 2
     refused = command("run", "rls2", "-n", 4_000, "--precision", 1, "--of", "lock", *PLAIN, "--out", tmp_path, code=2)
     assert refused.stderr == "rls2: of: must be what the case has, got lock: no lock rate in locks.csv\n"
 
@@ -268,7 +268,7 @@ def test_json_is_one_document_on_stdout(tmp_path):
 
 
 def test_a_pilot_and_exact_values_say_about_the_same(tmp_path):
-    """The last look that both foresee is within a doubling of where the run ends."""
+    """The last look that both predict is within a doubling of where the run ends."""
     for config, percent in (("rls2", 1), ("sonar_correlated", 2)):
         (check,) = json.loads(command("check", config, "-n", "1e6", "--precision", percent, "--json").stdout)
         command("run", config, "-n", "1e6", "--precision", percent, *PLAIN, "--out", tmp_path)

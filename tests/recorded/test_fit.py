@@ -140,7 +140,7 @@ def test_the_wrong_number_is_named_nine_times_of_ten(kind):
 
 
 def test_a_turning_target_needs_another_manoeuvre_variance_not_another_sigma():
-    """The case that misled: σ stated rightly, a turn that the filter does not foresee."""
+    """The case that misled: σ stated rightly, a turn that the filter does not predict."""
     config = loaded("target=turn", "scans=40", "radar.sigma_range_m=60", "radar.sigma_velocity_mps=2")
     columns = follow.simulated(config)
     measured = {name: columns[name] for name in ("t_s", "range_m", "velocity_mps")}

@@ -97,12 +97,12 @@ def test_a_gain_of_all_there_is_divides_by_nothing():
     assert list(noted.get("note", [""])) == [""]
 
 
-@pytest.mark.parametrize("foretold", [True, False])
-def test_a_calibration_is_marked_by_what_is_foretold(foretold, monkeypatch):
+@pytest.mark.parametrize("predicted", [True, False])
+def test_a_calibration_is_marked_by_what_is_foretold(predicted, monkeypatch):
     """Bins of 16 to 24 events to come: marked by those that came, the bins left are those of chance's excess."""
     import pandas as pd
 
-    if not foretold:
+    if not predicted:
         monkeypatch.setattr(notes, "SHARES", {"calibration": ("right",)})
         monkeypatch.setattr(notes, "FORETOLD", {})
     rng, n = np.random.default_rng(3), 1000
@@ -112,7 +112,7 @@ def test_a_calibration_is_marked_by_what_is_foretold(foretold, monkeypatch):
     made = {"curves": pd.DataFrame(), "calibration": table.assign(expected=truth)}
     free = notes.noted(made, [])["calibration"]["note"].eq("").to_numpy()
     held = (right.lo <= truth) & (truth <= right.hi)
-    if foretold:
+    if predicted:
         np.testing.assert_array_equal(free, truth >= 0.02)
         assert abs(held[free].mean() - 0.95) < 0.01  # Wilson's own unevenness; 12 000 bins tell it to 0.002
     else:

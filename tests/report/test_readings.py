@@ -19,7 +19,7 @@ from radarsim.report.statistics import Estimate
 
 
 class Small(PaperReadings):
-    """Two numbers that hang on two choices, of which one bears on the first claim alone."""
+    """Two numbers that depend on two choices, of which one bears on the first claim alone."""
 
     paper = "P9"
     choices = (
@@ -127,7 +127,7 @@ def test_printed_numbers_together():
     assert by_name["as shipped"].held == ()
     assert by_name["as shipped"].count(granular=False) == by_name["as shipped"].count(granular=True) == 1
     assert by_name["scale: two"].held == ("P9.2",)
-    assert len(by_name["scale: two"].came) == 3
+    assert len(by_name["scale: two"].outcomes) == 3
     assert by_name["scale: two; form: square"].judged == ("P9.2",)  # the form does not bear on it
     assert found.every[0].count(granular=False) == 1
     assert found.best(granular=False) is found.shipped  # of several with one, none nearer the shipped
@@ -144,7 +144,7 @@ def test_a_number_comes_out_by_its_interval():
     for name, seen in {"in": (10, 9.5, 10.5), "wide": (10, 8, 11.5), "beyond": (15, 14, 16)}.items():
         found = under(Sampled(), one, Sampled().reading(), seen)
         own = joint(Sampled(), [Over(one, (found,))]).shipped
-        came[name] = [(number.strict, number.granular, number.open) for number in own.came.values()]
+        came[name] = [(number.strict, number.granular, number.open) for number in own.outcomes.values()]
     assert came["in"] == [(True, True, False), (True, True, False)]
     assert came["wide"] == [(False, False, True), (False, True, False)]
     assert came["beyond"] == [(False, False, False), (False, False, False)]
@@ -160,7 +160,7 @@ def test_of_variants_one_suffices_and_void_parts_count_for_nothing():
     one = Claim("P9.4", "somewhere", "one or two", (*parts, void, ours))
     found = under(Small(), one, Small().reading(), 2.0)
     own = joint(Small(), [Over(one, (found,))]).shipped
-    ((number, came),) = own.came.items()
+    ((number, came),) = own.outcomes.items()
     assert number == ("P9.4", ": one")
     assert (came.value, came.strict) == (2.0, True)
 

@@ -83,11 +83,15 @@ KERNELS = (
     *mutants(
         "radarsim/studies/discriminator/kernels/sums.py",
         (
-            "within[i] = 1.0 if worst < 5.0",
-            "within[i] = 1.0 if worst < 4.0",
+            "met[i, k, 0] = 1.0 if worst < 5.0",
+            "met[i, k, 0] = 1.0 if worst < 4.0",
             f"{BURST}::test_sums_of_errors_against_numpy",
         ),
-        ("1.0 if worst_posterior < 5.0", "1.0 if worst < 5.0", f"{BURST}::test_sums_of_errors_against_numpy"),
+        (
+            "met[i, k, 2] = 1.0 if worst_posterior < 5.0",
+            "met[i, k, 2] = 1.0 if worst < 5.0",
+            f"{BURST}::test_sums_of_errors_against_numpy",
+        ),
     ),
 )
 

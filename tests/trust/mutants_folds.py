@@ -30,7 +30,7 @@ FOLDS = (
         f"{STUDY}/kernels/steps.py",
         ("P[4] - g[1] * P[2]", "P[4] - g[2] * P[2]", ONE),
         ("mean, square / total - mean * mean, total", "mean, square / total, total", MERGING),
-        ("get(plot, CAME), full(0.5 * D)", "get(plot, CAME), full(D)", f"{ONE} {NEAREST}"),
+        ("get(plot, DETECTED), full(0.5 * D)", "get(plot, DETECTED), full(D)", f"{ONE} {NEAREST}"),
     ),
     *mutants(
         f"{STUDY}/kernels/hypotheses.py",

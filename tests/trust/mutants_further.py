@@ -165,8 +165,8 @@ RUNS = (
     *mutants(
         "radarsim/report/precision.py",
         (
-            "np.isnan(percent) | np.isnan(sigma), np.inf",
-            "np.isnan(percent) | np.isnan(sigma), 0.0",
+            "np.isnan(percent) | np.isnan(value), np.inf",
+            "np.isnan(percent) | np.isnan(value), 0.0",
             "report/test_precision.py::test_what_is_not_known_is_never_reached",
         ),
         (

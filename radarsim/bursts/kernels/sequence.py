@@ -44,7 +44,7 @@ OPTIONS = np.dtype(
         ("phases", np.int64),  # tried in the first window; 0: in closed form
         ("steps", np.int64),  # of scoring in a window, at most
         ("tolerance", np.float64),  # ε
-        ("coherent", np.int64),  # whether steps heed the coherence
+        ("coherent", np.int64),  # whether steps account for the coherence
         ("search", np.int64),  # points on each side in the search at a hand-over; 0: none
         ("spacing", np.float64),  # of those points, radians rms
         ("margin", np.float64),  # standard errors of the coherence below one that start the search

@@ -326,7 +326,7 @@ class _Plots001:
         self.unrolled = Unrolled(WRAP_001_S)
 
     def row(self, data: bytes, at: int) -> tuple[str, str, tuple[float, ...] | None, int]:
-        """As of category 048; the profile hangs on the first bit of item 020, the second item of both."""
+        """As of category 048; the profile depends on the first bit of item 020, the second item of both."""
         kind = _after_specification(data, at) + 2  # item 010 has two bytes
         tracked = kind < len(data) and bool(data[kind] & 0x80)
         places, end = (self.tracked if tracked else self.plot).places(data, at)

@@ -73,7 +73,7 @@ class PaperClaims:
     """The claims of a paper that a study judges, and how its results are read for them.
 
     paper is how tables cite it: authors and year. page is the stem of the study's page in docs/, where there is one.
-    may_shorten names keys that only cut a run short, or let it go on: what does not hang on its end is judged still.
+    may_shorten names keys that only cut a run short, or let it go on: what does not depend on its end is judged still.
     may_grow names the study's lists to which members may be added without its being another experiment than the
     paper's; every other key must be as in the claim's config, see `radarsim.report.claims.paper`.
     held_too names, by the stem of a shipped config, the claims of other configs of which it holds every part: when it

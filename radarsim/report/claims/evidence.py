@@ -47,7 +47,7 @@ class Certain(Estimate):
 class Series:
     """A measured curve: scans k, times t, values and the ends of their intervals, arrays of one length.
 
-    short says why it ends before the paper's does; what hangs on its end is then missing.
+    short says why it ends before the paper's does; what depends on its end is then missing.
     """
 
     k: np.ndarray

@@ -21,7 +21,7 @@ def with_readings(rows: Sequence[Mapping[str, Any]], stored: Sequence[Mapping[st
     """Rows of claims.csv with holds, of, depends_on and the class filled in from rows of readings.csv.
 
     A claim of which no reading is stored stays as it is, and so does one that was not judged. Where the readings say
-    that the print contradicts itself, which hangs on more than how each of them comes out, so does the row.
+    that the print contradicts itself, which depends on more than how each of them comes out, so does the row.
     """
     by_claim: dict[str, list[Mapping[str, Any]]] = {}
     for row in stored:

@@ -22,7 +22,7 @@ WITHIN = term("within the margins of the words {count} of {of} numbers come out 
 
 
 @dataclass(frozen=True)
-class Came:
+class Outcome:
     """What came of a printed number under a reading: its value, and by which rule it comes out.
 
     open: its interval is too wide to say whether it lies within the margin.
@@ -53,16 +53,16 @@ class Together:
     kind: str
     held: tuple[str, ...]
     judged: tuple[str, ...]
-    came: Mapping[Key, Came]
+    outcomes: Mapping[Key, Outcome]
 
     def count(self, granular: bool) -> int:
         """How many numbers come out."""
-        return sum(one.granular if granular else one.strict for one in self.came.values())
+        return sum(one.granular if granular else one.strict for one in self.outcomes.values())
 
     @property
     def open(self) -> int:
         """Of how many it cannot be said whether they lie within their margin."""
-        return sum(one.open for one in self.came.values())
+        return sum(one.open for one in self.outcomes.values())
 
 
 @dataclass(frozen=True)
@@ -94,10 +94,10 @@ class Joint:
         said = []
         for granular, words in ((False, TO_THE_PRINT), (True, WITHIN)):
             own, best = self.shipped, self.best(granular)
-            text = tr(words, count=own.count(granular), of=len(own.came))
+            text = tr(words, count=own.count(granular), of=len(own.outcomes))
             if best.count(granular) > own.count(granular):
                 text += tr(
-                    ", {count} of {of} with {name}", count=best.count(granular), of=len(best.came), name=best.name
+                    ", {count} of {of} with {name}", count=best.count(granular), of=len(best.outcomes), name=best.name
                 )
             else:
                 text += tr(", and no reading that the paper allows gives more")
@@ -112,8 +112,8 @@ class Joint:
         known = {one.reading: one for one in self.every}
         found = {}
         for number in self.numbers:
-            tried = {name: known[of].came.get(number) for name, of in alone.items() if of in known}
-            found[number] = _listed({name: came.strict for name, came in tried.items() if came is not None})
+            tried = {name: known[of].outcomes.get(number) for name, of in alone.items() if of in known}
+            found[number] = _listed({name: outcomes.strict for name, outcomes in tried.items() if outcomes is not None})
         return found
 
 
@@ -143,9 +143,9 @@ def joint(of: PaperReadings, over: Sequence[Over]) -> Joint:
         if len(own) < len(at) and reading not in declared:
             continue
         held = tuple(one.under.claim.id for one in own if one.held)
-        came = {key: value for one in own for key, value in one.came.items()}
+        outcomes = {key: value for one in own for key, value in one.outcomes.items()}
         judged = tuple(one.under.claim.id for one in own)
-        found.append(Together(reading, of.name(reading), of.kind(reading), held, judged, came))
+        found.append(Together(reading, of.name(reading), of.kind(reading), held, judged, outcomes))
     found.sort(key=lambda one: (-one.count(False), -one.count(True), -len(one.held), changed(of, one.reading)))
     numbers = {key: asserted for own in claims for one in own.values() for key, asserted in one.numbers.items()}
     return Joint(of, tuple(found), numbers)
@@ -163,7 +163,7 @@ class _Own:
         self.under = under
         self.held = under.outcome is not None and under.outcome.kind == rule.CONFIRMED
         parts = _numbers(under)
-        self.came = {key: _came(under, own) for key, own in parts.items()}
+        self.outcomes = {key: _outcome(under, own) for key, own in parts.items()}
         self.numbers = {
             key: Asserted(under.claim.id, part.what, part.expected.words, part.unit)
             for key, ((part, _), *_) in parts.items()
@@ -180,15 +180,17 @@ def _numbers(one: Under) -> dict[Key, list[tuple[Part, Judged]]]:
     return found
 
 
-def _came(one: Under, parts: Sequence[tuple[Part, Judged]]) -> Came:
+def _outcome(one: Under, parts: Sequence[tuple[Part, Judged]]) -> Outcome:
     many = sum(judged.sampled for _, judged in one.parts)
-    return max((_one(part, judged, many) for part, judged in parts), key=lambda came: (came.strict, came.granular))
+    return max(
+        (_one(part, judged, many) for part, judged in parts), key=lambda outcomes: (outcomes.strict, outcomes.granular)
+    )
 
 
-def _one(part: Part, judged: Judged, many: int) -> Came:
+def _one(part: Part, judged: Judged, many: int) -> Outcome:
     lo, hi = rule.ends(judged, many)
     low, high = judged.expected_lo - judged.margin, judged.expected_hi + judged.margin
     slack = rule.ROUNDING * judged.margin
     strict = part.expected.strict[0] - slack <= lo and hi <= part.expected.strict[1] + slack
     granular = low - slack <= lo and hi <= high + slack
-    return Came(judged.value, strict, granular, not granular and not (hi < low or lo > high))
+    return Outcome(judged.value, strict, granular, not granular and not (hi < low or lo > high))

@@ -264,7 +264,7 @@ def _row(claim: Claim, paper: str, one: _Tried, outcome: Outcome | None, many: i
 
 
 def blank(claim: Claim, paper: str) -> dict[str, Any]:
-    """The columns of a claim that do not hang on a measurement; the others empty."""
+    """The columns of a claim that do not depend on a measurement; the others empty."""
     empty: dict[str, Any] = dict.fromkeys(CLAIMED, "") | dict.fromkeys(NUMBERS, math.nan)
     return empty | {
         "claim": claim.id,

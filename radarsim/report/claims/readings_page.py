@@ -89,7 +89,7 @@ def _best(of: Joint) -> str:
     best = of.every[:SHOWN]
     rows = [
         (
-            *(one.name, one.kind, f"{one.count(False)} of {len(one.came)}", str(one.count(True)), str(one.open)),
+            *(one.name, one.kind, f"{one.count(False)} of {len(one.outcomes)}", str(one.count(True)), str(one.open)),
             *(f"{len(one.held)} of {len(one.judged)}", ", ".join(one.held)),
         )
         for one in [*best, *([] if of.shipped in best else [of.shipped])]
@@ -111,13 +111,13 @@ def _printed(of: Joint) -> str:
 
 
 def _came(of: Together, key: Key) -> str:
-    if key not in of.came:
+    if key not in of.outcomes:
         return "not judged"
-    came = of.came[key]
-    text = plain(came.value) if math.isfinite(came.value) else "none"
-    if came.strict:
+    outcomes = of.outcomes[key]
+    text = plain(outcomes.value) if math.isfinite(outcomes.value) else "none"
+    if outcomes.strict:
         return f"**{text}**"
-    return text if came.granular else f"{text} ?" if came.open else f"{text} –"
+    return text if outcomes.granular else f"{text} ?" if outcomes.open else f"{text} –"
 
 
 def _alternatives(of: Joint) -> str:

@@ -16,15 +16,15 @@ MOST = 12  # sentences; the table has all
 def sentences(made: "pd.DataFrame") -> list[str]:
     """At the last common time, of the first component of each quantity: both values, and by how much they differ."""
     last = at_the_end(made)
-    told = []
+    lines = []
     for quantity, rows in last.groupby("quantity", sort=False):
         series = next(one for one in SERIES if one.value == quantity)
         first = rows[(rows["component"] == rows["component"].iloc[0]) & (rows["model"] == rows["model"].iloc[0])]
-        told += [_sentence(series.words, row) for row in first.to_dict("records")]
+        lines += [_sentence(series.words, row) for row in first.to_dict("records")]
         if series.ratio:
             break  # gains and shares of the same filters stand in the table
-    left = len(told) - MOST
-    return told[:MOST] + (
+    left = len(lines) - MOST
+    return lines[:MOST] + (
         [
             plural(
                 "{count} further comparison: in comparison.csv.",

@@ -333,7 +333,7 @@ class Combined:
     """Orders combined by their expected error, or by intersecting intervals: the members, and their joint errors.
 
     The errors are those of right folds, by the recursion of `exact`, with the gains that each row had. A manoeuvre may
-    begin at each of the last `scans` rows. A combination foretells nothing, so that there are no innovations.
+    begin at each of the last `scans` rows. A combination predicts nothing, so that there are no innovations.
     """
 
     def __init__(self, options: Any, spec: Any):

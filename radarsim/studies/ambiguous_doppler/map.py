@@ -37,7 +37,7 @@ def fan(case: Case, number: int, scans: int) -> Fan:
         )
         plots, out, listed = sums.simulated_lists(world, plan.banks, 0)
         count = int(out[0, -1, records.COUNT, LANE])
-        which = int(plots[:, records.CAME, LANE].sum()) % 2  # each plot is written from one list into the other
+        which = int(plots[:, records.DETECTED, LANE].sum()) % 2  # each plot is written from one list into the other
         own = listed.reshape(COLUMNS, -1)[4 * which : 4 * which + 4, :count]
         weight = np.exp(own[3] - own[3].max(initial=-np.inf))
         order = np.argsort(-weight, kind="stable")

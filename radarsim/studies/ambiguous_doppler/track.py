@@ -27,11 +27,11 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     first = realisation - realisation % WIDTH
     plots, _ = sums.simulated(plan.world, plan.banks, first)
     own = plots[:, :, realisation - first]
-    came = own[:, records.CAME] > 0
+    detected = own[:, records.DETECTED] > 0
     measured = {
         "t_s": plan.axes.t_s,
-        "range_m": np.where(came, own[:, records.RANGE], np.nan),
-        "velocity_mps": np.where(came, own[:, records.VELOCITY], np.nan),
+        "range_m": np.where(detected, own[:, records.RANGE], np.nan),
+        "velocity_mps": np.where(detected, own[:, records.VELOCITY], np.nan),
     }
     truth = own[:, records.TRUTH : records.TRUTH + 3]
     return measured | dict(zip((true_column(*one) for one in COMPONENTS), truth.T, strict=True))

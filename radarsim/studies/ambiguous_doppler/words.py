@@ -44,21 +44,21 @@ def answer(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> lis
 
     Of filters of several orders: the largest error of each over the scans, beside that of the best single order.
     """
-    shown, others = panels.told(results, 6)
+    shown, others = panels.reported(results, 6)
     return [*(sentence for result in shown for sentence in _sentences(result, made)), *others]
 
 
 def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
-    axes, told = result.axes, []
+    axes, sentences = result.axes, []
     spans = ", ".join(numeral(f"{span:g}") for span in result.spec.radar.spans_mps)
     for name in _told_of(result):
         where = f"{panels.plain_label(result)}, D = {spans} {tr('m/s')}, {name}"
         clauses = list(filter(None, (_as_good(result, name, made), _right(result, name, made))))
         if clauses:
-            told.append(f"{where}: {'; '.join(clauses)}.")
+            sentences.append(f"{where}: {'; '.join(clauses)}.")
     if axes.combines.any():
-        told.extend(_orders_sentence(result, made))
-    return told
+        sentences.extend(_orders_sentence(result, made))
+    return sentences
 
 
 def _told_of(result: Result) -> list[str]:

@@ -219,8 +219,8 @@ class Estimator(Model):
     )
     coherence_step: Flag = Field(
         False,
-        title="steps that heed the coherence",
-        description="let steps heed the coherence: far from the maximum the curvature is less than Fisher's",
+        title="steps that account for the coherence",
+        description="let steps account for the coherence: far from the maximum the curvature is less than Fisher's",
     )
     search_points: Annotated[int, Whole(0, 10)] = Field(
         0,

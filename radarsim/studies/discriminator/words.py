@@ -33,8 +33,12 @@ def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
         plain = list(results)  # what is sought is said of each
     if not plain and len(results) > 1:
         return [_over(results, made, name) for name in results[0].axes.filters]
-    told = plain or list(results)
-    return [words for result in told for words in _of_one(result, made, f"{result.name}, " if len(told) > 1 else "")]
+    sentences = plain or list(results)
+    return [
+        words
+        for result in sentences
+        for words in _of_one(result, made, f"{result.name}, " if len(sentences) > 1 else "")
+    ]
 
 
 def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:

@@ -27,7 +27,7 @@ def question(experiment: Experiment) -> str:
 def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
     """Sentences: which filter has the least σ of the height in each stage, by case; for one case also of the rate of
     climb."""
-    shown, others = panels.told(results, 4)
+    shown, others = panels.reported(results, 4)
     height = [f"{panels.plain_label(result)}: {_least(result, made, 'y', term('the height'))}" for result in shown]
     climb = [f"{panels.plain_label(results[0])}: {_least(results[0], made, 'vy', term('the rate of climb'))}"]
     controls = [tr("Intervals are those with controls where both ways agree and these are narrower.")]

@@ -138,7 +138,7 @@ class Prior(Model):
 
 
 class Forecast(Model):
-    """A forecast that is the same at each scan: errors about the truth, drawn anew, Gaussian."""
+    """A forecast that is the same at each scan: errors about the truth, drawn independently, Gaussian."""
 
     sigma_velocity_mps: Positive = Field(
         title="σ of the forecast velocity", description="standard deviation of the radial velocity, m/s"

@@ -40,7 +40,7 @@ def question(experiment: Experiment) -> str:
 
 def answer(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> list[str]:
     """For each case: the burst in numbers; of each filter its locks and its last σ beside the idealisation."""
-    shown, others = panels.told(results, 3)
+    shown, others = panels.reported(results, 3)
     return [*(sentence for result in shown for sentence in _sentences(result, made)), *others]
 
 
@@ -51,7 +51,7 @@ def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
         return []
     low, high = float(axes.energy_db.min()), float(axes.energy_db.max())
     energy = tr("{low:.3g} dB", low=low) if high - low < 0.05 else tr("{low:.3g} to {high:.3g} dB", low=low, high=high)
-    told = [
+    sentences = [
         tr(
             "{case}: {pulses} pulses in {burst_ms:.3g} ms, {energy} in all, allow σ_V = {sigma:.3g} m/s (Fisher "
             "bound).",
@@ -64,8 +64,8 @@ def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
     ]
     for f, name in enumerate(axes.filters):
         if axes.ideal[f] >= 0:
-            told.append(f"{panels.plain_label(result)}, {name}: {_filter(result, made, name)}.")
-    return told
+            sentences.append(f"{panels.plain_label(result)}, {name}: {_filter(result, made, name)}.")
+    return sentences
 
 
 def _filter(result: Result, made: "Mapping[str, pd.DataFrame]", name: str) -> str:

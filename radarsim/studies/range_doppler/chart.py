@@ -131,7 +131,7 @@ def aside(case: Case) -> str:
 
 
 def table(places: Sequence[Place]) -> "pd.DataFrame":
-    """chart.csv: of each case and component the steady gain, exact and in closed form, and the numbers it hangs on."""
+    """chart.csv: of each case and component the steady gain, exact and in closed form, and what it depends on."""
     names = [name for name, _ in COMPONENTS]
     count = len(names)
     corrected = [closed_form.steady_gains(p.of.c, p.inputs[2] / p.tau_2_s) for p in places]

@@ -66,12 +66,12 @@ class _Patterns:
 
     weight: np.ndarray
     count: np.ndarray
-    came: np.ndarray
+    detected: np.ndarray
     errors: Errors
 
     def __getitem__(self, which: np.ndarray) -> "_Patterns":
         errors = Errors(*(getattr(self.errors, f.name)[..., which] for f in fields(Errors)))
-        return _Patterns(self.weight[which], self.count[which], self.came[which], errors)
+        return _Patterns(self.weight[which], self.count[which], self.detected[which], errors)
 
     def joined(self, other: "_Patterns") -> "_Patterns":
         """Both sets side by side."""
@@ -79,7 +79,7 @@ class _Patterns:
         return _Patterns(
             np.concatenate([self.weight, other.weight]),
             np.concatenate([self.count, other.count]),
-            np.concatenate([self.came, other.came]),
+            np.concatenate([self.detected, other.detected]),
             Errors(*(np.concatenate(pair, axis=2) for pair in pairs)),
         )
 
@@ -101,12 +101,12 @@ class _Waiting:
 
     weight: np.ndarray
     count: np.ndarray
-    came: np.ndarray
+    detected: np.ndarray
     information: Information
 
     def __getitem__(self, which: np.ndarray) -> "_Waiting":
         information = Information.of(self.information.L[..., which], self.information.Y[..., which])
-        return _Waiting(self.weight[which], self.count[which], self.came[which], information)
+        return _Waiting(self.weight[which], self.count[which], self.detected[which], information)
 
     def branched(self, plots: Plots, observes: int) -> "_Waiting":
         """Each pattern with the next scan's plot, and without it; those that count."""
@@ -116,8 +116,8 @@ class _Waiting:
         both = Information.of(np.concatenate([hit.L, old.L], axis=2), np.concatenate([hit.Y, old.Y], axis=2))
         weight = np.concatenate([p * self.weight, (1 - p) * self.weight])
         count = np.concatenate([self.count + 1, self.count])
-        came = np.repeat([True, False], len(self.count))
-        return _Waiting(weight, count, came, both)[weight > NEGLIGIBLE]
+        detected = np.repeat([True, False], len(self.count))
+        return _Waiting(weight, count, detected, both)[weight > NEGLIGIBLE]
 
 
 def mixture(
@@ -147,7 +147,7 @@ def mixture(
         waiting = waiting.branched(plots, design.observes)
         begun, waiting = waiting[waiting.count == design.start], waiting[waiting.count < design.start]
         errors = begun.information.errors()
-        started = started.joined(_Patterns(begun.weight, begun.count, begun.came, errors))
+        started = started.joined(_Patterns(begun.weight, begun.count, begun.detected, errors))
         _note(made, k, started, _seen(started, waiting, plots, design.observes), beside)
         if len(started.weight) > most:
             started = _merged(started[started.weight > NEGLIGIBLE], most)
@@ -160,7 +160,7 @@ class _Seen(NamedTuple):
 
     weight: np.ndarray
     plots: np.ndarray
-    came: np.ndarray
+    detected: np.ndarray
     there: np.ndarray
     bias: np.ndarray
     moment: np.ndarray
@@ -169,7 +169,7 @@ class _Seen(NamedTuple):
 
 def _seen(started: _Patterns, waiting: _Waiting, plots: Plots, observes: int) -> _Seen:
     """The patterns that have started, and those whose estimate is the plot that came."""
-    errors, held = started.errors, waiting[waiting.came]
+    errors, held = started.errors, waiting[waiting.detected]
     n = len(held.weight)
     there = np.ones((3, len(started.weight) + n), dtype=bool)
     there[observes:, len(started.weight) :] = False
@@ -180,7 +180,7 @@ def _seen(started: _Patterns, waiting: _Waiting, plots: Plots, observes: int) ->
     return _Seen(
         np.concatenate([started.weight, held.weight]),
         np.concatenate([started.count, held.count]),
-        np.concatenate([started.came, held.came]),
+        np.concatenate([started.detected, held.detected]),
         there,
         beside(errors.E[:, 0], plots.bias),
         beside(diagonal(errors.second_moments()), plots.sigma**2 + plots.bias**2 + plots.sigma_bias**2),
@@ -212,7 +212,7 @@ def _note(made: Mixture, k: int, started: _Patterns, seen: _Seen, beside: Sequen
         made.nees[k] = np.divide(_nees(started.errors) @ started.weight, made.started[k])
         for g, other in enumerate(beside):
             observed = np.arange(3)[:, None] < other.observes
-            both = share * ((seen.plots >= other.start) | (observed & seen.came))
+            both = share * ((seen.plots >= other.start) | (observed & seen.detected))
             made.beside[g, k] = (both * seen.moment).sum(axis=1) / both.sum(axis=1)
 
 
@@ -261,7 +261,7 @@ def _grouped(patterns: _Patterns, cell: np.ndarray) -> _Patterns:
     E = mean(errors.E)
     S = mean(errors.second_moments()) - np.einsum("icb,jcb->ijb", E, E)
     one = order[first]
-    return _Patterns(total, patterns.count[one], patterns.came[one], Errors(mean(errors.P), S, E))
+    return _Patterns(total, patterns.count[one], patterns.detected[one], Errors(mean(errors.P), S, E))
 
 
 def settled(fine: Mixture, coarse: Mixture) -> bool:

@@ -58,7 +58,7 @@ def covariance_of(form: Form, variance: float, sigma_range_m: float, dt: float) 
 def started(start: Start, observes: int, sigma: np.ndarray, dt: float, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Covariances (B, 3, 3) of B starts, believed and true, at the last of the scans that make them.
 
-    observes is 1 (range) or 2 (and velocity); sigma (2,); Q (B, 3, 3) of a scan, which only `process_noise` heeds: the
+    observes is 1 (range) or 2 (and velocity); sigma (2,); Q (B, 3, 3) of a scan, which only `process_noise` uses: the
     others believe what is true of a target that does not manoeuvre while they start.
     """
     scans = first_scan(start, observes)

@@ -120,10 +120,10 @@ class _One:
             k += 1
         if k < n:
             dt = np.diff(t[k:], prepend=self.last if k == 0 else t[k - 1])
-            came = taken[k:].astype(float)
+            detected = taken[k:].astype(float)
             found = np.full((n - k, 2), np.nan)
             rows.filter_rows(
-                *(self.x, self.P, dt, np.where(taken[k:], z[k:], 0.0), came, self.sigma**2, self.noise),
+                *(self.x, self.P, dt, np.where(taken[k:], z[k:], 0.0), detected, self.sigma**2, self.noise),
                 *(estimate[k:], sigma[k:], found),
             )
             nis[k:] = found

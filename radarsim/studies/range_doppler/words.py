@@ -38,8 +38,8 @@ def answer(results: Sequence[Result], made: Made) -> list[str]:
     """
     gains = _gain_sentences(results, made)
     best = [*_best_sentences(results, made), *_best_of_broken(results, made)]
-    told = [*best, *gains] if _asks_for_variance(results) else [*gains, *best]
-    return [*told, *_broken_sentences(results, made), *_looked_for(results), *_ambiguity(results)]
+    sentences = [*best, *gains] if _asks_for_variance(results) else [*gains, *best]
+    return [*sentences, *_broken_sentences(results, made), *_looked_for(results), *_ambiguity(results)]
 
 
 def _asks_for_variance(results: Sequence[Result]) -> bool:
@@ -52,12 +52,12 @@ def _gain_sentences(results: Sequence[Result], made: Made) -> list[str]:
     rows = made["gains"][made["gains"]["case"].isin([result.name for result in plain])]
     gains, every = common.groups(rows, "component"), common.groups(made["gains"], "component")
     labels = {result.name: panels.plain_label(result) for result in results}
-    told = [
+    sentences = [
         _gain_sentence(plain, gains[(c,)], every[(c,)], of.name, labels)
         for c, of in QUANTITIES.items()
         if (c,) in gains
     ]
-    return told or [_sigma_sentence(results[0], made["curves"])]
+    return sentences or [_sigma_sentence(results[0], made["curves"])]
 
 
 class _Moment(NamedTuple):
@@ -123,13 +123,13 @@ def _capital(word: str) -> str:
 LOSS = 1.0  # per cent: a gain certainly below minus this, at any scan, is told
 
 
-def _loss(every: "pd.DataFrame", told: "pd.Series[Any]", labels: dict[str, str]) -> list[str]:
+def _loss(every: "pd.DataFrame", sentences: "pd.Series[Any]", labels: dict[str, str]) -> list[str]:
     """The greatest of the certain losses in words, unless there is none or it is the gain already told."""
     sure = every[every["gain_hi"] < -LOSS]
     if not len(sure):
         return []
     worst = sure.iloc[int(sure["gain_percent"].to_numpy().argmin())]
-    if worst.name == told.name:
+    if worst.name == sentences.name:
         return []
     several = every["filter"].nunique() > 1
     gain, at = _gain(worst), worst["t_s"]
@@ -155,13 +155,13 @@ def _baseline(results: Sequence[Result]) -> str:
 def _best_sentences(results: Sequence[Result], made: Made) -> list[str]:
     """The best manoeuvre variance of each radar and filter, in words, where several were tried."""
     table = made["steady"]
-    told: list[str] = []
+    sentences: list[str] = []
     for members in panels.families(results).values():
         rows = table[table["case"].isin([r.name for r in members]) & (table["component"] == "r")]
         if rows.groupby("filter")["manoeuvre_variance"].nunique().max() > 1:
             chosen = [_best(rows[rows["filter"] == name], name) for name in members[0].axes.filters]
-            told.append(f"{panels.plain(panels.device(members[0]))}: {'; '.join(chosen)}.")
-    if not told:
+            sentences.append(f"{panels.plain(panels.device(members[0]))}: {'; '.join(chosen)}.")
+    if not sentences:
         return []
     rule = plural(
         "Best manoeuvre variance D_M, (m/s³)² (least steady σ of the range among those that settle in under {count} "
@@ -170,7 +170,7 @@ def _best_sentences(results: Sequence[Result], made: Made) -> list[str]:
         "scan periods).",
         PERIODS,
     )
-    return [" ".join([rule, *told])]
+    return [" ".join([rule, *sentences])]
 
 
 def _best(rows: "pd.DataFrame", name: str) -> str:
@@ -215,21 +215,21 @@ def _given(result: Result) -> bool:
 
 def _best_of_broken(results: Sequence[Result], made: Made) -> list[str]:
     """The D_M of those tried with which the worst error on a manoeuvring target is least, by radar and filter."""
-    curves, told = made["curves"], []
+    curves, sentences = made["curves"], []
     rows = curves[(curves["component"] == "r") & (curves["k"] >= FIRST)]
     rows = rows.assign(error=rows["exact_sigma"].fillna(rows["sigma"]))
     for name, members in _tried_on(results).items():
         own = rows[rows["case"].isin([member.name for member in members])]
         words = [_least_worst(own[own["filter"] == one], members, one) for one in members[0].axes.filters]
-        told.append(f"{panels.plain(name)}: {'; '.join(words)}.")
-    if not told:
+        sentences.append(f"{panels.plain(name)}: {'; '.join(words)}.")
+    if not sentences:
         return []
     rule = tr(
         "Best manoeuvre variance D_M, (m/s³)², on a target that breaks the filters' model (least worst σ of the range "
         "from scan {k} on).",
         k=FIRST,
     )
-    return [" ".join([rule, *told])]
+    return [" ".join([rule, *sentences])]
 
 
 def _least_worst(rows: "pd.DataFrame", members: Sequence[Result], name: str) -> str:
@@ -254,26 +254,26 @@ def _broken_sentences(results: Sequence[Result], made: Made) -> list[str]:
     compared = {member.name for members in _tried_on(results).values() for member in members}
     broken = [result for result in results if not follows_the_model(result) and result.name not in compared]
     rows = common.groups(made["curves"][made["curves"]["component"] == "r"], "case", "filter")
-    told = []
+    sentences = []
     for result in broken[:MOST_TOLD]:
         words = [f"{name} {_worst(rows[result.name, name])}" for name in result.axes.filters]
-        told.append(
+        sentences.append(
             tr(
                 "{case}, a target that breaks the filters' model: {filters}.",
                 case=panels.plain_label(result),
                 filters="; ".join(words),
             )
         )
-    left = len(broken) - len(told)
+    left = len(broken) - len(sentences)
     if left:
-        told.append(
+        sentences.append(
             plural(
                 "{count} further case breaks the model: see curves.csv.",
                 "{count} further cases break the model: see curves.csv.",
                 left,
             )
         )
-    return told
+    return sentences
 
 
 def _tuned(result: Result) -> list[tuple[str, Best, float]]:
@@ -295,7 +295,7 @@ OVER = {
 
 def _looked_for(results: Sequence[Result]) -> list[str]:
     """The D_M that were looked for."""
-    told = []
+    sentences = []
     for result in [result for result in results if _tuned(result)][:MOST_TOLD]:
         axes, words = result.axes, []
         for name, wanted, variance in _tuned(result):
@@ -310,19 +310,19 @@ def _looked_for(results: Sequence[Result]) -> list[str]:
                 )
             else:
                 words.append(tr("{filter} {variance} ({rule})", **said))
-        told.append(
+        sentences.append(
             tr(
                 "{case}: D_M, (m/s³)², looked for by the exact errors: {filters}.",
                 case=panels.plain_label(result),
                 filters="; ".join(words),
             )
         )
-    return told
+    return sentences
 
 
 def _ambiguity(results: Sequence[Result]) -> list[str]:
     """That velocities are not folded, where a config gives the repetition rate."""
-    told: dict[str, str] = {}
+    sentences: dict[str, str] = {}
     for result in results:
         if "repetition_rate_hz" in result.spec.radar.model_fields_set and (result.axes.observes == 2).any():
             span, speed = span_mps(result), result.axes.speed_mps
@@ -332,13 +332,13 @@ def _ambiguity(results: Sequence[Result]) -> list[str]:
                 words = tr(
                     "a span of {span:.4g} m/s, which the target's {speed:.4g} m/s exceed", span=span, speed=speed
                 )
-            told.setdefault(panels.plain(panels.device(result)), words)
-    if not told:
+            sentences.setdefault(panels.plain(panels.device(result)), words)
+    if not sentences:
         return []
     return [
         tr(
             "Velocities are taken as unambiguous; the repetition rate alone tells apart λF/2 ({spans}).",
-            spans="; ".join(f"{name}: {span}" for name, span in told.items()),
+            spans="; ".join(f"{name}: {span}" for name, span in sentences.items()),
         )
     ]
 

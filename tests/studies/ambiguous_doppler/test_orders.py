@@ -26,7 +26,7 @@ SCALE = np.array([1e5, 1e3, 10.0])
 def outputs(case):
     plan = study.prepare(case)
     plots, out = sums.simulated(plan.world, plan.banks, 8)
-    columns = plots[:, [records.RANGE, records.VELOCITY, records.UNFOLDED, records.CAME]]
+    columns = plots[:, [records.RANGE, records.VELOCITY, records.UNFOLDED, records.DETECTED]]
     return plan, columns, out
 
 

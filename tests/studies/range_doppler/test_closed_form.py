@@ -105,7 +105,7 @@ def test_a_target_that_moves_as_believed_never_loses_by_the_velocity():
         for start, from_scan in (("process_noise", 0), ("weighted", 40)):
             base, own = recursion.both(radar, [("random_jerk", v, start) for v in variances], 120)
             assert np.nanmin(recursion.gain(base.believed, own.believed)[:, from_scan:]) > -1e-6
-    # Two that do not heed the manoeuvre while they start, one over two scans and one over three, are not comparable.
+    # Two that ignore the manoeuvre while they start, one over two scans and one over three, are not comparable.
     base, own = recursion.both(RADARS[1], [("random_jerk", 1e-2, "weighted")], 60)
     assert np.nanmin(recursion.gain(base.believed, own.believed)) < -1
     # And the same filters lose on a truth that does not manoeuvre, where c is small.

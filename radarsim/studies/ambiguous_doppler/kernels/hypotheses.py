@@ -15,8 +15,8 @@ from radarsim.kernels.lanes import WIDTH, exponential, full, get, nearest, put, 
 from radarsim.kernels.symmetric import predicted_axis
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     BEST,
-    CAME,
     COUNT,
+    DETECTED,
     FIRST,
     GAINS,
     LISTED,
@@ -138,7 +138,7 @@ def run_remembering(design, most, deepest, spans, plots, gains, out, lists):
                     start[i] = 0.0 if c < 3 or i == 0 else NOTHING
             column(lists, which, 0)[0] = plot[RANGE * WIDTH]
             count, right = 1, 0
-        if count > 0 and plot[CAME * WIDTH] > 0.0:
+        if count > 0 and plot[DETECTED * WIDTH] > 0.0:
             c = 0.5 / scan[VARIANCE * WIDTH]
             top = nearest_folds(lists, which, count, plot[VELOCITY * WIDTH], D, c)
             made = branched(lists, which, count, D, top, deepest, most)

@@ -13,8 +13,8 @@ from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import exponential, full, get, nearest, put, root, row, where_greater
 from radarsim.kernels.symmetric import predicted_axis, predicted_own
 from radarsim.studies.ambiguous_doppler.kernels.records import (
-    CAME,
     DESIGN,
+    DETECTED,
     FIRST,
     MEMBERS,
     NONE,
@@ -127,10 +127,10 @@ def taken(own, design, sigma, plot, D, unfolding, moves):
     F, Q = motion(design)
     zero, one = full(0.0), full(1.0)
     x, P = three(own, STATE), six(own, COVARIANCE)
-    came, first = get(plot, CAME), get(plot, FIRST)
+    detected, first = get(plot, DETECTED), get(plot, FIRST)
     if moves:
         x, P = predicted_axis(x, F), predicted_own(P, F, Q)
-    P, weight, g = range_taken(P, first, came - first, sigma[0] * sigma[0])
+    P, weight, g = range_taken(P, first, detected - first, sigma[0] * sigma[0])
     z = get(plot, RANGE)
     e = z - x[0]
     distance, factor = 2.0 * weight * (e * e), where_greater(weight, zero, root(weight), one)
@@ -141,12 +141,12 @@ def taken(own, design, sigma, plot, D, unfolding, moves):
         if unfolding != UNFOLDS:
             e = get(plot, VELOCITY) - x[1]
             e = e - D * nearest(e / D)
-        P, S, g = velocity_taken(P, came * design[TAKES_VELOCITY], sigma[1] * sigma[1])
+        P, S, g = velocity_taken(P, detected * design[TAKES_VELOCITY], sigma[1] * sigma[1])
         mean, variance, total = e, zero, one
         if unfolding != UNFOLDS:
             mean, variance, total = folds_merged(e, S, D)
-        distance = distance + came * (e * e) / S
-        factor = factor * where_greater(came, zero, total / root(S), one)
+        distance = distance + detected * (e * e) / S
+        factor = factor * where_greater(detected, zero, total / root(S), one)
         x = moved(x, g, mean)
         P = widened(P, g, variance)
     put_three(own, STATE, x)

@@ -6,7 +6,7 @@ from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, nearest, put, row, where_greater
 from radarsim.kernels.random import fill_normal_strip, fill_uniform_pairs
 from radarsim.studies.ambiguous_doppler.kernels.records import (
-    CAME,
+    DETECTED,
     FIRST,
     PAIRED,
     PLOT,
@@ -39,7 +39,7 @@ def solve_remainders(world, plots):
     for k in range(world.truth.shape[0]):
         scan = row(plots, k * PLOT)
         scan[SOLVED * WIDTH] = scan[PAIRED * WIDTH] = 0.0
-        if scan[CAME * WIDTH] > 0.0:
+        if scan[DETECTED * WIDTH] > 0.0:
             joint = world.joint[world.turn[k], world.turn[before]] if before >= 0 else 0.0
             if joint > 0.0:
                 z = row(plots, before * PLOT)[VELOCITY * WIDTH]
@@ -78,13 +78,13 @@ def fill_plots(world, first, random, plots):
         put(scan, VELOCITY, u - span * nearest(u / span))
     started = zero
     for k in range(scans):
-        scan, came = row(to, k * PLOT), one
+        scan, detected = row(to, k * PLOT), one
         if world.detection < 1.0:
             fill_uniform_pairs(world.keys[1], first, k, a[8 * k : 8 * k + 8], b[8 * k : 8 * k + 8])
-            came = where_greater(full(world.detection), get(noise_r, k), one, zero)
-        put(scan, CAME, came)
-        put(scan, FIRST, came * (one - started))
-        started = where_greater(came, started, one, started)
+            detected = where_greater(full(world.detection), get(noise_r, k), one, zero)
+        put(scan, DETECTED, detected)
+        put(scan, FIRST, detected * (one - started))
+        started = where_greater(detected, started, one, started)
         put(scan, STARTED, started)
     if world.joint.any():
         for lane in range(WIDTH):

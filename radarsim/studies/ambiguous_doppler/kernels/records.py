@@ -14,7 +14,7 @@ from radarsim.kernels.lanes import WIDTH, rows
 # A scan's plot and truth: range and folded velocity; the velocity before it was folded; 1 where there is a plot, where
 # it is the first, where there has been one; the truth (3); the velocity by the Chinese remainder of this plot and the
 # one before it, and 1 where these have one.
-RANGE, VELOCITY, UNFOLDED, CAME, FIRST, STARTED, TRUTH, SOLVED, PAIRED, PLOT = 0, 1, 2, 3, 4, 5, 6, 9, 10, 11
+RANGE, VELOCITY, UNFOLDED, DETECTED, FIRST, STARTED, TRUTH, SOLVED, PAIRED, PLOT = 0, 1, 2, 3, 4, 5, 6, 9, 10, 11
 
 # A scan's gains, shared by all hypotheses of a realisation: 1/(2S) of the range's innovation and its gains (3); of the
 # velocity's the variance S, which stands also where there is no plot, and its gains (3). Zero where nothing is taken.

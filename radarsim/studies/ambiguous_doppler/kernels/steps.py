@@ -17,8 +17,8 @@ from radarsim.kernels.lanes import any_greater, exponential, full, get, nearest,
 from radarsim.kernels.symmetric import predicted_axis, predicted_own
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     BEST,
-    CAME,
     COUNT,
+    DETECTED,
     FIRST,
     GAINS,
     LISTED,
@@ -133,13 +133,13 @@ def fill_gains(design, sigma, scans, plots, gains):
     P = prior(design)
     for k in range(scans):
         plot, to = row(plots, k * PLOT), row(gains, k * GAINS)
-        came, first = get(plot, CAME), get(plot, FIRST)
+        detected, first = get(plot, DETECTED), get(plot, FIRST)
         if k > 0:
             P = predicted_own(P, F, Q)
-        P, weight, g = range_taken(P, first, came - first, sigma[0] * sigma[0])
+        P, weight, g = range_taken(P, first, detected - first, sigma[0] * sigma[0])
         put(to, WEIGHT, weight)
         put_three(to, RANGE_GAIN, g)
-        taken = get(plot, PAIRED) if design[TAKES_VELOCITY] > 1.0 else came * design[TAKES_VELOCITY]
+        taken = get(plot, PAIRED) if design[TAKES_VELOCITY] > 1.0 else detected * design[TAKES_VELOCITY]
         P, S, g = velocity_taken(P, taken, sigma[1] * sigma[1])
         put(to, VARIANCE, S)
         put_three(to, VELOCITY_GAIN, g)
@@ -158,7 +158,7 @@ def whether_right(right, plot, taken, D):
     """`right` (0 or 1) where the velocity `taken`, folded back somehow, is the one that was folded; else 0."""
     off = get(plot, UNFOLDED) - taken
     off = where_greater(off, full(0.0), off, full(0.0) - off)
-    return where_greater(off * get(plot, CAME), full(0.5 * D), full(0.0), right)
+    return where_greater(off * get(plot, DETECTED), full(0.5 * D), full(0.0), right)
 
 
 @inline
@@ -224,18 +224,18 @@ def run_merged(design, sigma, spans, plots, out):
     x, P, right = (zero, zero, zero), prior(design), full(1.0)
     for k in range(spans.size):
         plot, D = row(plots, k * PLOT), spans[k]
-        came, first = get(plot, CAME), get(plot, FIRST)
+        detected, first = get(plot, DETECTED), get(plot, FIRST)
         x = predicted_axis(x, F)
         if k > 0:
             P = predicted_own(P, F, Q)
-        P, _, g = range_taken(P, first, came - first, sigma[0] * sigma[0])
+        P, _, g = range_taken(P, first, detected - first, sigma[0] * sigma[0])
         z = get(plot, RANGE)
         x = moved(x, g, z - x[0])
         x = where_greater(first, zero, z, x[0]), x[1], x[2]
         e = get(plot, VELOCITY) - x[1]
         e = e - D * nearest(e / D)
         right = whether_right(right, plot, x[1] + e, D)
-        P, S, g = velocity_taken(P, came, sigma[1] * sigma[1])
+        P, S, g = velocity_taken(P, detected, sigma[1] * sigma[1])
         mean, variance, _ = folds_merged(e, S, D)
         x = moved(x, g, mean)
         P = widened(P, g, variance)

@@ -11,10 +11,10 @@ from radarsim.studies.ambiguous_doppler.kernels.plots import fill_plots
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     BEYOND_SUM,
     BINS,
-    CAME,
     CHOOSES,
     COUNT,
     COUNT_SUM,
+    DETECTED,
     GAINS,
     INTERACTS,
     LISTED,
@@ -123,7 +123,7 @@ def add_scan(plot, estimated, counted, half_span, sums):
 def add_calibration(out, plot, calibration):
     """Count the lanes by the probability of the best hypothesis, and those where it is right; of plots that count."""
     for i in range(WIDTH):
-        if plot[CAME * WIDTH + i] > 0.0:
+        if plot[DETECTED * WIDTH + i] > 0.0:
             p = out[PROBABILITY * WIDTH + i]
             p = p if p >= 0.0 else 0.0  # not-a-number, which the errors show, is no place in the table
             number = 3 * min(int(p * BINS), BINS - 1)
@@ -140,7 +140,7 @@ def add_group(world, banks, memory, sums):
     for k in range(scans):
         plot = row(address(memory.plots), k * PLOT)
         counted = whole * get(plot, STARTED)
-        put(plot, CAME, whole * get(plot, CAME))  # read by add_calibration, and no more after it
+        put(plot, DETECTED, whole * get(plot, DETECTED))  # read by add_calibration, and no more after it
         base = row(out, (banks.bank[banks.baseline] * scans + k) * OUTPUT + banks.place[banks.baseline])
         for f in range(banks.bank.size):
             bank = row(out, (banks.bank[f] * scans + k) * OUTPUT)

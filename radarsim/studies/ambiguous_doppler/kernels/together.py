@@ -33,9 +33,9 @@ from radarsim.studies.ambiguous_doppler.kernels.orders import (
 )
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     BEST,
-    CAME,
     COUNT,
     DESIGN,
+    DETECTED,
     LISTED,
     MEAN,
     NONE,
@@ -307,7 +307,7 @@ def run_together(bank, limits, sigma, spans, plots, out, room):
             put(plot, i, full(here[i * WIDTH]))
         groups = (count + WIDTH - 1) // WIDTH
         ranged(bank, sigma, plot, k > 0, groups, (old, new), lists)
-        if here[CAME * WIDTH] > 0.0:
+        if here[DETECTED * WIDTH] > 0.0:
             made, top = branched(size, (variance, here[VELOCITY * WIDTH], D), limits, count, new, plot, lists)
             found, is_right = row(lists.children, lists.most // WIDTH), -1
             for i in range(made):

@@ -74,10 +74,10 @@ def density(work, old, new, rules, lane):
     size, total, least = rules.size, 0.0, 1e300
     last, at = size - 1, RESULT if rules.family == GPB2 else RESULT_GROUP
     for i in range(size):
-        if chance(work, old, rules, lane, i) > 0.0:
+        if predicted_probability(work, old, rules, lane, i) > 0.0:
             least = min(least, work[(at + 2 * i) * WIDTH + lane])
     for i in range(size):
-        c = chance(work, old, rules, lane, i)
+        c = predicted_probability(work, old, rules, lane, i)
         if c > 0.0:
             q, determinant = work[(at + 2 * i) * WIDTH + lane], work[(at + 2 * i + 1) * WIDTH + lane]
             total += c * np.exp(0.5 * (least - q)) / np.sqrt(determinant)
@@ -88,7 +88,7 @@ def density(work, old, new, rules, lane):
 
 
 @inline
-def chance(work, old, rules, lane, i):
+def predicted_probability(work, old, rules, lane, i):
     """The predicted probability of model i; of GPB2, that of the pair that leads from model i to the last one."""
     if rules.family == GPB2:
         last = rules.size - 1

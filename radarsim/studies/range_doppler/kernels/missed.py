@@ -119,7 +119,7 @@ def shapes(filters: int, scans: int) -> dict[str, tuple[int, ...]]:
 class Work(NamedTuple):
     """Arrays of one chunk of n realisations.
 
-    plots (2, n) range and velocity; came (n,) 1 where the scan has a plot; other (n,) for the pair of numbers drawn
+    plots (2, n) range and velocity; detected (n,) 1 where the scan has a plot; other (n,) for the pair of numbers drawn
     with it; count (n,) plots so far; first (n,) the scan of the first; offset (2, n) the biases; state (3, n) the drawn
     difference of the truth, moved on; shift (6, n) the displacement that is drawn of a flight; x (F, 3, n) and
     p (F, 6, n) of filters that have started; normal (F, 9, n) the sums of the starts in the making, six of the matrix
@@ -128,7 +128,7 @@ class Work(NamedTuple):
     """
 
     plots: np.ndarray
-    came: np.ndarray
+    detected: np.ndarray
     other: np.ndarray
     count: np.ndarray
     first: np.ndarray
@@ -182,32 +182,32 @@ def transported(p, dt):
 
 
 @part
-def count_plots(keys, first, k, detection, came, other, count, first_plot):
+def count_plots(keys, first, k, detection, detected, other, count, first_plot):
     """Draw which realisations have a plot at scan k, and count it: two scans share a pair of uniform numbers."""
-    n = came.size
+    n = detected.size
     if detection == 1.0:
-        came[:] = 1.0
+        detected[:] = 1.0
     elif k % 2 == 0:
-        fill_uniform_pairs(keys[1], first, k // 2, came, other)
+        fill_uniform_pairs(keys[1], first, k // 2, detected, other)
         for i in range(n):
-            came[i] = 1.0 if came[i] < detection else 0.0
+            detected[i] = 1.0 if detected[i] < detection else 0.0
     else:
         for i in range(n):
-            came[i] = 1.0 if other[i] < detection else 0.0
+            detected[i] = 1.0 if other[i] < detection else 0.0
     for i in range(n):
-        first_plot[i] = float(k) if count[i] == 0.0 and came[i] == 1.0 else first_plot[i]
-        count[i] += came[i]
+        first_plot[i] = float(k) if count[i] == 0.0 and detected[i] == 1.0 else first_plot[i]
+        count[i] += detected[i]
 
 
 @part
-def scan_range(x, p, plots, came, dt, Q, R):
+def scan_range(x, p, plots, detected, dt, Q, R):
     """One scan, in place, of a filter that observes the range: addresses of x (3, n), p (6, n), plots and came."""
     q0, q1, q2, q3, q4, q5 = Q[0], Q[1], Q[2], Q[3], Q[4], Q[5]
     for i in range(EIGHTS):
         r, v, a = extrapolated(get(x, i), get(x, EIGHTS + i), get(x, 2 * EIGHTS + i), dt)
         c0, c1, c2, c3, c4, c5 = transported(packed(p, i), dt)
         c0, c1, c2, c3, c4, c5 = c0 + q0, c1 + q1, c2 + q2, c3 + q3, c4 + q4, c5 + q5
-        here = get(came, i)
+        here = get(detected, i)
         weight = here / (c0 + R)
         left = 1.0 - here + R * weight  # c0 − c0²/(c0 + R) would cancel
         e = get(plots, i) - r
@@ -217,14 +217,14 @@ def scan_range(x, p, plots, came, dt, Q, R):
 
 
 @part
-def scan_range_velocity(x, p, plots, came, dt, Q, R, R_velocity):
+def scan_range_velocity(x, p, plots, detected, dt, Q, R, R_velocity):
     """One scan, in place, of a filter that observes range and velocity, one number after the other; as above."""
     q0, q1, q2, q3, q4, q5 = Q[0], Q[1], Q[2], Q[3], Q[4], Q[5]
     for i in range(EIGHTS):
         r, v, a = extrapolated(get(x, i), get(x, EIGHTS + i), get(x, 2 * EIGHTS + i), dt)
         c0, c1, c2, c3, c4, c5 = transported(packed(p, i), dt)
         c0, c1, c2, c3, c4, c5 = c0 + q0, c1 + q1, c2 + q2, c3 + q3, c4 + q4, c5 + q5
-        here = get(came, i)
+        here = get(detected, i)
         weight = here / (c0 + R)
         left = 1.0 - here + R * weight
         e = get(plots, i) - r
@@ -265,7 +265,7 @@ def put_packed(p, i, value):
 
 
 @part
-def gather(normal, plots, came, k, first_plot, weights, observes):
+def gather(normal, plots, detected, k, first_plot, weights, observes):
     """Add the plots that came at scan k to the starts' normal equations, normal (9, n); all by their addresses.
 
     The unknowns are range, velocity dt and acceleration dt² at the realisation's first plot; weights are the inverse
@@ -274,7 +274,7 @@ def gather(normal, plots, came, k, first_plot, weights, observes):
     a, b, dt = weights
     b = b if observes == 2 else 0.0
     for i in range(EIGHTS):
-        u, here = float(k) - get(first_plot, i), get(came, i)
+        u, here = float(k) - get(first_plot, i), get(detected, i)
         h, c, d = 0.5 * u * u, a * here, b * here
         z, w = c * get(plots, i), d * get(plots, EIGHTS + i) * dt
         s0, s1, s2, s3, s4, s5 = packed(normal, i)
@@ -290,7 +290,7 @@ def begin(made, f, k, start, dt):
     """Start filter f where the last plot of its start has come at scan k, in place."""
     x, p, normal, first_plot = made.x[f], made.p[f], made.normal[f], made.first
     for i in range(CHUNK):
-        if made.came[i] == 1.0 and made.count[i] == start:
+        if made.detected[i] == 1.0 and made.count[i] == start:
             of = inverted((normal[0, i], normal[1, i], normal[2, i], normal[3, i], normal[4, i], normal[5, i]))
             y0, y1, y2 = normal[6, i], normal[7, i], normal[8, i]
             r = of[0] * y0 + of[1] * y1 + of[2] * y2
@@ -308,7 +308,7 @@ def begin(made, f, k, start, dt):
 def compare(made, f, start, observes, truth, R):
     """Filter f: its errors, zero where there is no estimate, where there is one, and its believed variance; R (2,)."""
     x, p, e, has = address(made.x[f]), address(made.p[f]), address(made.e[f]), address(made.has[f])
-    v, plots, came, count = address(made.v[f]), address(made.plots), address(made.came), address(made.count)
+    v, plots, detected, count = address(made.v[f]), address(made.plots), address(made.detected), address(made.count)
     state = address(made.state)
     for c in range(3):
         of_plot = 1.0 if c < observes else 0.0
@@ -316,7 +316,7 @@ def compare(made, f, start, observes, truth, R):
         for i in range(EIGHTS):
             at = c * EIGHTS + i
             runs = where_greater(get(count, i), full(start - 0.5), full(1.0), full(0.0))
-            waits = (1.0 - runs) * of_plot * get(came, i)
+            waits = (1.0 - runs) * of_plot * get(detected, i)
             there = runs + waits
             value = runs * get(x, at) + waits * get(plots, measured * EIGHTS + i)
             put(e, at, value - there * (truth[c] + get(state, at)))
@@ -468,11 +468,11 @@ def observe(keys, first, k, made, truth, sigma):
 
 
 @summing
-def begun(count, came, start):
+def begun(count, detected, start):
     """How many realisations have started before this scan."""
     number = 0.0
     for i in range(count.size):
-        number += 1.0 if count[i] - came[i] >= start else 0.0
+        number += 1.0 if count[i] - detected[i] >= start else 0.0
     return number
 
 
@@ -480,15 +480,15 @@ def begun(count, came, start):
 def advance(made, f, k, dt, observes, start, Q, R):
     """Scan k of filter f, in place: those that have started, then those that are to start; True where all had."""
     if k > 0:
-        at = address(made.x[f]), address(made.p[f]), address(made.plots), address(made.came)
+        at = address(made.x[f]), address(made.p[f]), address(made.plots), address(made.detected)
         if observes == 1:
             scan_range(*at, dt, Q, R[0])
         else:
             scan_range_velocity(*at, dt, Q, R[0], R[1])
-    if begun(made.count, made.came, start) == float(CHUNK):
+    if begun(made.count, made.detected, start) == float(CHUNK):
         return True
     weights = 1.0 / R[0], 1.0 / (R[1] * dt * dt), dt
-    sums_at, plots_at, came_at = address(made.normal[f]), address(made.plots), address(made.came)
+    sums_at, plots_at, came_at = address(made.normal[f]), address(made.plots), address(made.detected)
     gather(sums_at, plots_at, came_at, k, address(made.first), weights, observes)
     begin(made, f, k, start, dt)
     return False
@@ -525,7 +525,7 @@ def add_block(made, first, count, problem, sums):
             if drawn:
                 move_truth(made, k, dt, flight, truth)
             observe(keys, first + done, k, made, truth[k], sigma)
-            count_plots(keys, first + done, k, detection, made.came, made.other, made.count, made.first)
+            count_plots(keys, first + done, k, detection, made.detected, made.other, made.count, made.first)
             whole = True
             for f in range(observes.size):
                 whole &= advance(made, f, k, dt, observes[f], start[f], Q[f], R)
@@ -538,7 +538,7 @@ def add_block(made, first, count, problem, sums):
 
 
 @kernel
-def fill_simulated(made, first, problem, plots, came, truth):
+def fill_simulated(made, first, problem, plots, detected, truth):
     """Realisation `first`: plots (K, 2), came (K,) 1 where there is one, truth (K, 3); made: work arrays."""
     spread = problem.sigma_bias, problem.sigma_state, problem.sigma_flight
     drawn = begin_chunk(problem.keys, first, made, problem.bias, *spread)
@@ -546,8 +546,8 @@ def fill_simulated(made, first, problem, plots, came, truth):
         if drawn:
             move_truth(made, k, problem.dt, problem.flight, problem.truth)
         observe(problem.keys, first, k, made, problem.truth[k], problem.sigma)
-        count_plots(problem.keys, first, k, problem.detection, made.came, made.other, made.count, made.first)
-        plots[k, 0], plots[k, 1], came[k] = made.plots[0, 0], made.plots[1, 0], made.came[0]
+        count_plots(problem.keys, first, k, problem.detection, made.detected, made.other, made.count, made.first)
+        plots[k, 0], plots[k, 1], detected[k] = made.plots[0, 0], made.plots[1, 0], made.detected[0]
         for c in range(3):
             truth[k, c] = problem.truth[k, c] + made.state[c, 0]
 
@@ -564,6 +564,6 @@ def simulate_block(problem: Problem, first: int, count: int, sums: Sums) -> None
 def simulate_plots(problem: Problem, realisation: int) -> tuple[np.ndarray, np.ndarray]:
     """A realisation's plots (K, 2) as `simulate_block` draws them, not-a-number where missed, and its truth (K, 3)."""
     problem, scans = problem.plain(), len(problem.truth)
-    plots, came, truth = np.empty((scans, 2)), np.empty(scans), np.empty((scans, 3))
-    fill_simulated(work(len(problem.observes)), int(realisation), problem, plots, came, truth)
-    return np.where(came[:, None] == 1, plots, np.nan), truth
+    plots, detected, truth = np.empty((scans, 2)), np.empty(scans), np.empty((scans, 3))
+    fill_simulated(work(len(problem.observes)), int(realisation), problem, plots, detected, truth)
+    return np.where(detected[:, None] == 1, plots, np.nan), truth

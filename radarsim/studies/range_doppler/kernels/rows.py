@@ -10,10 +10,10 @@ from radarsim.kernels.compile import kernel
 
 
 @kernel
-def filter_rows(x, P, dt, z, came, variance, noise, estimate, spread, nis):
+def filter_rows(x, P, dt, z, detected, variance, noise, estimate, spread, nis):
     """Go through n rows, in place: state x (3,), its covariance P (3, 3) before the first of them.
 
-    dt (n,) s since the row before; z (n, 2) value and rate, came (n, 2) 1 where the filter takes the number, else 0;
+    dt (n,) s since the row before; z (n, 2) value and rate, detected (n, 2) 1 where the filter takes it, else 0;
     variance (2,) of the plots; noise (2, 3, 3): a time t adds noise[0, i, j] t^(5 - i - j) + noise[1, i, j]
     t^(6 - i - j) to P. Out: estimate (n, 3), spread (n, 3) the believed standard deviations, nis (n, 2) the squared
     innovation over its variance, where the number came.
@@ -37,7 +37,7 @@ def filter_rows(x, P, dt, z, came, variance, noise, estimate, spread, nis):
                 grown = noise[0, i, j] * power[5 - i - j] + noise[1, i, j] * power[6 - i - j]
                 P[i, j] = M[i, 0] * F[j, 0] + M[i, 1] * F[j, 1] + M[i, 2] * F[j, 2] + grown
         for m in range(2):
-            if came[k, m] > 0.0:
+            if detected[k, m] > 0.0:
                 S = P[m, m] + variance[m]
                 innovation = z[k, m] - x[m]
                 nis[k, m] = innovation * innovation / S

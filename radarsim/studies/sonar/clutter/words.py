@@ -26,7 +26,7 @@ def question(specs: Sequence[Keys]) -> str:
 def answer(results: Sequence[CaseResult[ClutterAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
     """A sentence for each case shown: time to a confirmed track, track life, false tracks per hour, by tracker."""
     sentences = []
-    shown, others = panels.told(results, 2)
+    shown, others = panels.reported(results, 2)
     for result in shown:
         rows = made["tracking"][made["tracking"]["case"] == result.name]
         trackers = "; ".join(_of_tracker(row) for _, row in rows.iterrows())

@@ -39,7 +39,7 @@ CHOICES = (
         "… for a high accuracy of the estimated coordinates a large number (5–6) of the preceding observations has to "
         "be taken into account at once.",
         (
-            Alternative("foretold as measured", UNSTATED, "the position a scan ahead is as good as a plot"),
+            Alternative("predicted as measured", UNSTATED, "the position a scan ahead is as good as a plot"),
             Alternative("half the variance", UNSTATED, "the smoothed position has half of a plot's"),
             Alternative("under 5 % more", UNSTATED, "a further plot lowers the smoothed σ by less"),
             Alternative("two thirds", UNSTATED, "the smoothed σ is two thirds of a plot's"),
@@ -183,7 +183,7 @@ def _enough(criterion: str) -> int:
     n = np.arange(2, 100)
     smoothed, ahead = 2 * (2 * n - 1) / (n * (n + 1)), 2 * (2 * n + 1) / (n * (n - 1))  # variances, of a plot's
     met = {
-        "foretold as measured": ahead <= 1,
+        "predicted as measured": ahead <= 1,
         "half the variance": smoothed <= 0.5,
         "under 5 % more": np.append(np.sqrt(smoothed[1:] / smoothed[:-1]) > 0.95, True),
         "two thirds": smoothed <= (2 / 3) ** 2,

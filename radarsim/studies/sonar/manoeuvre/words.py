@@ -27,7 +27,7 @@ def question(specs: Sequence[Keys]) -> str:
 def answer(results: Sequence[CaseResult[ManoeuvreAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
     """Sentences with 95 % intervals: how often each manoeuvre is detected, and σ of uses against the covariance's."""
     moving = [result for result in results if result.spec.detectors and result.axes.manoeuvre_s]
-    shown = panels.told(moving, 2)[0] if "detections" in made else []
+    shown = panels.reported(moving, 2)[0] if "detections" in made else []
     return [*filter(None, (_detected(result, made["detections"]) for result in shown)), *_first_order(made)]
 
 

@@ -76,7 +76,7 @@ CLAIMS = (
         original="Анализ показывает, что при оптимальной фильтрации и экстраполяции по методу максимального "
         "правдоподобия для получения высокой точности оценки координат необходим одновременный учет "
         "большого числа (5-6) предыдущих наблюдений.",
-        reading="the paper does not say what high accuracy is; taken: the position foretold is as good as one measured",
+        reading="the paper does not say what high accuracy is; taken: a predicted position as good as a measured one",
     ),
     _claim(
         4,
@@ -156,7 +156,7 @@ CLAIMS = (
     _claim(
         11,
         "principle of optimal construction, sequential smoothing",
-        "The recursion keeps two numbers however many the plots, and takes fewer operations than least squares anew",
+        "The recursion keeps two numbers however many the plots, with fewer operations than repeated least squares",
         Part((TEXTBOOK,), "numbers kept from plot to plot", "", measured.kept("recursion (12)-(14)"), within(2, 2)),
         *(
             Part(
@@ -210,7 +210,7 @@ CLAIMS = (
     _claim(
         14,
         "principle of optimal construction, sequential smoothing",
-        "Sequential smoothing raises the accuracy of what is put out, at a lower cost than least squares anew",
+        "Sequential smoothing raises the accuracy of what is put out, at a lower cost than repeated least squares",
         Part(
             (TEXTBOOK,),
             "σ of the recursion after 20 plots over that of least squares on 6",

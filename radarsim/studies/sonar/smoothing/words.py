@@ -30,7 +30,7 @@ def question(specs: Sequence[Keys]) -> str:
 
 def answer(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.DataFrame]") -> list[str]:
     """Sentences with 95 % intervals: σ of the first coordinate at the end, and the most optimistic filter."""
-    shown, others = panels.told(results)
+    shown, others = panels.reported(results)
     best = [_best(result, made["curves"]) for result in shown]
     return [*best, *_most_optimistic(results, made), *others]
 

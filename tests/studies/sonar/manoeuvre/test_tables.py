@@ -175,6 +175,6 @@ def test_of_many_cases_the_ends_are_shown():
 
 
 def test_an_answer_of_many_cases_tells_the_ends():
-    assert panels.told([1, 2, 3]) == ([1, 2, 3], [])
-    assert panels.told([1, 2, 3], 2) == ([1, 3], ["The case between: in the report's tables."])
-    assert panels.told([1, 2, 3, 4]) == ([1, 4], ["The 2 cases between: in the report's tables."])
+    assert panels.reported([1, 2, 3]) == ([1, 2, 3], [])
+    assert panels.reported([1, 2, 3], 2) == ([1, 3], ["The case between: in the report's tables."])
+    assert panels.reported([1, 2, 3, 4]) == ([1, 4], ["The 2 cases between: in the report's tables."])

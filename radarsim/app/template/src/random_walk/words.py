@@ -15,12 +15,12 @@ def question(experiment: Experiment) -> str:
 def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
     """A sentence for each case and filter: σ at the last scan, and the gain against the baseline."""
     last = made["gains"].groupby(["case", "filter"], sort=False).tail(1).set_index(["case", "filter"])
-    told = []
+    sentences = []
     for row in made["steady"].to_dict("records"):
         words = f"{row['last_sigma']:.4g} m [{row['last_lo']:.4g}, {row['last_hi']:.4g}]"
         if (row["case"], row["filter"]) in last.index:
             gain = last.loc[(row["case"], row["filter"])]
             interval = f"[{gain['gain_lo']:.3g}, {gain['gain_hi']:.3g}]"
             words += f", a gain of {gain['gain_percent']:.3g} % {interval} against {gain['baseline']}"
-        told.append(f"{row['case']}, {row['filter']}: σ of the position at the last scan is {words}.")
-    return told
+        sentences.append(f"{row['case']}, {row['filter']}: σ of the position at the last scan is {words}.")
+    return sentences
