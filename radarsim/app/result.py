@@ -126,7 +126,7 @@ class Result:
         >>> import radarsim
         >>> result = radarsim.run("rls2", realisations=2000)
         >>> result.figures[:2]
-        ('sigma_r', 'gain_r')
+        ('gain_r', 'sigma_r')
         >>> result.figure("sigma_r").axes[0].get_xlabel()
         'time from the first plot, s'
         """

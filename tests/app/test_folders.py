@@ -105,9 +105,11 @@ def test_the_command_of_a_report_is_of_what_is_reported(tmp_path):
 def test_cases_that_a_precision_ends_at_several_numbers_are_repeated_with_it():
     asked = load("rls2_manoeuvres", ["realisations=64000"])
     done = {case.name: 2000 * (1 + i) for i, case in enumerate(asked.cases)}
-    told = repeat.repeated(asked, done, ["realisations=64000"], 1.3)
+    told = repeat.repeated(asked, done, ["realisations=64000"], (1.3, "sigma"))
     assert told == "radarsim run rls2_manoeuvres -n 64000 --precision 1.3"
-    assert repeat.repeated(asked, dict.fromkeys(done, 64_000), ["realisations=64000"], 1.3).endswith("-n 64000")
+    assert repeat.repeated(asked, dict.fromkeys(done, 64_000), ["realisations=64000"], (1.3, "sigma")).endswith(
+        "-n 64000"
+    )
 
 
 def test_what_no_command_repeats_says_so(tmp_path):

@@ -248,7 +248,7 @@ def test_a_claim_in_place_of_a_config_is_told_its_config(name, said):
 
 def test_claims_of_a_config_not_yet_run_are_listed_as_such(tmp_path):
     result = radarsim("claims", "range_doppler", "--out", tmp_path)
-    assert "32 not run" in result.stdout
+    assert "34 not run" in result.stdout
     radarsim("run", "rls2", "-n", 3000, "--no-figures", "--out", tmp_path)
     assert "P1.18" in radarsim("claims", "rls2", "--out", tmp_path).stdout
 

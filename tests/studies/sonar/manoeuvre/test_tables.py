@@ -125,7 +125,7 @@ def test_cases_in_several_frames_stand_side_by_side():
     )
     described = output.figures(result.cases, result.tables, result.experiment)
     panels = described["response"].panels
-    assert [panel.title for panel in panels[:2]] == ["0.07 rad/s, polar", "0.07 rad/s, cartesian_unbiased"]
+    assert [panel.title for panel in panels[:2]] == ["4.01°/s, polar", "4.01°/s, cartesian unbiased"]
     assert [panel.y.label for panel in panels[:2]] == ["$\\sigma$ of $r$, m", "$\\sigma$ of $x$, m"]
     assert {"roc", "detection", "delay", "modes"} <= set(described)
     assert result.tables["detections"]["exact"].isna().mean() == 0.5

@@ -92,7 +92,7 @@ def test_counted_formulas_are_the_filters():
 def test_claims_are_judged_where_their_cases_are(results):
     found = {stem: set(result.tables["claims"]["claim"]) for stem, result in results.items()}
     assert {"P3.1", "P3.2", "P3.3", "P3.4", "P3.11"} <= found["sonar_smoothing"]
-    assert found["sonar_correlated"] == {"P3.6", "P3.12"}
+    assert found["sonar_correlated"] == {"P3.6", "P3.12", "P3.17"}
     assert found["sonar_missed"] == {"P3.5"}
     rows = results["sonar_missed"].tables["claims"]
     assert set(rows["verdict"]) == {claims.CONFIRMED}
