@@ -455,12 +455,13 @@ def _by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> 
         notes = (doubt,) if near else boundary(asked, curve, best)
         return answer(limit=limit.value, limit_at=best, notes=notes)
     value = nearest([one.value for one in found], asked)
-    own = next(one for one in found if one.value == value)
+    own, there = next(one for one in found if one.value == value), curve.simulated(value, count)
+    jumps = not over.whole and not there.lo <= asked.equals <= there.hi
     return answer(
-        **{"value": value, "lo": own.lo, "hi": own.hi, "attained": curve.simulated(value, count).value},
-        slope=_sampled_slope(curve, own),
+        **{"value": value, "lo": own.lo, "hi": own.hi, "attained": there.value},
+        slope=None if jumps else _sampled_slope(curve, own),
         others=tuple(one.value for one in found if not own.lo <= one.value <= own.hi),
-        notes=((WHOLE,) if over.whole else ()) + curve.noted(value),
+        notes=((JUMPS,) if jumps else ()) + ((WHOLE,) if over.whole else ()) + curve.noted(value),
     )
 
 

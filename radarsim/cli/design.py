@@ -87,7 +87,7 @@ def solve(
       radarsim solve rls2 radar.sigma_velocity_mps --gain r --filter r+Vr --at 60 --equals 30
       radarsim solve rls2 radar.scan_period_s --sigma Vr --filter r --at 60 --equals 5
       radarsim solve discriminator burst.noise_variance --lock sequence --equals 95 -n 1000
-      radarsim solve sonar_clutter filters.0.manoeuvre_variance --loss nearest --equals 8 \\
+      radarsim solve sonar_clutter sensor.detection_probability --loss nearest --equals 5 --between 0.6 1 \\
           --case "sonar_clutter sensor.false_plots_per_km2=1" -n 2000
     """
     from radarsim.app import documents

@@ -13,6 +13,7 @@ from radarsim.app.quantities import Quantity
 from radarsim.app.solve import Cases, Curve, solve
 from radarsim.cli import main
 from radarsim.errors import ConfigError
+from radarsim.report.statistics import Estimate
 from tests.studies.range_doppler import impulse
 
 GAIN = Quantity("gain", "r+Vr", "r", 60.0)
@@ -416,3 +417,50 @@ def test_a_sampled_answer_names_a_run_of_as_many_realisations():
     row = result.gains.query("component == 'r' and t_s == 60").iloc[0]
     half = (row["gain_hi"] - row["gain_lo"]) / 2
     assert abs(row["gain_percent"] - 30) < 2 * math.sqrt(2) * half  # four standard errors of a difference
+
+
+def test_sampled_it_is_said_where_the_quantity_jumps_over_the_target(monkeypatch):
+    """As a rate of few events does, of the same noise at neighbouring values."""
+    monkeypatch.setattr(
+        Curve, "_sampled", lambda self, case, n: (Estimate(*(case.spec.radar.sigma_velocity_mps > 15) * np.ones(3)), 0)
+    )
+    monkeypatch.setattr(Curve, "noted", lambda self, value: ())
+    found = solve("rls2", "radar.sigma_velocity_mps", GAIN, 0.4, sampled=True, realisations=100, between=(4, 40))
+    assert found.value == pytest.approx(15)
+    assert found.notes == ("the quantity jumps over the target there",)
+    assert found.slope is None
+
+
+CLUTTER = "sonar_clutter sensor.false_plots_per_km2=1"
+CONFIRMED = {
+    "lock": ("discriminator", "burst.noise_variance", Quantity("lock", "sequence"), 95.0, {}),
+    "right": ("ambiguous_rls2", "radar.sigma_velocity_mps", Quantity("right", "memory", at_k=4), 85.0, {}),
+    "loss": (
+        *("sonar_clutter", "sensor.detection_probability", Quantity("loss", "nearest"), 5.0),
+        {"case": CLUTTER, "between": (0.6, 1)},
+    ),
+    "false tracks": (
+        *("sonar_clutter", "sensor.sigma_range_m", Quantity("false_tracks", "nearest"), 6e4),
+        {"case": CLUTTER, "between": (15, 100)},
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", CONFIRMED)
+def test_the_run_that_a_sampled_answer_names_confirms_it(kind):
+    """It has noise of its own: what it attains is within four standard errors of a difference of two such runs."""
+    from radarsim.app import quantities
+
+    config, key, quantity, equals, given = CONFIRMED[kind]
+    found = solve(config, key, quantity, equals, realisations=1000, **given)
+    assert not found.exact
+    assert found.lo <= found.value <= found.hi
+    words = shlex.split(found.command)
+    assert words[-2:] == ["-n", "1000"]
+    overrides = [words[i + 1] for i, word in enumerate(words) if word == "--set"]
+    result = radarsim.run(words[2], overrides=overrides, realisations=1000)
+    one = next(one for one in result.cases if one.name == given.get("case", one.name))
+    seen, _ = quantities.sampled(quantity, one)
+    half = (seen.hi - seen.lo) / 2
+    assert abs(seen.value - equals) <= 2 * math.sqrt(2) * half, (seen, found)
