@@ -178,13 +178,13 @@ def test_the_interval_covers_a_known_root(name):
     assert abs(inside - 0.95 * seeds) <= 4 * math.sqrt(seeds * 0.95 * 0.05), (under, over)
 
 
-@pytest.mark.parametrize("name", ["every plot", "missed plots"])
-def test_the_interval_holds_the_root_where_the_quantity_s_own_interval_there_holds_the_target(name):
+@pytest.mark.parametrize(("name", "seeds"), [("every plot", 3), ("missed plots", 1)])
+def test_the_interval_holds_the_root_where_the_quantity_s_own_interval_there_holds_the_target(name, seeds):
     """So the one covers as often as the other; by a margin of the search's residue of a fiftieth of the interval."""
     quantity, equals, overrides = KNOWN[name]
     key, between = "radar.sigma_velocity_mps", (4, 40)
     exact = solve("rls2", key, quantity, equals, overrides=overrides, between=between).value
-    for seed in range(3):
+    for seed in range(seeds):
         cases = Cases("rls2", (*overrides, f"seed={seed}"))
         at_root = Curve(cases, key, quantity, 1, None, 400).simulated(exact, 400)
         found = solve(
