@@ -96,7 +96,7 @@ def test_claims_are_judged_where_their_cases_are(results):
     assert found["sonar_missed"] == {"P3.5"}
     rows = results["sonar_missed"].tables["claims"]
     assert set(rows["verdict"]) == {claims.CONFIRMED}
-    assert [claim.id for claim in STUDY.claims().claims] == [f"P3.{n}" for n in range(1, 16)]
+    assert [claim.id for claim in STUDY.claims().claims] == [f"P3.{n}" for n in range(1, 18)]
 
 
 def test_words_of_the_report(results):
