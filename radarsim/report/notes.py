@@ -121,7 +121,7 @@ def _noted(
     columns = [column for column in (*SHARES.get(name, ()), *FORETOLD.get(name, ())) if column in table]
     shares = [table[column].to_numpy(dtype=float) for column in columns]
     events = np.min([n * np.minimum(share, 1 - share) for share in shares], axis=0) if shares else np.inf
-    if "rare" in made:
+    if shares and "rare" in made:
         events = rare.of_rows(table, made["rare"], events)
     if name in BOUNDED:
         effective = np.full(n.shape, np.inf)

@@ -26,12 +26,12 @@ ERRORS = 4.0  # standard errors of the mean weight beyond which it is not one
 
 
 class Drawn(NamedTuple):
-    """How realisations were drawn: all of them, how many from the law itself, Σw and Σw²."""
+    """How realisations were drawn: all of them, how many from the law itself, Σw and Σw²; numbers, or one a row."""
 
     n: int
-    plain: float
-    weight: float
-    squared: float
+    plain: float | np.ndarray
+    weight: float | np.ndarray
+    squared: float | np.ndarray
 
 
 class Counted(NamedTuple):
@@ -62,7 +62,7 @@ def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted,
     with np.errstate(divide="ignore", invalid="ignore"):
         factor = np.where(of.number > 0, estimate.value * (1 - estimate.value) / variance, np.nan)
     mean = drawn.weight / drawn.n
-    spread = np.sqrt(max(drawn.squared / drawn.n - mean**2, 0) / max(drawn.n - 1, 1))
+    spread = np.sqrt(np.maximum(drawn.squared / drawn.n - mean**2, 0) / max(drawn.n - 1, 1))
     return {
         **labels,
         "event": np.full(size, event, dtype=object),
@@ -72,7 +72,7 @@ def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted,
         "events": of.number.astype(np.int64),
         "n_eff": statistics.effective_events(of.weight, of.squared),
         "variance_factor": factor,
-        "plain": np.full(size, int(drawn.plain)),
+        "plain": np.full(size, drawn.plain).astype(np.int64),
         "mean_weight": np.full(size, mean),
         "mean_weight_se": np.full(size, spread),
     }
@@ -105,7 +105,9 @@ def warnings(made: "pd.DataFrame | None") -> list[str]:
             )
         )
     for case, own in common.groups(made, "case").items():
-        mean, error = (float(own[name].iloc[0]) for name in ("mean_weight", "mean_weight_se"))
+        means, errors = (own[name].to_numpy(dtype=float) for name in ("mean_weight", "mean_weight_se"))
+        worst = int(np.argmax(np.abs(means - 1) - ERRORS * errors))
+        mean, error = means[worst], errors[worst]
         if abs(mean - 1) > ERRORS * error:
             said.append(
                 tr(
