@@ -13,7 +13,7 @@ SMOKE_FLAGS ?= --no-figures
 run: $(VENV)/installed
 	$(RADARSIM) run configs/rls2.yaml
 
-# A process for each processor, at most eight; what measures time or memory runs after them, alone. JOBS=0: one after another.
+# A process for each processor, at most eight; what measures memory or sends signals runs after them, alone. JOBS=0: one after another.
 JOBS ?= logical
 ORDINARY := not slow and not machines
 

@@ -21,6 +21,7 @@ from tests.engine.fake import Fake, textbook
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.alone
 WORK = Fake()
+PATIENCE_S = 40  # less than the 60 s that a stuck task or a main thread that lingers takes
 
 
 @contextmanager
@@ -52,13 +53,12 @@ def whole(store, realisations):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_stops_the_run_within_two_seconds_and_all_it_did_is_stored(tmp_path, number):
+def test_a_signal_stops_the_run_and_all_it_did_is_stored(tmp_path, number):
     with started(tmp_path, 16 * 4_000, "--pause", 1e-3) as process:
         time.sleep(0.3)
         process.send_signal(number)
-        seconds, status = ended(process)
+        assert process.wait(PATIENCE_S) == 128 + number
         said = process.stdout.read().split()
-    assert (seconds < 2, status) == (True, 128 + number)
     count = int(said[0])
     assert 0 < count < 16 * 4_000
     assert said[1] == hashlib.sha256(textbook(WORK, count).tobytes()).hexdigest()
@@ -70,30 +70,28 @@ def test_a_stuck_task_does_not_hold_up_the_stop(tmp_path):
     with started(tmp_path, 16 * 4_000, "--pause", 1e-3, "--stuck-at", 16 * 900) as process:
         time.sleep(1)
         process.send_signal(signal.SIGINT)
-        seconds, status = ended(process)
+        assert process.wait(PATIENCE_S) == 130
         count = int(process.stdout.read().split()[0])
-    assert (seconds < 2, status) == (True, 130)
     assert 16 * 300 < count <= 16 * 900
     assert whole(tmp_path, 16 * 4_000) >= count
 
 
-def test_a_main_thread_that_never_asks_is_ended_within_two_seconds(tmp_path):
+def test_a_main_thread_that_never_asks_is_ended(tmp_path):
     with started(tmp_path, 1, "--linger") as process:
         process.send_signal(signal.SIGTERM)
-        seconds, status = ended(process)
+        assert process.wait(PATIENCE_S) == 143
         assert "stopped by SIGTERM" in process.stderr.read()
-    assert (1 < seconds < 2, status) == (True, 143)
 
 
 @pytest.mark.parametrize("options", [["--linger"], ["--pause", 1e-3, "--stuck-at", 16 * 900]])
-def test_a_second_signal_ends_it_within_half_a_second(tmp_path, options):
+def test_a_second_signal_ends_it_on_the_spot(tmp_path, options):
+    """The exit code is the second signal's: the first alone would have ended it later, with its own."""
     with started(tmp_path, 16 * 4_000, *options) as process:
         time.sleep(0.5)
         process.send_signal(signal.SIGINT)
         time.sleep(0.1)
         process.send_signal(signal.SIGTERM)
-        seconds, status = ended(process)
-    assert (seconds < 0.5, status) == (True, 143)
+        assert process.wait(PATIENCE_S) == 143
 
 
 def test_other_signals_are_left_alone_and_the_handlers_put_back():
