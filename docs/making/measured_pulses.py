@@ -33,6 +33,12 @@ def sigma(results: Results, stem: str, case: str, name: str, component: str) -> 
     return f"{row['exact_sigma']:.4g}" if row["exact_sigma"] == row["exact_sigma"] else bounded(row, "sigma")
 
 
+def bound_of(results: Results, stem: str, case: str) -> float:
+    """The Fisher bound of the velocity from the first burst of a case, m/s."""
+    found = rows(results, stem, "estimates", case=case.partition(" ")[2], filter="ideal")
+    return float(found.iloc[0]["bound"])
+
+
 def filters(results: Results) -> list[tuple]:
     """RLS 4's filters: locks, σ over the idealisation's, passes."""
     made = [("filter", "locked at the worst scan, %", "σ_r over ideal at 140 s", "σ_V over ideal", "passes a burst")]
@@ -49,7 +55,7 @@ def threshold(results: Results) -> list[tuple]:
     made: list[tuple] = [(*heads, *(f"σ_r over ideal: {name}" for name in ("cured", "spectrum", "spectrum, mixture")))]
     for snr in SHOWN_SNR:
         case = f"pulses_snr burst.snr_db={snr}"
-        bound = rows(results, "pulses_snr", "estimates", case=case.partition(" ")[2], filter="ideal").iloc[0]["bound"]
+        bound = bound_of(results, "pulses_snr", case)
         locked = [worst(results, "pulses_snr", case, name) for name in ("cured", "spectrum")]
         last = [over(results, "pulses_snr", case, name) for name in ("cured", "spectrum", "spectrum, mixture")]
         made.append((snr, f"{bound:.3g}", *locked, *last))
@@ -71,9 +77,7 @@ def energy(results: Results) -> list[tuple]:
     ]
     for period in (2.5, 5, 10, 20):
         case = f"pulses_energy radar.scan_period_s={period}"
-        bound = rows(results, "pulses_energy", "estimates", case=case.partition(" ")[2], filter="ideal").iloc[0][
-            "bound"
-        ]
+        bound = bound_of(results, "pulses_energy", case)
         last = [
             sigma(results, "pulses_energy", case, name, component)
             for component in ("r", "Vr")

@@ -174,7 +174,8 @@ def table_of(experiment: Experiment, of: str, controls: bool = True) -> "Table":
     if not (controls and experiment.control_variate):
         return plain
     if own.own_controls:
-        return lambda results: narrowed(plain(results), own.tables(results)["controlled"], of)
+        beside = "controlled_gains" if of == "gain" else "controlled"
+        return lambda results: narrowed(plain(results), own.tables(results)[beside], of)
     if of == "gain" or not own.exact_errors:
         return plain
     return lambda results: narrowed(plain(results), controlled.controlled(results), of)

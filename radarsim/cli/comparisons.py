@@ -2,7 +2,16 @@
 
 import click
 
-from radarsim.cli.group import completed, figures_option, format_option, json_option, main, out_option, width_option
+from radarsim.cli.group import (
+    completed,
+    drawn_as,
+    figures_option,
+    format_option,
+    json_option,
+    main,
+    out_option,
+    width_option,
+)
 
 
 @main.command()
@@ -39,8 +48,7 @@ def compare(
 
     if len(sources) < 2:
         raise click.UsageError(f"compare takes two results or more, got {len(sources)}")
-    chosen = () if no_figures else formats or ("svg", "png")
-    compared = comparing.compare(sources, out, formats=chosen, width_mm=width_mm)
+    compared = comparing.compare(sources, out, formats=drawn_as(no_figures, formats), width_mm=width_mm)
     if as_json:
         click.echo(documents.text(documents.fields(compared)))
     else:

@@ -7,6 +7,7 @@ import click
 from radarsim.cli.group import (
     completed,
     config_argument,
+    drawn_as,
     figures_option,
     format_option,
     json_option,
@@ -167,10 +168,10 @@ def chart(
     from radarsim.app import documents
     from radarsim.cli import answers, console
 
-    kinds = () if no_figures else formats or ("svg", "png")
+    chosen = drawn_as(no_figures, formats)
     with console.Progress("chart", quiet=as_json, what="figures") as progress:
         drawn = drawing.chart(
-            configs, out, overrides=overrides, formats=kinds, width_mm=width_mm, progress=progress.update
+            configs, out, overrides=overrides, formats=chosen, width_mm=width_mm, progress=progress.update
         )
     if as_json:
         click.echo(documents.text(documents.drawn(drawn)))
@@ -236,7 +237,7 @@ def sensitivity(
         found = finding.sensitivity(
             config, overrides=experiment.merged(overrides, None, seed), progress=progress.update, **asked_for
         )
-    written = finding.write(found, out, () if no_figures else formats or ("svg", "png"), width_mm)
+    written = finding.write(found, out, drawn_as(no_figures, formats), width_mm)
     if as_json:
         click.echo(documents.text(documents.fields(found) | {"files": written}))
     else:

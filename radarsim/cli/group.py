@@ -281,4 +281,11 @@ width_option = click.option(
     metavar="85|120|175",
     help="Width of the figures' files, mm; letters keep their size. Default: each its own.",
 )
+
+
+def drawn_as(no_figures: bool, formats: tuple[str, ...]) -> tuple[str, ...]:
+    """The formats that the options `--no-figures` and `--format` ask a command for: SVG and PNG where none is named."""
+    return () if no_figures else formats or ("svg", "png")
+
+
 figures_option = click.option("--no-figures", is_flag=True, help="Draw no figures; tables and report only.")

@@ -56,12 +56,12 @@ def _residuals(result: CaseResult, names: Sequence[str]) -> dict[str, np.ndarray
 
 RESIDUAL_GAINS = (
     *("case", "filter", "baseline", "component", "k", "t_s", "n", "gain_percent", "gain_lo", "gain_hi"),
-    *("variance_factor", "n_eff"),
+    *("variance_factor", "n_eff", "apart"),
 )
 
 
 def residual_gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
-    """Paired gains with the controls that a study simulates; n_eff is the fewer of both filters."""
+    """Paired gains with the controls that a study simulates; n_eff and apart are those of the worse of both filters."""
     return common.joined([_residual_gains(result) for result in results], RESIDUAL_GAINS)
 
 
@@ -84,7 +84,18 @@ def _residual_gains(result: CaseResult) -> dict[str, np.ndarray]:
         **common.interval("gain_percent", gain, "gain"),
         "variance_factor": factor,
         "n_eff": np.fmin(of.effective[at], of.effective[b, k, c]),
+        "apart": np.fmax(np.abs(of.apart[at]), np.abs(of.apart[b, k, c])),
     }
+
+
+def narrower_rows(plain: "pd.DataFrame", beside: "pd.DataFrame", ends: Sequence[str]) -> "pd.DataFrame":
+    """A table with value, lower and upper end (columns `ends`) of `beside`, row for row, where `narrower` takes them.
+
+    Where `beside` says in `apart` and `n_eff` how far it may be trusted, that counts.
+    """
+    own, other = (statistics.Estimate(*(table[end].to_numpy() for end in ends)) for table in (plain, beside))
+    trust = statistics.trusted(beside["apart"].to_numpy(), beside["n_eff"].to_numpy()) if "apart" in beside else True
+    return plain.assign(**dict(zip(ends, statistics.narrower(own, other, trust), strict=True)))
 
 
 def faults(made: "Mapping[str, pd.DataFrame]") -> list[str]:
@@ -94,7 +105,7 @@ def faults(made: "Mapping[str, pd.DataFrame]") -> list[str]:
     """
     found = []
     for name, table in made.items():
-        if "apart" in table and len(table):
+        if {"apart", "sigma"} <= set(table) and len(table):
             apart = np.abs(table["apart"].to_numpy(dtype=float))
             worst, bound = table.iloc[int(np.nanargmax(apart))], statistics.furthest(np.isfinite(apart).sum())
             if np.nanmax(apart) > bound:
@@ -128,17 +139,10 @@ def _controlled(result: CaseResult) -> dict[str, np.ndarray]:
     sums = own[:, 1], own[:, 3], base[:, 1], base[:, 3], cross
     of, factor = statistics.controlled(*sums, exact[b, k, c] ** 2, n[at])
     return {
-        "case": np.full(f.size, result.name, dtype=object),
-        "filter": common.names(axes.filters, f),
-        "control": np.full(f.size, axes.filters[b], dtype=object),
-        "component": common.names([name for name, _ in axes.components], c),
-        "unit": common.names([unit for _, unit in axes.components], c),
-        "k": np.asarray(axes.k)[k],
-        "t_s": np.asarray(axes.t_s, dtype=float)[k],
+        **common.leading(result, f, k, control=np.full(f.size, axes.filters[b], dtype=object)),
+        **common.components(result, c),
         "n": n[at].astype(np.int64),
-        "sigma": of.value,
-        "sigma_lo": of.lo,
-        "sigma_hi": of.hi,
+        **common.interval("sigma", of),
         "variance_factor": factor,
         "exact_sigma": exact[at],
     }

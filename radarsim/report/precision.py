@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from radarsim.engine.results import CaseResult
+from radarsim.report.controlled import narrower_rows
 
 if TYPE_CHECKING:
     import pandas
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 Table = Callable[[Sequence[CaseResult]], "pandas.DataFrame"]  # of a study: that which holds the quantity
 FIRST = 2000
 EQUAL = 1e-9  # relative difference of widths that is rounding
-APART = 3.0  # standard errors between plain and controlled, beyond which the plain one counts
 MOST = 10**12  # realisations, as in a config
 
 
@@ -117,18 +117,10 @@ def worst(result: CaseResult, table: Table, of: str = "sigma") -> Cell | None:
 
 
 def narrowed(plain: "pandas.DataFrame", controlled: "pandas.DataFrame", of: str = "sigma") -> "pandas.DataFrame":
-    """Curves or gains with value and interval from a table with control variates, where that has the narrower one.
-
-    Not where the two differ by more than three standard errors, in the table's column `apart`.
-    """
-    keys, columns = ["case", "filter", "component", "k"], list(OF[of].columns)
-    _, lo, hi = columns
-    further = [name for name in ("apart",) if name in controlled]
-    other = plain[keys].merge(controlled[[*keys, *columns, *further]], on=keys, how="left").set_axis(plain.index)
-    narrower = (other[hi] - other[lo]) < (plain[hi] - plain[lo])
-    if further:
-        narrower &= other["apart"].abs() <= APART
-    return plain.assign(**{name: plain[name].mask(narrower, other[name]) for name in columns})
+    """Curves or gains with value and interval from a table with control variates, as `narrower_rows` chooses."""
+    keys = ["case", "filter", "component", "k"]
+    beside = plain[keys].merge(controlled, on=keys, how="left")
+    return narrower_rows(plain, beside, OF[of].columns)
 
 
 def needed(result: CaseResult, percent: float, table: Table, of: str = "sigma", most: int = MOST) -> int | None:

@@ -145,6 +145,7 @@ class Controlled(NamedTuple):
 
 
 GAUSSIAN_SQUARE = 14.0  # κ − 1 of the square of a Gaussian number
+APART = 3.0  # standard errors between a value with and without controls, beyond which the plain one counts
 TOGETHER = 0.0027  # chance of a number beyond three standard errors
 
 
@@ -192,9 +193,9 @@ def furthest(looks: Values) -> float:
     return NormalDist().inv_cdf(1 - TOGETHER / 2 / max(int(looks), 1))
 
 
-def trusted(of: Controlled) -> Values:
+def trusted(apart: Values, effective: Values) -> Values:
     """Where values with and without controls agree within three standard errors and enough realisations count."""
-    return (np.abs(of.apart) <= 3) & (np.asarray(of.effective) >= FEW_EFFECTIVE)
+    return (np.abs(apart) <= APART) & (np.asarray(effective) >= FEW_EFFECTIVE)
 
 
 def narrower(plain: Estimate, controlled: Estimate, trust: Values) -> Estimate:

@@ -155,7 +155,8 @@ def best_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> statisti
     plain = stage_gain(result, f, base, s, c)
     if "controlled_stage" not in result.sums:
         return plain
-    trust = all(statistics.trusted(controlled_sigma(result, i, s, c)) for i in (f, base))
+    both = (controlled_sigma(result, i, s, c) for i in (f, base))
+    trust = all(statistics.trusted(of.apart, of.effective) for of in both)
     return statistics.narrower(plain, controlled_gain(result, f, base, s, c)[0], trust)
 
 
@@ -164,11 +165,7 @@ def best_stages(made: "Mapping[str, pd.DataFrame]") -> "pd.DataFrame":
     rows = made["stages"]
     if "controlled_stages" not in made:
         return rows
-    ends, beside = ["sigma", "sigma_lo", "sigma_hi"], made["controlled_stages"]  # row by row of the same
-    plain, ours = (statistics.Estimate(*(table[end].to_numpy() for end in ends)) for table in (rows, beside))
-    told = (beside[name].to_numpy() for name in ("variance_factor", "apart", "n_eff"))
-    found = statistics.narrower(plain, ours, statistics.trusted(statistics.Controlled(ours, *told)))
-    return rows.assign(**dict(zip(ends, found, strict=True)))
+    return controlled.narrower_rows(rows, made["controlled_stages"], ("sigma", "sigma_lo", "sigma_hi"))
 
 
 def _controls(result: CaseResult) -> list[tuple]:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.app import run
+from radarsim.app import run, simulation
 from radarsim.app.configs import load
 from radarsim.errors import DisagreementError
 from radarsim.physics import frames
-from radarsim.report import controlled, statistics
+from radarsim.report import controlled, precision, statistics
 from radarsim.studies.multimodel import controls, tables
 from radarsim.studies.multimodel import study as multimodel
 from radarsim.studies.multimodel.kernels import records, sums
@@ -305,6 +305,22 @@ def test_answer_and_claims_take_the_narrower_interval_where_both_agree():
     wrong["controlled_stage"][1, 1, 3, 1] *= 1.5
     wrong["controlled_stage"][1, 1, 3, 1] += wrong["controlled_stage"][1, 1, 3, 0]
     assert tables.best_gain(replace(case, sums=wrong), 1, 0, 1, 3) == tables.stage_gain(case, 1, 0, 1, 3)
+
+
+@pytest.mark.parametrize(("of", "beside"), [("sigma", "controlled"), ("gain", "controlled_gains")])
+def test_a_precision_counts_the_narrower_interval_where_both_agree(of, beside):
+    overrides = ["control_variate=true", "report_every=40"]
+    result = radarsim.run("multimodel_1hz", realisations=400, overrides=overrides)
+    experiment = load("multimodel_1hz", overrides)
+    value, lo, hi = precision.OF[of].columns
+    plain, best = (simulation.table_of(experiment, of, controls)(result.cases) for controls in (False, True))
+    keys = ["filter", "component", "k"]
+    other = plain[keys].merge(result.tables[beside], on=keys, how="left")
+    trust = (other["n_eff"] >= statistics.FEW_EFFECTIVE) & (other["apart"].abs() <= 3)
+    taken = trust & (other[hi] - other[lo] < plain[hi] - plain[lo])
+    assert 0.2 < taken.mean() < 1
+    assert np.array_equal(best[value], np.where(taken, other[value], plain[value]))
+    assert np.array_equal(best[hi], np.where(taken, other[hi], plain[hi]))
 
 
 def test_a_run_that_disagrees_with_its_controls_ends_in_a_fault(tmp_path, monkeypatch):
