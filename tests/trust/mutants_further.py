@@ -237,7 +237,7 @@ PULSES = (
 P1_WORLD = "studies/range_doppler/test_world.py"
 DRAWN_FLIGHTS = (
     *mutants(
-        "radarsim/studies/range_doppler/kernels/missed.py",
+        "radarsim/studies/range_doppler/kernels/draws.py",
         (
             "y = flight[3] + shift[1, i] + t * shift[4, i]",
             "y = flight[3] + shift[1, i]",

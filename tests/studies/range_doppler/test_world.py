@@ -119,6 +119,13 @@ def test_each_realisation_is_that_of_a_textbook_filter(changes):
             np.testing.assert_allclose(sums["nees"][f, started, 1], q, rtol=1e-6)
             own = np.diagonal(P, axis1=1, axis2=2)[started]
             np.testing.assert_allclose(sums["believed"][f, started], own, rtol=1e-7)
+            e_f, e_b = sums["error"][f, ..., 0], sums["error"][problem.baseline, ..., 0]
+            both = there & (sums["estimates"][problem.baseline] == 1)
+            pairs = np.stack([both, e_f**2, e_f**4, e_b**2, e_b**4], axis=-1) * both[..., None]
+            np.testing.assert_allclose(sums["both"][f], pairs, rtol=1e-12)
+            np.testing.assert_allclose(sums["paired"][f], both * e_f**2 * e_b**2, rtol=1e-12)
+            crossed = np.stack([e_f[:, 0] * e_f[:, 1], e_f[:, 0] * e_f[:, 2], e_f[:, 1] * e_f[:, 2]], axis=-1)
+            np.testing.assert_allclose(sums["cross"][f], crossed, rtol=1e-12)
 
 
 def test_with_every_plot_both_kernels_agree():
