@@ -1,4 +1,4 @@
-"""Planted faults of rare events: weights dropped, mixtures with one side, shifts and losses not those meant."""
+"""Planted faults of rare events: weights dropped, mixtures with one side, shifts, losses and boxes not those meant."""
 
 from tests.trust.mutant import mutants
 
@@ -39,4 +39,27 @@ LOSSES = (
         ),
     ),
 )
-RARE = LOSSES
+TRACKS = "studies/sonar/clutter/test_rare.py"
+TWINS = f"{TRACKS}::test_weights_and_lives_are_the_twins"
+PAIRS = f"{TRACKS}::test_pairs_of_false_plots_are_confirmed_as_their_exact_law_says"
+FALSE_TRACKS = (
+    *mutants(
+        "radarsim/studies/sonar/clutter/kernels/rare.py",
+        ("else (1.0 - h) / (1.0 - p)", "else 1.0", TWINS),
+        ("if ring:", "if not ring:", PAIRS),
+        ("min(high, b0 + sector - b)", "high", PAIRS),
+        ("number_when_any(box.mean, p, uniform(u) / h)", "number_when_any(box.mean, p, uniform(u))", TWINS),
+        ("box.q + box.dq * u_q", "box.q + box.dq * u_b", TWINS),
+        ("held[j, 1] += w * w", "held[j, 1] += w", TWINS),
+        ("drawn[1] += w", "drawn[1] += 1.0", TWINS),
+    ),
+    *mutants(
+        "radarsim/studies/sonar/clutter/tables.py",
+        (
+            "held(result, (f,)).weight.sum()",
+            "held(result, (f,)).number.sum()",
+            f"{TRACKS}::test_tables_tell_the_rate_and_how_well_it_is_known",
+        ),
+    ),
+)
+RARE = (*LOSSES, *FALSE_TRACKS)

@@ -4,9 +4,10 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, Strict
 
 from radarsim.config.fields import (
+    Added,
     At,
     Design,
     Model,
@@ -139,11 +140,43 @@ class Filter(config.Filter):
             yield at("association", "needs a filter of kind kalman and degree 1")
 
 
+class RareTracks(Model):
+    """Events that are rare: realisations drawn where they are frequent, and weights that make up for it."""
+
+    events: Annotated[tuple[Literal["false_tracks"], ...], Field(min_length=1, max_length=1)] = Field(
+        title="events that are sought",
+        description="false_tracks: tracks that false plots begin, of all trackers, are drawn with more plots in their "
+        "gates until they are confirmed",
+    )
+    plain_share: Annotated[float, Strict(), Field(ge=0.01, le=0.9)] = Field(
+        0.1,
+        title="share of plain realisations",
+        json_schema_extra={"symbol": "α_0"},
+        description="share of the realisations that are drawn as they are, no unit; no weight is over one divided by "
+        "it",
+    )
+
+
 class Keys(config.Keys):
     """The keys of a case whose filters may be trackers."""
 
     sensor: Sensor = Field(title="sensor", description="the sonar")
     filters: tuple[Filter, ...]
+    rare: Annotated[RareTracks | None, Design(), Added()] = Field(
+        None,
+        title="rare events",
+        description="importance sampling of false tracks, for trackers that hardly have any: rare.csv",
+    )
+
+    @cross_check
+    def _rare_fits(self) -> Iterator[At]:
+        if self.rare is None:
+            return
+        kinds = {member.association for member in self.filters}
+        if not kinds & {"nearest", "pda"}:
+            yield at("rare", "needs a filter that has to find its plots, with association nearest or pda")
+        elif not self.sensor.false_plots_per_km2:
+            yield at("rare", "needs false plots: sensor.false_plots_per_km2 must be > 0")
 
     @cross_check
     def _trackers_fit(self) -> Iterator[At]:

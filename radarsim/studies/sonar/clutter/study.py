@@ -1,7 +1,8 @@
 """P3's second half: tracks among false and missed plots.
 
 The errors in the sums of `sonar.study` are those of the tracks kept, which are confirmed and on the target. The sums
-`counts`, `begun`, `ratios` and `scores` are described in `kernels.counts`.
+`counts`, `begun`, `ratios` and `scores` are described in `kernels.counts`. With `rare`, `held` and `drawn` of
+`kernels.rare` are in place of `begun`, and the scores of false tracks are those of the plain ones.
 """
 
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from radarsim.studies.sonar.clutter import filters as design
 from radarsim.studies.sonar.clutter import world as observed
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.config import Keys
-from radarsim.studies.sonar.clutter.kernels import blocks, counts
+from radarsim.studies.sonar.clutter.kernels import blocks, counts, rare
 from radarsim.studies.sonar.clutter.kernels.field import Field
 from radarsim.studies.sonar.clutter.kernels.tracker import Trackers, workspace
 from radarsim.studies.sonar.exact_values import exact_values
@@ -32,7 +33,7 @@ class Plan:
     """A plan of trackers of a target and of false tracks.
 
     field_about_false holds the false plots among which false tracks live; seeds (2,) is the key of the stream of their
-    first plots.
+    first plots. shift: how false tracks are drawn where they are rare; None: as they are.
     """
 
     layout: Layout
@@ -40,6 +41,7 @@ class Plan:
     trackers: Trackers
     field_about_false: Field
     seeds: np.ndarray
+    shift: rare.Shift | None = None
     block: int = base.BLOCK
     gaussian = False
 
@@ -52,7 +54,12 @@ class Plan:
         track_sums, work = counts.TrackSums(sums, **own), workspace(F)
         inputs = (axes.world, axes.detections, axes.field, self.trackers)
         blocks.simulate_block(*inputs, work, first, count, track_sums)
-        if axes.field.cells.density > 0:
+        if self.shift is not None:
+            weighted = rare.WeightedSums(np.zeros((F, K, 3)), np.zeros((F, 3)))
+            drawn = (self.seeds, self.field_about_false, self.shift, self.trackers)
+            rare.simulate_false(*drawn, work, axes.world.dt, first, count, own["scores"][1], weighted)
+            own |= weighted._asdict()
+        elif axes.field.cells.density > 0:
             false = (self.seeds, self.field_about_false, self.trackers)
             blocks.simulate_false(*false, work, axes.world.dt, first, count, track_sums)
         return base.packed(self.layout, sums, **own)
@@ -65,12 +72,18 @@ def prepare(case: Case) -> Plan:
     F, K = len(specs), len(scene.t)
     common = base.shapes(F, K, COORDINATES, SIZE)
     del common["paired"]  # trackers keep tracks in different realisations
+    own, shift = counts.shapes(F, K, len(design.THRESHOLDS)), None
+    if spec.rare is not None:
+        del own["begun"]
+        own |= {"held": (F, K, 3), "drawn": (F, 3)}
+        shift = rare.Shift(noise_key(case, "rare"), noise_key(case, "rare plots"), spec.rare.plain_share)
     return Plan(
-        layout=Layout(**common, **counts.shapes(F, K, len(design.THRESHOLDS))),
+        layout=Layout(**common, **own),
         axes=axes(case, scene, specs, given),
         trackers=design.trackers(specs, given),
         field_about_false=design.field(noise_key(case, "seeds"), spec.sensor.sector, given),
         seeds=noise_key(case, "places"),
+        shift=shift,
     )
 
 

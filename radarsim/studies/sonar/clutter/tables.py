@@ -1,4 +1,4 @@
-"""P3's tables of tracks among false plots: tracks, tracking, gates, track_classes."""
+"""P3's tables of tracks among false plots: tracks, tracking, gates, track_classes; rare."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import statistics
+from radarsim.report import rare, statistics
 from radarsim.report.statistics import Z95, Estimate, Values
 from radarsim.report.tables import interval, leading
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
@@ -24,6 +24,7 @@ def tables(results: Sequence[CaseResult[ClutterAxes]]) -> "dict[str, pd.DataFram
         "tracking": stacked(_tracking(result) for result in results),
         "gates": stacked(_gates(result) for result in results),
         "track_classes": stacked(_classes(result) for result in results),
+        **rare.table([_rare(result) for result in results if "held" in result.sums]),
     }
 
 
@@ -40,6 +41,29 @@ def per_hour(result: CaseResult[ClutterAxes]) -> float:
 def false_plots(result: CaseResult[ClutterAxes]) -> float:
     """Mean number of false plots a scan in the whole sector."""
     return result.spec.sensor.false_plots_per_km2 * result.axes.area_m2 / 1e6
+
+
+def held(result: CaseResult[ClutterAxes], at: tuple[Any, ...]) -> rare.Counted:
+    """Tracks begun by false plots that were held for at least so many scans, by their weights; at filter and scan."""
+    return rare.Counted(*np.moveaxis(result.sums["held"][at], -1, 0))
+
+
+def drawn(result: CaseResult[ClutterAxes], f: int | np.ndarray) -> rare.Drawn:
+    """How the tracks of filter f that false plots begin were drawn, where false tracks are rare."""
+    return rare.Drawn(result.count, *np.moveaxis(result.sums["drawn"][f], -1, 0))
+
+
+def false_tracks(result: CaseResult[ClutterAxes], f: int) -> tuple[Estimate, np.ndarray, np.ndarray]:
+    """The probability that a track begun by a false plot is confirmed; scans with a confirmed one, and confirmed ones.
+
+    The last two are of all realisations; where false tracks are rare, by their weights.
+    """
+    if "held" not in result.sums:
+        begun = result.sums["begun"][f]
+        alive, found = begun[:, at.FALSE_KEPT].sum(), begun[:, at.FALSE_FOUND].sum()
+        return statistics.rate(found, result.count), alive, found
+    confirmed = held(result, (f, 0))
+    return rare.rate(confirmed, drawn(result, f)), held(result, (f,)).weight.sum(), confirmed.weight
 
 
 # ---- statistics ------------------------------------------------------------------------------------------------------
@@ -115,10 +139,10 @@ def _tracking(result: CaseResult[ClutterAxes]) -> Columns:
 
 def _summary(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
     tracker, sensor, n = result.spec.filters[f], result.spec.sensor, result.count
-    counts, begun, ratios = (result.sums[name][f] for name in ("counts", "begun", "ratios"))
-    found, alive, false_found = counts[:, at.FOUND], begun[:, at.FALSE_KEPT].sum(), begun[:, at.FALSE_FOUND].sum()
+    counts, ratios = (result.sums[name][f] for name in ("counts", "ratios"))
+    found, (false, alive, false_found) = counts[:, at.FOUND], false_tracks(result, f)
     ends_per_hour = Estimate(*(part * per_hour(result) for part in ratio(ratios[at.ENDS_PER_SCAN], n)))
-    false, any_false = statistics.rate(false_found, n), sensor.false_plots_per_km2 > 0
+    any_false = sensor.false_plots_per_km2 > 0
     false_per_hour = Estimate(*(false_plots(result) * per_hour(result) * part for part in false))
     with np.errstate(divide="ignore", invalid="ignore"):
         life = Estimate(
@@ -199,3 +223,17 @@ def _classes(result: CaseResult[ClutterAxes]) -> Columns:
         **interval("false_called_true", statistics.rate(false, n_false), "false"),
         "bound": np.tile(np.exp(-thresholds), len(chosen)),
     }
+
+
+def _rare(result: CaseResult[ClutterAxes]) -> dict[str, Any]:
+    """Probabilities that a track begun by a false plot is confirmed (k = 1), and that it is held to its k-th scan.
+
+    Scans and t_s count from the confirmation.
+    """
+    chosen = trackers(result)
+    shown = held(result, (chosen,)).number > 0
+    shown[:, 0] = True
+    row, k = np.nonzero(shown)
+    f, sought = chosen[row], k == 0
+    rows = rare.rows(leading(result, f, k), "false track held", sought, held(result, (f, k)), drawn(result, f))
+    return {**rows, "event": np.where(sought, "false track", rows["event"])}

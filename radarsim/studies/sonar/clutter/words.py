@@ -31,6 +31,9 @@ def answer(results: Sequence[CaseResult[ClutterAxes]], made: "Mapping[str, pd.Da
         rows = made["tracking"][made["tracking"]["case"] == result.name]
         trackers = "; ".join(_of_tracker(row) for _, row in rows.iterrows())
         sentences.append(panels.at_its_place(result, f"{trackers}."))
+        if result.spec.rare is not None:
+            found = made["rare"][(made["rare"]["case"] == result.name) & made["rare"]["sought"]]
+            sentences.append(panels.at_its_place(result, _by_importance(found)))
     return [*sentences, *others]
 
 
@@ -55,3 +58,17 @@ def _bounded(row: "pd.Series", name: str, stem: str, unit: str = "") -> str:
     """The value of a column with its interval, to three digits."""
     value, low, high = (numeral(f"{float(f'{row[key]:.3g}'):,.10g}") for key in (name, f"{stem}_lo", f"{stem}_hi"))
     return f"{' '.join(filter(None, (value, unit)))} {text.interval(low, high)}"
+
+
+def _by_importance(rows: "pd.DataFrame") -> str:
+    """What stands behind rates of false tracks that importance sampling found, by tracker."""
+    found = (
+        tr(
+            "{filter} {events:,} of them, {n_eff:,.0f} effective",
+            filter=row["filter"],
+            events=row["events"],
+            n_eff=row["n_eff"],
+        )
+        for _, row in rows.iterrows()
+    )
+    return tr("False tracks are drawn by importance sampling: {found}.", found="; ".join(found))

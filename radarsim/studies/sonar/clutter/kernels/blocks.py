@@ -9,8 +9,8 @@ confirmed. Letters as in `tracker`.
 import numpy as np
 
 from radarsim.kernels.compile import kernel
-from radarsim.kernels.random import uniforms
 from radarsim.studies.sonar.clutter.kernels.counts import COUNTS, ENDS_PER_SCAN, WRONG_PER_PLOT
+from radarsim.studies.sonar.clutter.kernels.field import even_places
 from radarsim.studies.sonar.clutter.kernels.gate import KNOWN
 from radarsim.studies.sonar.clutter.kernels.rules import (
     BEST,
@@ -72,15 +72,11 @@ def simulate_false(key, field, trackers, work, dt, first, total, sums):
 
     key (2,) of the stream of their positions; dt (K,) intervals before each scan.
     """
-    q0, dq, nq, b0, db, nb, _, _ = field.cells
     z, detected, counts, nothing = np.empty((2, CHUNK)), np.ones(CHUNK), np.zeros(COUNTS), np.zeros(CHUNK)
     for done in range(0, total, CHUNK):
         reset(work)
         n = min(CHUNK, total - done)
-        for i in range(n):
-            u, v = uniforms(key[0], key[1], first + done + i, 0)
-            z[0, i] = np.sqrt(2.0 * (q0 + dq * nq * u))
-            z[1, i] = b0 + db * nb * v
+        even_places(key, field, first + done, n, z)
         for f in range(trackers.gate.size):
             tracks, status = tracks_of(work, f), work.status[f]
             if trackers.association[f] == KNOWN:

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.compile import inline, kernel
+from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import address
-from radarsim.kernels.random import U, threefry, uniform
+from radarsim.kernels.random import U, threefry, uniform, uniforms
 from radarsim.studies.sonar.clutter.kernels.gate import inverse_two, with_plot
 
 DRAW_BITS = 12  # of the number of a draw: the draw in its cell
@@ -137,6 +137,16 @@ def with_false_plots(gated, draws, realisation, scan, gate, threshold):
                 if least <= q <= most and abs(off) <= high:  # roots are slow
                     gated = with_plot(gated, math.sqrt(2.0 * q) - r, off, 1.0, (irr, irb, ibb), threshold)
     return gated
+
+
+@part
+def even_places(key, field, first, n, z):
+    """Write positions drawn uniformly over the sector, one a realisation from `first` on, to z (2, ≥ n)."""
+    q0, dq, nq, b0, db, nb, _, _ = field.cells
+    for i in range(n):
+        u, v = uniforms(key[0], key[1], first + i, 0)
+        z[0, i] = np.sqrt(2.0 * (q0 + dq * nq * u))
+        z[1, i] = b0 + db * nb * v
 
 
 @kernel

@@ -125,6 +125,13 @@ def tracks_of(work, f):
     return Tracks(work.x[f], work.Y[f], work.P[f], work.C[f], work.plots[f])
 
 
+@inline
+def rule_of(trackers, f):
+    """How tracker f chooses among plots."""
+    association, gate, inside, speed = trackers.association[f], trackers.gate[f], trackers.inside[f], trackers.speed[f]
+    return Rule(association, gate, trackers.detection, inside, trackers.density, speed)
+
+
 # ---- association --------------------------------------------------------------------------------------------------
 @inline
 def associate_track(draws, rule, realisation, k, plot, gate, counts):
@@ -173,6 +180,25 @@ def gate_of(place, S, settled, reach):
     return Gate(r, b, S, settled)
 
 
+@inline
+def settle(status, i, found, out):
+    """Write the Association of track i to the rows of out (6, CHUNK), and count it in the track's status."""
+    out[0, i], out[1, i], out[2, i] = found.taken, found.nu_r, found.nu_b
+    out[3, i], out[4, i], out[5, i] = found.rr, found.rb, found.bb
+    if status[STATE, i] == CONFIRMED:
+        status[WRONG, i] += found.false_share
+        status[TAKEN, i] += found.taken
+    status[AGE, i] += 1.0
+    status[SCORE, i] += found.score
+    if status[FIRST, i] > 0.0:
+        status[BEST, i] = max(status[BEST, i], status[SCORE, i])
+    if found.taken > 0.0:
+        status[HITS, i] += 1.0
+        status[MISSES, i], status[SINCE, i] = 0.0, 0.0
+    else:
+        status[MISSES, i] += 1.0
+
+
 @part
 def associate(field, rule, scan, tracks, status, target, work, counts):
     """Associate a scan's plots with every track of a chunk; the results go to work.association (6, CHUNK).
@@ -194,20 +220,7 @@ def associate(field, rule, scan, tracks, status, target, work, counts):
         gate = gate_of(place, S, plots[i] > 1.5, rule.speed * status[SINCE, i])
         plot = (detected[i], z[0, i], z[1, i])
         found = associate_track(draws, rule, scan.first + i, scan.k, plot, gate, tally)
-        out[0, i], out[1, i], out[2, i] = found.taken, found.nu_r, found.nu_b
-        out[3, i], out[4, i], out[5, i] = found.rr, found.rb, found.bb
-        if status[STATE, i] == CONFIRMED:
-            status[WRONG, i] += found.false_share
-            status[TAKEN, i] += found.taken
-        status[AGE, i] += 1.0
-        status[SCORE, i] += found.score
-        if status[FIRST, i] > 0.0:
-            status[BEST, i] = max(status[BEST, i], status[SCORE, i])
-        if found.taken > 0.0:
-            status[HITS, i] += 1.0
-            status[MISSES, i], status[SINCE, i] = 0.0, 0.0
-        else:
-            status[MISSES, i] += 1.0
+        settle(status, i, found, out)
 
 
 @part
@@ -215,8 +228,5 @@ def step(trackers, f, field, scan, tracks, target, work, counts):
     """Predict, associate and update all tracks of tracker f at one scan."""
     manoeuvre, association = trackers.manoeuvre[f], trackers.association[f]
     predict(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, work.predicted)
-    rule = Rule(
-        association, trackers.gate[f], trackers.detection, trackers.inside[f], trackers.density, trackers.speed[f]
-    )
-    associate(field, rule, scan, tracks, work.status[f], target, work, counts)
+    associate(field, rule_of(trackers, f), scan, tracks, work.status[f], target, work, counts)
     update(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, association == PDA, work.association)

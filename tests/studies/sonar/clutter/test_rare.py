@@ -1,0 +1,298 @@
+"""Rare false tracks: against a textbook twin on the same words, exact laws of two plots, and plain sampling."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import radarsim
+from radarsim.app import run as experiment
+from radarsim.app.configs import load
+from radarsim.config.identity import canonical
+from radarsim.errors import ConfigError
+from radarsim.kernels import random
+from radarsim.report.tables import to_csv
+from radarsim.studies.sonar import STUDY
+from radarsim.studies.sonar.clutter import filters as design
+from radarsim.studies.sonar.clutter import track as plots
+from radarsim.studies.sonar.clutter.kernels import counts as places
+from radarsim.studies.sonar.clutter.kernels.rare import Shift
+from tests.engine.test_collect import Shuffled
+from tests.studies.sonar.clutter.naive_false import FalseTrack
+from tests.studies.sonar.clutter.test_study import config, simulated, tracker
+
+RARE = {"events": ["false_tracks"]}
+SECTOR = ((7e3, 11e3), (math.radians(5), math.radians(40)))
+FOUR_OF_SIX = tracker("four of six", m=4, n=6)
+
+
+def case_of(filters, density, sought=True, scans=10, share=0.1, **sensor):
+    """A case whose false tracks are sought, or are not."""
+    keys = config(filters, density, 0.9, scans, **sensor)
+    return load(keys | ({"rare": RARE | {"plain_share": share}} if sought else {})).cases[0]
+
+
+def plan_of(*of, **more):
+    return STUDY.prepare(case_of(*of, **more))
+
+
+def reseeded(plan, seed):
+    """The plan under other false plots."""
+    keys = [random.stream(seed, str(i)) for i in range(4)]
+    shift = None if plan.shift is None else Shift(keys[2], keys[3], plan.shift.plain)
+    field = plan.field_about_false._replace(key=keys[1])
+    return replace(plan, seeds=keys[0], field_about_false=field, shift=shift)
+
+
+def share(plan, n, f=0):
+    """The weighted share of tracks that are confirmed, its standard error and effective events."""
+    weight, squared, _ = simulated(plan, n)["held"][f, 0]
+    p = weight / n
+    return p, math.sqrt(max(squared / n - p * p, 0) / n), weight**2 / squared
+
+
+def brute(plan, n, f=0):
+    """The share of n plain tracks that are confirmed, and its standard error."""
+    found = simulated(plan, n)["begun"][f, :, places.FALSE_FOUND].sum()
+    return found / n, math.sqrt(max(found, 1)) / n
+
+
+def words_of(key, realisation):
+    """What gives the words of a draw at a scan."""
+
+    def words(k, draw):
+        x, y = np.empty(1, dtype=np.uint64), np.empty(1, dtype=np.uint64)
+        random.fill_words(key, realisation, (k << 12) + draw, x, y)
+        return [int(x[0]), int(y[0])]
+
+    return words
+
+
+def uniforms(key, realisation):
+    a, b = np.empty(1), np.empty(1)
+    random.fill_uniform_pairs(key, realisation, 0, a, b)
+    return a[0], b[0]
+
+
+@pytest.mark.parametrize("density", [0.05, 2.0])
+def test_weights_and_lives_are_the_twins(density):
+    """Nearest plot and PDA, three rules: which tracks are held how long, and their weights, realisation by one."""
+    filters = [tracker("near"), tracker("pda", "pda", 3, 5), tracker("wide", m=4, n=6, gate=0.9999)]
+    case = case_of(filters, density, scans=12)
+    plan = STUDY.prepare(case)
+    given, alpha, seen = design.conditions(case.spec), plan.shift.plain, np.zeros(3)
+    for realisation in range(150):
+        sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
+        u, v = uniforms(plan.seeds, realisation)
+        (near, far), (left, right) = SECTOR
+        first = np.array([math.sqrt(near**2 + (far**2 - near**2) * u), left + (right - left) * v])
+        plain = uniforms(plan.shift.choice, realisation)[0] < alpha
+        words = words_of(plan.shift.plots, realisation)
+        for f, choice in enumerate(design.tracker_specs(case.spec)):
+            gate = design.gate_threshold(choice.gate_probability)
+            field = lambda k, i=realisation: plots.false_plots(plan.field_about_false, i, k).T  # noqa: E731
+            ratio, held = FalseTrack(choice, given, gate, SECTOR, words, field).follow(first, 12, plain)
+            weight = 1 / (alpha + (1 - alpha) * ratio)
+            assert sums["drawn"][f] == pytest.approx([float(plain), weight, weight**2], rel=1e-9, abs=0)
+            expected = np.where(np.arange(12)[:, None] < held, [weight, weight**2, 1], 0)
+            assert sums["held"][f] == pytest.approx(expected, rel=1e-9, abs=0)
+            seen += held > 0, held > 3, plain
+    assert seen[0] > 100
+    assert seen[1] > 10
+    assert seen[2] > 20
+
+
+@pytest.mark.parametrize(
+    "sector",
+    [
+        {"range_m": [7e3, 11e3], "bearing_deg": [5, 40]},
+        {"range_m": [7e3, 7.3e3], "bearing_deg": [175, 181]},  # most gates are cut by an edge
+        {"range_m": [7e3, 11e3], "bearing_deg": [-180, 180]},
+    ],
+)
+def test_pairs_of_false_plots_are_confirmed_as_their_exact_law_says(sector):
+    """2 of 3 and 2 of 5, down to once in 10⁵: a Poisson number in the part of the gate within the sector."""
+    filters = [tracker("2 of 3", m=2, n=3), tracker("2 of 5", "pda", 2, 5, 0.999)]
+    for density in (1e-4, 1e-2, 0.3):
+        plan = plan_of(filters, density, scans=6, sector=sector)
+        for f, exactly in enumerate(plan.axes.exact_begun.sum(axis=1)):
+            p, error, _ = share(plan, 20_000, f)
+            assert abs(p - exactly) < 4 * error, (density, p, exactly, error)
+            assert error < 0.02 * exactly
+
+
+def test_the_mean_weight_is_one_and_none_is_over_one_by_the_plain_share():
+    plan = plan_of([tracker("a"), FOUR_OF_SIX], 0.1, share=0.2)
+    plain, weight, squared = np.moveaxis(simulated(plan, 20_000)["drawn"], 1, 0)
+    error = np.sqrt((squared / 20_000 - (weight / 20_000) ** 2) / 20_000)
+    assert (np.abs(weight / 20_000 - 1) < 4 * error).all()
+    assert (np.abs(plain - 4000) < 4 * math.sqrt(3200)).all()
+    for i in range(50):
+        assert STUDY.simulate(plan, i, 1).max() >= 0
+        assert plan.layout.unpack(STUDY.simulate(plan, i, 1))["drawn"][:, 1].max() <= 5.0
+
+
+@pytest.mark.parametrize("density", [0.3, 1.5])
+def test_false_tracks_are_those_of_plain_sampling(density):
+    """3 of 4 and 4 of 6, of nearest plot and PDA, confirmed and held on, against plain tracks of other noise."""
+    filters = [tracker("a"), tracker("b", "pda", 4, 6)]
+    weighted, plain = plan_of(filters, density), reseeded(plan_of(filters, density, sought=False), 5)
+    held, begun = simulated(weighted, 20_000)["held"], simulated(plain, 100_000)["begun"]
+    for f in range(2):
+        p, error, _ = share(weighted, 20_000, f)
+        other, its = brute(plain, 100_000, f)
+        assert abs(p - other) < 4 * math.hypot(error, its)
+        life = held[f, :, 0].sum() / held[f, 0, 0]
+        its_life = begun[f, :, places.FALSE_KEPT].sum() / begun[f, :, places.FALSE_FOUND].sum()
+        assert life == pytest.approx(its_life, rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("rule", "density"), [((3, 4), 0.3), ((4, 6), 0.3), ((4, 6), 0.15)])
+def test_false_tracks_are_those_of_plain_sampling_on_twenty_seeds(rule, density):
+    """From 0.1 to 5·10⁻³: every difference within its 99.99 % bounds, their mean within three standard errors."""
+    weighted, plain = (plan_of([tracker("a", m=rule[0], n=rule[1])], density, sought=one) for one in (True, False))
+    z = []
+    for seed in range(20):
+        p, error, _ = share(reseeded(weighted, seed), 20_000)
+        other, its = brute(reseeded(plain, 100 + seed), 100_000)
+        z.append((p - other) / math.hypot(error, its))
+    assert np.abs(z).max() < 3.9
+    assert abs(np.mean(z)) < 3 / math.sqrt(20)
+    assert 0.3 < np.mean(np.square(z)) < 2.2
+
+
+def shipped():
+    """4 of 6 at 0.03 false plots per km², as it is shipped."""
+    return load("sonar_clutter_rare", ["sweep.sensor.false_plots_per_km2=[0.03]", "scans=10"]).cases[0]
+
+
+def test_four_of_six_at_the_shipped_size_is_known_to_a_twentieth():
+    """False tracks so rare that 20 000 plain realisations have about two."""
+    plan = STUDY.prepare(shipped())
+    p, error, effective = share(plan, 20_000, 2)
+    assert p == pytest.approx(1.13e-4, rel=0.1)
+    assert error < 0.05 * p
+    assert effective > 400
+
+
+@pytest.mark.slow
+def test_twenty_runs_scatter_as_their_intervals_say():
+    plan = STUDY.prepare(shipped())
+    found = np.array([share(reseeded(plan, seed), 20_000, 2) for seed in range(20)])
+    assert found[:, 0].std() < 0.05 * found[:, 0].mean()
+    z = (found[:, 0] - found[:, 0].mean()) / found[:, 1]
+    assert 0.3 < np.mean(z**2) < 2.2
+
+
+def test_gates_full_of_false_plots_are_left_as_they_are():
+    """Where a box has more than sixteen of them in the mean, all weights are one and tracks those of plain sampling."""
+    filters = [tracker("open", gate=1.0), tracker("open, PDA", "pda", gate=1.0)]
+    weighted, plain = plan_of(filters, 2.0), plan_of(filters, 2.0, sought=False)
+    drawn, begun = simulated(weighted, 700), simulated(plain, 700)["begun"]
+    assert (drawn["drawn"][:, 1:] == 700).all()
+    assert (drawn["held"][:, 0, 2] == begun[:, :, places.FALSE_FOUND].sum(axis=1)).all()
+    assert (drawn["held"][:, :, 2].sum(axis=1) == begun[:, :, places.FALSE_KEPT].sum(axis=1)).all()
+
+
+def test_blocks_add_up_and_the_target_is_left_alone():
+    weighted, plain = plan_of([tracker("a")], 0.3), plan_of([tracker("a")], 0.3, sought=False)
+    whole = weighted.layout.unpack(STUDY.simulate(weighted, 0, 700))
+    parts = [weighted.layout.unpack(STUDY.simulate(weighted, *part)) for part in ((0, 130), (130, 570))]
+    for name, values in whole.items():
+        assert parts[0][name] + parts[1][name] == pytest.approx(values, rel=1e-9, abs=1e-9)
+    alone = plain.layout.unpack(STUDY.simulate(plain, 0, 700))
+    for name in ("error", "counts", "ratios"):
+        assert (whole[name] == alone[name]).all()
+    assert (whole["scores"][0] == alone["scores"][0]).all()
+    assert whole["scores"][1, 0, -1] == whole["drawn"][0, 0]  # of false tracks, those of the plain ones
+
+
+def result_of(n, filters, density=0.03, **more):
+    return radarsim.run(config(filters, density, 0.9) | {"rare": RARE} | more, realisations=n)
+
+
+def test_tables_tell_the_rate_and_how_well_it_is_known():
+    result = result_of(5000, [FOUR_OF_SIX, tracker("b", "pda"), tracker("told", "known")])
+    table, tracking, sums = result.tables["rare"], result.tables["tracking"], result.cases[0].sums
+    assert list(table["filter"].unique()) == ["four of six", "b"]
+    first = table[table["sought"]]
+    assert list(first["event"]) == ["false track"] * 2
+    for f in range(2):
+        row, of = first.iloc[f], tracking.iloc[f]
+        weight, squared, number = sums["held"][f, 0]
+        assert row["rate"] == of["false_confirmed"] == weight / 5000
+        assert row["events"] == number
+        assert row["n_eff"] == pytest.approx(weight**2 / squared)
+        assert row["variance_factor"] > 100
+        an_hour = 0.03e-6 * result.cases[0].axes.area_m2 * 720
+        assert of["false_tracks_per_hour"] == pytest.approx(an_hour * row["rate"], rel=1e-12)
+        assert of["false_lo"] == pytest.approx(an_hour * row["rate_lo"], rel=1e-12)
+        own = table[table["filter"] == row["filter"]]
+        assert (np.diff(own["rate"]) <= 0).all()  # the tail of the life: held for one scan more
+        assert of["false_life_s"] == pytest.approx(5.0 * own["rate"].sum() / row["rate"], rel=1e-9)
+    assert "importance sampling" in " ".join(result.answer)
+    assert not any("rare event" in line for line in result.warnings)
+    assert "note" not in result.tables["tracks"] or not result.tables["tracks"]["note"].str.contains("events").any()
+
+
+def test_a_rate_that_rests_on_few_events_is_told():
+    result = result_of(20, [FOUR_OF_SIX])
+    assert any("four of six: the rate of a rare event rests on" in line for line in result.warnings)
+    assert result.tables["rare"]["note"].str.contains("effective events").all()
+
+
+def test_bytes_are_those_of_any_threads_and_order():
+    keys = config([tracker("a"), FOUR_OF_SIX], 0.1, 0.9, 6) | {"rare": RARE, "realisations": 9001}
+    one, three, shuffled = (
+        {name: to_csv(table) for name, table in experiment.run(load(keys), **means).tables.items()}
+        for means in ({"threads": 1}, {"threads": 3}, {"executor": Shuffled(1)})
+    )
+    assert one == three == shuffled
+
+
+def test_a_run_goes_on_where_it_was(tmp_path):
+    keys = config([tracker("a")], 0.1, 0.9, 6) | {"rare": RARE}
+    radarsim.run(keys, realisations=5000, out=tmp_path)
+    grown = radarsim.run(keys, realisations=9001, out=tmp_path)
+    whole = radarsim.run(keys, realisations=9001)
+    assert to_csv(grown.tables["rare"]) == to_csv(whole.tables["rare"])
+
+
+def test_without_the_key_a_case_is_the_one_it_was():
+    case = case_of([tracker("a")], 0.1, sought=False)
+    assert "rare" not in canonical(case.spec)
+    assert "rare" in canonical(case_of([tracker("a")], 0.1).spec)
+    assert "held" not in STUDY.prepare(case).layout.shapes
+    assert (STUDY.prepare(case).seeds == plan_of([tracker("a")], 0.1).seeds).all()
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"rare": {"events": []}}, "rare.events"),
+        ({"rare": {"events": ["false tracks"]}}, "rare.events.0"),
+        ({"rare": RARE | {"plain_share": 1.0}}, "rare.plain_share: must be <= 0.9, got 1"),
+        ({"rare": RARE | {"plain_share": 0}}, "rare.plain_share: must be >= 0.01"),
+        ({"rare": RARE | {"shift": 3}}, "rare.shift: unknown key"),
+        ({"rare": RARE, "filters": [tracker("a", "known")]}, "rare: needs a filter that has to find its plots"),
+        ({"rare": RARE, "sensor.false_plots_per_km2": 0.0}, "rare: needs false plots"),
+        ({"rare": {}}, "rare.events: "),
+        ({"rare": 3}, "rare: "),
+    ],
+)
+def test_wrong_values_are_told_by_their_key(keys, words):
+    whole = config([tracker("a")], 0.1)
+    whole["sensor"]["false_plots_per_km2"] = keys.pop("sensor.false_plots_per_km2", 0.1)
+    with pytest.raises(ConfigError) as error:
+        load(whole | keys)
+    assert any(words in line for line in error.value.lines), error.value.lines
+
+
+def test_filters_that_know_their_plots_have_nothing_that_is_rare():
+    smoothing = {"name": "plain", "kind": "kalman"}
+    keys = config([smoothing])
+    keys["sensor"].pop("sector")
+    with pytest.raises(ConfigError, match="rare: needs a filter that has to find its plots"):
+        load(keys | {"rare": RARE})
