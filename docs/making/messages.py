@@ -10,17 +10,21 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from radarsim.app.inventory import inventory
 from radarsim.config.check import models_in
 from radarsim.config.fields import Model
 from radarsim.config.schema import Common
 from radarsim.language import catalogue
 from radarsim.report.claims import judge, rule
 from radarsim.studies import registry
+from radarsim.studies.discriminator import search as discriminator
+from radarsim.studies.range_doppler import search as range_doppler
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "radarsim"
 CATALOGUES = PACKAGE / "language"
 CALLS = {"tr": 1, "term": 1, "plural": 2}  # functions that say messages, and how many texts they take
+SAYING = ("exact_but_for",)  # functions of studies that return a message
 APART = ("app/template",)  # of another package
 IN_TEMPLATE = re.compile(r'\b(tr|plural)\(((?:"(?:[^"\\]|\\.)*"(?:,\s*)?)+)')
 QUOTED = re.compile(r'"((?:[^"\\]|\\.)*)"')
@@ -29,7 +33,10 @@ QUOTED = re.compile(r'"((?:[^"\\]|\\.)*)"')
 def found() -> dict[tuple[str, str, str], list[str]]:
     """Context, text and plural of every message, with the places that say it."""
     said: dict[tuple[str, str, str], list[str]] = {}
-    for text, plural, place in (*in_sources(), *in_templates(), *in_schemas(), *in_claims(), *in_scenarios()):
+    for text, plural, place in (
+        *(*in_sources(), *in_templates(), *in_schemas(), *in_claims(), *in_readings()),
+        *(*in_scenarios(), *in_inventory()),
+    ):
         if re.search("[A-Za-zσ]", text):
             places = said.setdefault(("", text, plural), [])
             if place not in places:
@@ -44,6 +51,10 @@ def in_sources() -> Iterator[tuple[str, str, str]]:
         if any(part in name for part in APART):
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and node.name in SAYING:
+                for one in ast.walk(node):
+                    if isinstance(one, ast.Return) and isinstance(one.value, ast.Constant) and one.value.value:
+                        yield str(one.value.value), "", name
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in CALLS:
                 texts = [one.value for one in node.args[: CALLS[node.func.id]] if isinstance(one, ast.Constant)]
                 if len(texts) == CALLS[node.func.id]:
@@ -52,7 +63,7 @@ def in_sources() -> Iterator[tuple[str, str, str]]:
 
 def in_templates() -> Iterator[tuple[str, str, str]]:
     """The texts of pages' templates."""
-    for path in sorted((PACKAGE / "report/templates").glob("*.j2")):
+    for path in sorted(PACKAGE.rglob("*.j2")):
         for call, texts in IN_TEMPLATE.findall(path.read_text(encoding="utf-8")):
             quoted = QUOTED.findall(texts)[: CALLS[call]]
             yield quoted[0], "".join(quoted[1:]), path.relative_to(ROOT).as_posix()
@@ -90,6 +101,30 @@ def in_claims() -> Iterator[tuple[str, str, str]]:
                 for part in claim.parts:
                     yield part.what, "", place
                     yield part.unit, "", place
+
+
+def in_readings() -> Iterator[tuple[str, str, str]]:
+    """What the papers leave open, why, and the numbers of their joint searches."""
+    for name in registry.SHIPPED:
+        of = registry.study(name).readings()
+        if of is None:
+            continue
+        place = f"radarsim/studies/{name}/readings.py"
+        for choice in of.choices:
+            for text in (choice.asks, *(one.reason for one in choice.alternatives)):
+                yield text, "", place
+            if choice.original == choice.english:  # the paper is silent
+                yield choice.original, "", place
+    for number in (*range_doppler.PRINTED, *discriminator.PRINTED):
+        yield number.what, "", "radarsim/studies"
+        yield number.unit, "", "radarsim/studies"
+
+
+def in_inventory() -> Iterator[tuple[str, str, str]]:
+    """What `radarsim list` says of configs, scenarios, studies and filters."""
+    for _, _, rows in inventory():
+        for row in rows:
+            yield row[-1], "", "radarsim/app/inventory.py"
 
 
 def in_scenarios() -> Iterator[tuple[str, str, str]]:

@@ -290,8 +290,10 @@ def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answ
     attained_now = curve.exactly(None)
     curve.expected = len(asked.over.grid()) + TO_CLOSE
     near = registry.study(asked.cases.base.study).exact_but_for(quantities.shortened(asked.quantity, asked.cases.base))
-    what = f"computes the {asked.quantity.words} at about {curve.expected} values of {asked.key}"
-    predict(told, f"{what}{f', each {near}' if near else ''}", curve.expected * (time.monotonic() - begun))
+    what = tr("computes the {quantity} at about {count} values of {key}", **_of(asked), count=curve.expected)
+    predict(
+        told, what + (tr(", each {near}", near=tr(near)) if near else ""), curve.expected * (time.monotonic() - begun)
+    )
 
     def missing(x: float) -> float:
         return curve.exactly(x) - asked.equals
@@ -317,14 +319,19 @@ def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answ
         others=tuple(x for x in values if x != value),
         notes=((JUMPS,) if jumps else ())
         + ((WHOLE,) if asked.over.whole and attained != asked.equals else ())
-        + ((f"σ is {near}",) if near else ()),
+        + ((tr("σ is {what}", what=tr(near)),) if near else ()),
     )
 
 
 def predict(told: Callable[[str], None], what: str, seconds: float) -> None:
     """Say what a search will do and about how long it takes, where that is long."""
     if seconds > LONG_S:
-        told(f"{what}: about {seconds:.0f} s")
+        told(tr("{what}: about {seconds:.0f} s", what=what, seconds=seconds))
+
+
+def _of(asked: Question) -> dict[str, str]:
+    """What is asked, for a sentence."""
+    return {"quantity": asked.quantity.said, "key": asked.key}
 
 
 def _answer(asked: Question, attained_now: float, **given: Any) -> Answer:
@@ -425,7 +432,12 @@ def _by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> 
     curve.simulated(None, 1)  # compiles
     begun = time.monotonic()
     attained_now = curve.simulated(None, count).value
-    what = f"simulates {len(grid)} values of {asked.key} with {pilot} realisations, then about {WITH_ALL} with {count}"
+    counts = {"grid": len(grid), "pilot": pilot, "more": WITH_ALL, "count": count}
+    what = tr(
+        "simulates {grid} values of {key} with {pilot} realisations, then about {more} with {count}",
+        **_of(asked),
+        **counts,
+    )
     predict(told, what, (WITH_ALL + len(grid) * pilot / count) * (time.monotonic() - begun))
     scanned = [(x, curve.simulated(x, pilot).value - asked.equals) for x in grid]
     known = [one for one in scanned if not math.isnan(one[1])]

@@ -251,10 +251,12 @@ def print_result(result: "Result") -> None:
     show_last_scan(result.last_scan)
     verdicts = result.verdicts()
     if verdicts:
+        from radarsim.report.claims import reasons
+
         for verdict, names in verdicts.items():
             field("claims", tr("{count} {kind}: {names}", count=len(names), kind=Term(verdict), names=", ".join(names)))
         for reason, names in result.unjudged().items():
-            field("", tr("not judged: {names}: {reason}", names=", ".join(names), reason=reason))
+            field("", tr("not judged: {names}: {reason}", names=", ".join(names), reason=reasons.said(reason)))
         field("", tr("`radarsim claims {stem}` says what each of them is", stem=result.experiment.stem))
     drawn = [Path(name) for name in written.files if name.startswith("figures/") and not name.endswith(".md")]
     others = sum(name.endswith(".csv") for name in written.files) - 1
@@ -513,7 +515,7 @@ def _named(row: Mapping[str, Any]) -> str:
 
 def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
     """A claim in lines: its class, statement and original sentence, and a line a part."""
-    from radarsim.report.claims import page
+    from radarsim.report.claims import page, reasons
 
     first = parts[0]
     verdict = page.verdict_of(parts).replace("*", "")
@@ -533,19 +535,21 @@ def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
         if (missed := page.number(row["miss"])) is not None and missed:
             said.append(tr("misses by {miss:.3g} margins", miss=missed))
         if row["verdict"] == "not judged here":
-            said.append(tr(str(row["why"])))
+            said.append(reasons.said(row["why"]))
         say(f"       {tr(row['verdict']):<20} {'; '.join(said)}")
 
 
 def print_readings(done: "Done", detailed: bool) -> None:
     """A line a claim, of single claims a line a reading too, and what the joint search came to."""
-    from radarsim.report.claims import page
+    from radarsim.report.claims import page, reasons
 
     for read in done.read:
         for over in read.over:
             if detailed:
                 for one in over.under:
-                    outcome = tr(one.outcome.kind) if one.outcome else tr("not possible: {why}", why=one.why)
+                    outcome = (
+                        tr(one.outcome.kind) if one.outcome else tr("not possible: {why}", why=reasons.said(one.why))
+                    )
                     say(f"       {one.kind}  {outcome:<24} {one.name}")
             found = over.outcome
             words = page.class_words(found.words) if found else tr("not judged")
@@ -562,4 +566,4 @@ def print_inventory(inventory: "Inventory") -> None:
     for n, (title, columns, rows) in enumerate(reversed(inventory)):
         if n:
             say("")
-        show(tr(title), columns, [tuple(tr(cell) for cell in row) for row in rows])
+        show(tr(title), columns, [(*row[:-1], tr(row[-1])) for row in rows])

@@ -18,6 +18,7 @@ from radarsim.language import current, numeral, plural, term, tr
 from radarsim.report import asked, chart, links, provenance, text
 from radarsim.report.chart_text import spoken
 from radarsim.report.claims import page as claims_page
+from radarsim.report.claims import reasons
 from radarsim.report.claims.judge import LOOKED
 from radarsim.report.drawing import Figure, Line
 
@@ -201,6 +202,7 @@ def _template(name: str) -> "Template":
         "expected": claims_page.expected,
         "css": _css,
         "kept": kept,
+        "reason": reasons.said,
         "measured": _measured,
     }
     environment.filters.update(own)
@@ -280,7 +282,7 @@ def head(column: str) -> str:
     if by_stage:
         return tr("σ of y, {stage}, m", stage=tr(by_stage[1]))
     name, _, unit = column.rpartition(", ")
-    return f"{name}, {tr(unit)}" if name else column
+    return f"{tr(HEADS.get(name, name))}, {tr(unit)}" if name else column
 
 
 FACTS = (  # names of facts of a run and of its machine
@@ -288,9 +290,12 @@ FACTS = (  # names of facts of a run and of its machine
     *(term("seconds"), term("kernel seconds"), term("realisations computed"), term("realisations from store")),
 )
 HEADS = {  # of tables that stand in pages alone
+    "SNR a pulse": term("SNR a pulse"),
     "at_k": term("at scan"),
+    "burst": term("burst"),
     "case": term("case"),
     "component": term("component"),
+    "energy": term("energy"),
     "filter": term("filter"),
     "family": term("family"),
     "inside_percent": term("inside the interval, %"),
@@ -301,6 +306,7 @@ HEADS = {  # of tables that stand in pages alone
     "merge": term("merging rule"),
     "models": term("models"),
     "operations": term("operations"),
+    "pulses": term("pulses"),
     "radar": term("radar"),
     "realisations": term("realisations"),
     "scans": term("scans"),
@@ -342,9 +348,9 @@ def _files(figures: Sequence[Figure], outputs: Collection[str]) -> dict[str, lis
     return {name: own for name, own in found.items() if own}
 
 
-def words_of_script() -> "Markup":
-    """What the page's script says, in the language spoken, as JSON by what it says in English."""
-    return _json({text: tr(text) for text in SCRIPT})
+def words_of_script(own: Sequence[str] = ()) -> "Markup":
+    """What the page's script says, and a script of the page's own, in the language spoken, as JSON by the English."""
+    return _json({text: tr(text) for text in (*SCRIPT, *own)})
 
 
 def _json(value: object) -> "Markup":
@@ -367,17 +373,22 @@ def _file(name: str) -> str:
     return resources.files("radarsim.report").joinpath("templates", name).read_text(encoding="utf-8")
 
 
-def live(title: str, body: str, style: str, script: str, data: str) -> str:
+def live(title: str, parts: Sequence[str], data: str, words: Sequence[str] = ()) -> str:
     """A self-contained page that computes: a study's own body, style and script, and its data as JSON.
 
-    Body, style and script are files of the package and stand as they are; the data cannot end its element.
+    The parts are files of the package: the body is a template in which `tr` says a message, style and script stand as
+    they are. words: what the script says. The data cannot end its element.
     """
+    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
+
+    source, style, script = parts
+    body = Environment(autoescape=True, undefined=StrictUndefined).from_string(source).render(tr=tr)
 
     digest = "sha256-" + base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     safe = Markup(data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
     own = {"title": title, "body": Markup(body), "own_style": Markup(style), "own_script": Markup(script)}
-    return whole("live.html.j2", own_script_hash=digest, data=safe, **own)
+    return whole("live.html.j2", own_script_hash=digest, data=safe, words=words_of_script(words), **own)
 
 
 def whole(template: str, **content: object) -> str:
@@ -385,7 +396,7 @@ def whole(template: str, **content: object) -> str:
     from markupsafe import Markup
 
     code, digest = script()
-    content |= {"language": current(), "words": words_of_script()}
+    content = {"language": current(), "words": words_of_script()} | content
     return _template(template).render(
         style=Markup(_file("style.css")), script=Markup(code), script_hash=digest, **content
     )

@@ -46,8 +46,10 @@ class Quantity(NamedTuple):
 def number(value: object, powers: bool = False) -> str:
     """A number for people: 0.001 as 10⁻³ (with powers, 0.1 as 10⁻¹), others at four digits; text as it is.
 
-    A mapping of keys as "key value, key value".
+    A mapping of keys as "key value, key value", numbers of a list one after the other.
     """
+    if isinstance(value, list | tuple) and all(isinstance(one, int | float) for one in value):
+        return text.in_a_row(map(number, value))
     if isinstance(value, Mapping):
         return ", ".join(f"{literal(str(key))} {number(one)}" for key, one in value.items())
     if not isinstance(value, int | float) or isinstance(value, bool):
@@ -84,6 +86,8 @@ def swept(result: CaseResult) -> str:
 
 def with_its_unit(result: CaseResult, key: str, value: object) -> str:
     """A value of a key with the key's unit, but for one that would have to stand in brackets."""
+    if isinstance(value, list | tuple):
+        return " ".join(filter(None, (number(value), key_label(result, key).unit)))
     if not isinstance(value, int | float) or isinstance(value, bool):
         return number(value)
     factor, own = in_degrees(key_label(result, key).unit)
@@ -243,7 +247,9 @@ def by_panel(results: Sequence[CaseResult], most: float = MOST_LINES) -> dict[st
         of = (device(result) if several or not words else "", words)
         found.setdefault("\0".join((stem(result), *filter(None, of))), []).append(result)
     titles = [key.partition("\0")[2].replace("\0", ", ") for key in found]
-    groups = dict(zip(titles if len(set(titles)) == len(titles) else found, found.values(), strict=True))
+    if len(set(titles)) < len(titles):  # of several configs
+        titles = [key.replace("\0", ", ") for key in found]
+    groups = dict(zip(titles, found.values(), strict=True))
     parted: dict[str, list[CaseResult]] = {}
     for title, members in groups.items():
         counts = [len(result.axes.filters) for result in members]
@@ -596,7 +602,8 @@ def dynamic_figure(
     )
     caption += left_out(len(drawn) - MOST_PANELS)
     title = tr("Dynamic and fluctuation error of the {quantity}", quantity=of.name)
-    return in_columns(Figure(name, title, caption, tuple(spread_out(drawn, MOST_PANELS))))
+    figure = in_columns(Figure(name, title, caption, tuple(spread_out(drawn, MOST_PANELS))))
+    return seen.begun(figure, seen.extremes(figure, unit_in(curves, component)))
 
 
 def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Quantity) -> Panel:

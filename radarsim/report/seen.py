@@ -3,7 +3,7 @@
 Read off the marks that are drawn, so that it is true of every run. Lines whose intervals overlap are told together.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,12 +14,20 @@ from radarsim.report.chart_text import spoken
 from radarsim.report.drawing import Figure, Heat, Line, Panel
 
 DIGITS = 3
+MOST_PANELS = 4  # told one by one
 MOST_NAMES = 3  # told of those that share a place
 
 
 def begun(figure: Figure, sentence: str) -> Figure:
     """The figure whose caption begins with a sentence, where there is one."""
     return replace(figure, caption=f"{sentence} {figure.caption}") if sentence else figure
+
+
+def all_begun(
+    drawn: Mapping[str, Figure | None], by: Mapping[str, Callable[[Figure], str]]
+) -> dict[str, Figure | None]:
+    """Figures by name, each that `by` names with the sentence of its function; the others as they are."""
+    return {name: begun(one, by[name](one)) if one and name in by else one for name, one in drawn.items()}
 
 
 def numbered(figure: Figure, number: str) -> Figure:
@@ -39,10 +47,13 @@ def crossed(figure: Figure) -> Figure:
 def at_the_end(figure: Figure, unit: str = "") -> str:
     """Which line ends lowest and which highest, of each panel; nothing for a figure without two lines.
 
-    A line whose interval is not known at its end is neither.
+    A line whose interval is not known at its end is neither; where that leaves a panel less than two, the extremes of
+    the figure are told.
     """
-    ending = ([line for line in _ending(panel) if all(np.isfinite(_interval(line)))] for panel in figure.panels)
-    drawn = [lines for lines in ending if len(lines) > 1]
+    every = [lines for panel in figure.panels if len(lines := _ending(panel)) > 1]
+    drawn = [[line for line in lines if all(np.isfinite(_interval(line)))] for lines in every]
+    if any(len(known) < 2 or _alike(known, lines) for known, lines in zip(drawn, every, strict=True)):
+        return extremes(figure, unit)
     if len(drawn) == 1:
         low, high = _lowest(drawn[0], 1), _lowest(drawn[0], -1)
         if len(low) == len(drawn[0]):
@@ -76,14 +87,70 @@ def most(figure: Figure, unit: str = "%") -> str:
     )
 
 
+def highest_at_the_end(figure: Figure) -> str:
+    """Which line ends highest, of each panel: of what adds up to one."""
+    drawn = [(panel, lines) for panel in figure.panels if len(lines := _ending(panel)) > 1]
+    found = [(_title(panel), _listed(_lowest(lines, -1))) for panel, lines in drawn]
+    if not found:
+        return ""
+    if len({names for _, names in found}) == 1:
+        return tr("At the end highest: {highest}.", highest=found[0][1])
+    return tr("At the end highest: {highest}.", highest="; ".join(map(": ".join, found[:MOST_PANELS])))
+
+
+def extremes(figure: Figure, unit: str = "") -> str:
+    """The highest and the lowest point of all named lines, and whose they are."""
+    found = [(panel, line) for panel in figure.panels for line in _named(panel)]
+    if not found:
+        return ""
+    top = max(found, key=lambda pair: float(np.nanmax(pair[1].y)))
+    bottom = min(found, key=lambda pair: float(np.nanmin(pair[1].y)))
+    high, low = np.nanmax(top[1].y), np.nanmin(bottom[1].y)
+    several = len(figure.panels) > 1
+    return tr(
+        "Highest: {high} ({name}); lowest: {low} ({other}).",
+        **{"high": _valued(np.array([high]), unit), "name": _whose(*top, several)},
+        **{"low": _valued(np.array([low]), unit), "other": _whose(*bottom, several)},
+    )
+
+
+def first_extremes(figure: Figure) -> str:
+    """The highest and the lowest point of the first panel, with the unit of its axis."""
+    unit = figure.panels[0].y.label.rpartition(", ")[2] if ", " in figure.panels[0].y.label else ""
+    return extremes(replace(figure, panels=figure.panels[:1]), unit)
+
+
+def reading_at(x: float) -> Callable[[Figure], str]:
+    """A function that tells which line is highest and which lowest at a place of the axis."""
+
+    def told(figure: Figure) -> str:
+        found = [
+            (float(np.interp(x, line.x, line.y)), panel, line)
+            for panel in figure.panels
+            for line in _named(panel)
+            if len(line.x) > 1 and line.x[0] <= x <= line.x[-1]
+        ]
+        if len(found) < 2:
+            return extremes(figure)
+        top, bottom = max(found, key=lambda one: one[0]), min(found, key=lambda one: one[0])
+        several = len(figure.panels) > 1
+        return tr(
+            "At {x:g} highest: {high} ({name}); lowest: {low} ({other}).",
+            x=x,
+            **{"high": text.number(top[0], DIGITS), "name": _whose(*top[1:], several)},
+            **{"low": text.number(bottom[0], DIGITS), "other": _whose(*bottom[1:], several)},
+        )
+
+    return told
+
+
 def over(figure: Figure, unit: str = "") -> str:
-    """The least and the largest value of all maps or lines of a figure."""
+    """The least and the largest value of all maps of a figure; where there is none, of the lines of its first panel."""
     values = [np.ravel(m.values) for panel in figure.panels for m in panel.marks if isinstance(m, Heat)]
-    values = values or [m.y for panel in figure.panels[:1] for m in panel.marks if isinstance(m, Line)]
     found = np.concatenate([np.zeros(0), *values])
     found = found[np.isfinite(found)]
     if not found.size:
-        return ""
+        return extremes(replace(figure, panels=figure.panels[:1]), unit)
     low, high = text.number(float(found.min()), DIGITS), _valued(found[[found.argmax()]], unit)
     return tr("From {low} to {high}.", low=low, high=high)
 
@@ -97,6 +164,26 @@ def _ending(panel: Panel) -> list[Line]:
     """The lines of a panel that have a name and a last point."""
     lines = [mark for mark in panel.marks if isinstance(mark, Line) and _name(mark)]
     return [line for line in lines if len(line.y) and np.isfinite(line.y[-1])]
+
+
+def _named(panel: Panel) -> list[Line]:
+    """The lines of a panel that have a name and a point."""
+    lines = [mark for mark in panel.marks if isinstance(mark, Line) and _name(mark)]
+    return [line for line in lines if np.isfinite(line.y).any()]
+
+
+def _alike(known: Sequence[Line], lines: Sequence[Line]) -> bool:
+    """Whether those of known intervals are all alike, though there are others."""
+    return len(known) < len(lines) and len(_lowest(known, 1)) == len(known)
+
+
+def _title(panel: Panel) -> str:
+    return spoken(panel.title).replace("\n", " ")
+
+
+def _whose(panel: Panel, line: Line, several: bool) -> str:
+    """A line by its name, with its panel's title where there are several panels."""
+    return ", ".join(dict.fromkeys(filter(None, (_title(panel) if several else "", _name(line)))))
 
 
 def _lowest(lines: Sequence[Line], sign: int) -> list[Line]:

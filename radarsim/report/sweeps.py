@@ -1,5 +1,6 @@
 """What a sweep shows by itself: σ at the last scan against one swept key, or over two as a map, whatever the study."""
 
+import textwrap
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,6 +13,7 @@ from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Heat, Line
 WIDE = 20  # largest over least swept value from which the axis is logarithmic
 VALUES = ("m", "rad")  # units of what is measured itself, not of its rates
 MOST_PANELS = 6
+BROAD = 12  # letters of a name at an axis, from which it is broken between words
 
 
 def figures(results: Sequence[CaseResult], curves: Mapping) -> dict[str, Figure]:
@@ -54,7 +56,8 @@ def places(result: CaseResult, key: str, values: Sequence) -> tuple[np.ndarray, 
     if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
         x = panels.axis_factor(result, key) * np.array(values, dtype=float)
         return x, Axis(label, "log" if x.min() > 0 and x.max() / x.min() > WIDE else "linear")
-    ticks = tuple((float(i), panels.number(v if isinstance(v, str) else str(v))) for i, v in enumerate(values))
+    words = [panels.number(v if isinstance(v, str | list | tuple) else str(v)) for v in values]
+    ticks = tuple((float(i), textwrap.fill(one, BROAD, break_long_words=False)) for i, one in enumerate(words))
     return np.arange(float(len(values))), Axis(label, ticks=ticks)
 
 

@@ -86,19 +86,22 @@ def test_loads_offline_in_under_a_second_without_a_complaint(page, results, name
     assert min(times) < SOONEST_S, times
 
 
-def first_panel(page):
-    """Middle of the plot of the first panel, and its width, in the window."""
-    x, y = page.place("svg.chart")
-    width = page.evaluate("document.querySelector('svg.chart').getBoundingClientRect().width")
+SIGMA = "#figure-sigma_r"  # the figure of both filters
+
+
+def first_panel(page, figure="figure"):
+    """Middle of the plot of a figure's first panel, and its width, in the window."""
+    x, y = page.place(f"{figure} svg.chart")
+    width = page.evaluate(f"document.querySelector('{figure} svg.chart').getBoundingClientRect().width")
     return x, y, width
 
 
 def test_hovering_shows_the_value_and_its_interval(page, results):
     page.open(results / "rls2" / "report.html")
-    x, y, width = first_panel(page)
+    x, y, width = first_panel(page, SIGMA)
     page.move(x + 0.05 * width, y)
-    tip = page.evaluate("document.querySelector('figure .tip').innerText")
-    assert page.evaluate("!document.querySelector('figure .tip').hidden")
+    tip = page.evaluate(f"document.querySelector('{SIGMA} .tip').innerText")
+    assert page.evaluate(f"!document.querySelector('{SIGMA} .tip').hidden")
     assert "time from the first plot, s: " in tip
     at = float(re.search(r"s: ([\d.]+)", tip)[1])
     rows = [row.split(",") for row in (results / "rls2" / "curves.csv").read_text().splitlines()[1:]]
@@ -109,7 +112,7 @@ def test_hovering_shows_the_value_and_its_interval(page, results):
             )
             assert [float(v) for v in told.groups()] == pytest.approx([float(row[i]) for i in (7, 8, 9, 13)], rel=1e-4)
     page.move(5, 5)
-    assert page.evaluate("document.querySelector('figure .tip').hidden")
+    assert page.evaluate(f"document.querySelector('{SIGMA} .tip').hidden")
 
 
 def test_the_keyboard_reads_values_too(page, results):
@@ -126,16 +129,16 @@ def test_the_keyboard_reads_values_too(page, results):
 
 def test_curves_are_switched_off_and_on(page, results):
     page.open(results / "rls2" / "report.html")
-    seen = "[...document.querySelectorAll('figure')[0].querySelectorAll('[data-g=\"0\"]')].map((e) => e.style.display)"
-    page.click(".switches button")
+    seen = f"[...document.querySelectorAll('{SIGMA} [data-g=\"0\"]')].map((e) => e.style.display)"
+    page.click(f"{SIGMA} .switches button")
     assert page.evaluate(f"[{seen}].flat().filter((d) => d === 'none').length") == 1
-    assert page.evaluate("document.querySelector('.switches button').getAttribute('aria-pressed')") == "false"
-    x, y, width = first_panel(page)
+    assert page.evaluate(f"document.querySelector('{SIGMA} .switches button').getAttribute('aria-pressed')") == "false"
+    x, y, width = first_panel(page, SIGMA)
     page.move(x + 0.05 * width, y)
-    tip = page.evaluate("document.querySelector('figure .tip').innerText")
+    tip = page.evaluate(f"document.querySelector('{SIGMA} .tip').innerText")
     assert "r+Vr: " in tip
     assert not re.search(r"^r: ", tip, re.MULTILINE)
-    page.click(".switches button")
+    page.click(f"{SIGMA} .switches button")
     assert page.evaluate(f"{seen}.every((d) => d === '')")
 
 

@@ -35,7 +35,7 @@ NAMES = {
         "max",
         "min",
     ),
-    *("RLS", "IEEE", "Std", "asin", "combined", "modified", "moment", "best", "samples"),
+    *("RLS", "IEEE", "Std", "asin", "combined", "modified", "moment", "best", "samples", "sinc"),
     *("python", "numpy", "numba", "llvmlite", "scipy", "pandas", "matplotlib", "pydantic", "pyyaml"),
 }
 
@@ -54,16 +54,18 @@ def shown(figure: Figure):
 def told(page: str):
     """All texts of a report but what is typed, counted or quoted as it is: code, keys, tables that are files."""
     page = re.sub(r"(?s)<(style|script|pre|code|svg|i)\b.*?</\1>", "", page)
-    page = re.sub(r"(?s)<table class=\"sortable\" id=\"table-asked.*?</table>", columns, page)
+    page = re.sub(r"(?s)<table class=\"sortable\" id=\"table-asked.*?</table>", meanings, page)
     page = re.sub(r"(?s)<h2 id=\"tables\">.*?<h2 id=\"provenance\">", "", page)
     page = re.sub(r"(?s)<dd>.*?</dd>", "", page)
     yield from (html.unescape(words) for words in re.findall(r'aria-label="([^"]*)"', page))
     yield from (html.unescape(words) for words in re.findall(r">([^<]+)<", page))
 
 
-def columns(table: re.Match) -> str:
-    """The heads and meanings of a table of keys, without keys and values."""
-    return re.sub(r"(?s)<tr><td[^>]*>.*?</td><td[^>]*>.*?</td>", "<tr>", table[0])
+def meanings(table: re.Match) -> str:
+    """Of a table of keys what they mean: the last column; where cases differ, keys and values are all there is."""
+    heads = re.findall(r"<th[^>]*>(.*?)</th>", table[0])
+    cells = re.findall(r"(?s)<td[^>]*>.*?</td>", table[0])
+    return " ".join(cells[len(heads) - 1 :: len(heads)]) if len(heads) == 3 and heads[0] == "ключ" else ""
 
 
 def untranslated(words: str, names: set[str]) -> list[str]:
@@ -75,6 +77,8 @@ def untranslated(words: str, names: set[str]) -> list[str]:
 def check(stem: str, realisations: int, folder) -> None:
     result = run(stem, realisations=realisations, out=folder, figures=False)
     names = NAMES | {part for text in own_names(result) for part in re.findall("[A-Za-z]+", text)}
+    config = (SHIPPED / "configs" / f"{stem}.yaml").read_text(encoding="utf-8")
+    names |= {path.stem for path in (SHIPPED / "scenarios").glob("*.yaml") if f"target: {path.stem}" in config}
     before = {name: to_csv(table) for name, table in output.tables(result.cases, stem=stem).items()}
     with speaking("ru"):
         made = output.tables(result.cases, stem=stem)

@@ -1,5 +1,7 @@
 """What captions say is to be seen: the lines that end lowest and highest, what intervals leave open, crosses."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from radarsim.report import seen
@@ -34,7 +36,9 @@ def test_lines_whose_intervals_overlap_are_told_together():
 def test_a_line_of_unknown_interval_is_neither_lowest_nor_highest():
     nothing = np.full(5, np.nan)
     unknown = Line(T, np.linspace(9.0, 0.5, 5), "b", lo=nothing, hi=nothing)
-    assert seen.at_the_end(figure((line("a", 1.0), unknown))) == ""
+    assert seen.at_the_end(figure((line("a", 1.0), unknown))) == "Highest: 9 (a); lowest: 0.5 (b)."
+    alike = figure((line("a", 1.0), line("c", 1.1), unknown))
+    assert seen.at_the_end(alike).startswith("Highest: ")  # not "all are within each other's intervals"
     told = seen.at_the_end(figure((line("a", 1.0), unknown, line("c", 3.0))))
     assert told == "At the end lowest: a (1); highest: c (3)."
 
@@ -51,6 +55,25 @@ def test_gains_and_maps():
     assert seen.most(figure((gain,), title="Gain")) == "At most 35 % (r+Vr, at 2 s); 18 % at the end."
     heat = Heat(T[:2], T[:2], np.array([[0.5, np.nan], [0.25, 1.0]]), "share")
     assert seen.over(figure((heat,), title="Lock")) == "From 0.25 to 1."
+
+
+def test_extremes_and_readings_at_a_place():
+    made = figure((line("a", 1.0), line("b", 3.0)), (line("c", 12.0),))
+    made = replace(made, panels=tuple(replace(one, title=f"case {n}") for n, one in enumerate(made.panels)))
+    assert seen.extremes(made, "m") == "Highest: 12 m (case 1, c); lowest: 1 m (case 0, a)."
+    assert seen.reading_at(2.0)(made) == "At 2 highest: 10.5 (case 1, c); lowest: 5 (case 0, a)."
+    first = replace(made, panels=(replace(made.panels[0], y=Axis("time to a track, s")), made.panels[1]))
+    assert seen.first_extremes(first) == "Highest: 9 s (a); lowest: 1 s (a)."
+    assert seen.highest_at_the_end(made) == "At the end highest: b."
+    assert seen.extremes(figure(())) == ""
+
+
+def test_figures_by_name():
+    made = figure((line("a", 1.0), line("b", 3.0)))
+    begun = seen.all_begun({"f": made, "g": made, "h": None}, {"f": lambda _: "Seen.", "h": lambda _: "Never."})
+    assert begun["f"].caption == "Seen. How."
+    assert begun["g"] is made
+    assert begun["h"] is None
 
 
 def test_crosses_are_told_of_where_there_are_any():

@@ -156,3 +156,22 @@ def test_of_very_many_cases_the_caption_says_how_many_are_left_out():
     assert len(sigma.panels) == 12
     assert sigma.panels[-1].title == "$σ_V$ = 14 m/s"  # the ends are among those shown
     assert f"{14 * 10 - 12 * 8} further cases" in sigma.caption
+
+
+def test_lists_and_long_names_at_an_axis_and_in_titles():
+    assert panels.number((1000.0, 1200.0)) == "1000, 1200"
+    result = experiment.run("ambiguous_turns", realisations=8, figures=False)
+    first, second = result.cases[:2]
+    key = first.swept[0][0]
+    assert panels.swept(first) == "$F_r$ = 1000, 1200 Hz"
+    _, axis = sweeps.places(first, key, [dict(one.swept)[key] for one in (first, second)])
+    assert [words for _, words in axis.ticks] == ["1000, 1200", "1000, 1200,\n1400"]
+    _, axis = sweeps.places(first, key, ["aeroballistic_gentle", "weaving"])
+    assert [words for _, words in axis.ticks] == ["aeroballistic\ngentle", "weaving"]
+
+
+def test_panels_of_several_configs_that_would_be_called_the_same_are_told_by_their_config():
+    result = experiment.run("ambiguous_stagger", realisations=8, figures=False)
+    assert list(panels.by_panel(result.cases)) == [
+        *("ambiguous_rls4, RLS 4", "RLS 4, $F_r$ = 1000, 1200 Hz", "RLS 4, $F_r$ = 1000, 1200, 1400 Hz"),
+    ]

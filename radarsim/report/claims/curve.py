@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from radarsim.language import term, tr
 from radarsim.report.claims import rule
 from radarsim.report.claims.over import Over, Under, depth
 from radarsim.report.claims.readings import Choice, PaperReadings
@@ -10,9 +11,9 @@ from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Referenc
 FURTHEST = 5.0  # margins: what lies further is drawn there
 LETTERS = 44  # of an alternative beside the panel
 KINDS = {
-    rule.EQUIVALENT: ("as shipped, or equivalent", Style(colour=0, dash=None, marker=0)),
-    rule.UNSTATED: ("the paper does not say", Style(colour=1, dash=None, marker=1)),
-    rule.AGAINST: ("against the print", Style(colour=2, dash=None, marker=2)),
+    rule.EQUIVALENT: (term("as shipped, or equivalent"), Style(colour=0, dash=None, marker=0)),
+    rule.UNSTATED: (term("the paper does not say"), Style(colour=1, dash=None, marker=1)),
+    rule.AGAINST: (term("against the print"), Style(colour=2, dash=None, marker=2)),
 }
 
 
@@ -26,10 +27,15 @@ def specification(of: PaperReadings, over: Over) -> Figure:
     varied = [choice for choice in of.choices if len({one.reading[choice.key] for one in every}) > 1]
     return Figure(
         name=over.claim.id,
-        title=f"{over.claim.id} under every reading",
-        caption=f"{over.claim.statement}. Above: how far the worst part of the claim is from what the paper says, in "
-        f"margins of that part, cut at ± {FURTHEST:g}; under 0 it holds, over 1 it fails beyond the margin. Below: "
-        f"what each reading takes. {over.sentence().capitalize()}.",
+        title=tr("{claim} under every reading", claim=over.claim.id),
+        caption=tr(
+            "{statement}. {outcome}. Above: how far the worst part of the claim is from what the paper says, in "
+            "margins of that part, cut at ± {furthest:g}; under 0 it holds, over 1 it fails beyond the margin. Below: "
+            "what each reading takes.",
+            statement=tr(over.claim.statement),
+            outcome=over.sentence().capitalize(),
+            furthest=FURTHEST,
+        ),
         panels=(_above(every, where, ends, over), *([_below(varied, every, where)] if varied else [])),
         width_mm=PAGE_MM,
         panel_height_mm=max(62.0, 4.2 * sum(len(choice.alternatives) + 1 for choice in varied)),
@@ -42,11 +48,11 @@ def _above(every: list[Under], where: np.ndarray, ends: np.ndarray, over: Over) 
         of = np.array([one.kind == kind for one in every])
         if of.any():
             value, lo, hi = ends[of].T
-            marks.append(Line(where[of], value, label, style, lo, hi))
+            marks.append(Line(where[of], value, tr(label), style, lo, hi))
     return Panel(
-        Axis("reading, sorted", limits=(0, len(every) + 1)),
-        Axis("distance of the worst part, margins"),
-        (*marks, Reference(0.0, label="as the paper says"), Reference(1.0, label="beyond the margin")),
+        Axis(tr("reading, sorted"), limits=(0, len(every) + 1)),
+        Axis(tr("distance of the worst part, margins")),
+        (*marks, Reference(0.0, label=tr("as the paper says")), Reference(1.0, label=tr("beyond the margin"))),
         title=f"{over.claim.id}: {over.sentence()}",
         direct=False,
     )
@@ -66,7 +72,7 @@ def _below(varied: list[Choice], every: list[Under], where: np.ndarray) -> Panel
                 marks.append(Line(where[taken], np.full(taken.sum(), float(height)), "", style))
         height -= 1 if number + 1 < len(varied) else 0
     return Panel(
-        Axis("reading, sorted", limits=(0, len(every) + 1)),
+        Axis(tr("reading, sorted"), limits=(0, len(every) + 1)),
         Axis("", limits=(height - 1.0, 0.0), ticks=tuple(reversed(ticks))),
         tuple(marks),
         legend="none",

@@ -1,11 +1,12 @@
 """The forest plot of claims: of each the worst part, its interval and exact value, in margins of what the words say."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from radarsim.language import tr
+from radarsim.language import Term, tr
 from radarsim.report.claims import page
 from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
 from radarsim.report.claims.rule import CLASSES, VOID
@@ -55,10 +56,15 @@ def figure(rows: Sequence[Mapping]) -> Figure | None:
     panels = [_panel(paper, [(own, row) for own, row in found if own[0]["paper"] == paper]) for paper in papers]
     if not panels:
         return None
+    classes = Counter(own[0]["class"] for own in judged)
+    counted = ", ".join(
+        tr("{count} {kind}", count=classes[kind], kind=Term(kind)) for kind in page.ORDER if classes[kind]
+    )
     return Figure(
         name="claims",
         title=tr("Claims, in margins of what their papers say"),
-        caption=tr(
+        caption=tr("Of {count} claims: {counted}. ", count=len(judged), counted=counted)
+        + tr(
             "Of each claim the part that lies furthest from the paper's words: measured, with its 95 % interval, and "
             "exactly, in margins of that part, cut at ± {furthest:g}. Under 0 it is as the words say, up to "
             "1 within their margin. The mark is the class of the claim, over all readings where these are known.",

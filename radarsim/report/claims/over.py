@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from radarsim.language import tr
-from radarsim.report.claims import rule
+from radarsim.report.claims import reasons, rule
 from radarsim.report.claims.declared import Claim, Part
 from radarsim.report.claims.evidence import Evidence, Missing
 from radarsim.report.claims.readings import PaperReadings, Reading
@@ -126,7 +126,7 @@ class Over:
         """One line: in how many readings it holds, on what it depends, what would have to be changed."""
         found = self.outcome
         if found is None:
-            return tr("not judged: {why}", why=self.under[0].why)
+            return tr("not judged: {why}", why=reasons.said(self.under[0].why))
         words = [tr("holds in {holds} of {of} readings", holds=found.holds_in or 0, of=found.readings or 0)]
         if found.depends_on:
             words.append(tr("depends on: {choices}", choices=", ".join(found.depends_on)))

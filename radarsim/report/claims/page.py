@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from radarsim.language import numeral, plural, term, tr
+from radarsim.report.claims import reasons
 from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
 from radarsim.report.claims.rule import (
     CLASSES,
@@ -122,7 +123,7 @@ def verdict_of(parts: Sequence[Mapping]) -> str:
         holds, of = number(first["holds"]), number(first["of"])
         notes.append(tr("in {holds:.0f} of {of:.0f} readings", holds=holds, of=of))
     if first["class"] in (UNJUDGEABLE, NOT_JUDGED) and first["why"]:
-        notes.append(tr(str(first["why"])))
+        notes.append(reasons.said(first["why"]))
     if extension(parts):
         notes.append(tr("extension, not counted"))
     return f"{text} ({'; '.join(notes)})" if notes else text
@@ -211,7 +212,7 @@ def expected(words: str) -> str:
     return " ".join(tr(one) if one.isalpha() else numeral(one) for one in words.split())
 
 
-EXPECTED = (term("about"), term("to"))  # the words in it
+EXPECTED = (term("about"), term("to"), term("few"))  # the words in it
 
 
 def plain(value: float) -> str:

@@ -1,25 +1,32 @@
 """The page of a paper's readings: what it leaves open, its claims over all readings, its printed numbers by reading."""
 
 import math
+import re
 from collections.abc import Sequence
 
 import numpy as np
 
+from radarsim.language import Term, current, numeral, plural, term, tr
 from radarsim.report.claims.joint import Joint, Key, Together
 from radarsim.report.claims.over import Over
-from radarsim.report.claims.page import plain
+from radarsim.report.claims.page import class_words, expected, plain
 from radarsim.report.claims.readings import PaperReadings
+from radarsim.report.claims.reasons import said
 from radarsim.report.claims.search import Search
 
+PAPERS = "ru"  # the language of the papers that are quoted
 SHOWN = 12  # readings of the table of claims by reading
-KINDS = "E: equivalent in every respect; U: the paper does not say; N: against its print."
-COUNTED = (
+EVERY, NOWHERE, BUT = term("all"), term("none"), "all but "
+RANGES = re.compile(r"[\d.,e… +-]+")
+PRINTED = (term("claim"), term("number"), term("printed"))  # columns
+KINDS = term("E: equivalent in every respect; U: the paper does not say; N: against its print.")
+COUNTED = term(
     "Counted are the numbers, limits and comparisons that the claims of this page assert, each once. One comes out to "
     "the print where its 95 % interval, all of a claim's at once, or its exact value lies in the range that the print "
     "rounds to; within margins where it lies in the margin of the words; undecided where the interval is too wide to "
     "say. Below: bold to the print, plain within margins, – beyond them, ? undecided."
 )
-INTRODUCTION = (
+INTRODUCTION = term(
     "Written by `radarsim readings {paper} --markdown`; every number by reading stands in "
     "`results/readings/readings.csv`, and beside it a specification curve a claim. The rule: "
     "[how a claim is judged](verdicts.md)."
@@ -28,27 +35,34 @@ INTRODUCTION = (
 
 def page(of: PaperReadings, cited: str, over: Sequence[Over], counted: Search | Joint) -> str:
     """The page as Markdown; counted is what the joint search of the paper came to."""
-    parts = [f"# {of.paper} by reading", f"{cited}. {INTRODUCTION.format(paper=of.paper)}"]
+    parts = [tr("# {paper} by reading", paper=of.paper), f"{tr(cited)}. {tr(INTRODUCTION, paper=of.paper)}"]
     parts += [f"**{counted.sentence()}**"]
-    parts += ["## Claims over all readings", _claims(over)]
+    parts += [tr("## Claims over all readings"), _claims(over)]
     changed = _changed(over)
     if changed:
-        words = "What would have to be changed: readings against the print under which a claim comes out otherwise."
+        words = tr("What would have to be changed: readings against the print under which a claim comes out otherwise.")
         parts += [words, changed]
     impossible = _impossible(over)
     if impossible:
-        parts += ["Readings that cannot be flown, designed or measured:", impossible]
+        parts += [tr("Readings that cannot be flown, designed or measured:"), impossible]
     if isinstance(counted, Joint):
         numbers, windows = f"{_best(counted)}\n\n{_printed(counted)}", _alternatives(counted)
     else:
         numbers, windows = _numbers(counted), _windows(counted)
-    parts += ["## Printed numbers by reading", numbers, "## Where each number comes out", windows]
-    parts += ["## What the paper leaves open", KINDS, *(_choice(of, number) for number in range(len(of.choices)))]
+    parts += [tr("## Printed numbers by reading"), numbers, tr("## Where each number comes out"), windows]
+    parts += [
+        tr("## What the paper leaves open"),
+        tr(KINDS),
+        *(_choice(of, number) for number in range(len(of.choices))),
+    ]
     return "\n\n".join(parts) + "\n"
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    lines = [
+        "| " + " | ".join(tr(one) if isinstance(one, Term) else one for one in columns) + " |",
+        "|" + "---|" * len(columns),
+    ]
     return "\n".join(lines + ["| " + " | ".join(_cell(one) for one in row) + " |" for row in rows])
 
 
@@ -60,19 +74,20 @@ def _claims(over: Sequence[Over]) -> str:
     rows = []
     for one in over:
         found = one.outcome
-        holds = f"{found.holds_in or 0} of {found.readings or 0}" if found else ""
-        rows.append((one.claim.id, one.claim.statement, found.words if found else "not judged", holds))
-    return _table(("claim", "statement", "verdict", "holds in"), rows)
+        holds = tr("{count} of {of}", count=found.holds_in or 0, of=found.readings or 0) if found else ""
+        verdict = class_words(found.words) if found else tr("not judged")
+        rows.append((one.claim.id, tr(one.claim.statement), verdict, holds))
+    return _table((term("claim"), term("statement"), term("verdict"), term("holds in")), rows)
 
 
 def _changed(over: Sequence[Over]) -> str:
     rows = [
-        (one.claim.id, reading.name, reading.outcome.kind)
+        (one.claim.id, tr(reading.name), tr(reading.outcome.kind))
         for one in over
         for reading in one.against_print
         if reading.outcome is not None
     ]
-    return _table(("claim", "reading", "comes out"), rows) if rows else ""
+    return _table((term("claim"), term("reading"), term("comes out")), rows) if rows else ""
 
 
 def _impossible(over: Sequence[Over]) -> str:
@@ -80,8 +95,8 @@ def _impossible(over: Sequence[Over]) -> str:
     for one in over:
         for reading in one.impossible:
             reasons.setdefault((one.claim.id, reading.why), []).append(reading.name)
-    rows = [(claim, str(len(names)), names[0], why) for (claim, why), names in reasons.items()]
-    return _table(("claim", "readings", "such as", "why not"), rows) if rows else ""
+    rows = [(claim, str(len(names)), names[0], said(why)) for (claim, why), names in reasons.items()]
+    return _table((term("claim"), term("readings"), term("such as"), term("why not")), rows) if rows else ""
 
 
 def _best(of: Joint) -> str:
@@ -89,32 +104,40 @@ def _best(of: Joint) -> str:
     best = of.every[:SHOWN]
     rows = [
         (
-            *(one.name, one.kind, f"{one.count(False)} of {len(one.outcomes)}", str(one.count(True)), str(one.open)),
-            *(f"{len(one.held)} of {len(one.judged)}", ", ".join(one.held)),
+            *(tr(one.name), one.kind, tr("{count} of {of}", count=one.count(False), of=len(one.outcomes))),
+            *(str(one.count(True)), str(one.open)),
+            *(tr("{count} of {of}", count=len(one.held), of=len(one.judged)), ", ".join(one.held)),
         )
         for one in [*best, *([] if of.shipped in best else [of.shipped])]
     ]
-    columns = ("reading", "kind", "to the print", "within margins", "undecided", "claims that hold", "which")
-    return f"{COUNTED}\n\n{_table(columns, rows)}"
+    columns = (
+        *(term("reading"), term("kind"), term("to the print"), term("within margins"), term("undecided")),
+        *(term("claims that hold"), term("which")),
+    )
+    return f"{tr(COUNTED)}\n\n{_table(columns, rows)}"
 
 
 def _printed(of: Joint) -> str:
     """Every number under the shipped reading and the best ones."""
-    places = {"as shipped": of.shipped, "most to the print": of.best(False), "most within margins": of.best(True)}
+    places = {
+        term("as shipped"): of.shipped,
+        term("most to the print"): of.best(False),
+        term("most within margins"): of.best(True),
+    }
     places = {name: one for i, (name, one) in enumerate(places.items()) if one not in list(places.values())[:i]}
     rows = []
     for key, number in of.numbers.items():
-        printed = f"{number.words} {number.unit}".strip()
-        rows.append((number.claim, number.what, printed, *(_came(one, key) for one in places.values())))
-    words = [f"*{name}*: {one.name}." for name, one in places.items() if one != of.shipped]
-    return "\n\n".join([_table(("claim", "number", "printed", *places), rows), *words])
+        printed = f"{expected(number.words)} {tr(number.unit)}".strip()
+        rows.append((number.claim, tr(number.what), printed, *(_came(one, key) for one in places.values())))
+    words = [f"*{tr(name)}*: {one.name}." for name, one in places.items() if one != of.shipped]
+    return "\n\n".join([_table((*PRINTED, *places), rows), *words])
 
 
 def _came(of: Together, key: Key) -> str:
     if key not in of.outcomes:
-        return "not judged"
+        return tr("not judged")
     outcomes = of.outcomes[key]
-    text = plain(outcomes.value) if math.isfinite(outcomes.value) else "none"
+    text = plain(outcomes.value) if math.isfinite(outcomes.value) else tr("none")
     if outcomes.strict:
         return f"**{text}**"
     return text if outcomes.granular else f"{text} ?" if outcomes.open else f"{text} –"
@@ -125,32 +148,36 @@ def _alternatives(of: Joint) -> str:
     windows = {choice.key: of.windows(choice.key) for choice in of.of.choices}
     kept = {key: own for key, own in windows.items() if set(own.values()) - {"all", "none"}}
     rows = [
-        (number.claim, number.what, *(own[key] for own in kept.values()))
+        (number.claim, tr(number.what), *(_listed(own[key]) for own in kept.values()))
         for key, number in of.numbers.items()
         if any(own[key] not in ("all", "none") for own in kept.values())
     ]
-    words = "Values of one choice, all others as shipped, with which a number comes out to the print."
-    return f"{words}\n\n{_table(('claim', 'number', *kept), rows)}"
+    words = tr("Values of one choice, all others as shipped, with which a number comes out to the print.")
+    return f"{words}\n\n{_table((*PRINTED[:2], *kept), rows)}"
 
 
 def _numbers(search: Search) -> str:
     best = {rule: search.best(rule) for rule in (False, True)}
-    places = {"as shipped": search.place, "most to the digit": best[False], "most to the print's steps": best[True]}
+    places = {
+        term("as shipped"): search.place,
+        term("most to the digit"): best[False],
+        term("most to the print's steps"): best[True],
+    }
     places = {name: place for i, (name, place) in enumerate(places.items()) if place not in list(places.values())[:i]}
     rows = []
     for number, one in enumerate(search.printed):
         cells = [_value(search, number, place) for place in places.values()]
-        rows.append((one.claim, one.what, f"{one.printed} {one.unit}".strip(), *cells))
-    for rule, name in ((False, "come out to the digit"), (True, "come out to the print's steps")):
+        rows.append((one.claim, tr(one.what), f"{expected(one.printed)} {tr(one.unit)}".strip(), *cells))
+    for rule, name in ((False, tr("come out to the digit")), (True, tr("come out to the print's steps"))):
         counts = [str(int(search.count(rule)[place])) for place in places.values()]
         rows.append(("", name, str(len(search.printed)), *counts))
-    words = [f"*{name}*: {search.words(place)}." for name, place in places.items() if place != search.place]
-    return "\n\n".join([_table(("claim", "number", "printed", *places), rows), *words])
+    words = [f"*{tr(name)}*: {search.words(place)}." for name, place in places.items() if place != search.place]
+    return "\n\n".join([_table((*PRINTED, *places), rows), *words])
 
 
 def _value(search: Search, number: int, place: tuple[int, ...]) -> str:
     value = float(search.measured(place)[number])
-    text = f"{value:.6g}" if math.isfinite(value) else "none"
+    text = numeral(f"{value:.6g}") if math.isfinite(value) else tr("none")
     return f"**{text}**" if search.strict[(number, *place)] else text
 
 
@@ -159,26 +186,44 @@ def _windows(search: Search) -> str:
     windows = {key: search.windows(key) for key in search.axes}
     kept = {key: own for key, own in windows.items() if len(set(own) - {"all", "none"}) or len(set(own)) > 1}
     rows = [
-        (one.claim, f"{one.what}: {one.printed} {one.unit}".strip(), *(own[number] for own in kept.values()))
+        (
+            one.claim,
+            f"{tr(one.what)}: {expected(one.printed)} {tr(one.unit)}".strip(),
+            *(_listed(own[number]) for own in kept.values()),
+        )
         for number, one in enumerate(search.printed)
         if any(own[number] != "all" for own in kept.values())
     ]
-    words = "Values of one choice, all others as shipped, with which a number comes out to the printed digit."
+    words = tr("Values of one choice, all others as shipped, with which a number comes out to the printed digit.")
     never = int(np.sum(~search.strict.reshape(len(search.printed), -1).any(axis=1)))
     if never:
-        words += f" {never} come out under no combination."
-    return f"{words}\n\n{_table(('claim', 'number', *kept), rows)}"
+        words += plural(" {count} comes out under no combination.", " {count} come out under no combination.", never)
+    return f"{words}\n\n{_table((*PRINTED[:2], *kept), rows)}"
+
+
+def _listed(window: str) -> str:
+    """Alternatives or ranges of numbers, in the language spoken; the names of alternatives are what is typed."""
+    if window in (EVERY, NOWHERE):
+        return tr(window)
+    if window.startswith(BUT):
+        return tr("all but {names}", names=window.removeprefix(BUT))
+    return numeral(window) if RANGES.fullmatch(window) else window
 
 
 def _choice(of: PaperReadings, number: int) -> str:
     choice = of.choices[number]
-    rows = [(one.name, one.kind, one.reason) for one in choice.alternatives]
-    on = f" Bears on {', '.join(choice.claims)}." if choice.claims else ""
+    rows = [(one.name, one.kind, tr(one.reason)) for one in choice.alternatives]
+    on = tr(" Bears on {claims}.", claims=", ".join(choice.claims)) if choice.claims else ""
+    quoted = (
+        choice.original
+        if current() == PAPERS or choice.original == choice.english
+        else f"{choice.original}\n>\n> {choice.english}"
+    )
     return "\n\n".join(
         [
             f"### `{choice.key}`",
-            f"{choice.asks}.{on}",
-            f"> {choice.original}\n>\n> {choice.english}",
-            _table(("value", "kind", "why"), rows),
+            f"{tr(choice.asks)}.{on}",
+            f"> {quoted}",
+            _table((term("value"), term("kind"), term("why")), rows),
         ]
     )

@@ -10,6 +10,11 @@ from functools import cached_property
 
 import numpy as np
 
+from radarsim.language import term, tr
+
+TO_THE_DIGIT = term("to the printed digit {count} of {of} come out as shipped")
+TO_THE_STEPS = term("to the steps of the print {count} of {of} come out as shipped")
+
 
 @dataclass(frozen=True)
 class Printed:
@@ -82,22 +87,22 @@ class Search:
         """What the search comes to."""
         of, place = len(self.printed), self.place
         parts = []
-        for granular, rule in ((False, "to the printed digit"), (True, "to the steps of the print")):
+        for granular, rule in ((False, TO_THE_DIGIT), (True, TO_THE_STEPS)):
             count = self.count(granular)
             best = int(count.max())
             own = int(count[place])
-            words = f"{rule} {own} of {of} come out as shipped"
+            words = tr(rule, count=own, of=of)
             if best > own:
-                words += f", {best} with {self.words(self.best(granular))}"
+                words += tr(", {count} with {name}", count=best, name=self.words(self.best(granular)))
             else:
-                words += ", and no reading gives more"
+                words += tr(", and no reading gives more")
             parts.append(words)
-        return f"{self.readings:,} readings: {'; '.join(parts)}."
+        return tr("{count:,} readings: {said}.", count=self.readings, said="; ".join(parts))
 
     def words(self, place: tuple[int, ...]) -> str:
         """What a combination takes otherwise than shipped."""
         other = [f"{key}: {value}" for key, value in self.taken(place).items() if value != self.shipped[key]]
-        return "; ".join(other) or "as shipped"
+        return "; ".join(other) or tr("as shipped")
 
     def windows(self, key: str) -> list[str]:
         """The values of one choice, all others as shipped, at which each number comes out to the printed digit."""

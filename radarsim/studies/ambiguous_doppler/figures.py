@@ -8,7 +8,7 @@ import numpy as np
 
 from radarsim.config.experiment import Case, Experiment
 from radarsim.language import term, tr
-from radarsim.report import panels
+from radarsim.report import panels, seen
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.ambiguous_doppler.map import Fan, fan
@@ -40,8 +40,11 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
         drawn |= {name: figure} if figure else {}
     drawn |= hypotheses_figure(experiment.shown_in("hypotheses"))
     some, left_out = panels.shown(results, chosen("orders"))
-    return drawn | orders_figure(some, made["orders"], left_out)
+    drawn |= orders_figure(some, made["orders"], left_out)
+    return {name: one for name, one in seen.all_begun(drawn, SEEN).items() if one}
 
+
+SEEN = {"right": seen.at_the_end, "lost": seen.at_the_end, "orders": seen.highest_at_the_end}
 
 SHARES = {  # figure: column of folds.csv, what it is, caption
     "right": (
@@ -90,18 +93,21 @@ def _share_panel(title: str, members: Sequence[Result], rows: Mapping, of: tuple
 def hypotheses_figure(cases: Sequence[Case]) -> dict[str, Figure]:
     """The hypotheses of one realisation as a fan: a panel for each config, of the first filter that remembers."""
     drawn: list[Panel] = []
-    seen: set[str] = set()
+    shown: dict[str, Fan] = {}
     for case in cases:
         remember = [i for i, one in enumerate(case.spec.filters) if (one.hypotheses or 1) > 1 and one.combine is None]
-        if remember and case.stem not in seen and len(drawn) < FANS:
-            seen.add(case.stem)
-            drawn.append(_fan_panel(case, fan(case, remember[-1], min(FAN_SCANS, case.spec.scans)), remember[-1]))
+        if remember and case.stem not in shown and len(drawn) < FANS:
+            shown[case.stem] = fan(case, remember[-1], min(FAN_SCANS, case.spec.scans))
+            drawn.append(_fan_panel(case, shown[case.stem], remember[-1]))
     if not drawn:
         return {}
+    counts = [len(velocities) for velocities, _, _ in next(iter(shown.values())).lists]
     caption = tr(
+        "Sequences of folds that are kept: {first} at first, {last} after {scans} scans. "
         "The hypotheses of one realisation (number 7): after each scan a line for every sequence of "
         "folds that is kept, at its velocity and with its acceleration, up to the next scan; the "
-        "brighter and broader, the more probable. Dots: the true velocity."
+        "brighter and broader, the more probable. Dots: the true velocity.",
+        **{"first": counts[0], "last": counts[-1], "scans": len(counts)},
     )
     columns = min(2, len(drawn))
     width = COLUMN_MM if columns == 1 else PAGE_MM

@@ -204,7 +204,8 @@ def accuracy(result: CaseResult, made: Mapping) -> Figure:
         count=result.count,
     )
     columns = min(3, max(1, len(drawn)))
-    return Figure("accuracy", tr("Accuracy of the locked bursts"), caption, tuple(drawn), columns, PAGE_MM, 52.0)
+    figure = Figure("accuracy", tr("Accuracy of the locked bursts"), caption, tuple(drawn), columns, PAGE_MM, 52.0)
+    return seen.begun(figure, seen.extremes(figure))
 
 
 def final(made: Mapping, result: CaseResult, name: str) -> "pd.Series":

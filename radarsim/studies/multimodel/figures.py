@@ -1,8 +1,9 @@
 """P2's figures: the flight (1-4), σ of height and its rate (5, 6), probabilities (7), families × rules, cost,
 consistency."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
-from radarsim.report import panels, seen
+from radarsim.report import panels, seen, text
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
 
@@ -43,7 +44,13 @@ def figures(
     drawn["families"] = families(chosen("families"), made)
     drawn["cost"] = cost(chosen("cost"), made)
     drawn["consistency"] = consistency(chosen("consistency"), made["consistency"])
-    return {name: figure for name, figure in drawn.items() if figure is not None}
+    return {name: figure for name, figure in seen.all_begun(drawn, SEEN).items() if figure is not None}
+
+
+SEEN: dict[str, Callable[[Figure], str]] = {
+    **{"probabilities": seen.highest_at_the_end, "families": partial(seen.over, unit="m")},
+    **{"consistency": seen.extremes},
+}
 
 
 def _several(name: str, title: str, caption: str, drawn: Sequence[Panel], height: float = 62.0) -> Figure | None:
@@ -94,8 +101,16 @@ def _title(result: CaseResult, results: Sequence[CaseResult]) -> str:
     if len(results) == 1:
         return ""
     one = len(panels.families(results)) == 1
-    words = ", ".join(panels.number(value) for _, value in result.swept) if one else panels.label(result)
-    return words.replace("_", " ")
+    if not one:
+        return panels.label(result).replace("_", " ")
+    return ", ".join(_value(result, key, value) for key, value in result.swept)
+
+
+def _value(result: CaseResult, key: str, value: object) -> str:
+    """A swept value: a number with its symbol and unit, a choice as it is called."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return f"{panels.symbol_of(result, key)} = {panels.with_its_unit(result, key, value)}"
+    return panels.number(value)
 
 
 def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
@@ -130,7 +145,14 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
         Panel(x, y, (*marks, *own), title, direct=False) for (x, y, title, marks), own in zip(axes, lines, strict=True)
     ]
     drawn[0] = replace(drawn[0], marks=(*drawn[0].marks, *_landmarks(lines[0])), equal=True)
+    track, (height, *_), (acceleration, *_) = lines[0][0], lines[1], lines[3]
+    far = np.hypot(track.x, track.y)
     caption = tr(
+        "{name}: from {begin:.0f} to {end:.0f} km of the radar over the ground, up to {height:.0f} km high and "
+        "{acceleration:.0f} m/s². ",
+        **{"name": track.name or track.label or results[0].name, "begin": float(far[0]), "end": float(far[-1])},
+        **{"height": float(height.y.max()), "acceleration": float(acceleration.y.max())},
+    ) + tr(
         "The true flight: the ground track from its start, at one scale "
         "north and east, with the radar at the origin. Dotted: ends of the stages."
     )
@@ -289,8 +311,15 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
             Axis(panels.sigma_of("$y$", "m"), "log"),
         )
         drawn.append(Panel(x, y, tuple(marks), tr(str(stage)), direct=False))
+    points = [mark for mark in drawn[-1].marks if isinstance(mark, Line)]
+    cheap, good = min(points, key=lambda one: float(one.x[0])), min(points, key=lambda one: float(one.y[0]))
+    told = tr(
+        "Fewest operations: {cheap} ({count:.0f}); least σ, {stage}: {good} ({sigma} m). ",
+        **{"cheap": cheap.label, "count": float(cheap.x[0]), "stage": drawn[-1].title},
+        **{"good": good.label, "sigma": text.number(float(good.y[0]), 3)},
+    )
     drawn = _beside(drawn, result, dash=None)
-    caption = tr(
+    caption = told + tr(
         "Accuracy against cost: σ of the height over a stage (whiskers: 95 %) and the mean count of "
         "arithmetic operations of one update.{of_case}",
         of_case=_of_case(result, results),

@@ -8,7 +8,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import term, tr
-from radarsim.report import panels, sweeps
+from radarsim.report import panels, seen, sweeps
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.pulses_to_tracks.kernels.records import AGES
@@ -45,7 +45,14 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
         found = [panel for result in some if (panel := draw(result, made)).marks]
         if found:
             drawn[name] = _figure(name, tr(title), tr(caption) + left_out, found)
-    return drawn | threshold_figure(results, made)
+    drawn |= threshold_figure(results, made)
+    return {name: one for name, one in seen.all_begun(drawn, SEEN).items() if one}
+
+
+SEEN = {
+    **{"locks": seen.extremes, "folds": seen.at_the_end, "measured": seen.first_extremes},
+    **{"losses": seen.first_extremes, "threshold": seen.first_extremes},
+}
 
 
 def wide(panel: Panel) -> Panel:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.language import listed, tr
+from radarsim.language import listed, numeral, term, tr
 from radarsim.report import html, panels
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Chart, Figure, Line, Mark, Note, Panel, Reference, Style
@@ -21,7 +21,7 @@ from radarsim.studies.range_doppler.study import COMPONENTS, RangeDopplerAxes, p
 if TYPE_CHECKING:
     import pandas as pd
 
-NAMES = ("range", "radial velocity", "radial acceleration")
+NAMES = (term("range"), term("radial velocity"), term("radial acceleration"))
 LINES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)  # of c
 FINE = 40  # scans in the shorter of τ₁ and τ₂: the limit to a quarter of a point
 SETTLED = 12  # of τ₂, after which both filters are steady to a thousandth
@@ -56,7 +56,7 @@ def chart(cases: Sequence[Case], references: Sequence[Case]) -> Chart:
     found = [(case, placed(case)) for case in cases]
     for i, (case, place) in enumerate(found):
         if place is not None and of_others.get(place.name, place.inputs) != place.inputs:  # an edited radar of theirs
-            found[i] = case, replace(place, name=f"{place.name}, as set")
+            found[i] = case, replace(place, name=tr("{name}, as set", name=place.name))
     own = [place for _, place in found if place is not None]
     known = [place for place in known if all(place.of != one.of for one in own)]
     drawn = [over_time(own or known), in_the_long_run(own, known), over_groups(own, known)]
@@ -181,19 +181,20 @@ def over_time(places: Sequence[Place]) -> Figure:
         marks: list[Mark] = [Reference(0.0)]
         for n, (c, (t, gain)) in enumerate(zip(LINES, courses, strict=True)):
             style = Style(n / (len(LINES) - 1), 0)
-            marks.append(Line(t, gain[:, i], f"{c:g}", style, name=f"c = {c:g}"))
+            marks.append(Line(t, gain[:, i], numeral(f"{c:g}"), style, name=f"c = {numeral(f'{c:g}')}"))
         for n, one in enumerate(places):
             marks.append(Line(one.t_s / one.tau_1_s, one.gain[:, i], "", Style(n + 1, None, n), name=one.name))
-        y = Axis(panels.with_unit("gain", "%"), limits=(-30, 100))
+        y = Axis(panels.with_unit(tr("gain"), "%"), limits=(-30, 100))
         x = Axis("$t/\\tau_1$", "log", (EARLIEST, LATEST))
         keys = tuple(_key(n, one) for n, one in enumerate(places)) if i == 0 else ()
-        made.append(Panel(x, y, tuple(marks), name, keys, legend="lower left", remark="$c$ =" if i == 0 else ""))
-    caption = (
-        "Gain of the velocity in σ against time in units of τ₁ = σ_r/σ_V, for lines of c = (τ₁/τ₂)², as the scan "
-        f"period becomes short (drawn with {FINE} scans in the shorter of τ₁ and τ₂). Markers: exact gains at the "
-        "scans of real radars, whose period is not short."
+        made.append(Panel(x, y, tuple(marks), tr(name), keys, legend="lower left", remark="$c$ =" if i == 0 else ""))
+    caption = tr(
+        "The larger c, the longer the velocity gains, and the more of the gain lasts. Gain in σ against time in units "
+        "of τ₁ = σ_r/σ_V, for lines of c = (τ₁/τ₂)², as the scan period becomes short (drawn with {fine} scans in the "
+        "shorter of τ₁ and τ₂). Markers: exact gains at the scans of real radars, whose period is not short.",
+        fine=FINE,
     )
-    return Figure("gain_against_time", "What Doppler gains over time", caption, tuple(made), 3, PAGE_MM, 66)
+    return Figure("gain_against_time", tr("What Doppler gains over time"), caption, tuple(made), 3, PAGE_MM, 66)
 
 
 def _key(n: int, one: Place) -> tuple[str, Style]:
@@ -206,7 +207,7 @@ def in_the_long_run(own: Sequence[Place], known: Sequence[Place]) -> Figure:
     c = np.geomspace(0.03, 300.0, 200)
     marks: list[Mark] = [Reference(0.0)]
     for i, (name, gain) in enumerate(zip(NAMES, closed_form.steady_gains(c), strict=True)):
-        marks.append(Line(c, gain, name, Style(i + 1, i)))
+        marks.append(Line(c, gain, tr(name), Style(i + 1, i)))
     places = [*own, *known]
     for n, one in enumerate(places):
         size = 6.0 if n < len(own) else 3.4
@@ -216,15 +217,16 @@ def in_the_long_run(own: Sequence[Place], known: Sequence[Place]) -> Figure:
     for group in _together(places):
         top = max(group, key=lambda one: one.exact.max())
         marks.append(Note(top.of.c, float(top.exact.max()), "\n".join(one.name for one in group), "nw"))
-    marks.append(Reference(closed_form.no_acceleration_gain(), "x", "$c$ = 0.698"))
-    caption = (
-        "Steady gain of the velocity against c = (τ₁/τ₂)². Lines: closed form, as the period becomes short. Markers: "
-        "the exact steady gain of a radar with its own period (large: yours). Left of c = 0.698 Doppler makes the "
-        "acceleration of a target that does not manoeuvre worse."
+    marks.append(Reference(closed_form.no_acceleration_gain(), "x", f"$c$ = {numeral('0.698')}"))
+    caption = tr(
+        "Left of c = 0.698 Doppler makes the acceleration of a target that does not manoeuvre worse; right of it "
+        "everything gains, the more the larger c. Steady gain of the velocity against c = (τ₁/τ₂)². Lines: closed "
+        "form, as the period becomes short. Markers: the exact steady gain of a radar with its own period (large: "
+        "yours)."
     )
-    x, y = Axis("$c = (\\tau_1/\\tau_2)^2$", "log", (0.03, 300)), Axis("steady gain, %", limits=(-15, 100))
-    panel = Panel(x, y, tuple(marks), "In the long run")
-    return Figure("steady_gain", "What Doppler gains in the long run", caption, (panel,), 1, 1.6 * COLUMN_MM, 90)
+    x = Axis("$c = (\\tau_1/\\tau_2)^2$", "log", (0.03, 300))
+    panel = Panel(x, Axis(tr("steady gain, %"), limits=(-15, 100)), tuple(marks), tr("In the long run"))
+    return Figure("steady_gain", tr("What Doppler gains in the long run"), caption, (panel,), 1, 1.6 * COLUMN_MM, 90)
 
 
 def _together(places: Sequence[Place]) -> list[list[Place]]:
@@ -257,7 +259,15 @@ def over_groups(own: Sequence[Place], known: Sequence[Place]) -> Figure:
             limit = _limit_of(i, level) / MAP_LAMBDA ** (2 / 3)
             inside = (limit > MAP_C_THETA[0]) & (limit < MAP_C_THETA[-1])
             faint = Style(level / LEVELS[-1], 2, width_pt=0.6)
-            marks.append(Line(np.where(inside, limit, np.nan), MAP_LAMBDA, "", faint, name=f"{level} %, short period"))
+            marks.append(
+                Line(
+                    np.where(inside, limit, np.nan),
+                    MAP_LAMBDA,
+                    "",
+                    faint,
+                    name=tr("{level} %, short period", level=level),
+                )
+            )
             marks += _level_note(exactly, level)
         for n, one in enumerate([*own, *known]):
             style = Style(0, None, n, size_pt=6.0 if n < len(own) else 3.4)
@@ -265,12 +275,13 @@ def over_groups(own: Sequence[Place], known: Sequence[Place]) -> Figure:
             marks.append(Note(one.of.C_theta, one.of.Lambda, one.name, "se" if n % 2 else "ne"))
         limits = (float(MAP_C_THETA[0]), float(MAP_C_THETA[-1]))
         rows = (float(MAP_LAMBDA[0]), float(MAP_LAMBDA[-1]))
-        made.append(Panel(Axis("$C_\\theta$", "log", limits), Axis("$\\Lambda$", "log", rows), tuple(marks), name))
-    caption = (
-        "Steady gain of the velocity, in per cent along the lines, over C_θ = (τ₁/Δt)² and Λ = (Δt/τ₂)³. Full lines: "
+        made.append(Panel(Axis("$C_\\theta$", "log", limits), Axis("$\\Lambda$", "log", rows), tuple(marks), tr(name)))
+    caption = tr(
+        "The limit of a short period holds where Λ is small; above, a long period changes what is gained. Steady "
+        "gain of the velocity, in per cent along the lines, over C_θ = (τ₁/Δt)² and Λ = (Δt/τ₂)³. Full lines: "
         "exact, with the scan period in it. Dotted: the limit of a short period, c = C_θ Λ^(2/3)."
     )
-    return Figure("map", "What Doppler gains, by period too", caption, tuple(made), 3, PAGE_MM, 66)
+    return Figure("map", tr("What Doppler gains, by period too"), caption, tuple(made), 3, PAGE_MM, 66)
 
 
 def _level_note(places: np.ndarray, level: int) -> list[Mark]:
@@ -300,8 +311,14 @@ def page(own: Sequence[Place], known: Sequence[Place]) -> str:
     """The live page: one's own radars first, then those that are known, as settings to begin from."""
     data = [dict(zip(("name", "r", "v", "dt", "dm"), (one.name, *one.inputs), strict=True)) for one in [*own, *known]]
     parts = [resources.files(__package__).joinpath("live", name).read_text(encoding="utf-8") for name in LIVE]
-    body, style, script = parts
-    return html.live("What Doppler gains for a radar", body, style, script, json.dumps(data))
+    return html.live(tr("What Doppler gains for a radar"), parts, json.dumps(data), SAID)
 
 
-LIVE = ("body.html", "style.css", "script.js")
+LIVE = ("body.html.j2", "style.css", "script.js")
+SAID = (  # by the page's script
+    *(term("range"), term("velocity"), term("acceleration"), term("time, s"), term("Scan {k}, {t} s: {values}")),
+    *(term("takes {size} % off the range"), term("adds {size} % to the range")),
+    *(term("takes {size} % off the velocity"), term("adds {size} % to the velocity")),
+    *(term("the acceleration gains {size} %"), term("the acceleration loses {size} %"), term("from {low} to {high}")),
+    term("c = {c} (τ₁ = {one} s, τ₂ = {two} s): at scan {k}, {t} s, Doppler {range} and {velocity}; {acceleration}."),
+)

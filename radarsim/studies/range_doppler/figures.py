@@ -7,8 +7,9 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import term, tr
-from radarsim.report import panels, seen
+from radarsim.report import panels, seen, text
 from radarsim.report import tables as common
+from radarsim.report.chart_text import spoken
 from radarsim.report.drawing import GREY, Axis, Figure, Line, Note, Panel, Reference, Style
 from radarsim.studies.range_doppler.tables import PERIODS, Result
 
@@ -45,7 +46,11 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
     figure = settling_figure(some, made["steady"])
     drawn |= {"settling": figure} if figure else {}
     some, left_out = panels.shown_families(panels.unswept(results), chosen("consistency"))
-    return drawn | ({"consistency": consistency_figure(some, made["consistency"], left_out)} if some else {})
+    drawn |= {"consistency": consistency_figure(some, made["consistency"], left_out)} if some else {}
+    return {name: one for name, one in seen.all_begun(drawn, SEEN).items() if one}
+
+
+SEEN = {"consistency": seen.extremes}
 
 
 def consistency_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: str) -> Figure:
@@ -69,6 +74,7 @@ def consistency_figure(results: Sequence[Result], table: "pd.DataFrame", left_ou
 
 
 NEES = term("NEES per component\n(1 = consistent, below = pessimistic)")
+BEST = 7  # marker of the best manoeuvre variance
 MOST_NAMED = 2  # cases that are named at the ends of lines in half a page
 
 
@@ -95,7 +101,7 @@ def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure 
     drawn = panels.spread_out(drawn, panels.MOST_PANELS)
     if not drawn:
         return None
-    caption = tr(
+    caption = _best_settled(drawn) + tr(
         "Exact steady σ of the range against the settling time of the measured σ (within 5 % of the "
         "steady value, for good); grey lines join equal manoeuvre variances D_M, named in (m/s³)². "
         "Dotted: ten scan periods, the paper's limit; star: the least steady error under it. What "
@@ -103,6 +109,24 @@ def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure 
     )
     caption += tr(" {left} further panels: in steady.csv.", left=left) if left > 0 else ""
     return panels.in_columns(Figure("settling", tr("Steady error against settling time"), caption, tuple(drawn)))
+
+
+def _best_settled(drawn: Sequence[Panel]) -> str:
+    """The least steady error within the paper's limit, of all panels."""
+    stars = [
+        (mark, panel)
+        for panel in drawn
+        for mark in panel.marks
+        if isinstance(mark, Line) and len(mark.y) and mark.style.marker == BEST
+    ]
+    if not stars:
+        return tr("Nothing settles within {periods} scan periods. ", periods=PERIODS)
+    star, panel = min(stars, key=lambda pair: float(pair[0].y[0]))
+    name = ", ".join(filter(None, (panel.title, star.name)))
+    return tr(
+        "Least steady σ within {periods} scan periods: {sigma} m ({name}). ",
+        **{"periods": PERIODS, "sigma": text.number(float(star.y[0]), 3), "name": spoken(name)},
+    )
 
 
 def _settling_panel(title: str, result: Result, rows: "pd.DataFrame") -> Panel:
@@ -118,7 +142,7 @@ def _settling_panel(title: str, result: Result, rows: "pd.DataFrame") -> Panel:
     for n, name in enumerate(result.axes.filters):
         own = settled[settled["filter"] == name].sort_values("manoeuvre_variance")
         best, style = own[own["best"]], Style(n, n, n)
-        words, star = panels.literal(name), Style(n, None, 7, size_pt=8)
+        words, star = panels.literal(name), Style(n, None, BEST, size_pt=8)
         marks.append(Line(own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy(), "", style, name=words))
         x, y = (best[key].to_numpy() for key in ("settling_s", "steady_sigma"))
         marks.append(Line(x, y, "", star, name=tr("{words}: best $D_M$", words=words)))
@@ -126,7 +150,7 @@ def _settling_panel(title: str, result: Result, rows: "pd.DataFrame") -> Panel:
     longest = max([limit, *settled["settling_s"]])
     x = Axis(tr("settling time of $\\sigma$ of $r$, s"), limits=(-0.04 * longest, 1.15 * longest))
     keys += [
-        (tr("best $D_M$"), Style(0, None, 7, size_pt=8)),
+        (tr("best $D_M$"), Style(0, None, BEST, size_pt=8)),
         (tr("{periods} scan periods", periods=PERIODS), Style(GREY, 2, width_pt=0.7)),
     ]
     y, words = Axis(tr("steady $\\sigma$ of $r$, m")), tr("at the points: $D_M$, (m/s³)²")

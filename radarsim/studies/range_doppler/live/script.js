@@ -86,10 +86,11 @@ const radar = (() => {
 })();
 
 (() => {
-  const { setting, ALLOWED } = radar, NAMES = ["range", "velocity", "acceleration"], STEPS = 1000;
+  const { setting, ALLOWED } = radar, NAMES = ["range", "velocity", "acceleration"].map(said), STEPS = 1000;
   const [LEFT, RIGHT, TOP, BOTTOM] = [48, 412, 8, 226];
   const node = (id) => document.getElementById(id);
-  const short = (x, digits = 4) => String(Number(x.toPrecision(digits))).replace("-", "−");
+  const short = (x, digits = 4) => local(String(Number(x.toPrecision(digits))));
+  const filled = (text, values) => said(text).replace(/\{(\w+)\}/g, (_, name) => values[name]);
 
   function put(svg, tag, attributes, text) {
     const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
@@ -147,14 +148,19 @@ const radar = (() => {
   function sentence() {
     const { c, one, two } = radar.numbers(setting), last = shown.gain[setting.k - 1];
     const [r, V, a] = last.map((g) => Math.round(10 * g) / 10 + 0);
-    const part = (g, words, to) => (g >= 0 ? `takes ${short(g)} % off the ${words}` : `adds ${short(-g)} % to the ${words}`);
-    const gained = a >= 0 ? `the acceleration gains ${short(a)} %` : `the acceleration loses ${short(-a)} %`;
-    node("sentence").textContent = `c = ${short(c, 2)} (τ₁ = ${short(one, 3)} s, τ₂ = ${short(two, 3)} s): at scan ${setting.k}, ${short((setting.k - 1) * setting.dt)} s, Doppler ${part(r, "range")} and ${part(V, "velocity")}; ${gained}.`;
+    const part = (g, less, more) => filled(g >= 0 ? less : more, { size: short(Math.abs(g)) });
+    const told = {
+      c: short(c, 2), one: short(one, 3), two: short(two, 3), k: setting.k, t: short((setting.k - 1) * setting.dt),
+      range: part(r, "takes {size} % off the range", "adds {size} % to the range"),
+      velocity: part(V, "takes {size} % off the velocity", "adds {size} % to the velocity"),
+      acceleration: part(a, "the acceleration gains {size} %", "the acceleration loses {size} %"),
+    };
+    node("sentence").textContent = filled("c = {c} (τ₁ = {one} s, τ₂ = {two} s): at scan {k}, {t} s, Doppler {range} and {velocity}; {acceleration}.", told);
   }
 
   function redraw() {
     shown = radar.sigmas(setting);
-    const t = (n) => n * setting.dt, time = [0, t(setting.k - 1), false, "time, s"];
+    const t = (n) => n * setting.dt, time = [0, t(setting.k - 1), false, said("time, s")];
     const places = [];
     for (let i = 0; i < 3; i++) {
       const of = (rows) => rows.map((row, n) => [t(n), row[i]]), all = [...shown.one, ...shown.two].map((row) => row[i]).filter((s) => s !== null);
@@ -189,7 +195,7 @@ const radar = (() => {
       const [a, b, g] = [shown.one[n][i], shown.two[n][i], shown.gain[n][i]].map((s) => (s === null ? "–" : short(s)));
       return `${name} ${a} → ${b} (${g} %)`;
     });
-    node("read").textContent = `Scan ${n + 1}, ${short(n * setting.dt)} s: ${told.join(", ")}`;
+    node("read").textContent = filled("Scan {k}, {t} s: {values}", { k: n + 1, t: short(n * setting.dt), values: told.join(COMMA ? "; " : ", ") });
   }
 
   function readable(svg) {
@@ -240,7 +246,7 @@ const radar = (() => {
       if (value !== null) { setting[name] = value; changed(field); }
       field.setAttribute("aria-invalid", String(value === null));
     });
-    field.title = `from ${ALLOWED[name][0]} to ${ALLOWED[name][1]}`;
+    field.title = filled("from {low} to {high}", { low: local(String(ALLOWED[name][0])), high: local(String(ALLOWED[name][1])) });
   }
   for (const one of JSON.parse(node("data").textContent)) {
     const button = document.createElement("button");

@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import tr
-from radarsim.report import panels
+from radarsim.report import panels, seen
 from radarsim.report import tables as common
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
@@ -30,13 +30,20 @@ def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, F
     """The figures of these cases, all of which have trackers."""
     if not results:
         return {}
-    return {
+    drawn = {
         "track_map": map_figure(middle(results)),
         "confirmation": confirmation_figure(results, made["tracks"]),
         "track_life": life_figure(results, made),
         "false_tracks": false_figure(results, made["tracking"]),
         "track_classes": classes_figure(results, made["track_classes"]),
     }
+    return seen.all_begun(drawn, SEEN)
+
+
+SEEN = {
+    **{"confirmation": seen.at_the_end, "track_life": seen.first_extremes},
+    **{"false_tracks": seen.extremes, "track_classes": seen.first_extremes},
+}
 
 
 def middle(results: Results) -> CaseResult[ClutterAxes]:
@@ -180,7 +187,7 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
     drawn = []
     if false:
         longest = max(false, key=lambda mark: len(mark.x))
-        bound = Line(longest.x, np.exp(-longest.x), "bound", Style(GREY, 1, None))
+        bound = Line(longest.x, np.exp(-longest.x), tr("bound"), Style(GREY, 1, None))
         y = Axis(tr("share of false tracks called true"), "log")
         drawn.append(Panel(x, y, (*false, bound), direct=False))
     if true:
@@ -204,10 +211,10 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
     km = 1e-3
     marks = [
         Line(shown.false[1] * km, shown.false[0] * km, tr("false plots"), Style(GREY, None, 0, 1.1, 1.0)),
-        Line(shown.truth[1] * km, shown.truth[0] * km, "target", Style(1, 1, None)),
+        Line(shown.truth[1] * km, shown.truth[0] * km, tr("target"), Style(1, 1, None)),
         Line(shown.plots[1] * km, shown.plots[0] * km, tr("its plots"), Style(1, None, 1, 1.1, 2.0)),
     ]
-    curves = (("tracks", shown.tracks, Style(2, 0, None, 1.3)), ("gates", shown.gates, Style(3, 0, None, 0.6)))
+    curves = ((tr("tracks"), shown.tracks, Style(2, 0, None, 1.3)), (tr("gates"), shown.gates, Style(3, 0, None, 0.6)))
     for label, drawn, style in curves:
         marks += [Line(y * km, x * km, "" if n else label, style) for n, (x, y) in enumerate(drawn)]
     (south, north), (west, east) = shown.window

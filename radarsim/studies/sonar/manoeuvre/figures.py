@@ -8,7 +8,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
-from radarsim.report import panels
+from radarsim.report import panels, seen
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.studies.sonar.figures import QUANTITIES, SIGMA, case_lines, line
@@ -47,7 +47,13 @@ def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, F
         drawn["modes"] = _said(modes_figure(some, made["modes"]), left)
     if "uses" in made:
         drawn["uses"] = uses_figure([result for result in results if "uses" in result.sums], made["uses"])
-    return drawn
+    return seen.all_begun(drawn, SEEN)
+
+
+SEEN = {
+    **{"detection": seen.at_the_end, "roc": seen.reading_at(0.01), "delay": seen.at_the_end},
+    **{"response": seen.first_extremes, "modes": seen.extremes, "uses": seen.extremes},
+}
 
 
 def shown(results: Results) -> tuple[list[CaseResult[ManoeuvreAxes]], str]:

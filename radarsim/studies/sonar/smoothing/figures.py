@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language import numeral, tr
-from radarsim.report import panels
+from radarsim.language import numeral, term, tr
+from radarsim.report import panels, seen
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.studies.sonar.axes import GivenPlotsAxes
@@ -16,6 +16,11 @@ from radarsim.studies.sonar.figures import QUANTITIES, SIGMA, line
 if TYPE_CHECKING:
     import pandas as pd
 
+WHAT = {  # of the position or motion, by its name in the table
+    "smoothed": term("smoothed"),
+    "extrapolated": term("extrapolated"),
+    "acceleration": term("acceleration"),
+}
 DRAWN_FROM = {"missed": ("curves",), "believed": ("believed", "consistency")}
 
 
@@ -24,10 +29,16 @@ def figures(
 ) -> dict[str, Figure | None]:
     """The figures of these cases in addition to those of all parts; None where there is nothing to draw."""
     drawn = {"plots": plots_figure, "smoothing_gains": gains_figure, "conversion": conversion_figure}
-    return {name: draw(made[name]) for name, draw in drawn.items() if name in made} | {
-        "believed": believed_figure(results, made["believed"], made["consistency"]),
-        "missed": missed_figure(results, made["curves"]),
-    }
+    own = {name: draw(made[name]) for name, draw in drawn.items() if name in made}
+    own["believed"] = believed_figure(results, made["believed"], made["consistency"])
+    own["missed"] = missed_figure(results, made["curves"])
+    return seen.all_begun(own, SEEN)
+
+
+SEEN = {
+    **{"plots": seen.first_extremes, "smoothing_gains": seen.at_the_end, "conversion": seen.extremes},
+    **{"believed": seen.first_extremes, "missed": seen.first_extremes},
+}
 
 
 def plots_figure(table: "pd.DataFrame") -> Figure | None:
@@ -38,16 +49,16 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
     accuracy: list[Mark] = [Reference(1.0, label=tr("one plot"))]
     bought: list[Mark] = []
     for n, (what, part) in enumerate(rows.groupby("what", sort=False)):
-        accuracy.append(line(part, ("plots", "ratio", "ratio_lo", "ratio_hi", "formula"), str(what), n))
+        accuracy.append(line(part, ("plots", "ratio", "ratio_lo", "ratio_hi", "formula"), tr(WHAT[str(what)]), n))
         x, measured, formula = (
             part[key].to_numpy(dtype=float)[1:] for key in ("plots", "bought_percent", "formula_bought_percent")
         )
-        bought.append(Line(x, measured, str(what), Style(n, n, n), exact=formula))
+        bought.append(Line(x, measured, tr(WHAT[str(what)]), Style(n, n, n), exact=formula))
     x_axis = panels.counts(tr("plots n"), float(rows["plots"].max()))
     left = Axis(tr("$\\sigma$ / $\\sigma$ of a plot"), limits=(0, None))
     right = Axis(tr("bought by the n-th plot, %"), limits=(0, None))
     drawn = (
-        Panel(x_axis, left, tuple(accuracy), key_title="measured", direct=False, crosses=tr("the paper's formula")),
+        Panel(x_axis, left, tuple(accuracy), key_title=tr("measured"), direct=False, crosses=tr("the paper's formula")),
         Panel(x_axis, right, tuple(bought), direct=False, crosses=tr("the paper's formula")),
     )
     caption = tr(
@@ -161,7 +172,7 @@ def conversion_figure(table: "pd.DataFrame") -> Figure | None:
     for n, (frame, rows) in enumerate(table.groupby("frame", sort=False)):
         rows = rows.sort_values("across_m")
         rows = rows.assign(**{name: rows[name] / rows["sigma_range_m"] for name in names})
-        label = "plain" if frame == "cartesian" else "unbiased"
+        label = tr("plain") if frame == "cartesian" else tr("unbiased")
         marks.append(line(rows, ("across_m", *names), label, n))
     caption = tr(
         "Mean error of the converted plot along the line of sight, in σ of the range, over range × σ "

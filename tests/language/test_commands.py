@@ -1,0 +1,140 @@
+"""What commands say in Russian beside a run: the chart and its page, lists, readings, reasons of claims not judged."""
+
+import json
+import re
+
+import pytest
+from click.testing import CliRunner
+from making import messages
+
+from radarsim.app import inventory, readings, solve
+from radarsim.app.chart import chart, described
+from radarsim.app.configs import load
+from radarsim.app.quantities import Quantity
+from radarsim.cli import main
+from radarsim.language import speaking, tr
+from radarsim.report.claims import curve, reasons
+from radarsim.report.claims.paper import differences
+from radarsim.studies.range_doppler.chart import SAID
+from radarsim.studies.range_doppler.study import exact_but_for
+from tests.language.test_russian import NAMES, shown, untranslated
+
+CHOICE = re.compile(r"\b\w+: [^;|.]+")  # a choice of a reading, as it is typed
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    """The chart of a radar in Russian."""
+    with speaking("ru"):
+        return described(load("rls2").cases)
+
+
+def test_the_chart_and_its_figures(drawn):
+    names = NAMES | {"rls", "Lambda", "theta"}
+    left = {
+        words: found
+        for figure in drawn.figures.values()
+        for words in shown(figure)
+        if (found := untranslated(words, names))
+    }
+    assert left == {}
+    assert "дальности" in drawn.sentences[0]
+
+
+def test_the_live_page_is_russian_in_its_body_and_in_what_its_script_says(drawn):
+    page = drawn.page
+    body = page[page.index("<body") : page.index('<script type="application/json" id="data"')]
+    words = re.findall(r'aria-label="([^"]*)"', body) + re.findall(r">([^<]+)<", body)
+    assert {text: found for text in words if (found := untranslated(text, {"radarsim"}))} == {}
+    said = json.loads(re.search(r'id="words">(.*?)</script>', page)[1])
+    script = page[page.rindex("<script>") :]
+    asked = {
+        *re.findall(r'\b(?:said|filled|part\(\w+,)\(?"([^"]+)"', script),
+        *re.findall(r'"((?:takes|adds|the acc)[^"]+)"', script),
+    }
+    assert asked | {"range", "velocity", "acceleration"} == set(SAID)
+    assert all(said[text] != text for text in SAID)
+
+
+def test_the_chart_table_is_the_same(tmp_path):
+    english = chart(["rls2"], tmp_path / "en", formats=[])
+    with speaking("ru"):
+        russian = chart(["rls2"], tmp_path / "ru", formats=[])
+    assert (english.folder / "chart.csv").read_bytes() == (russian.folder / "chart.csv").read_bytes()
+
+
+def test_the_list_says_what_things_are_and_leaves_their_names():
+    with speaking("ru"):
+        ended = CliRunner().invoke(main, ["list"])
+    for _, _, rows in inventory.inventory():
+        for row in rows:
+            assert row[0] in ended.stdout
+            assert tr(row[-1]) == row[-1]
+            with speaking("ru"):
+                assert tr(row[-1]) in ended.stdout
+                assert tr(row[-1]) != row[-1]
+
+
+@pytest.mark.parametrize("claim", ["P1.4", "P1.5"])
+def test_readings_of_a_claim_and_their_curve(claim, tmp_path):
+    with speaking("ru"):
+        done = readings.readings(readings.asked([claim]), out=tmp_path, figures=False)
+        page = readings.pages(done)
+        of, over = done.read[0].paper.readings, done.read[0].over[0]
+        texts = [CHOICE.sub("", text) for text in shown(curve.specification(of, over))]
+    typed = {part for choice in of.choices for one in choice.alternatives for part in re.findall("[A-Za-z]+", one.name)}
+    typed |= {"scans", "span", "same", "time"} | {
+        part for choice in of.choices for part in re.findall("[A-Za-z]+", choice.key)
+    }
+    names = NAMES | typed | {"readings", "markdown", "results", "verdicts"}
+    assert {text: found for text in [*texts, *page.splitlines()] if (found := untranslated(text, names))} == {}
+
+
+REASONS = (
+    "not the paper's experiment: rls1: radar.sigma_range_m is 30, the paper's 200, seed is 2, the paper's 1 …; "
+    "and 2 more",
+    "not the paper's experiment: rls2 D_M=1: 2 of the paper's 3 filters changed or not there",
+    "not the paper's experiment: rls2: target another one than the paper's",
+    "rls2 ends at 50 s, the paper's run at 140 s",
+    "not the paper's experiment: no such experiment is shipped",
+    "a case that it needs is not there",
+    "exact value and simulation differ by more than 5.85 standard errors: exact 1.5, simulated 2 [1.9, 2.1]",
+)
+
+
+@pytest.mark.parametrize("why", REASONS)
+def test_reasons_of_claims_that_are_not_judged(why):
+    assert reasons.said(why) == why
+    with speaking("ru"):
+        said = reasons.said(why)
+    assert untranslated(said, {"rls", "seed", "filters", "target", "radar"}) == []
+    assert re.findall(r"\d+", said.replace(",", ".")) == re.findall(r"\d+", why)
+
+
+def test_every_reason_that_the_sources_give_is_known():
+    """What `Missing` and `Unreadable` are raised with stands in the catalogues."""
+    found = {text for _, text, _ in messages.found()}
+    raised = set()
+    for path in sorted((messages.PACKAGE).rglob("*.py")):
+        if path.name != "recorded.py" and "template" not in path.parts:
+            raised |= set(
+                re.findall(r'raise (?:claims\.)?(?:Missing|Unreadable)\("([^"]+)"', path.read_text(encoding="utf-8"))
+            )
+    assert len(raised) > 4
+    assert raised <= found
+    assert differences  # its texts are the patterns of `reasons`
+
+
+def test_what_solve_announces():
+    said = []
+    with speaking("ru"):
+        solve.predict(
+            said.append,
+            tr("computes the {quantity} at about {count} values of {key}", quantity="q", count=7, key="k"),
+            12.3,
+        )
+        near = tr(exact_but_for(load("rls2", ["radar.detection_probability=0.9"]).cases[0]))
+        quantity = Quantity("sigma", "r", "Vr", at_s=60.0).said
+    assert said == ["вычисляется q примерно при 7 значениях k: около 12 с"]
+    assert untranslated(near, set()) == []
+    assert untranslated(quantity, {"Vr"}) == []
