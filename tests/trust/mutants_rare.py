@@ -51,6 +51,8 @@ FALSE_TRACKS = (
         ("number_when_any(box.mean, p, uniform(u) / h)", "number_when_any(box.mean, p, uniform(u))", TWINS),
         ("box.q + box.dq * u_q", "box.q + box.dq * u_b", TWINS),
         ("held[j, 1] += w * w", "held[j, 1] += w", TWINS),
+        ("own[FOUND, i] * (factor if tentative else 1.0)", "own[FOUND, i] * factor", TWINS),
+        ("shares[2] * own[LONG, i]", "shares[2] * own[FOUND, i]", TWINS),
         ("drawn[1] += w", "drawn[1] += 1.0", TWINS),
     ),
     *mutants(

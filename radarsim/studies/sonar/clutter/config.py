@@ -143,10 +143,10 @@ class Filter(config.Filter):
 class RareTracks(Model):
     """Events that are rare: realisations drawn where they are frequent, and weights that make up for it."""
 
-    events: Annotated[tuple[Literal["false_tracks"], ...], Field(min_length=1, max_length=1)] = Field(
+    events: Annotated[tuple[Literal["false_tracks", "long_false_tracks"], ...], Field(min_length=1)] = Field(
         title="events that are sought",
         description="false_tracks: tracks that false plots begin, of all trackers, are drawn with more plots in their "
-        "gates until they are confirmed",
+        "gates until they are confirmed; long_false_tracks: until they end",
     )
     plain_share: Annotated[float, Strict(), Field(ge=0.01, le=0.9)] = Field(
         0.1,
@@ -155,6 +155,17 @@ class RareTracks(Model):
         description="share of the realisations that are drawn as they are, no unit; no weight is over one divided by "
         "it",
     )
+
+    def shares(self) -> tuple[float, float, float]:
+        """Shares of the laws that false tracks are drawn from: as they are, so that they are confirmed, and held on."""
+        each = (1.0 - self.plain_share) / len(self.events)
+        found, long = (each if event in self.events else 0.0 for event in ("false_tracks", "long_false_tracks"))
+        return self.plain_share, found, long
+
+    @cross_check
+    def _differ(self) -> Iterator[At]:
+        if len(set(self.events)) < len(self.events):
+            yield at("events", f"must differ: {self.events[0]} is there twice")
 
 
 class Keys(config.Keys):

@@ -76,7 +76,7 @@ def prepare(case: Case) -> Plan:
     if spec.rare is not None:
         del own["begun"]
         own |= {"held": (F, K, 3), "drawn": (F, 3)}
-        shift = rare.Shift(noise_key(case, "rare"), noise_key(case, "rare plots"), spec.rare.plain_share)
+        shift = rare.Shift(noise_key(case, "rare"), noise_key(case, "rare plots"), np.array(spec.rare.shares()))
     return Plan(
         layout=Layout(**common, **own),
         axes=axes(case, scene, specs, given),

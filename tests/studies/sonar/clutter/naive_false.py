@@ -53,15 +53,15 @@ class FalseTrack:
         self.choice, self.given, self.gate, self.sector = choice, given, gate, sector
         self.words, self.field = words, field
 
-    def drawn(self, k, place, S, needed, plain):
-        """Plots in the box, and the factor of the ratio of what is drawn to what is."""
+    def drawn(self, k, place, S, needed, shifts):
+        """Plots in the box, and the factor of the ratio of the law that shifts them; whether it is drawn from."""
         (low, high), (left, right) = box_of(place, S, self.gate, self.sector)
         mean = self.given.density * max(high - low, 0.0) * max(right - left, 0.0)
         if mean == 0:  # the gate is outside the sector
             return np.empty((0, 2)), 1.0
         p = 1 - math.exp(-mean)
         shifted = max(needed, p)
-        h = p if plain else shifted
+        h = shifted if shifts else p
         one, two = self.words(k, 0)
         if unit(one) >= h:
             return np.empty((0, 2)), (1 - shifted) / (1 - p)
@@ -75,10 +75,13 @@ class FalseTrack:
             found.append((math.sqrt(2 * (low + (high - low) * u)), left + (right - left) * v))
         return np.array(found), shifted / p
 
-    def follow(self, first, scans, plain):
-        """Ratio of what is drawn to what is, and scans held, of the track that the plot `first` (2,) begins."""
+    def follow(self, first, scans, law, shares):
+        """Weights at the end and at each scan held, of the track that the plot `first` (2,) begins.
+
+        law 0: as it is; 1: drawn so that it is confirmed; 2: so that it is held on. shares (3,) of these laws.
+        """
         choice, sigma, T = self.choice, self.given.sigma, self.given.period
-        state, hits, misses, last, held, ratio = 1, 1, 0, 0, 0, 1.0
+        state, hits, misses, last, held, ratios = 1, 1, 0, 0, [], np.ones(3)
         x = P = None
         for k in range(1, scans):
             if hits == 1:
@@ -88,8 +91,11 @@ class FalseTrack:
                 x, P, S = foretold(x, P, T, choice.variance, sigma)
                 place = H @ x
             if state == 1:
-                plots, factor = self.drawn(k, place, S, (choice.m - hits) / (choice.n - k), plain)
-                ratio *= factor
+                plots, factor = self.drawn(k, place, S, (choice.m - hits) / (choice.n - k), law > 0)
+                ratios[1:] *= factor
+            elif shares[2]:
+                plots, factor = self.drawn(k, place, S, 1 / (choice.misses - misses), law == 2)
+                ratios[2] *= factor
             else:
                 plots = self.field(k)
             nu = plots - place
@@ -110,7 +116,7 @@ class FalseTrack:
                 state = 2 if hits >= choice.m else int(hits + choice.n - k - 1 >= choice.m)
             elif misses >= choice.misses or (np.diag(P)[[0, 2]] > (choice.lost * sigma) ** 2).any():
                 state = 0
-            held += state == 2
+            held += [1 / (shares @ ratios)] if state == 2 else []
             if state == 0:
                 break
-        return ratio, held
+        return 1 / (shares @ ratios), held

@@ -23,14 +23,15 @@ from tests.studies.sonar.clutter.naive_false import FalseTrack
 from tests.studies.sonar.clutter.test_study import config, simulated, tracker
 
 RARE = {"events": ["false_tracks"]}
+LONG = {"events": ["false_tracks", "long_false_tracks"]}
 SECTOR = ((7e3, 11e3), (math.radians(5), math.radians(40)))
 FOUR_OF_SIX = tracker("four of six", m=4, n=6)
 
 
-def case_of(filters, density, sought=True, scans=10, share=0.1, **sensor):
+def case_of(filters, density, sought=True, scans=10, share=0.1, rare=RARE, **sensor):
     """A case whose false tracks are sought, or are not."""
     keys = config(filters, density, 0.9, scans, **sensor)
-    return load(keys | ({"rare": RARE | {"plain_share": share}} if sought else {})).cases[0]
+    return load(keys | ({"rare": rare | {"plain_share": share}} if sought else {})).cases[0]
 
 
 def plan_of(*of, **more):
@@ -40,7 +41,7 @@ def plan_of(*of, **more):
 def reseeded(plan, seed):
     """The plan under other false plots."""
     keys = [random.stream(seed, str(i)) for i in range(4)]
-    shift = None if plan.shift is None else Shift(keys[2], keys[3], plan.shift.plain)
+    shift = None if plan.shift is None else Shift(keys[2], keys[3], plan.shift.shares)
     field = plan.field_about_false._replace(key=keys[1])
     return replace(plan, seeds=keys[0], field_about_false=field, shift=shift)
 
@@ -75,29 +76,29 @@ def uniforms(key, realisation):
     return a[0], b[0]
 
 
-@pytest.mark.parametrize("density", [0.05, 2.0])
-def test_weights_and_lives_are_the_twins(density):
+@pytest.mark.parametrize(("density", "rare"), [(0.05, RARE), (2.0, RARE), (0.05, LONG), (0.5, LONG)])
+def test_weights_and_lives_are_the_twins(density, rare):
     """Nearest plot and PDA, three rules: which tracks are held how long, and their weights, realisation by one."""
     filters = [tracker("near"), tracker("pda", "pda", 3, 5), tracker("wide", m=4, n=6, gate=0.9999)]
-    case = case_of(filters, density, scans=12)
+    case = case_of(filters, density, scans=12, rare=rare)
     plan = STUDY.prepare(case)
-    given, alpha, seen = design.conditions(case.spec), plan.shift.plain, np.zeros(3)
+    given, shares, seen = design.conditions(case.spec), plan.shift.shares, np.zeros(3)
     for realisation in range(150):
         sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
         u, v = uniforms(plan.seeds, realisation)
         (near, far), (left, right) = SECTOR
         first = np.array([math.sqrt(near**2 + (far**2 - near**2) * u), left + (right - left) * v])
-        plain = uniforms(plan.shift.choice, realisation)[0] < alpha
+        law = int(np.searchsorted(np.cumsum(shares), uniforms(plan.shift.choice, realisation)[0]))
         words = words_of(plan.shift.plots, realisation)
         for f, choice in enumerate(design.tracker_specs(case.spec)):
             gate = design.gate_threshold(choice.gate_probability)
             field = lambda k, i=realisation: plots.false_plots(plan.field_about_false, i, k).T  # noqa: E731
-            ratio, held = FalseTrack(choice, given, gate, SECTOR, words, field).follow(first, 12, plain)
-            weight = 1 / (alpha + (1 - alpha) * ratio)
-            assert sums["drawn"][f] == pytest.approx([float(plain), weight, weight**2], rel=1e-9, abs=0)
-            expected = np.where(np.arange(12)[:, None] < held, [weight, weight**2, 1], 0)
+            weight, held = FalseTrack(choice, given, gate, SECTOR, words, field).follow(first, 12, law, shares)
+            assert sums["drawn"][f] == pytest.approx([float(law == 0), weight, weight**2], rel=1e-9, abs=0)
+            expected = np.zeros((12, 3))
+            expected[: len(held)] = np.array([[w, w**2, 1] for w in held]).reshape(-1, 3)
             assert sums["held"][f] == pytest.approx(expected, rel=1e-9, abs=0)
-            seen += held > 0, held > 3, plain
+            seen += len(held) > 0, len(held) > 3, law == 0
     assert seen[0] > 100
     assert seen[1] > 10
     assert seen[2] > 20
@@ -161,6 +162,25 @@ def test_false_tracks_are_those_of_plain_sampling_on_twenty_seeds(rule, density)
     assert np.abs(z).max() < 3.9
     assert abs(np.mean(z)) < 3 / math.sqrt(20)
     assert 0.3 < np.mean(np.square(z)) < 2.2
+
+
+def test_the_tail_of_their_life_is_that_of_tracks_that_are_not_held_on():
+    """How long they are held, sought and not, at 0.3 per km²; sought down to where the other has no track at all."""
+    filters = [tracker("a"), tracker("b", "pda")]
+    sought, plain = plan_of(filters, 0.3, scans=25, rare=LONG), plan_of(filters, 0.3, scans=25)
+    n, compared = 20_000, 0
+    tails = [simulated(reseeded(plan, 3 + i), n)["held"] for i, plan in enumerate((sought, plain))]
+    for f in range(2):
+        (p, error, effective), (other, its, least) = (
+            (tail[f, :, 0] / n, np.sqrt(tail[f, :, 1]) / n, tail[f, :, 0] ** 2 / np.maximum(tail[f, :, 1], 1e-300))
+            for tail in tails
+        )
+        known = least > 30
+        compared += known[3:].sum()
+        assert (np.abs(p - other)[known] < 4 * np.hypot(error, its)[known]).all()
+        assert (effective[:13] > 100).all()
+    assert compared >= 8
+    assert (tails[1][0, 12:, 2] == 0).any()
 
 
 def shipped():
@@ -273,6 +293,7 @@ def test_without_the_key_a_case_is_the_one_it_was():
     [
         ({"rare": {"events": []}}, "rare.events"),
         ({"rare": {"events": ["false tracks"]}}, "rare.events.0"),
+        ({"rare": {"events": ["false_tracks"] * 2}}, "rare.events: must differ: false_tracks is there twice"),
         ({"rare": RARE | {"plain_share": 1.0}}, "rare.plain_share: must be <= 0.9, got 1"),
         ({"rare": RARE | {"plain_share": 0}}, "rare.plain_share: must be >= 0.01"),
         ({"rare": RARE | {"shift": 3}}, "rare.shift: unknown key"),

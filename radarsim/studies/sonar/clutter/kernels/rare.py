@@ -1,17 +1,18 @@
-"""Tracks that false plots begin, drawn where they are confirmed: more false plots in their gates while tentative.
+"""Tracks that false plots begin, drawn where they are confirmed, and where they live long: more plots in their gates.
 
-Of a share of the realisations the gate of a tentative track contains false plots more often than it should, and each
-realisation counts with the ratio of the two laws (importance sampling). What is drawn at a scan is the number in a box
-in q and bearing about the gate, within the sector: zero or not, with the probability h that it is not, in place of the
-p = 1 - exp(-μ) of a Poisson number of mean μ, and then a Poisson number that is not zero. Positions in the box are
-uniform, as they are in the field; what is in the box but outside the gate is not seen. The ratio of the laws is that of
-the answers "zero or not" alone, (1 - h) / (1 - p) or h / p each scan.
+Of a share of the realisations the gate of a tentative track contains false plots more often than it should, of another
+that of a confirmed one too, and each realisation counts with the ratio of the laws (importance sampling). What is drawn
+at a scan is the number in a box in q and bearing about the gate, within the sector: zero or not, with the probability h
+that it is not, in place of the p = 1 - exp(-μ) of a Poisson number of mean μ, and then a Poisson number that is not
+zero. Positions in the box are uniform, as they are in the field; what is in the box but outside the gate is not seen.
+The ratio of the laws is that of the answers "zero or not" alone, (1 - h) / (1 - p) or h / p each scan.
 
 h is the number of plots that the rule m of n still needs over the scans that are left, at least p: were p the same at
-all scans, and small, all patterns of plots that confirm the track would have equal weights. Letters as in `field`, and
+all scans, and small, all patterns of plots that confirm the track would have equal weights. Of a confirmed track it is
+one over the misses in a row that still drop it. Letters as in `field`, and
 
     p, h        probability that the box contains a false plot: as it is, and as it is drawn
-    ratio       the law that is drawn from over the law itself
+    ratio       a law that is drawn from over the law itself
 """
 
 import math
@@ -31,6 +32,7 @@ from radarsim.studies.sonar.clutter.kernels.rules import (
     CONFIRMED,
     FIRST,
     HITS,
+    MISSES,
     NONE,
     SINCE,
     STATE,
@@ -54,20 +56,21 @@ from radarsim.studies.sonar.kernels.steps import CHUNK
 
 MOST_MEAN = 16.0  # of a box: where it is larger, false plots are in the gate anyway, and the field is as it is
 LARGEST = 1e280  # of the ratio: far beyond any whose reciprocal counts
-ROWS = 3
-PLAIN, RATIO, HELD = range(ROWS)  # 1 if drawn from the law itself, else 0; the ratio so far; scans held
+# Which law a track is drawn from; ratios so far of the laws under which tracks are confirmed, and held on; scans held.
+ROWS = 4
+LAW, FOUND, LONG, HELD = range(ROWS)
 
 
 class Shift(NamedTuple):
     """How tracks that false plots begin are drawn.
 
-    choice (2,) is the key of the stream that chooses the plain ones, a share `plain` of all; plots (2,) that of the
-    plots in boxes.
+    choice (2,) is the key of the stream that chooses the law of each; plots (2,) that of the plots in boxes. shares
+    (3,) of the laws: as they are, so that they are confirmed, and so that they are held on; the sum is one.
     """
 
     choice: np.ndarray
     plots: np.ndarray
-    plain: float
+    shares: np.ndarray
 
 
 class WeightedSums(NamedTuple):
@@ -139,26 +142,26 @@ def with_drawn_plots(keys, realisation, k, gate, threshold, box, p, h):
 
 
 @inline
-def associate_drawn(keys, rule, realisation, k, gate, box, needed, plain):
-    """The Association of one tentative track with plots drawn in its box, and the factor of its ratio.
+def associate_drawn(keys, rule, realisation, k, gate, box, needed, shifted):
+    """The Association of one track with plots drawn in its box, and the factor of the ratio of the law that shifts it.
 
-    needed: plots that the rule still needs over the scans that are left.
+    needed: the probability h of that law, if it is not under p; shifted: whether the track is drawn from it.
     """
     p = -math.expm1(-box.mean)
     h = max(needed, p)
-    gated, some = with_drawn_plots(keys, realisation, k, gate, rule.gate, box, p, p if plain else h)
+    gated, some = with_drawn_plots(keys, realisation, k, gate, rule.gate, box, p, h if shifted else p)
     return associated(gated, rule, gate.r, gate.S, gate.settled), h / p if some else (1.0 - h) / (1.0 - p)
 
 
 @part
 def associate_false(field, shift, trackers, f, scan, work, own, counts):
-    """Associate a scan's false plots with every track of a chunk: of tentative ones, those drawn in boxes.
+    """Associate a scan's false plots with every track of a chunk: those drawn in boxes, or those of the field.
 
-    The results go to work.association (6, CHUNK), as those of `tracker.associate`.
+    The results go to work.association (6, CHUNK), as those of `tracker.associate`; own (ROWS, CHUNK) has the ratios.
     """
     draws, out, tally, status = draws_of(field), work.association, address(counts), work.status[f]
     predicted, plots, rule, m, n = work.predicted, work.plots[f], rule_of(trackers, f), trackers.m[f], trackers.n[f]
-    keys = shift.plots[0], shift.plots[1]
+    keys, most, held_on = (shift.plots[0], shift.plots[1]), trackers.misses[f], shift.shares[2] > 0.0
     for i in range(scan.count):
         if status[STATE, i] == NONE:
             out[:, i] = 0.0
@@ -166,12 +169,13 @@ def associate_false(field, shift, trackers, f, scan, work, own, counts):
         status[SINCE, i] += scan.dt
         place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
         gate = gate_of(place, S, plots[i] > 1.5, rule.speed * status[SINCE, i])
-        box = box_of(draws.cells, gate, rule.gate)
-        if status[STATE, i] == TENTATIVE and 0.0 < box.mean <= MOST_MEAN:
-            needed = (m - status[HITS, i]) / (n - status[AGE, i])
-            drawn = (scan.first + i, scan.k, gate, box, needed, own[PLAIN, i] > 0.0)
+        box, tentative = box_of(draws.cells, gate, rule.gate), status[STATE, i] == TENTATIVE
+        if (tentative or held_on) and 0.0 < box.mean <= MOST_MEAN:
+            rest = (m - status[HITS, i]) / (n - status[AGE, i]) if tentative else 1.0 / (most - status[MISSES, i])
+            drawn = (scan.first + i, scan.k, gate, box, rest, own[LAW, i] > (0.0 if tentative else 1.0))
             found, factor = associate_drawn(keys, rule, *drawn)
-            own[RATIO, i] = min(own[RATIO, i] * factor, LARGEST)
+            own[FOUND, i] = min(own[FOUND, i] * (factor if tentative else 1.0), LARGEST)
+            own[LONG, i] = min(own[LONG, i] * factor, LARGEST)
         else:
             found = associate_track(draws, rule, scan.first + i, scan.k, (0.0, 0.0, 0.0), gate, tally)
         settle(status, i, found, out)
@@ -179,26 +183,41 @@ def associate_false(field, shift, trackers, f, scan, work, own, counts):
 
 @part
 def begin_false(shift, first, n, status, own):
-    """Choose which of the n tracks that have begun are plain; the scores of the others are not counted."""
+    """Choose the laws of the n tracks that have begun; only scores of the plain ones are counted."""
     for i in range(n):
         u, _ = uniforms(shift.choice[0], shift.choice[1], first + i, 0)
-        own[PLAIN, i], own[RATIO, i], own[HELD, i] = 1.0 if u < shift.plain else 0.0, 1.0, 0.0
-        if own[PLAIN, i] == 0.0:
+        own[LAW, i] = 0.0 if u < shift.shares[0] else 1.0 if u < shift.shares[0] + shift.shares[1] else 2.0
+        own[FOUND, i], own[LONG, i], own[HELD, i] = 1.0, 1.0, 0.0
+        if own[LAW, i] > 0.0:
             status[FIRST, i] = -1.0
 
 
+@inline
+def weight_of(shares, own, i):
+    """The weight of track i so far: the law itself over the mixture of all."""
+    return 1.0 / (shares[0] + shares[1] * own[FOUND, i] + shares[2] * own[LONG, i])
+
+
 @part
-def add_weighted(plain, own, n, held, drawn):
-    """Add the weights of n tracks, 1 / (α + (1 - α) ratio) with α the plain share, to the sums of one tracker."""
+def add_held(shares, own, state, n, held):
+    """Count a scan of the n tracks that are confirmed, by their weights so far; state (CHUNK,)."""
     for i in range(n):
-        w = 1.0 / (plain + (1.0 - plain) * own[RATIO, i])
-        drawn[0] += own[PLAIN, i]
-        drawn[1] += w
-        drawn[2] += w * w
-        for j in range(int(own[HELD, i])):
+        if state[i] == CONFIRMED:
+            w, j = weight_of(shares, own, i), int(own[HELD, i])
             held[j, 0] += w
             held[j, 1] += w * w
             held[j, 2] += 1.0
+            own[HELD, i] += 1.0
+
+
+@part
+def add_drawn(shares, own, n, drawn):
+    """Add how n tracks were drawn to the sums of one tracker."""
+    for i in range(n):
+        w = weight_of(shares, own, i)
+        drawn[0] += own[LAW, i] == 0.0
+        drawn[1] += w
+        drawn[2] += w * w
 
 
 @part
@@ -209,10 +228,7 @@ def scan_false(field, shift, trackers, f, scan, work, own, counts):
     associate_false(field, shift, trackers, f, scan, work, own, counts)
     joint = trackers.association[f] == PDA
     update(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, joint, work.association)
-    left = judge_false(trackers, f, scan.count, tracks, status, counts)
-    for i in range(scan.count):
-        own[HELD, i] += status[STATE, i] == CONFIRMED
-    return left
+    return judge_false(trackers, f, scan.count, tracks, status, counts)
 
 
 @kernel
@@ -233,7 +249,10 @@ def simulate_false(seeds, field, shift, trackers, work, dt, first, total, scores
             step(trackers, f, field, Scan(first + done, n, 0, dt[0]), tracks, Target(detected, z, True), work, counts)
             begin_false(shift, first + done, n, status, own)
             for k in range(1, dt.size):
-                if not scan_false(field, shift, trackers, f, Scan(first + done, n, k, dt[k]), work, own, counts):
+                scan = Scan(first + done, n, k, dt[k])
+                left = scan_false(field, shift, trackers, f, scan, work, own, counts)
+                add_held(shift.shares, own, status[STATE], n, sums.held[f])
+                if not left:
                     break
-            add_weighted(shift.plain, own, n, sums.held[f], sums.drawn[f])
+            add_drawn(shift.shares, own, n, sums.drawn[f])
             add_scores(trackers.thresholds, n, status[FIRST], status[BEST], scores[f])
