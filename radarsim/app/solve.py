@@ -286,9 +286,11 @@ class Curve:
 
 def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answer:
     """The answer where the quantity is exact."""
-    begun = time.monotonic()
     attained_now = curve.exactly(None)
-    curve.expected = len(asked.over.grid()) + TO_CLOSE
+    grid = asked.over.grid()
+    curve.expected = len(grid) + TO_CLOSE
+    begun = time.monotonic()
+    curve.exactly(grid[len(grid) // 3])  # not the config's own, which a study may still know
     near = registry.study(asked.cases.base.study).exact_but_for(quantities.shortened(asked.quantity, asked.cases.base))
     what = tr("computes the {quantity} at about {count} values of {key}", **_of(asked), count=curve.expected)
     predict(

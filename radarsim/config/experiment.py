@@ -17,6 +17,7 @@ class Case:
     name is the stem of its config with ` key=value` for each swept key. spec holds the study's own keys, an object of
     its subclass of `radarsim.config.fields.Study`. noise_of, where given, are the keys of another case, whose noise
     this one shares although its world is another: common random numbers. control_variate: as of the experiment.
+    asked_from_k: exact σ and gains are asked for from this scan on, counted from 1; 0: every exact value.
     """
 
     name: str
@@ -28,6 +29,7 @@ class Case:
     seed: int
     noise_of: Any = None
     control_variate: bool = False
+    asked_from_k: int = 0
 
     def resolved(self) -> dict[str, Any]:
         """The case as plain JSON-able data, names included."""

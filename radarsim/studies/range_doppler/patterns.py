@@ -4,22 +4,35 @@ A filter's gains depend on the pattern alone, so each pattern has its covariance
 mean, weighted by the patterns' probabilities. Their number doubles at every scan. Past some thousands, patterns whose
 believed covariances agree to a small fraction are merged, the less probable ones sooner: these have the same gains from
 then on, and what they have been through is kept by the first two moments of their errors, so that the merging errs by
-about the square of that fraction. How much it errs is seen by merging to a quarter as many, which errs about five times
-as much (tried against 131 072 patterns). Where that changes σ by more than `CLOSE`, more are kept; where it still does
-with the most of `KEPT`, no exact value is given.
+about the square of that fraction. How much it errs is seen by merging to a quarter as many, which errs at least four
+times as much (tried against all 524 288 patterns of 19 scans; not proved). Where that changes σ by more than `CLOSE`,
+more are kept; where it still does with the most of `KEPT`, no exact value is given.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.studies.range_doppler.propagation import Errors, Information, Plots, defects
+from radarsim.studies.range_doppler.propagation import (
+    COLUMNS,
+    DIAGONAL,
+    ROWS,
+    Errors,
+    Information,
+    Plots,
+    defects,
+    normalised,
+    outer,
+)
 
-KEPT = (512, 2048, 8192)  # patterns side by side, each compared with the one before; the most: thirteen scans
+KEPT = (128, 512, 2048, 8192)  # patterns side by side, each compared with the one before
+WHOLE = 2048  # patterns that are never merged: eleven scans
 CLOSE = 4e-4  # of σ, between the two; so the finer one is right to about a ten-thousandth
 ALIKE = 1e-4  # fraction by which the covariances of merged patterns may differ, to begin with
+FINER = 1.5  # with which part of the fraction of the scan before a scan begins
+LEAST_STEP, STEP = 1.1, 0.5  # the number of patterns falls about as the square of the fraction, and what is missing
 LIGHTER = 4  # patterns 2 to this power less probable may differ twice as much
 NEGLIGIBLE = 1e-12  # probability of a pattern that is left out
 
@@ -70,24 +83,23 @@ class _Patterns:
     errors: Errors
 
     def __getitem__(self, which: np.ndarray) -> "_Patterns":
-        errors = Errors(*(getattr(self.errors, f.name)[..., which] for f in fields(Errors)))
-        return _Patterns(self.weight[which], self.count[which], self.detected[which], errors)
+        return _Patterns(
+            self.weight[which], self.count[which], self.detected[which], Errors(self.errors.rows[:, which])
+        )
 
     def joined(self, other: "_Patterns") -> "_Patterns":
         """Both sets side by side."""
-        pairs = [(getattr(self.errors, f.name), getattr(other.errors, f.name)) for f in fields(Errors)]
         return _Patterns(
             np.concatenate([self.weight, other.weight]),
             np.concatenate([self.count, other.count]),
             np.concatenate([self.detected, other.detected]),
-            Errors(*(np.concatenate(pair, axis=2) for pair in pairs)),
+            Errors(np.concatenate([self.errors.rows, other.errors.rows], axis=1)),
         )
 
     def branched(self, plots: Plots, observes: int, most: int) -> "_Patterns":
         """Each pattern with the next scan's plot, and without it."""
         p, count = plots.detection, np.minimum(self.count + 1, most)
-        errors = Errors(self.errors.P, self.errors.S, self.errors.E)
-        errors.update(plots, observes)
+        errors = self.errors.updated(plots, observes)
         with_plot = _Patterns(p * self.weight, count, np.ones(len(count), dtype=bool), errors)
         if p == 1:
             return with_plot
@@ -137,11 +149,11 @@ def mixture(
     defect = defects(truth, dt, plots, drawn)
     made = Mixture.empty(len(beside), scans)
     enough = max(one.start for one in (design, *beside))
-    empty, nothing = Errors(*(np.zeros((3, n, 0)) for n in (3, 3, columns))), np.zeros(0, dtype=int)
-    started = _Patterns(np.zeros(0), nothing, nothing.astype(bool), empty)
+    nothing, Q, alike = np.zeros(0, dtype=int), design.Q[ROWS, COLUMNS][:, None], ALIKE
+    started = _Patterns(np.zeros(0), nothing, nothing.astype(bool), Errors(np.zeros((12 + 3 * columns, 0))))
     waiting = _Waiting(np.ones(1), np.zeros(1, dtype=int), np.zeros(1, dtype=bool), Information(columns))
     for k in range(scans):
-        started.errors.predict(dt, design.Q[..., None], defect[k])
+        started.errors.predict(dt, Q, defect[k])
         waiting.information.predict(dt, defect[k])
         started = started.branched(plots, design.observes, enough)
         waiting = waiting.branched(plots, design.observes)
@@ -150,7 +162,7 @@ def mixture(
         started = started.joined(_Patterns(begun.weight, begun.count, begun.detected, errors))
         _note(made, k, started, _seen(started, waiting, plots, design.observes), beside)
         if len(started.weight) > most:
-            started = _merged(started[started.weight > NEGLIGIBLE], most)
+            started, alike = _merged(started[started.weight > NEGLIGIBLE], most, alike)
     return made
 
 
@@ -183,22 +195,9 @@ def _seen(started: _Patterns, waiting: _Waiting, plots: Plots, observes: int) ->
         np.concatenate([started.detected, held.detected]),
         there,
         beside(errors.E[:, 0], plots.bias),
-        beside(diagonal(errors.second_moments()), plots.sigma**2 + plots.bias**2 + plots.sigma_bias**2),
-        beside(diagonal(errors.P), plots.sigma**2),
+        beside(errors.second_moments()[DIAGONAL], plots.sigma**2 + plots.bias**2 + plots.sigma_bias**2),
+        beside(errors.P[DIAGONAL], plots.sigma**2),
     )
-
-
-def diagonal(M: np.ndarray) -> np.ndarray:
-    """The diagonals (3, B) of matrices (3, 3, B)."""
-    return np.einsum("iib->ib", M)
-
-
-def _nees(errors: Errors) -> np.ndarray:
-    """The expectation (B,) of eᵀP⁻¹e / 3."""
-    scale = np.sqrt(diagonal(errors.P))
-    unit = scale[:, None] * scale
-    P, M = (np.moveaxis(part / unit, 2, 0) for part in (errors.P, errors.second_moments()))
-    return np.asarray(np.trace(np.linalg.solve(P, M), axis1=1, axis2=2) / 3)
 
 
 def _note(made: Mixture, k: int, started: _Patterns, seen: _Seen, beside: Sequence[Design]) -> None:
@@ -208,38 +207,56 @@ def _note(made: Mixture, k: int, started: _Patterns, seen: _Seen, beside: Sequen
     made.available[k] = share.sum(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         for mean, values in ((made.bias, seen.bias), (made.moment, seen.moment), (made.believed, seen.believed)):
-            mean[k] = (share * values).sum(axis=1) / made.available[k]
-        made.nees[k] = np.divide(_nees(started.errors) @ started.weight, made.started[k])
+            mean[k] = np.einsum("cb,cb->c", share, values) / made.available[k]
+        of_started = normalised(started.errors.P, started.errors.second_moments())
+        made.nees[k] = np.divide(of_started @ started.weight, made.started[k])
         for g, other in enumerate(beside):
             observed = np.arange(3)[:, None] < other.observes
             both = share * ((seen.plots >= other.start) | (observed & seen.detected))
-            made.beside[g, k] = (both * seen.moment).sum(axis=1) / both.sum(axis=1)
+            made.beside[g, k] = np.einsum("cb,cb->c", both, seen.moment) / both.sum(axis=1)
 
 
-def _merged(patterns: _Patterns, most: int) -> _Patterns:
-    """The patterns, those that are alike made one until there are no more than `most`."""
-    alike = ALIKE
-    while len(patterns.weight) > most:
-        patterns = _grouped(patterns, _cells(patterns, alike))
-        alike *= 2
-    return patterns
+def _merged(patterns: _Patterns, most: int, alike: float) -> tuple[_Patterns, float]:
+    """The patterns, those that are alike made one, so that there are no more than `most`; how alike they had to be.
 
-
-def _cells(patterns: _Patterns, alike: float) -> np.ndarray:
-    """A number (B,) for each pattern, the same where believed covariances agree to about the fraction `alike`.
-
-    That is for the most probable pattern; less probable ones may differ more.
+    alike: what was enough at the scan before, or ALIKE.
     """
+    if len(patterns.weight) <= most:
+        return patterns, alike
+    places = _places(patterns)
+    alike = max(alike / FINER, ALIKE)
+    while (count := _number(cell := _cells(places, patterns.count, alike))) > most:
+        alike *= max(LEAST_STEP, (count / most) ** STEP)
+    return _grouped(patterns, cell), alike
+
+
+def _number(cell: np.ndarray) -> int:
+    """How many cells there are."""
+    return int(np.count_nonzero(np.diff(np.sort(cell)))) + 1
+
+
+def _places(patterns: _Patterns) -> tuple[np.ndarray, np.ndarray]:
+    """Where the believed covariances lie, (6, B), in units of a fraction of them, and how much less probable each is
+    than the most probable, (B,), in powers of 2 ** LIGHTER."""
     P, weight = patterns.errors.P, patterns.weight
-    scale = np.sqrt(diagonal(P))
-    correlation = P / (scale[:, None] * scale)
+    size = np.log(P[DIAGONAL])
     # Where a correlation is near ±1 it is 1 − |ρ| that must agree.
     inside = 1 - 1e-15
-    turned = [np.arctanh(np.clip(correlation[pair], -inside, inside)) for pair in ((0, 1), (0, 2), (1, 2))]
+    turned = np.arctanh(np.clip(P[[1, 2, 4]] / np.sqrt(P[[0, 0, 3]] * P[[3, 5, 5]]), -inside, inside))
     lighter = np.round(np.log2(weight.max() / weight) / LIGHTER).astype(np.int64)
-    values = np.concatenate([2 * np.log(scale), turned]) / (alike * 2.0**lighter)
-    parts = np.concatenate([np.floor(values).astype(np.int64), [lighter, patterns.count]])
-    return (parts * PRIMES[:, None]).sum(axis=0)
+    return np.concatenate([size, turned]), lighter
+
+
+def _cells(places: tuple[np.ndarray, np.ndarray], count: np.ndarray, alike: float) -> np.ndarray:
+    """A number (B,) for each pattern, the same where believed covariances agree to about the fraction `alike`.
+
+    That is for the most probable pattern; less probable ones may differ more. count (B,): plots so far.
+    """
+    values, lighter = places
+    cell = lighter * PRIMES[6] + count * PRIMES[7]
+    for value, prime in zip(values / (alike * 2.0**lighter), PRIMES[:6], strict=True):
+        cell += np.floor(value).astype(np.int64) * prime
+    return cell
 
 
 # Any large primes: cells that differ get numbers that differ, but for one pair in 2⁶⁴.
@@ -252,21 +269,26 @@ def _grouped(patterns: _Patterns, cell: np.ndarray) -> _Patterns:
     """One pattern for each cell (B,), with the mean of its members' P and the first two moments of their errors."""
     order = np.argsort(cell, kind="stable")
     first = np.flatnonzero(np.diff(cell[order], prepend=cell[order[0]] - 1))
-    weight, errors = patterns.weight, patterns.errors
-    total = np.add.reduceat(weight[order], first)
+    errors, one = patterns.errors, order[first]
+    weight, rows = patterns.weight[order], np.empty((len(errors.rows), len(first)))
+    total = np.add.reduceat(weight, first)
+    moved = np.concatenate([errors.P, errors.second_moments(), errors.rows[12:]])
+    for mean, values in zip(rows, moved, strict=True):  # one row after the other, so that they stay in cache
+        mean[:] = np.add.reduceat(values[order] * weight, first) / total
+    made = Errors(rows)
+    made.rows[6:12] -= outer(made.E)
+    return _Patterns(total, patterns.count[one], patterns.detected[one], made)
 
-    def mean(values: np.ndarray) -> np.ndarray:
-        return np.add.reduceat((values * weight)[..., order], first, axis=-1) / total
 
-    E = mean(errors.E)
-    S = mean(errors.second_moments()) - np.einsum("icb,jcb->ijb", E, E)
-    one = order[first]
-    return _Patterns(total, patterns.count[one], patterns.detected[one], Errors(mean(errors.P), S, E))
+def settled(fine: Mixture, coarse: Mixture, from_k: int = 0) -> bool:
+    """Whether every mean that there is changes by little when merged to a quarter as many patterns.
 
-
-def settled(fine: Mixture, coarse: Mixture) -> bool:
-    """Whether every mean that there is changes by little when merged to a quarter as many patterns."""
-    pairs = ((fine.moment, coarse.moment), (fine.nees, coarse.nees), (fine.beside, coarse.beside))
+    from_k: of e² alone, from this scan on, counted from 1; 0: of e² and NEES, at every scan.
+    """
+    late = slice(max(from_k - 1, 0), None)
+    pairs = [(fine.moment[late], coarse.moment[late]), (fine.beside[:, late], coarse.beside[:, late])]
+    if from_k == 0:
+        pairs.append((fine.nees, coarse.nees))
     return all(bool((close(one, other) | np.isnan(one)).all()) for one, other in pairs)
 
 

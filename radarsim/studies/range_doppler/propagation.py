@@ -1,10 +1,10 @@
-"""The exact error recursion for many filters or patterns of plots at once: matrices (3, 3, B), B of them side by side.
+"""The exact error recursion for many filters or patterns of plots at once, B of them side by side.
 
 Three things run together: P, the covariance that a filter believes, which gives its gains; S, the covariance of what
 the noise of the plots puts into its error; and E (3, C, B), the parts of the error that do not change from plot to
 plot. Column 0 is the mean error; each further column is what one drawn bias of unit variance leads to. So the second
 moment of the error is S + E Eᵀ. The last columns are of a truth that is drawn, by how its motion leaves that of the
-middle.
+middle. Symmetric matrices are packed, (6, B): 00, 01, 02, 11, 12, 22.
 """
 
 from dataclasses import dataclass
@@ -31,35 +31,90 @@ class Plots(NamedTuple):
         return np.concatenate([self.bias[:, None], drawn, np.zeros((2, self.of_truth))], axis=1)
 
 
+ROWS, COLUMNS = np.triu_indices(3)  # of what is packed
+PLACE = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])  # of an element in the packed matrix
+DIAGONAL = np.array([0, 3, 5])
+
+
 @dataclass
 class Errors:
-    """P, S (3, 3, B) and E (3, C, B) at one scan, as above."""
+    """P, S and E at one scan, as above, in one array (12 + 3 C, B)."""
 
-    P: np.ndarray
-    S: np.ndarray
-    E: np.ndarray
+    rows: np.ndarray
+
+    @classmethod
+    def of(cls, P: np.ndarray, S: np.ndarray, E: np.ndarray) -> Self:
+        """Of P, S (6, B) and E (3, C, B)."""
+        return cls(np.concatenate([P, S, E.reshape(3 * E.shape[1], E.shape[2])]))
+
+    @property
+    def P(self) -> np.ndarray:
+        """The covariances that are believed, (6, B)."""
+        return self.rows[:6]
+
+    @property
+    def both(self) -> np.ndarray:
+        """P and S, the covariances of what the noise makes: (2, 6, B)."""
+        return self.rows[:12].reshape(2, 6, self.rows.shape[1])
+
+    @property
+    def E(self) -> np.ndarray:
+        """The lasting parts of the errors, (3, C, B)."""
+        return self.rows[12:].reshape(3, (len(self.rows) - 12) // 3, self.rows.shape[1])
 
     def predict(self, dt: float, Q: np.ndarray, defect: np.ndarray) -> None:
-        """Go to the next scan, dt (s) later, in place: Q (3, 3, B or 1); defect (3, C) is F x − x⁺ of the truth x."""
-        self.P = congruent(self.P, dt) + Q
-        self.S = congruent(self.S, dt)
-        self.E = moved(self.E, dt) + defect[:, :, None]
+        """Go to the next scan, dt (s) later, in place: Q (6, B or 1); defect (3, C) is F x − x⁺ of the truth x."""
+        p0, p1, p2, p3, p4, p5 = self.both.swapaxes(0, 1)
+        h = 0.5 * dt * dt
+        over, above = p2 + dt * p4 + h * p5, p1 + dt * p3 + h * p4
+        p0 += dt * p1 + h * p2 + dt * above + h * over
+        p1[:] = above + dt * over
+        p2[:] = over
+        p3 += dt * (2 * p4 + dt * p5)
+        p4 += dt * p5
+        self.rows[:6] += Q
+        self.rows[12:] = (moved(self.E, dt) + defect[:, :, None]).reshape(self.rows[12:].shape)
 
-    def update(self, plots: Plots, observes: int) -> None:
-        """Take in a plot, in place, one number after the other: the noises are independent, so the order is free.
+    def updated(self, plots: Plots, observes: int) -> Self:
+        """With a plot, one number taken in after the other: the noises are independent, so the order is free.
 
-        (I − K h) P (I − K h)ᵀ + K R Kᵀ, Joseph's form, for P and for S.
+        (I − K h) M (I − K h)ᵀ + K R Kᵀ, Joseph's form, for P and for S.
         """
-        inputs = plots.inputs
+        made, inputs = type(self)(self.rows.copy()), plots.inputs
+        both, E = made.both, made.E
         for m in range(observes):
             R = plots.sigma[m] ** 2
-            K = self.P[:, m] / (self.P[m, m] + R)
-            self.P, self.S = taken(self.P, K, m, R), taken(self.S, K, m, R)
-            self.E = self.E + K[:, None] * (inputs[m][:, None] - self.E[m])
+            own = both[:, PLACE[m]]
+            K = own[0] / (own[0, m] + R)
+            rest = own - K * (own[:, m, None] + R)
+            for n, (i, j) in enumerate(zip(ROWS, COLUMNS, strict=True)):
+                both[:, n] -= K[i] * own[:, j] + rest[:, i] * K[j]
+            E += K[:, None] * (inputs[m][:, None] - E[m])
+        return made
 
     def second_moments(self) -> np.ndarray:
-        """E eeᵀ (3, 3, B)."""
-        return self.S + np.einsum("icb,jcb->ijb", self.E, self.E)
+        """E eeᵀ (6, B)."""
+        return self.both[1] + outer(self.E)
+
+
+def outer(E: np.ndarray) -> np.ndarray:
+    """E Eᵀ of E (3, C, B), packed."""
+    made = np.zeros((6, E.shape[2]))
+    for n, (i, j) in enumerate(zip(ROWS, COLUMNS, strict=True)):
+        for c in range(E.shape[1]):
+            made[n] += E[i, c] * E[j, c]
+    return made
+
+
+def normalised(P: np.ndarray, M: np.ndarray) -> np.ndarray:
+    """tr(P⁻¹ M) / 3 (B,) of packed P and M, by the factors L D Lᵀ of P, whose digits no scale of the rows changes."""
+    l10, l20 = P[1] / P[0], P[2] / P[0]
+    d1, m = P[3] - l10 * P[1], P[4] - l10 * P[2]
+    l21 = m / d1
+    d2, a = P[5] - l20 * P[2] - l21 * m, l10 * l21 - l20  # L⁻¹ = [[1, 0, 0], [−l10, 1, 0], [a, −l21, 1]]
+    second = M[3] - l10 * (2 * M[1] - l10 * M[0])
+    third = M[5] + a * (a * M[0] + 2 * M[2]) - l21 * (2 * M[4] + 2 * a * M[1] - l21 * M[3])
+    return np.asarray((M[0] / P[0] + second / d1 + third / d2) / 3)
 
 
 def defects(x: np.ndarray, dt: float, plots: Plots, drawn: np.ndarray | None) -> np.ndarray:
@@ -81,17 +136,6 @@ def moved(M: np.ndarray, dt: float) -> np.ndarray:
     out[0] += dt * (M[1] + dt / 2 * M[2])
     out[1] += dt * M[2]
     return out
-
-
-def congruent(M: np.ndarray, dt: float) -> np.ndarray:
-    """F M Fᵀ of symmetric M (3, 3, …)."""
-    return moved(moved(M, dt).swapaxes(0, 1), dt)
-
-
-def taken(M: np.ndarray, K: np.ndarray, m: int, R: float) -> np.ndarray:
-    """(I − K h) M (I − K h)ᵀ + K R Kᵀ of symmetric M (3, 3, B), h the m-th unit vector, K (3, B)."""
-    A = M - K[:, None] * M[m]
-    return A - A[:, m, None] * K + R * K[:, None] * K
 
 
 class Information:
@@ -128,7 +172,8 @@ class Information:
         unit = scale[:, None] * scale
         P = np.moveaxis(np.linalg.inv(np.moveaxis(self.L / unit, 2, 0)), 0, 2) / unit
         P = (P + P.swapaxes(0, 1)) / 2
-        return Errors(P, P.copy(), np.einsum("ijb,jcb->icb", P, self.Y))
+        own = P[ROWS, COLUMNS]
+        return Errors.of(own, own, np.einsum("ijb,jcb->icb", P, self.Y))
 
 
 def back(M: np.ndarray, dt: float) -> np.ndarray:

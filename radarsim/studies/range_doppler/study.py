@@ -73,6 +73,7 @@ class Designed:
     """A case's filters and what they see: truth x (K, 3) at times t (K,), plots, D_M (F,), gains of full detection.
 
     drawn (K, 3, 1 + C): how the truth of realisations leaves the model beyond x, as `world.drawn_defects` has it.
+    asked_from_k: as of the case.
     """
 
     spec: Keys
@@ -82,6 +83,7 @@ class Designed:
     plots: Plots
     variances: tuple[float, ...]
     filters: tuple[filters.LinearFilter, ...]
+    asked_from_k: int = 0
 
     @property
     def dt(self) -> float:
@@ -110,7 +112,7 @@ def designed(case: Case) -> Designed:
         filters.design(len(f.observes), f.plots_to_start, variance, plots.sigma, dt, len(t), f.process_noise)
         for f, variance in zip(spec.filters, variances, strict=True)
     )
-    return Designed(spec, t, x, drawn, plots, variances, tuple(made))
+    return Designed(spec, t, x, drawn, plots, variances, tuple(made), case.asked_from_k)
 
 
 def plots_of(spec: Keys) -> Plots:
@@ -146,13 +148,13 @@ def shortened(case: Case, at_s: float | None, at_k: int | None) -> Case:
     elif at_s is not None and 0 <= at_s < until * spec.radar.scan_period_s:
         until = min(int(at_s / spec.radar.scan_period_s) + 2, until)  # the scans before and after it
     scans = max(until, *(f.plots_to_start for f in spec.filters))
-    return replace(case, spec=spec.model_copy(update={"scans": scans}))
+    return replace(case, spec=spec.model_copy(update={"scans": scans}), asked_from_k=max(1, until - 1))
 
 
 def exact_but_for(case: Case) -> str:
     """What σ of missed plots is, where not every pattern of plots is followed on its own."""
     spec: Keys = case.spec
-    if spec.radar.detection_probability == 1 or 2**spec.plots <= patterns.KEPT[1]:
+    if spec.radar.detection_probability == 1 or 2**spec.plots <= patterns.WHOLE:
         return ""
     return "a mean over patterns of plots, of which nearly equal ones are merged: right to about a ten-thousandth"
 
@@ -294,19 +296,41 @@ class Means:
     beside: np.ndarray
 
 
+_MEANS: dict[tuple, Means] = {}  # of the last filters and worlds: a filter of the range is the same at any σ_V
+MOST_MEANS = 32
+
+
 def means(design: patterns.Design, beside: Sequence[patterns.Design], made: Designed) -> Means:
+    """The means of one filter over the patterns; those of the last that were asked for are kept."""
+    seen = [part[: design.observes] for part in made.plots[:3]]
+    arrays = (design.Q, *seen, made.x, made.drawn)
+    others = tuple((one.observes, one.start) for one in beside)
+    key = (design[:2], others, made.dt, made.asked_from_k, made.plots.detection, *(array.tobytes() for array in arrays))
+    if key not in _MEANS:
+        if len(_MEANS) >= MOST_MEANS:
+            del _MEANS[next(iter(_MEANS))]
+        _MEANS[key] = over_patterns(design, beside, made)
+    return _MEANS[key]
+
+
+def over_patterns(design: patterns.Design, beside: Sequence[patterns.Design], made: Designed) -> Means:
     """The means of one filter over the patterns, of which as many are kept as it takes."""
-    mixtures = (
-        patterns.mixture(design, made.plots, made.x, made.dt, most, beside, made.drawn) for most in patterns.KEPT
-    )
+
+    def kept(most: int) -> patterns.Mixture:
+        return patterns.mixture(design, made.plots, made.x, made.dt, most, beside, made.drawn)
+
+    if 2 ** len(made.t) <= patterns.WHOLE:
+        whole = kept(patterns.WHOLE)
+        return Means(np.sqrt(whole.moment), whole.bias, whole.nees, np.sqrt(whole.beside))
+    mixtures = map(kept, patterns.KEPT)
     coarse, fine = next(mixtures), next(mixtures)
-    while not patterns.settled(fine, coarse) and (finer := next(mixtures, None)) is not None:
+    while not patterns.settled(fine, coarse, made.asked_from_k) and (finer := next(mixtures, None)) is not None:
         coarse, fine = fine, finer
     known = patterns.close(fine.moment, coarse.moment)
-    whole = patterns.close(fine.nees, coarse.nees) & known.all(axis=1)
+    whole_state = patterns.close(fine.nees, coarse.nees) & known.all(axis=1)
     others = np.where(patterns.close(fine.beside, coarse.beside), np.sqrt(fine.beside), np.nan)
     sigma, bias = (np.where(known, values, np.nan) for values in (np.sqrt(fine.moment), fine.bias))
-    return Means(sigma, bias, np.where(whole, fine.nees, np.nan), others)
+    return Means(sigma, bias, np.where(whole_state, fine.nees, np.nan), others)
 
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 from radarsim.physics.motion import process_noise
 from radarsim.studies.range_doppler.config import Best, Filter
 from radarsim.studies.range_doppler.patterns import Design, mixture
-from radarsim.studies.range_doppler.propagation import Errors, Information, Plots, defects
+from radarsim.studies.range_doppler.propagation import COLUMNS, DIAGONAL, ROWS, Errors, Information, Plots, defects
 
 LEAST, MOST = 1e-12, 1e8  # D_M Δt⁶/σ_r²; the least is lowered for long runs
 TO_VELOCITY = 1e12  # most of D_M Δt⁴/σ_V², as the config's check has it
@@ -112,10 +112,10 @@ def side_by_side(observes: int, start: int, Q: np.ndarray, seen: Seen) -> np.nda
         information.update(plots, observes)
         sigma[:, k, :observes] = of_plot[:observes]
     one = information.errors()
-    running = Errors(*(np.repeat(part, count, axis=2) for part in (one.P, one.S, one.E)))
-    sigma[:, start - 1] = np.sqrt(np.einsum("iib->bi", running.second_moments()))
+    running, packed = Errors(np.repeat(one.rows, count, axis=1)), Q[ROWS, COLUMNS]
+    sigma[:, start - 1] = np.sqrt(running.second_moments()[DIAGONAL].T)
     for k in range(start, scans):
-        running.predict(seen.dt, Q, defect[k])
-        running.update(plots, observes)
-        sigma[:, k] = np.sqrt(np.einsum("iib->bi", running.second_moments()))
+        running.predict(seen.dt, packed, defect[k])
+        running = running.updated(plots, observes)
+        sigma[:, k] = np.sqrt(running.second_moments()[DIAGONAL].T)
     return sigma

@@ -35,6 +35,11 @@ SIGMA, DT, VARIANCE = np.array([60.0, 2.0]), 10.0, 0.05
 
 def prepared(**changes):
     """The plan of a case of an S-band radar."""
+    return study.prepare(case_of(**changes))
+
+
+def case_of(**changes):
+    """A case of an S-band radar."""
     radar = {"wavelength_m": 0.1, "sigma_range_m": SIGMA[0], "sigma_velocity_mps": SIGMA[1], "scan_period_s": DT}
     filters = [
         {"name": "r", "observes": ["range"], "manoeuvre_variance": VARIANCE},
@@ -47,7 +52,7 @@ def prepared(**changes):
             made["filters"] = [one | value for one in filters]
         else:
             made[key] = made[key] | value if key == "radar" else value
-    return study.prepare(load(made).cases[0])
+    return load(made).cases[0]
 
 
 def sums_of(plan, count, first=0):
@@ -254,14 +259,31 @@ def test_gain_is_of_those_that_have_both_estimates(seven):
     assert row["gain_lo"] - 1 < expected < row["gain_hi"] + 1
 
 
-def test_merging_patterns_keeps_the_means():
-    truth = prepared(scans=17).problem.truth
-    plots = Plots(SIGMA, np.zeros(2), np.array([10.0, 1.0]), 0.8)
-    for observes, start in ((1, 3), (2, 2)):
-        design = patterns.Design(observes, start, process_noise("random_jerk", VARIANCE, DT))
-        whole, merged = (patterns.mixture(design, plots, truth, DT, most) for most in (1 << 17, 2048))
-        np.testing.assert_allclose(np.sqrt(merged.moment), np.sqrt(whole.moment), rtol=patterns.CLOSE / 4)
-        assert patterns.close(whole.moment, merged.moment)[start:].all()
+@pytest.mark.parametrize("detection", [0.8, 0.5])
+def test_means_over_merged_patterns_are_those_over_all(detection):
+    plan = prepared(scans=16, radar={"detection_probability": detection, "sigma_bias_range_m": 10})
+    plots, axes, later = Plots(SIGMA, np.zeros(2), np.array([10.0, 0.0]), detection), plan.axes, slice(3, None)
+    Q = process_noise("random_jerk", VARIANCE, DT)
+    designs = [patterns.Design(observes, start, Q) for observes, start in ((1, 3), (2, 2))]
+    whole = [patterns.mixture(one, plots, plan.problem.truth, DT, 1 << 16, designs) for one in designs]
+    near = {"rtol": patterns.CLOSE / 3}
+    for f, mean in enumerate(whole):
+        np.testing.assert_allclose(axes.exact_sigma[f, later], np.sqrt(mean.moment)[later], **near)
+        np.testing.assert_allclose(axes.exact_nees[f, later], mean.nees[later], rtol=patterns.CLOSE)
+    left = 1 - np.sqrt(whole[1].beside[0] / whole[0].beside[1])
+    np.testing.assert_allclose(1 - axes.exact_gain[1, later] / 100, 1 - left[later], **near)
+
+
+def test_a_shortened_case_has_the_same_exact_errors_where_it_is_asked():
+    case = case_of(scans=16, radar={"detection_probability": 0.6})
+    whole = study.prepare(case).axes
+    for at, k in (({"at_s": 127.0, "at_k": None}, (13, 14)), ({"at_s": None, "at_k": 12}, (12,))):
+        short = study.prepare(study.shortened(case, **at)).axes
+        assert len(short.k) == k[-1]
+        for one in k:
+            found, wanted = short.exact_sigma[:, one - 1], whole.exact_sigma[:, one - 1]
+            np.testing.assert_allclose(found, wanted, rtol=patterns.CLOSE)
+            assert np.isfinite(found).all()
 
 
 def test_where_patterns_are_too_many_nothing_is_called_exact(monkeypatch):
