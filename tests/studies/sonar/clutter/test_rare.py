@@ -9,6 +9,8 @@ import pytest
 import radarsim
 from radarsim.app import run as experiment
 from radarsim.app.configs import load
+from radarsim.app.quantities import Quantity
+from radarsim.app.solve import solve
 from radarsim.config.identity import canonical
 from radarsim.errors import ConfigError
 from radarsim.kernels import random
@@ -255,6 +257,18 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
     assert "importance sampling" in " ".join(result.answer)
     assert not any("rare event" in line for line in result.warnings)
     assert "note" not in result.tables["tracks"] or not result.tables["tracks"]["note"].str.contains("events").any()
+
+
+def test_solve_takes_the_weighted_rate():
+    """The gate at which 4 of 6 has half as many, from 1500 false plots, of which plainly hardly one is confirmed."""
+    keys = config([FOUR_OF_SIX], 0.03, 0.9, 8) | {"rare": RARE, "realisations": 1500}
+    quantity = Quantity("false_tracks", "four of six")
+    at = radarsim.run(keys).tables["tracking"]["false_tracks_per_hour"][0]
+    found = solve(keys, "gate_probability", quantity, 0.5 * at, between=(0.9, 0.999))
+    assert found.lo < found.value < found.hi < 0.99
+    assert found.hi - found.lo < 0.02
+    again = radarsim.run(keys, overrides=[f"gate_probability={found.value}"])
+    assert again.tables["tracking"]["false_tracks_per_hour"][0] == pytest.approx(0.5 * at, rel=0.02)
 
 
 def test_a_rate_that_rests_on_few_events_is_told():
