@@ -142,7 +142,7 @@ RUNS = (
         "radarsim/engine/stopping.py",
         (
             "limit_s = 1.5",
-            "limit_s = 15.0",
+            "limit_s = 150.0",
             "engine/test_signals.py::test_a_main_thread_that_never_asks_is_ended",
         ),
     ),
