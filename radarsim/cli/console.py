@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TextIO
 
 from radarsim.language import Term, few, listed, numeral, plural, term, tr
-from radarsim.report.text import clock, known, labelled, printable, significant_digits
+from radarsim.report.text import clock, known, labelled, printable, significant_digits, unbroken
 from radarsim.report.text import unit as unit_of
 
 if TYPE_CHECKING:
@@ -235,7 +235,7 @@ def wrapped(line: str, width: int) -> list[str]:
     """A line broken between words, a unit kept with its number; what follows stands under its first words."""
     label = re.match(r"(\S+( \S+)?)? {2,}|", line)
     indent = " " * len(label[0]) if label and len(label[0]) < width // 2 else ""
-    kept = re.sub(r"(?<=\d) (?=(%|°|m|s|km|Hz|rad|m/s²?|rad/s²?)(\W|$))", "\N{NO-BREAK SPACE}", line)
+    kept = unbroken(line)
     broken = textwrap.wrap(
         kept, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False, drop_whitespace=True
     )

@@ -211,8 +211,8 @@ def _template(name: str) -> "Template":
 
 
 def kept(words: object) -> str:
-    """Text in which a per cent sign stays with its number."""
-    return str(words).replace(" %", "\u00a0%")
+    """Text in which numbers stay with their units, and with ± before them."""
+    return text.unbroken(str(words))
 
 
 def _measured(part: Mapping[str, Any]) -> str:

@@ -1,6 +1,7 @@
 """Numbers, units and counts as they stand in sentences, and text that is safe to print."""
 
 import math
+import re
 from collections.abc import Iterable
 
 from radarsim.language import numeral, term, tr
@@ -16,6 +17,11 @@ UNITS = {
 SAID = (  # units that a language may write otherwise
     *(term("m"), term("s"), term("m/s"), term("m/s²"), term("rad"), term("rad/s"), term("rad/s²")),
     *(term("Hz"), term("Hz/s"), term("Hz/s²"), term("Hz/s³"), term("Hz/s⁴"), term("km"), term("°/s"), term("°/s²")),
+)
+NBSP = "\N{NO-BREAK SPACE}"
+KEPT = re.compile(  # the space between a number and its unit, in any language spoken here; and around ±
+    r"(?<=\d) (?=(?:%|°|k?m|к?м|m?s|м?с|[kM]?Hz|[кМ]?Гц|dB|дБ|rad|рад)(?:[/²³]\S*)?(?:\W|$))"
+    r"|(?<=\S) (?=± )|(?<=±) (?=\d)"
 )
 SPACES = "\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}"  # which a language may put into numbers
 PLAIN = 6  # digits before the point that are still written out
@@ -85,6 +91,15 @@ def estimate(values: Iterable[float], unit: str = "", form: str = ".4g") -> str:
 def unit(name: str) -> str:
     """A unit of a table as people write it: m/s² of m/s2."""
     return UNITS.get(name, name)
+
+
+def unbroken(words: str) -> str:
+    """Text in which a unit stays with its number, and a number with a ± before it.
+
+    >>> unbroken("at 60 s: 12 % ± 3 m/s").replace(NBSP, "_")
+    'at 60_s: 12_%_±_3_m/s'
+    """
+    return KEPT.sub(NBSP, words)
 
 
 def printable(text: str) -> str:

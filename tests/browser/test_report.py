@@ -108,9 +108,11 @@ def test_hovering_shows_the_value_and_its_interval(page, results):
     for row in rows:
         if row[2] == "r" and float(row[5]) == at:
             told = re.search(
-                rf"^{re.escape(row[1])}: ([\d.]+) \[([\d.]+), ([\d.]+)\], exact ([\d.]+)$", tip, re.MULTILINE
+                rf"^{re.escape(row[1])}: ([\d.]+) \[([\d.]+), ([\d.]+)\] m, exact ([\d.]+)$", tip, re.MULTILINE
             )
-            assert [float(v) for v in told.groups()] == pytest.approx([float(row[i]) for i in (7, 8, 9, 13)], rel=1e-4)
+            assert [float(v) for v in told.groups()] == pytest.approx(
+                [float(row[i]) for i in (7, 8, 9, 13)], abs=0.051 * (float(row[9]) - float(row[8])) / 2
+            )  # to two figures of the half-width
     page.move(5, 5)
     assert page.evaluate(f"document.querySelector('{SIGMA} .tip').hidden")
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from radarsim.language import Term, tr
+from radarsim.language import Term, plural, tr
 from radarsim.report.claims import page
 from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
 from radarsim.report.claims.rule import CLASSES, VOID
@@ -63,7 +63,7 @@ def figure(rows: Sequence[Mapping]) -> Figure | None:
     return Figure(
         name="claims",
         title=tr("Claims, in margins of what their papers say"),
-        caption=tr("Of {count} claims: {counted}. ", count=len(judged), counted=counted)
+        caption=plural("Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged), counted=counted)
         + tr(
             "Of each claim the part that lies furthest from the paper's words: measured, with its 95 % interval, and "
             "exactly, in margins of that part, cut at ± {furthest:g}. Under 0 it is as the words say, up to "

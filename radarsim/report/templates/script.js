@@ -3,6 +3,7 @@
 // dark. Panels of lines are drawn again here with other limits, as report/chart.py draws them.
 const REACH = 14; // units of a panel within which a point belongs to the pointer's place
 const MANY = 8; // curves told from which they stand in two columns
+const DIGITS = 4; // of a number that has no interval
 const DRAGGED = 6; // units that a pointer has to go before it marks a range; less is a click
 const FLAT = 14; // units of height or width under which a range is of the other axis alone
 const CLOSEST = 500; // times that a panel can be magnified: its numbers have five digits
@@ -20,7 +21,14 @@ function local(text) {
 
 function words(value) {
   if (value === null || value === undefined) return "";
-  return typeof value === "string" ? value : local(String(Number(value.toPrecision(5))));
+  return typeof value === "string" ? value : local(String(Number(value.toPrecision(DIGITS))));
+}
+
+// A number to two figures of the half-width of its interval, as claims and answers have it.
+function rounded(value, half) {
+  const place = Math.floor(Math.log10(half)) - 1;
+  if (!Number.isFinite(place)) return words(value);
+  return place < 0 && place > -12 ? local(Number(value).toFixed(-place)) : words(value);
 }
 
 const SAID = JSON.parse(document.getElementById("words").textContent);
@@ -140,12 +148,17 @@ function nearest(panel, at) {
   return whole.sort((a, b) => a.away - b.away);
 }
 
-function told(point) {
+function told(point, unit) {
   const { line, i } = point;
   const part = (key) => (line[key] ? line[key][i] : null);
-  let text = words(line.y[i]);
-  if (line.l && line.h && (part("l") !== null || part("h") !== null)) text += ` [${words(part("l")) || "−∞"}, ${words(part("h")) || "∞"}]`;
-  if (part("e") !== null) text += `, ${said("exact")} ${words(part("e"))}`;
+  const half = (part("h") - part("l")) / 2, y = line.y[i];
+  const put = line.l && line.h && part("l") !== null && part("h") !== null && half > 0 ? (v) => rounded(v, half) : words;
+  let text = put(y);
+  if (line.l && line.h && (part("l") !== null || part("h") !== null)) {
+    text += ` [${part("l") === null ? "−∞" : put(part("l"))}, ${part("h") === null ? "∞" : put(part("h"))}]`;
+  }
+  if (unit) text += ` ${unit}`;
+  if (part("e") !== null) text += `, ${said("exact")} ${put(part("e"))}`;
   return text;
 }
 
@@ -519,13 +532,14 @@ class Panel {
     }
     const points = nearest(this, at);
     if (!points.length) return this.leave();
+    const unit = this.yl.includes(", ") ? this.yl.split(", ").pop() : "";
     tip.replaceChildren();
     tip.classList.toggle("many", points.length > MANY);
     make("div", `${this.xl}: ${words(points[0].value)}`, tip, "soft");
     for (const one of [...points].sort((a, b) => a.y - b.y)) { // as they stand, the highest first
       const row = make("div", null, tip);
       make("i", "", row).style.background = one.line.c[dark() ? 1 : 0];
-      make(one === points[0] ? "b" : "span", `${one.line.n ? one.line.n + ": " : ""}${told(one)}`, row);
+      make(one === points[0] ? "b" : "span", `${one.line.n ? one.line.n + ": " : ""}${told(one, unit)}`, row);
     }
     this.mark(points);
     this.show(points[0]);

@@ -102,7 +102,7 @@ class Burst(Model):
     )
     snr_db: Annotated[Number, Field(ge=-60, le=100)] = Field(
         title="signal-to-noise ratio of a pulse",
-        json_schema_extra={"unit": "dB"},
+        json_schema_extra={"unit": "dB", "symbol": "q"},
         description="ratio of the power of the echo to that of the noise in the sample of a pulse, dB",
     )
     snr_range_m: Positive | None = Field(
