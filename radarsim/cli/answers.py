@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from radarsim.app.solve import Answer
 
 PLAIN = ".6g"
+RATES = ("lock", "right")  # kinds of which what is left to 100 % matters
+MOST_DIGITS = 12  # behind the point: beyond, rounding shows
 SAME = 1e-9  # of a quantity: how near an exact root comes
 
 
@@ -133,7 +135,19 @@ def _now(answer: "Answer") -> str:
 
 
 def _quantity(answer: "Answer", value: float) -> str:
-    return f"{_number(value, '.4g')} {tr(answer.quantity_unit)}"
+    return f"{_rate(value) if answer.quantity.kind in RATES else _number(value, '.4g')} {tr(answer.quantity_unit)}"
+
+
+def _rate(percent: float) -> str:
+    """A share in per cent: of one that is nearly all so many digits that three are of the rest.
+
+    >>> _rate(99.9990021)
+    '99.999002'
+    """
+    rest = 100.0 - percent
+    if not 0.0 < rest < 1.0:
+        return _number(percent, ".4g")
+    return _number(percent, f".{min(2 - math.floor(math.log10(rest)), MOST_DIGITS)}f")
 
 
 def _with_unit(value: float, unit: str, form: str = PLAIN) -> str:

@@ -48,6 +48,7 @@ SHARES = {
     "locks": ("lock_rate", "always_rate_3sigma", "always_posterior_rate_3sigma", "wrong_fold"),
     "probabilities": ("probability",),
     "orders": ("weight",),
+    "folds": (),  # those of rare events alone
 }
 # Columns that predict a share, where a table has one: rows are marked by these events in place of those that came.
 # Where about twenty are to come, a row that is marked by what came is unmarked when chance brought more: such rows of
@@ -121,7 +122,7 @@ def _noted(
     columns = [column for column in (*SHARES.get(name, ()), *FORETOLD.get(name, ())) if column in table]
     shares = [table[column].to_numpy(dtype=float) for column in columns]
     events = np.min([n * np.minimum(share, 1 - share) for share in shares], axis=0) if shares else np.inf
-    if shares and "rare" in made:
+    if name in SHARES and "rare" in made:
         events = rare.of_rows(table, made["rare"], events)
     if name in BOUNDED:
         effective = np.full(n.shape, np.inf)

@@ -1,4 +1,4 @@
-"""Planted faults of rare events: weights dropped, mixtures with one side, shifts, losses and boxes not those meant."""
+"""Planted faults of rare events: weights dropped, one side alone, shifts, events and boxes not those meant."""
 
 from tests.trust.mutant import mutants
 
@@ -64,4 +64,38 @@ FALSE_TRACKS = (
         ),
     ),
 )
-RARE = (*LOSSES, *FALSE_TRACKS)
+
+FOLDS = "studies/ambiguous_doppler/test_rare.py"
+NORMAL = f"{FOLDS}::test_weights_bring_back_the_normal_law"
+JUST = f"{FOLDS}::test_folds_are_wrong_just_where_the_half_spaces_are"
+ADDED = f"{FOLDS}::test_sums_are_those_of_the_weights_and_add_up"
+TEXTBOOK = f"{FOLDS}::test_distances_between_sequences_are_the_textbooks"
+EARLY = f"{FOLDS}::test_what_is_dropped_early_is_dropped_in_a_half_space"
+PRODUCT = f"{FOLDS}::test_the_nearest_fold_is_wrong_as_often_as_the_exact_product_says"
+STUDY = "radarsim/studies/ambiguous_doppler"
+
+WRONG_FOLDS = (
+    *mutants(
+        f"{STUDY}/kernels/rare.py",
+        ("put(weights, 0, 1.0 / density)", "put(weights, 0, full(1.0))", NORMAL),
+        ("exponential(shift * along - 0.5 * shift * shift)", "exponential(shift * along - shift * shift)", NORMAL),
+        ("to[1] += weight * weight", "to[1] += weight", ADDED),
+        ("n < size and chosen[n] == 0 else 0.0", "n < size else 0.0", ADDED),
+    ),
+    *mutants(
+        f"{STUDY}/rare.py",
+        ("made[k, 0] = e / math.sqrt(of.range_variance[k])", "made[k, 0] = 0.0 * e", f"{TEXTBOOK} {JUST}"),
+        ("/ 2 + apart @ b + depth) / length", "/ 2 - apart @ b + depth) / length", JUST),
+        ("own = 0.0 if k == len(of.constant) else depth", "own = depth", f"{JUST} {EARLY}"),
+        ("(apart**2).sum(axis=1) / 2", "(apart**2).sum(axis=1)", f"{JUST} {PRODUCT}"),
+    ),
+    *mutants(
+        f"{STUDY}/lattice.py",
+        (
+            "np.ceil(centre - reach), np.floor",
+            "np.floor(centre), np.floor",
+            f"{FOLDS}::test_short_vectors_are_all_that_there_are",
+        ),
+    ),
+)
+RARE = (*LOSSES, *FALSE_TRACKS, *WRONG_FOLDS)

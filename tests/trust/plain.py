@@ -172,12 +172,14 @@ REMAINDER = "{name: remainder, doppler: remainder, manoeuvre_variance: 1e-3}"
 FLIGHT = (
     "{kind: fly_by, distance_m: 2e4, speed_mps: 300, start_range_m: 5e4, sigma_position_m: 2e3, sigma_velocity_mps: 9}"
 )
+RARE = "rare={filter: H 3}"
 # What is run: name → config, overrides, realisations; of several cases the last.
 RUNS = {
     "linear": ("rls2", ["scans=9"], 11),
     "linear with misses": ("rls2", MISSES, 11),
     "linear, drawn flight": ("rls2", ["scans=4", f"target={FLIGHT}"], 11),
     "folds": ("ambiguous_depth", ["scans=4", FEW], 8),
+    "folds shifted": ("ambiguous_rare", ["scans=3", "sweep.radar.repetition_rate_hz=[4000]", FEW, RARE], 8),
     "folds missed": ("ambiguous_missed", ["scans=5"], 8),
     "orders": ("orders", ["scans=6"], 8),
     "pulses": ("pulses", ["scans=3"], 8),

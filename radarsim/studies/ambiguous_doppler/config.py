@@ -7,8 +7,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from radarsim.config import radial
+from radarsim.config import radial, rare
 from radarsim.config.fields import (
+    Added,
     At,
     Design,
     Display,
@@ -42,6 +43,7 @@ from radarsim.config.radial import (
 )
 from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
 
+MOST_RARE_SCANS = 64  # sequences of folds are looked for before the run, and each shifts the noise of every scan
 MOST_SCANS = 10_000  # plots and estimates of eight realisations are held for the whole run
 MOST_HYPOTHESES = 100_000
 MOST_RATES = 16
@@ -302,6 +304,12 @@ class Filter(Model):
         return self.model_copy(update=missing) if missing else self
 
 
+class RareFolds(rare.RareEvent):
+    """Wrong folds that are rare: realisations shifted towards them, and weights that make up for it."""
+
+    filter: Name = Field(title="filter", description="the filter whose wrong folds at the last scan are sought")
+
+
 class Keys(Study):
     """Folded Doppler: what it is worth, and how many scans it takes."""
 
@@ -328,6 +336,11 @@ class Keys(Study):
     )
     scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = Field(
         title="number of scans", description="number of scans"
+    )
+    rare: Annotated[RareFolds | None, Design(), Added()] = Field(
+        None,
+        title="rare wrong folds",
+        description="importance sampling of wrong folds, for filters that are almost always right: rare.csv",
     )
 
     @model_validator(mode="after")
@@ -384,6 +397,20 @@ class Keys(Study):
         for i, one in enumerate(self.filters):
             if one.combine in ("expected_error", "intersection") and self.radar.detection_probability < 1:
                 yield at(f"filters.{i}.combine", f"{one.combine} needs every plot: radar.detection_probability 1")
+
+    @cross_check
+    def _rare_fits(self) -> Iterator[At]:
+        if self.rare is None:
+            return
+        listing = [one for one in self.filters if one.doppler == "folded" and one.merge == "never"]
+        single = [one.name for one in listing if one.combine is None]
+        if self.rare.filter not in single:
+            names = ", ".join(single) or "there is none"
+            yield at("rare.filter", f"must be the name of a filter of one order that lists its folds: {names}")
+        if self.radar.detection_probability < 1:
+            yield at("rare", "needs every plot: radar.detection_probability 1")
+        if self.scans > MOST_RARE_SCANS:
+            yield at("rare", f"needs at most {MOST_RARE_SCANS} scans, got {self.scans}")
 
     @cross_check
     def _variances_in_proportion(self) -> Iterator[At]:

@@ -29,6 +29,7 @@ class Gains:
     range: np.ndarray
     velocity: np.ndarray
     variance: np.ndarray
+    range_variance: np.ndarray
     believed: np.ndarray
 
 
@@ -37,18 +38,18 @@ def gains(one: Member, prior: Any, sigma: np.ndarray, dt: float, scans: int) -> 
     F, Q = filters.model(one.order, one.manoeuvre_variance, dt)
     P = np.diag([0.0, *filters.prior_variances(one.order, prior)])
     of_range, of_velocity = np.zeros((scans, 3)), np.zeros((scans, 3))
-    variance, believed = np.zeros(scans), np.zeros((scans, 3, 3))
+    variance, range_variance, believed = np.zeros(scans), np.ones(scans), np.zeros((scans, 3, 3))
     for k in range(scans):
         if k == 0:
             P[0, 0] = sigma[0] ** 2
         else:
             P = F @ P @ F.T + Q
-            P, of_range[k], _ = _taken(P, 0, sigma[0])
+            P, of_range[k], range_variance[k] = _taken(P, 0, sigma[0])
         variance[k] = P[1, 1] + sigma[1] ** 2
         if one.doppler != "none" and (k > 0 or one.doppler != "remainder"):  # a remainder needs two scans
             P, of_velocity[k], _ = _taken(P, 1, sigma[1])
         believed[k] = P
-    return Gains(F, of_range, of_velocity, variance, believed)
+    return Gains(F, of_range, of_velocity, variance, range_variance, believed)
 
 
 def _taken(P: np.ndarray, component: int, sigma: float) -> tuple[np.ndarray, np.ndarray, float]:

@@ -7,9 +7,11 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.engine.moments import Layout
+from radarsim.errors import ConfigError
 from radarsim.kernels.linear import plain
-from radarsim.studies.ambiguous_doppler import exact, filters, world
+from radarsim.studies.ambiguous_doppler import exact, filters, rare, world
 from radarsim.studies.ambiguous_doppler.axes import FoldedAxes
+from radarsim.studies.ambiguous_doppler.kernels import rare as rare_kernels
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
 from radarsim.studies.noise import noise_key
 
@@ -25,6 +27,7 @@ class Plan:
     axes: FoldedAxes
     world: records.World
     banks: records.Banks
+    mixture: rare_kernels.Mixture | None = None
     block: int = BLOCK
     gaussian: bool = False  # a wrong fold is no Gaussian error
 
@@ -46,7 +49,14 @@ def prepare(case: Case) -> Plan:
         detection=float(radar.detection_probability),
     )
     banks = filters.banks(spec, lambda one: shares(spec, one, observed))
-    return Plan(Layout(**records.shapes(len(spec.filters), spec.scans)), axes(spec, observed, banks), observed, banks)
+    shapes, labels, mixture = dict(records.shapes(len(spec.filters), spec.scans)), axes(spec, observed, banks), None
+    if spec.rare is not None:
+        shapes |= {"events": (len(spec.filters), spec.scans, rare_kernels.EVENTS, 3), "drawn": (3,)}
+        try:
+            mixture = rare.mixture(observed, spec, noise_key(case, "rare"))
+        except rare.NotFound as error:
+            raise ConfigError(f"{case.name}: rare: {spec.rare.filter} {error}") from None
+    return Plan(Layout(**shapes), labels, observed, banks, mixture)
 
 
 def shares(spec: Any, one: Any, observed: records.World) -> np.ndarray:
@@ -148,7 +158,13 @@ def follows_the_model(spec: Any, one: Any) -> bool:
 
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
-    """Sums of one block, in the order of the plan's layout."""
+    """Sums of one block, in the order of the plan's layout; with `rare` the common ones are of plain realisations."""
     values = np.zeros(plan.layout.size)
-    sums.simulate_block(plan.world, plan.banks, records.Sums(**plan.layout.unpack(values)), first, count)
+    arrays = plan.layout.unpack(values)
+    common = records.Sums(**{name: arrays[name] for name in records.Sums._fields})
+    if plan.mixture is None:
+        sums.simulate_block(plan.world, plan.banks, common, first, count)
+    else:
+        losses = rare_kernels.Losses(arrays["events"], arrays["drawn"])
+        rare_kernels.simulate_block(plan.world, plan.banks, plan.mixture, common, losses, first, count)
     return values

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import panels, statistics
+from radarsim.report import panels, rare, statistics
 from radarsim.report import tables as common
 from radarsim.studies.ambiguous_doppler.axes import FoldedAxes
+from radarsim.studies.ambiguous_doppler.kernels.rare import BEYOND, WRONG
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     BEYOND_SUM,
     BINS,
@@ -34,12 +35,13 @@ ABOVE = ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")
 
 
 def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
-    """The tables beyond curves: gains (with what is lost against the oracle), folds, calibration, orders."""
+    """The tables beyond curves: gains (with what is lost against the oracle), folds, calibration, orders; rare."""
     return {
         "gains": gains(results),
         "folds": folds(results),
         "calibration": calibration(results),
         "orders": orders(results),
+        **rare.table([_rare(result) for result in results if "events" in result.sums]),
     }
 
 
@@ -77,24 +79,57 @@ def folds(results: Sequence[Result]) -> "pd.DataFrame":
 
 def _folds(result: Result) -> dict[str, np.ndarray]:
     axes = result.axes
-    unfolds = np.array([one.folds and one.combine in (None, "likelihood") for one in result.spec.filters])
-    shown = np.broadcast_to(unfolds[:, None], axes.exact_right.shape)
+    shown = np.broadcast_to(unfolding(result)[:, None], axes.exact_right.shape)
     at = f, k = np.nonzero(shown & (np.asarray(result.sums["estimates"])[..., 0] > 0))
     n = np.asarray(result.sums["estimates"])[..., 0][at]
     of = np.asarray(result.sums["folds"])[at]
-    right, beyond = statistics.rate(of[:, RIGHT_SUM], n), statistics.rate(of[:, BEYOND_SUM], n)
+    right, beyond, every = statistics.rate(of[:, RIGHT_SUM], n), statistics.rate(of[:, BEYOND_SUM], n), n
+    if "events" in result.sums:
+        every = np.full(f.size, float(result.count))
+        right = rare.complement(rare.rate(events(result, (f, k), WRONG), drawn(result)))
+        beyond = rare.rate(events(result, (f, k), BEYOND), drawn(result))
     return {
         "case": np.full(f.size, result.name, dtype=object),
         "filter": common.names(axes.filters, f),
         "k": np.asarray(axes.k)[k],
         "t_s": np.asarray(axes.t_s, dtype=float)[k],
-        "n": n.astype(np.int64),
+        "n": every.astype(np.int64),
         **dict(zip(("right", "right_lo", "right_hi"), right, strict=True)),
         "exact_right": axes.exact_right[at],
         "listed": of[:, LISTED_SUM] / n,
         "hypotheses": of[:, COUNT_SUM] / n,
         **dict(zip(("beyond", "beyond_lo", "beyond_hi"), beyond, strict=True)),
     }
+
+
+def unfolding(result: Result) -> np.ndarray:
+    """Which filters (F,) unfold by themselves."""
+    return np.array([one.folds and one.combine in (None, "likelihood") for one in result.spec.filters])
+
+
+def drawn(result: Result) -> rare.Drawn:
+    """How the realisations of a case with rare wrong folds were drawn."""
+    return rare.Drawn(result.count, *np.asarray(result.sums["drawn"]))
+
+
+def events(result: Result, at: tuple[np.ndarray, ...], event: int) -> rare.Counted:
+    """The realisations that have an event, WRONG or BEYOND, at filters and scans."""
+    return rare.Counted(*np.moveaxis(np.asarray(result.sums["events"])[(*at, event)], -1, 0))
+
+
+def _rare(result: Result) -> dict[str, np.ndarray]:
+    """Wrong folds of every filter of one order that unfolds, at the last scan, by the weights of the realisations."""
+    (f,) = np.nonzero(unfolding(result) & ~result.axes.combines)
+    k = np.full(f.size, len(result.axes.k) - 1)
+    names = common.names(result.axes.filters, f)
+    labels = {
+        "case": np.full(f.size, result.name, dtype=object),
+        "filter": names,
+        "k": np.asarray(result.axes.k)[k],
+        "t_s": np.asarray(result.axes.t_s, dtype=float)[k],
+    }
+    sought = np.asarray(names) == result.spec.rare.filter
+    return rare.rows(labels, "wrong fold", sought, events(result, (f, k), WRONG), drawn(result))
 
 
 def calibration(results: Sequence[Result]) -> "pd.DataFrame":

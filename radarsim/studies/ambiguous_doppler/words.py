@@ -8,6 +8,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.language import listed, numeral, tr
 from radarsim.report import panels, text
+from radarsim.report import tables as common
 from radarsim.studies.ambiguous_doppler.tables import Result
 
 if TYPE_CHECKING:
@@ -53,7 +54,8 @@ def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
     spans = ", ".join(numeral(f"{span:g}") for span in result.spec.radar.spans_mps)
     for name in _told_of(result):
         where = f"{panels.plain_label(result)}, D = {spans} {tr('m/s')}, {name}"
-        clauses = list(filter(None, (_as_good(result, name, made), _right(result, name, made))))
+        right = _right(result, name, made) if result.spec.rare is None else _wrong(result, name, made)
+        clauses = list(filter(None, (_as_good(result, name, made), right)))
         if clauses:
             sentences.append(f"{where}: {'; '.join(clauses)}.")
     if axes.combines.any():
@@ -114,6 +116,22 @@ def _right(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str
     last = rows.iloc[-1]
     share = _percent(*(100 * last[key] for key in ("right", "right_lo", "right_hi")))
     return tr("all folds are right in {share} of realisations at scan {k}", share=share, k=last["k"])
+
+
+def _wrong(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str:
+    """How often a fold is wrong at the last scan, by importance sampling."""
+    rows = common.groups(made["rare"], "case")[(result.name,)]
+    row = rows[rows["filter"] == name].iloc[0]
+    return tr(
+        "a fold is wrong at scan {k} in {rate:.3g} [{low:.3g}, {high:.3g}] of realisations, by importance sampling "
+        "from {events:,} of them, {n_eff:,.0f} effective ones",
+        k=row["k"],
+        rate=row["rate"],
+        low=row["rate_lo"],
+        high=row["rate_hi"],
+        events=row["events"],
+        n_eff=row["n_eff"],
+    )
 
 
 def _as_good(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str:

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, Strict
+from pydantic import AfterValidator, Field
 
+from radarsim.config import rare
 from radarsim.config.fields import (
     Added,
     At,
@@ -247,17 +248,11 @@ class Estimator(Model):
             yield at("schedule", "window lengths must rise")
 
 
-class Rare(Model):
+class Rare(rare.RareEvent):
     """Losses of lock that are rare: bursts shifted towards them, and weights that make up for it."""
 
     estimator: Name = Field(
         title="estimator", description="the estimator whose losses of lock at its last window are sought"
-    )
-    plain_share: Annotated[float, Strict(), Field(ge=0.01, le=0.9)] = Field(
-        0.1,
-        title="share of plain bursts",
-        json_schema_extra={"symbol": "α_0"},
-        description="share of the bursts that are drawn as they are, no unit; no weight is over one divided by it",
     )
 
 

@@ -24,7 +24,7 @@ RANDOM = {"kind": "random_polynomial"}
 FIXED = {"kind": "polynomial", "coefficients": [100e3, -250.0, 4.0]}
 
 
-def made(radar, filters, scans, target=RANDOM, variance=1e-3, seed=1, prior=None, **keys):
+def made(radar, filters, scans, target=RANDOM, variance=1e-3, seed=1, prior=None, rare=None, **keys):
     """A checked case; keys are further ones of the radar."""
     sigma_r, sigma_v, dt, wavelength = RADARS[radar]
     given = {"sigma_range_m": sigma_r, "sigma_velocity_mps": sigma_v, "scan_period_s": dt, "wavelength_m": wavelength}
@@ -36,6 +36,8 @@ def made(radar, filters, scans, target=RANDOM, variance=1e-3, seed=1, prior=None
     }
     if prior:
         document["prior"] = prior
+    if rare:
+        document["rare"] = rare
     spec = config.Keys.model_validate(document)
     return Case("case", "case", "ambiguous_doppler", spec, (), 1, seed)
 

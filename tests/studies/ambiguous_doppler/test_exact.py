@@ -150,5 +150,7 @@ def test_no_exact_probability_where_truth_and_filter_differ():
 
 def test_product_of_teunissen():
     """Two scans of a span of two standard deviations: erf(1/√2)² = 0.4660649…"""
-    of = exact.Gains(np.eye(3), np.zeros((2, 3)), np.zeros((2, 3)), np.array([4.0, 9.0]), np.zeros((2, 3, 3)))
+    of = exact.Gains(
+        np.eye(3), np.zeros((2, 3)), np.zeros((2, 3)), np.array([4.0, 9.0]), np.ones(2), np.zeros((2, 3, 3))
+    )
     assert np.allclose(exact.all_right(of, np.array([4.0, 6.0])), [0.6826894921370859, 0.6826894921370859**2])

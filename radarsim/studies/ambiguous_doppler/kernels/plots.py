@@ -50,21 +50,29 @@ def solve_remainders(world, plots):
 
 
 @part
-def fill_plots(world, first, random, plots):
-    """Plots and truth of the realisations first … first + 7 into rows PLOT a scan; random (2 K rows) is written over.
+def fill_normals(world, first, normals):
+    """Unit normals of realisations first … first + 7: rows of what a target draws (2), of ranges (K), velocities (K).
 
     The first normal of draw pair k goes to the range of scan k, the second to its velocity, whether or not there is a
-    plot; the first uniform of draw pair k says whether there is.
+    plot.
+    """
+    size = WIDTH * world.truth.shape[0]
+    ranges, velocities = normals[2 * WIDTH : 2 * WIDTH + size], normals[2 * WIDTH + size :]
+    fill_normal_strip(world.keys[2], first, 0, normals[:WIDTH], normals[WIDTH : 2 * WIDTH])
+    fill_normal_strip(world.keys[0], first, 0, ranges, velocities)
+
+
+@part
+def put_plots(world, first, normals, plots):
+    """Plots and truth from normals, which are written over, into rows PLOT a scan.
+
+    The first uniform of draw pair k says whether there is a plot at scan k.
     """
     scans = world.truth.shape[0]
-    half = random.size // 2
-    a, b = random[:half], random[half:]
     zero, one = full(0.0), full(1.0)
-    fill_normal_strip(world.keys[2], first, 0, a[:8], b[:8])
-    dv, da = world.spread[0] * get(address(a), 0), world.spread[1] * get(address(b), 0)
-    size = 8 * scans
-    fill_normal_strip(world.keys[0], first, 0, a[:size], b[:size])
-    to, noise_r, noise_v = address(plots), address(a), address(b)
+    to, drawn = address(plots), address(normals)
+    noise_r, noise_v = row(drawn, 2), row(drawn, 2 + scans)
+    dv, da = world.spread[0] * get(drawn, 0), world.spread[1] * get(drawn, 1)
     for k in range(scans):
         t, scan = world.t[k], row(to, k * PLOT)
         r = world.truth[k, 0] + dv * t + da * (0.5 * t * t)
@@ -80,8 +88,8 @@ def fill_plots(world, first, random, plots):
     for k in range(scans):
         scan, detected = row(to, k * PLOT), one
         if world.detection < 1.0:
-            fill_uniform_pairs(world.keys[1], first, k, a[8 * k : 8 * k + 8], b[8 * k : 8 * k + 8])
-            detected = where_greater(full(world.detection), get(noise_r, k), one, zero)
+            fill_uniform_pairs(world.keys[1], first, k, normals[:WIDTH], normals[WIDTH : 2 * WIDTH])
+            detected = where_greater(full(world.detection), get(drawn, 0), one, zero)
         put(scan, DETECTED, detected)
         put(scan, FIRST, detected * (one - started))
         started = where_greater(detected, started, one, started)

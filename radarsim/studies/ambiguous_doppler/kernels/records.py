@@ -101,11 +101,11 @@ class Banks(NamedTuple):
 class Memory(NamedTuple):
     """Work arrays for a group of eight realisations.
 
-    plots (K × PLOT rows), gains (D × K × GAINS), out (B × K × OUTPUT), and room for hypotheses, see
+    normals (2 + 2 K rows), plots (K × PLOT), gains (D × K × GAINS), out (B × K × OUTPUT), and room for hypotheses, see
     `kernels.hypotheses.Lists` and `together`.
     """
 
-    random: np.ndarray
+    normals: np.ndarray
     plots: np.ndarray
     gains: np.ndarray
     out: np.ndarray
@@ -167,7 +167,7 @@ def memory(scans: int, banks: Banks) -> Memory:
     room = -(-most // WIDTH) * WIDTH + WIDTH
     children = 4 * room + 64
     return Memory(
-        random=rows(2 * max(scans, 1)),
+        normals=rows(2 + 2 * scans),
         plots=rows(scans * PLOT),
         gains=rows(len(banks.designs) * scans * GAINS),
         out=rows(len(banks.kind) * scans * OUTPUT),

@@ -7,7 +7,7 @@ from radarsim.kernels.hypotheses import Lists
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, total, where_greater
 from radarsim.studies.ambiguous_doppler.kernels.hypotheses import run_remembering
 from radarsim.studies.ambiguous_doppler.kernels.orders import Orders, run_choosing, run_interacting, run_weighing
-from radarsim.studies.ambiguous_doppler.kernels.plots import fill_plots
+from radarsim.studies.ambiguous_doppler.kernels.plots import fill_normals, put_plots
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     BEYOND_SUM,
     BINS,
@@ -171,7 +171,8 @@ def add_block(world, banks, memory, sums, first, count):
     for group in range(0, count, WIDTH):
         for n in range(WIDTH):
             memory.counted[n] = 1.0 if group + n < count else 0.0
-        fill_plots(world, first + group, memory.random, memory.plots)
+        fill_normals(world, first + group, memory.normals)
+        put_plots(world, first + group, memory.normals, memory.plots)
         run_filters(world, banks, memory, group == 0 or world.detection < 1.0)
         add_group(world, banks, memory, sums)
 
@@ -179,7 +180,8 @@ def add_block(world, banks, memory, sums, first, count):
 @kernel
 def fill_outputs(world, banks, memory, first):
     """Plots and outputs of the realisations first … first + 7, left in memory."""
-    fill_plots(world, first, memory.random, memory.plots)
+    fill_normals(world, first, memory.normals)
+    put_plots(world, first, memory.normals, memory.plots)
     run_filters(world, banks, memory, True)
 
 
