@@ -45,7 +45,7 @@ ROOMS = {
 
 # Inside a study: what of the shared rooms a role stands on, and on which roles of its own study.
 GROUND = ("errors", "kernels", "physics", "bursts", *CASE)
-KEYS = ("errors", "config.faults", "config.fields", "config.radial", "physics")
+KEYS = ("errors", "config.faults", "config.fields", "config.radial", "config.rare", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
 SHOWN = (*SUMS, "cost", "tables", "figures", "map")

@@ -14,5 +14,6 @@ class RareEvent(Model):
         0.1,
         title="share of plain realisations",
         json_schema_extra={"symbol": "α_0"},
-        description="share of the realisations that are drawn as they are; no weight is over one divided by it",
+        description="share of the realisations that are drawn as they are, no unit; no weight is over one divided by "
+        "it",
     )

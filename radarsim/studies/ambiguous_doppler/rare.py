@@ -177,7 +177,7 @@ def probable(found: HalfSpaces) -> HalfSpaces:
 
 
 def chances(of: HalfSpaces) -> np.ndarray:
-    """The probability Φ(−s) of each; their sum bounds that of a wrong fold from above."""
+    """The probability (M,) of each, Φ(−s); their sum bounds that of a wrong fold from above."""
     return np.array([math.erfc(s / math.sqrt(2.0)) / 2 for s in of.distance])
 
 

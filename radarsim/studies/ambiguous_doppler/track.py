@@ -62,16 +62,19 @@ class Tracker:
         """
         rows = rows_of(columns)
         made = [stepped(one, rows) for one in self.filters]
-        estimate, sigma, residual, nis = (
-            np.array([[getattr(row, name) for row in own] for own in made]) for name in followers.Row._fields
-        )
-        tested = tuple((name, 1) for name, _ in MEASURED)
-        t = columns["t_s"]
-        spread = self.errors**2 + self.drawn[:, None] * sigma[..., :2] ** 2
-        believed = np.where(np.isfinite(residual), np.sqrt(np.maximum(spread, 0.0)), np.nan)
+        gathered = {
+            name: np.array([[getattr(row, name) for row in own] for own in made]) for name in followers.Row._fields
+        }
+        spread = self.errors**2 + self.drawn[:, None] * gathered["sigma"][..., :2] ** 2
+        finite = np.isfinite(gathered["residual"])
         return Track(
-            *(self.names, COMPONENTS, t, estimate, sigma, None, MEASURED, residual, tested, nis),
-            residual_sigma=believed,
+            filters=self.names,
+            components=COMPONENTS,
+            t_s=columns["t_s"],
+            measured=MEASURED,
+            tested=tuple((name, 1) for name, _ in MEASURED),
+            residual_sigma=np.where(finite, np.sqrt(np.maximum(spread, 0.0)), np.nan),
+            **gathered,
         )
 
 

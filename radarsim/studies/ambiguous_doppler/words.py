@@ -54,7 +54,7 @@ def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
     spans = ", ".join(numeral(f"{span:g}") for span in result.spec.radar.spans_mps)
     for name in _told_of(result):
         where = f"{panels.plain_label(result)}, D = {spans} {tr('m/s')}, {name}"
-        right = _right(result, name, made) if result.spec.rare is None else _wrong(result, name, made)
+        right = _wrong(result, name, made) or _right(result, name, made)
         clauses = list(filter(None, (_as_good(result, name, made), right)))
         if clauses:
             sentences.append(f"{where}: {'; '.join(clauses)}.")
@@ -119,9 +119,11 @@ def _right(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str
 
 
 def _wrong(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str:
-    """How often a fold is wrong at the last scan, by importance sampling."""
-    rows = common.groups(made["rare"], "case")[(result.name,)]
-    row = rows[rows["filter"] == name].iloc[0]
+    """How often a fold is wrong at the last scan, by importance sampling; empty where it was not drawn so."""
+    rows = common.groups(made["rare"], "case", "filter") if result.spec.rare is not None else {}
+    if (result.name, name) not in rows:
+        return ""
+    row = rows[result.name, name].iloc[0]
     return tr(
         "a fold is wrong at scan {k} in {rate:.3g} [{low:.3g}, {high:.3g}] of realisations, by importance sampling "
         "from {events:,} of them, {n_eff:,.0f} effective ones",

@@ -351,37 +351,31 @@ def add_one(of, to, at, residual):
 
 
 @inline
+def outcome(beside, slopes, sums, products):
+    """Where the sums of scans, or of stages, lie: arrays by filter, scan or stage, and state."""
+    pilot = 1 if beside.controls.mode[0] == PILOT else 0
+    residuals = address(beside.memory.residuals)
+    width, many = slopes.shape[3], products.shape[3]
+    return Outcome(residuals, address(slopes), width, address(sums), address(products), many, pilot)
+
+
+@inline
 def add_controlled_scan(world, banks, beside, outputs, counted, baseline, k, n):
     """Add scan n of a strip, the reported scan k of the track, of all filters; outputs, counted: addresses."""
-    controls, memory, sums, place = beside.controls, beside.memory, beside.sums, world.place[k]
-    number, x, filters, scans = (
-        total(get(counted, 0)),
-        address(memory.x),
-        banks.numbers.shape[0],
-        controls.scans.shape[1],
-    )
-    pilot, products, residuals = controls.mode[0], beside.products.scans, address(memory.residuals)
-    to = Outcome(
-        residuals,
-        address(controls.scans),
-        controls.scans.shape[3],
-        address(sums.controlled),
-        address(products),
-        products.shape[3],
-        1 if pilot == PILOT else 0,
-    )
+    controls, memory, sums = beside.controls, beside.memory, beside.sums
+    filters, scans, place = banks.numbers.shape[0], controls.scans.shape[1], world.place[k]
+    x, number = address(memory.x), total(get(counted, 0))
+    to = outcome(beside, controls.scans, sums.controlled, beside.products.scans)
     errors, truth = row(address(memory.errors), n * STATES), address(world.truth[k])
     variances, stride = address(controls.variances), scans * STATES
     for f in range(filters):
         size, own = banks.numbers[f, SIZE], row(address(controls.own), f)
-        places, of = (
-            Places(own, size, errors, x, 0, variances, stride, place * STATES),
-            Rows(x, 2 * size, counted, number),
-        )
+        places = Places(own, size, errors, x, 0, variances, stride, place * STATES)
+        of = Rows(x, 2 * size, counted, number)
         add_scan(of, places, row(outputs, (f * STRIP + n) * OUTPUT), truth, to, (f * scans + place) * STATES, f)
-    if pilot == CONTROLLED:
+    if controls.mode[0] == CONTROLLED:
         for f in range(filters):
-            own, base = row(residuals, f * STATES), row(residuals, baseline * STATES)
+            own, base = row(to.residuals, f * STATES), row(to.residuals, baseline * STATES)
             add_pairs(own, base, address(sums.controlled_pairs), (f * scans + place) * STATES)
 
 
@@ -391,18 +385,10 @@ def close_controls(banks, beside, stages, counted, count):
 
     stages: address of the means, as `sums.close_stages` leaves them; count: number of stages.
     """
-    controls, memory, sums, filters = beside.controls, beside.memory, beside.sums, banks.numbers.shape[0]
-    number, x, step = total(get(counted, 0)), address(memory.x), PARTS * STATES * COLLECTED
-    pilot, products, residuals = controls.mode[0], beside.products.stages, address(memory.residuals)
-    to = Outcome(
-        residuals,
-        address(controls.stages),
-        controls.stages.shape[3],
-        address(sums.controlled_stage),
-        address(products),
-        products.shape[3],
-        1 if pilot == PILOT else 0,
-    )
+    controls, memory, sums = beside.controls, beside.memory, beside.sums
+    filters, step = banks.numbers.shape[0], PARTS * STATES * COLLECTED
+    x, number = address(memory.x), total(get(counted, 0))
+    to = outcome(beside, controls.stages, sums.controlled_stage, beside.products.stages)
     for s in range(count):
         parts, expected = row(address(memory.parts), s * step), address(controls.sums)
         for f in range(filters):
@@ -410,9 +396,9 @@ def close_controls(banks, beside, stages, counted, count):
             places = Places(own, size, x, parts, count * step, expected, count * PARTS * STATES, s * PARTS * STATES)
             of = Rows(x, PARTS * COLLECTED * size, counted, number)
             add_stage(of, places, row(stages, (f * count + s) * STAGE), to, (f * count + s) * STATES, f)
-        if pilot == CONTROLLED:
+        if controls.mode[0] == CONTROLLED:
             for f in range(filters):
                 for g in range(filters):
-                    own, other = row(residuals, f * STATES), row(residuals, g * STATES)
+                    own, other = row(to.residuals, f * STATES), row(to.residuals, g * STATES)
                     at = ((f * filters + g) * count + s) * STATES
                     add_pairs(own, other, address(sums.controlled_stage_pairs), at)

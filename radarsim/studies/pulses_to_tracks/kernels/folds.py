@@ -67,14 +67,11 @@ def branches(own, sigma, measured, span, held, i, lists):
     A parent below zero, -1 - h, is that of a branch in which the burst did not lock.
     """
     v, a, best = measured[0], measured[1], NOTHING
-    w, e, near, c = (
-        column(lists, 0, WEIGHT_COLUMN),
-        column(lists, 2, INNOVATION),
-        column(lists, 2, NEAR),
-        column(lists, 2, FALL),
-    )
-    mixture = own.use == MIXTURE
-    lock, lost = (math.log(own.lock), math.log((1.0 - own.lock) * own.density)) if mixture else (0.0, NOTHING)
+    w, e = column(lists, 0, WEIGHT_COLUMN), column(lists, 2, INNOVATION)
+    near, c = column(lists, 2, NEAR), column(lists, 2, FALL)
+    mixture, lock, lost = own.use == MIXTURE, 0.0, NOTHING
+    if mixture:
+        lock, lost = math.log(own.lock), math.log((1.0 - own.lock) * own.density)
     for h in range(held.count[i]):
         x, P = state_of(held.states[i, h])
         weight = held.weights[i, h] + lock
