@@ -243,8 +243,11 @@ def work(config, overrides):
     from radarsim.app.configs import load
     from radarsim.studies.multimodel import controls
 
-    controls.PILOT = 40
-    return Work(load(config, overrides).cases[-1])
+    usual, controls.PILOT = controls.PILOT, 40
+    try:
+        return Work(load(config, overrides).cases[-1])
+    finally:
+        controls.PILOT = usual
 
 
 def sums(config, overrides, count):
