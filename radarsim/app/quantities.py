@@ -4,6 +4,7 @@ Exact numbers come from the plan of a case, without a realisation. Sampled ones 
 that these have in every study: whatever study makes a table `locks` can be asked for its locks.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -102,6 +103,28 @@ class Series(NamedTuple):
     values: Estimate
 
 
+def checked(quantity: Quantity, case: Case) -> None:
+    """ConfigError for a filter or a rate that a case has not, before anything is prepared."""
+    known = registry.study(case.study).rates(case.spec)
+    if quantity.kind not in ("gain", "sigma") and known is not None and quantity.of.table not in known:
+        raise none_made(quantity, case.name, case.study)
+    if quantity.filter is not None:
+        named(quantity.filter, [member.name for member in case.spec.members])
+
+
+def named(name: str, names: Sequence[str]) -> None:
+    """ConfigError unless one of the filters has this name."""
+    if name not in names:
+        near = did_you_mean(name, names) or f"; there are: {', '.join(names)}"
+        raise ConfigError(f"no filter {name!r}{near}")
+
+
+def none_made(quantity: Quantity, name: str, study: str) -> ConfigError:
+    """That the study of a case makes no table of the quantity's kind."""
+    what, table = quantity.of.words, quantity.of.table
+    return ConfigError(f"{name}: study {study} knows no {what}: it makes no {table}.csv")
+
+
 def resolved(quantity: Quantity, axes: Axes) -> Quantity:
     """The quantity with its filter, found where there is but one. ConfigError for names that the case has not."""
     names, chosen = list(axes.filters), quantity.filter
@@ -110,9 +133,7 @@ def resolved(quantity: Quantity, axes: Axes) -> Quantity:
         if len(others) != 1:
             raise ConfigError(f"--filter: name one of {', '.join(names)}")
         chosen = others[0]
-    elif chosen not in names:
-        near = did_you_mean(chosen, names) or f"; there are: {', '.join(names)}"
-        raise ConfigError(f"no filter {chosen!r}{near}")
+    named(chosen, names)
     if quantity.kind == "gain" and chosen == names[axes.baseline]:
         raise ConfigError(f"filter {chosen!r} is the baseline, against which gains are: its gain is 0 % at any value")
     components = [name for name, _ in axes.components]
@@ -211,7 +232,7 @@ def _rows(quantity: Quantity, result: CaseResult) -> "pd.DataFrame":
     else:
         table = study.tables([result]).get(name)
     if table is None:
-        raise ConfigError(f"{result.name}: study {result.study} knows no {quantity.of.words}: it makes no {name}.csv")
+        raise none_made(quantity, result.name, result.study)
     table = table[table["filter"] == quantity.filter]
     if quantity.component is not None:
         table = table[table["component"] == quantity.component]

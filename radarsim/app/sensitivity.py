@@ -74,11 +74,12 @@ def sensitivity(
     Whole numbers grow by at least one. component leads the order: by default the first. Raises ConfigError.
     """
     cases = Cases(config, tuple(overrides), case)
-    axes = registry.study(cases.base.study).prepare(cases.base).axes
-    names = [name for name, _ in axes.components]
+    names = [name for name, _ in quantities.labels(Quantity("sigma", at_k=1), cases.base).components]
     leading = names[0] if component is None else component
     if leading not in names:
-        raise ConfigError(f"no component {leading!r}{did_you_mean(leading, names) or f'; there are: {names}'}")
+        near = did_you_mean(leading, names) or f"; there are: {', '.join(names)}"
+        raise ConfigError(f"no component {leading!r}{near}")
+    axes = registry.study(cases.base.study).prepare(cases.base).axes
     timed = registry.study(cases.base.study).exact_errors and at_s is None and at_k is None
     asked = Quantity("sigma", at_s=float(axes.t_s[-1]) if timed else at_s, at_k=at_k)
     look = Look(asked, axes, realisations or cases.base.realisations)

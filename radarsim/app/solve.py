@@ -136,6 +136,7 @@ def solve(
         raise ConfigError(f"--equals: must be a finite number, got {equals:g}")
     cases = Cases(config, tuple(overrides), case)
     found = numeric.find(cases.base.spec, key)
+    quantities.checked(quantity, cases.base)
     axes = quantities.labels(quantity, cases.base)
     quantity = quantities.resolved(quantity, axes)
     over = range_of(found, key, between)

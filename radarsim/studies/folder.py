@@ -57,7 +57,7 @@ class StudyFolder(Study):
     """A study whose parts are the functions of the files of a folder.
 
     package is the folder as Python imports it, `__name__` in its `__init__.py`. paper is whose claims it judges. offers
-    are the optional parts that it has. The others are as in `Study`.
+    are the optional parts that it has; rate_tables what `Study.rates` says. The others are as in `Study`.
     """
 
     package: str
@@ -69,6 +69,7 @@ class StudyFolder(Study):
     exact_errors: bool = True
     own_controls: bool = False
     draws_sweeps: bool = False
+    rate_tables: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         if unknown := set(self.offers) - set(get_args(OptionalPart)):
@@ -99,6 +100,9 @@ class StudyFolder(Study):
     def exact_but_for(self, case: "Case") -> str:
         offered = "exact_but_for" in self.offers
         return self.file("study").exact_but_for(case) if offered else super().exact_but_for(case)
+
+    def rates(self, spec: Any) -> tuple[str, ...] | None:
+        return self.rate_tables
 
     def seconds_per_update(self, plan: Any) -> Mapping[str, float]:
         offered = "seconds_per_update" in self.offers

@@ -207,6 +207,10 @@ class Study(ABC):
         """
         return ""
 
+    def rates(self, spec: Any) -> tuple[str, ...] | None:
+        """Which of the tables of rates, locks, folds and tracking, are made of a case. Default: None, a run tells."""
+        return None
+
     def relabelled(self, axes: "Axes", case: "Case") -> "Axes":
         """The axes of a plan with the display names of a case that has the same identity. Default: names of filters."""
         return replace(axes, filters=tuple(member.name for member in case.spec.members))

@@ -15,4 +15,5 @@ STUDY = StudyFolder(
     },
     paper=Paper("Gorshkov & Zavizhenets 2017, conclusion", page="ambiguous_doppler"),
     offers=("inputs", "recorded", "warnings"),
+    rate_tables=("folds",),
 )

@@ -21,4 +21,5 @@ STUDY = StudyFolder(
     ),
     own_controls=True,
     offers=("cost", "readings", "seconds_per_update", "recorded"),
+    rate_tables=(),
 )

@@ -16,4 +16,5 @@ STUDY = StudyFolder(
     },
     paper=Paper("Uss, Baryshev & Djavad 2010, into Gorshkov & Zavizhenets 2017", page="pulses_to_tracks"),
     offers=("inputs", "warnings"),
+    rate_tables=("locks", "folds"),
 )

@@ -22,4 +22,5 @@ STUDY = StudyFolder(
         },
     ),
     offers=("gains", "inputs", "readings", "recorded", "chart", "shortened", "exact_but_for"),
+    rate_tables=(),
 )

@@ -69,6 +69,9 @@ class Sonar(Study):
 
         return clutter.prepare(case)
 
+    def rates(self, spec: "AllKeys") -> tuple[str, ...]:
+        return ("tracking",) if "clutter" in spec.parts else ()
+
     def simulate(self, plan: "RealisationPlan | SharedPlan | ClutterPlan", first: int, count: int) -> "np.ndarray":
         return plan.simulate(first, count)
 

@@ -1,0 +1,128 @@
+"""`solve` and `sensitivity` in every study: one JSON document, a signal that ends them, what is refused at once."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from click.testing import CliRunner
+
+from radarsim.app.configs import load
+from radarsim.app.simulation import result_of
+from radarsim.app.work import CaseWork
+from radarsim.cli import main
+from radarsim.engine.collect import collect
+from radarsim.studies import registry
+from tests.cli.test_stopped import obedient, until_it_listens
+
+MANOEUVRE = ("sonar_manoeuvre", "--case", "sonar_manoeuvre target.acceleration_mps2=0.4")
+CLUTTER = ("sonar_clutter", "--case", "sonar_clutter sensor.false_plots_per_km2=1")
+CONFIGS = {
+    "range_doppler": ("rls2",),
+    "multimodel": ("multimodel_1hz",),
+    "smoothing": ("sonar_smoothing",),
+    "manoeuvre": MANOEUVRE,
+    "clutter": CLUTTER,
+    "discriminator": ("discriminator",),
+    "ambiguous_doppler": ("ambiguous_rls2",),
+    "pulses_to_tracks": ("pulses_rls2",),
+}
+SOLVED = {
+    "range_doppler": "radar.sigma_velocity_mps --gain r --filter r+Vr --at 60 --equals 30",
+    "multimodel": "sensor.sigma_range_m --sigma y --filter MMA2-11 --at-k 5 --equals 30",
+    "smoothing": "sensor.sigma_range_m --sigma r --filter kalman --equals 10",
+    "manoeuvre": "sensor.sigma_range_m --sigma r --filter growing --equals 300",
+    "clutter": "sensor.detection_probability --loss nearest --equals 5 --between 0.6 1",
+    "discriminator": "burst.noise_variance --lock narrow --equals 95",
+    "ambiguous_doppler": "radar.sigma_velocity_mps --right memory --at-k 6 --equals 99",
+    "pulses_to_tracks": "burst.snr_db --lock spectrum --equals 95",
+}
+
+
+def words(study, count):
+    """The command `solve` of a study, with so many realisations behind a value."""
+    config, *case = CONFIGS[study]
+    return ["solve", config, *SOLVED[study].split(), *case, "-n", str(count)]
+
+
+@pytest.mark.parametrize("study", SOLVED)
+def test_solve_gives_one_document(study):
+    result = CliRunner().invoke(main, [*words(study, 40), "--json"])
+    assert result.exit_code in (0, 3), result.output
+    found = json.loads(result.stdout)
+    assert found["key"] == words(study, 1)[2]
+    assert (found["value"] is None) == (result.exit_code == 3)
+    shown = "limit" if found["value"] is None else "attained"
+    assert isinstance(found[shown], float)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("study", CONFIGS)
+def test_sensitivity_gives_one_document_of_every_filter(study, tmp_path):
+    config, *case = CONFIGS[study]
+    command = ["sensitivity", config, *case, "-n", "40", "--no-figures", "--out", str(tmp_path), "--json"]
+    result = CliRunner().invoke(main, command)
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    case = next(one for one in load(config).cases if len(case) == 0 or one.name == case[1])
+    assert {row["filter"] for row in found["rows"]} == {member.name for member in case.spec.members}
+    assert all(row["sigma_change_lo"] <= row["sigma_change_percent"] <= row["sigma_change_hi"] for row in found["rows"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["solve", "sensitivity"])
+@pytest.mark.parametrize("study", CONFIGS)
+def test_a_signal_ends_it(command, study, tmp_path):
+    config, *case = CONFIGS[study]
+    given = words(study, 10**7) if command == "solve" else ["sensitivity", config, *case, "-n", "1e7"]
+    if study in ("range_doppler", "smoothing"):  # exact: in a moment
+        given += ["--set", "radar.detection_probability=0.7" if study == "range_doppler" else "scans=200"]
+        given += ["--set", "scans=40"] if study == "range_doppler" else []
+    number = signal.SIGINT if command == "solve" else signal.SIGTERM
+    with subprocess.Popen(
+        [sys.executable, "-m", "radarsim", *given, "--json"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ,
+        preexec_fn=obedient,
+    ) as process:
+        until_it_listens(process)
+        time.sleep(0.5)
+        process.send_signal(number)
+        try:
+            said, error = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert process.returncode == 128 + number, error
+    assert (said, error) == ("", f"stopped by {'Ctrl-C' if number == signal.SIGINT else 'SIGTERM'}\n")
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+@pytest.mark.parametrize("study", CONFIGS)
+def test_a_wrong_name_is_refused_before_anything_is_prepared(study, monkeypatch):
+    def prepared(self, case):
+        raise AssertionError("prepared")
+
+    config, *case = CONFIGS[study]
+    key = SOLVED[study].split()[0]
+    monkeypatch.setattr(type(registry.study(load(config).cases[0].study)), "prepare", prepared)
+    asked = [("--sigma", "r", "--filter", "nobody"), ("--loss" if study != "clutter" else "--lock", "nobody")]
+    for quantity, said in zip(asked, ("no filter 'nobody'", "it makes no "), strict=True):
+        result = CliRunner().invoke(main, ["solve", config, key, *quantity, *case, "--equals", "1"])
+        assert result.exit_code == 2
+        assert said in result.stderr
+
+
+@pytest.mark.parametrize("study", CONFIGS)
+def test_studies_say_truly_which_rates_they_make(study):
+    case = load(CONFIGS[study][0]).cases[-1]
+    work = CaseWork(case)
+    tables = registry.study(case.study).tables([result_of(case, work, collect(work, 2, threads=1))])
+    rates = registry.study(case.study).rates(case.spec)
+    assert rates is not None
+    assert set(rates) == set(tables) & {"locks", "folds", "tracking"}
