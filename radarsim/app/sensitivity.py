@@ -19,6 +19,8 @@ from radarsim.app.solve import Cases, Config
 from radarsim.app.work import CaseWork
 from radarsim.config import numeric
 from radarsim.config.experiment import Case
+from radarsim.config.fields import Study
+from radarsim.config.labels import Label, label
 from radarsim.config.lookup import did_you_mean
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError
@@ -35,6 +37,7 @@ MORE = 0.1
 BATCHES = 20  # of one case: their spread has 19 degrees of freedom
 MOST_BARS = 16
 NOTHING = 1e-9  # per cent: what rounding may make of no change
+ROUNDED = NOTHING / 100  # the same of a ratio; of gains, in points, still less
 FOLDER = "sensitivity"
 COLUMNS = (
     *("case", "filter", "component", "unit", "key", "value", "changed_value"),
@@ -48,6 +51,7 @@ class Sensitivity:
     """What was found: one row a key, filter and component, by falling effect of the key on the component that leads.
 
     at says when; without_effect are keys that change nothing, left_out those that cannot be raised, with the reason.
+    labels: what people call each key of the rows, with its symbol and unit.
     """
 
     stem: str
@@ -56,6 +60,7 @@ class Sensitivity:
     rows: tuple[dict[Hashable, Any], ...]
     without_effect: tuple[str, ...]
     left_out: dict[str, str]
+    labels: dict[str, Label]
 
 
 def sensitivity(
@@ -100,7 +105,19 @@ def sensitivity(
     idle = [path for path, (own, every) in effect.items() if every < NOTHING and path not in left_out]
     shown = [row for row in rows if row["key"] not in idle]
     shown.sort(key=lambda row: effect[row["key"]], reverse=True)
-    return Sensitivity(cases.base.stem, leading, when(asked), tuple(shown), tuple(idle), left_out)
+    labels = {str(row["key"]): named(cases.base.spec, str(row["key"])) for row in shown}
+    return Sensitivity(cases.base.stem, leading, when(asked), tuple(shown), tuple(idle), left_out, labels)
+
+
+def named(spec: Study, path: str) -> Label:
+    """What people call a key: of a filter with its name, of a list's item with its number."""
+    found = label(spec, path)
+    text, steps = tr(found.text), path.split(".")
+    if steps[-1].isdecimal():
+        text = f"{text} {int(steps[-1]) + 1}"
+    if steps[0] == spec.bare_keys:
+        text = f"{spec.members[int(steps[1])].name}: {text}"
+    return found._replace(text=text)
 
 
 def more(key: numeric.NumericKey) -> float:
@@ -157,7 +174,9 @@ class Look:
         """What a case shows. Raises ConfigError."""
         axes = quantities.labels(self.asked, case)
         known = self._each(lambda quantity: quantities.exact(quantity, case, axes))
-        return Seen(known, known[:, None]) if np.isfinite(known[0]).any() else self._sampled(case)
+        # Of some filters alone, the others would seem to change nothing.
+        exact = np.isfinite(known[0]).any(axis=1).all()
+        return Seen(known, known[:, None]) if exact else self._sampled(case)
 
     def _each(self, of: Callable[[Quantity], float]) -> np.ndarray:
         """(2, F, C) of a function of the quantity."""
@@ -200,6 +219,8 @@ class Look:
 def interval(batches: np.ndarray, value: float) -> tuple[float, float, float]:
     """A value with its 95 % interval from the same number of each batch; one batch alone is exact."""
     n = len(batches)
+    if np.all(np.abs(batches) < ROUNDED) and abs(value) < ROUNDED:
+        return 0.0, 0.0, 0.0
     half = 0.0 if n == 1 else float(statistics.student(n - 1)) * float(np.std(batches, ddof=1)) / math.sqrt(n)
     return value, value - half, value + half
 
@@ -230,7 +251,10 @@ def tornado(found: Sensitivity) -> Figure:
                     marks.append(
                         Line(x, y, "", Style(i, 0, width_pt=9.0 / len(filters), flat=True), name=f"{one}, {key}")
                     )
-        ticks = tuple((float(j), panels.literal(key) if n == 0 else "") for j, key in enumerate(keys))
+                if math.isfinite(value) and not own[key]["exact"]:
+                    ends = np.array([own[key][f"{name}_lo"], own[key][f"{name}_hi"]])
+                    marks.append(Line(ends, y, "", Style(i, 0, width_pt=1.0, flat=True), name=f"{one}, {key}, 95 %"))
+        ticks = tuple((float(j), tick(found.labels[key]) if n == 0 else "") for j, key in enumerate(keys))
         y_axis = Axis("", limits=(-0.6, len(keys) - 0.4), ticks=ticks)
         names = [(panels.literal(one), Style(i, 0, width_pt=4.0, flat=True)) for i, one in enumerate(filters)]
         styles = tuple(names) if n == len(kinds) - 1 else ()
@@ -240,9 +264,17 @@ def tornado(found: Sensitivity) -> Figure:
         component=found.leading,
         when=found.at,
     )
+    if not all(row["exact"] for row in rows):
+        caption += " " + tr("Thin lines: 95 % intervals.")
     title = tr("What a tenth more of each key changes, {stem}", stem=found.stem)
     height = 24 + 6.5 * max(3, len(keys))
     return Figure("tornado", title, caption, tuple(made), len(made), PAGE_MM, height)
+
+
+def tick(name: Label) -> str:
+    """A key beside its bars: its name, letter and unit."""
+    words = panels.literal(name.text)
+    return panels.with_unit(" ".join(filter(None, (words, panels.mathematical(name.symbol)))), name.unit)
 
 
 def write(

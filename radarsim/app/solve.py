@@ -104,8 +104,22 @@ class Cases:
 
     def at(self, key: str, value: float) -> Case:
         """The case with another value at a key. Raises ConfigError where the config refuses it."""
-        text = repr(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))
-        return replace(self._chosen((*self.overrides, f"{key}={text}")), noise_of=self.base.spec)
+        return replace(self._chosen((*self.overrides, self._setting(key, value))), noise_of=self.base.spec)
+
+    def _setting(self, key: str, value: float) -> str:
+        """A key's setting; of an item of a list the whole list, which the config may give in degrees or not at all."""
+        holder, _, place = key.rpartition(".")
+        items = {one.path: one.value for one in numeric.keys(self.base.spec) if one.path.rpartition(".")[0] == holder}
+        listed = [f"{holder}.{i}" for i in range(len(items))]
+        if not place.isdecimal() or list(items) != listed or None in items.values():
+            return f"{key}={_yaml(value)}"
+        values = (value if path == key else own for path, own in items.items())
+        return f"{holder}=[{', '.join(_yaml(one) for one in values if one is not None)}]"
+
+
+def _yaml(value: float) -> str:
+    """A number as a config holds it: whole ones without a point."""
+    return repr(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))
 
 
 def solve(

@@ -136,3 +136,30 @@ def test_with_missed_plots_gains_are_those_of_the_run():
     one = row(found, "radar.sigma_velocity_mps")
     assert one["gain_percent"] == pytest.approx(known, rel=1e-12)
     assert one["exact"]
+
+
+def test_a_figure_names_keys_as_people_do(exact):
+    (panel, _) = finding.tornado(exact).panels
+    names = [text for _, text in panel.y.ticks]
+    assert names[-1] == "\u03c3 of the measured range $\u03c3_r$, m"
+    assert "r+Vr: manoeuvre variance $D_M$, (m/s\u00b3)\u00b2" in names
+    assert not any("_mps" in name or "filters" in name for name in names)
+
+
+def test_where_some_filters_have_no_exact_values_all_are_sampled():
+    """Else the others would be said to change nothing."""
+    found = sensitivity("ambiguous_rls2", overrides=["scans=4"], realisations=100)
+    filters = {r["filter"] for r in found.rows}
+    assert len(filters) == 6
+    assert not any(r["exact"] for r in found.rows)
+    assert "radar.repetition_rate_hz" not in found.without_effect
+    lines = [mark for mark in finding.tornado(found).panels[0].marks if getattr(mark, "name", "").endswith("95 %")]
+    assert lines
+
+
+def test_items_of_a_list_are_raised_though_the_config_gives_degrees():
+    found = sensitivity("sonar_smoothing", overrides=["scans=12"], realisations=40)
+    assert not [key for key in found.left_out if "bearing" in key]
+    given = {r["key"]: (r["value"], r["changed_value"]) for r in found.rows} | dict.fromkeys(found.without_effect)
+    assert {"target.bearing_rad.0", "target.bearing_rad.1"} <= set(given)
+    assert all(abs(r["sigma_change_percent"]) == 0 or abs(r["sigma_change_percent"]) > 1e-9 for r in found.rows)

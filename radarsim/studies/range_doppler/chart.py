@@ -61,7 +61,10 @@ def chart(cases: Sequence[Case], references: Sequence[Case]) -> Chart:
     known = [place for place in known if all(place.of != one.of for one in own)]
     drawn = [over_time(own or known), in_the_long_run(own, known), over_groups(own, known)]
     without = tr("no place on the chart without a filter of the range and one of range and velocity")
-    sentences = [f"{case.name}: {without}" if place is None else sentence(place) + aside(case) for case, place in found]
+    sentences = [
+        f"{case.name}: {without}" if place is None else sentence(place) + beyond(place) + aside(case)
+        for case, place in found
+    ]
     sentences = sentences or [sentence(place) for place in known]
     return Chart({figure.name: figure for figure in drawn}, table([*own, *known]), tuple(sentences), page(own, known))
 
@@ -121,6 +124,24 @@ def sentence(place: Place) -> str:
     )
 
 
+def beyond(place: Place) -> str:
+    """That the closed form is not promised where a radar lies, as a further sentence; nothing where it is."""
+    if place.of.c <= closed_form.LARGEST:
+        return ""
+    off = float(np.abs(place.exact - corrected(place)).max())
+    away = tr("here it is {away} points off", away=significant_digits(off, ".2g"))
+    return tr(
+        " Beyond c = 50 000 the closed form, corrected for the period too, is not promised to be near: {how}; the "
+        "gains above are exact.",
+        how=away if np.isfinite(off) else tr("here it has no value"),
+    )
+
+
+def corrected(place: Place) -> np.ndarray:
+    """The closed form's steady gains (3,) with the first order of the period."""
+    return closed_form.steady_gains(place.of.c, place.inputs[2] / place.tau_2_s)
+
+
 def aside(case: Case) -> str:
     """What of a case the chart leaves out of account, as a further sentence; nothing where there is nothing."""
     left = [] if case.spec.radar.as_the_papers else [tr("missed plots and biases")]
@@ -134,7 +155,7 @@ def table(places: Sequence[Place]) -> "pd.DataFrame":
     """chart.csv: of each case and component the steady gain, exact and in closed form, and what it depends on."""
     names = [name for name, _ in COMPONENTS]
     count = len(names)
-    corrected = [closed_form.steady_gains(p.of.c, p.inputs[2] / p.tau_2_s) for p in places]
+    with_period = [corrected(place) for place in places]
     columns: dict[str, Any] = {
         "case": np.repeat(np.array([p.name for p in places], dtype=object), count),
         "component": names * len(places),
@@ -147,7 +168,7 @@ def table(places: Sequence[Place]) -> "pd.DataFrame":
         | {
             "steady_gain_percent": np.concatenate([p.exact for p in places]),
             "limit_percent": np.concatenate([p.limit for p in places]),
-            "corrected_percent": np.concatenate(corrected),
+            "corrected_percent": np.concatenate(with_period),
         }
     )
 

@@ -210,3 +210,19 @@ def test_a_config_given_twice_counts_once_and_figures_are_told(tmp_path):
     drawn = chart(["rls4", "rls4"], tmp_path, formats=["svg"], progress=lambda *done: said.append(done))
     assert len(drawn.sentences) == 1
     assert said == [(1, 3, 0), (2, 3, 0), (3, 3, 0)]
+
+
+@pytest.mark.parametrize(
+    ("sigma_velocity_mps", "period", "said"),
+    [(5, 10, ""), (0.05, 10, "here it has no value"), (0.05, 0.5, "here it is")],
+)
+def test_a_radar_beyond_the_closed_forms_promise_is_told(sigma_velocity_mps, period, said, tmp_path):
+    settings = [f"radar.sigma_velocity_mps={sigma_velocity_mps}", f"radar.scan_period_s={period}"]
+    found = chart(["rls2"], tmp_path, overrides=settings, formats=[])
+    assert (closed_form.groups(250, sigma_velocity_mps, period, 1e-3).c > closed_form.LARGEST) == bool(said)
+    assert ("is not promised to be near" in found.sentences[0]) == bool(said)
+    assert said in found.sentences[0]
+    if said == "here it is":
+        own = found.rows[:3]
+        away = max(abs(row["steady_gain_percent"] - row["corrected_percent"]) for row in own)
+        assert f"here it is {away:.2g} points off" in found.sentences[0]
