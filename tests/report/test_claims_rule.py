@@ -1,8 +1,11 @@
 """The rule, case by case, by hand."""
 
+import itertools
 import math
+from collections import Counter
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from radarsim.report.claims import rule
@@ -194,3 +197,26 @@ def test_the_choice_that_flips():
     assert rule.flips(grid) == ("flight",)
     apart = [reading(CONFIRMED, a="1", b="1"), reading(REFUTED, a="2", b="2"), reading(CONFIRMED, a="1", b="2")]
     assert rule.flips(apart) == ("a",)
+
+
+def pairwise_flips(readings):
+    """How often two readings that differ in one choice alone come out differently, by looking at every pair."""
+    found = Counter()
+    for one, other in itertools.combinations(readings, 2):
+        differ = [key for key in ("a", "b", "c", "d") if one.choices.get(key) != other.choices.get(key)]
+        if len(differ) == 1 and (one.outcome == CONFIRMED) != (other.outcome == CONFIRMED):
+            found[differ[0]] += 1
+    return found
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_choices_that_flip_are_those_of_every_pair(seed):
+    """The strongest first, equal ones as they are declared; choices left out and readings met twice included."""
+    draw = np.random.default_rng(seed)
+    readings = []
+    for values in itertools.product("123", "12", "1234", "12"):
+        choices = {key: value for key, value in zip("abcd", values, strict=True) if (key, value) != ("d", "2")}
+        true = values[0] == "2" or (values[2] == "4" and draw.random() < 0.5)
+        readings += [reading(CONFIRMED if true else REFUTED, **choices)] * (draw.random() < 0.8) * 2
+    found = pairwise_flips(readings)
+    assert rule.flips(readings) == tuple(sorted(found, key=lambda key: (-found[key], key)))

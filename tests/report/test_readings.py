@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from radarsim.report.claims import Claim, Part, about, certain, printed
+from radarsim.report.claims import Claim, Part, about, certain, printed, rule
 from radarsim.report.claims import readings as data
 from radarsim.report.claims.evidence import Missing
 from radarsim.report.claims.joint import joint
@@ -98,6 +98,19 @@ def test_a_claim_over_its_readings():
     never = over(of, claim(2, "10"))
     assert never.outcome.kind == REFUTED
     assert "against the print it holds with scale: ten" in never.sentence()
+
+
+def test_the_rule_looks_at_all_readings_once(monkeypatch):
+    """A row each asks for the class: of 768 readings, each looking at all the others, that took ten minutes."""
+    asked = []
+    monkeypatch.setattr(
+        rule, "over_readings", lambda own, every, true=rule.over_readings: asked.append(1) or true(own, every)
+    )
+    one = over(Small(), claim(1, "1"))
+    names = columns([Small()])
+    assert {row["over"] for each in one.under for row in rows(each, names, one.outcome)} == {one.outcome.kind}
+    assert one.sentence()
+    assert len(asked) == 1
 
 
 def test_a_reading_that_cannot_be_done_is_listed():

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from radarsim.language import tr
@@ -86,7 +87,7 @@ class Over:
     under: tuple[Under, ...]
     contradicting: frozenset[str] = frozenset()  # the choices of which the print has several alternatives
 
-    @property
+    @cached_property
     def outcome(self) -> Outcome | None:
         """What the rule says of it; None where the default reading was not judged."""
         own = self.under[0].outcome

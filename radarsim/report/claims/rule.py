@@ -354,29 +354,38 @@ def over_readings(own: Outcome, readings: Sequence[Reading]) -> Outcome:
 
 
 def flips(readings: Sequence[Reading]) -> tuple[str, ...]:
-    """The choices on which the outcome hangs, the strongest first.
+    """The choices on which the outcome hangs, the strongest first, equal ones in their order.
 
     A choice is one of them if two readings that differ in it alone come out differently. Where no two readings differ
     in one choice alone, those by whose values the readings differ most in the share that holds; where none holds, in
     the share that is refuted.
     """
     asked = CONFIRMED if any(one.outcome == CONFIRMED for one in readings) else REFUTED
+    choices = list(dict.fromkeys(key for one in readings for key in one.choices))
     found: Counter[str] = Counter()
     alone = False
-    for i, one in enumerate(readings):
-        for other in readings[:i]:
-            keys = dict.fromkeys((*one.choices, *other.choices))
-            differ = [key for key in keys if one.choices.get(key) != other.choices.get(key)]
-            alone = alone or len(differ) == 1
-            if len(differ) == 1 and (one.outcome == asked) != (other.outcome == asked):
-                found[differ[0]] += 1
-    if alone and found:
-        return tuple(name for name, _ in found.most_common())
-    spread = {
-        name: _spread(name, readings, asked) for name in dict.fromkeys(key for one in readings for key in one.choices)
-    }
+    for choice in choices:
+        for own in _alike_but(choice, choices, readings).values():
+            held = [sum(one.outcome == asked for one in alike) for alike in own.values()]
+            missed = [len(alike) - count for alike, count in zip(own.values(), held, strict=True)]
+            found[choice] += sum(held) * sum(missed) - sum(a * b for a, b in zip(held, missed, strict=True))
+            alone = alone or len(own) > 1
+    if alone and +found:
+        return tuple(name for name, _ in (+found).most_common())
+    spread = {name: _spread(name, readings, asked) for name in choices}
     most = max(spread.values(), default=0.0)
     return tuple(name for name, one in spread.items() if one and math.isclose(one, most))
+
+
+def _alike_but(
+    choice: str, choices: Sequence[str], readings: Sequence[Reading]
+) -> dict[tuple[str | None, ...], dict[str | None, list[Reading]]]:
+    """Readings by all that they choose but this, and those by what they choose of this."""
+    found: dict[tuple[str | None, ...], dict[str | None, list[Reading]]] = {}
+    for one in readings:
+        rest = tuple(one.choices.get(key) for key in choices if key != choice)
+        found.setdefault(rest, {}).setdefault(one.choices.get(choice), []).append(one)
+    return found
 
 
 def _spread(choice: str, readings: Sequence[Reading], asked: str) -> float:
