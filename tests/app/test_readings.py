@@ -3,11 +3,13 @@
 import csv
 import dataclasses
 import json
+import weakref
 
 import pytest
 from click.testing import CliRunner
 
 from radarsim.app import readings as app
+from radarsim.app.reading_runs import Plan
 from radarsim.app.simulation import RunOptions
 from radarsim.cli import main
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
@@ -200,6 +202,25 @@ def test_readings_that_are_run(ran, tmp_path):
     again = []
     app.readings([ran], out=tmp_path, figures=False, progress=lambda *of: again.append(of))
     assert again[-1][2] == again[-1][1]  # all of it from the store
+
+
+def test_a_run_is_judged_and_let_go(ran, tmp_path, monkeypatch):
+    """Sums and tables of one run at a time are held, however many readings there are."""
+    seen, alive = [], []
+    run = Plan._run
+
+    def counted(self, *of):
+        alive.append(sum(one() is not None for one in seen))
+        found = run(self, *of)
+        seen.append(weakref.ref(found))
+        return found
+
+    monkeypatch.setattr(Plan, "_run", counted)
+    wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, readings=Margins()))
+    app.readings([wanted], out=tmp_path, realisations=4000, decide=True, figures=False)
+    assert len(alive) > 2
+    assert max(alive) == 0
+    assert all(one() is None for one in seen)
 
 
 def test_a_reading_as_shipped_measures_what_a_run_of_the_config_does(ran, tmp_path):
