@@ -168,12 +168,10 @@ def _left(over: Over) -> str:
     """What is to be said of a claim that is not decided: under how many readings, and what it would take."""
     if over.outcome is None or over.outcome.kind != UNDECIDED:
         return ""
-    open_ = over.undecided
-    n = min((judged.n for one in open_ for _, judged in one.parts), default=0)
-    needed = [one.outcome.needed for one in open_ if one.outcome]
-    known = [one for one in needed if one is not None]
-    would = f"about {max(known):,} would" if len(known) == len(needed) else "a value lies on a border: no number would"
-    return f"{over.claim.id} not yet decided under {len(open_)} readings at {n:,} realisations; {would}"
+    needed = over.outcome.needed
+    would = "a value lies on a border: no number would" if needed is None else f"about {needed:,} would"
+    open_, n = len(over.undecided), over.looked
+    return f"{over.claim.id} not yet decided under {open_} readings at {n:,} realisations; {would}"
 
 
 def _counted(paper: Paper, over: list[Over]) -> Search | Joint:

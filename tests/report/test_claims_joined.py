@@ -1,11 +1,13 @@
 """Readings beside claims, the page's headline, and the forest plot, by hand."""
 
+import math
+
 import numpy as np
 
 from radarsim.report.claims import forest, page
 from radarsim.report.claims.joined import with_readings
 from radarsim.report.claims.judge import NOT_RUN
-from radarsim.report.claims.rule import CONFIRMED, CONTRADICTORY, DEPENDS, REFUTED
+from radarsim.report.claims.rule import CONFIRMED, CONTRADICTORY, DEPENDS, REFUTED, UNDECIDED
 
 
 def row(claim="P9.1", kind=REFUTED, **more):
@@ -47,6 +49,22 @@ def test_a_print_that_contradicts_itself_over_its_readings_does_so_beside_the_cl
     (joined,) = with_readings([row(kind=CONFIRMED, worst_miss=0.9)], stored)
     assert (joined["class"], joined["overall"]) == (CONTRADICTORY, CONTRADICTORY)
     assert page.verdict_of([joined]) == f"{CONTRADICTORY} (in 1 of 2 readings)"  # within the margin: no miss is said
+
+
+def test_what_would_decide_is_of_all_readings_that_are_open():
+    stored = [
+        reading("a", CONFIRMED, flight="weave", needed=""),
+        reading("b", UNDECIDED, flight="pull", needed="3000"),
+        reading("c", UNDECIDED, flight="turn", needed="64000"),
+        reading("d", UNDECIDED, "N", flight="other", needed="900000"),
+    ]
+    (joined,) = with_readings([row(kind=CONFIRMED)], stored)
+    assert (joined["class"], joined["needed"]) == (UNDECIDED, 64000)
+    assert "6.4e+04 realisations would decide" in page.verdict_of([joined])
+    stored[1]["needed"] = ""  # a value on a border
+    (joined,) = with_readings([row(kind=CONFIRMED)], stored)
+    assert math.isnan(joined["needed"])
+    assert "would decide" not in page.verdict_of([joined])
 
 
 def test_headline_counts_classes_and_leaves_extensions_out():

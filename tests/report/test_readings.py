@@ -13,7 +13,7 @@ from radarsim.report.claims.joint import joint
 from radarsim.report.claims.over import Over, columns, depth, rows, under
 from radarsim.report.claims.readings import Alternative, Choice, PaperReadings
 from radarsim.report.claims.readings_page import page
-from radarsim.report.claims.rule import AGAINST, CONFIRMED, DEPENDS, EQUIVALENT, REFUTED, UNSTATED
+from radarsim.report.claims.rule import AGAINST, CONFIRMED, DEPENDS, EQUIVALENT, REFUTED, UNDECIDED, UNSTATED
 from radarsim.report.claims.search import Fine, Printed, Search
 from radarsim.report.statistics import Estimate
 
@@ -161,6 +161,29 @@ def test_a_number_comes_out_by_its_interval():
     assert came["in"] == [(True, True, False), (True, True, False)]
     assert came["wide"] == [(False, False, True), (False, True, False)]
     assert came["beyond"] == [(False, False, False), (False, False, False)]
+
+
+def test_what_is_open_says_what_would_decide_it():
+    """Two readings of three are open: the harder one says how many it takes; the one against the print is not asked."""
+    of, one = Sampled(), claim(2, "1")
+    ends = {"one": (1.0, 0.99, 1.01), "two": (1.04, 1.0, 1.08), "ten": (1.0, 0.0, 2.0)}
+    every = [
+        under(of, dataclasses.replace(one, parts=(part(ends[reading["scale"]]),)), reading, None, 1000)
+        for reading in of.of_claim(one.id)
+    ]
+    found = Over(one, tuple(every))
+    assert [each.outcome.kind for each in every] == [CONFIRMED, UNDECIDED, UNDECIDED]
+    needed = every[1].outcome.needed
+    assert 1000 < needed < every[2].outcome.needed
+    assert (found.outcome.kind, found.outcome.needed, found.looked) == (UNDECIDED, needed, 1000)
+    assert f"1 open at 1,000 realisations, about {needed:,} would decide" in found.sentence()
+    assert {row["needed"] for each in every[1:2] for row in rows(each, columns([of]))} == {needed}
+    assert found.still_open() in page(of, "Nobody 1900", [found], joint(of, [found]))
+    assert over(Small(), claim(2, "1")).still_open() == ""
+
+
+def part(seen):
+    return Part((), "number", "m", lambda _: Estimate(*seen), printed("1.0"))
 
 
 def test_of_variants_one_suffices_and_void_parts_count_for_nothing():

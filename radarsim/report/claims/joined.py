@@ -1,5 +1,6 @@
 """Verdicts over all readings that a paper allows, beside those of the default one: from the rows of readings.csv."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -12,7 +13,7 @@ from radarsim.report.claims.rule import Outcome, Reading
 FIXED = frozenset(
     (
         *("claim", "part", "reading", "kind", "measured", "lo", "hi", "exact", "expected_lo", "expected_hi", "margin"),
-        *("verdict", "unit", "what", "outcome", "miss", "n", "reason", "over"),
+        *("verdict", "unit", "what", "outcome", "miss", "n", "needed", "reason", "over"),
     )
 )
 
@@ -28,7 +29,19 @@ def with_readings(rows: Sequence[Mapping[str, Any]], stored: Sequence[Mapping[st
         by_claim.setdefault(str(row["claim"]), []).append(row)
     found = {claim: _readings(own) for claim, own in by_claim.items()}
     torn = {claim for claim, own in by_claim.items() if any(row.get("over") == rule.CONTRADICTORY for row in own)}
-    return [dict(row) | _over(row, found.get(str(row["claim"]), []), str(row["claim"]) in torn) for row in rows]
+    joined = [dict(row) | _over(row, found.get(str(row["claim"]), []), str(row["claim"]) in torn) for row in rows]
+    open_ = {claim: _needed(own) for claim, own in by_claim.items()}
+    return [
+        row | {"needed": open_[str(row["claim"])]} if row["class"] == rule.UNDECIDED and row["claim"] in open_ else row
+        for row in joined
+    ]
+
+
+def _needed(rows: Sequence[Mapping[str, Any]]) -> float:
+    """Realisations that would decide every reading that the paper allows; not-a-number where that is not known."""
+    open_ = [row for row in rows if row["kind"] != rule.AGAINST and row["outcome"] == rule.UNDECIDED]
+    found = rule.most_needed(int(row["needed"]) if row.get("needed") else None for row in open_)
+    return math.nan if found is None else float(found)
 
 
 def _readings(rows: Sequence[Mapping[str, Any]]) -> list[Reading]:

@@ -17,7 +17,7 @@ NOTHING = "there is nothing to measure it by"
 FIRST = ("claim", "part", "reading", "kind")
 LAST = (
     *("measured", "lo", "hi", "exact", "expected_lo", "expected_hi", "margin", "verdict"),
-    *("unit", "what", "outcome", "miss", "n", "reason", "over"),
+    *("unit", "what", "outcome", "miss", "n", "needed", "reason", "over"),
 )
 
 
@@ -97,7 +97,13 @@ class Over:
         printed_twice = any(part.against_print for part in self.claim.parts)
         torn = printed_twice and not self.contradicting.isdisjoint(found.depends_on)
         torn = torn or (self.claim.joint and self._each_somewhere())
-        return replace(found, kind=rule.CONTRADICTORY) if torn else found
+        if torn:
+            return replace(found, kind=rule.CONTRADICTORY)
+        return replace(found, needed=self._needed() if found.kind == rule.UNDECIDED else None)
+
+    def _needed(self) -> int | None:
+        """Realisations that would decide every reading that is not; None where a value lies on a border."""
+        return rule.most_needed(one.outcome.needed for one in self.undecided if one.outcome)
 
     def _each_somewhere(self) -> bool:
         """Whether every number of a joint claim comes out under some reading, though no reading gives all."""
@@ -119,6 +125,11 @@ class Over:
         return [one for one in self.under if one.counted and one.outcome and one.outcome.kind == rule.UNDECIDED]
 
     @property
+    def looked(self) -> int:
+        """The fewest realisations of a reading that is not decided; 0 where all are."""
+        return min((judged.n for one in self.undecided for _, judged in one.parts), default=0)
+
+    @property
     def impossible(self) -> list[Under]:
         """The readings that were not judged, which say why."""
         return [one for one in self.under if one.outcome is None]
@@ -129,6 +140,8 @@ class Over:
         if found is None:
             return tr("not judged: {why}", why=reasons.said(self.under[0].why))
         words = [tr("holds in {holds} of {of} readings", holds=found.holds_in or 0, of=found.readings or 0)]
+        if self.still_open():
+            words.append(self.still_open())
         if found.depends_on:
             words.append(tr("depends on: {choices}", choices=", ".join(found.depends_on)))
         held = [one for one in self.against_print if one.outcome and one.outcome.kind == rule.CONFIRMED]
@@ -138,6 +151,15 @@ class Over:
         if self.impossible:
             words.append(tr("{count} not possible", count=len(self.impossible)))
         return "; ".join(words)
+
+    def still_open(self) -> str:
+        """Of a claim that is not decided, how many readings leave it so, and what they would take; else nothing."""
+        if self.outcome is None or self.outcome.kind != rule.UNDECIDED:
+            return ""
+        told, needed = {"count": len(self.undecided), "n": f"{self.looked:,}"}, self.outcome.needed
+        if needed is None:
+            return tr("{count} open at {n} realisations, a value on a border: no number would decide", **told)
+        return tr("{count} open at {n} realisations, about {needed} would decide", **told, needed=f"{needed:,}")
 
 
 def columns(every: Iterable[PaperReadings]) -> tuple[str, ...]:
@@ -165,6 +187,7 @@ def rows(one: Under, names: Sequence[str], over: Outcome | None = None) -> list[
             **{name: _cell(getattr(judged, name)) for name in ("expected_lo", "expected_hi", "margin")},
             **{"part": number, "what": part.what, "unit": part.unit, "verdict": rule.verdict(judged, many)},
             **{"outcome": one.outcome.kind, "miss": _cell(rule.miss(judged)), "n": judged.n or ""},
+            "needed": one.outcome.needed or "",
         }
         for number, (part, judged) in enumerate(one.parts, 1)
     ]

@@ -75,7 +75,7 @@ def _claims(over: Sequence[Over]) -> str:
     for one in over:
         found = one.outcome
         holds = tr("{count} of {of}", count=found.holds_in or 0, of=found.readings or 0) if found else ""
-        verdict = class_words(found.words) if found else tr("not judged")
+        verdict = "; ".join(filter(None, (class_words(found.words), one.still_open()))) if found else tr("not judged")
         rows.append((one.claim.id, tr(one.claim.statement), verdict, holds))
     return _table((term("claim"), term("statement"), term("verdict"), term("holds in")), rows)
 

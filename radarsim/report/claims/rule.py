@@ -7,7 +7,7 @@ claim, `over_readings` a claim under all readings that its paper allows.
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import NormalDist
 
@@ -245,7 +245,7 @@ def claim(parts: Sequence[Judged], *, unstated: bool = False, joint: bool = Fals
         failed=sum(one in (REFUTED, CONTRADICTORY) for one in said.values()),
         of=sum(one != VOID for one in said.values()),
         miss=max(misses, default=math.nan),
-        needed=_most_needed(open_, many) if kind == UNDECIDED else None,
+        needed=most_needed(needed(part, many) for part in open_) if kind == UNDECIDED else None,
     )
 
 
@@ -290,9 +290,10 @@ def _sentence(said: Sequence[str], safe: bool) -> str:
     return IMMATERIAL if said else UNJUDGEABLE
 
 
-def _most_needed(parts: Sequence[Judged], many: int) -> int | None:
-    every = [needed(part, many) for part in parts]
-    return None if not every or None in every else max(one for one in every if one is not None)
+def most_needed(every: Iterable[int | None]) -> int | None:
+    """Of numbers of realisations the largest; None where there is none, or one of them is no number."""
+    known = list(every)
+    return None if not known or None in known else max(one for one in known if one is not None)
 
 
 def _joint(parts: Sequence[Judged], many: int) -> Outcome:
