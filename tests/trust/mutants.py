@@ -6,6 +6,7 @@ term, a bound one off. A test of the ordinary suite keeps the list in step with 
 """
 
 from tests.trust.mutant import mutants
+from tests.trust.mutants_controls import CONTROLS
 from tests.trust.mutants_folds import FOLDS
 from tests.trust.mutants_further import FURTHER
 from tests.trust.mutants_rare import RARE
@@ -340,4 +341,4 @@ ENGINE = (
     ),
 )
 
-ALL = (*KERNELS, *FILTERS, *FRAMES_AND_MODELS, *EXACT_VALUES, *NUMBERS, *ENGINE, *FURTHER, *FOLDS, *RARE)
+ALL = (*KERNELS, *FILTERS, *FRAMES_AND_MODELS, *EXACT_VALUES, *NUMBERS, *ENGINE, *FURTHER, *FOLDS, *RARE, *CONTROLS)
