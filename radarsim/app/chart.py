@@ -7,6 +7,7 @@ from pathlib import Path
 
 from radarsim.app import arguments
 from radarsim.app.configs import load
+from radarsim.app.output import captions
 from radarsim.app.run import namesakes
 from radarsim.config.experiment import Case
 from radarsim.errors import ConfigError
@@ -56,6 +57,7 @@ def chart(
             contents |= {f"{name}.{kind}": data for kind, data in drawing.save(figure, formats, width_mm).items()}
             if progress is not None:
                 progress(n + 1, len(made.figures), 0)
+        contents["captions.md"] = captions(made.figures).encode()
     folder = Path(out) / FOLDER
     files.replace_all(folder, contents)
     return Drawn(folder, tuple(sorted(contents)), made.sentences, tuple(made.table.to_dict("records")))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.app import arguments, stored_tables
 from radarsim.app.configs import load
+from radarsim.app.output import captions
 from radarsim.app.records import recorded_case
 from radarsim.app.repeat import command
 from radarsim.config.experiment import Case, Experiment
@@ -84,6 +85,8 @@ def compare(
         for name, figure in described.items():
             saved = drawing.save(figure, formats, width_mm)
             contents |= {f"figures/{name}.{kind}": data for kind, data in saved.items()}
+        if described:
+            contents["figures/captions.md"] = captions(described).encode()
     contents["compare.html"] = _page(
         runs, sentences, notes, warnings, list(described.values()), made, contents
     ).encode()

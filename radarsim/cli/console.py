@@ -328,7 +328,7 @@ def print_comparison(compared: "Compared") -> None:
     for line in compared.notes:
         field("note", line)
     field("table", str(compared.folder / "comparison.csv"))
-    if drawn := {Path(name).stem for name in compared.files if name.startswith("figures/")}:
+    if drawn := {Path(n).stem for n in compared.files if n.startswith("figures/") and not n.endswith(".md")}:
         field("figures", f"{compared.folder / 'figures'} ({len(drawn)})")
     field("page", str(compared.folder / "compare.html"))
     print_warnings(compared.warnings)

@@ -1,6 +1,7 @@
 """Figures of a comparison: each quantity of all sides on common axes, and beside it the differences."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,9 +55,9 @@ def _figure(
     keys += [(literal(f), Style(0, n, n)) for n, f in enumerate(filters)] if len(filters) > 1 else []
     low = None if series.value == "gain_percent" else 0.0
     y = Axis(with_unit(what, unit), limits=(low, None))
-    of = "change" if series.ratio else "difference"
+    of = term("change") if series.ratio else term("difference")
     against = rows["against_label"].iloc[0] if rows["against_label"].nunique() == 1 else tr("the first")
-    difference = Axis(with_unit(f"{of} against {literal(against)}", "%" if series.ratio else unit))
+    difference = Axis(with_unit(tr("{of} against {name}", of=of, name=literal(against)), "%" if series.ratio else unit))
     panels = (
         Panel(time_axis(), y, tuple(values), direct=False, legend="none"),
         Panel(time_axis(), difference, (Reference(0), *apart), keys=tuple(keys), legend="right"),
@@ -71,7 +72,10 @@ def _figure(
             against=against,
         )
     ) + (tr(" {left} further cases are in comparison.csv alone.", left=left) if left > 0 else "")
-    return seen.crossed(Figure(name, tr("{what} side by side", what=what), caption, panels, 2, PAGE_MM, HEIGHT_MM))
+    figure = Figure(name, tr("{what} side by side", what=what), caption, panels, 2, PAGE_MM, HEIGHT_MM)
+    right, in_units = replace(figure, panels=panels[1:]), "%" if series.ratio else unit
+    told = seen.at_the_end(right, in_units) or seen.extremes(right, in_units)
+    return seen.crossed(seen.begun(figure, tr("Right: {told}", told=told[0].lower() + told[1:]) if told else ""))
 
 
 def _values(series: Series, side: Side, n: int, filters: Sequence[str], component: str, model: str) -> list[Mark]:

@@ -210,7 +210,7 @@ def over_time(places: Sequence[Place]) -> Figure:
         keys = tuple(_key(n, one) for n, one in enumerate(places)) if i == 0 else ()
         made.append(Panel(x, y, tuple(marks), tr(name), keys, legend="lower left", remark="$c$ =" if i == 0 else ""))
     caption = tr(
-        "The larger c, the longer the velocity gains, and the more of the gain lasts. Gain in σ against time in units "
+        "From c of about 0.7 on, the larger c, the more of the first gain lasts. Gain in σ against time in units "
         "of τ₁ = σ_r/σ_V, for lines of c = (τ₁/τ₂)², as the scan period becomes short (drawn with {fine} scans in the "
         "shorter of τ₁ and τ₂). Markers: exact gains at the scans of real radars, whose period is not short.",
         fine=FINE,

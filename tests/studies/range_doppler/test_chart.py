@@ -114,7 +114,8 @@ def test_the_papers_radars_lie_where_the_paper_has_them(tmp_path):
 def test_ones_own_radar_is_named_and_marked(made):
     (sentence,) = made.sentences
     assert sentence.startswith("rls2, as set: c = 6.3 (τ₁ = 50 s, τ₂ = 19.9 s): Doppler takes 45.4 % off the range")
-    assert {"chart.csv", "chart.html", "gain_against_time.svg", "map.svg", "steady_gain.svg"} == set(made.files)
+    figures = {"gain_against_time.svg", "map.svg", "steady_gain.svg"}
+    assert {"chart.csv", "chart.html", "captions.md", *figures} == set(made.files)
     rows = pd.read_csv(made.folder / "chart.csv")
     assert rows["case"].unique().tolist() == ["rls2, as set", "rls1", "rls2", "rls3", "rls4", "rls5"]
     own = rows.iloc[0]
