@@ -10,6 +10,8 @@ PAIRS = f"{HERE}::test_pairs_are_products_of_residuals"
 
 CONTROLS = mutants(
     "radarsim/studies/multimodel/kernels/controls.py",
+    ("detected * (w - x - h) + p * h", "detected * (w - x - h) + h", ZERO),
+    ("d * d - places.variances[places.first + i * places.stride + c]", "d * d", ZERO),
     ("noise[at + 3] * a + noise[at + 4] * b", "noise[at + 3] * a - noise[at + 4] * b", TWIN),
     ("put(parts, to, get(parts, to) + d[i] * d[i])", "put(parts, to, d[i] * d[i])", ZERO),
     ("get(of.x, 0) - found - level", "get(of.x, 0) - level", LEFT),
