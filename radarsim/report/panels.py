@@ -538,7 +538,8 @@ def _gains_said(figure: Figure) -> Figure:
 
 def _cut(y: Axis, lines: Sequence[Mark]) -> tuple[Axis, tuple[Mark, ...]]:
     """The axis of gains and its marks: losses far beyond all of σ would hide everything else, and are cut."""
-    least = min((float(np.nanmin(mark.y)) for mark in lines if isinstance(mark, Line)), default=0.0)
+    values = [mark.y[np.isfinite(mark.y)] for mark in lines if isinstance(mark, Line)]
+    least = min((float(found.min()) for found in values if found.size), default=0.0)
     return replace(y, limits=(-LOSS, 100.0)) if least < -2 * LOSS else y, (Reference(0), *lines)
 
 

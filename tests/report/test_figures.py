@@ -374,3 +374,12 @@ def test_no_two_of_many_scattered_series_look_alike():
     assert len({(look["color"], look["marker"]) for look in looks}) == 40
     assert len({look["marker"] for look in looks}) == len(figures.MARKERS) == len(chart_look.MARKERS)
     assert len(set(chart_look.MARKERS)) == len(chart_look.MARKERS)
+
+
+def test_a_gain_that_is_nowhere_known_is_drawn_as_nothing_and_cuts_no_axis():
+    """A filter without an error has no gain against itself: warnings are errors here."""
+    nowhere, loss = (Line(np.arange(3.0), y, "f") for y in (np.full(3, np.nan), np.array([np.nan, -1e4, 5.0])))
+    axis, marks = panels._cut(Axis("gain"), [nowhere])
+    assert axis.limits == Axis("gain").limits
+    assert marks[1:] == (nowhere,)
+    assert panels._cut(Axis("gain"), [nowhere, loss])[0].limits == (-panels.LOSS, 100.0)

@@ -28,7 +28,8 @@ class Fan:
 
 def fan(case: Case, number: int, scans: int) -> Fan:
     """The lists of filter `number` over the first scans, in realisation 7 of the case."""
-    only: Any = case.spec.model_copy(update={"filters": (case.spec.filters[number],), "baseline": None})
+    alone = {"filters": (case.spec.filters[number],), "baseline": None, "rare": None}
+    only: Any = case.spec.model_copy(update=alone)
     plan = prepare(Case(case.name, case.stem, case.study, only, case.swept, case.realisations, case.seed))
     lists = []
     for k in range(1, scans + 1):

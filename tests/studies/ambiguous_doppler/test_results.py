@@ -1,6 +1,7 @@
 """Tables, figures, sentences and recorded plots of a small run."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -233,3 +234,14 @@ def test_sequences_of_folds_are_counted_before_they_are_made():
     for e, S in ((np.zeros(1), most * 1.001), (np.zeros(300), most / 299**2), (np.zeros(1), np.nan), (np.zeros(1), 0)):
         with pytest.raises(PlotFault, match="velocity_mps"):
             folds.innovations(e, np.array([S]))
+
+
+def test_the_fan_of_a_case_with_rare_folds_is_of_plots_as_they_fall():
+    """The fan holds one filter alone, which need not be the one whose wrong folds are rare."""
+    case = load("ambiguous_rare").cases[0]
+    number = next(i for i, one in enumerate(case.spec.filters) if (one.hypotheses or 1) > 1)
+    shown = fans.fan(case, number, 3)
+    plain = replace(case, spec=case.spec.model_copy(update={"rare": None}))
+    assert case.spec.rare is not None
+    np.testing.assert_array_equal(shown.truth, fans.fan(plain, number, 3).truth)
+    assert len(shown.lists) == 3
