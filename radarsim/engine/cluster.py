@@ -37,6 +37,13 @@ ROLES = ("client", "scheduler", "worker")
 LOOPBACK = "127.0.0.1"  # what this machine starts for itself listens to nobody else
 HINT = "--workers and --scheduler need Dask: pip install 'radarsim[cluster]'"
 QUIET = ("distributed", "distributed.nanny", "distributed.worker", "distributed.scheduler", "distributed.comm")
+# A worker process of this machine, whose options follow.
+WORKER = """
+from radarsim.engine.cluster import steady_clock
+steady_clock()
+from distributed.cli.dask_worker import main
+main()
+"""
 SETTINGS = {
     "distributed.scheduler.allowed-failures": DEATHS,
     "distributed.comm.timeouts.connect": f"{CONNECT_S}s",
@@ -50,6 +57,23 @@ def _dask() -> ModuleType:
     except ImportError as error:
         raise ConfigError(f"{HINT} ({error})") from error
     return distributed
+
+
+def steady_clock() -> None:
+    """Let messages of this process wait by a clock that nobody sets; to be called before any loop begins.
+
+    Dask holds what it sends back until a deadline by the time of day, as Tornado's loops count it: a clock set back by
+    an hour between two messages held the second for that hour, and the run waited for it. Neither has a setting.
+    """
+    from distributed import batched
+    from tornado.ioloop import IOLoop
+
+    batched.time = time.monotonic
+
+    def now(self: IOLoop) -> float:
+        return time.monotonic()
+
+    IOLoop.time = now  # type: ignore[method-assign]
 
 
 def trust(address: str) -> str | None:
@@ -119,6 +143,7 @@ class Cluster:
         Raises ConfigError where Dask is missing, the address is wrong, or no worker is there within half a minute.
         """
         distributed = _dask()
+        steady_clock()
         import dask
 
         for name in QUIET:
@@ -309,7 +334,7 @@ class _Processes:
         options = ["--no-nanny", "--nthreads", "1", "--memory-limit", "0", "--death-timeout", "10"]
         # Without the latter a worker serves HTTP to the whole network even with --no-dashboard.
         closed = ["--host", LOOPBACK, "--no-dashboard", "--dashboard-address", f"{LOOPBACK}:0"]
-        self._command = [sys.executable, "-m", "distributed.cli.dask_worker", address, *options, *closed]
+        self._command = [sys.executable, "-c", WORKER, address, *options, *closed]
         self._environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         if security is not None:
             self._environment["DASK_INTERNAL_INHERIT_CONFIG"] = _for_workers(security)
