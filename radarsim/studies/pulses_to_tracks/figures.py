@@ -117,15 +117,20 @@ def _locked(result: Result, locks: "pd.DataFrame", name: str) -> tuple[float, fl
     return float(row["lock_rate"]), float(row["lock_lo"]), float(row["lock_hi"])
 
 
+def _look(result: Result, name: str) -> Style:
+    """A filter's look, the same in every figure of its case."""
+    return panels.look(result.axes.filters.index(name), 0, 1)
+
+
 def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """Share of bursts that locked against time, a line for each estimator."""
     rows = common.groups(made["locks"][made["locks"]["case"] == result.name], "filter")
     marks = []
     ideal = {one.name for one in result.spec.filters if one.estimator == "fisher_bound"}
-    for n, ((name,), own) in enumerate(rows.items()):
+    for (name,), own in rows.items():
         x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
         if (y < 1).any() and name not in ideal:
-            marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, hi))
+            marks.append(Line(x, y, panels.literal(name), _look(result, name), lo, hi))
     return Panel(panels.time_axis(), Axis(tr("P(locked)"), limits=(None, 1.0)), tuple(marks), _title(result))
 
 
@@ -133,9 +138,9 @@ def folds_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """How often the best hypothesis has no wrong fold against time, a line for each filter that keeps several."""
     rows = common.groups(made["folds"][made["folds"]["case"] == result.name], "filter")
     marks = []
-    for n, ((name,), own) in enumerate(rows.items()):
+    for (name,), own in rows.items():
         x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", "right", "right_lo", "right_hi"))
-        marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, hi))
+        marks.append(Line(x, y, panels.literal(name), _look(result, name), lo, hi))
     return Panel(panels.time_axis(), Axis(tr("P(no wrong fold)"), limits=(0, 1)), tuple(marks), _title(result))
 
 
@@ -144,9 +149,9 @@ def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     table = made["estimates"]
     rows = common.groups(table[(table["case"] == result.name) & (table["component"] == "Vr")], "filter")
     marks: list[Line] = []
-    for n, ((name,), own) in enumerate(rows.items()):
+    for (name,), own in rows.items():
         x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", "sigma_all", "sigma_all_lo", "sigma_all_hi"))
-        marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, hi))
+        marks.append(Line(x, y, panels.literal(name), _look(result, name), lo, hi))
     if rows:
         own = next(iter(rows.values()))
         marks.append(Line(own["t_s"].to_numpy(), own["bound"].to_numpy(), tr("Fisher bound"), Style(9, 1)))
@@ -159,11 +164,11 @@ def losses_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     table = made["losses"]
     own = table[(table["case"] == result.name) & (table["component"] == "r") & (table["k"] == result.axes.k[-1])]
     marks = []
-    for n, ((name,), rows) in enumerate(common.groups(own, "filter").items()):
+    for (name,), rows in common.groups(own, "filter").items():
         rows = rows[rows["n"] >= FEW]
         if len(rows) > 1:
             x, y, lo, hi = (rows[c].to_numpy(dtype=float) for c in ("since_loss", "sigma", "sigma_lo", "sigma_hi"))
-            marks.append(Line(x, y, panels.literal(name), panels.look(n, 0, 1), lo, np.minimum(hi, 1e3 * y)))
+            marks.append(Line(x, y, panels.literal(name), _look(result, name), lo, np.minimum(hi, 1e3 * y)))
     ticks = tuple((float(age), str(age) if age < AGES - 1 else f"{age}+") for age in range(AGES))
     x_axis = Axis(tr("scans since a burst was lost"), ticks=ticks)
     return wide(Panel(x_axis, Axis(tr("$\\sigma$ of $r$ at the last scan, m")), tuple(marks), _title(result)))

@@ -5,6 +5,7 @@ import pytest
 
 import radarsim
 from radarsim.app.configs import load
+from radarsim.report.drawing import Line
 from radarsim.studies import registry
 from radarsim.studies.pulses_to_tracks import study
 from tests.studies.pulses_to_tracks import naive
@@ -85,6 +86,16 @@ def test_figures(found, swept):
     assert {"sigma_r", "gain_Vr", "locks", "measured"} <= set(found.figures)
     assert "threshold" in swept.figures
     assert "losses" not in swept.figures
+
+
+def test_a_filter_looks_the_same_in_every_figure(found):
+    drawn = registry.study("pulses_to_tracks").figures(found.cases, found.tables, load("pulses"))
+    looks = {}
+    for name in ("sigma_r", "locks"):
+        for mark in (mark for panel in drawn[name].panels for mark in panel.marks if isinstance(mark, Line)):
+            looks.setdefault(mark.label, {})[name] = mark.style
+    assert set(looks["cured"]) == {"sigma_r", "locks"}
+    assert all(len(set(own.values())) == 1 for own in looks.values())
 
 
 def test_the_threshold_is_seen(swept):
