@@ -48,7 +48,10 @@ def words(study, count):
     return ["solve", config, *SOLVED[study].split(), *case, "-n", str(count)]
 
 
-@pytest.mark.parametrize("study", SOLVED)
+LONG = ("smoothing", "manoeuvre", "discriminator")  # a value of the key takes a second or more of them
+
+
+@pytest.mark.parametrize("study", [pytest.param(one, marks=pytest.mark.slow) if one in LONG else one for one in SOLVED])
 def test_solve_gives_one_document(study):
     result = CliRunner().invoke(main, [*words(study, 40), "--json"])
     assert result.exit_code in (0, 3), result.output

@@ -1,6 +1,6 @@
 """Spoiled configs and spoiled files of plots: an answer or our own error in words, quickly and in little memory.
 
-FUZZ_CASES is how many there are in all: 2000 in the ordinary suite; `make slow` runs 100 000.
+FUZZ_CASES is how many there are in all: 1000 in the ordinary suite; `make slow` runs 100 000.
 """
 
 import contextlib
@@ -20,7 +20,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.config.lookup import SHIPPED
 from radarsim.errors import ConfigError
 
-CASES = int(os.environ.get("FUZZ_CASES", "2000"))
+CASES = int(os.environ.get("FUZZ_CASES", "1000"))
 RELEASE = max(CASES, 100_000)
 SECONDS, MEGABYTES = 2.0, 300
 CONFIGS = sorted((SHIPPED / "configs").glob("*.yaml"))

@@ -136,7 +136,7 @@ def test_the_mean_weight_is_one_and_none_is_over_one_by_the_plain_share():
         assert plan.layout.unpack(STUDY.simulate(plan, i, 1))["drawn"][:, 1].max() <= 5.0
 
 
-@pytest.mark.parametrize("density", [0.3, 1.5])
+@pytest.mark.parametrize("density", [0.3, pytest.param(1.5, marks=pytest.mark.slow)])
 def test_false_tracks_are_those_of_plain_sampling(density):
     """3 of 4 and 4 of 6, of nearest plot and PDA, confirmed and held on, against plain tracks of other noise."""
     filters = [tracker("a"), tracker("b", "pda", 4, 6)]
