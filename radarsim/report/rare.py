@@ -83,6 +83,17 @@ def table(parts: "list[dict[str, Any]]") -> "dict[str, pd.DataFrame]":
     return {"rare": common.joined(parts, COLUMNS)} if parts else {}
 
 
+def told(row: "pd.Series") -> dict[str, Any]:
+    """What a sentence tells of a row of rare.csv: rate with interval, number of events, and effective ones."""
+    return {
+        "rate": row["rate"],
+        "low": row["rate_lo"],
+        "high": row["rate_hi"],
+        "events": row["events"],
+        "n_eff": row["n_eff"],
+    }
+
+
 def weak(made: "pd.DataFrame") -> np.ndarray:
     """Which rows of the table rest on too few effective events for their interval."""
     return np.asarray(made["n_eff"].to_numpy(dtype=float) < FEW_EVENTS)

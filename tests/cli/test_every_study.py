@@ -1,11 +1,7 @@
 """`solve` and `sensitivity` in every study: one JSON document, a signal that ends them, what is refused at once."""
 
 import json
-import os
 import signal
-import subprocess
-import sys
-import time
 
 import pytest
 from click.testing import CliRunner
@@ -16,7 +12,7 @@ from radarsim.app.work import CaseWork
 from radarsim.cli import main
 from radarsim.engine.collect import collect
 from radarsim.studies import registry
-from tests.cli.test_stopped import obedient, until_it_listens
+from tests.cli.test_stopped import ended_by
 
 MANOEUVRE = ("sonar_manoeuvre", "--case", "sonar_manoeuvre target.acceleration_mps2=0.4")
 CLUTTER = ("sonar_clutter", "--case", "sonar_clutter sensor.false_plots_per_km2=1")
@@ -85,25 +81,7 @@ def test_a_signal_ends_it(command, study, tmp_path):
         given += ["--set", "radar.detection_probability=0.7" if study == "range_doppler" else "scans=200"]
         given += ["--set", "scans=40"] if study == "range_doppler" else []
     number = signal.SIGINT if command == "solve" else signal.SIGTERM
-    with subprocess.Popen(
-        [sys.executable, "-m", "radarsim", *given, "--json"],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ,
-        preexec_fn=obedient,
-    ) as process:
-        until_it_listens(process)
-        time.sleep(0.5)
-        process.send_signal(number)
-        try:
-            said, error = process.communicate(timeout=60)
-        finally:
-            process.kill()
-    assert process.returncode == 128 + number, error
-    assert (said, error) == ("", f"stopped by {'Ctrl-C' if number == signal.SIGINT else 'SIGTERM'}\n")
-    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+    ended_by(number, [*given, "--json"], tmp_path, after_s=0.5)
 
 
 @pytest.mark.parametrize("study", CONFIGS)

@@ -48,20 +48,18 @@ def caught(number):
     return int(next(line.split()[1] for line in status.splitlines() if line.startswith("SigCgt")), 16)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("name", LONG)
-def test_a_signal_ends_it_with_one_line_and_no_file(name, number, tmp_path):
-    command = [sys.executable, "-m", "radarsim", *LONG[name]]
+def ended_by(number, options, folder, after_s):
+    """A command that gets a signal so long after it listens ends with its exit code, one line and no file."""
     with subprocess.Popen(
-        command,
-        cwd=tmp_path,
+        [sys.executable, "-m", "radarsim", *options],
+        cwd=folder,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         preexec_fn=obedient,
     ) as process:
         until_it_listens(process)
-        time.sleep(1)
+        time.sleep(after_s)
         process.send_signal(number)
         try:
             said, error = process.communicate(timeout=60)
@@ -70,7 +68,13 @@ def test_a_signal_ends_it_with_one_line_and_no_file(name, number, tmp_path):
     assert process.returncode == 128 + number, error
     assert said == ""
     assert error == f"stopped by {'Ctrl-C' if number == signal.SIGINT else 'SIGTERM'}\n"
-    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert not [path for path in folder.rglob("*") if path.is_file()]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("name", LONG)
+def test_a_signal_ends_it_with_one_line_and_no_file(name, number, tmp_path):
+    ended_by(number, LONG[name], tmp_path, after_s=1)
 
 
 def test_an_exception_that_a_library_makes_of_the_signal_is_still_the_signal():

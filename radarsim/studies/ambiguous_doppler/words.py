@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language import listed, numeral, tr
-from radarsim.report import panels, text
+from radarsim.report import panels, rare, text
 from radarsim.report import tables as common
 from radarsim.studies.ambiguous_doppler.tables import Result
 
@@ -128,11 +128,7 @@ def _wrong(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str
         "a fold is wrong at scan {k} in {rate:.3g} [{low:.3g}, {high:.3g}] of realisations, by importance sampling "
         "from {events:,} of them, {n_eff:,.0f} effective ones",
         k=row["k"],
-        rate=row["rate"],
-        low=row["rate_lo"],
-        high=row["rate_hi"],
-        events=row["events"],
-        n_eff=row["n_eff"],
+        **rare.told(row),
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, numeral, plural, tr
-from radarsim.report import panels, text
+from radarsim.report import panels, rare, text
 from radarsim.report import tables as common
 from radarsim.studies.discriminator.kernels.sums import LOCKS
 
@@ -119,9 +119,5 @@ def _rare(rows: "pd.DataFrame") -> str:
         "{estimator}: lock is lost in {rate:.3g} [{low:.3g}, {high:.3g}] of the bursts, by importance sampling from "
         "{events:,} losses, {n_eff:,.0f} effective ones.",
         estimator=row["filter"],
-        rate=row["rate"],
-        low=row["rate_lo"],
-        high=row["rate_hi"],
-        events=row["events"],
-        n_eff=row["n_eff"],
+        **rare.told(row),
     )
