@@ -26,7 +26,7 @@ slow: $(VENV)/tested
 
 # Two BLAS kernels, two compiler targets, NumPy with and without AVX; `make slow` tries them all.
 machines: $(VENV)/tested
-	$(BIN)/python -m pytest -m machines
+	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 8 -m machines
 
 mutants: $(VENV)/tested
 	nice $(BIN)/python -m tests.trust.mutate
