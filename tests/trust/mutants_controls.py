@@ -11,9 +11,12 @@ PAIRS = f"{HERE}::test_pairs_are_products_of_residuals"
 CONTROLS = mutants(
     "radarsim/studies/multimodel/kernels/controls.py",
     ("detected * (w - x - h) + p * h", "detected * (w - x - h) + h", ZERO),
+    ("noise[at + 3 * i + 1] * b", "noise[at + 3 * i] * b", TWIN),
+    ("(a[0] + d[0] * d[0], ", "(d[0] * d[0], ", ZERO),
+) + mutants(
+    "radarsim/studies/multimodel/kernels/residuals.py",
     ("d * d - places.variances[places.first + i * places.stride + c]", "d * d", ZERO),
-    ("noise[at + 3] * a + noise[at + 4] * b", "noise[at + 3] * a - noise[at + 4] * b", TWIN),
-    ("put(parts, to, get(parts, to) + d[i] * d[i])", "put(parts, to, d[i] * d[i])", ZERO),
-    ("get(of.x, 0) - found - level", "get(of.x, 0) - level", LEFT),
-    ("row(to.residuals, baseline * STATES)", "row(to.residuals, f * STATES)", PAIRS),
+    ("slopes[at + 1] * (d * d - variance)", "slopes[at + 1] * (d * d)", LEFT),
+    ("y - found - level", "y - level", LEFT),
+    ("add_pairs(own, base, ", "add_pairs(own, own, ", PAIRS),
 )

@@ -152,16 +152,16 @@ def designed(spec: Keys, world: records.World) -> records.Controls:
         part=part,
         noise=noise.reshape(len(noise), -1),
         own=own,
-        variances=np.ascontiguousarray(variances[:, reported]),
+        variances=np.ascontiguousarray(variances[:, reported].swapaxes(0, 1)),
         sums=sums_,
-        scans=np.zeros((members, len(reported), STATES, 1 + 2 * most)),
-        stages=np.zeros((members, stages, STATES, 1 + records.PARTS * records.COLLECTED * most)),
+        scans=np.zeros((len(reported), members, STATES, 1 + 2 * most)),
+        stages=np.zeros((stages, members, STATES, 1 + records.PARTS * records.COLLECTED * most)),
     )
 
 
 def none(members: int) -> records.Controls:
     """No controls beside so many filters, for a kernel that takes some."""
-    empty = np.zeros((members, 0, STATES, 1))
+    empty = np.zeros((0, members, STATES, 1))
     return records.Controls(
         mode=np.array([records.NO_CONTROLS]),
         gains=np.zeros((0, 0, records.CONTROL)),
@@ -183,15 +183,14 @@ def beside(
     """What the kernel takes of controls: with memory, the named sums in arrays, where there are some, and products."""
     empty = np.zeros((0, 0, STATES, 0))
     named = {name: arrays.get(name, np.zeros((0,) * n)) for name, n in DIMENSIONS.items()}
-    members, stages = len(controls.own), controls.stages.shape[1]
-    memory = kernel.memory(len(controls.gains), members, stages)
+    memory = kernel.memory(len(controls.gains), len(controls.own), len(controls.stages))
     return kernel.Beside(controls, memory, records.ControlSums(**named), products or records.Products(empty, empty))
 
 
 def piloted(spec: Keys, world: records.World, banks: records.Banks) -> records.Controls:
     """The controls of a case with their slopes, from realisations of a world whose noise is that of no run."""
     controls = designed(spec, world)
-    members, reported, stages = len(spec.filters), controls.scans.shape[1], controls.stages.shape[1]
+    members, reported, stages = len(spec.filters), len(controls.scans), len(controls.stages)
     products = records.Products(*(sums_of(slopes) for slopes in (controls.scans, controls.stages)))
     plain = records.Sums(*(np.zeros(shape) for shape in records.shapes(members, reported, stages).values()))
     memory, asked = sums.memory(members, stages), beside(controls, {}, products)
@@ -199,7 +198,7 @@ def piloted(spec: Keys, world: records.World, banks: records.Banks) -> records.C
     for f, options in enumerate(spec.filters):
         for slopes, found, each in zip(controls[-2:], products, (2, records.PARTS * records.COLLECTED), strict=True):
             count = each * len(options.models)
-            slopes[f, ..., : 1 + count] = regressed(found[f], count, PILOT)
+            slopes[:, f, :, : 1 + count] = regressed(found[:, f], count, PILOT)
     return controls._replace(mode=np.array([records.CONTROLLED]))
 
 

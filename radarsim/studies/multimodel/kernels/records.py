@@ -156,10 +156,10 @@ class Controls(NamedTuple):
     row, part (K,)                the number of a scan's gain, and of the part of a stage that it belongs to
     noise (K, 9)                  G, row by row: the plot's error in the local frame is G n, n three standard normals
     own (F, 8)                    the control of each model of a filter
-    variances (C, K', 9)          E d² at a reported scan
+    variances (K', C, 9)          E d² at a reported scan
     sums (C, S PARTS, 9)          Σ E d² over the scans of a part
-    scans (F, K', 9, 1 + 2 M)     level and slopes of the squared error at a scan: on d and d² - E d² of each model
-    stages (F, S, 9, 1 + 2 PARTS M)   the same of the mean over a stage: on both sums over each part, of each model
+    scans (K', F, 9, 1 + 2 M)     level and slopes of the squared error at a scan: on d and d² - E d² of each model
+    stages (S, F, 9, 1 + 2 PARTS M)   the same of the mean over a stage: on both sums over each part, of each model
     """
 
     mode: np.ndarray
@@ -193,7 +193,7 @@ class ControlSums(NamedTuple):
 class Products(NamedTuple):
     """Sums over a pilot's realisations, from which the slopes are regressed: of the regressand y and its regressors.
 
-    scans (F, K', 9, …), stages (F, S, 9, …)    Σ of each, then Σ of the products of any two, as `products` counts
+    scans (K', F, 9, …), stages (S, F, 9, …)    Σ of each, then Σ of the products of any two, as `products` counts
     """
 
     scans: np.ndarray

@@ -19,7 +19,7 @@ from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, rows, total, where_greater
 from radarsim.kernels.symmetric import dot, factored, scaled, whitened
 from radarsim.studies.multimodel.kernels import strip
-from radarsim.studies.multimodel.kernels.controls import Span, add_controlled_scan, close_controls, follow_controls
+from radarsim.studies.multimodel.kernels.controls import Span, follow_controls
 from radarsim.studies.multimodel.kernels.plots import RANDOM, STRIP, draw_strip, make_plots
 from radarsim.studies.multimodel.kernels.records import (
     DETECTED,
@@ -43,6 +43,7 @@ from radarsim.studies.multimodel.kernels.records import (
     VARIANCE,
     WORK,
 )
+from radarsim.studies.multimodel.kernels.residuals import add_controlled_scan, close_controls
 from radarsim.studies.multimodel.kernels.strip import Filter, Scans, rules_of, run_strip, start
 
 
