@@ -5,6 +5,8 @@ below; anything else of ours is refused. Foreign libraries that are costly or th
 """
 
 import ast
+from collections import defaultdict
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -48,7 +50,7 @@ GROUND = ("errors", "kernels", "physics", "bursts", *CASE)
 KEYS = ("errors", "config.faults", "config.fields", "config.radial", "config.rare", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
-SHOWN = (*SUMS, "cost", "tables", "figures", "map")
+SHOWN = (*SUMS, "cost", "notes", "tables", "figures", "map")
 READ = (*SHOWN, "words", "claims", "measures", "readings", "search")
 ROLES = {
     "kernels": (("kernels", "bursts.kernels"), ("kernels",)),
@@ -59,6 +61,7 @@ ROLES = {
     ),  # world, filters, exact, and whatever else prepares numbers
     "study": ((*GROUND, *DATA, "studies.noise"), SUMS),
     "cost": ((*GROUND, *DATA), (*SUMS, "cost")),
+    "notes": ((*GROUND, *DATA, "report"), SUMS),  # where an interval rests on too little
     "tables": ((*GROUND, *DATA, "report"), SHOWN),
     "figures": ((*GROUND, *DATA, "report", "language"), SHOWN),
     "words": ((*GROUND, *DATA, "report", "language"), READ),
@@ -271,14 +274,15 @@ def test_a_planted_import_is_refused(module, imported):
         assert len(faults(module, f"{text}\n{form}\n")) == 1
 
 
-def users(library: str) -> set[str]:
-    """The files that import a library when they run, by their path in the package."""
-    return {
-        path.relative_to(PACKAGE).as_posix()
-        for module, path in MODULES.items()
-        if any(name.split(".")[0] == library for name in imports(running(text_of(module))))
-        and not path.is_relative_to(TEMPLATE)
-    }
+@cache
+def users() -> dict[str, set[str]]:
+    """By library, the files that import it when they run, by their path in the package."""
+    found: dict[str, set[str]] = defaultdict(set)
+    for module, path in MODULES.items():
+        if not path.is_relative_to(TEMPLATE):
+            for name in imports(running(text_of(module))):
+                found[name.split(".")[0]].add(path.relative_to(PACKAGE).as_posix())
+    return found
 
 
 def running(text: str) -> str:
@@ -292,7 +296,7 @@ def running(text: str) -> str:
 
 @pytest.mark.parametrize("library", LIBRARIES)
 def test_foreign_libraries_are_fenced_in(library):
-    assert {user for user in users(library) if not at_home(user, LIBRARIES[library])} == set()
+    assert {user for user in users()[library] if not at_home(user, LIBRARIES[library])} == set()
 
 
 def at_home(file: str, homes: set[str]) -> bool:

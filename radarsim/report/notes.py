@@ -92,21 +92,32 @@ def _rows(result: CaseResult) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Realisations, effective ones of the errors about their mean, and whether larger ones may be missing; (rows,)."""
     at = common.shown(result)
     every = common.realisations(result)
-    n, moments = every[at], np.asarray(result.sums["error"], dtype=float)
+    n, (variance, kurtosis) = every[at], _about_mean(result)
+    moments = np.asarray(result.sums["error"], dtype=float)
+    largest = tails(result).max(axis=1, keepdims=True)  # over the scans
     with np.errstate(invalid="ignore", divide="ignore"):
-        m1, m2, m3, m4 = np.moveaxis(moments / every[..., None], -1, 0)
-        variance = np.maximum(m2 - m1**2, 0.0)
-        fourth = np.maximum(m4 - 4 * m1 * m3 + 6 * m1**2 * m2 - 3 * m1**4, 0.0)
-        known = variance > ROUNDING * m2  # about a mean that is all there is, the rest is rounding
-        kurtosis = np.where(known, fourth / variance**2, np.nan)
-        tail = np.where(result.axes.available & (kurtosis > TAIL), fourth / variance, 0.0)
-        largest = tail.max(axis=1, keepdims=True)  # over the scans: the squared size of the errors of a tail
         sigma = root_mean_square(moments[..., 1], moments[..., 3], every)
         missed = MISSED / every
-        of_sigma = missed * largest / m2 / 2 > MOVED * (sigma.hi - sigma.lo) / 2 / sigma.value
+        of_sigma = missed * largest / sigma.value**2 / 2 > MOVED * (sigma.hi - sigma.lo) / 2 / sigma.value
         of_bias = missed * np.sqrt(largest) > MOVED * Z95 * np.sqrt(variance / every)
-    effective = np.where(known, every / np.maximum(kurtosis - 1, ALIKE_SQUARES), np.nan)
+        effective = every / np.maximum(kurtosis - 1, ALIKE_SQUARES)
     return n, effective[at], ((of_sigma | of_bias) & (largest > 0) & (every > 0))[at]
+
+
+def _about_mean(result: CaseResult) -> tuple[np.ndarray, np.ndarray]:
+    """Variance and κ (F, K, C) of the errors about their mean; κ not-a-number where the mean is all but rounding."""
+    moments = np.asarray(result.sums["error"], dtype=float)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        m1, m2, m3, m4 = np.moveaxis(moments / common.realisations(result)[..., None], -1, 0)
+        variance = np.maximum(m2 - m1**2, 0.0)
+        fourth = np.maximum(m4 - 4 * m1 * m3 + 6 * m1**2 * m2 - 3 * m1**4, 0.0)
+        return variance, np.where(variance > ROUNDING * m2, fourth / variance**2, np.nan)
+
+
+def tails(result: CaseResult) -> np.ndarray:
+    """Squared size (F, K, C) of the errors that make a tail at each scan; 0 where there is none."""
+    variance, kurtosis = _about_mean(result)
+    return np.where(result.axes.available & (kurtosis > TAIL), kurtosis * variance, 0.0)
 
 
 def _noted(

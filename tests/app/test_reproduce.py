@@ -68,6 +68,7 @@ def test_a_signal_ends_it_and_its_processes(tmp_path):
     assert "run the same command again to continue" in said
 
 
+@pytest.mark.slow
 def test_two_at_once_into_one_folder(tmp_path):
     """Both end well, and leave what one alone would have left."""
     shell = [sys.executable, "-m", "radarsim.cli.reproduce"]
@@ -90,6 +91,7 @@ def test_two_at_once_into_one_folder(tmp_path):
     assert not [path for path in (tmp_path / "both").rglob("*") if path.suffix in (".tmp", ".damaged")]
 
 
+@pytest.mark.slow
 def test_output_that_nobody_can_take(tmp_path):
     shell = f"{sys.executable} -m radarsim.cli.reproduce {tmp_path} rls2 rls2 --no-figures --set realisations=100"
     full = subprocess.run(f"{shell} > /dev/full", shell=True, capture_output=True, text=True, check=False)

@@ -47,6 +47,7 @@ def computed(place):
     return json.loads((place / "out" / "rls2" / "run.json").read_text())["realisations_computed"]
 
 
+@pytest.mark.slow
 def test_three_machines_by_ssh(tmp_path, expected):
     run(["sh", RECIPES / "ssh.sh"], tmp_path, HOSTS="a b c")
     assert csv_bytes(tmp_path / "out" / "rls2") == expected

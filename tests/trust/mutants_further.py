@@ -262,12 +262,26 @@ DRAWN_FLIGHTS = (
     ),
 )
 MARKS = "report/test_notes.py"
+STAGES = "studies/multimodel/test_notes.py"
 SAID = (
+    *mutants(
+        "radarsim/studies/multimodel/notes.py",
+        (
+            "* np.minimum(lasts, scans) / scans)",
+            ")",
+            f"{STAGES}::test_what_rare_errors_add_is_as_a_twin_counts_it",
+        ),
+        (
+            "few_of_gain = n**2 * log_variance",
+            "few_of_gain = n**2 / effective",
+            f"{STAGES}::test_a_gain_may_be_narrower_than_what_its_filters_lack",
+        ),
+    ),
     *mutants(
         "radarsim/report/notes.py",
         (
-            "largest = tail.max(axis=1, keepdims=True)",
-            "largest = tail",
+            "largest = tails(result).max(axis=1, keepdims=True)",
+            "largest = tails(result)",
             f"{MARKS}::test_large_errors_at_one_scan_mark_those_whose_sample_may_lack_them",
         ),
         (

@@ -32,10 +32,12 @@ class FlightAxes(Axes):
     """Labels of the sums, and what tables and figures need of the flight; stages and banks are described by the case.
 
     truth (K', 9)       true states x, vx, ax, y, vy, ay, z, vz, az (m, m/s, m/s²) at the reported scans
+    stage (K',)         stage of each reported scan
     stage_scans (S,)    scans of each stage that its means are of: from the third scan of the track on, reported or not
     """
 
     truth: np.ndarray
+    stage: np.ndarray
     stage_scans: np.ndarray
 
 
@@ -108,11 +110,12 @@ def prepare(case: Case) -> Plan:
         shapes |= records.controlled_shapes(*sizes)
         other = world._replace(keys=np.stack([noise_key(case, "pilot plots"), noise_key(case, "pilot detections")]))
         beside = controls.Once(lambda: controls.piloted(spec, other, members))
-    return Plan(Layout(**shapes), axes(spec, t, x, reported, lengths), world, members, beside)
+    return Plan(Layout(**shapes), axes(spec, t, world, lengths), world, members, beside)
 
 
-def axes(spec: Keys, t: np.ndarray, x: np.ndarray, reported: np.ndarray, lengths: np.ndarray) -> FlightAxes:
+def axes(spec: Keys, t: np.ndarray, world: records.World, lengths: np.ndarray) -> FlightAxes:
     """Labels of the sums; nothing of this study is known exactly."""
+    reported = world.reported.astype(bool)
     shape = (len(spec.filters), int(reported.sum()), records.STATES)
     names = tuple(f.name for f in spec.filters)
     unknown = np.full(shape, np.nan)
@@ -125,7 +128,8 @@ def axes(spec: Keys, t: np.ndarray, x: np.ndarray, reported: np.ndarray, lengths
         baseline=names.index(spec.baseline) if spec.baseline else 0,
         exact_sigma=unknown,
         exact_bias=unknown,
-        truth=x[reported],
+        truth=world.truth[reported],
+        stage=world.stage[reported],
         stage_scans=lengths[:, 0],
     )
 

@@ -9,7 +9,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import consistency, controlled, statistics
 from radarsim.report import tables as common
 from radarsim.studies.multimodel import cost as costs
-from radarsim.studies.multimodel import filters
+from radarsim.studies.multimodel import filters, notes
 from radarsim.studies.multimodel.kernels.records import MERGED, MERGES, NEES, NIS
 
 if TYPE_CHECKING:
@@ -66,12 +66,15 @@ def _probabilities(result: CaseResult) -> dict[str, np.ndarray]:
 
 STAGES = (
     *("case", "filter", "stage", "begin_s", "end_s", "component", "unit", "n", "sigma", "sigma_lo", "sigma_hi"),
-    *("baseline", "gain_percent", "gain_lo", "gain_hi"),
+    *("baseline", "gain_percent", "gain_lo", "gain_hi", "note"),
 )
 
 
 def stages(results: Sequence[CaseResult]) -> "pd.DataFrame":
-    """σ over each stage of the flight, of all its scans, and the paired gain against the baseline filter."""
+    """σ over each stage of the flight, of all its scans, and the paired gain against the baseline filter.
+
+    `note` says where an interval rests on too little (`notes`).
+    """
     rows = [row for result in results for row in _stages(result)]
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(STAGES)})
 
@@ -102,7 +105,7 @@ def stage_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> statist
 
 def _stages(result: CaseResult) -> list[tuple]:
     rows, axes, b = [], result.axes, result.axes.baseline
-    places = {name: s for s, name in enumerate(stage_names(result))}
+    places, said = {name: s for s, name in enumerate(stage_names(result))}, notes.of_stages(result)
     for f, label in enumerate(axes.filters):
         for stage, begin, end in stage_bounds(result):
             for c, (component, unit) in enumerate(axes.components):
@@ -111,7 +114,7 @@ def _stages(result: CaseResult) -> list[tuple]:
                 nothing = statistics.Estimate(np.nan, np.nan, np.nan)
                 gain = stage_gain(result, f, b, s, c) if f != b else nothing
                 where = (result.name, label, stage, begin, end, component, unit, result.count)
-                rows.append((*where, *map(float, sigma), axes.filters[b], *map(float, gain)))
+                rows.append((*where, *map(float, sigma), axes.filters[b], *map(float, gain), said[f, s, c]))
     return rows
 
 

@@ -1,0 +1,69 @@
+"""Where an interval over a stage of the flight rests on a few rare errors, or on a sample that lacks them.
+
+A realisation's mean square over the K scans of a stage, q = Σ e_k²/K, is one observation. An error of a tail, of size
+√T for d scans one after the other where the mean is b, adds up to X = (T + 2|b|√T) min(d, K)/K to it. If r of n
+realisations had one and nothing else varied, Var q would be r X²/n: so an interval as wide as that of this sample can
+speak of r = n Var q/X² such errors, and as rates of under `FEW_EVENTS` events are, it is marked where these are fewer.
+Of a gain r is n² times the variance of the logarithm over (X/E q)², for either filter: its interval is narrower, as the
+common noise is not in it.
+
+X is told from all stages in which the filter has such errors in this component, and the greatest counts, as the sample
+may lack them in the stage that is judged, or have fewer than its share:
+
+* T is the mean of `report.notes.tails` over the scans of that stage that have a tail;
+* d is told by the serial correlation of the squares there: Var q = Σ_jk Cov(e_j², e_k²)/K² is d/K times the mean of
+  Var(e_k²) where each scan goes with d others, so d = K Var q / mean Var(e_k²), between 1 and K;
+* b² is the mean over the scans of the stage that is judged.
+
+A model that is the best for one scan by mistake has d = 1: that decides σ over six scans, and not over hundreds.
+What came out stands in docs/trust.md.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.report import notes as common
+from radarsim.report import statistics
+
+if TYPE_CHECKING:
+    from radarsim.studies.multimodel.study import FlightAxes
+
+RARE = f"under {statistics.FEW_EVENTS} rare errors: heavy tails"
+OF_GAIN = "gain: "  # before what is to be said of the gain alone
+
+
+def of_stages(result: "CaseResult[FlightAxes]") -> np.ndarray:
+    """What is to be said (F, S, C) of σ and gain over each stage; "" of most."""
+    b, n = result.axes.baseline, result.count
+    square, fourth = np.moveaxis(np.asarray(result.sums["stage"])[:, :, : len(result.axes.components)], -1, 0)
+    cross = np.asarray(result.sums["pairs"])[:, b]
+    log_variance = statistics.log_variance(square, fourth, square[b], fourth[b], cross, n)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        more, effective = rare(result) / (square / n), statistics.effective(square, fourth, n)
+        few = n**2 / effective / more**2 < statistics.FEW_EVENTS
+        few_of_gain = n**2 * log_variance / np.fmax(more, more[b]) ** 2 < statistics.FEW_EVENTS
+    own = np.where(effective < statistics.FEW_EFFECTIVE, common.THIN, np.where(few, RARE, "")).astype(object)
+    of_gain = np.where(own[b] != "", own[b], np.where(few_of_gain, RARE, "")).astype(object)
+    of_gain[b] = ""
+    return np.where((own == "") & (of_gain != ""), OF_GAIN + of_gain, own)
+
+
+def rare(result: "CaseResult[FlightAxes]") -> np.ndarray:
+    """What errors of a tail add to the mean square of a realisation over each stage, (F, S, C); 0 without one."""
+    axes, scans = result.axes, np.maximum(np.asarray(result.axes.stage_scans, dtype=float), 1)[:, None]
+    m1, m2, _, m4 = np.moveaxis(np.asarray(result.sums["error"], dtype=float) / result.count, -1, 0)
+    square, fourth = np.moveaxis(np.asarray(result.sums["stage"])[:, :, : len(axes.components)] / result.count, -1, 0)
+    of_scan, tail = m4 - m2**2, common.tails(result)
+    bias, found = np.zeros(square.shape), np.zeros(square.shape)
+    for s in np.unique(axes.stage):
+        bias[:, s] = np.mean(m1[:, axes.stage == s] ** 2, axis=1)
+    for s in np.unique(axes.stage):
+        here = tail[:, axes.stage == s]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = np.nan_to_num(here.sum(axis=1) / (here > 0).sum(axis=1))[:, None]
+            lasts = scans[s] * (fourth[:, s] - square[:, s] ** 2) / np.mean(of_scan[:, axes.stage == s], axis=1)
+        lasts = np.clip(np.nan_to_num(lasts, nan=1.0), 1.0, scans[s])[:, None]
+        found = np.maximum(found, (mean + 2 * np.sqrt(bias * mean)) * np.minimum(lasts, scans) / scans)
+    return found
