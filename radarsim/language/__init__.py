@@ -40,6 +40,7 @@ class Term(str):
 _chosen: list[str] = []  # the last one counts
 
 
+@cache
 def known() -> tuple[str, ...]:
     """The codes of the languages: English, and those with a catalogue."""
     files = resources.files(__name__).iterdir()
