@@ -5,7 +5,7 @@ laws: the mean of w over those with the event is its probability, whatever the l
 drawn from the law itself, so that no weight is over one divided by it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ COLUMNS = (
     *("case", "filter", "k", "t_s", "event", "sought", "n", "rate", "rate_lo", "rate_hi", "events", "n_eff"),
     *("variance_factor", "plain", "mean_weight", "mean_weight_se"),
 )
+UNAIMED = 0.1  # share of Σw² that no shift leads to, from which on it is told
 ERRORS = 4.0  # standard errors of the mean weight beyond which it is not one
 
 
@@ -94,6 +95,11 @@ def told(row: "pd.Series") -> dict[str, Any]:
     }
 
 
+def unaimed(event: str, how: str) -> str:
+    """The name of an event that no shift leads to, part of one that is sought: `how` it comes about."""
+    return f"{event} {how}"
+
+
 def weak(made: "pd.DataFrame") -> np.ndarray:
     """Which rows of the table rest on too few effective events for their interval."""
     return np.asarray(made["n_eff"].to_numpy(dtype=float) < FEW_EVENTS)
@@ -115,6 +121,7 @@ def warnings(made: "pd.DataFrame | None") -> list[str]:
                 least=FEW_EVENTS,
             )
         )
+    said += _unaimed(made)
     for case, own in common.groups(made, "case").items():
         means, errors = (own[name].to_numpy(dtype=float) for name in ("mean_weight", "mean_weight_se"))
         worst = int(np.argmax(np.abs(means - 1) - ERRORS * errors))
@@ -132,14 +139,37 @@ def warnings(made: "pd.DataFrame | None") -> list[str]:
     return said
 
 
+def _unaimed(made: "pd.DataFrame") -> Iterator[str]:
+    """Where much of what is known of a sought event, Σw² = (Σw)²/n_eff, is of a part of it that no shift leads to."""
+    keys = ["case", "filter", "k"]
+    pairs = made[made["sought"].astype(bool)].merge(made[~made["sought"].astype(bool)], on=keys, suffixes=("", "_part"))
+    for row in pairs.to_dict("records"):
+        part, whole = (
+            row[rate] ** 2 / max(row[n_eff], 1.0) for rate, n_eff in (("rate_part", "n_eff_part"), ("rate", "n_eff"))
+        )
+        if row["event_part"].startswith(unaimed(row["event"], "")) and part > UNAIMED * whole:
+            yield tr(
+                "{case}: {filter}: {percent:.0f} % of the squared weights of a rare event are of '{event}', to which "
+                "no shift leads: the rate may be too low, and its interval too narrow",
+                case=row["case"],
+                filter=row["filter"],
+                percent=100 * part / whole,
+                event=row["event_part"],
+            )
+
+
 def of_rows(table: "pd.DataFrame", made: "pd.DataFrame", events: "np.ndarray | float") -> np.ndarray:
     """Events (rows,) behind the shares of a table by realisations, those of cases with weights from the table `rare`.
 
-    Where it has no row for the filter and scan, nothing is said of them: infinite.
+    Where it has no row for the filter and scan, nothing is said of them: infinite. Of several events the first counts.
     """
     keys = ["case", "filter", "k"]
     if not set(keys) <= set(table):
         return np.asarray(events)
-    known = table[keys].merge(made[[*keys, "n_eff"]], on=keys, how="left")["n_eff"].to_numpy(dtype=float)
+    known = (
+        table[keys]
+        .merge(made.drop_duplicates(keys)[[*keys, "n_eff"]], on=keys, how="left")["n_eff"]
+        .to_numpy(dtype=float)
+    )
     weighted = table["case"].isin(made["case"]).to_numpy()
     return np.asarray(np.where(weighted, np.where(np.isnan(known), np.inf, known), events))

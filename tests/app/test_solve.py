@@ -296,6 +296,22 @@ def test_rates_of_other_studies_are_read_by_the_names_of_their_tables():
     assert first.attained == pytest.approx(85.0, abs=1.0)
 
 
+@pytest.mark.slow
+def test_rare_wrong_folds_are_read_by_their_weights():
+    """Once in 1000: of 500 plain realisations half see none. The rate at the root, of other noise, is the target."""
+    quantity, rare = Quantity("right", "memory", at_k=6), ["scans=6", "rare={filter: memory}"]
+    key, given = "radar.repetition_rate_hz", {"between": (600, 1300), "realisations": 500, "overrides": rare}
+    found = solve("ambiguous_rls5", key, quantity, 99.9, **given)
+    assert not found.exact
+    assert 0 < found.hi - found.lo < 0.1 * found.value
+    overrides = [*rare, f"{key}={found.value}", "seed=3"]
+    row = radarsim.run("ambiguous_rls5", overrides=overrides, realisations=2000).tables["rare"]
+    (row,) = row[row["sought"]].to_dict("records")
+    assert row["n_eff"] > 100
+    spread = row["rate"] * math.hypot(1 / math.sqrt(row["n_eff"]), math.sqrt(2000 / 500 / row["n_eff"]))
+    assert abs(row["rate"] - 1e-3) < 4 * spread
+
+
 # ---- missed plots ----------------------------------------------------------------------------------------------------
 MISSED = ["radar.detection_probability=0.8"]
 

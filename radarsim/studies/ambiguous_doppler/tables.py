@@ -1,6 +1,6 @@
 """The study's own tables: folds, calibration, and gains with a further column on the oracle."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +9,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import panels, rare, statistics
 from radarsim.report import tables as common
 from radarsim.studies.ambiguous_doppler.axes import FoldedAxes
-from radarsim.studies.ambiguous_doppler.kernels.rare import BEYOND, WRONG
+from radarsim.studies.ambiguous_doppler.kernels.rare import BEYOND, FULL, WRONG
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     BEYOND_SUM,
     BINS,
@@ -31,6 +31,7 @@ ORDERS = (
     *("best_order_sigma_r", "best_combination_sigma_r"),
 )
 CALIBRATION = ("case", "filter", "k", "bin_lo", "bin_hi", "n", "right", "right_lo", "right_hi", "expected")
+WRONG_FOLD = "wrong fold"  # the event of rare.csv
 ABOVE = ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")
 
 
@@ -41,7 +42,7 @@ def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
         "folds": folds(results),
         "calibration": calibration(results),
         "orders": orders(results),
-        **rare.table([_rare(result) for result in results if "events" in result.sums]),
+        **rare.table([rows for result in results if "events" in result.sums for rows in _rare(result)]),
     }
 
 
@@ -113,13 +114,25 @@ def drawn(result: Result) -> rare.Drawn:
 
 
 def events(result: Result, at: tuple[np.ndarray, ...], event: int) -> rare.Counted:
-    """The realisations that have an event, WRONG or BEYOND, at filters and scans."""
+    """The realisations that have an event, WRONG, BEYOND or FULL, at filters and scans."""
     return rare.Counted(*np.moveaxis(np.asarray(result.sums["events"])[(*at, event)], -1, 0))
 
 
-def _rare(result: Result) -> dict[str, np.ndarray]:
-    """Wrong folds of every filter of one order that unfolds, at the last scan, by the weights of the realisations."""
+def _rare(result: Result) -> Iterator[dict[str, np.ndarray]]:
+    """Wrong folds of every filter of one order that unfolds, at the last scan, by the weights of the realisations.
+
+    Those of the sought filter that found no room in a full list in a row of their own: no shift leads there.
+    """
     (f,) = np.nonzero(unfolding(result) & ~result.axes.combines)
+    sought = np.array([one.name == result.spec.rare.filter for one in result.spec.filters])
+    yield _rare_rows(result, f, sought[f], WRONG, WRONG_FOLD)
+    if next(one for one in result.spec.filters if one.name == result.spec.rare.filter).hypotheses > 1:
+        (f,) = np.nonzero(sought)
+        yield _rare_rows(result, f, np.zeros(f.size, dtype=bool), FULL, rare.unaimed(WRONG_FOLD, "that found no room"))
+
+
+def _rare_rows(result: Result, f: np.ndarray, sought: np.ndarray, event: int, name: str) -> dict[str, np.ndarray]:
+    """Columns of rare.csv of filters f (n,), of an event by its place in the sums and its name."""
     k = np.full(f.size, len(result.axes.k) - 1)
     names = common.names(result.axes.filters, f)
     labels = {
@@ -128,8 +141,7 @@ def _rare(result: Result) -> dict[str, np.ndarray]:
         "k": np.asarray(result.axes.k)[k],
         "t_s": np.asarray(result.axes.t_s, dtype=float)[k],
     }
-    sought = np.asarray(names) == result.spec.rare.filter
-    return rare.rows(labels, "wrong fold", sought, events(result, (f, k), WRONG), drawn(result))
+    return rare.rows(labels, name, sought, events(result, (f, k), event), drawn(result))
 
 
 def calibration(results: Sequence[Result]) -> "pd.DataFrame":

@@ -339,7 +339,8 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
     assert row["n_eff"] == pytest.approx(weight**2 / square)
     assert row["rate_lo"] < row["rate"] < row["rate_hi"]
     assert row["variance_factor"] > 5
-    assert list(table["sought"]) == [True, False]
+    assert list(table["sought"]) == [True, False, False]
+    assert list(table["event"]) == ["wrong fold", "wrong fold", "wrong fold that found no room"]
     folds = result.tables["folds"]
     last = folds[(folds["filter"] == "memory") & (folds["k"] == 8)].iloc[0]
     assert last["right"] == pytest.approx(1 - row["rate"], rel=1e-15)
@@ -373,6 +374,25 @@ def test_a_rate_that_rests_on_few_events_is_told():
     result = result_of(24)
     assert any("the rate of a rare event rests on" in line for line in result.warnings)
     assert result.tables["rare"]["note"].str.contains("effective events").all()
+
+
+def test_wrong_folds_of_full_lists_are_told():
+    """With room for few hypotheses many wrong folds are of a right one that found no room, and no shift leads there."""
+    short, long = (
+        radarsim.run(
+            "ambiguous_rare",
+            realisations=1000,
+            overrides=["sweep.radar.repetition_rate_hz=[700]", f"filters.1.hypotheses={most}"],
+        )
+        for most in (100, 1000)
+    )
+    for result, told in ((short, True), (long, False)):
+        whole, _, full = result.tables["rare"].to_dict("records")
+        assert full["event"] == "wrong fold that found no room"
+        assert full["events"] <= whole["events"]
+        squares = [row["rate"] ** 2 / max(row["n_eff"], 1) for row in (full, whole)]
+        assert (squares[0] > 0.1 * squares[1]) == told
+        assert any("to which no shift leads" in line for line in result.warnings) == told
 
 
 def test_calibration_and_curves_are_marked_by_their_own_realisations():
