@@ -212,12 +212,11 @@ def noted(quantity: Quantity, result: CaseResult) -> str:
     return str(rows["note"].iloc[-1]) if len(rows) else ""
 
 
-def of_table(quantity: Quantity, table: "pd.DataFrame") -> float:
-    """The value alone from a table of the quantity's kind that is at hand; not-a-number where it has none."""
-    rows = table[(table["filter"] == quantity.filter) & (table["component"] == quantity.component)]
-    value = rows[quantity.of.columns[0]].to_numpy(dtype=float)
-    k, t_s = rows["k"].to_numpy(), rows["t_s"].to_numpy(dtype=float)
-    return float(at(quantity, Series(k, t_s, Estimate(value, value, value))).value)
+def courses(kind: str, table: "pd.DataFrame") -> dict[tuple[str, str], Series]:
+    """The values of every filter and component from a table of a kind that is at hand, without their intervals."""
+    value, k, t_s = (table[name].to_numpy(dtype=float) for name in (KINDS[kind].columns[0], "k", "t_s"))
+    rows: Any = table.groupby(["filter", "component"], sort=False).indices.items()
+    return {cell: Series(k[at], t_s[at], Estimate(*[value[at]] * 3)) for cell, at in rows}
 
 
 def _rows(quantity: Quantity, result: CaseResult) -> "pd.DataFrame":

@@ -1,7 +1,7 @@
 """`radarsim sensitivity`: by how much σ and gains change for a tenth more of each key.
 
 Exact where the case's σ are. Else both cases are simulated with the same noise, batch by batch, and the interval of a
-change is that of its mean over the batches.
+change is by how much it differs without one of the batches.
 """
 
 import math
@@ -51,6 +51,7 @@ class Sensitivity:
     """What was found: one row a key, filter and component, by falling effect of the key on the component that leads.
 
     at says when; without_effect are keys that change nothing, left_out those that cannot be raised, with the reason.
+    without_estimate are filters that no row is about, as they have no estimate there.
     labels: what people call each key of the rows, with its symbol and unit.
     """
 
@@ -59,6 +60,7 @@ class Sensitivity:
     at: str
     rows: tuple[dict[Hashable, Any], ...]
     without_effect: tuple[str, ...]
+    without_estimate: tuple[str, ...]
     left_out: dict[str, str]
     labels: dict[str, Label]
 
@@ -106,7 +108,10 @@ def sensitivity(
     shown = [row for row in rows if row["key"] not in idle]
     shown.sort(key=lambda row: effect[row["key"]], reverse=True)
     labels = {str(row["key"]): named(cases.base.spec, str(row["key"])) for row in shown}
-    return Sensitivity(cases.base.stem, leading, when(asked), tuple(shown), tuple(idle), left_out, labels)
+    silent = [name for name, own in zip(axes.filters, base.whole[0], strict=True) if not np.isfinite(own).any()]
+    return Sensitivity(
+        cases.base.stem, leading, when(asked), tuple(shown), tuple(idle), tuple(silent), left_out, labels
+    )
 
 
 def named(spec: Study, path: str) -> Label:
@@ -142,15 +147,15 @@ def size(rows: Sequence[dict[Hashable, Any]], path: str, leading: str) -> tuple[
 
 
 class Seen(NamedTuple):
-    """σ, and gain in per cent, of F filters and C components at one time: of the whole case (2, F, C), and of n batches
-    of its realisations (2, n, F, C), one where exact. Not-a-number where there is no estimate."""
+    """σ, and gain in per cent, of F filters and C components at one time: of the whole case (2, F, C), and of all its
+    realisations but one of n batches (2, n, F, C), n = 1 where exact. Not-a-number where there is no estimate."""
 
     whole: np.ndarray
-    batches: np.ndarray
+    but_one: np.ndarray
 
     @property
     def exact(self) -> bool:
-        return self.batches.shape[1] == 1
+        return self.but_one.shape[1] == 1
 
 
 @dataclass(frozen=True)
@@ -172,6 +177,8 @@ class Look:
 
     def of(self, case: Case) -> Seen:
         """What a case shows. Raises ConfigError."""
+        if not registry.study(case.study).exact_errors:
+            return self._sampled(case)
         axes = quantities.labels(self.asked, case)
         known = self._each(lambda quantity: quantities.exact(quantity, case, axes))
         # Of some filters alone, the others would seem to change nothing.
@@ -186,22 +193,29 @@ class Look:
     def _sampled(self, case: Case) -> Seen:
         work, each = CaseWork(case), max(2, self.realisations // BATCHES)
         batches = [work.simulate(batch * each, each) for batch in range(BATCHES)]
-        whole = self._of_sums(case, work, np.sum(batches, axis=0), BATCHES * each)
-        return Seen(whole, np.stack([self._of_sums(case, work, sums, each) for sums in batches], axis=1))
+        total, others = np.sum(batches, axis=0), (BATCHES - 1) * each
+        but_one = [self._of_sums(case, work, total - sums, others) for sums in batches]
+        return Seen(self._of_sums(case, work, total, BATCHES * each), np.stack(but_one, axis=1))
 
     def _of_sums(self, case: Case, work: CaseWork, packed: np.ndarray, count: int) -> np.ndarray:
         sums = work.plan.layout.unpack(packed)
         study = registry.study(case.study)
         results = [CaseResult(case.name, case.study, case.spec, case.swept, count, sums, work.plan.axes)]
         tables = {"sigma": study.curves(results), "gain": study.gains(results)}
-        return self._each(lambda quantity: quantities.of_table(quantity, tables[quantity.kind]))
+        known = {kind: quantities.courses(kind, made) for kind, made in tables.items()}
+
+        def value(quantity: Quantity) -> float:
+            course = known[quantity.kind].get((str(quantity.filter), str(quantity.component)))
+            return math.nan if course is None else float(quantities.at(quantity, course).value)
+
+        return self._each(value)
 
     def rows(self, case: Case, key: numeric.NumericKey, base: Seen, raised: Seen) -> list[dict[Hashable, Any]]:
         """A row for each filter and component that has an estimate, with the changes from base to raised."""
         made: list[dict[Hashable, Any]] = []
         with np.errstate(divide="ignore", invalid="ignore"):
-            grown, ratios = np.log(raised.whole[0] / base.whole[0]), np.log(raised.batches[0] / base.batches[0])
-        gained, points = raised.whole[1] - base.whole[1], raised.batches[1] - base.batches[1]
+            grown, ratios = np.log(raised.whole[0] / base.whole[0]), np.log(raised.but_one[0] / base.but_one[0])
+        gained, points = raised.whole[1] - base.whole[1], raised.but_one[1] - base.but_one[1]
         for f, c in self.cells:
             if not np.isfinite(grown[f, c]):
                 continue
@@ -216,12 +230,17 @@ class Look:
         return made
 
 
-def interval(batches: np.ndarray, value: float) -> tuple[float, float, float]:
-    """A value with its 95 % interval from the same number of each batch; one batch alone is exact."""
-    n = len(batches)
-    if np.all(np.abs(batches) < ROUNDED) and abs(value) < ROUNDED:
+def interval(but_one: np.ndarray, value: float) -> tuple[float, float, float]:
+    """A value with its 95 % interval from the same number without one batch each (n,); of n = 1 it is exact.
+
+    The jackknife over groups (Shao & Tu, The Jackknife and Bootstrap, 1995, sec. 2.3): a batch alone may have no
+    estimate, as where few realisations lock.
+    """
+    n = len(but_one)
+    if np.all(np.abs(but_one) < ROUNDED) and abs(value) < ROUNDED:
         return 0.0, 0.0, 0.0
-    half = 0.0 if n == 1 else float(statistics.student(n - 1)) * float(np.std(batches, ddof=1)) / math.sqrt(n)
+    error = 0.0 if n == 1 else (n - 1) / math.sqrt(n) * float(np.std(but_one, ddof=1))
+    half = 0.0 if n == 1 else float(statistics.student(n - 1)) * error
     return value, value - half, value + half
 
 

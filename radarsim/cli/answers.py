@@ -93,6 +93,8 @@ def print_sensitivity(found: "Sensitivity", written: "Sequence[str]") -> None:
     show(title, columns, cells, right=columns[1:], spare=columns[:1:-1])
     if found.without_effect:
         field("no effect", ", ".join(found.without_effect))
+    if found.without_estimate:
+        field("no estimate", ", ".join(found.without_estimate))
     for key, reason in found.left_out.items():
         field("left out", f"{key}: {reason}")
     field("files", ", ".join(written))

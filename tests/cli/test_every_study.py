@@ -67,7 +67,10 @@ def test_sensitivity_gives_one_document_of_every_filter(study, tmp_path):
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
     case = next(one for one in load(config).cases if len(case) == 0 or one.name == case[1])
-    assert {row["filter"] for row in found["rows"]} == {member.name for member in case.spec.members}
+    seen, silent = {row["filter"] for row in found["rows"]}, set(found["without_estimate"])
+    assert seen | silent == {member.name for member in case.spec.members}
+    assert seen
+    assert not seen & silent
     assert all(row["sigma_change_lo"] <= row["sigma_change_percent"] <= row["sigma_change_hi"] for row in found["rows"])
 
 

@@ -1,7 +1,7 @@
 """P4 (Uss, Baryshev & Djavad 2010): Doppler frequency and its derivatives from one burst, and how often they lock."""
 
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -125,13 +125,17 @@ def forecast(spec: Keys, burst: model.Burst) -> np.ndarray:
     return given
 
 
-def windows_of(spec: Keys, burst: model.Burst, designer: schedules.Designer) -> list[list[int]]:
-    """Window lengths of every estimator in pulses; estimators of one condition are designed once."""
+@lru_cache(maxsize=64)
+def designed_windows(
+    burst: model.Burst, sigma: tuple[float, ...], condition: schedules.Condition, least_s: float
+) -> tuple[int, ...]:
+    """Windows in pulses of one condition, designed once: of many cases that differ elsewhere they are the same."""
+    designer = schedules.Designer(burst, np.array(sigma), partial(exact.fisher, burst, len(sigma)), condition)
+    return tuple(designer.windows(least_s))
 
-    @cache
-    def designed(condition: schedules.Condition, least_s: float) -> list[int]:
-        return replace(designer, condition=condition).windows(least_s)
 
+def windows_of(spec: Keys, burst: model.Burst, sigma: np.ndarray) -> list[list[int]]:
+    """Window lengths of every estimator in pulses, for the forecast's standard deviations sigma (size,)."""
     found = []
     for e in spec.estimators:
         if e.method == "ridge":
@@ -139,7 +143,8 @@ def windows_of(spec: Keys, burst: model.Burst, designer: schedules.Designer) -> 
             continue
         least = exact.shortest_window(burst, e.minimum_energy_ratio) if e.minimum_energy_ratio else 0.0
         if e.schedule == "designed":
-            windows = designed(schedules.Condition(e.lock_probability, e.main_lobe_threshold, e.tail), least)
+            condition = schedules.Condition(e.lock_probability, e.main_lobe_threshold, e.tail)
+            windows = list(designed_windows(burst, tuple(sigma.tolist()), condition, least))
         else:
             windows = sorted({burst.pulses_in(duration) for duration in e.schedule})
         found.append(schedules.denser(windows, e.density)[: e.first_windows])
@@ -170,7 +175,7 @@ def prepared(case: Case) -> Plan:
     phase, sigma = phase_of(spec, burst), forecast(spec, burst)
     size = len(sigma)
     designer = schedules.Designer(burst, sigma, partial(exact.fisher, burst, size), schedules.Condition())
-    windows = windows_of(spec, burst, designer)
+    windows = windows_of(spec, burst, sigma)
     every = sorted({w for own in windows for w in own})
     image = plans.has_image(burst, every, phase.turns)
     per_window = spec.blocks_per_window or (IMAGE_BLOCKS_PER_WINDOW if image else BLOCKS_PER_WINDOW)[mode]
