@@ -12,6 +12,8 @@ from itertools import pairwise
 WIDE = 20  # high over low from which a range is searched logarithmically
 PER_DECADE, LEAST_POINTS, MOST_POINTS = 5, 25, 61
 EXACTLY = 1e-13  # of a root's size, to which brackets are closed: far below the 1e-9 that is promised
+BILLIONTH = 1e-9
+FIRST_STEP = 1e-4  # of the range, to the second place at which a root is looked for near another
 GOLDEN = (math.sqrt(5) - 1) / 2
 
 Function = Callable[[float], float]
@@ -62,10 +64,11 @@ class Found:
     at_nearest: float
 
 
-def roots(function: Function, over: Range) -> Found:
+def roots(function: Function, over: Range, width: float = EXACTLY) -> Found:
     """All roots that a scan of the range shows: changes of sign, and touching ones where it turns near zero.
 
-    Where the function jumps over zero, the place of the jump counts as one, unless it is undefined between.
+    Where the function jumps over zero, the place of the jump counts as one, unless it is undefined between. Brackets
+    are closed to a part `width` of the root, by default to rounding.
 
     Raises ValueError where the function is defined nowhere on the scan.
     """
@@ -78,10 +81,35 @@ def roots(function: Function, over: Range) -> Found:
     found = [x for x, y in known if y == 0]
     for (a, ya), (b, yb) in pairwise(places):
         if ya * yb < 0:
-            found.append(closed(function, over, (a, ya), (b, yb)))
+            found.append(closed(function, over, (a, ya), (b, yb), width=width))
     found = [x for x in found if not math.isnan(function(x))]
     nearest, at_nearest = min(known, key=lambda one: abs(one[1]))
     return Found(tuple(sorted(found)), nearest, at_nearest)
+
+
+def near(function: Function, over: Range, root: float, near_enough: float) -> float | None:
+    """The root of a function near that of a rougher one: to a billionth, or where |function| <= near_enough.
+
+    None where the function keeps its sign for as far as a tenth of the range.
+    """
+    u, reach = over.inner(root), over.inner(over.high) - over.inner(over.low)
+
+    def place(u: float) -> tuple[float, float]:
+        x = over.outer(u)
+        return x, function(x)
+
+    one = place(u)
+    if abs(one[1]) <= near_enough:
+        return root
+    step, other = FIRST_STEP * reach, place(u + FIRST_STEP * reach)
+    side, before = (1, other) if abs(other[1]) < abs(one[1]) else (-1, one)
+    if one[1] * other[1] > 0:
+        while before[1] * (other := place(u + side * step))[1] > 0 and step < reach / 10:
+            before, step = other, 2 * step
+        one = before
+    if not one[1] * other[1] <= 0:
+        return None
+    return closed(function, over, one, other, lambda x, y: abs(y) <= near_enough, BILLIONTH)
 
 
 def closed(
@@ -90,19 +118,21 @@ def closed(
     one: tuple[float, float],
     other: tuple[float, float],
     near_enough: Callable[[float, float], bool] = lambda x, y: False,
+    width: float = EXACTLY,
 ) -> float:
     """The root between two places (x, y) of opposite signs (Chandrupatla, Adv. Eng. Software 28, 1997, 145-149).
 
-    Ends where near_enough(x, y), at a root, or where the bracket is closed to rounding; where the function jumps over
-    zero, at the jump. Of whole numbers the one beside the change of sign with the smaller value.
+    Ends where near_enough(x, y), at a root, or where the bracket is closed to a part `width` of it, by default to
+    rounding; where the function jumps over zero, at the jump. Of whole numbers the one beside the change of sign with the
+    smaller value.
     """
     (a, fa), (b, fb) = (over.inner(one[0]), one[1]), (over.inner(other[0]), other[1])
     c, fc, t = a, fa, 0.5
     for _ in range(200):
         x = over.outer(a + t * (b - a))
         u = over.inner(x)
-        width = abs(over.outer(b) - over.outer(a))
-        if x in (over.outer(a), over.outer(b)) or width <= EXACTLY * abs(x) or (over.whole and width <= 1):
+        between = abs(over.outer(b) - over.outer(a))
+        if x in (over.outer(a), over.outer(b)) or between <= width * abs(x) or (over.whole and between <= 1):
             break
         f = function(x)
         if f == 0 or near_enough(x, f) or math.isnan(f):

@@ -36,8 +36,13 @@ WHOLE = term("of whole numbers the one beside the target that does at least as w
 MOST_NAMED = 6  # cases that a message lists
 JUMP = 1e-4  # of a quantity: more than means over patterns of plots may jump where others are merged
 JUMPS = term("the quantity jumps over the target there")
+TINY = 1e-300  # in place of nothing
 SAME = 1e-12  # of a quantity: what rounding may make of no change
 TO_CLOSE = 12  # values, beside those of the scan, that bring a root from its bracket to rounding, and its slope
+ROUGH = -1  # in place of a number of realisations
+NEAR_ENOUGH = 1e-10  # of the quantity: how near to its target it ends where it jumps about at a ten-thousandth anyway
+ROUGHLY = 1e-4  # part of a root, to which a rough one is closed
+DOUBT = 0.01  # of the quantity: how near to the target the rough one may come without a root before it is not trusted
 LONG_S = 2.0  # of an answer, from which it is predicted what it takes
 
 Config = str | os.PathLike[str] | Mapping[str, Any]
@@ -241,6 +246,7 @@ class Curve:
         self.known: dict[tuple[float, int], Estimate] = {}
         self.refused: dict[float, ConfigError] = {}
         self.from_tables = False
+        self.rough = False  # whether there are values for less work, for a search to look about
         self.expected = 1
 
     def exact(self, axes: Axes) -> bool:
@@ -257,6 +263,12 @@ class Curve:
     def exactly(self, value: float | None) -> float:
         """The exact quantity at a value (None: as the config has it); not-a-number where there is none."""
         return self._kept(value, 0, self._exact_of).value
+
+    def roughly(self, value: float) -> float:
+        """The same for less work, to a thousandth of σ, where the study has it so; else the exact quantity."""
+        if not self.rough:
+            return self.exactly(value)
+        return self._kept(value, ROUGH, lambda case: self._exact_of(replace(case, roughly=True))).value
 
     def simulated(self, value: float | None, realisations: int) -> Estimate:
         """The quantity with its interval, from so many realisations."""
@@ -312,14 +324,13 @@ def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answ
         told, what + (tr(", each {near}", near=tr(near)) if near else ""), curve.expected * (time.monotonic() - begun)
     )
 
-    def missing(x: float) -> float:
-        return curve.exactly(x) - asked.equals
-
+    curve.rough = bool(near) and not asked.over.whole
     try:
-        found = search.roots(missing, asked.over)
+        found = roots(asked, curve)
     except ValueError:
         raise nowhere(asked, curve) from None
-    refuse_without_effect(asked, [one.value for one in curve.known.values()])
+    counted = ROUGH if curve.rough else 0  # both kinds differ a little where the key has no effect
+    refuse_without_effect(asked, [one.value for (_, count), one in curve.known.items() if count == counted])
     values = found.roots
     if asked.over.whole:
         values = tuple(dict.fromkeys(fulfilling(asked, x, curve.exactly) for x in values))
@@ -338,6 +349,26 @@ def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answ
         + ((WHOLE,) if asked.over.whole and attained != asked.equals else ())
         + ((tr("σ is {what}", what=tr(near)),) if near else ()),
     )
+
+
+def roots(asked: Question, curve: Curve) -> search.Found:
+    """Where the exact quantity reaches the target; first looked for roughly where that is much less work.
+
+    Raises ValueError where it is defined nowhere.
+    """
+
+    def missing(x: float) -> float:
+        return curve.exactly(x) - asked.equals
+
+    if not curve.rough:
+        return search.roots(missing, asked.over)
+    size = max(abs(asked.equals), TINY)
+    found = search.roots(lambda x: curve.roughly(x) - asked.equals, asked.over, ROUGHLY)
+    near = [search.near(missing, asked.over, x, NEAR_ENOUGH * size) for x in found.roots]
+    exactly = [x for x in near if x is not None]
+    if len(exactly) < len(near) or (not near and abs(found.at_nearest) < DOUBT * size):
+        return search.roots(missing, asked.over)
+    return search.Found(tuple(exactly), found.nearest, missing(found.nearest))
 
 
 def predict(told: Callable[[str], None], what: str, seconds: float) -> None:

@@ -17,7 +17,8 @@ class Case:
     name is the stem of its config with ` key=value` for each swept key. spec holds the study's own keys, an object of
     its subclass of `radarsim.config.fields.Study`. noise_of, where given, are the keys of another case, whose noise
     this one shares although its world is another: common random numbers. control_variate: as of the experiment.
-    asked_from_k: exact σ and gains are asked for from this scan on, counted from 1; 0: every exact value.
+    asked_from_k: exact σ and gains are asked for from this scan on, counted from 1; 0: every exact value. roughly: what
+    is long to compute may be off by a thousandth, as where a search only looks about.
     """
 
     name: str
@@ -30,6 +31,7 @@ class Case:
     noise_of: Any = None
     control_variate: bool = False
     asked_from_k: int = 0
+    roughly: bool = False
 
     def resolved(self) -> dict[str, Any]:
         """The case as plain JSON-able data, names included."""

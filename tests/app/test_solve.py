@@ -388,7 +388,7 @@ def test_what_takes_long_is_foretold_with_its_time_and_what_it_is(monkeypatch):
     from radarsim.app import solve as solving
 
     said = []
-    late = {"overrides": [*MISSED, "scans=13"], "between": (10, 20), "told": said.append}
+    late = {"overrides": [*MISSED, "scans=17"], "between": (10, 20), "told": said.append}
     found = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r"), 15, **late)
     words = "a mean over patterns of plots, of which nearly equal ones are merged: right to about a ten-thousandth"
     assert found.notes == (f"σ is {words}",)

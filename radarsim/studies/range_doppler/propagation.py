@@ -1,4 +1,4 @@
-"""The exact error recursion for many filters or patterns of plots at once, B of them side by side.
+"""The exact error recursion for many filters at once, B of them side by side.
 
 Three things run together: P, the covariance that a filter believes, which gives its gains; S, the covariance of what
 the noise of the plots puts into its error; and E (3, C, B), the parts of the error that do not change from plot to
@@ -106,17 +106,6 @@ def outer(E: np.ndarray) -> np.ndarray:
     return made
 
 
-def normalised(P: np.ndarray, M: np.ndarray) -> np.ndarray:
-    """tr(P⁻¹ M) / 3 (B,) of packed P and M, by the factors L D Lᵀ of P, whose digits no scale of the rows changes."""
-    l10, l20 = P[1] / P[0], P[2] / P[0]
-    d1, m = P[3] - l10 * P[1], P[4] - l10 * P[2]
-    l21 = m / d1
-    d2, a = P[5] - l20 * P[2] - l21 * m, l10 * l21 - l20  # L⁻¹ = [[1, 0, 0], [−l10, 1, 0], [a, −l21, 1]]
-    second = M[3] - l10 * (2 * M[1] - l10 * M[0])
-    third = M[5] + a * (a * M[0] + 2 * M[2]) - l21 * (2 * M[4] + 2 * a * M[1] - l21 * M[3])
-    return np.asarray((M[0] / P[0] + second / d1 + third / d2) / 3)
-
-
 def defects(x: np.ndarray, dt: float, plots: Plots, drawn: np.ndarray | None) -> np.ndarray:
     """F x − x⁺ of the truth x (K, 3) at every scan from the one before, for the columns of E: (K, 3, C).
 
@@ -144,15 +133,8 @@ class Information:
     Without process noise, so that the start is the weighted least squares over the plots so far, however they lie.
     """
 
-    def __init__(self, columns: int, count: int = 1):
-        self.L, self.Y = np.zeros((3, 3, count)), np.zeros((3, columns, count))
-
-    @classmethod
-    def of(cls, L: np.ndarray, Y: np.ndarray) -> Self:
-        """Of given arrays."""
-        made = cls(0, 0)
-        made.L, made.Y = L, Y
-        return made
+    def __init__(self, columns: int):
+        self.L, self.Y = np.zeros((3, 3, 1)), np.zeros((3, columns, 1))
 
     def predict(self, dt: float, defect: np.ndarray) -> None:
         """Refer to the next scan, in place: L ← F⁻ᵀ L F⁻¹; the error's columns gain the defect (3, C) of the truth."""

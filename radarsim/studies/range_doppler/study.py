@@ -73,7 +73,7 @@ class Designed:
     """A case's filters and what they see: truth x (K, 3) at times t (K,), plots, D_M (F,), gains of full detection.
 
     drawn (K, 3, 1 + C): how the truth of realisations leaves the model beyond x, as `world.drawn_defects` has it.
-    asked_from_k: as of the case.
+    asked_from_k, roughly: as of the case.
     """
 
     spec: Keys
@@ -84,6 +84,7 @@ class Designed:
     variances: tuple[float, ...]
     filters: tuple[filters.LinearFilter, ...]
     asked_from_k: int = 0
+    roughly: bool = False
 
     @property
     def dt(self) -> float:
@@ -112,7 +113,7 @@ def designed(case: Case) -> Designed:
         filters.design(len(f.observes), f.plots_to_start, variance, plots.sigma, dt, len(t), f.process_noise)
         for f, variance in zip(spec.filters, variances, strict=True)
     )
-    return Designed(spec, t, x, drawn, plots, variances, tuple(made), case.asked_from_k)
+    return Designed(spec, t, x, drawn, plots, variances, tuple(made), case.asked_from_k, case.roughly)
 
 
 def plots_of(spec: Keys) -> Plots:
@@ -305,22 +306,23 @@ def means(design: patterns.Design, beside: Sequence[patterns.Design], made: Desi
     seen = [part[: design.observes] for part in made.plots[:3]]
     arrays = (design.Q, *seen, made.x, made.drawn)
     others = tuple((one.observes, one.start) for one in beside)
-    key = (design[:2], others, made.dt, made.asked_from_k, made.plots.detection, *(array.tobytes() for array in arrays))
-    if key not in _MEANS:
-        if len(_MEANS) >= MOST_MEANS:
-            del _MEANS[next(iter(_MEANS))]
-        _MEANS[key] = over_patterns(design, beside, made)
-    return _MEANS[key]
+    asked = made.dt, made.asked_from_k, made.roughly, made.plots.detection
+    key = (design[:2], others, *asked, *(array.tobytes() for array in arrays))
+    found = _MEANS.pop(key) if key in _MEANS else over_patterns(design, beside, made)
+    if len(_MEANS) >= MOST_MEANS:
+        del _MEANS[next(iter(_MEANS))]
+    _MEANS[key] = found
+    return found
 
 
 def over_patterns(design: patterns.Design, beside: Sequence[patterns.Design], made: Designed) -> Means:
     """The means of one filter over the patterns, of which as many are kept as it takes."""
 
     def kept(most: int) -> patterns.Mixture:
-        return patterns.mixture(design, made.plots, made.x, made.dt, most, beside, made.drawn)
+        return patterns.mixture(design, made.plots, made.x, made.dt, most, beside, made.drawn, made.asked_from_k)
 
-    if 2 ** len(made.t) <= patterns.WHOLE:
-        whole = kept(patterns.WHOLE)
+    if made.roughly or 2 ** len(made.t) <= patterns.WHOLE:
+        whole = kept(patterns.KEPT[0] if made.roughly else patterns.WHOLE)
         return Means(np.sqrt(whole.moment), whole.bias, whole.nees, np.sqrt(whole.beside))
     mixtures = map(kept, patterns.KEPT)
     coarse, fine = next(mixtures), next(mixtures)

@@ -1,0 +1,328 @@
+"""Means over the patterns of plots that came and that did not: P, S and E of `propagation` for each, eight at a time.
+
+Patterns lie in blocks of eight. A block holds the rows of its patterns one after the other, each of eight numbers:
+P (6) and S (6) packed, E (3 C), their probability, plots so far, and whether the last scan had one. What is beyond the
+last pattern has no probability. Patterns in which the filter has not started are few; they lie one by one.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from radarsim.kernels.compile import inline, kernel, part
+from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, total, where_greater
+from radarsim.studies.range_doppler.kernels.chunk import transported
+from radarsim.studies.range_doppler.kernels.merging import ALIKE, FURTHER, at, blocks_of, height, merge, pad
+from radarsim.studies.range_doppler.kernels.steps import inverted
+
+NEGLIGIBLE = 1e-18  # probability of a pattern that is left out
+OWN, BESIDE = 14, 6  # means of a scan: of the filter, and of each one beside it
+FIRST = 11  # of the probabilities of a plot alone
+
+
+class World(NamedTuple):
+    """What a filter sees over K scans, and what is asked of it.
+
+    defect     (K, 3, C)  of the truth at every scan from the one before, as `propagation.defects` has it
+    Q          (6,)       covariance that a scan adds, packed
+    R          (2,)       variances of the plots
+    inputs     (2, C)     what the plots add to the columns of E
+    of_plot    (2, 2)     mean error and mean square error of a plot alone, of range and velocity
+    others     (G, 2)     of G filters beside it: what they observe, plots in their starts
+    detection             probability that a scan has its plot
+    dt                    scan period, s
+    observes              1: the filter observes the range alone; 2: range and velocity
+    start                 plots in its least-squares start
+    enough                plots with which all filters have started
+    most                  patterns that are kept
+    from_k                scan, counted from 1, from which means are taken
+    """
+
+    defect: np.ndarray
+    Q: np.ndarray
+    R: np.ndarray
+    inputs: np.ndarray
+    of_plot: np.ndarray
+    others: np.ndarray
+    detection: float
+    dt: float
+    observes: int
+    start: int
+    enough: int
+    most: int
+    from_k: int
+
+
+@inline
+def six(p, first):
+    """A packed matrix from six rows."""
+    return get(p, first), get(p, first + 1), get(p, first + 2), get(p, first + 3), get(p, first + 4), get(p, first + 5)
+
+
+@inline
+def put_six(p, first, m):
+    """Write a packed matrix to six rows."""
+    put(p, first, m[0])
+    put(p, first + 1, m[1])
+    put(p, first + 2, m[2])
+    put(p, first + 3, m[3])
+    put(p, first + 4, m[4])
+    put(p, first + 5, m[5])
+
+
+@part
+def predict(rows, n, columns, dt, Q, defect):
+    """Go to the next scan, in place."""
+    high, h = height(columns), 0.5 * dt * dt
+    for j in range(blocks_of(n)):
+        p = row(rows, j * high)
+        m = transported(six(p, 0), dt)
+        put_six(p, 0, (m[0] + Q[0], m[1] + Q[1], m[2] + Q[2], m[3] + Q[3], m[4] + Q[4], m[5] + Q[5]))
+        put_six(p, 6, transported(six(p, 6), dt))
+        for c in range(columns):
+            r, v, a = get(p, 12 + c), get(p, 12 + columns + c), get(p, 12 + 2 * columns + c)
+            put(p, 12 + c, r + dt * v + h * a + defect[0, c])
+            put(p, 12 + columns + c, v + dt * a + defect[1, c])
+            put(p, 12 + 2 * columns + c, a + defect[2, c])
+
+
+@inline
+def taken_in(s, own, more, g):
+    """(I − K h) S (I − K h)ᵀ + K R Kᵀ of a packed S, by its column h, `own`, the same number's variance and R, `more`,
+    and the gains g."""
+    d0, d1, d2 = own[0] - g[0] * more, own[1] - g[1] * more, own[2] - g[2] * more
+    return (
+        s[0] - g[0] * own[0] - d0 * g[0],
+        s[1] - g[0] * own[1] - d0 * g[1],
+        s[2] - g[0] * own[2] - d0 * g[2],
+        s[3] - g[1] * own[1] - d1 * g[1],
+        s[4] - g[1] * own[2] - d1 * g[2],
+        s[5] - g[2] * own[2] - d2 * g[2],
+    )
+
+
+@inline
+def move_columns(p, g, columns, inputs, m):
+    """The columns of E with their share of the plot's error of number m."""
+    for c in range(columns):
+        e = inputs[m, c] - get(p, 12 + m * columns + c)
+        put(p, 12 + c, get(p, 12 + c) + g[0] * e)
+        put(p, 12 + columns + c, get(p, 12 + columns + c) + g[1] * e)
+        put(p, 12 + 2 * columns + c, get(p, 12 + 2 * columns + c) + g[2] * e)
+
+
+@part
+def update(rows, n, columns, world):
+    """Give every pattern the scan's plot, in place, one number after the other: the noises are independent."""
+    high, p_detected, enough = height(columns), world.detection, full(float(world.enough))
+    for j in range(blocks_of(n)):
+        p = row(rows, j * high)
+        P, S, R = six(p, 0), six(p, 6), world.R[0]
+        weight = 1.0 / (P[0] + R)
+        g = P[0] * weight, P[1] * weight, P[2] * weight
+        P, S = taken_in(P, P[:3], P[0] + R, g), taken_in(S, S[:3], S[0] + R, g)
+        move_columns(p, g, columns, world.inputs, 0)
+        if world.observes == 2:
+            R = world.R[1]
+            of_P, of_S = (P[1], P[3], P[4]), (S[1], S[3], S[4])
+            weight = 1.0 / (P[3] + R)
+            g = P[1] * weight, P[3] * weight, P[4] * weight
+            P, S = taken_in(P, of_P, P[3] + R, g), taken_in(S, of_S, S[3] + R, g)
+            move_columns(p, g, columns, world.inputs, 1)
+        put_six(p, 0, P)
+        put_six(p, 6, S)
+        last = high - FURTHER
+        put(p, last, get(p, last) * p_detected)
+        count = get(p, last + 1) + 1.0
+        put(p, last + 1, where_greater(count, enough, enough, count))
+        put(p, last + 2, full(1.0))
+
+
+@part
+def branch(rows, n, columns, world):
+    """Each of n patterns without the next scan's plot, and with it; how many there are then."""
+    high, width = height(columns), blocks_of(n)
+    if world.detection == 1.0 or n == 0:
+        update(rows, n, columns, world)
+        return n
+    last = high - FURTHER
+    for j in range(width):
+        p, q = row(rows, j * high), row(rows, (width + j) * high)
+        for i in range(last):
+            put(q, i, get(p, i))
+        put(q, last, get(p, last) * (1.0 - world.detection))
+        put(q, last + 1, get(p, last + 1))
+        put(q, last + 2, full(0.0))
+    update(rows, n, columns, world)
+    missing = width * WIDTH - n  # places of the last block with a plot that hold none: filled from the end
+    for b in range(min(missing, n)):
+        to, source = at(n + b, high), at(width * WIDTH + n - 1 - b, high)
+        for i in range(high):
+            rows[to + i * WIDTH] = rows[source + i * WIDTH]
+    pad(rows, 2 * n, high)
+    return 2 * n
+
+
+@part
+def refer(L, columns, dt, defect):
+    """Refer a start in the making to the next scan, in place: L ← F⁻ᵀ L F⁻¹; Y gains L times the defect."""
+    l5, l4, l2, l3, l1, l0 = transported((L[5], L[4], L[2], L[3], L[1], L[0]), -dt)
+    L[0], L[1], L[2], L[3], L[4], L[5] = l0, l1, l2, l3, l4, l5
+    for c in range(columns):
+        y0, y1, y2 = L[6 + c], L[6 + columns + c], L[6 + 2 * columns + c]
+        d0, d1, d2 = defect[0, c], defect[1, c], defect[2, c]
+        L[6 + c] = y0 + l0 * d0 + l1 * d1 + l2 * d2
+        L[6 + columns + c] = y1 - dt * y0 + l1 * d0 + l3 * d1 + l4 * d2
+        L[6 + 2 * columns + c] = y2 - dt * y1 + 0.5 * dt * dt * y0 + l2 * d0 + l4 * d1 + l5 * d2
+
+
+@part
+def begin(rows, n, L, columns):
+    """A pattern more, the n-th, which starts with the sums L."""
+    high, P = height(columns), inverted((L[0], L[1], L[2], L[3], L[4], L[5]))
+    first = at(n, high)
+    for i in range(6):
+        rows[first + i * WIDTH] = rows[first + (6 + i) * WIDTH] = P[i]
+    for c in range(columns):
+        y0, y1, y2 = L[6 + c], L[6 + columns + c], L[6 + 2 * columns + c]
+        rows[first + (12 + c) * WIDTH] = P[0] * y0 + P[1] * y1 + P[2] * y2
+        rows[first + (12 + columns + c) * WIDTH] = P[1] * y0 + P[3] * y1 + P[4] * y2
+        rows[first + (12 + 2 * columns + c) * WIDTH] = P[2] * y0 + P[4] * y1 + P[5] * y2
+    for i in range(FURTHER):
+        rows[first + (high - FURTHER + i) * WIDTH] = L[6 + 3 * columns + i]
+
+
+@part
+def wait(room, rows, n, held, world, defect):
+    """The patterns that have not started, `held` of them, through a scan: those with their plots begin.
+
+    How many have started then, and how many wait.
+    """
+    columns, kept = defect.shape[1], 0
+    last = 6 + 3 * columns
+    for b in range(held):
+        old = room.waiting[b]
+        refer(old, columns, world.dt, defect)
+        weight, count = old[last], old[last + 1]
+        if weight * (1.0 - world.detection) > NEGLIGIBLE:
+            new = room.following[kept]
+            new[:] = old
+            new[last], new[last + 2] = weight * (1.0 - world.detection), 0.0
+            kept += 1
+        if weight * world.detection > NEGLIGIBLE:
+            for m in range(world.observes):
+                old[3 * m] += 1.0 / world.R[m]  # of 00, 01, 02, 11, …
+                for c in range(columns):
+                    old[6 + m * columns + c] += world.inputs[m, c] / world.R[m]
+            old[last], old[last + 1], old[last + 2] = weight * world.detection, count + 1.0, 1.0
+            if count + 1.0 == world.start:
+                begin(rows, n, old, columns)
+                n += 1
+            else:
+                room.following[kept, :] = old
+                kept += 1
+    room.waiting[:kept] = room.following[:kept]
+    pad(rows, n, height(columns))
+    return n, kept
+
+
+@inline
+def normalised(P, M):
+    """tr(P⁻¹ M) / 3 of packed P and M, by the factors L D Lᵀ of P, whose digits no scale of the rows changes."""
+    l10, l20 = P[1] / P[0], P[2] / P[0]
+    d1, m = P[3] - l10 * P[1], P[4] - l10 * P[2]
+    l21 = m / d1
+    d2, a = P[5] - l20 * P[2] - l21 * m, l10 * l21 - l20  # L⁻¹ = [[1, 0, 0], [−l10, 1, 0], [a, −l21, 1]]
+    second = M[3] - l10 * (2.0 * M[1] - l10 * M[0])
+    third = M[5] + a * (a * M[0] + 2.0 * M[2]) - l21 * (2.0 * M[4] + 2.0 * a * M[1] - l21 * M[3])
+    return (M[0] / P[0] + second / d1 + third / d2) / 3.0
+
+
+@inline
+def second_moment(p, columns):
+    """S + E Eᵀ, packed, of a block."""
+    s0, s1, s2, s3, s4, s5 = six(p, 6)
+    for c in range(columns):
+        r, v, a = get(p, 12 + c), get(p, 12 + columns + c), get(p, 12 + 2 * columns + c)
+        s0, s1, s2, s3, s4, s5 = s0 + r * r, s1 + r * v, s2 + r * a, s3 + v * v, s4 + v * a, s5 + a * a
+    return s0, s1, s2, s3, s4, s5
+
+
+@part
+def note_started(rows, n, columns, world, found):
+    """Add to the means of a scan, found (OWN + G BESIDE,): those of the patterns in which the filter has started.
+
+    Their probability, NEES, bias (3), e² (3), believed variance (3), each times the probability; of each filter beside
+    it the probability (3) that it has an estimate too, and e² there (3).
+    """
+    high, none = height(columns), full(0.0)
+    last = high - FURTHER
+    w0 = q0 = b0 = b1 = b2 = m0 = m1 = m2 = v0 = v1 = v2 = none
+    for j in range(blocks_of(n)):
+        p = row(rows, j * high)
+        w, P, M = get(p, last), six(p, 0), second_moment(p, columns)
+        w0, q0 = w0 + w, q0 + w * normalised(P, M)
+        b0, b1, b2 = b0 + w * get(p, 12), b1 + w * get(p, 12 + columns), b2 + w * get(p, 12 + 2 * columns)
+        m0, m1, m2 = m0 + w * M[0], m1 + w * M[3], m2 + w * M[5]
+        v0, v1, v2 = v0 + w * P[0], v1 + w * P[3], v2 + w * P[5]
+    for i, sum_of in enumerate((w0, q0, b0, b1, b2, m0, m1, m2, v0, v1, v2)):
+        found[i] += total(sum_of)
+    for g in range(len(world.others)):
+        note_beside(rows, n, columns, world.others[g], found[OWN + g * BESIDE :])
+
+
+@part
+def note_beside(rows, n, columns, other, found):
+    """Of the started patterns those in which another filter has an estimate as well: probabilities (3), e² (3)."""
+    high, none, one = height(columns), full(0.0), full(1.0)
+    last, enough = high - FURTHER, full(other[1] - 0.5)
+    sees = full(1.0 if other[0] == 2 else 0.0)
+    s0 = s1 = s2 = m0 = m1 = m2 = none
+    for j in range(blocks_of(n)):
+        p = row(rows, j * high)
+        w, M, hit, count = get(p, last), second_moment(p, columns), get(p, last + 2), get(p, last + 1)
+        w0 = w * where_greater(count, enough, one, hit)
+        w1 = w * where_greater(count, enough, one, sees * hit)
+        w2 = w * where_greater(count, enough, one, none)
+        s0, s1, s2 = s0 + w0, s1 + w1, s2 + w2
+        m0, m1, m2 = m0 + w0 * M[0], m1 + w1 * M[3], m2 + w2 * M[5]
+    for i, sum_of in enumerate((s0, s1, s2, m0, m1, m2)):
+        found[i] += total(sum_of)
+
+
+@part
+def note_waiting(waiting, held, columns, world, found):
+    """The same of those that have not started: where a plot came it is the estimate, of what it holds."""
+    last = 6 + 3 * columns
+    for b in range(held):
+        if waiting[b, last + 2] == 1.0:
+            w, count = waiting[b, last], waiting[b, last + 1]
+            for m in range(world.observes):
+                found[FIRST + m] += w
+                found[2 + m] += w * world.of_plot[m, 0]
+                found[5 + m] += w * world.of_plot[m, 1]
+                found[8 + m] += w * world.R[m]
+                for g in range(len(world.others)):
+                    if m < world.others[g, 0] or count >= world.others[g, 1]:
+                        first = OWN + g * BESIDE + m
+                        found[first] += w
+                        found[first + 3] += w * world.of_plot[m, 1]
+
+
+@kernel
+def add_means(room, world, found):
+    """`patterns.mixture`: the sums of each scan into found (K, OWN + G BESIDE), in a `merging.room`."""
+    rows, spare, columns = address(room.rows), address(room.spare), world.defect.shape[2]
+    n, held, alike = 0, 1, ALIKE
+    room.waiting[0, :] = 0.0
+    room.waiting[0, 6 + 3 * columns] = 1.0
+    for k in range(len(world.defect)):
+        predict(rows, n, columns, world.dt, world.Q, world.defect[k])
+        n = branch(rows, n, columns, world)
+        n, held = wait(room, rows, n, held, world, world.defect[k])
+        if k + 1 >= world.from_k:
+            note_started(rows, n, columns, world, found[k])
+            note_waiting(room.waiting, held, columns, world, found[k])
+        if n > world.most:
+            n, alike = merge(room, rows, spare, n, columns, world.most, alike)
+            rows, spare = spare, rows
