@@ -123,8 +123,8 @@ def closed(
     """The root between two places (x, y) of opposite signs (Chandrupatla, Adv. Eng. Software 28, 1997, 145-149).
 
     Ends where near_enough(x, y), at a root, or where the bracket is closed to a part `width` of it, by default to
-    rounding; where the function jumps over zero, at the jump. Of whole numbers the one beside the change of sign with the
-    smaller value.
+    rounding; where the function jumps over zero, at the jump. Of whole numbers the one beside the change of sign with
+    the smaller value.
     """
     (a, fa), (b, fb) = (over.inner(one[0]), one[1]), (over.inner(other[0]), other[1])
     c, fc, t = a, fa, 0.5

@@ -26,6 +26,17 @@ def test_all_roots_are_found_to_rounding(function, expected):
     assert search.roots(function, RANGE).roots == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.parametrize("off", [0.9, 0.99, 0.999999, 1.0, 1.001, 1.1])
+@pytest.mark.parametrize("function", [lambda x: math.log(x / 5), lambda x: 1 / x - 0.2, lambda x: x**3 - 125])
+def test_a_root_is_found_near_one_that_is_a_little_off(function, off):
+    assert search.near(function, RANGE, 5 * off, 0.0) == pytest.approx(5, rel=1e-9)
+
+
+def test_a_function_that_keeps_its_sign_has_no_root_near():
+    assert search.near(lambda x: 1 + x, RANGE, 5.0, 0.0) is None
+    assert search.near(lambda x: (x - 5) ** 2 + 1e-3, RANGE, 5.0, 0.0) is None
+
+
 def test_many_roots_on_a_linear_scale():
     found = search.roots(math.sin, search.searched(1.0, 19.5)).roots
     assert found == pytest.approx([math.pi * n for n in range(1, 7)], rel=1e-12)

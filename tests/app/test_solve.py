@@ -392,6 +392,7 @@ def test_what_takes_long_is_foretold_with_its_time_and_what_it_is(monkeypatch):
     found = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r"), 15, **late)
     words = "a mean over patterns of plots, of which nearly equal ones are merged: right to about a ten-thousandth"
     assert found.notes == (f"σ is {words}",)
+    assert found.attained == pytest.approx(15, abs=1e-6)  # first looked for roughly, then of the exact quantity
     monkeypatch.setattr(solving, "LONG_S", 0.0)
     solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r", at_k=11), 15, **late)
     solve("rls2", "radar.sigma_velocity_mps", GAIN, 30, sampled=True, realisations=400, told=said.append)

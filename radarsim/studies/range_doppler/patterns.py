@@ -5,10 +5,10 @@ mean, weighted by the patterns' probabilities. Their number doubles at every sca
 covariances agree to a small fraction are merged, the less probable ones sooner: these have the same gains from then on,
 and what they have been through is kept by the first two moments of their errors, so that the merging errs by about the
 square of that fraction. How much it errs is seen by merging to a quarter as many. Where that changes σ by more than
-`CLOSE`, more are kept; where it still does with the most of `KEPT`, no exact value is given. The finer one then erred by
-no more than 0.6 of the change (tried against all 524 288 patterns of 19 scans: measured, not proved. What can be proved,
-as predictions and updates move no two covariances apart by a greater factor, is of first order in the fraction, and
-thousands of times too wide).
+`CLOSE`, more are kept; where it still does with the most of `KEPT`, no exact value is given. The finer one then erred
+by at most 0.6 of the change, against all 524 288 patterns of 19 scans: measured, not proved. What follows from
+predictions and updates never moving two covariances apart by a greater factor is a bound of first order in the
+fraction, not of second.
 """
 
 import math
