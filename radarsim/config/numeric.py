@@ -5,11 +5,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_origin
 
-from radarsim.config.check import unknown_key
 from radarsim.config.faults import dotted
 from radarsim.config.fields import Model, Study, Whole, in_degrees, in_radians
 from radarsim.config.lookup import did_you_mean
 from radarsim.errors import ConfigError
+
+MOST_NAMED = 5  # keys that begin as a mistaken name does and are all suggested
 
 
 @dataclass(frozen=True)
@@ -148,9 +149,25 @@ def _no_such(name: str, spec: Study, known: list[str]) -> str:
         elif isinstance(value, tuple) and step.isdecimal() and int(step) < len(value):
             value = value[int(step)]
         else:
-            near = did_you_mean(name, known) or _by_last(name, known)
-            return unknown_key(name, known) if not near else f"unknown key{near}"
+            near = _several(name, known) or did_you_mean(name, known) or _by_last(name, known)
+            return f"unknown key{near}" + ("" if near and "." not in name else _in_group(name, known))
     return "holds no number, and only a number can be solved for"
+
+
+def _several(name: str, known: list[str]) -> str:
+    """A suggestion of all the keys that begin as a name does, where they are a few."""
+    begun = [path for path in known if len(name) > 2 and path.startswith(name)]
+    return f"; did you mean {' or '.join(begun)}?" if 1 < len(begun) <= MOST_NAMED else ""
+
+
+def _in_group(name: str, known: list[str]) -> str:
+    """What there is in the group of a name, or which groups and single keys there are."""
+    group = name.rpartition(".")[0]
+    while group and not any(path.startswith(f"{group}.") for path in known):
+        group = group.rpartition(".")[0]
+    inside = [path[len(group) + 1 if group else 0 :] for path in known if not group or path.startswith(f"{group}.")]
+    parts = dict.fromkeys(f"{path.partition('.')[0]}." if "." in path else path for path in inside)
+    return f"; {group or 'there'} {'has' if group else 'are'} {', '.join(parts)}"
 
 
 def _by_last(name: str, known: list[str]) -> str:

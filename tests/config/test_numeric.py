@@ -63,8 +63,10 @@ def test_a_bare_filter_key_means_every_filter_and_degrees_are_understood():
         ("sigma_range_m", "did you mean radar.sigma_range_m?"),
         ("radar.name", "holds no number"),
         ("filters", "holds no number"),
-        ("zzz", "allowed: radar.wavelength_m"),
-        ("filters.7.manoeuvre_variance", "unknown key"),
+        ("zzz", "unknown key; there are radar., target., filters., scans, "),
+        ("radar.sigma", "did you mean radar.sigma_range_m or radar.sigma_velocity_mps or "),
+        ("radar.zzz", "unknown key; radar has wavelength_m, sigma_range_m, "),
+        ("filters.7.manoeuvre_variance", "did you mean filters.1.manoeuvre_variance?; filters has 0., 1."),
         ("", "unknown key"),
     ],
 )
