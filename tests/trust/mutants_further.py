@@ -249,7 +249,7 @@ DRAWN_FLIGHTS = (
         (
             "np.linalg.eigh(products - np.outer(total, total))",
             "np.linalg.eigh(products)",
-            f"{P1_WORLD}::test_sums_over_drawn_flights_agree_with_the_exact_errors",
+            f"{P1_WORLD}::test_how_drawn_flights_leave_the_model_has_the_moments_of_those_flights",
         ),
     ),
     *mutants(

@@ -13,7 +13,7 @@ from radarsim.app.configs import load
 from radarsim.errors import ConfigError
 from radarsim.kernels.random import fill_normal_pairs
 from radarsim.physics.motion import process_noise
-from radarsim.studies.range_doppler import patterns, study, tuning
+from radarsim.studies.range_doppler import patterns, study, tuning, world
 from radarsim.studies.range_doppler.kernels import missed
 from radarsim.studies.range_doppler.propagation import Plots
 from tests.studies.range_doppler import naive
@@ -410,10 +410,30 @@ def test_sums_over_drawn_flights_agree_with_the_exact_errors(changes, tmp_path, 
     assert np.abs(axes.exact_sigma[there] / fixed.exact_sigma[there] - 1).max() > 1e-3  # what is drawn matters
 
 
+@pytest.mark.parametrize("target", [TURN, FLY_BY], ids=lambda target: target["kind"])
+def test_how_drawn_flights_leave_the_model_has_the_moments_of_those_flights(target):
+    """Mean and covariance in plain NumPy, on flights so widely drawn that the mean counts in the covariance."""
+    case = case_of(target=target | DRAWN)
+    t = DT * np.arange(9.0)
+    middle = world.true_motion(case)[1]
+    flown, weights = [], []
+    for share, shifts in world.displacements(world.sigma_flight(case.spec.target)):
+        flown.append(world.left(world.displaced(world.flight(case.spec.target, t), shifts, t), DT))
+        weights.append(share)
+    left, weights = np.concatenate(flown) - world.left(middle[None], DT), np.concatenate(weights)
+    mean = np.average(left, axis=0, weights=weights)
+    flat = left.reshape(len(left), -1)
+    covariance = np.cov(flat.T, aweights=weights, ddof=0)
+    found = world.drawn_defects(case.spec.target, t, middle)
+    np.testing.assert_allclose(found[..., 0], mean, rtol=1e-9, atol=1e-12 * np.abs(mean).max())
+    columns = found[..., 1:].reshape(flat.shape[1], -1)
+    scale = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
+    np.testing.assert_array_less(np.abs(columns @ columns.T - covariance), 1e-6 * scale + 1e-30)
+    assert (np.outer(mean, mean).diagonal() > 1e-4 * np.diag(covariance)).any()
+
+
 def test_the_mean_over_drawn_flights_has_settled(monkeypatch):
     """As widely drawn as is allowed, two more nodes in each number change it by less than the stated millionth."""
-    from radarsim.studies.range_doppler import world
-
     widest = TURN | {"sigma_position_m": 4000, "sigma_velocity_mps": 10}
     for target in (widest, FLY_BY | {"sigma_position_m": 2400}):
         plans = [prepared(target=target)]
