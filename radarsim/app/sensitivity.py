@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MORE = 0.1
+UNPAIRED = 4  # times the realisations behind a change of the scan times, whose noise falls on other times
 BATCHES = 20  # of one case: their spread has 19 degrees of freedom
 MOST_BARS = 16
 NOTHING = 1e-9  # per cent: what rounding may make of no change
@@ -51,7 +52,8 @@ class Sensitivity:
     """What was found: one row a key, filter and component, by falling effect of the key on the component that leads.
 
     at says when; without_effect are keys that change nothing, left_out those that cannot be raised, with the reason.
-    without_estimate are filters that no row is about, as they have no estimate there.
+    without_estimate are filters that no row is about, as they have no estimate there. not_paired are sampled keys that
+    change when the scans are.
     labels: what people call each key of the rows, with its symbol and unit.
     """
 
@@ -61,6 +63,7 @@ class Sensitivity:
     rows: tuple[dict[Hashable, Any], ...]
     without_effect: tuple[str, ...]
     without_estimate: tuple[str, ...]
+    not_paired: tuple[str, ...]
     left_out: dict[str, str]
     labels: dict[str, Label]
 
@@ -94,11 +97,13 @@ def sensitivity(
     if not np.isfinite(base.whole[0]).any():
         raise ConfigError("there is no estimate there")
     keys = [key for key in numeric.keys(cases.base.spec) if key.value and not ("." not in key.path and key.whole)]
-    rows, left_out = [], {}
+    rows, left_out, apart = [], {}, list[str]()
     for n, key in enumerate(keys):
         try:
             raised = cases.at(key.path, more(key))
-            rows += look.rows(cases.base, key, base, look.of(raised))
+            before, after = look.pair(cases.base, base, raised)
+            rows += look.rows(cases.base, key, before, after)
+            apart += [key.path] if before is not base else []
         except ConfigError as error:
             left_out[key.path] = error.lines[0]
         if progress is not None:
@@ -110,7 +115,7 @@ def sensitivity(
     labels = {str(row["key"]): named(cases.base.spec, str(row["key"])) for row in shown}
     silent = [name for name, own in zip(axes.filters, base.whole[0], strict=True) if not np.isfinite(own).any()]
     return Sensitivity(
-        cases.base.stem, leading, when(asked), tuple(shown), tuple(idle), tuple(silent), left_out, labels
+        cases.base.stem, leading, when(asked), tuple(shown), tuple(idle), tuple(silent), tuple(apart), left_out, labels
     )
 
 
@@ -148,10 +153,12 @@ def size(rows: Sequence[dict[Hashable, Any]], path: str, leading: str) -> tuple[
 
 class Seen(NamedTuple):
     """σ, and gain in per cent, of F filters and C components at one time: of the whole case (2, F, C), and of all its
-    realisations but one of n batches (2, n, F, C), n = 1 where exact. Not-a-number where there is no estimate."""
+    realisations but one of n batches (2, n, F, C), n = 1 where exact. Not-a-number where there is no estimate.
+    t_s (K,) are the times of the scans, s."""
 
     whole: np.ndarray
     but_one: np.ndarray
+    t_s: np.ndarray
 
     @property
     def exact(self) -> bool:
@@ -175,6 +182,18 @@ class Look:
         """σ or gain of one filter and component."""
         return replace(self.asked, kind=kind, filter=self.axes.filters[f], component=self.axes.components[c][0])
 
+    def pair(self, case: Case, base: Seen, raised: Case) -> tuple[Seen, Seen]:
+        """What a case, `base` with the usual realisations, and a raised one show. Raises ConfigError.
+
+        With more of them where both are sampled at a time and the scan times differ: that time then has noise of other
+        scans in each, so that the interval of the change is that of two runs of their own.
+        """
+        seen = self.of(raised)
+        if base.exact or self.asked.at_s is None or np.array_equal(base.t_s, seen.t_s):
+            return base, seen
+        longer = replace(self, realisations=UNPAIRED * self.realisations)
+        return longer.of(case), longer.of(raised)
+
     def of(self, case: Case) -> Seen:
         """What a case shows. Raises ConfigError."""
         if not registry.study(case.study).exact_errors:
@@ -183,7 +202,7 @@ class Look:
         known = self._each(lambda quantity: quantities.exact(quantity, case, axes))
         # Of some filters alone, the others would seem to change nothing.
         exact = np.isfinite(known[0]).any(axis=1).all()
-        return Seen(known, known[:, None]) if exact else self._sampled(case)
+        return Seen(known, known[:, None], np.asarray(axes.t_s)) if exact else self._sampled(case)
 
     def _each(self, of: Callable[[Quantity], float]) -> np.ndarray:
         """(2, F, C) of a function of the quantity."""
@@ -195,7 +214,8 @@ class Look:
         batches = [work.simulate(batch * each, each) for batch in range(BATCHES)]
         total, others = np.sum(batches, axis=0), (BATCHES - 1) * each
         but_one = [self._of_sums(case, work, total - sums, others) for sums in batches]
-        return Seen(self._of_sums(case, work, total, BATCHES * each), np.stack(but_one, axis=1))
+        whole = self._of_sums(case, work, total, BATCHES * each)
+        return Seen(whole, np.stack(but_one, axis=1), np.asarray(work.plan.axes.t_s))
 
     def _of_sums(self, case: Case, work: CaseWork, packed: np.ndarray, count: int) -> np.ndarray:
         sums = work.plan.layout.unpack(packed)

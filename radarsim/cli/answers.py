@@ -95,6 +95,11 @@ def print_sensitivity(found: "Sensitivity", written: "Sequence[str]") -> None:
         field("no effect", ", ".join(found.without_effect))
     if found.without_estimate:
         field("no estimate", ", ".join(found.without_estimate))
+    if found.not_paired:
+        what = tr(
+            "{keys}: the scans are at other times, so each has noise of its own", keys=", ".join(found.not_paired)
+        )
+        field("not paired", what)
     for key, reason in found.left_out.items():
         field("left out", f"{key}: {reason}")
     field("files", ", ".join(written))

@@ -163,3 +163,17 @@ def test_items_of_a_list_are_raised_though_the_config_gives_degrees():
     given = {r["key"]: (r["value"], r["changed_value"]) for r in found.rows} | dict.fromkeys(found.without_effect)
     assert {"target.bearing_rad.0", "target.bearing_rad.1"} <= set(given)
     assert all(abs(r["sigma_change_percent"]) == 0 or abs(r["sigma_change_percent"]) > 1e-9 for r in found.rows)
+
+
+def test_a_changed_period_is_not_paired_and_has_more_realisations(monkeypatch):
+    """With exact values withheld: its interval holds the exact change, and the others stay paired."""
+    known = sensitivity("rls2", overrides=["scans=7"])
+    monkeypatch.setattr(finding.quantities, "exact", lambda *_: np.nan)
+    found = sensitivity("rls2", overrides=["scans=7"], realisations=2000)
+    assert found.not_paired == ("radar.scan_period_s",)
+    one, exactly = (row(of, "radar.scan_period_s")["sigma_change_percent"] for of in (found, known))
+    whole = row(found, "radar.scan_period_s")
+    half = (whole["sigma_change_hi"] - whole["sigma_change_lo"]) / 2
+    assert abs(one - exactly) < 2 * half
+    assert half < 2 * 100 * 1.96 / np.sqrt(2 * 2000)
+    assert known.not_paired == ()
