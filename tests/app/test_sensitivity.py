@@ -165,6 +165,7 @@ def test_items_of_a_list_are_raised_though_the_config_gives_degrees():
     assert all(abs(r["sigma_change_percent"]) == 0 or abs(r["sigma_change_percent"]) > 1e-9 for r in found.rows)
 
 
+@pytest.mark.slow
 def test_a_changed_period_is_not_paired_and_has_more_realisations(monkeypatch):
     """With exact values withheld: its interval holds the exact change, and the others stay paired."""
     known = sensitivity("rls2", overrides=["scans=7"])
