@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from radarsim.bursts.kernels.lanes import PASSES, lane
-from radarsim.kernels.compile import inline, kernel
+from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH
 from radarsim.kernels.random import normals
 from radarsim.studies.pulses_to_tracks.kernels.estimate import estimate, room_for
@@ -39,7 +39,7 @@ from radarsim.studies.pulses_to_tracks.kernels.steps import (
 )
 
 
-@kernel
+@part
 def take_ranges(world, own, k, first, tracks):
     """Predict all tracks (n, 9) to scan k and take its range; the first sets it, and draws the designation."""
     variance = world.sigma_r**2
@@ -61,7 +61,7 @@ def level(own, c, sigma):
     return int(min(max(down, 0.0), own.levels[c] - 1.0))
 
 
-@kernel
+@part
 def make_forecasts(world, own, k, first, work):
     """Errors (n, 2) of the forecasts of velocity and acceleration, and entries (n,) of the menu.
 
@@ -78,12 +78,32 @@ def make_forecasts(world, own, k, first, work):
             forecasts[i, 0], forecasts[i, 1], entries[i] = own.fixed[0] * x, own.fixed[1] * y, 0
 
 
-@kernel
+@part
+def in_order(entries):
+    """The places of the entries (n,) in rising order, equal ones as they come.
+
+    A counting sort, since entries are few: Numba's own takes a second to compile.
+    """
+    count, most = entries.size, 0
+    for i in range(count):
+        most = max(most, entries[i])
+    start, order = np.zeros(most + 2, np.int64), np.empty(count, np.int64)
+    for i in range(count):
+        start[entries[i] + 1] += 1
+    for entry in range(most):
+        start[entry + 1] += start[entry]
+    for i in range(count):
+        order[start[entries[i]]] = i
+        start[entries[i]] += 1
+    return order
+
+
+@part
 def estimate_all(world, filters, f, k, first, work):
     """Estimates (n, 2) of the bursts of scan k, less the truth, an entry at a time; passes are counted."""
     who, eight, found = np.empty(WIDTH, np.int64), np.empty((WIDTH, 2)), np.empty((WIDTH, 2))
     entries, measured = work.entries, work.measured
-    order = np.argsort(entries, kind="mergesort")
+    order = in_order(entries)
     begin = 0
     while begin < order.size:
         entry, end = entries[order[begin]], begin
@@ -99,7 +119,7 @@ def estimate_all(world, filters, f, k, first, work):
         begin = end
 
 
-@kernel
+@part
 def take_estimates(world, filters, f, k, work, sums):
     """Take the estimates (n, 2) of a scan into the tracks; counts and errors of them are added to the sums."""
     own, sigma, span, tracks = filters.filters[f], filters.sigma[f, k], world.span, work.tracks
@@ -131,7 +151,7 @@ def take_estimates(world, filters, f, k, work, sums):
         locks[WRONG_FOLD] += wrong * weight
 
 
-@kernel
+@part
 def add_errors(tracks, ages, takes, errors, error, age, loss):
     """Keep the errors (n, 3) of a scan and add their powers to the sums."""
     for i in range(tracks.shape[0]):
@@ -148,7 +168,7 @@ def add_errors(tracks, ages, takes, errors, error, age, loss):
                 loss[ages[i], c, 1] += e * e * e * e
 
 
-@kernel
+@part
 def run_filter(world, filters, f, first, work, errors, sums):
     """A filter over all scans of realisations first, first + 1, …; errors (K, n, 3) are written."""
     own, tracks, ages = filters.filters[f], work.tracks, work.ages
@@ -171,7 +191,7 @@ def run_filter(world, filters, f, first, work, errors, sums):
         sums.passes[f, 1] += passes * passes
 
 
-@kernel
+@part
 def add_pairs(errors, base, paired):
     """Add e² times the baseline's; errors and base (K, n, 3)."""
     for k in range(errors.shape[0]):

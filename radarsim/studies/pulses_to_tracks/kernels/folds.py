@@ -8,7 +8,7 @@ The acceleration is taken before the velocity, so that it weighs a hypothesis an
 
 import math
 
-from radarsim.kernels.compile import inline, kernel, part
+from radarsim.kernels.compile import inline, part
 from radarsim.kernels.hypotheses import FALL, INNOVATION, NEAR, NOTHING, Lists, branched, column, keep_greatest
 from radarsim.kernels.lanes import WIDTH, address, row
 from radarsim.kernels.random import normals
@@ -37,7 +37,7 @@ def heaviest(weights, count):
     return best
 
 
-@kernel
+@part
 def ranges_to_hypotheses(world, own, k, first, work):
     """Predict all hypotheses to scan k and weigh them by its range; the tracks become those of the best."""
     variance, held = world.sigma_r**2, work.held
@@ -139,7 +139,7 @@ def put_estimate(own, held, i, best, whole, to):
             to[c] = total / whole
 
 
-@kernel
+@part
 def take_folds(world, filters, f, k, work, sums):
     """As `chain.take_estimates`, by hypotheses."""
     own, held, span, sigma = filters.filters[f], work.held, world.span, filters.sigma[f, k]
