@@ -24,7 +24,7 @@ from radarsim.studies.sonar.kernels.detector import (
 )
 from radarsim.studies.sonar.kernels.imm import PROBABILITY, ROWS, ModelPair, ModelPairs, interact, mode_sums
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK, Sums, move_and_measure
-from radarsim.studies.sonar.kernels.steps import Memory, Model, Plot, fit, recur, remember
+from radarsim.studies.sonar.kernels.steps import Memory, Model, Plot, copy_row, fit, recur, remember
 from radarsim.studies.sonar.kernels.sums import Counted, Course, Estimate, add_ahead, add_sums
 
 INFORMATION, COVARIANCE, FIXED, WINDOW, ADAPTIVE, IMM = range(6)
@@ -144,6 +144,15 @@ def convert(conversion, sigma, k, plots, detected, place, z, weight):
             power, twice = 0.5 * grow * (r * r + sr), shrink * (co * co - si * si)
             xx, yy = power * (1.0 + twice) - r * r * co * co, power * (1.0 - twice) - r * r * si * si
         weight[0, i], weight[1, i] = detected[i] * nominal_x / xx, detected[i] * nominal_y / yy
+
+
+@part
+def count_plots(weight, n, n_now):
+    """Count the plots of a scan: n before it and n_now up to it, (C, CHUNK) each."""
+    for c in range(n.shape[0]):
+        for i in range(n.shape[1]):
+            n[c, i] = n_now[c, i]
+            n_now[c, i] += weight[c, i] > 0.0
 
 
 class Filters(NamedTuple):
@@ -279,11 +288,12 @@ def simulate_block(world, detections, conversion, bank, detectors, first, total,
             move_and_measure(world, first + done, k, measured)
             detect(detections, first + done, k, detected)
             convert(conversion, bank.sigma, k, measured, detected, place, z, weight)
-            shift[:, :2] = measured[:C, 2:]
+            for c in range(C):
+                copy_row(measured[c, 2], shift[c, 0])
+                copy_row(measured[c, 3], shift[c, 1])
             if k > 0:
                 add_ahead(bank.size, x, course, Counted(n_now, used), k, dt, out, sums.errors)
-            n[:] = n_now
-            n_now += weight > 0.0
+            count_plots(weight, n, n_now)
             for c in range(C):
                 if recent.shape[2] > 0:
                     remember(recent[c], z[c], weight[c], dt / bank.period)

@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.compile import inline, kernel, summing
+from radarsim.kernels.compile import inline, kernel, part, summing
 from radarsim.kernels.linear import extrapolated
 from radarsim.kernels.random import U, normals
+from radarsim.studies.sonar.kernels.steps import copy_row
 
 CHUNK = 512
 
@@ -70,7 +71,7 @@ class Sums(NamedTuple):
 
 
 # ---- the world ----------------------------------------------------------------------------------------------------
-@kernel
+@part
 def push(key, first, pair, dt, walk, one, two):
     """Move the deviations of value and rate from the course, one and two (2, n), by random accelerations walk (2,)."""
     k0, k1, start, walk_one, walk_two = key[0], key[1], U(first), walk[0], walk[1]
@@ -83,7 +84,7 @@ def push(key, first, pair, dt, walk, one, two):
         two[1, i] += dt * b
 
 
-@kernel
+@part
 def measure(key, first, pair, step, fresh, mean, one, two):
     """Plots of two coordinates, rows 0 of one and two (3, n), from their errors, rows 1, and the deviations, rows 2.
 
@@ -117,7 +118,7 @@ def move_and_measure(world, first, k, plots):
 
 
 # ---- one scan of a filter -----------------------------------------------------------------------------------------
-@kernel
+@part
 def scan_value(x, z, dt, gain):
     """Update a filter that assumes white errors with one scan, in place: x (>= 3, n), plots z (n,), gain (>= 3,)."""
     r, v, a = x[0], x[1], x[2]
@@ -128,7 +129,7 @@ def scan_value(x, z, dt, gain):
         r[i], v[i], a[i] = p + g0 * residual, q + g1 * residual, s + g2 * residual
 
 
-@kernel
+@part
 def scan_carried(x, z, dt, carry, gain):
     """Update a filter that assumes correlated errors with one scan, in place: x (4, n), the last row is the error."""
     r, v, a, e = x[0], x[1], x[2], x[3]
@@ -141,7 +142,7 @@ def scan_carried(x, z, dt, carry, gain):
         e[i] = predicted + g3 * residual
 
 
-@kernel
+@part
 def window(x, ring, weights):
     """Estimates x (>= 3, n) as weights (3, L) of the plots in the ring (L, n)."""
     for j in range(3):
@@ -153,7 +154,7 @@ def window(x, ring, weights):
                     x[j, i] += weight * ring[q, i]
 
 
-@kernel
+@part
 def advance(bank, x, ring, plots, k, dt):
     """Update all filters in all coordinates with scan k, in place.
 
@@ -161,7 +162,7 @@ def advance(bank, x, ring, plots, k, dt):
     """
     for c in range(x.shape[1]):
         if bank.slot[k, c] >= 0 and ring.shape[1] > 0:
-            ring[c, bank.slot[k, c]] = plots[c, 0]
+            copy_row(plots[c, 0], ring[c, bank.slot[k, c]])
     for f in range(x.shape[0]):
         for c in range(x.shape[1]):
             if bank.length[f] > 0:
@@ -220,7 +221,7 @@ def ahead_sums(x, shift, truth, dt, n):
     return s1, s2, s3, s4
 
 
-@kernel
+@part
 def add_sums(bank, x, plots, truth, k, n, baseline, sums):
     """Add the errors of scan k: x (F, C, 4, CHUNK), plots (C, 4, CHUNK), truth (C, 3)."""
     for f in range(x.shape[0]):
@@ -237,7 +238,7 @@ def add_sums(bank, x, plots, truth, k, n, baseline, sums):
                     sums.joint[f, k, c, q] += joint[q]
 
 
-@kernel
+@part
 def add_ahead(bank, x, plots, truth, k, dt, n, sums):
     """Add the errors at scan k of values extrapolated from scan k - 1, where the state was complete."""
     for f in range(x.shape[0]):

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.compile import inline, kernel
+from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, where_greater
 from radarsim.kernels.linear import extrapolated
 
@@ -189,6 +189,13 @@ def put_eight(a, i, values):
     put_four(a, 4 * GROUPS + i, values[4:])
 
 
+@part
+def copy_row(source, target):
+    """Copy a row (CHUNK,); an assignment to a slice has Numba compile texts of errors for seconds."""
+    for i in range(target.size):
+        target[i] = source[i]
+
+
 # ---- least squares in information form ----------------------------------------------------------------------------
 @inline
 def predicted_information(Y, tau):
@@ -326,7 +333,7 @@ def updated_state(x, z, K, dt, period, c):
     )
 
 
-@kernel
+@part
 def recur(by_covariance, model, dt, period, memory, plot, P):
     """Update the memory of a recursive filter with one scan, in place, and write P (6, CHUNK).
 
@@ -366,7 +373,7 @@ def remember(recent, z, weight, tau):
         put(a, weights + i, where_greater(w, zero, w, get(a, weights + i)))
 
 
-@kernel
+@part
 def fit(x, recent, length, size, period, n, P):
     """Least squares on the last `length` of recent plots: x (4, CHUNK), P (6, CHUNK); n (CHUNK,) of plots so far."""
     ax, a, an, ap = address(x), address(recent), address(n), address(P)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.compile import inline, kernel
+from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import address, full, get, total, where_greater
 from radarsim.studies.sonar.kernels.steps import GROUPS, inverse, six
 
@@ -48,7 +48,7 @@ class Counted(NamedTuple):
     used: np.ndarray
 
 
-@kernel
+@part
 def component_sums(j, x, x_base, course, counted, out):
     """Write the number of estimates, Σe, Σe², Σe³, Σe⁴ and Σe²f² of component j to out (6,); x, x_base (4, CHUNK)."""
     ax, ab, moved, zero = address(x), address(x_base), address(course.shift[j]), full(0.0)
@@ -85,7 +85,7 @@ def quadratic_form(Y, e):
     )
 
 
-@kernel
+@part
 def joint_sums(x, P, size, course, counted, units, out):
     """Write Σ of the diagonal of P, where estimated, and Σq, Σq², Σp, Σp², where the state is complete, to out (7,).
 
@@ -112,7 +112,7 @@ def joint_sums(x, P, size, course, counted, units, out):
     out[3], out[4], out[5], out[6] = total(q1), total(q2), total(p1), total(p2)
 
 
-@kernel
+@part
 def ahead_sums(x, size, course, counted, dt, out):
     """Write Σe, Σe², Σe³, Σe⁴ of the value extrapolated by dt, where the state was complete, to out (4,)."""
     ax, moved, truth = address(x), address(course.shift), course.truth[0]
@@ -127,7 +127,7 @@ def ahead_sums(x, size, course, counted, dt, out):
     out[0], out[1], out[2], out[3] = total(s1), total(s2), total(s3), total(s4)
 
 
-@kernel
+@part
 def add_sums(estimate, course, counted, units, at, out, sums):
     """Add the errors of one filter in one coordinate; units (σ, period), at (f, k, c), out (7,) scratch."""
     (sigma, period), (f, k, c) = units, at
@@ -145,7 +145,7 @@ def add_sums(estimate, course, counted, units, at, out, sums):
         sums.joint[f, k, c, power] += out[3 + power]
 
 
-@kernel
+@part
 def add_ahead(sizes, x, course, counted, k, dt, out, sums):
     """Add the errors at scan k of values extrapolated from scan k - 1, for all filters and coordinates.
 

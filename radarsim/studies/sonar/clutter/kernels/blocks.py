@@ -27,7 +27,7 @@ from radarsim.studies.sonar.clutter.kernels.sums import add_ahead, add_errors, a
 from radarsim.studies.sonar.clutter.kernels.tracker import Scan, Target, reset, step, tracks_of
 from radarsim.studies.sonar.kernels.patterns import detect
 from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
-from radarsim.studies.sonar.kernels.steps import CHUNK
+from radarsim.studies.sonar.kernels.steps import CHUNK, copy_row
 from radarsim.studies.sonar.kernels.sums import Counted, Course
 
 
@@ -47,7 +47,10 @@ def simulate_block(world, detections, field, trackers, work, first, total, sums)
             scan, course = Scan(first + done, n, k, world.dt[k]), Course(world.truth[k], shift)
             move_and_measure(world, first + done, k, plots)
             detect(detections, first + done, k, detected)
-            shift[:, :2], z[:] = plots[:, 2:], plots[:, 0]
+            for c in range(2):
+                copy_row(plots[c, 0], z[c])
+                copy_row(plots[c, 2], shift[c, 0])
+                copy_row(plots[c, 3], shift[c, 1])
             for f in range(F):
                 tracks, counted = tracks_of(work, f), Counted(kept[f], used)
                 if k > 0:
@@ -58,7 +61,8 @@ def simulate_block(world, detections, field, trackers, work, first, total, sums)
                     judge_known(tracks, status[f], n, kept[f], counts)
                 else:
                     judge(trackers, f, n, tracks, status[f], course, kept[f], counts)
-                sums.counts[f, k] += counts
+                for j in range(COUNTS):
+                    sums.counts[f, k, j] += counts[j]
                 add_errors(trackers, tracks, f, k, course, counted, out, sums.errors)
         for f in range(F):
             add_ratio(status[f, ENDS], status[f, HELD], n, sums.ratios[f, ENDS_PER_SCAN])
