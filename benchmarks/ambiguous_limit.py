@@ -11,14 +11,13 @@ answer is seen.
 import argparse
 import ctypes
 import math
-import shutil
 import statistics
-import subprocess
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import limits
 import numpy as np
 
 from radarsim.app.configs import load
@@ -30,10 +29,7 @@ DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 def limit(folder: str):
     """The C function, compiled for this processor."""
-    made = Path(folder) / "limit.so"
-    flags = ["-O3", "-march=native", "-fno-math-errno", "-shared", "-fPIC"]
-    subprocess.run(["gcc", *flags, "-o", str(made), str(SOURCE), "-lm"], check=True)
-    function = ctypes.CDLL(str(made)).run
+    function = limits.library(SOURCE, folder).run
     function.restype = ctypes.c_double
     whole, real = ctypes.c_int, ctypes.c_double
     function.argtypes = [whole, whole, *[real] * 6, whole, real, DOUBLES, DOUBLES, ctypes.c_uint64]
@@ -84,8 +80,6 @@ def main() -> None:
     parser.add_argument("-n", type=int, default=20_000)
     parser.add_argument("--pairs", type=int, default=5)
     asked = parser.parse_args()
-    if shutil.which("gcc") is None:
-        raise SystemExit("no gcc: the C limit cannot be compiled")
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(1) as pool:
         function = limit(folder)
         for radar in ("ambiguous_rls2", "ambiguous_rls3", "ambiguous_rls4", "ambiguous_rls5"):

@@ -49,7 +49,7 @@ def kept(function: Callable) -> Callable:
 
 
 def without_collection(compile_kernel: Callable) -> Callable:
-    """Compile without Python's search for cyclic garbage, which is a seventh of the time; it is searched for after."""
+    """Compile without Python's search for cyclic garbage, which takes up to a seventh of the time; it runs after."""
 
     @functools.wraps(compile_kernel)
     def compiled(*args, **kwargs):
