@@ -91,8 +91,7 @@ def run(
       radarsim run rls2 --json | jq '.[0].last_scan[0].sigma'
     """
     _refuse_together(shard, precision, workers or scheduler, threads)
-    if of != "sigma" and precision is None:
-        raise click.UsageError("--of says what a precision is of: give --precision too")
+    _refuse_of_nothing(of, precision)
     if decide and (shard or precision):
         raise click.UsageError("--decide goes with neither --shard nor --precision: claims are judged on all blocks")
     if workers and scheduler:
@@ -117,6 +116,12 @@ def run(
             if shard:
                 compute = partial(experiment.share, part=shard)
             _compute_each(loaded, partial(compute, **means), out, quiet, as_json)
+
+
+def _refuse_of_nothing(of: str, precision: float | None) -> None:
+    """Raises UsageError for what a precision is of where none is given."""
+    if of != "sigma" and precision is None:
+        raise click.UsageError("--of says what a precision is of: give --precision too")
 
 
 def _refuse_together(shard: object, precision: object, cluster: object, threads: object) -> None:
@@ -207,7 +212,9 @@ def check(
     Examples
       radarsim check configs/range_doppler.yaml -n 1e7
       radarsim check multimodel --precision 1
+      radarsim check discriminator_rare -n 1e6 --precision 10 --of lost
     """
+    _refuse_of_nothing(of, precision)
     from radarsim.app import documents
     from radarsim.app import outlook as overview
     from radarsim.app import run as experiment

@@ -248,6 +248,10 @@ def test_wrong_values_and_combinations_are_refused(tmp_path, arguments, words):
     assert not list(tmp_path.iterdir())
 
 
+def test_check_refuses_what_a_precision_is_of_where_none_is_given():
+    assert "give --precision too" in command("check", "rls2", "--of", "gain", code=2).stderr
+
+
 def test_json_is_one_document_on_stdout(tmp_path):
     out = ("--out", tmp_path, "--json")
     (run,) = json.loads(command("run", "rls2", "-n", 3_000, "--no-figures", *out).stdout)
