@@ -99,16 +99,20 @@ def highest_at_the_end(figure: Figure) -> str:
 
 
 def extremes(figure: Figure, unit: str = "") -> str:
-    """The highest and the lowest point of all named lines, and whose they are."""
+    """The highest and the lowest point of all named lines, whose they are, of the quantity of the first panel."""
     found = [(panel, line) for panel in figure.panels for line in _named(panel)]
     if not found:
         return ""
+    axis = found[0][0].y.label
+    several = len({panel.title for panel in figure.panels if panel.y.label == axis}) > 1
+    found = [pair for pair in found if pair[0].y.label == axis]
     top = max(found, key=lambda pair: float(np.nanmax(pair[1].y)))
     bottom = min(found, key=lambda pair: float(np.nanmin(pair[1].y)))
     high, low = np.nanmax(top[1].y), np.nanmin(bottom[1].y)
-    several = len(figure.panels) > 1
+    unit = unit or _unit(axis)
     return tr(
-        "Highest: {high} ({name}); lowest: {low} ({other}).",
+        "{quantity}: highest {high} ({name}), lowest {low} ({other}).",
+        quantity=_quantity(figure, axis),
         **{"high": _valued(np.array([high]), unit), "name": _whose(*top, several)},
         **{"low": _valued(np.array([low]), unit), "other": _whose(*bottom, several)},
     )
@@ -116,8 +120,18 @@ def extremes(figure: Figure, unit: str = "") -> str:
 
 def first_extremes(figure: Figure) -> str:
     """The highest and the lowest point of the first panel, with the unit of its axis."""
-    unit = figure.panels[0].y.label.rpartition(", ")[2] if ", " in figure.panels[0].y.label else ""
-    return extremes(replace(figure, panels=figure.panels[:1]), unit)
+    return extremes(replace(figure, panels=figure.panels[:1]))
+
+
+def _unit(label: str) -> str:
+    """The unit at the end of an axis' label, or nothing."""
+    return label.rpartition(", ")[2] if ", " in label else ""
+
+
+def _quantity(figure: Figure, label: str) -> str:
+    """What an axis shows, without its unit, as a sentence begins; of an axis without a label the figure's title."""
+    words = spoken(label.rpartition(", ")[0] or label or figure.title)
+    return words if "α" <= words[:1] <= "ω" else words[:1].upper() + words[1:]
 
 
 def reading_at(x: float) -> Callable[[Figure], str]:
@@ -128,15 +142,16 @@ def reading_at(x: float) -> Callable[[Figure], str]:
             (float(np.interp(x, line.x, line.y)), panel, line)
             for panel in figure.panels
             for line in _named(panel)
-            if len(line.x) > 1 and line.x[0] <= x <= line.x[-1]
+            if len(line.x) > 1 and line.x[0] <= x <= line.x[-1] and panel.y.label == figure.panels[0].y.label
         ]
         if len(found) < 2:
             return extremes(figure)
         top, bottom = max(found, key=lambda one: one[0]), min(found, key=lambda one: one[0])
         several = len(figure.panels) > 1
         return tr(
-            "At {x:g} highest: {high} ({name}); lowest: {low} ({other}).",
+            "{quantity} at {x:g}: highest {high} ({name}), lowest {low} ({other}).",
             x=x,
+            quantity=_quantity(figure, figure.panels[0].y.label),
             **{"high": text.number(top[0], DIGITS), "name": _whose(*top[1:], several)},
             **{"low": text.number(bottom[0], DIGITS), "other": _whose(*bottom[1:], several)},
         )

@@ -36,9 +36,9 @@ def test_lines_whose_intervals_overlap_are_told_together():
 def test_a_line_of_unknown_interval_is_neither_lowest_nor_highest():
     nothing = np.full(5, np.nan)
     unknown = Line(T, np.linspace(9.0, 0.5, 5), "b", lo=nothing, hi=nothing)
-    assert seen.at_the_end(figure((line("a", 1.0), unknown))) == "Highest: 9 (a); lowest: 0.5 (b)."
+    assert seen.at_the_end(figure((line("a", 1.0), unknown))) == "Y: highest 9 (a), lowest 0.5 (b)."
     alike = figure((line("a", 1.0), line("c", 1.1), unknown))
-    assert seen.at_the_end(alike).startswith("Highest: ")  # not "all are within each other's intervals"
+    assert seen.at_the_end(alike).startswith("Y: highest ")  # not "all are within each other's intervals"
     told = seen.at_the_end(figure((line("a", 1.0), unknown, line("c", 3.0))))
     assert told == "At the end lowest: a (1); highest: c (3)."
 
@@ -60,12 +60,24 @@ def test_gains_and_maps():
 def test_extremes_and_readings_at_a_place():
     made = figure((line("a", 1.0), line("b", 3.0)), (line("c", 12.0),))
     made = replace(made, panels=tuple(replace(one, title=f"case {n}") for n, one in enumerate(made.panels)))
-    assert seen.extremes(made, "m") == "Highest: 12 m (case 1, c); lowest: 1 m (case 0, a)."
-    assert seen.reading_at(2.0)(made) == "At 2 highest: 10.5 (case 1, c); lowest: 5 (case 0, a)."
+    assert seen.extremes(made, "m") == "Y: highest 12 m (case 1, c), lowest 1 m (case 0, a)."
+    assert seen.reading_at(2.0)(made) == "Y at 2: highest 10.5 (case 1, c), lowest 5 (case 0, a)."
     first = replace(made, panels=(replace(made.panels[0], y=Axis("time to a track, s")), made.panels[1]))
-    assert seen.first_extremes(first) == "Highest: 9 s (a); lowest: 1 s (a)."
+    assert seen.first_extremes(first) == "Time to a track: highest 9 s (a), lowest 1 s (a)."
     assert seen.highest_at_the_end(made) == "At the end highest: b."
     assert seen.extremes(figure(())) == ""
+
+
+def test_extremes_name_their_quantity_and_mix_no_two():
+    """σ of a range and a share are no numbers to be compared; Greek letters have no capitals here."""
+    range_m, share = Axis("$\\sigma$ of $r$, m"), Axis("share of locks")
+    made = figure((line("a", 1.0),), (line("b", 900.0),))
+    one, other = made.panels
+    mixed = replace(made, panels=(replace(one, y=range_m), replace(other, y=share)))
+    assert seen.extremes(mixed) == "σ of r: highest 9 m (a), lowest 1 m (a)."
+    assert seen.extremes(replace(mixed, panels=mixed.panels[::-1])) == "Share of locks: highest 900 (b), lowest 9 (b)."
+    unnamed = replace(made, panels=tuple(replace(panel, y=Axis("")) for panel in made.panels))
+    assert seen.extremes(unnamed).startswith("σ of the range: highest 900 (b)")
 
 
 def test_figures_by_name():

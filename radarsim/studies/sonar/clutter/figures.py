@@ -219,9 +219,11 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
         marks += [Line(y * km, x * km, "" if n else label, style) for n, (x, y) in enumerate(drawn)]
     (south, north), (west, east) = shown.window
     caption = tr(
-        "Realisation 0 of {name}, tracker {tracker}: the target's course and plots, the false plots "
-        "of all {k} scans, the confirmed tracks and their gates at every fourth scan, near the "
-        "target.",
+        "Confirmed tracks near the target: {tracks}, among {false} false plots in {k} scans. The target's course and "
+        "plots, the false plots of all scans, the tracks and their gates at every fourth scan, in realisation 0 of "
+        "{name}, tracker {tracker}.",
+        tracks=len(shown.tracks),
+        false=len(shown.false[0]),
         name=result.name,
         tracker=shown.tracker,
         k=len(result.axes.k),
