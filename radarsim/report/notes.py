@@ -127,8 +127,7 @@ def _noted(
     if not len(table) or "case" not in table or not any(str(column).endswith("_lo") for column in table):
         return table
     if name == "rare":
-        notes = np.where(rare.weak(table), f"under {FEW_EVENTS} effective events", "").astype(object)
-        return table.assign(note=notes) if any(notes) else table
+        return table if any(table["note"]) else table.drop(columns="note")
     n, effective, nearby = _realisations(table, made, results)
     columns = [column for column in (*SHARES.get(name, ()), *FORETOLD.get(name, ())) if column in table]
     shares = [table[column].to_numpy(dtype=float) for column in columns]

@@ -59,8 +59,11 @@ def test_coverage_over_two_thousand_repetitions(count, radar_config):
 SEEDS, N = 200, 1000  # the least N at which tables of no known n_eff bear no note
 # Times on a grid of scans: their intervals, of whole scans, hold too often.
 DISCRETE = {("steady", "settling_s")}
-# Beside a case of every study and part of the sonar: missed plots, models that differ by rare events, orders.
-FURTHER = ("rls2", "multimodel_1hz", "multimodel_families_1hz", "sonar_missed", "sonar_conversion", "orders")
+# Beside a case of every study and part of the sonar: missed plots, models that differ by rare events, orders, plots.
+FURTHER = (
+    *("rls2", "multimodel_1hz", "multimodel_families_1hz", "orders"),
+    *("sonar_smoothing", "sonar_missed", "sonar_conversion"),
+)
 
 
 def right(experiment, n, seeds):

@@ -51,7 +51,7 @@ def prepare(case: Case) -> Plan:
     banks = filters.banks(spec, lambda one: shares(spec, one, observed))
     shapes, labels, mixture = dict(records.shapes(len(spec.filters), spec.scans)), axes(spec, observed, banks), None
     if spec.rare is not None:
-        shapes |= {"events": (len(spec.filters), spec.scans, rare_kernels.EVENTS, 3), "drawn": (3,)}
+        shapes |= {"events": (len(spec.filters), spec.scans, rare_kernels.EVENTS, 4), "drawn": (3,)}
         try:
             mixture = rare.mixture(observed, spec, noise_key(case, "rare"))
         except rare.NotFound as error:

@@ -199,7 +199,7 @@ def prepared(case: Case) -> Plan:
             locks=(count, most, len(sums_of.LOCKS)),
             residuals=(count, most, size, sums_of.BINS),
             passes=(count, 2),
-            **({} if spec.rare is None else {"losses": (count, most, len(sums_of.LOCKS), 3), "drawn": (3,)}),
+            **({} if spec.rare is None else {"losses": (count, most, len(sums_of.LOCKS), 4), "drawn": (3,)}),
         ),
         axes=axes(spec, burst, windows, phase, sigma, potential, posterior),
         world=world,

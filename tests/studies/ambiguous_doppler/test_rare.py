@@ -48,7 +48,7 @@ def added(plan, n):
 
 def rate(plan, n, f=0):
     """The weighted share of wrong folds of filter f at the last scan, and its standard error."""
-    weight, square, _ = added(plan, n)["events"][f, -1, kernels.WRONG]
+    weight, square, *_ = added(plan, n)["events"][f, -1, kernels.WRONG]
     return weight / n, math.sqrt(square / n - (weight / n) ** 2) / math.sqrt(n)
 
 
@@ -312,7 +312,9 @@ def test_sums_are_those_of_the_weights_and_add_up():
     wrong = np.array(
         [plan.layout.unpack(study.simulate(plan, 104 + i, 1))["events"][0, -1, kernels.WRONG, 2] for i in range(60)]
     )
-    assert sums["events"][0, -1, kernels.WRONG] == pytest.approx([weights @ wrong, weights**2 @ wrong, wrong.sum()])
+    assert sums["events"][0, -1, kernels.WRONG] == pytest.approx(
+        [weights @ wrong, weights**2 @ wrong, wrong.sum(), weights**4 @ wrong]
+    )
     assert not sums["events"][1].any()  # the oracle folds nothing
     assert sums["folds"][0, -1, records.RIGHT_SUM] == (plain & (wrong == 0)).sum()
     assert (sums["estimates"] == plain.sum()).all()
@@ -333,7 +335,7 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
     table = result.tables["rare"]
     assert list(table.columns[: len(report.COLUMNS)]) == list(report.COLUMNS)
     row, sums = table.iloc[0], result.cases[0].sums
-    weight, square, number = sums["events"][0, -1, kernels.WRONG]
+    weight, square, number, _ = sums["events"][0, -1, kernels.WRONG]
     assert row["rate"] == weight / 3000
     assert row["events"] == number
     assert row["n_eff"] == pytest.approx(weight**2 / square)

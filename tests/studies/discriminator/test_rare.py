@@ -223,7 +223,9 @@ def test_sums_are_those_of_the_weights_and_add_up(plan):
     errors, passes, weights, plain = rare.estimate(plan, 100, 64)
     last = int(plan.options[0]["windows"]) - 1
     lost = (np.abs(errors[:, 0, last]) >= 5 * plan.potential[0, last]).any(axis=1)
-    assert sums["losses"][0, last, 0] == pytest.approx([weights @ lost, weights**2 @ lost, lost.sum()])
+    assert sums["losses"][0, last, 0] == pytest.approx(
+        [weights @ lost, weights**2 @ lost, lost.sum(), weights**4 @ lost]
+    )
     assert sums["drawn"] == pytest.approx([plain.sum(), weights.sum(), weights @ weights])
     assert sums["passes"][0, 0] == passes[plain].sum()
     assert sums["locks"][0, last, 0] == (~lost[plain]).sum()
@@ -245,7 +247,7 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
     row = table.iloc[0]
     sums = result.cases[0].sums
     last = int(row["k"]) - 1
-    weight, square, number = sums["losses"][0, last, 0]
+    weight, square, number, _ = sums["losses"][0, last, 0]
     assert row["rate"] == weight / 3000
     assert row["events"] == number
     assert row["n_eff"] == pytest.approx(weight**2 / square)
@@ -266,6 +268,16 @@ def test_a_rate_that_rests_on_few_events_is_told():
     result = result_of(60, RARELY)
     assert any("the rate of a rare event rests on" in line for line in result.warnings)
     assert result.tables["rare"]["note"].str.contains("effective events").all()
+
+
+def test_an_interval_that_few_heavy_weights_make_is_marked():
+    """Forty equal weights are enough; a hundred of which three make the variance are not, though n_eff is over 20."""
+    equal, mixed = np.ones(40), np.r_[np.ones(97), np.full(3, 6.0)]
+    sums = np.array([[w.sum(), (w**2).sum(), len(w), (w**4).sum()] for w in (equal, mixed, equal[:10])])
+    drawn = report.Drawn(10_000, 1000.0, 10_000.0, 10_001.0)
+    made = report.rows({}, "loss", np.full(3, True), report.Counted(*sums.T), drawn)
+    assert made["n_eff"] == pytest.approx([40, 115**2 / 205, 10])
+    assert list(made["note"]) == ["", report.HEAVY, report.FEW]
 
 
 def test_weights_whose_mean_is_not_one_are_told():

@@ -53,7 +53,7 @@ class Mixture(NamedTuple):
 class Losses(NamedTuple):
     """Weighted sums over realisations.
 
-    events (F, K, EVENTS, 3)   Σw, Σw² and the number of the realisations that have it
+    events (F, K, EVENTS, 4)   Σw, Σw², the number, and Σw⁴ of the realisations that have it
     drawn  (3,)                realisations that are plain, and Σw, Σw² of all
     """
 
@@ -105,6 +105,7 @@ def add_event(weight, to):
     to[0] += weight
     to[1] += weight * weight
     to[2] += 1.0
+    to[3] += weight**4
 
 
 @part

@@ -108,7 +108,7 @@ def accumulate(errors, options, potential, posterior, sums):
 
 @kernel
 def accumulate_losses(errors, options, potential, posterior, weights, losses):
-    """Adds to losses (F, K, 6, 3), of what LOCKS counts, the bursts that fail it: Σw, Σw², their number.
+    """Adds to losses (F, K, 6, 4), of what LOCKS counts, the bursts that fail it: Σw, Σw², their number, Σw⁴.
 
     errors (n, F, K, 6), potential and posterior as for `accumulate`; weights (n,) of the bursts. Components that
     are not used have no error.
@@ -124,3 +124,4 @@ def accumulate_losses(errors, options, potential, posterior, weights, losses):
                         losses[f, k, lock, 0] += weights[i]
                         losses[f, k, lock, 1] += weights[i] * weights[i]
                         losses[f, k, lock, 2] += 1.0
+                        losses[f, k, lock, 3] += weights[i] ** 4

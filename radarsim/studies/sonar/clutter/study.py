@@ -55,7 +55,7 @@ class Plan:
         inputs = (axes.world, axes.detections, axes.field, self.trackers)
         blocks.simulate_block(*inputs, work, first, count, track_sums)
         if self.shift is not None:
-            weighted = rare.WeightedSums(np.zeros((F, K, 3)), np.zeros((F, 3)))
+            weighted = rare.WeightedSums(np.zeros((F, K, 4)), np.zeros((F, 3)))
             drawn = (self.seeds, self.field_about_false, self.shift, self.trackers)
             rare.simulate_false(*drawn, work, axes.world.dt, first, count, own["scores"][1], weighted)
             own |= weighted._asdict()
@@ -75,7 +75,7 @@ def prepare(case: Case) -> Plan:
     own, shift = counts.shapes(F, K, len(design.THRESHOLDS)), None
     if spec.rare is not None:
         del own["begun"]
-        own |= {"held": (F, K, 3), "drawn": (F, 3)}
+        own |= {"held": (F, K, 4), "drawn": (F, 3)}
         shift = rare.Shift(noise_key(case, "rare"), noise_key(case, "rare plots"), np.array(spec.rare.shares()))
     return Plan(
         layout=Layout(**common, **own),

@@ -50,7 +50,7 @@ def reseeded(plan, seed):
 
 def share(plan, n, f=0):
     """The weighted share of tracks that are confirmed, its standard error and effective events."""
-    weight, squared, _ = simulated(plan, n)["held"][f, 0]
+    weight, squared, *_ = simulated(plan, n)["held"][f, 0]
     p = weight / n
     return p, math.sqrt(max(squared / n - p * p, 0) / n), weight**2 / squared
 
@@ -97,8 +97,8 @@ def test_weights_and_lives_are_the_twins(density, rare):
             field = lambda k, i=realisation: plots.false_plots(plan.field_about_false, i, k).T  # noqa: E731
             weight, held = FalseTrack(choice, given, gate, SECTOR, words, field).follow(first, 12, law, shares)
             assert sums["drawn"][f] == pytest.approx([float(law == 0), weight, weight**2], rel=1e-9, abs=0)
-            expected = np.zeros((12, 3))
-            expected[: len(held)] = np.array([[w, w**2, 1] for w in held]).reshape(-1, 3)
+            expected = np.zeros((12, 4))
+            expected[: len(held)] = np.array([[w, w**2, 1, w**4] for w in held]).reshape(-1, 4)
             assert sums["held"][f] == pytest.approx(expected, rel=1e-9, abs=0)
             seen += len(held) > 0, len(held) > 3, law == 0
     assert seen[0] > 100
@@ -243,7 +243,7 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
     assert list(first["event"]) == ["false track"] * 2
     for f in range(2):
         row, of = first.iloc[f], tracking.iloc[f]
-        weight, squared, number = sums["held"][f, 0]
+        weight, squared, number, _ = sums["held"][f, 0]
         assert row["rate"] == of["false_confirmed"] == weight / 5000
         assert row["events"] == number
         assert row["n_eff"] == pytest.approx(weight**2 / squared)

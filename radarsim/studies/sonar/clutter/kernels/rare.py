@@ -76,7 +76,7 @@ class Shift(NamedTuple):
 class WeightedSums(NamedTuple):
     """Sums of a block by weights w, for F trackers.
 
-    held (F, K, 3): Σw, Σw² and number of tracks that were held for at least 1 … K scans from their confirmation on;
+    held (F, K, 4): Σw, Σw², number and Σw⁴ of tracks held for at least 1 … K scans from their confirmation on;
     drawn (F, 3): number of plain ones, Σw and Σw² of all.
     """
 
@@ -207,6 +207,7 @@ def add_held(shares, own, state, n, held):
             held[j, 0] += w
             held[j, 1] += w * w
             held[j, 2] += 1.0
+            held[j, 3] += w**4
             own[HELD, i] += 1.0
 
 
