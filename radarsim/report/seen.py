@@ -124,13 +124,14 @@ def first_extremes(figure: Figure) -> str:
 
 
 def _unit(label: str) -> str:
-    """The unit at the end of an axis' label, or nothing."""
-    return label.rpartition(", ")[2] if ", " in label else ""
+    """The unit at the end of an axis' label, or nothing: what follows a comma in brackets is none."""
+    _, comma, tail = label.rpartition(", ")
+    return tail if comma and tail.count("(") == tail.count(")") else ""
 
 
 def _quantity(figure: Figure, label: str) -> str:
     """What an axis shows, without its unit, as a sentence begins; of an axis without a label the figure's title."""
-    words = spoken(label.rpartition(", ")[0] or label or figure.title)
+    words = spoken(label.removesuffix(f", {_unit(label)}") or figure.title)
     return words if "α" <= words[:1] <= "ω" else words[:1].upper() + words[1:]
 
 

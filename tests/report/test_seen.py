@@ -76,6 +76,8 @@ def test_extremes_name_their_quantity_and_mix_no_two():
     mixed = replace(made, panels=(replace(one, y=range_m), replace(other, y=share)))
     assert seen.extremes(mixed) == "σ of r: highest 9 m (a), lowest 1 m (a)."
     assert seen.extremes(replace(mixed, panels=mixed.panels[::-1])) == "Share of locks: highest 900 (b), lowest 9 (b)."
+    bracket = replace(made, panels=(replace(one, y=Axis("NEES (1: right, below: shy)")),))
+    assert seen.extremes(bracket) == "NEES (1: right, below: shy): highest 9 (a), lowest 1 (a)."
     unnamed = replace(made, panels=tuple(replace(panel, y=Axis("")) for panel in made.panels))
     assert seen.extremes(unnamed).startswith("σ of the range: highest 900 (b)")
 
