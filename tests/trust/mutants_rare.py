@@ -27,7 +27,7 @@ LOSSES = (
         (
             "zeroth * g[1] + first * g[6]",
             "zeroth * g[1]",
-            f"{LOCKS}::test_errors_are_linear_in_the_normals_near_the_truth",
+            f"{LOCKS}::test_maps_take_both_moments_of_a_block_from_each_of_its_normals",
         ),
     ),
     *mutants(
@@ -35,7 +35,7 @@ LOSSES = (
         (
             "np.where((p > 0) & (p < 1) & (variance > 0), trials, plain)",
             "np.where((p > 0) & (p < 1) & (variance > 0), n, plain)",
-            f"{LOCKS}::test_tables_tell_the_rate_and_how_well_it_is_known",
+            f"{LOCKS}::test_the_interval_of_a_weighted_rate_follows_the_weights",
         ),
     ),
 )

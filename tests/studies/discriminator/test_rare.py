@@ -90,6 +90,28 @@ def test_errors_are_linear_in_the_normals_near_the_truth():
     assert np.abs((errors[:, :, :5] - expected) / (small * plan.posterior[0, :, :5]))[:, 3:].max() < 0.05
 
 
+def test_maps_take_both_moments_of_a_block_from_each_of_its_normals(plan):
+    """The imaginary parts of a block's Z₀ and Z₁ are rows of its root: each normal turns the phase by both of them."""
+    law = plan.world.factor
+    low = np.tril_indices(4)
+
+    def errors(of):
+        return rare.linear(replace(plan, world=replace(plan.world, factor=of)), 0).errors
+
+    def alone(entry):
+        return np.where(np.arange(10) == entry, 1.0, 0.0) * np.ones((len(law), 1))
+
+    nothing = errors(np.zeros_like(law))
+    zeroth, first = ((errors(alone(entry)) - nothing)[:, :, 6:] for entry in (2, 9))
+    drawn = np.random.default_rng(3).standard_normal(law.shape)
+    roots = np.zeros((len(law), 4, 4))
+    roots[:, low[0], low[1]] = drawn
+    of_both = [part.reshape(*part.shape[:2], len(law), 4).sum(axis=3) for part in (zeroth, first)]
+    expected = np.einsum("mkib,mbj->kibj", np.stack(of_both), roots[:, [1, 3]].transpose(1, 0, 2))
+    found = (errors(drawn) - nothing)[:, :, 6:].reshape(expected.shape)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+
+
 def test_directions_are_unit_vectors_of_the_hand_overs(plan):
     units = rare.directions(plan, 0)
     assert len(units) == plan.options[0]["windows"] + 5
@@ -284,6 +306,16 @@ def test_weights_whose_mean_is_not_one_are_told():
     made = result_of(300, RARELY).tables["rare"]
     assert not any("not one" in line for line in report.warnings(made))
     assert any("not one" in line for line in report.warnings(made.assign(mean_weight=1.5, mean_weight_se=0.1)))
+
+
+def test_the_interval_of_a_weighted_rate_follows_the_weights():
+    """A hundredth of the weight for a hundred times the events: an interval a tenth as wide."""
+    total, square, n = 25.0, 0.25, 1e5  # 2500 events of weight 0.01
+    found = statistics.weighted_rate(total, square, n, 1e4)
+    p = total / n
+    spread = np.sqrt((square / n - p**2) / (n - 1))
+    assert found.value == p
+    assert (found.hi - found.lo) / 2 == pytest.approx(statistics.Z95 * spread, rel=2e-3)
 
 
 def test_a_weighted_rate_is_wilsons_where_all_weights_are_one():
