@@ -306,10 +306,24 @@ def tracks():
     return made
 
 
+def alike():
+    """Exact means over patterns of plots, of which the alike are merged."""
+    from radarsim.physics.motion import process_noise
+    from radarsim.studies.range_doppler import patterns
+    from radarsim.studies.range_doppler.propagation import Plots
+
+    truth, dt = work(*RUNS["linear with misses"][:2]).plan.problem.truth, 5.0
+    plots = Plots(np.array([25.0, 5.0]), np.zeros(2), np.array([10.0, 0.0]), 0.7)
+    design = patterns.Design(2, 2, process_noise("white_jerk", 1.0, dt))
+    found = patterns.mixture(design, plots, truth, dt, 32)
+    return {name: np.nan_to_num(getattr(found, name)) for name in ("moment", "bias", "believed", "nees")}
+
+
 def numbers():
     """All arrays: {run/name: array}."""
     made = {f"random/{name}": array for name, array in words().items()}
     made |= {f"tracks/{name}": array for name, array in tracks().items()}
+    made |= {f"patterns/{name}": array for name, array in alike().items()}
     made |= bursts(*RUNS["discriminator on block sums"])
     for run, arguments in RUNS.items():
         made |= {f"{run}/{name}": array for name, array in sums(*arguments).items()}
