@@ -257,7 +257,40 @@ DRAWN_FLIGHTS = (
         (
             "self.Y = back(self.Y, dt) + np.einsum",
             "self.Y = back(self.Y, dt) - np.einsum",
-            f"{P1_WORLD}::test_with_few_misses_drawn_flights_are_as_without",
+            f"{P1_WORLD}::test_the_search_for_a_variance_sees_the_exact_errors",
+        ),
+    ),
+)
+MISSED_PLOTS = (
+    *mutants(
+        "radarsim/studies/range_doppler/kernels/patterns.py",
+        (
+            "s[5] - g[2] * own[2] - d2 * g[2],",
+            "s[5] - g[2] * own[2],",
+            f"{P1_WORLD}::test_exact_values_are_the_means_over_all_patterns",
+        ),
+        (
+            "get(p, last) * (1.0 - world.detection)",
+            "get(p, last) * world.detection",
+            f"{P1_WORLD}::test_exact_values_are_the_means_over_all_patterns",
+        ),
+        (
+            "l2 * d0 + l4 * d1 + l5 * d2",
+            "l2 * d0 + l4 * d1",
+            f"{P1_WORLD}::test_exact_values_are_the_means_over_all_patterns",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/range_doppler/kernels/merging.py",
+        (
+            "get(p, 9) + sign * v * v",
+            "get(p, 9)",
+            f"{P1_WORLD}::test_means_over_merged_patterns_are_those_over_all",
+        ),
+        (
+            "spare[to + i * WIDTH] += rows",
+            "spare[to + i * WIDTH] = rows",
+            f"{P1_WORLD}::test_means_over_merged_patterns_are_those_over_all",
         ),
     ),
 )
@@ -313,4 +346,4 @@ SAID = (
         ),
     ),
 )
-FURTHER = (*MANOEUVRES, *FALSE_PLOTS, *SCORES, *LAWS_EXACT, *RUNS, *PULSES, *DRAWN_FLIGHTS, *SAID)
+FURTHER = (*MANOEUVRES, *FALSE_PLOTS, *SCORES, *LAWS_EXACT, *RUNS, *PULSES, *DRAWN_FLIGHTS, *MISSED_PLOTS, *SAID)

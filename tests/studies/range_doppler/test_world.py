@@ -453,6 +453,19 @@ def test_with_few_misses_drawn_flights_are_as_without():
     np.testing.assert_allclose(missing.exact_bias[there], whole.exact_bias[there], rtol=1e-4, atol=1e-3)
 
 
+def test_the_search_for_a_variance_sees_the_exact_errors():
+    """Of filters that start within a drawn turn, with biases: σ at a given variance is that of the exact recursion."""
+    turned = {"target": TURN | DRAWN | {"start_s": 5}, "every_filter": {"initial_scans": 5}}
+    case = case_of(radar={"bias_velocity_mps": 1, "sigma_bias_range_m": 30}, **turned)
+    t, x = world.true_motion(case)
+    drawn = world.drawn_defects(case.spec.target, t, x)
+    plots = Plots(SIGMA, np.array([0.0, 1.0]), np.array([30.0, 0.0]), 1.0, drawn.shape[2] - 1)
+    seen = tuning.Seen(plots, x, DT, drawn)
+    exact = study.prepare(case).axes.exact_sigma
+    for one, expected in zip(case.spec.filters, exact, strict=True):
+        np.testing.assert_allclose(tuning.errors(one, np.array([VARIANCE]), seen)[0], expected, rtol=1e-7)
+
+
 def test_the_best_variance_on_a_drawn_flight():
     wanted = {"minimise": "sigma_r", "over": "worst", "from_k": 4}
     one = {"name": "a", "observes": ["range", "velocity"], "process_noise": "white_jerk"}
