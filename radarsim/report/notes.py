@@ -94,7 +94,7 @@ def _rows(result: CaseResult) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     every = common.realisations(result)
     n, (variance, kurtosis) = every[at], _about_mean(result)
     moments = np.asarray(result.sums["error"], dtype=float)
-    largest = tails(result).max(axis=1, keepdims=True)  # over the scans
+    largest = _of_tail(result, variance, kurtosis).max(axis=1, keepdims=True)  # over the scans
     with np.errstate(invalid="ignore", divide="ignore"):
         sigma = root_mean_square(moments[..., 1], moments[..., 3], every)
         missed = MISSED / every
@@ -116,7 +116,11 @@ def _about_mean(result: CaseResult) -> tuple[np.ndarray, np.ndarray]:
 
 def tails(result: CaseResult) -> np.ndarray:
     """Squared size (F, K, C) of the errors that make a tail at each scan; 0 where there is none."""
-    variance, kurtosis = _about_mean(result)
+    return _of_tail(result, *_about_mean(result))
+
+
+def _of_tail(result: CaseResult, variance: np.ndarray, kurtosis: np.ndarray) -> np.ndarray:
+    """`tails` of known moments about the mean."""
     return np.where(result.axes.available & (kurtosis > TAIL), kurtosis * variance, 0.0)
 
 

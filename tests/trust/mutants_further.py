@@ -313,8 +313,8 @@ SAID = (
     *mutants(
         "radarsim/report/notes.py",
         (
-            "largest = tails(result).max(axis=1, keepdims=True)",
-            "largest = tails(result)",
+            "largest = _of_tail(result, variance, kurtosis).max(axis=1, keepdims=True)",
+            "largest = _of_tail(result, variance, kurtosis)",
             f"{MARKS}::test_large_errors_at_one_scan_mark_those_whose_sample_may_lack_them",
         ),
         (

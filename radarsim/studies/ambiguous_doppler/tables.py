@@ -126,9 +126,11 @@ def _rare(result: Result) -> Iterator[dict[str, np.ndarray]]:
     (f,) = np.nonzero(unfolding(result) & ~result.axes.combines)
     sought = np.array([one.name == result.spec.rare.filter for one in result.spec.filters])
     yield _rare_rows(result, f, sought[f], WRONG, WRONG_FOLD)
-    if next(one for one in result.spec.filters if one.name == result.spec.rare.filter).hypotheses > 1:
-        (f,) = np.nonzero(sought)
-        yield _rare_rows(result, f, np.zeros(f.size, dtype=bool), FULL, rare.unaimed(WRONG_FOLD, "that found no room"))
+    (own,) = np.nonzero(sought)
+    if result.spec.filters[own[0]].hypotheses > 1:
+        yield _rare_rows(
+            result, own, np.zeros(own.size, dtype=bool), FULL, rare.unaimed(WRONG_FOLD, "that found no room")
+        )
 
 
 def _rare_rows(result: Result, f: np.ndarray, sought: np.ndarray, event: int, name: str) -> dict[str, np.ndarray]:
