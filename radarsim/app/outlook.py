@@ -19,6 +19,7 @@ from radarsim.studies import registry
 PILOT_S = 0.3  # of all cases together, unless single realisations take longer
 LADDER, FOR_NOTHING = 8, 1.2  # so many times more realisations at a look; times as good as equal
 SHORT_S = 0.01
+SURELY_SHORT_S, SURELY_SMALL = 1.0, 1000  # CPU time of all cases, estimates of a case: then nothing is timed
 PILOT_OF_PRECISION_S, LEAST, MOST = 1.0, 256, 16_384  # realisations that a precision is judged from
 
 
@@ -36,6 +37,7 @@ class Need:
 class CaseOutlook:
     """What running a case would take: labels, counts, seconds of one thread's work.
 
+    timed: whether a few realisations were; else it takes at most so many seconds, which is short.
     need is what a precision takes by the plain intervals, controlled by those with control variates, where the config
     asks for these; beside each the seconds of one thread until then. The run ends at the earlier.
     """
@@ -45,6 +47,7 @@ class CaseOutlook:
     scans: int
     realisations: int
     seconds: float
+    timed: bool = True
     need: Need | None = None
     controlled: Need | None = None
     seconds_plain: float | None = None
@@ -71,46 +74,74 @@ def outlook(
     progress: Callable[[int, int, int], None] | None = None,
     of: str = "sigma",
 ) -> Outlook:
-    """Prepare every case and time a few realisations of it, compiled beforehand, and say what the whole would take.
+    """Prepare every case and say what the whole would take.
 
-    With a precision, in per cent, of a kind of quantity: a case ends when that is reached, or at its N. progress(done,
-    total, 0) is called after each case.
+    A few realisations are timed, compiled beforehand, unless the study knows that all of them are short; then the
+    compiler is not loaded. With a precision, in per cent, of a kind of quantity: a case ends when that is reached, or
+    at its N. progress(done, total, 0) is called after each case.
     """
     threads = threads or available_cores()
     if precision is not None:
         check_precision([experiment], precision, of)
     cases: list[CaseOutlook] = []
     largest, preparing, control = 0, 0.0, False
-    registry.study(experiment.study).prepare(experiment.cases[0])  # what it loads is not to be timed
+    study = registry.study(experiment.study)
+    study.prepare(experiment.cases[0])  # what it loads is not to be timed
     for done, case in enumerate(experiment.cases, 1):
         work, started = CaseWork(case), time.perf_counter()
-        work.plan  # noqa: B018  (prepares it)
+        axes = work.plan.axes
         preparing += time.perf_counter() - started
-        work.simulate(0, 1)
-        each = seconds_each(work, case.realisations, PILOT_S / len(experiment.cases))
-        axes, need, controlled = work.plan.axes, None, None
-        study = registry.study(case.study)
         has_controls = experiment.control_variate and (study.own_controls or (study.exact_errors and controls(axes)))
-        if precision is not None:
-            need = needed(experiment, work, precision, each, of)
-            if has_controls and (of == "sigma" or (of == "gain" and study.own_controls)):
-                controlled = needed(experiment, work, precision, each, of, controls=True)
-        ends = [ending(one, case.realisations) for one in (need, controlled) if one is not None]
-        count = min(ends, default=case.realisations)
-        taken = [None if one is None else each * one for one in (*ends, None, None)[:2]]
-        labels = case.name, ", ".join(axes.filters), len(axes.k)
-        cases.append(CaseOutlook(*labels, count, each * count, need, controlled, *taken))
         control |= has_controls
-        largest = max(largest, work.size)
+        labels = case.name, ", ".join(axes.filters), len(axes.k)
+        short = None if precision is not None else surely_short(work, SURELY_SHORT_S / len(experiment.cases))
+        if short is not None:
+            cases.append(CaseOutlook(*labels, case.realisations, short, timed=False))
+        else:
+            ways = precision, of, has_controls and (of == "sigma" or (of == "gain" and study.own_controls))
+            cases.append(measured(experiment, work, labels, PILOT_S / len(experiment.cases), *ways))
+            largest = max(largest, work.size)
         if progress is not None:
             progress(done, len(experiment.cases), 0)
     # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter and its libraries.
     memory = 200 + 8e-6 * largest * (2 * threads + 32)
     seconds = preparing + sum(c.seconds for c in cases) / threads
-    warnings = [*registry.study(experiment.study).warnings(experiment)]
+    warnings = [*study.warnings(experiment)]
     if experiment.control_variate and not control:
         warnings.append(NO_CONTROL)
     return Outlook(tuple(cases), threads, seconds, memory, precision, of, tuple(warnings))
+
+
+def surely_short(work: CaseWork, most_s: float) -> float | None:
+    """Seconds of one thread that all realisations of a case take at most, where that is surely short, and the sums are
+    small beside the interpreter; else None."""
+    if work.plan.axes.available.size > SURELY_SMALL:
+        return None
+    each = registry.study(work.case.study).seconds_at_most(work.plan)
+    return None if each is None or each * work.case.realisations > most_s else each * work.case.realisations
+
+
+def measured(
+    experiment: Experiment,
+    work: CaseWork,
+    labels: tuple[str, str, int],
+    pilot_s: float,
+    precision: float | None,
+    of: str,
+    controlled: bool,
+) -> CaseOutlook:
+    """The outlook of a case of which a few realisations are timed."""
+    case = work.case
+    work.simulate(0, 1)
+    each = seconds_each(work, case.realisations, pilot_s)
+    need = by_controls = None
+    if precision is not None:
+        need = needed(experiment, work, precision, each, of)
+        by_controls = needed(experiment, work, precision, each, of, controls=True) if controlled else None
+    ends = [None if one is None else ending(one, case.realisations) for one in (need, by_controls)]
+    count = min((end for end in ends if end is not None), default=case.realisations)
+    plain_s, controlled_s = (None if end is None else each * end for end in ends)
+    return CaseOutlook(*labels, count, each * count, True, need, by_controls, plain_s, controlled_s)
 
 
 def controls(axes: Axes) -> bool:

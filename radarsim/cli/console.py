@@ -352,7 +352,7 @@ def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
             case.filters,
             str(case.scans),
             numeral(f"{case.realisations:,}"),
-            tr("{t_s:.3g} s", t_s=case.seconds),
+            tr("{t_s:.3g} s", t_s=case.seconds) if case.timed else tr("under {t_s:.2g} s", t_s=case.seconds),
         )
         for case in outlook.cases
     ]

@@ -205,6 +205,8 @@ def check(
 ) -> None:
     """Validate configs; say what would run: cases, filters, realisations, time, memory.
 
+    A few realisations are timed for that, unless all are surely done within a second.
+
     With a precision, also how many realisations it takes, and how long: from exact values where the filters are linear,
     else from a pilot of a second or two; where the config asks for a control variate, by these intervals too.
 

@@ -21,7 +21,7 @@ A study that follows this declares an object and writes no class:
 | `question`, `answer` | functions of `words` |
 | `warnings`, if offered | the function of `words` |
 | `claims`, if there is a paper | `claims.CLAIMS`, judged by `measures.Evidence` |
-| `seconds_per_update`, if offered | the function of `cost` |
+| `seconds_per_update`, `seconds_at_most`, if offered | functions of `cost` |
 | `shortened`, `exact_but_for`, if offered | functions of `study` |
 | `readings`, if offered | an object of the class `readings.Readings` |
 | `recorded`, if offered | an object of the class `track.Recorded` |
@@ -107,6 +107,10 @@ class StudyFolder(Study):
     def seconds_per_update(self, plan: Any) -> Mapping[str, float]:
         offered = "seconds_per_update" in self.offers
         return self.file("cost").seconds_per_update(plan) if offered else super().seconds_per_update(plan)
+
+    def seconds_at_most(self, plan: Any) -> float | None:
+        offered = "seconds_at_most" in self.offers
+        return self.file("cost").seconds_at_most(plan) if offered else super().seconds_at_most(plan)
 
     # ---- what is shown -------------------------------------------------------------------------------------------
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":

@@ -154,7 +154,8 @@ class Paper(NamedTuple):
 
 
 Beside = Literal["readings", "recorded", "shipped", "chart", "shortened"]
-OptionalPart = Literal["curves", "gains", "inputs", "cost", "seconds_per_update", "warnings", "exact_but_for", Beside]
+Costs = Literal["cost", "seconds_per_update", "seconds_at_most"]
+OptionalPart = Literal["curves", "gains", "inputs", "warnings", "exact_but_for", Costs, Beside]
 
 
 class Study(ABC):
@@ -218,6 +219,13 @@ class Study(ABC):
     def seconds_per_update(self, plan: Any) -> Mapping[str, float]:
         """CPU seconds of one update of one realisation, by filter. Default: not measured."""
         return {}
+
+    def seconds_at_most(self, plan: Any) -> float | None:
+        """CPU seconds that no processor exceeds for one realisation, from what is counted: nothing is simulated.
+
+        `radarsim check` times a few realisations, unless all of them are surely short by this. Default: not known.
+        """
+        return None
 
     # ---- what is shown -------------------------------------------------------------------------------------------
     @abstractmethod

@@ -5,7 +5,7 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from radarsim.app import simulation
+from radarsim.app import outlook, simulation
 from radarsim.cli import main
 
 
@@ -24,6 +24,28 @@ def test_more_realisations_than_a_config_may_ask_for_are_out_of_reach():
 
 def test_one_realisation():
     assert "1 case, 1 realisation, " in check("rls2", "-n", 1).output
+
+
+def test_what_is_surely_short_is_not_timed(monkeypatch):
+    """30 scans of filters at 1e-7 s; where each realisation has gains of its own at 5e-7 s."""
+    monkeypatch.setattr(outlook.CaseWork, "simulate", None)
+    text = check("rls2").output
+    assert "under 0.3 s" in text
+    assert "100,000 realisations, under a second on" in text
+    (document,) = json.loads(check("rls2", "--json").stdout)
+    (case,) = document["cases"]
+    assert (case["timed"], case["seconds"]) == (False, pytest.approx(0.3, rel=1e-12))
+    (document,) = json.loads(check("rls2", "-n", 1000, "--set", "radar.bias_range_m=5", "--json").stdout)
+    assert document["cases"][0]["seconds"] == pytest.approx(0.015, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "words", [("rls2", "-n", 1e7), ("rls2", "-n", 1, "--set", "scans=400"), ("sonar_smoothing", "-n", 1)]
+)
+def test_what_may_be_long_or_large_or_is_not_counted_is_timed(words):
+    (document,) = json.loads(check(*words, "--json").stdout)
+    assert all(case["timed"] for case in document["cases"])
+    assert "under 0" not in check(*words).output.replace("under a second", "")
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.kernels.linear import CROSSED
 from radarsim.report import consistency, panels, statistics
 from radarsim.report import tables as common
 from radarsim.studies.range_doppler import exact
@@ -200,6 +199,8 @@ def nees(result: Result) -> statistics.Estimate:
     From Σe and the Σ of products of two components. The errors of this study are Gaussian, so that these give the
     spread too: of mean m and second moment M = E eeᵀ, var eᵀP⁻¹e = 2 tr (P⁻¹M)² - 2 (mᵀP⁻¹m)².
     """
+    from radarsim.kernels.linear import CROSSED  # loads the compiler
+
     axes, P, n = result.axes, result.axes.believed, result.count
     error, first = np.asarray(result.sums["error"]), np.asarray(result.sums["error"])[..., 0] / n
     second = np.zeros(P.shape)

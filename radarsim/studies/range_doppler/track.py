@@ -12,9 +12,10 @@ from radarsim.kernels.innovations import log_likelihood
 from radarsim.physics.motion import transition
 from radarsim.studies.interface import EXPLANATIONS, RecordedPlots, true_column
 from radarsim.studies.range_doppler.config import Filter, Keys
+from radarsim.studies.range_doppler.design import designed
 from radarsim.studies.range_doppler.filters import noise_by_time, noise_over, observation
 from radarsim.studies.range_doppler.kernels import missed, rows
-from radarsim.studies.range_doppler.study import COMPONENTS, designed, prepare
+from radarsim.studies.range_doppler.study import COMPONENTS, prepare
 
 STARTING = 3  # ranges of a track from which its state is found, in the likelihood
 LEAST_MANOEUVRE = 1e-6  # of the stated manoeuvre variance, which counts as none

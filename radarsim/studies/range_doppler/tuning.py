@@ -12,7 +12,6 @@ import numpy as np
 
 from radarsim.physics.motion import process_noise
 from radarsim.studies.range_doppler.config import Best, Filter
-from radarsim.studies.range_doppler.patterns import Design, mixture
 from radarsim.studies.range_doppler.propagation import COLUMNS, DIAGONAL, ROWS, Errors, Information, Plots, defects
 
 LEAST, MOST = 1e-12, 1e8  # D_M Δt⁶/σ_r²; the least is lowered for long runs
@@ -94,6 +93,8 @@ def errors(one: Filter, variances: np.ndarray, seen: Seen) -> np.ndarray:
     observes, start = len(one.observes), one.plots_to_start
     Q = np.stack([process_noise(one.process_noise, float(v), seen.dt) for v in variances], axis=2)
     if seen.plots.detection < 1:
+        from radarsim.studies.range_doppler.patterns import Design, mixture  # loads the compiler
+
         designs = (Design(observes, start, Q[..., i]) for i in range(len(variances)))
         found = (mixture(design, seen.plots, seen.x, seen.dt, FEW, drawn=seen.drawn) for design in designs)
         return np.stack([np.sqrt(one.moment) for one in found])

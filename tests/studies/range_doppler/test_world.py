@@ -13,7 +13,7 @@ from radarsim.app.configs import load
 from radarsim.errors import ConfigError
 from radarsim.kernels.random import fill_normal_pairs
 from radarsim.physics.motion import process_noise
-from radarsim.studies.range_doppler import patterns, study, tuning, world
+from radarsim.studies.range_doppler import means, patterns, study, tuning, world
 from radarsim.studies.range_doppler.kernels import missed
 from radarsim.studies.range_doppler.propagation import Plots
 from tests.studies.range_doppler import naive
@@ -287,7 +287,7 @@ def test_a_shortened_case_has_the_same_exact_errors_where_it_is_asked():
 
 
 def test_where_patterns_are_too_many_nothing_is_called_exact(monkeypatch):
-    monkeypatch.setattr(study, "PATTERN_SCANS", 8)
+    monkeypatch.setattr(means, "PATTERN_SCANS", 8)
     assert np.isnan(prepared(radar={"detection_probability": 0.75}).axes.exact_sigma).all()
 
 

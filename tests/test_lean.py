@@ -1,0 +1,70 @@
+"""What needs no kernel loads no compiler: it is half of what such a command would take."""
+
+import ast
+import json
+import subprocess
+import sys
+
+import pytest
+
+from tests.test_layers import MODULES, imports, ours, running, text_of
+
+HEAVY = ("numba", "llvmlite", "scipy", "dask", "matplotlib", "pandas")
+COMMAND = f"""
+import json, sys
+from radarsim.cli import main
+main(sys.argv[1:], standalone_mode=False)
+print(json.dumps([name for name in {HEAVY} if name in sys.modules]), file=sys.stderr)
+"""
+SOLVE = ("solve", "rls2", "radar.sigma_velocity_mps", "--gain", "r", "--filter", "r+Vr", "--at", "60", "--equals", "30")
+
+
+@pytest.mark.parametrize(
+    "words", [("check", "rls2"), ("list",), ("schema",), ("--help",), SOLVE], ids=lambda words: words[0]
+)
+def test_what_needs_no_kernel_loads_none(words):
+    ended = subprocess.run([sys.executable, "-c", COMMAND, *words], capture_output=True, text=True, check=True)
+    assert len(ended.stdout.splitlines()) > 3
+    assert json.loads(ended.stderr) == []
+
+
+def test_a_check_of_what_is_long_loads_the_compiler():
+    """So that the test above sees what it looks for."""
+    words = "check", "rls2", "-n", "1e7"
+    ended = subprocess.run([sys.executable, "-c", COMMAND, *words], capture_output=True, text=True, check=True)
+    assert "numba" in json.loads(ended.stderr)
+
+
+def at_once(text):
+    """What a source imports when it is imported, not when one of its functions is called."""
+    tree = ast.parse(running(text))
+    tree.body = [node for node in tree.body if not isinstance(node, ast.FunctionDef)]
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef):
+            node.body = [one for one in node.body if not isinstance(one, ast.FunctionDef)] or [ast.Pass()]
+    return imports(ast.unparse(tree))
+
+
+def loaded_with(module):
+    """The modules of ours, and the foreign libraries, that importing a module loads."""
+    found, waiting = set(), [module]
+    while waiting:
+        one = waiting.pop()
+        if one not in found:
+            found.add(one)
+            waiting += (
+                [ours(name) or name.partition(".")[0] for name in at_once(text_of(one))] if one in MODULES else []
+            )
+    return found
+
+
+@pytest.mark.parametrize("module", ["cli", "app.outlook", "app.solve", "studies.range_doppler.study"])
+def test_no_kernel_is_imported_above_the_functions_that_run_it(module):
+    assert not [name for name in loaded_with(module) - NO_CODE if name in HEAVY or "kernels." in name]
+
+
+NO_CODE = {"kernels.sources", "kernels.trees"}  # of the identity: they read sources
+
+
+def test_a_planted_import_is_seen():
+    assert {"numba", "kernels.linear"} <= loaded_with("studies.range_doppler.blocks")
