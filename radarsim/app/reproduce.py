@@ -2,7 +2,8 @@
 
 Two processes share the configs, so that one computes while the other draws: drawing keeps a single core busy, and takes
 about as long as computing. They are new processes, which take a line of JSON for each config and answer with
-one; the store is safe with both.
+one; the store is safe with both. One works from the first config on, the other from the last one back: neighbours by
+name are mostly of one study, and the two would compile its kernels at the same time, each for itself.
 """
 
 import json
@@ -12,6 +13,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
@@ -80,16 +82,18 @@ def _finished(tasks: Sequence[Task], stop: Signals | None) -> Iterator[Done]:
     processes = [_Process() for _ in range(count)]
     for process in processes:
         idle.put(process)
+    waiting = deque(tasks)
 
-    def run(task: Task) -> Done:
+    def run() -> Done:
         process = idle.get()
+        task = waiting.popleft() if process is processes[0] else waiting.pop()
         try:
             return process.done(task)
         finally:
             idle.put(process)
 
     with ThreadPoolExecutor(max(1, count)) as pool:
-        pending: set[Future[Done]] = {pool.submit(run, task) for task in tasks}
+        pending: set[Future[Done]] = {pool.submit(run) for _ in tasks}
         try:
             while pending:
                 ready, pending = wait(pending, LOOK_S, FIRST_COMPLETED)

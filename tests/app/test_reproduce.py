@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -39,6 +40,32 @@ def test_a_fault_is_told_and_the_rest_runs(tmp_path):
     assert {one.stem: (bool(one.faults), one.code) for one in done} == {"rls2": (True, 4), "rls4": (False, 0)}
     assert not done[0].stages or not done[1].stages  # the one that failed has no part in where the time went
     assert "failed   rls2" in reproduce.summary(done, str(tmp_path), 1.0)
+
+
+def test_the_processes_start_from_both_ends(tmp_path, monkeypatch):
+    """Neighbours share kernels, which two processes side by side would both compile."""
+    both, taken = threading.Barrier(2), []
+
+    class Process:
+        def __init__(self):
+            taken.append([])
+            self.own = taken[-1]
+
+        def done(self, task):
+            both.wait(10)
+            self.own.append(task.stem)
+            return reproduce.Done(task.stem, 0.0, "")
+
+        def stop(self, at_once):
+            pass
+
+        def wait(self):
+            pass
+
+    monkeypatch.setattr(reproduce, "_Process", Process)
+    done = reproduce.reproduce(list("abcdef"), str(tmp_path), lambda line: None)
+    assert sorted(one.stem for one in done) == list("abcdef")
+    assert taken == [["a", "b", "c"], ["f", "e", "d"]]
 
 
 def test_a_process_that_dies_is_told_and_replaced(tmp_path):
