@@ -31,9 +31,9 @@ IN double total(v8 x) { return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) 
 IN u8 rotated(u8 x, int n) { return (x << n) | (x >> (64 - n)); }
 #define ROUND(n) a += b, b = rotated(b, n) ^ a
 #define ROUNDS(i, j, k, l, s, t, add) ROUND(i), ROUND(j), ROUND(k), ROUND(l), a += s, b += t + add
-IN void threefry(u8 a, uint64_t pair, uint64_t k0, uint64_t k1, u8 *x, u8 *y) {
+IN void threefry_pairs(u8 a, u8 pair, uint64_t k0, uint64_t k1, u8 *x, u8 *y) {
     uint64_t k2 = 0x1BD11BDAA9FC1A22u ^ k0 ^ k1;
-    u8 b = (u8){0} + pair + k1;
+    u8 b = pair + k1;
     a += k0;
     ROUNDS(16, 42, 12, 31, k1, k2, 1);
     ROUNDS(16, 32, 24, 21, k2, k0, 2);
@@ -41,6 +41,9 @@ IN void threefry(u8 a, uint64_t pair, uint64_t k0, uint64_t k1, u8 *x, u8 *y) {
     ROUNDS(16, 32, 24, 21, k1, k2, 4);
     ROUNDS(16, 42, 12, 31, k2, k0, 5);
     *x = a, *y = b;
+}
+IN void threefry(u8 a, uint64_t pair, uint64_t k0, uint64_t k1, u8 *x, u8 *y) {
+    threefry_pairs(a, (u8){0} + pair, k0, k1, x, y);
 }
 IN v8 logarithm(v8 x) {
     i8 b = (i8)x, e = (b - 0x3FE6A09E667F3BCD) >> 52;

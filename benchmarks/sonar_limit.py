@@ -4,6 +4,8 @@
 
 Each realisation's own misses: the case of sonar.py, plots missed at random. Detectors: five of `sonar_manoeuvre` over
 45 scans, plots missed at random, with one filter; a test is one detector, one coordinate or both, and one threshold.
+Tracker: the cases of sonar_clutter.py; a track-scan is one scan of one track, the target's or one that false plots
+began.
 The C limits draw the same noise and add the same sums; how far both are apart is printed, so that a fast wrong answer
 is seen.
 """
@@ -17,9 +19,14 @@ from pathlib import Path
 import limits
 import numpy as np
 import sonar
+import sonar_clutter
+
+from radarsim.studies.sonar.clutter.kernels.counts import COUNTS, FALSE_COUNTS, FALSE_KEPT, RATIOS
+from radarsim.studies.sonar.clutter.kernels.gate import PDA
 
 SUMS = 29  # of a filter, scan and coordinate: as in sonar_limit.c
 PLACES = {"error": slice(0, 12), "paired": slice(12, 15), "estimates": slice(15, 18), "joint": slice(21, 25)}
+TRACKED = {name: PLACES[name] for name in ("error", "estimates", "joint")} | {"ahead": slice(25, 29)}
 DETECTORS = sonar.SONAR | {
     "target": "sonar_accelerating",
     "scans": 45,
@@ -94,6 +101,75 @@ def detectors(library, pool, n: int, pairs: int) -> str:
     )
 
 
+def world_of_tracks(plan) -> dict:
+    """The same of a plan of trackers, which have no bank of filters."""
+    axes, trackers = plan.axes, plan.trackers
+    none = np.zeros(0, dtype=np.int64)
+    arrays = {
+        "plots": axes.world.plots,
+        "misses": axes.detections.key,
+        "certain": axes.detections.certain.astype(np.int64),
+        **dict.fromkeys(("size", "covariance"), none),
+        **{name: getattr(axes.world, name) for name in ("dt", "truth", "steps", "fresh")},
+        **dict.fromkeys(("carry", "manoeuvre"), none),
+        "sigma": trackers.sigma,
+    }
+    numbers = {"scans": len(axes.k), "filters": 0, "limit": float(axes.detections.probability)}
+    numbers |= {"period": float(trackers.period)}
+    return numbers | {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+
+
+def tracker_of(plan) -> dict:
+    """The members of the C structure Tracker: one tracker, and a sector that is not a full circle."""
+    of, field = plan.trackers, plan.axes.field
+    cells = field.cells
+    assert len(of.gate) == 1
+    assert not cells.ring
+    numbers = {"joint": int(of.association[0] == PDA), "nq": cells.nq, "nb": cells.nb}
+    numbers |= {"levels": len(of.thresholds), "shares": len(field.share)}
+    assert numbers["shares"] <= 40  # MOST_IN_CELL
+    for name in ("gate", "m", "n", "misses", "speed", "lost"):
+        numbers[name] = float(getattr(of, name)[0])
+    numbers |= {"detection": float(of.detection), "inside": float(of.inside[0]), "assumed": float(of.density)}
+    numbers |= {name: float(getattr(cells, name)) for name in ("q0", "dq", "b0", "db", "density")}
+    keys = {"field": field.key, "about": plan.field_about_false.key, "seeds": plan.seeds}
+    return numbers | keys | {"share": field.share, "threshold": of.thresholds, "manoeuvre": of.manoeuvre[0].copy()}
+
+
+def tracker(library, pool, n: int, pairs: int) -> str:
+    """A line on each tracker among false plots."""
+    return "\n".join(one_tracker(library, pool, n // 5, pairs, name) for name in sonar_clutter.CASES)
+
+
+def one_tracker(library, pool, n: int, pairs: int, name: str) -> str:
+    """A line on one tracker."""
+    made, scans = sonar.work(sonar_clutter.config(*sonar_clutter.CASES[name]), 1)
+    given, alone, n = world_of_tracks(made.plan), tracker_of(made.plan), n - n % made.block
+    world, own = limits.structure(given), limits.structure(alone)
+    theirs = {
+        **{"sums": np.zeros((1, scans, 2, SUMS)), "counts": np.zeros((1, scans, COUNTS))},
+        **{"begun": np.zeros((1, scans, FALSE_COUNTS)), "ratios": np.zeros((1, RATIOS, 5))},
+        "scores": np.zeros((2, 1, alone["levels"] + 1)),
+    }
+
+    def limit():
+        for array in theirs.values():
+            array[:] = 0.0
+        to = [ctypes.c_void_p(array.ctypes.data) for array in theirs.values()]
+        library.tracked(ctypes.byref(world), ctypes.byref(own), ctypes.c_uint64(0), n, *to)
+
+    found, mine, least, ratio = timed(made, pool, limit, n, pairs)
+    tracks = n * scans + found["begun"][0, :, : FALSE_KEPT + 1].sum()
+    # Whole numbers, but for the expected number of false plots and for weights, which ratios sum.
+    same = all(np.allclose(found[of], theirs[of], rtol=1e-10, atol=0) for of in ("counts", "begun", "ratios", "scores"))
+    apart = filters_apart(found, theirs["sums"], TRACKED)
+    mine, least = mine / tracks * 1e9, least / tracks * 1e9
+    return (
+        f"tracker, {name}: {mine:.0f} ns a track-scan, C {least:.0f} ns, {ratio:.2f} of C; "
+        f"counts {'equal' if same else 'DIFFER'}, sums apart by {apart}"
+    )
+
+
 def timed(made, pool, limit, n: int, pairs: int) -> tuple[dict, float, float, float]:
     """The kernel's sums by name, its CPU seconds, the limit's, and their ratio."""
     ours = [None]
@@ -106,10 +182,10 @@ def timed(made, pool, limit, n: int, pairs: int) -> tuple[dict, float, float, fl
     return made.plan.layout.unpack(ours[0]), *times
 
 
-def filters_apart(found: dict, theirs: np.ndarray) -> str:
+def filters_apart(found: dict, theirs: np.ndarray, places: dict[str, slice] = PLACES) -> str:
     """How far the sums of filters are apart, the largest over scans of each kind being one."""
     apart = 0.0
-    for name, place in PLACES.items():
+    for name, place in places.items():
         here = found[name].reshape((*theirs.shape[:3], -1))
         there = theirs[..., place][..., : here.shape[-1]]
         scale = np.abs(here).max(axis=(0, 1), keepdims=True)
@@ -125,7 +201,7 @@ def main() -> None:
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(1) as pool:
         library = limits.library(Path(__file__).with_suffix(".c"), folder)
-        for measure in (own_misses, detectors):
+        for measure in (own_misses, detectors, tracker):
             print(measure(library, pool, given.n, given.pairs))
 
 

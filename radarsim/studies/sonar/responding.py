@@ -12,7 +12,7 @@ from radarsim.studies.sonar.detectors import detector_arrays
 from radarsim.studies.sonar.kernels import detector, patterns
 from radarsim.studies.sonar.kernels.imm import ROWS
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK
-from radarsim.studies.sonar.kernels.steps import remember
+from radarsim.studies.sonar.kernels.steps import ROW, remember
 
 
 def estimate_recorded(
@@ -32,7 +32,7 @@ def estimate_recorded(
     bank = banks.per_realisation_bank(specs, t, period, sigma, detectors)
     x, Y, further = (np.zeros((F, C, rows, CHUNK)) for rows in (4, 8, ROWS))
     filters = patterns.Filters(x, Y, further, np.empty((6, CHUNK)))
-    recent, T = np.zeros((C, 3, bank.memory, CHUNK)), np.zeros((len(detectors.plots), C + 1, CHUNK))
+    recent, T = np.zeros((C, 3, bank.memory, ROW)), np.zeros((len(detectors.plots), C + 1, CHUNK))
     count = np.zeros((C, CHUNK))
     estimates, covariances = np.zeros((F, n, C, 3)), np.zeros((F, n, C, 3, 3))
     scale = period ** -np.arange(3.0)

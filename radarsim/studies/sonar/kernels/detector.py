@@ -8,7 +8,7 @@ For all coordinates jointly it is the sum. Letters as in `sonar.kernels.steps`, 
     mode       1 in a manoeuvre, else 0
     quiet      tests without an alarm in a row
 
-recent (3, L, CHUNK) holds the last L plots of a coordinate: plot, age, weight, the newest first.
+recent (3, L, ROW) holds the last L plots of a coordinate: plot, age, weight, the newest first.
 """
 
 from typing import NamedTuple
@@ -130,7 +130,7 @@ def joint_statistic(T):
 
 @kernel
 def detector_statistics(detectors, k, recent, sigma, n, weight, T):
-    """Statistics T (D, G, CHUNK) of all detectors at scan k; recent (C, 3, L, CHUNK), n and weight (C, CHUNK)."""
+    """Statistics T (D, G, CHUNK) of all detectors at scan k; recent (C, 3, L, ROW), n and weight (C, CHUNK)."""
     for d in range(detectors.plots.size):
         if (k + 1 - detectors.plots[d]) % detectors.every[d] != 0:
             T[d] = UNTESTED

@@ -24,7 +24,7 @@ from radarsim.studies.sonar.kernels.detector import (
 )
 from radarsim.studies.sonar.kernels.imm import PROBABILITY, ROWS, ModelPair, ModelPairs, interact, mode_sums
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK, Sums, move_and_measure
-from radarsim.studies.sonar.kernels.steps import Memory, Model, Plot, copy_row, fit, recur, remember
+from radarsim.studies.sonar.kernels.steps import ROW, Memory, Model, Plot, copy_row, fit, recur, remember
 from radarsim.studies.sonar.kernels.sums import Counted, Course, Estimate, add_ahead, add_sums
 
 INFORMATION, COVARIANCE, FIXED, WINDOW, ADAPTIVE, IMM = range(6)
@@ -169,7 +169,7 @@ class Filters(NamedTuple):
 class Plots(NamedTuple):
     """Plots of a chunk at a scan: z, weight, number n of plots before the scan and n_now up to it, each (C, CHUNK).
 
-    recent (C, 3, L, CHUNK) holds the last plots: plot, age, weight; T (D, G, CHUNK) the statistics of the detectors.
+    recent (C, 3, L, ROW) holds the last plots: plot, age, weight; T (D, G, CHUNK) the statistics of the detectors.
     """
 
     z: np.ndarray
@@ -276,7 +276,7 @@ def simulate_block(world, detections, conversion, bank, detectors, first, total,
     x, Y, further = np.empty((F, C, 4, CHUNK)), np.empty((F, C, 8, CHUNK)), np.empty((F, C, rows, CHUNK))
     filters = Filters(x, Y, further, np.empty((6, CHUNK)))
     z, weight, n, n_now = np.empty((C, CHUNK)), np.empty((C, CHUNK)), np.empty((C, CHUNK)), np.empty((C, CHUNK))
-    recent, T = np.empty((C, 3, bank.memory, CHUNK)), np.empty((detectors.plots.size, C + 1, CHUNK))
+    recent, T = np.empty((C, 3, bank.memory, ROW)), np.empty((detectors.plots.size, C + 1, CHUNK))
     plots, measured = Plots(z, weight, n, n_now, recent, T), np.empty((world.walk.size, 4, CHUNK))
     shift, place, detected = np.zeros((C, 3, CHUNK)), np.empty((3, CHUNK)), np.empty(CHUNK)
     passed, used, out = np.empty((*detectors.threshold.shape, CHUNK)), np.ones(CHUNK), np.empty(7)

@@ -30,6 +30,8 @@ from radarsim.kernels.linear import extrapolated
 
 CHUNK = 512  # realisations, as in `shared_gains`
 GROUPS = CHUNK // WIDTH
+PITCH = GROUPS + 1  # of the rows of recent plots: rows 4 KiB apart would all use the same few lines of the cache
+ROW = PITCH * WIDTH
 KALMAN_GAIN = (0.0, 0.0, 0.0)  # instead of a fixed gain
 
 
@@ -109,9 +111,9 @@ def normal_equations(recent, length, longest, i, origin, half):
     zero = full(0.0)
     y0, y1, y2, y3, y4, y5, b0, b1, b2 = zero, zero, zero, zero, zero, zero, zero, zero, zero
     for j in range(length):
-        here = j * GROUPS + i
+        here = j * PITCH + i
         z = get(recent, here) - origin
-        age, w = get(recent, longest * GROUPS + here), get(recent, 2 * longest * GROUPS + here)
+        age, w = get(recent, longest * PITCH + here), get(recent, 2 * longest * PITCH + here)
         h1, h2 = zero - age, half * age * age
         w1, w2 = w * h1, w * h2
         y0, y1, y2, y3, y4, y5 = y0 + w, y1 + w1, y2 + w2, y3 + w1 * h1, y4 + w1 * h2, y5 + w2 * h2
@@ -358,13 +360,13 @@ def recur(by_covariance, model, dt, period, memory, plot, P):
 # ---- windows ------------------------------------------------------------------------------------------------------
 @kernel
 def remember(recent, z, weight, tau):
-    """Add the plots of a scan to recent (3, L, CHUNK), the last L plots: plot, age, weight, the newest first."""
+    """Add the plots of a scan to recent (3, L, ROW), the last L plots: plot, age, weight, the newest first."""
     a, az, aw, length = address(recent), address(z), address(weight), recent.shape[1]
-    zero, ages, weights = full(0.0), length * GROUPS, 2 * length * GROUPS
+    zero, ages, weights = full(0.0), length * PITCH, 2 * length * PITCH
     for i in range(GROUPS):
         w = get(aw, i)
         for j in range(length - 1, 0, -1):
-            here, older = j * GROUPS + i, (j - 1) * GROUPS + i
+            here, older = j * PITCH + i, (j - 1) * PITCH + i
             put(a, here, where_greater(w, zero, get(a, older), get(a, here)))
             put(a, ages + here, where_greater(w, zero, get(a, ages + older), get(a, ages + here)) + tau)
             put(a, weights + here, where_greater(w, zero, get(a, weights + older), get(a, weights + here)))
