@@ -8,7 +8,10 @@ SMOKE := $(VENV)/smoke
 # Drawing takes twice as long as all the rest: `make smoke SMOKE_FLAGS=` draws too.
 SMOKE_FLAGS ?= --no-figures
 
-.PHONY: run test slow machines mutants lint smoke reproduce-figures claims-page readings-pages bench schema known docs docs-numbers docs-pictures docs-examples docs-house messages clean
+.PHONY: run environment test slow machines mutants lint smoke reproduce-figures claims-page readings-pages bench schema known docs docs-numbers docs-pictures docs-examples docs-house messages clean
+
+# Containers often forbid Python to keep what it compiles: every process of the tests would compile the package anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 run: $(VENV)/installed
 	$(RADARSIM) run configs/rls2.yaml
@@ -16,17 +19,19 @@ run: $(VENV)/installed
 # A process for each processor, at most eight; what measures memory or sends signals runs after them, alone. JOBS=0: one after another.
 JOBS ?= logical
 ORDINARY := not slow and not machines
+# The files with tests of a mark: to read all the others takes longer than some of these tests.
+marked = $$(grep -rl --include='test_*.py' 'mark\.$(1)\b' tests)
 
 test: $(VENV)/tested
 	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 8 --dist loadgroup --no-loadscope-reorder -m '$(ORDINARY) and not alone'
-	$(BIN)/python -m pytest -m '$(ORDINARY) and alone'
+	$(BIN)/python -m pytest -m '$(ORDINARY) and alone' $(call marked,alone)
 
 slow: $(VENV)/tested
 	$(BIN)/python -m pytest -m slow
 
 # Two BLAS kernels, two compiler targets, NumPy with and without AVX; `make slow` tries them all.
 machines: $(VENV)/tested
-	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 8 -m machines
+	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 8 -m machines $(call marked,machines)
 
 mutants: $(VENV)/tested
 	nice $(BIN)/python -m tests.trust.mutate
@@ -92,6 +97,12 @@ messages: $(VENV)/installed
 # The picture of the rooms, from the package's own imports.
 docs-house: $(VENV)/installed
 	PYTHONPATH=docs $(BIN)/python -m making.house docs/house.svg
+
+# All that the other targets install, in one step: the search for versions takes as long as each of theirs.
+environment:
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,docs]'
+	touch $(VENV)/installed $(VENV)/tested $(VENV)/documented
 
 clean:
 	rm -rf $(VENV) docs/_build build *.egg-info .pytest_cache .ruff_cache .hypothesis
