@@ -5,7 +5,9 @@ below; anything else of ours is refused. Foreign libraries that are costly or th
 """
 
 import ast
+import itertools
 from collections import defaultdict
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -171,13 +173,26 @@ def named(path: Path) -> str:
 MODULES = modules()
 
 
-def imports(text: str) -> set[str]:
-    """Every module that a source imports, at any depth, relative imports excluded.
+class Imports(NamedTuple):
+    """The modules that a source imports: at any depth, and without what is for a type checker alone."""
 
-    `from package import name` counts as package.name where that is a module.
-    """
+    all: frozenset[str]
+    running: frozenset[str]
+
+
+@cache
+def imports(text: str) -> Imports:
+    """Every module that a source imports, relative imports excluded."""
+    body = ast.parse(text).body
+    typed = [node for node in body if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)]
+    running = imported(node for node in body if node not in typed)
+    return Imports(running | imported(typed), running)
+
+
+def imported(body: Iterable[ast.stmt]) -> frozenset[str]:
+    """The modules that statements import; `from package import name` counts as package.name where that is a module."""
     found = set()
-    for node in ast.walk(ast.parse(text)):
+    for node in itertools.chain.from_iterable(map(ast.walk, body)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -185,7 +200,7 @@ def imports(text: str) -> set[str]:
             inner = {f"{node.module}.{alias.name}" for alias in node.names}
             of_modules = {name for name in inner if ours(name) in MODULES}
             found |= of_modules | ({node.module} if len(of_modules) < len(inner) else set())
-    return found
+    return frozenset(found)
 
 
 def ours(module: str) -> str | None:
@@ -198,7 +213,7 @@ def ours(module: str) -> str | None:
 
 def faults(module: str, text: str) -> list[str]:
     """The imports of ours that a module of this name and source may not have, and why."""
-    wanted = sorted(name for name in map(ours, imports(text)) if name is not None)
+    wanted = sorted(name for name in map(ours, imports(text).all) if name is not None)
     return [f"{module} → {name}: {words}" for name in wanted if (words := fault(module, name))]
 
 
@@ -280,18 +295,9 @@ def users() -> dict[str, set[str]]:
     found: dict[str, set[str]] = defaultdict(set)
     for module, path in MODULES.items():
         if not path.is_relative_to(TEMPLATE):
-            for name in imports(running(text_of(module))):
+            for name in imports(text_of(module)).running:
                 found[name.split(".")[0]].add(path.relative_to(PACKAGE).as_posix())
     return found
-
-
-def running(text: str) -> str:
-    """A source without what it imports for a type checker alone."""
-    tree = ast.parse(text)
-    tree.body = [
-        node for node in tree.body if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test))
-    ]
-    return ast.unparse(tree)
 
 
 @pytest.mark.parametrize("library", LIBRARIES)
@@ -343,8 +349,15 @@ def probes(module: str, text: str) -> list[str]:
     return [
         ast.unparse(node)
         for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.Call) and probing(module, ast.unparse(node.func), node.args)
+        if isinstance(node, ast.Call) and probing(module, called(node.func), node.args)
     ]
+
+
+def called(function: ast.expr) -> str:
+    """The dotted name of what is called; of anything else its last part."""
+    if isinstance(function, ast.Attribute):
+        return f"{called(function.value)}.{function.attr}"
+    return function.id if isinstance(function, ast.Name) else ""
 
 
 def probing(module: str, call: str, arguments: list[ast.expr]) -> bool:
