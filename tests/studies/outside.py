@@ -4,7 +4,10 @@ import os
 import subprocess
 import sys
 import tomllib
+from functools import partial
 from pathlib import Path
+
+from tests.warm import Start
 
 ROOT = Path(__file__).parents[2]
 
@@ -27,8 +30,18 @@ def metadata(site: Path, name: str, version: str, offers: dict[str, str]) -> Non
     (folder / "entry_points.txt").write_text("\n".join(["[radarsim.studies]", *lines, ""]))
 
 
+def forking(site: Path, place: Path):
+    """The command with the packages in `site`, without a start for each; what is yielded is called as `command`."""
+
+    def asked(start, *arguments, code: int = 0, **options):
+        return whole(start.run(*arguments, **{"cwd": place} | options), code)
+
+    with Start(place, path=(site,)) as start:
+        yield partial(asked, start)
+
+
 def command(*arguments, site: Path, cwd: Path, code: int = 0, module: str = "radarsim", **environment):
-    """Run the real command with the packages in `site`; what it printed."""
+    """Run the command in an interpreter of its own with the packages in `site`; what it printed."""
     path = os.pathsep.join([str(site), str(ROOT)])
     done = subprocess.run(
         [sys.executable, "-m", module, *map(str, arguments)],
@@ -38,6 +51,11 @@ def command(*arguments, site: Path, cwd: Path, code: int = 0, module: str = "rad
         text=True,
         timeout=300,
     )
-    assert done.returncode == code, (arguments, done.stdout, done.stderr)
+    return whole(done, code)
+
+
+def whole(done, code):
+    """What a command answered, once its exit code is right and it has not failed in Python."""
+    assert done.returncode == code, (done.args, done.stdout, done.stderr)
     assert "Traceback" not in done.stderr
     return done

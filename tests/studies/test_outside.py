@@ -28,13 +28,14 @@ def place(tmp_path_factory):
 @pytest.fixture(scope="module")
 def radarsim(place):
     """The real command, beside the installed package."""
-    return lambda *arguments, **options: outside.command(*arguments, **{"site": place / "site", "cwd": place} | options)
+    yield from outside.forking(place / "site", place)
 
 
 @pytest.fixture(scope="module")
-def ran(place, radarsim):
-    """The folder of results of a finished run."""
-    radarsim("run", "fifth", "-n", N, "--threads", 1, "--out", "results")
+def ran(place):
+    """The folder of results of a finished run, in an interpreter with hashes of its own."""
+    arguments = ("run", "fifth", "-n", N, "--threads", 1, "--out", "results")
+    outside.command(*arguments, site=place / "site", cwd=place)
     return place / "results/fifth"
 
 
@@ -190,6 +191,6 @@ def test_its_identity_is_that_of_its_own_sources(identities, i):
     assert (identities[i + 1] != identities[0]) is EDITS[i][3]
 
 
-def test_its_own_tests_pass(place):
-    done = outside.command("-q", "-p", "no:cacheprovider", site=place / "site", cwd=place / "fifth", module="pytest")
+def test_its_own_tests_pass(place, radarsim):
+    done = radarsim("-q", "-p", "no:cacheprovider", cwd=place / "fifth", module="pytest")
     assert "6 passed" in done.stdout
