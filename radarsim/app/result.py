@@ -103,10 +103,13 @@ class Result:
 
     @property
     def last_scan(self) -> "pd.DataFrame":
-        """The rows of curves at the last scan of each case, filter and component, with those of gains beside them."""
+        """The rows of curves at the last scan of each case, filter and component, with those of gains beside them.
+
+        `note` says where σ's interval rests on too little, `gain_note` where the gain's does; either there if needed.
+        """
         keys = ["case", "filter", "component"]
         last = self.curves.groupby(keys, sort=False).tail(1)
-        gains = self.gains.groupby(keys, sort=False).tail(1).drop(columns="note", errors="ignore")
+        gains = self.gains.groupby(keys, sort=False).tail(1).rename(columns={"note": "gain_note"})
         return last.merge(gains, on=[*keys, "k", "t_s"], how="left")
 
     @cached_property
@@ -199,7 +202,6 @@ class Result:
     @property
     def warnings(self) -> list[str]:
         """What a reader of the numbers must know: damaged or mixed blocks, too few realisations."""
-        from radarsim.report import provenance, rare
+        from radarsim.report import provenance
 
-        weak = rare.warnings(self._tables.get("rare"))
-        return [*self.facts["warnings"], *provenance.few(self.cases, self._tables["curves"]), *weak]
+        return [*self.facts["warnings"], *provenance.of_intervals(self.cases, self._tables)]

@@ -287,10 +287,10 @@ def show_last_scan(last: "pd.DataFrame") -> None:
         (
             *(row.case, row.filter, row.component, tr("{t_s:g} s", t_s=row.t_s)),
             f"{significant_digits(row.sigma)} {tr(unit_of(row.unit))}",
-            f"{significant_digits(row.sigma_lo)} … {significant_digits(row.sigma_hi)}" + too_narrow(row),
+            f"{significant_digits(row.sigma_lo)} … {significant_digits(row.sigma_hi)}" + too_narrow(row, "note"),
             known(row.exact_sigma),
             known(row.gain_percent, ".2f", " %"),
-            known(row.gain_lo, ".2f", " … ") + known(row.gain_hi, ".2f"),
+            known(row.gain_lo, ".2f", " … ") + known(row.gain_hi, ".2f") + too_narrow(row, "gain_note"),
         )
         for row in found
     ]
@@ -334,13 +334,18 @@ def print_comparison(compared: "Compared") -> None:
     print_warnings(compared.warnings)
 
 
-def too_narrow(row: Any) -> str:
-    """A mark behind an interval, of a row of curves, that rests, there or nearby, on too few effective realisations."""
+def too_narrow(row: Any, column: str) -> str:
+    """A mark behind an interval, of a row of `last_scan`, by the column that says where it rests on too little."""
     from radarsim.report import notes
 
-    tails = tr(" (heavy tails)")
-    marks = {notes.THIN: tr(" ({n_eff:.0f} effective)", n_eff=row.n_eff), notes.NEAR: tails, notes.UNSEEN: tails}
-    return marks.get(getattr(row, "note", ""), "")
+    note = getattr(row, column, "")
+    if not isinstance(note, str):  # of a gain that a row does not have
+        return ""
+    if note == notes.THIN and row.n_eff < notes.FEW_EFFECTIVE:  # of a gain the baseline may have fewer
+        return tr(" ({n_eff:.0f} effective)", n_eff=row.n_eff)
+    if note in notes.HEAVY:
+        return tr(" (heavy tails)")
+    return tr(" (marked)") if note else ""
 
 
 def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:

@@ -40,7 +40,7 @@ def record(
     """
     facts = dict(run)
     stop = facts.pop("stop", "done")
-    warnings = [*facts.pop("warnings", ()), *few(results, made.get("curves")), *rare.warnings(made.get("rare"))]
+    warnings = [*facts.pop("warnings", ()), *of_intervals(results, made)]
     done = {result.name: result.count for result in results}
     return {
         "config": experiment.stem,
@@ -113,6 +113,29 @@ def _asked(resolved: Any) -> object:
     except (LookupError, TypeError):
         return None
     return json.loads(to_json(cases))
+
+
+def of_intervals(results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]") -> list[str]:
+    """Warnings on intervals that rest on too little: of whole cases, of curves, of other tables, of rare events."""
+    return [*few(results, made.get("curves")), *marked(results, made), *rare.warnings(made.get("rare"))]
+
+
+def marked(results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]") -> list[str]:
+    """A line on the tables with marked rows, if any, but for what `few` and `rare.warnings` tell."""
+    told = [result.name for result in results if result.count < FEW]
+    counts = []
+    for name, table in made.items():
+        if name == "curves" or "note" not in table or "case" not in table:
+            continue
+        rows = table["note"].ne("") & ~table["case"].isin(told)
+        if name == "rare":
+            rows &= ~table["sought"].astype(bool)
+        if rows.any():
+            counts.append(tr("{marked:,} of {rows:,} in {name}.csv", marked=rows.sum(), rows=len(table), name=name))
+    if not counts:
+        return []
+    every = ", ".join(counts)
+    return [tr("intervals that rest on too little, marked by row in the column note: {counts}", counts=every)]
 
 
 def few(results: Sequence[CaseResult], curves: "pd.DataFrame | None" = None) -> list[str]:

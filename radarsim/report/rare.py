@@ -116,7 +116,9 @@ def weak(made: "pd.DataFrame") -> np.ndarray:
 
 
 def warnings(made: "pd.DataFrame | None") -> list[str]:
-    """Where the weights fail: an event that was sought and hardly found, or weights whose mean is not one."""
+    """Where the weights fail: an event that was sought and hardly found or whose interval few heavy ones make, or
+    weights whose mean is not one.
+    """
     said: list[str] = []
     if made is None or not len(made):
         return said
@@ -128,6 +130,17 @@ def warnings(made: "pd.DataFrame | None") -> list[str]:
                 case=row["case"],
                 filter=row["filter"],
                 n_eff=row["n_eff"],
+                least=FEW_EVENTS,
+            )
+        )
+    heavy = made["note"].eq(HEAVY) if "note" in made else np.full(len(made), False)
+    for row in made[heavy & made["sought"].astype(bool)].to_dict("records"):
+        said.append(
+            tr(
+                "{case}: {filter}: heavy weights: the interval of the rate of a rare event rests on under {least} "
+                "effective events; rate and interval may be too small",
+                case=row["case"],
+                filter=row["filter"],
                 least=FEW_EVENTS,
             )
         )

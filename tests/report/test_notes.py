@@ -1,10 +1,13 @@
 """Notes where an interval rests on too little: by realisations, by events, and none elsewhere."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.report import notes, statistics
+from radarsim.report import notes, provenance, statistics
 from radarsim.report.statistics import FEW, FEW_EFFECTIVE, FEW_EVENTS, FEW_HEAVY
 
 
@@ -37,8 +40,6 @@ def test_effective_realisations_mark_a_row_whatever_n():
 
 
 def test_a_gain_rests_on_the_fewer_of_its_two_filters():
-    import pandas as pd
-
     rows = {"case": "a", "component": "x", "k": 1, "n": 5000, "sigma": 1.5, "sigma_lo": 1.0, "sigma_hi": 2.0}
     curves = pd.DataFrame([{**rows, "filter": "one", "n_eff": 2000.0}, {**rows, "filter": "two", "n_eff": 20.0}])
     gain = {"baseline": "two", "gain_percent": 0.5, "gain_lo": 0.0, "gain_hi": 1.0, "exact_percent": np.nan}
@@ -49,8 +50,6 @@ def test_a_gain_rests_on_the_fewer_of_its_two_filters():
 
 
 def test_rare_locks_are_noted_row_by_row():
-    import pandas as pd
-
     rates = [0.0, 0.001, 0.02, 0.5, 0.99, 1.0]
     table = pd.DataFrame({"case": "a", "n": 1000, "probability": rates, "probability_lo": 0.0, "probability_hi": 1.0})
     noted = notes.noted({"probabilities": table}, [])["probabilities"]
@@ -58,8 +57,6 @@ def test_rare_locks_are_noted_row_by_row():
 
 
 def test_a_scan_near_one_with_heavy_tails_is_marked_too():
-    import pandas as pd
-
     of = [{"case": "a", "component": c, "k": k, "n": 5000, "filter": f} for f in "fg" for c in "xy" for k in range(60)]
     curves = pd.DataFrame(of).assign(sigma=1.0, sigma_lo=0.9, sigma_hi=1.1, n_eff=2500.0)
     curves.loc[(curves["filter"] == "g") & (curves["component"] == "x") & (curves["k"] == 20), "n_eff"] = 30.0
@@ -75,8 +72,6 @@ def test_a_scan_near_one_with_heavy_tails_is_marked_too():
 )
 def test_gains_of_filters_that_err_nearly_alike_are_marked(half, exact, alike):
     """Independent σ to ± 4 % would give a gain to ± 5.7; the same filter twice has no chance in it."""
-    import pandas as pd
-
     row = {"case": "a", "component": "x", "k": 1, "n": 5000, "sigma": 1.0, "sigma_lo": 0.96, "sigma_hi": 1.04}
     curves = pd.DataFrame([{**row, "filter": name, "n_eff": 2500.0} for name in ("one", "two")])
     gain = {"gain_percent": 0.0, "gain_lo": -half, "gain_hi": half, "exact_percent": exact}
@@ -86,8 +81,6 @@ def test_gains_of_filters_that_err_nearly_alike_are_marked(half, exact, alike):
 
 
 def test_a_gain_of_all_there_is_divides_by_nothing():
-    import pandas as pd
-
     row = {"case": "a", "component": "x", "k": 1, "n": 5000, "sigma": 0.0, "sigma_lo": 0.0, "sigma_hi": 0.0}
     curves = pd.DataFrame([{**row, "filter": name, "n_eff": 2500.0} for name in ("one", "two")])
     gain = {"gain_percent": 100.0, "gain_lo": 100.0, "gain_hi": 100.0, "exact_percent": np.nan}
@@ -100,8 +93,6 @@ def test_a_gain_of_all_there_is_divides_by_nothing():
 @pytest.mark.parametrize("predicted", [True, False])
 def test_a_calibration_is_marked_by_what_is_foretold(predicted, monkeypatch):
     """Bins of 16 to 24 events to come: marked by those that came, the bins left are those of chance's excess."""
-    import pandas as pd
-
     if not predicted:
         monkeypatch.setattr(notes, "SHARES", {"calibration": ("right",)})
         monkeypatch.setattr(notes, "FORETOLD", {})
@@ -123,8 +114,6 @@ def test_a_calibration_is_marked_by_what_is_foretold(predicted, monkeypatch):
 
 def test_bins_of_few_realisations_have_no_tails():
     """Of yes or no alone nothing is heavy: 300 of the 1000 that a mean would want are enough."""
-    import pandas as pd
-
     row = {"case": "a", "n": 300, "right": 0.5, "right_lo": 0.44, "right_hi": 0.56, "expected": 0.5}
     made = {"curves": pd.DataFrame(), "calibration": pd.DataFrame([row, row | {"n": 100}])}
     assert list(notes.noted(made, [])["calibration"]["note"]) == ["", f"under {FEW} realisations"]
@@ -178,8 +167,6 @@ def test_large_errors_at_one_scan_mark_those_whose_sample_may_lack_them():
 
 
 def test_a_table_keeps_the_notes_that_it_brings():
-    import pandas as pd
-
     table = pd.DataFrame({"case": "a", "n": [5000, 50], "ratio": 1.0, "ratio_lo": 0.9, "ratio_hi": 1.1, "note": "own"})
     for empty in (False, True):
         made = {"curves": pd.DataFrame(), "believed": table.assign(note="") if empty else table}
@@ -188,3 +175,19 @@ def test_a_table_keeps_the_notes_that_it_brings():
     assert list(table["note"]) == ["own", "own"]
     none = notes.noted({"curves": pd.DataFrame(), "believed": table[:1].assign(note="")}, [])["believed"]
     assert "note" not in none
+
+
+def test_marked_rows_of_any_table_are_told_in_one_line():
+    """Curves and what is sought of rare events have lines of their own, and so have cases of few realisations."""
+    results = [SimpleNamespace(name="a", count=5000), SimpleNamespace(name="b", count=FEW - 1)]
+    cases = ["a", "a", "b"]
+    made = {
+        "curves": pd.DataFrame({"case": cases, "note": notes.THIN}),
+        "gains": pd.DataFrame({"case": cases, "note": [notes.ALIKE, "", notes.ALIKE]}),
+        "locks": pd.DataFrame({"case": cases, "note": ["", "", "under 200 realisations"]}),
+        "rare": pd.DataFrame({"case": cases, "sought": [True, False, False], "note": "heavy"}),
+        "passes": pd.DataFrame({"case": cases}),
+    }
+    (line,) = provenance.marked(results, made)
+    assert line.endswith("in the column note: 1 of 3 in gains.csv, 1 of 3 in rare.csv")
+    assert not provenance.marked(results[1:], {"locks": made["locks"].iloc[2:]})

@@ -309,6 +309,11 @@ SAID = (
             "few_of_gain = n**2 / effective",
             f"{STAGES}::test_a_gain_may_be_narrower_than_what_its_filters_lack",
         ),
+        (
+            "alike = np.array([own == unit for own in units])",
+            "alike = np.array([own != unit for own in units])",
+            f"{STAGES}::test_a_gain_is_marked_by_the_axis_that_shows_rare_errors_most",
+        ),
     ),
     *mutants(
         "radarsim/report/notes.py",

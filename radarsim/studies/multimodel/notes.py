@@ -16,9 +16,16 @@ may lack them in the stage that is judged, or have fewer than its share:
 * b² is the mean over the scans of the stage that is judged.
 
 A model that is the best for one scan by mistake has d = 1: that decides σ over six scans, and not over hundreds.
+
+Beside the bulk of the errors T is too small, and so r too large: m₄/m₂ is the size of the rare ones only where these
+make m₂. A model is best for all three axes at once, so what its mistakes do to a gain is told by the axis that shows
+them most: of components with one unit the least r counts. For σ that would mark rows that cover: its interval has the
+variance of the bulk in it, which a gain's has not where both filters share their noise.
+
 What came out stands in docs/trust.md.
 """
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,11 +50,21 @@ def of_stages(result: "CaseResult[FlightAxes]") -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         more, effective = rare(result) / (square / n), statistics.effective(square, fourth, n)
         few = n**2 / effective / more**2 < statistics.FEW_EVENTS
-        few_of_gain = n**2 * log_variance / np.fmax(more, more[b]) ** 2 < statistics.FEW_EVENTS
+        events_of_gain = n**2 * log_variance / np.fmax(more, more[b]) ** 2
+    few_of_gain = _least_of_axes(events_of_gain, [unit for _, unit in result.axes.components]) < statistics.FEW_EVENTS
     own = np.where(effective < statistics.FEW_EFFECTIVE, common.THIN, np.where(few, RARE, "")).astype(object)
     of_gain = np.where(own[b] != "", own[b], np.where(few_of_gain, RARE, "")).astype(object)
     of_gain[b] = ""
     return np.where((own == "") & (of_gain != ""), OF_GAIN + of_gain, own)
+
+
+def _least_of_axes(events: np.ndarray, units: Sequence[str]) -> np.ndarray:
+    """The least (F, S, C) over components of the same unit: place, velocity or acceleration along each axis."""
+    least = np.full(events.shape, np.inf)
+    for unit in set(units):
+        alike = np.array([own == unit for own in units])
+        least[..., alike] = np.fmin.reduce(events[..., alike], axis=-1, keepdims=True)
+    return least
 
 
 def rare(result: "CaseResult[FlightAxes]") -> np.ndarray:

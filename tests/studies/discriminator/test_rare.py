@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.integrate import quad
 from scipy.special import ndtr
@@ -300,6 +301,12 @@ def test_an_interval_that_few_heavy_weights_make_is_marked():
     made = report.rows({}, "loss", np.full(3, True), report.Counted(*sums.T), drawn)
     assert made["n_eff"] == pytest.approx([40, 115**2 / 205, 10])
     assert list(made["note"]) == ["", report.HEAVY, report.FEW]
+    labels = {"case": "a", "filter": list("fgh"), "k": 1, "t_s": 0.0}
+    said = report.warnings(pd.DataFrame({**labels, **made}))
+    assert [line.partition(": ")[2].split(":")[0] for line in said] == ["h", "g"]
+    assert "rests on 10.0 effective events" in said[0]
+    assert "heavy weights" in said[1]
+    assert not report.warnings(pd.DataFrame({**labels, **made, "sought": False}))
 
 
 def test_weights_whose_mean_is_not_one_are_told():

@@ -13,20 +13,26 @@ SHORT, LONG = 10, 400  # scans of the two stages
 
 def case_of(errors):
     """A case of errors (F, n, K): one component, two stages, every scan reported; the first filter is the baseline."""
-    filters, n, scans = errors.shape
+    case, means = parts_of(errors[..., None], [("x", "m")])
+    return case, means[..., 0]
+
+
+def parts_of(errors, components):
+    """As `case_of` for errors (F, n, K, C) of several components, and their mean squares (F, S, n, C)."""
+    filters, n, scans, count = errors.shape
     stage = (np.arange(scans) >= SHORT).astype(int)
-    means = np.stack([(errors[:, :, stage == s] ** 2).mean(axis=2) for s in (0, 1)], axis=1)  # (F, S, n)
+    means = np.stack([(errors[:, :, stage == s] ** 2).mean(axis=2) for s in (0, 1)], axis=1)
     axes = SimpleNamespace(
-        available=np.full((filters, scans, 1), True),
-        components=(("x", "m"),),
+        available=np.full((filters, scans, count), True),
+        components=tuple(components),
         baseline=0,
         stage=stage,
         stage_scans=np.array([SHORT, scans - SHORT], dtype=float),
     )
     sums = {
-        "error": np.stack([(errors**p).sum(axis=1) for p in (1, 2, 3, 4)], axis=-1)[:, :, None, :],
-        "stage": np.stack([means.sum(axis=2), (means**2).sum(axis=2)], axis=-1)[:, :, None, :],
-        "pairs": np.einsum("fsn,gsn->fgs", means, means)[..., None],
+        "error": np.stack([(errors**p).sum(axis=1) for p in (1, 2, 3, 4)], axis=-1),
+        "stage": np.stack([means.sum(axis=2), (means**2).sum(axis=2)], axis=-1),
+        "pairs": np.einsum("fsnc,gsnc->fgsc", means, means),
     }
     return SimpleNamespace(count=n, sums=sums, axes=axes), means
 
@@ -91,3 +97,14 @@ def test_a_gain_may_be_narrower_than_what_its_filters_lack():
     said = notes.of_stages(case_of(errors)[0])[..., 0]
     assert said[0].tolist() == ["", ""]
     assert said[1, 1] == notes.OF_GAIN + notes.RARE
+
+
+def test_a_gain_is_marked_by_the_axis_that_shows_rare_errors_most():
+    """Errors of 15 σ along x alone: gains of y, whose own have no tail, bear the mark; those of the speed do not."""
+    rng = np.random.default_rng(6)
+    components = [("x", "m"), ("vx", "m/s"), ("y", "m"), ("vy", "m/s")]
+    errors = np.stack([errors_of(rng) for _ in components], axis=-1)
+    errors[1, :3, 4, 0] += 15
+    said = notes.of_stages(parts_of(errors, components)[0])
+    assert said[1, 0].tolist() == [notes.RARE, "", notes.OF_GAIN + notes.RARE, ""]
+    assert said[0].tolist() == [[""] * 4] * 2
