@@ -11,10 +11,9 @@ answer is seen.
 import argparse
 import ctypes
 import math
-import statistics
 import tempfile
-import time
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import limits
@@ -54,25 +53,23 @@ def plan_of(radar: str):
     return plan, spec, memory, np.ascontiguousarray(gains)
 
 
-def ours(plan, n: int) -> tuple[float, np.ndarray]:
-    """CPU seconds of n realisations, and σ of the velocity (K,)."""
-    values, started = np.zeros(plan.layout.size), time.thread_time()
+def ours(plan, n: int) -> np.ndarray:
+    """σ of the velocity (K,) from n realisations."""
+    values = np.zeros(plan.layout.size)
     for first in range(0, n, plan.block):
         values += study.simulate(plan, first, min(plan.block, n - first))
-    seconds = time.thread_time() - started
-    return seconds, np.sqrt(plan.layout.unpack(values)["error"][0, :, 1, 1] / n)
+    return np.sqrt(plan.layout.unpack(values)["error"][0, :, 1, 1] / n)
 
 
-def theirs(function, spec, memory, gains: np.ndarray, n: int) -> tuple[float, np.ndarray, float]:
+def theirs(function, spec, memory, gains: np.ndarray, n: int) -> tuple[np.ndarray, float]:
     """The same of the C limit, and the mean number of hypotheses."""
     radar, sums = spec.radar, np.zeros(spec.scans)
-    started = time.thread_time()
     kept = function(
         *(n, spec.scans, radar.scan_period_s, radar.sigma_range_m, radar.sigma_velocity_mps, radar.spans_mps[0]),
         *(spec.prior.sigma_velocity_mps, spec.prior.sigma_acceleration_mps2, memory.hypotheses),
         *(-math.log(memory.prune_below), gains.ctypes.data_as(DOUBLES), sums.ctypes.data_as(DOUBLES), 7),
     )
-    return time.thread_time() - started, np.sqrt(sums / n), kept
+    return np.sqrt(sums / n), kept
 
 
 def main() -> None:
@@ -85,16 +82,13 @@ def main() -> None:
         for radar in ("ambiguous_rls2", "ambiguous_rls3", "ambiguous_rls4", "ambiguous_rls5"):
             plan, spec, memory, gains = plan_of(radar)
             pool.submit(ours, plan, 64).result()
-            ratios, each = [], []
-            for _ in range(asked.pairs):
-                before = pool.submit(theirs, function, spec, memory, gains, asked.n).result()
-                own = pool.submit(ours, plan, asked.n).result()
-                after = pool.submit(theirs, function, spec, memory, gains, asked.n).result()
-                ratios.append(2 * own[0] / (before[0] + after[0]))
-                each.append(own[0] / asked.n / spec.scans * 1e9)
-            apart = np.abs(own[1] / after[1] - 1).max()
-            cost = f"{statistics.median(ratios):.2f} of the C limit, {statistics.median(each):.0f} ns a scan"
-            found = f"{after[2]:.0f} hypotheses on average; largest difference of σ_V {100 * apart:.1f} %"
+            given = (function, spec, memory, gains, asked.n)
+            paired = pool.submit(limits.paired, partial(ours, plan, asked.n), partial(theirs, *given), asked.pairs)
+            seconds, _, ratio = paired.result()
+            (sigma, kept), own = theirs(*given), ours(plan, asked.n)
+            apart = np.abs(own / sigma - 1).max()
+            cost = f"{ratio:.2f} of C, {seconds / asked.n / spec.scans * 1e9:.0f} ns a scan"
+            found = f"{kept:.0f} hypotheses on average; largest difference of σ_V {100 * apart:.1f} %"
             print(f"{radar}: {cost}, {found}")
 
 

@@ -26,11 +26,12 @@ PILOT_OF_PRECISION_S, LEAST, MOST = 1.0, 256, 16_384  # realisations that a prec
 @dataclass(frozen=True)
 class Need:
     """What a precision takes: realisations (None beyond all bounds), from `exact` values or a `pilot` of how many, and
-    the name of what reaches it last."""
+    the name of what reaches it last; below: the bound of its rate, if the pilot had no such event."""
 
     realisations: int | None
     known_by: str
     last: str
+    below: float | None = None
 
 
 @dataclass(frozen=True)
@@ -172,7 +173,8 @@ def needed(
     if cell is None and of != "sigma":
         raise ConfigError(unknown(work.case, of))
     last = tr("no sigma in this case") if cell is None else cell.last()
-    return Need(n, tr("exact") if exact else tr("pilot of {count:,}", count=count), last)
+    below = None if cell is None else cell.below
+    return Need(n, tr("exact") if exact else tr("pilot of {count:,}", count=count), last, below)
 
 
 def ending(need: Need, most: int) -> int:

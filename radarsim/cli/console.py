@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from radarsim.app.compare import Compared
     from radarsim.app.doctor import Inspection
     from radarsim.app.inventory import Inventory
-    from radarsim.app.outlook import Outlook
+    from radarsim.app.outlook import Need, Outlook
     from radarsim.app.readings import Done
     from radarsim.app.result import Result
     from radarsim.app.simulation import Shares
@@ -393,7 +393,7 @@ def print_needs(experiment: "Experiment", outlook: "Outlook") -> None:
     rows = [
         (
             f"{name}{way}",
-            tr("out of reach") if need.realisations is None else numeral(f"{need.realisations:,}"),
+            numeral(f"{need.realisations:,}") if need.realisations is not None else _unreached(need),
             tr("{t_s:.3g} s", t_s=float(seconds or 0)),
             need.known_by,
             need.last,
@@ -418,6 +418,11 @@ def print_needs(experiment: "Experiment", outlook: "Outlook") -> None:
                 cure=cure,
             )
         )
+
+
+def _unreached(need: "Need") -> str:
+    """Why a pilot foretells no number of realisations."""
+    return tr("out of reach") if need.below is None else tr("none seen: below {rate:.2g}", rate=need.below)
 
 
 def print_share(share: "Shares", out: str | os.PathLike[str]) -> None:

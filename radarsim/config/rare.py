@@ -17,3 +17,8 @@ class RareEvent(Model):
         description="share of the realisations that are drawn as they are, no unit; no weight is over one divided by "
         "it",
     )
+
+    @property
+    def aimed_at(self) -> str | None:
+        """The name of the filter or estimator whose event is sought; None where it is sought for all."""
+        return None

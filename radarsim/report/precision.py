@@ -57,7 +57,7 @@ SIGMA = OF["sigma"]
 class Cell:
     """The 95 % half-width of a quantity, in per cent (infinite where it is not known), and which one that is.
 
-    component is empty and k zero where the quantity has none.
+    component is empty and k zero where the quantity has none. below bounds a rate of events that were never seen.
     """
 
     percent: float
@@ -67,10 +67,13 @@ class Cell:
     k: int
     count: int
     of: str = "sigma"
+    below: float | None = None
 
     def __str__(self) -> str:
         unit = "%" if OF[self.of].relative else "points"
         width = f"± {self.percent:.3g} {unit}" if math.isfinite(self.percent) else "not known"
+        if self.below is not None:
+            width = f"none seen, so below {self.below:.2g},"
         return f"{self.case}: filter {self.place()}: {OF[self.of].words} {width} at {self.count:,} realisations"
 
     def place(self) -> str:
@@ -98,8 +101,14 @@ def looks(most: int) -> Iterator[int]:
 
 
 def worst(result: CaseResult, table: Table, of: str = "sigma") -> Cell | None:
-    """The quantity of a case with the widest interval; None where the case has none."""
+    """The quantity of a case with the widest interval; None where the case has none.
+
+    Where the case draws rare events of one filter, only its rate of them counts: others are left as rare as they are.
+    """
     what, made = OF[of], table([result])
+    aimed_at = getattr(getattr(result.spec, "rare", None), "aimed_at", None)
+    if what.last and aimed_at is not None:
+        made = made[made["filter"] == aimed_at]
     if what.last and len(made):
         made = made.groupby(["case", "filter"], sort=False).tail(1)
     if not len(made):
@@ -111,9 +120,11 @@ def worst(result: CaseResult, table: Table, of: str = "sigma") -> Cell | None:
         percent = np.where(hi == lo, 0.0, 50 * (hi - lo) / value if what.relative else 0.5 * (hi - lo))
     percent = np.where(np.isnan(percent) | np.isnan(value), np.inf, percent)
     # Of equal ones the first: Gaussian errors without bias are all known equally well, up to rounding.
-    row = made.iloc[int(np.flatnonzero(percent >= percent.max() * (1 - EQUAL))[0])]
+    first = int(np.flatnonzero(percent >= percent.max() * (1 - EQUAL))[0])
+    row = made.iloc[first]
     component, k = str(row.get("component", "")), int(row.get("k", 0))
-    return Cell(float(percent.max()), str(row["case"]), str(row["filter"]), component, k, result.count, of)
+    below = float(hi[first]) if value[first] == 0 and math.isinf(percent[first]) else None
+    return Cell(float(percent.max()), str(row["case"]), str(row["filter"]), component, k, result.count, of, below)
 
 
 def narrowed(plain: "pandas.DataFrame", controlled: "pandas.DataFrame", of: str = "sigma") -> "pandas.DataFrame":

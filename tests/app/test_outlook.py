@@ -22,6 +22,14 @@ def test_more_realisations_than_a_config_may_ask_for_are_out_of_reach():
     assert "would do" in check("rls2", "--precision", 1e-3).output
 
 
+def test_a_rate_of_what_the_pilot_never_saw_has_its_bound():
+    """Folds at 20 kHz are 300 m/s apart, 20 σ or more: none is wrong, however many the pilot has."""
+    options = ("--precision", 10, "--of", "wrong", "-n", 2000, "--set", "radar.repetition_rate_hz=20000")
+    text = check("ambiguous_rls5", *options).output
+    assert "none seen: below 0.0" in text
+    assert "out of reach" not in text
+
+
 def test_one_realisation():
     assert "1 case, 1 realisation, " in check("rls2", "-n", 1).output
 

@@ -1,10 +1,15 @@
 """Half-widths of σ and what they need: against the tables, against known laws, for every study."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
+import pandas as pd
 import pytest
 
 import radarsim
 from radarsim.app import output
+from radarsim.app.configs import load
 from radarsim.app.selftest import KNOWN
 from radarsim.config.schema import LARGEST_REALISATIONS
 from radarsim.report import precision
@@ -110,3 +115,42 @@ def test_what_is_not_known_is_never_reached(results):
     sums["error"][0, 3, 0] = 0.0
     assert worst(replace(case, sums=sums), curves).percent < 10
     assert precision.MOST == LARGEST_REALISATIONS  # more cannot be asked for
+
+
+def folds(*rates):
+    """A table of two filters' right folds at one scan each, (value, lo, hi) by filter."""
+    names = ("sought", "other")
+    labels = [{"case": "one", "filter": name, "k": 9} for name in names]
+    values = [dict(zip(("right", "right_lo", "right_hi"), one, strict=True)) for one in rates]
+    made = pd.DataFrame([label | value for label, value in zip(labels, values, strict=True)])
+    return lambda _: made
+
+
+def test_of_rare_events_the_filter_they_are_drawn_for_counts_alone(results):
+    (case,) = results["range_doppler"]
+    table = folds((0.75, 0.625, 0.875), (1.0, 0.5, 1.0))
+    assert worst(case, table, "wrong").filter == "other"
+    for aimed_at, filter_name in (("sought", "sought"), ("other", "other"), (None, "other")):
+        aimed = replace(case, spec=SimpleNamespace(rare=SimpleNamespace(aimed_at=aimed_at)))
+        assert worst(aimed, table, "wrong").filter == filter_name
+    drawn = replace(case, spec=SimpleNamespace(rare=SimpleNamespace(aimed_at="sought")))
+    assert worst(drawn, table, "wrong").percent == 50.0
+    assert worst(drawn, curves).percent == worst(case, curves).percent  # σ is of plain realisations, of all filters
+
+
+def test_events_never_seen_are_told_with_their_bound(results):
+    (case,) = results["range_doppler"]
+    none = worst(case, folds((1.0, 0.75, 1.0), (0.5, 0.25, 0.75)), "wrong")
+    assert (none.filter, none.percent, none.below) == ("sought", np.inf, 0.25)
+    told = f"one: filter 'sought', k = 9: rate of wrong folds none seen, so below 0.25, at {case.count:,} realisations"
+    assert str(none) == told
+    assert worst(case, folds((0.75, 0.5, 1.0), (0.5, 0.25, 0.75)), "wrong").below is None
+    unknown = worst(case, folds((np.nan, np.nan, np.nan), (0.5, 0.25, 0.75)), "wrong")
+    assert unknown.below is None
+    assert "not known" in str(unknown)
+
+
+@pytest.mark.parametrize("config", ["ambiguous_rare", "discriminator_rare"])
+def test_the_shipped_rare_events_are_of_one_filter(config):
+    for case in load(config).cases:
+        assert case.spec.rare.aimed_at in [member.name for member in case.spec.members]

@@ -309,6 +309,10 @@ class RareFolds(rare.RareEvent):
 
     filter: Name = Field(title="filter", description="the filter whose wrong folds at the last scan are sought")
 
+    @property
+    def aimed_at(self) -> str:
+        return self.filter
+
 
 class Keys(Study):
     """Folded Doppler: what it is worth, and how many scans it takes."""

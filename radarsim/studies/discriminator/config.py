@@ -255,6 +255,10 @@ class Rare(rare.RareEvent):
         title="estimator", description="the estimator whose losses of lock at its last window are sought"
     )
 
+    @property
+    def aimed_at(self) -> str:
+        return self.estimator
+
 
 class Keys(Study):
     """Doppler frequency and its derivatives from one burst."""

@@ -125,13 +125,17 @@ def forecast(spec: Keys, burst: model.Burst) -> np.ndarray:
     return given
 
 
+def designer_of(burst: model.Burst, sigma: np.ndarray, condition: schedules.Condition) -> schedules.Designer:
+    """The designer of a burst's windows under a forecast sigma (size,)."""
+    return schedules.Designer(burst, sigma, partial(exact.fisher, burst, len(sigma)), condition)
+
+
 @lru_cache(maxsize=64)
 def designed_windows(
     burst: model.Burst, sigma: tuple[float, ...], condition: schedules.Condition, least_s: float
 ) -> tuple[int, ...]:
     """Windows in pulses of one condition, designed once: of many cases that differ elsewhere they are the same."""
-    designer = schedules.Designer(burst, np.array(sigma), partial(exact.fisher, burst, len(sigma)), condition)
-    return tuple(designer.windows(least_s))
+    return tuple(designer_of(burst, np.array(sigma), condition).windows(least_s))
 
 
 def windows_of(spec: Keys, burst: model.Burst, sigma: np.ndarray) -> list[list[int]]:
@@ -174,7 +178,7 @@ def prepared(case: Case) -> Plan:
     burst, mode = burst_of(spec), mode_of(spec)
     phase, sigma = phase_of(spec, burst), forecast(spec, burst)
     size = len(sigma)
-    designer = schedules.Designer(burst, sigma, partial(exact.fisher, burst, size), schedules.Condition())
+    designer = designer_of(burst, sigma, schedules.Condition())  # of forms, which no condition enters
     windows = windows_of(spec, burst, sigma)
     every = sorted({w for own in windows for w in own})
     image = plans.has_image(burst, every, phase.turns)
