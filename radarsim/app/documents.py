@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from radarsim.app.chart import Drawn
     from radarsim.app.inventory import Inventory
     from radarsim.app.outlook import Outlook
+    from radarsim.app.question import Answer
     from radarsim.app.result import Result
     from radarsim.app.simulation import Shares
-    from radarsim.app.solve import Answer
     from radarsim.config.experiment import Experiment
 
 

@@ -13,6 +13,7 @@ WIDE = 20  # high over low from which a range is searched logarithmically
 PER_DECADE, LEAST_POINTS, MOST_POINTS = 5, 25, 61
 EXACTLY = 1e-13  # of a root's size, to which brackets are closed: far below the 1e-9 that is promised
 BILLIONTH = 1e-9
+POLISHED, MOST_POLISHED = 1e-10, 8  # of a root's size, to which secants go on; how many
 FIRST_STEP = 1e-4  # of the range, to the second place at which a root is looked for near another
 GOLDEN = (math.sqrt(5) - 1) / 2
 
@@ -85,6 +86,25 @@ def roots(function: Function, over: Range, width: float = EXACTLY) -> Found:
     found = [x for x in found if not math.isnan(function(x))]
     nearest, at_nearest = min(known, key=lambda one: abs(one[1]))
     return Found(tuple(sorted(found)), nearest, at_nearest)
+
+
+def polished(function: Function, over: Range, root: float, rising: float, near_enough: float) -> float | None:
+    """The root of a smooth function near that of a rougher one, by secants on the scale of the search.
+
+    rising is the first slope. To ten digits, or to rounding; of a function that jumps where |function| <= near_enough.
+    None where a step does not bring it nearer.
+    """
+    u, y = over.inner(root), function(root)
+    for _ in range(MOST_POLISHED):
+        size = 1.0 if over.logarithmic else abs(u)
+        if y == 0 or (rising and abs(y / rising) <= POLISHED * size):
+            return over.outer(u)
+        v = over.inner(over.outer(u - y / rising)) if rising else u
+        z = function(over.outer(v)) if v != u else math.nan
+        if not abs(z) <= abs(y) / 2:
+            break
+        u, y, rising = v, z, (z - y) / (v - u)
+    return over.outer(u) if abs(y) <= near_enough else None
 
 
 def near(function: Function, over: Range, root: float, near_enough: float) -> float | None:

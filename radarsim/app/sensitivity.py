@@ -15,7 +15,7 @@ import numpy as np
 
 from radarsim.app import arguments, quantities
 from radarsim.app.quantities import Quantity
-from radarsim.app.solve import Cases, Config
+from radarsim.app.question import Cases, Config
 from radarsim.app.work import CaseWork
 from radarsim.config import numeric
 from radarsim.config.experiment import Case

@@ -10,8 +10,8 @@ from radarsim.report.text import significant_digits
 
 if TYPE_CHECKING:
     from radarsim.app.chart import Drawn
+    from radarsim.app.question import Answer
     from radarsim.app.sensitivity import Sensitivity
-    from radarsim.app.solve import Answer
 
 PLAIN = ".6g"
 RATES = ("lock", "right")  # kinds of which what is left to 100 % matters

@@ -22,7 +22,7 @@ A study that follows this declares an object and writes no class:
 | `warnings`, if offered | the function of `words` |
 | `claims`, if there is a paper | `claims.CLAIMS`, judged by `measures.Evidence` |
 | `seconds_per_update`, `seconds_at_most`, if offered | functions of `cost` |
-| `shortened`, `exact_but_for`, if offered | functions of `study` |
+| `shortened`, `exact_but_for`, `costly`, if offered | functions of `study` |
 | `readings`, if offered | an object of the class `readings.Readings` |
 | `recorded`, if offered | an object of the class `track.Recorded` |
 | `chart`, if offered | the function of `chart` |
@@ -100,6 +100,9 @@ class StudyFolder(Study):
     def exact_but_for(self, case: "Case") -> str:
         offered = "exact_but_for" in self.offers
         return self.file("study").exact_but_for(case) if offered else super().exact_but_for(case)
+
+    def costly(self, case: "Case") -> bool:
+        return self.file("study").costly(case) if "costly" in self.offers else super().costly(case)
 
     def rates(self, spec: Any) -> tuple[str, ...] | None:
         return self.rate_tables

@@ -155,7 +155,7 @@ class Paper(NamedTuple):
 
 Beside = Literal["readings", "recorded", "shipped", "chart", "shortened"]
 Costs = Literal["cost", "seconds_per_update", "seconds_at_most"]
-OptionalPart = Literal["curves", "gains", "inputs", "warnings", "exact_but_for", Costs, Beside]
+OptionalPart = Literal["curves", "gains", "inputs", Costs, "warnings", "exact_but_for", "costly", Beside]
 
 
 class Study(ABC):
@@ -207,6 +207,10 @@ class Study(ABC):
         Default: nothing, they are exact.
         """
         return ""
+
+    def costly(self, case: "Case") -> bool:
+        """Whether the exact errors of a case take long, and with `Case.roughly` much less. Default: no."""
+        return False
 
     def rates(self, spec: Any) -> tuple[str, ...] | None:
         """Which of the tables of rates, locks, folds and tracking, are made of a case. Default: None, a run tells."""

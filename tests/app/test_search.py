@@ -32,6 +32,30 @@ def test_a_root_is_found_near_one_that_is_a_little_off(function, off):
     assert search.near(function, RANGE, 5 * off, 0.0) == pytest.approx(5, rel=1e-9)
 
 
+@pytest.mark.parametrize("off", [0.999, 0.999999, 1.0, 1.001])
+@pytest.mark.parametrize(
+    ("function", "rising"),
+    [(lambda x: math.log(x / 5), 1.0), (lambda x: 1 / x - 0.2, -0.21), (lambda x: x**3 - 125, 370)],
+)
+def test_secants_end_at_the_root_in_few_steps(function, rising, off):
+    """rising is right to a few per cent, as that of a rougher function is."""
+    looks = []
+
+    def seen(x):
+        looks.append(x)
+        return function(x)
+
+    assert search.polished(seen, RANGE, 5 * off, rising, 0.0) == pytest.approx(5, rel=1e-9)
+    assert len(looks) <= 4
+
+
+def test_secants_give_up_where_a_step_brings_no_nearer():
+    assert search.polished(lambda x: 1 + x, RANGE, 5.0, 0.0, 0.0) is None
+    assert search.polished(lambda x: 1 + (x - 5) ** 2, RANGE, 5.001, 0.05, 0.0) is None
+    assert search.polished(lambda x: math.copysign(1, x - 5), RANGE, 5.1, 5.0, 0.0) is None
+    assert search.polished(lambda x: 1e-3 if x < 5 else 1.5e-3, RANGE, 5.1, 5.0, 0.01) is not None
+
+
 def test_a_function_that_keeps_its_sign_has_no_root_near():
     assert search.near(lambda x: 1 + x, RANGE, 5.0, 0.0) is None
     assert search.near(lambda x: (x - 5) ** 2 + 1e-3, RANGE, 5.0, 0.0) is None

@@ -10,7 +10,8 @@ from click.testing import CliRunner
 
 import radarsim
 from radarsim.app.quantities import Quantity
-from radarsim.app.solve import Cases, Curve, solve
+from radarsim.app.question import Cases, Curve
+from radarsim.app.solve import solve
 from radarsim.cli import main
 from radarsim.errors import ConfigError
 from radarsim.report.statistics import Estimate
@@ -385,21 +386,53 @@ def test_where_the_quantity_jumps_over_the_target_it_is_said():
 
 
 def test_what_takes_long_is_foretold_with_its_time_and_what_it_is(monkeypatch):
-    from radarsim.app import solve as solving
+    from radarsim.app import question
+    from radarsim.studies.range_doppler import means, patterns
 
+    monkeypatch.setattr(patterns, "WHOLE", 1 << 15)
+    monkeypatch.setattr(means, "FOUND", {})
     said = []
     late = {"overrides": [*MISSED, "scans=17"], "between": (10, 20), "told": said.append}
     found = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r"), 15, **late)
     words = "a mean over patterns of plots, of which nearly equal ones are merged: right to about a ten-thousandth"
     assert found.notes == (f"σ is {words}",)
     assert found.attained == pytest.approx(15, abs=1e-6)  # first looked for roughly, then of the exact quantity
-    monkeypatch.setattr(solving, "LONG_S", 0.0)
+    monkeypatch.setattr(question, "LONG_S", 0.0)
     solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r", at_k=11), 15, **late)
     solve("rls2", "radar.sigma_velocity_mps", GAIN, 30, sampled=True, realisations=400, told=said.append)
     assert said[-2].startswith(
         "computes the gain of r+Vr in r at k = 11 at about 37 values of radar.sigma_velocity_mps: "
     )
     assert "simulates 13 values of radar.sigma_velocity_mps with 200 realisations, then about 13 with 400: " in said[-1]
+
+
+def test_a_root_among_many_patterns_is_that_of_all_of_them_side_by_side():
+    """17 scans: looked for roughly, then by secants of the means over all 131 072 patterns."""
+    from radarsim.studies.range_doppler import means, patterns, study
+
+    late = {"overrides": [*MISSED, "scans=17"], "between": (10, 20)}
+    found = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r"), 15, **late)
+    assert (found.exact, found.notes, found.lo) == (True, (), found.value)
+    made = study.designed(Cases("rls2", tuple(late["overrides"])).at("radar.sigma_velocity_mps", found.value))
+    own = means.designs(made)
+    mixed = [patterns.mixture(one, made.plots, made.x, made.dt, 1 << 17, own) for one in own]
+    gain = 100 * (1 - np.sqrt(mixed[1].beside[0, -1, 0] / mixed[0].beside[1, -1, 0]))
+    assert abs(gain - 15) <= 1e-9 * abs(found.slope * found.value)
+
+
+def test_a_root_among_many_patterns_takes_few_looks_at_all_of_them(monkeypatch):
+    from radarsim.studies.range_doppler import patterns
+
+    looks, plain = [], patterns.mixture
+
+    def counted(*given):
+        looks.append(given[-1])
+        return plain(*given)
+
+    monkeypatch.setattr(patterns, "mixture", counted)
+    found = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", None, "r"), 25, overrides=[*MISSED, "scans=16"])
+    assert found.attained == pytest.approx(25, rel=1e-11)
+    assert 2 + 2 + 2 + 2 <= looks.count(True) <= 12  # as it is, to time one, a root, its slope
 
 
 def test_an_interval_that_rests_on_heavy_tails_says_so():

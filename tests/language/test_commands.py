@@ -133,8 +133,9 @@ def test_what_solve_announces():
             tr("computes the {quantity} at about {count} values of {key}", quantity="q", count=7, key="k"),
             12.3,
         )
-        near = tr(exact_but_for(load("rls2", ["radar.detection_probability=0.9"]).cases[0]))
+        near = tr(exact_but_for(load("rls2", ["radar.detection_probability=0.9", "scans=22"]).cases[0]))
         quantity = Quantity("sigma", "r", "Vr", at_s=60.0).said
     assert said == ["вычисляется q примерно при 7 значениях k: около 12 с"]
+    assert near.startswith("среднее")
     assert untranslated(near, set()) == []
     assert untranslated(quantity, {"Vr"}) == []

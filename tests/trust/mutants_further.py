@@ -279,6 +279,16 @@ MISSED_PLOTS = (
             "l2 * d0 + l4 * d1",
             f"{P1_WORLD}::test_exact_values_are_the_means_over_all_patterns",
         ),
+        (
+            "room.size[top], room.size[top + 1], room.scan[top + 1] = kept * WIDTH, m - kept * WIDTH, scan",
+            "room.size[top], room.size[top + 1], room.scan[top + 1] = kept * WIDTH, kept * WIDTH, scan",
+            f"{P1_WORLD}::test_patterns_followed_to_the_end_piece_by_piece_are_those_side_by_side",
+        ),
+        (
+            "for first in range(0, n, PIECE):",
+            "for first in range(0, n - PIECE, PIECE):",
+            f"{P1_WORLD}::test_patterns_followed_to_the_end_piece_by_piece_are_those_side_by_side",
+        ),
     ),
     *mutants(
         "radarsim/studies/range_doppler/kernels/merging.py",

@@ -307,7 +307,7 @@ def tracks():
 
 
 def alike():
-    """Exact means over patterns of plots, of which the alike are merged."""
+    """Exact means over patterns of plots, of which the alike are merged, or all are followed to the end."""
     from radarsim.physics.motion import process_noise
     from radarsim.studies.range_doppler import patterns
     from radarsim.studies.range_doppler.propagation import Plots
@@ -315,8 +315,10 @@ def alike():
     truth, dt = work(*RUNS["linear with misses"][:2]).plan.problem.truth, 5.0
     plots = Plots(np.array([25.0, 5.0]), np.zeros(2), np.array([10.0, 0.0]), 0.7)
     design = patterns.Design(2, 2, process_noise("white_jerk", 1.0, dt))
-    found = patterns.mixture(design, plots, truth, dt, 32)
-    return {name: np.nan_to_num(getattr(found, name)) for name in ("moment", "bias", "believed", "nees")}
+    made = {"merged": patterns.mixture(design, plots, truth, dt, 32)}
+    made["in pieces"] = patterns.mixture(design, plots, truth[:9], dt, 16, whole=True)
+    names = "moment", "bias", "believed", "nees"
+    return {f"{how} {name}": np.nan_to_num(getattr(one, name)) for how, one in made.items() for name in names}
 
 
 def numbers():

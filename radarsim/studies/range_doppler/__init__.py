@@ -21,6 +21,16 @@ STUDY = StudyFolder(
             "manoeuvre_variance": tuple(f"P1.{number}" for number in range(1, 33)),
         },
     ),
-    offers=("gains", "inputs", "readings", "recorded", "chart", "shortened", "exact_but_for", "seconds_at_most"),
+    offers=(
+        "gains",
+        "inputs",
+        "readings",
+        "recorded",
+        "chart",
+        "shortened",
+        "exact_but_for",
+        "costly",
+        "seconds_at_most",
+    ),
     rate_tables=(),
 )

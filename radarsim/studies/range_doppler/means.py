@@ -27,8 +27,8 @@ class Means:
     beside: np.ndarray
 
 
-_MEANS: dict[tuple, Means] = {}  # of the last filters and worlds: a filter of the range is the same at any σ_V
-MOST_MEANS = 32
+FOUND: dict[tuple, Means] = {}  # of the last filters and worlds: a filter of the range is the same at any σ_V
+MOST_MEANS = 128
 
 
 def means(design: patterns.Design, beside: Sequence[patterns.Design], made: Designed) -> Means:
@@ -38,22 +38,22 @@ def means(design: patterns.Design, beside: Sequence[patterns.Design], made: Desi
     others = tuple((one.observes, one.start) for one in beside)
     asked = made.dt, made.asked_from_k, made.roughly, made.plots.detection
     key = (design[:2], others, *asked, *(array.tobytes() for array in arrays))
-    found = _MEANS.pop(key) if key in _MEANS else over_patterns(design, beside, made)
-    if len(_MEANS) >= MOST_MEANS:
-        del _MEANS[next(iter(_MEANS))]
-    _MEANS[key] = found
+    found = FOUND.pop(key) if key in FOUND else over_patterns(design, beside, made)
+    if len(FOUND) >= MOST_MEANS:
+        del FOUND[next(iter(FOUND))]
+    FOUND[key] = found
     return found
 
 
 def over_patterns(design: patterns.Design, beside: Sequence[patterns.Design], made: Designed) -> Means:
     """The means of one filter over the patterns, of which as many are kept as it takes."""
 
-    def kept(most: int) -> patterns.Mixture:
-        return patterns.mixture(design, made.plots, made.x, made.dt, most, beside, made.drawn, made.asked_from_k)
+    def kept(most: int, whole: bool = False) -> patterns.Mixture:
+        return patterns.mixture(design, made.plots, made.x, made.dt, most, beside, made.drawn, made.asked_from_k, whole)
 
     if made.roughly or 2 ** len(made.t) <= patterns.WHOLE:
-        whole = kept(patterns.KEPT[0] if made.roughly else patterns.WHOLE)
-        return Means(np.sqrt(whole.moment), whole.bias, whole.nees, np.sqrt(whole.beside))
+        one = kept(patterns.KEPT[0]) if made.roughly else kept(patterns.AT_ONCE, whole=True)
+        return Means(np.sqrt(one.moment), one.bias, one.nees, np.sqrt(one.beside))
     mixtures = map(kept, patterns.KEPT)
     coarse, fine = next(mixtures), next(mixtures)
     while not patterns.settled(fine, coarse, made.asked_from_k) and (finer := next(mixtures, None)) is not None:

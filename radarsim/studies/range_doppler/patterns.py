@@ -1,7 +1,8 @@
 """Exact errors where plots may be missed: the mean over all patterns of plots that came and that did not.
 
 A filter's gains depend on the pattern alone, so each pattern has its covariance and its mean error, and σ² is their
-mean, weighted by the patterns' probabilities. Their number doubles at every scan. Past `WHOLE`, patterns whose believed
+mean, weighted by the patterns' probabilities. Their number doubles at every scan. Up to `WHOLE` each is followed; what
+two have in common is computed once, so that the 2²¹ patterns of 21 scans take 2²² steps. Beyond, those whose believed
 covariances agree to a small fraction are merged, the less probable ones sooner: these have the same gains from then on,
 and what they have been through is kept by the first two moments of their errors, so that the merging errs by about the
 square of that fraction. How much it errs is seen by merging to a quarter as many. Where that changes σ by more than
@@ -23,7 +24,8 @@ from radarsim.studies.range_doppler.kernels import patterns as kernels
 from radarsim.studies.range_doppler.propagation import COLUMNS, ROWS, Plots, defects
 
 KEPT = (512, 2048, 8192, 32768)  # patterns side by side, each compared with the one before
-WHOLE = 1 << 15  # patterns that are never merged: fifteen scans
+WHOLE = 1 << 21  # patterns that are never merged: 21 scans, a twentieth of a second
+AT_ONCE = 1 << 15  # of these side by side; more are followed to the end piece by piece
 CLOSE = 1e-4  # of σ, between the two: the finer one is right to that
 MOST_WAITING = 1 << 18  # patterns in which a filter has not started, beyond which nothing is known
 
@@ -74,11 +76,12 @@ def mixture(
     beside: Sequence[Design] = (),
     drawn: np.ndarray | None = None,
     from_k: int = 0,
+    whole: bool = False,
 ) -> Mixture:
     """Means over all patterns of plots, of a filter on the truth (K, 3) at scans dt (s) apart; beside it others.
 
     drawn: of a truth that is drawn, as `propagation.defects` takes it. from_k: nothing is known before this scan,
-    counted from 1.
+    counted from 1. whole: beyond `most` patterns none are merged.
     """
     defect = defects(truth, dt, plots, drawn)
     scans, _, columns = defect.shape
@@ -96,6 +99,7 @@ def mixture(
         start=design.start,
         enough=max(start for _, start in [(design.observes, design.start), *others]),
         most=most,
+        whole=whole,
         from_k=from_k,
     )
     waiting = most_waiting(design.start, scans, plots.detection)
@@ -103,7 +107,7 @@ def mixture(
     if waiting > MOST_WAITING:
         return Mixture.of(np.full(sums, np.nan))
     found = np.zeros(sums)
-    kernels.add_means(merging.room(min(most, 1 << min(scans, 30)), columns, waiting), world, found)
+    kernels.add_means(merging.room(min(most, 1 << min(scans, 30)), columns, waiting, scans), world, found)
     return Mixture.of(found)
 
 

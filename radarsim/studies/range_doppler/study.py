@@ -116,6 +116,15 @@ def exact_but_for(case: Case) -> str:
     return "a mean over patterns of plots, of which nearly equal ones are merged: right to about a ten-thousandth"
 
 
+def costly(case: Case) -> bool:
+    """Whether patterns of plots are so many that merging most of them spares work."""
+    if case.spec.radar.detection_probability == 1:
+        return False
+    from radarsim.studies.range_doppler import patterns
+
+    return bool(2**case.spec.plots > patterns.AT_ONCE)
+
+
 def axes(made: Designed) -> RangeDopplerAxes:
     """Labels and exact values."""
     spec, radar = made.spec, made.spec.radar

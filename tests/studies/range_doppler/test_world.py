@@ -260,7 +260,9 @@ def test_gain_is_of_those_that_have_both_estimates(seven):
 
 
 @pytest.mark.parametrize("detection", [0.8, 0.5])
-def test_means_over_merged_patterns_are_those_over_all(detection):
+def test_means_over_merged_patterns_are_those_over_all(detection, monkeypatch):
+    monkeypatch.setattr(patterns, "WHOLE", 1 << 15)
+    monkeypatch.setattr(means, "FOUND", {})
     plan = prepared(scans=16, radar={"detection_probability": detection, "sigma_bias_range_m": 10})
     plots, axes, later = Plots(SIGMA, np.zeros(2), np.array([10.0, 0.0]), detection), plan.axes, slice(3, None)
     Q = process_noise("random_jerk", VARIANCE, DT)
@@ -272,6 +274,26 @@ def test_means_over_merged_patterns_are_those_over_all(detection):
         np.testing.assert_allclose(axes.exact_nees[f, later], mean.nees[later], rtol=patterns.CLOSE)
     left = 1 - np.sqrt(whole[1].beside[0] / whole[0].beside[1])
     np.testing.assert_allclose(1 - axes.exact_gain[1, later] / 100, 1 - left[later], **near)
+
+
+@pytest.mark.parametrize("most", [8, 300])
+@pytest.mark.parametrize("from_k", [0, 12])
+def test_patterns_followed_to_the_end_piece_by_piece_are_those_side_by_side(most, from_k):
+    """From 8 on at once, in pieces smaller than PIECE and of several; only the order of the sums is another."""
+    truth = prepared(scans=13).problem.truth
+    plots = Plots(SIGMA, np.array([30.0, 1.0]), np.array([10.0, 0.5]), 0.6)
+    designs = [
+        patterns.Design(observes, start, process_noise("white_jerk", VARIANCE, DT)) for observes, start in STARTS
+    ]
+    for design in designs:
+        given = design, plots, truth, DT
+        beside = patterns.mixture(*given, 1 << 13, designs, from_k=from_k)
+        pieces = patterns.mixture(*given, most, designs, from_k=from_k, whole=True)
+        for name in ("started", "available", "bias", "moment", "believed", "nees", "beside"):
+            np.testing.assert_allclose(getattr(pieces, name), getattr(beside, name), rtol=1e-11, err_msg=name)
+
+
+STARTS = ((1, 3), (2, 2))
 
 
 def test_a_shortened_case_has_the_same_exact_errors_where_it_is_asked():

@@ -17,6 +17,7 @@ LIGHTER = 4.0  # patterns 2 to this power less probable may differ twice as much
 FILLED = 0.9  # of the patterns that are kept, about which their number is held
 LEAST_STEP, MOST_STEP = 1.05, 2.0  # by which the fraction grows where patterns are still too many
 NONE = -1
+PIECE = 128  # patterns that are followed to the end side by side: with as many again they stay in cache
 NEGLIGIBLE = 60.0  # powers of two, by which a pattern that is left out is less probable than the most probable
 LN_2 = 0.6931471805599453
 # A double's bits as a whole number, less those of 1, times this: its logarithm to two, to within a twelfth.
@@ -33,6 +34,8 @@ class Room(NamedTuple):
     lighter            (N,)          how much less probable it is than the most probable, in powers of 2 ** LIGHTER
     table, owner       (T,)          cells and their groups, T a power of two
     waiting, following (V, 9 + 3 C)  information (6) packed, its products Y (3 C), probability, plots, whether one came
+    pieces             (D M,)        blocks of the patterns that are followed to the end piece by piece, D pieces
+    size, scan         (D,)          how many patterns a piece has, after which scan
     """
 
     rows: np.ndarray
@@ -45,9 +48,12 @@ class Room(NamedTuple):
     owner: np.ndarray
     waiting: np.ndarray
     following: np.ndarray
+    pieces: np.ndarray
+    size: np.ndarray
+    scan: np.ndarray
 
 
-def room(most: int, columns: int, waiting: int) -> Room:
+def room(most: int, columns: int, waiting: int, scans: int) -> Room:
     """Arrays for `most` patterns of so many columns of E, which double at a scan, and for those that wait."""
     high = 12 + 3 * columns + FURTHER
     count = (2 * most + waiting + 4 * WIDTH) // WIDTH * WIDTH
@@ -57,7 +63,9 @@ def room(most: int, columns: int, waiting: int) -> Room:
     table, owner = np.zeros((2, cells), dtype=np.int64)
     held, following = np.zeros((2, waiting + 1, 6 + 3 * columns + FURTHER))
     rows, spare = aligned_zeros(count * high), aligned_zeros(count * high)
-    return Room(rows, spare, places, places.view(np.int64), group, lighter, table, owner, held, following)
+    pieces, (size, scan) = aligned_zeros((scans + 1) * 2 * PIECE * high), np.zeros((2, scans + 1), dtype=np.int64)
+    labels = group, lighter, table, owner
+    return Room(rows, spare, places, places.view(np.int64), *labels, held, following, pieces, size, scan)
 
 
 @inline

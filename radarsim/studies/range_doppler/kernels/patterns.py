@@ -12,7 +12,7 @@ import numpy as np
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, total, where_greater
 from radarsim.studies.range_doppler.kernels.chunk import transported
-from radarsim.studies.range_doppler.kernels.merging import ALIKE, FURTHER, at, blocks_of, height, merge, pad
+from radarsim.studies.range_doppler.kernels.merging import ALIKE, FURTHER, PIECE, at, blocks_of, height, merge, pad
 from radarsim.studies.range_doppler.kernels.steps import inverted
 
 NEGLIGIBLE = 1e-18  # probability of a pattern that is left out
@@ -34,7 +34,8 @@ class World(NamedTuple):
     observes              1: the filter observes the range alone; 2: range and velocity
     start                 plots in its least-squares start
     enough                plots with which all filters have started
-    most                  patterns that are kept
+    most                  patterns that are kept, or
+    whole                 beyond which they are followed to the end piece by piece, none merged
     from_k                scan, counted from 1, from which means are taken
     """
 
@@ -50,6 +51,7 @@ class World(NamedTuple):
     start: int
     enough: int
     most: int
+    whole: bool
     from_k: int
 
 
@@ -309,6 +311,38 @@ def note_waiting(waiting, held, columns, world, found):
                         found[first + 3] += w * world.of_plot[m, 1]
 
 
+@part
+def follow(room, rows, n, k, world, found):
+    """All patterns that n started ones become after scan k, to the last scan, their sums added to found as below.
+
+    A piece of at most PIECE patterns goes on until it is larger; then its later half waits, above it, until it is done.
+    """
+    columns, scans = world.defect.shape[2], len(world.defect)
+    high = height(columns)
+    length, room_of_piece = WIDTH * high, 2 * PIECE * high
+    for first in range(0, n, PIECE):
+        top = 0
+        room.size[0], room.scan[0] = min(PIECE, n - first), k
+        begin_at = first // WIDTH * length
+        for i in range(blocks_of(room.size[0]) * length):
+            room.pieces[i] = rows[begin_at + i]
+        while top >= 0:
+            piece, m, scan = row(address(room.pieces), top * room_of_piece // WIDTH), room.size[top], room.scan[top] + 1
+            predict(piece, m, columns, world.dt, world.Q, world.defect[scan])
+            m = branch(piece, m, columns, world)
+            if scan + 1 >= world.from_k:
+                note_started(piece, m, columns, world, found[scan])
+            room.size[top], room.scan[top] = m, scan
+            if scan == scans - 1:
+                top -= 1
+            elif m > PIECE:
+                kept = blocks_of(m) // 2
+                for i in range(kept * length, blocks_of(m) * length):
+                    room.pieces[(top + 1) * room_of_piece + i - kept * length] = room.pieces[top * room_of_piece + i]
+                room.size[top], room.size[top + 1], room.scan[top + 1] = kept * WIDTH, m - kept * WIDTH, scan
+                top += 1
+
+
 @kernel
 def add_means(room, world, found):
     """`patterns.mixture`: the sums of each scan into found (K, OWN + G BESIDE), in a `merging.room`."""
@@ -323,6 +357,10 @@ def add_means(room, world, found):
         if k + 1 >= world.from_k:
             note_started(rows, n, columns, world, found[k])
             note_waiting(room.waiting, held, columns, world, found[k])
-        if n > world.most:
+        if n > world.most and world.whole:
+            if k < len(world.defect) - 1:
+                follow(room, rows, n, k, world, found)
+            n = 0
+        elif n > world.most:
             n, alike = merge(room, rows, spare, n, columns, world.most, alike)
             rows, spare = spare, rows

@@ -1,0 +1,333 @@
+"""What `radarsim solve` is asked: which key of which cases, which quantity it shall bring where; the quantity as a
+function of the key; and the answer.
+"""
+
+import math
+import os
+import shlex
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from radarsim.app import quantities, search
+from radarsim.app.configs import load
+from radarsim.app.quantities import UNKNOWN, Quantity
+from radarsim.app.simulation import result_of
+from radarsim.app.work import CaseWork
+from radarsim.config import numeric
+from radarsim.config.experiment import Case
+from radarsim.config.lookup import did_you_mean
+from radarsim.engine.collect import collect
+from radarsim.engine.results import Axes, CaseResult
+from radarsim.errors import ConfigError
+from radarsim.language import term, tr
+from radarsim.report.statistics import Estimate
+
+FACTOR = 1000.0  # the search goes from a thousandth of a positive key's value to a thousand times it
+WHOLE = term("of whole numbers the one beside the target that does at least as well")
+MOST_NAMED = 6  # cases that a message lists
+JUMPS = term("the quantity jumps over the target there")
+SAME = 1e-12  # of a quantity: what rounding may make of no change
+ROUGH = -1  # in place of a number of realisations
+LONG_S = 2.0  # of an answer, from which it is predicted what it takes
+
+Config = str | os.PathLike[str] | Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was found.
+
+    value is None where the target is not attained; then limit is the nearest that was, at limit_at. lo and hi bound the
+    value at 95 %, and equal it where exact. slope is the quantity's change for one unit of the key; others are further
+    values that attain the target. low and high are what was searched, command the run that confirms.
+    """
+
+    key: str
+    unit: str
+    quantity: Quantity
+    quantity_unit: str
+    equals: float
+    now: float | None
+    attained_now: float
+    value: float | None
+    lo: float | None
+    hi: float | None
+    exact: bool
+    attained: float | None
+    slope: float | None
+    others: tuple[float, ...]
+    limit: float | None
+    limit_at: float | None
+    low: float
+    high: float
+    command: str
+    notes: tuple[str, ...] = ()
+
+
+@dataclass
+class Cases:
+    """The cases that a config stands for with other values at a key; `base` as it is.
+
+    The others share the base's noise, whatever their world.
+    """
+
+    config: Config
+    overrides: tuple[str, ...]
+    name: str | None = None
+    base: Case = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.base = self._chosen(self.overrides)
+
+    def _chosen(self, overrides: Iterable[str]) -> Case:
+        experiment = load(self.config, overrides)
+        named = {case.name: case for case in experiment.cases}
+        if self.name is None and len(named) == 1:
+            return experiment.cases[0]
+        if self.name is None:
+            some = ", ".join(repr(one) for one in list(named)[:MOST_NAMED]) + (", …" if len(named) > MOST_NAMED else "")
+            raise ConfigError(f"{experiment.stem} has {len(named)} cases: choose one with --case: {some}")
+        if self.name not in named:
+            near = did_you_mean(self.name, named) or f"; there are: {', '.join(named)}"
+            raise ConfigError(f"no case {self.name!r} in {experiment.stem}{near}")
+        return named[self.name]
+
+    def at(self, key: str, value: float) -> Case:
+        """The case with another value at a key. Raises ConfigError where the config refuses it."""
+        return replace(self._chosen((*self.overrides, self._setting(key, value))), noise_of=self.base.spec)
+
+    def _setting(self, key: str, value: float) -> str:
+        """A key's setting; of an item of a list the whole list, which the config may give in degrees or not at all."""
+        holder, _, place = key.rpartition(".")
+        if not place.isdecimal():
+            return f"{key}={_yaml(value)}"
+        items = {one.path: one.value for one in numeric.keys(self.base.spec) if one.path.rpartition(".")[0] == holder}
+        listed = [f"{holder}.{i}" for i in range(len(items))]
+        if list(items) != listed or None in items.values():
+            return f"{key}={_yaml(value)}"
+        values = (value if path == key else own for path, own in items.items())
+        return f"{holder}=[{', '.join(_yaml(one) for one in values if one is not None)}]"
+
+
+def _yaml(value: float) -> str:
+    """A number as a config holds it: whole ones without a point."""
+    return repr(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked, with its config read: of which cases, which key, what it shall do, over which range."""
+
+    cases: Cases
+    key: str
+    quantity: Quantity
+    equals: float
+    over: search.Range
+    now: float | None
+    unit: str
+    overrides: tuple[str, ...]
+    realisations: int | None = None
+
+    def command(self, value: float) -> str:
+        """The run that shows what a value attains, of noise of its own, with as many realisations as were asked for."""
+        name = self.cases.config if isinstance(self.cases.config, str | os.PathLike) else "CONFIG.yaml"
+        settings = [*self.overrides, f"{self.key}={number(value)}"]
+        count = [] if self.realisations is None else ["-n", str(self.realisations)]
+        parts = [part for one in settings for part in ("--set", one)]
+        return shlex.join(["radarsim", "run", os.fspath(name), *parts, *count])
+
+
+def number(value: float) -> str:
+    """A number as YAML reads it back, to twelve digits."""
+    return repr(rounded(value)).removesuffix(".0")
+
+
+def rounded(value: float) -> float:
+    """A number without what lies beyond its twelfth digit."""
+    return float(f"{value:.12g}")
+
+
+def range_of(found: Sequence[numeric.NumericKey], name: str, between: tuple[float, float] | None) -> search.Range:
+    """What is searched of a key. Raises ConfigError where it has neither bounds nor a value to begin from."""
+    key, values = found[0], [one.value for one in found if one.value]
+    if between is not None:
+        low, high = between
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise ConfigError(f"--between: must be two rising numbers, got {low:g} {high:g}")
+        if key.whole:
+            low, high = float(math.ceil(low)), float(math.floor(high))
+            if low > high:
+                ends = " ".join(f"{end:g}" for end in between)
+                raise ConfigError(f"--between: {name} takes whole numbers, and there is none from {ends}")
+        return search.searched(low, high, key.whole)
+    if math.isfinite(key.low) and math.isfinite(key.high) and not key.whole:
+        return search.searched(key.low, key.high)
+    if not values:
+        what = "not given" if key.value is None else f"{key.value:g}"
+        raise ConfigError(f"{name}: is {what} in the config, and its own range has no end: give --between LO HI")
+    if key.low >= 0:
+        low, high = max(rounded(min(values) / FACTOR), key.low), min(rounded(max(values) * FACTOR), key.high)
+        return search.searched(math.ceil(low) if key.whole else low, math.floor(high) if key.whole else high, key.whole)
+    size = 10 * max(map(abs, values))
+    return search.searched(max(-size, key.low), min(size, key.high), key.whole)
+
+
+class Curve:
+    """The quantity as a function of the key, each value computed once.
+
+    progress is told of each; `simulated` counts those that were simulated.
+    """
+
+    def __init__(
+        self,
+        cases: Cases,
+        key: str,
+        quantity: Quantity,
+        threads: int | None,
+        progress: Callable[[int, int, int], None] | None,
+        realisations: int,
+    ):
+        self.cases, self.key, self.quantity = cases, key, quantity
+        self.threads, self.progress, self.realisations = threads, progress, realisations
+        self.known: dict[tuple[float, int], Estimate] = {}
+        self.refused: dict[float, ConfigError] = {}
+        self.from_tables = False
+        self.rough = False  # whether there are values for less work, for a search to look about
+        self.expected = 1
+
+    def exact(self, axes: Axes) -> bool:
+        """Whether the quantity is known exactly: from the plan, or from one realisation's tables."""
+        case = self.cases.base
+        if not math.isnan(quantities.exact(self.quantity, case, axes)):
+            return True
+        if self.quantity.kind in ("gain", "sigma"):
+            return False
+        _, known = self._sampled(case, 1)
+        self.from_tables = not math.isnan(known)
+        return self.from_tables
+
+    def exactly(self, value: float | None) -> float:
+        """The exact quantity at a value (None: as the config has it); not-a-number where there is none."""
+        return self._kept(value, 0, self._exact_of).value
+
+    def roughly(self, value: float) -> float:
+        """The same for less work, to a thousandth of σ, where the study has it so; else the exact quantity."""
+        if not self.rough:
+            return self.exactly(value)
+        return self._kept(value, ROUGH, lambda case: self._exact_of(replace(case, roughly=True))).value
+
+    def simulated(self, value: float | None, realisations: int) -> Estimate:
+        """The quantity with its interval, from so many realisations."""
+        return self._kept(value, realisations, lambda case: self._sampled(case, realisations)[0])
+
+    def noted(self, value: float) -> tuple[str, ...]:
+        """What the tables note of the interval at a value, in words."""
+        note = quantities.noted(self.quantity, self._result(self.cases.at(self.key, value), self.realisations))
+        return (f"the interval is too narrow: {note}; more realisations, -n, mend that",) if note else ()
+
+    def _kept(self, value: float | None, count: int, of: Callable[[Case], Estimate]) -> Estimate:
+        place = (math.nan if value is None else value, count)
+        if place in self.known:
+            return self.known[place]
+        if value is None:
+            return of(self.cases.base)
+        try:
+            found = of(self.cases.at(self.key, value))
+        except ConfigError as error:
+            self.refused[value] = error
+            found = UNKNOWN
+        self.known[place] = found
+        if self.progress is not None:
+            self.expected = max(self.expected, len(self.known))
+            self.progress(len(self.known), self.expected, 0)
+        return found
+
+    def _exact_of(self, case: Case) -> Estimate:
+        if self.from_tables:
+            value = self._sampled(case, 1)[1]
+        else:
+            value = quantities.exact(self.quantity, case, quantities.labels(self.quantity, case))
+        return Estimate(value, value, value)
+
+    def _sampled(self, case: Case, realisations: int) -> tuple[Estimate, float]:
+        return quantities.sampled(self.quantity, self._result(case, realisations))
+
+    def _result(self, case: Case, realisations: int) -> CaseResult:
+        work = CaseWork(case)
+        return result_of(case, work, collect(work, realisations, threads=self.threads))
+
+
+def predict(told: Callable[[str], None], what: str, seconds: float) -> None:
+    """Say what a search will do and about how long it takes, where that is long."""
+    if seconds > LONG_S:
+        told(tr("{what}: about {seconds:.0f} s", what=what, seconds=seconds))
+
+
+def said_of(asked: Question) -> dict[str, str]:
+    """What is asked, for a sentence."""
+    return {"quantity": asked.quantity.said, "key": asked.key}
+
+
+def answered(asked: Question, attained_now: float, **given: Any) -> Answer:
+    """An answer of what was asked; what is not given is none."""
+    whole: dict[str, Any] = {
+        **dict.fromkeys(("value", "lo", "hi", "attained", "slope", "limit", "limit_at")),
+        "others": (),
+        "notes": (),
+        **given,
+    }
+    shown = whole["limit_at"] if whole["value"] is None else whole["value"]
+    return Answer(
+        key=asked.key,
+        unit=numeric.unit(asked.key),
+        quantity=asked.quantity,
+        quantity_unit=asked.unit,
+        equals=asked.equals,
+        now=asked.now,
+        attained_now=attained_now,
+        low=asked.over.low,
+        high=asked.over.high,
+        command=asked.command(shown),
+        **whole,
+    )
+
+
+def nowhere(asked: Question, curve: Curve) -> ConfigError:
+    """Why the quantity has no value anywhere on the range: the config's own reason where it gives one."""
+    reasons = [error for _, error in sorted(curve.refused.items())]
+    if reasons:
+        return ConfigError(*dict.fromkeys(line for error in reasons[:1] for line in error.lines))
+    return ConfigError(f"{asked.quantity.words}: there is no estimate there, whatever {asked.key} is")
+
+
+def refuse_without_effect(asked: Question, values: Iterable[float]) -> None:
+    """ConfigError where the quantity is the same at every value that was tried."""
+    known = [value for value in values if not math.isnan(value)]
+    if known and max(known) - min(known) <= SAME * max(abs(max(known)), abs(min(known)), 1e-300):
+        everywhere = f"{known[0]:.6g} {asked.unit} at every value from {asked.over.low:g} to {asked.over.high:g}"
+        raise ConfigError(f"{asked.key}: has no effect on the {asked.quantity.words}: {everywhere}")
+
+
+def fulfilling(asked: Question, x: float, of: Callable[[float], float]) -> float:
+    """Of the whole numbers about a change of sign the first that does at least as well as is asked."""
+    better = 1 if asked.quantity.of.more_is_better else -1
+    near = [n for n in (x, x - 1, x + 1) if asked.over.low <= n <= asked.over.high]
+    good = [n for n in near if better * (of(n) - asked.equals) >= 0]
+    return good[0] if good else x
+
+
+def nearest(values: Sequence[float], asked: Question) -> float:
+    """The value nearest to the config's own, on the scale of the search; the first where the config has none."""
+    if asked.now is None or (asked.over.logarithmic and asked.now <= 0):
+        return values[0]
+    own = asked.over.inner(asked.now)
+    return min(values, key=lambda x: abs(asked.over.inner(x) - own))
+
+
+def boundary(asked: Question, curve: Curve, x: float) -> tuple[str, ...]:
+    """Whether the nearest value lies at an end of what was searched, or of what the config allows, in words."""
+    if x in (asked.over.low, asked.over.high):
+        return (term("the end of what was searched; --between LO HI searches elsewhere"),)
+    beyond = [other for other in curve.refused if abs(other - x) <= 0.05 * abs(x)]
+    return (term("the end of what the config allows"),) if beyond else ()
