@@ -9,11 +9,13 @@ import unicodedata
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import radarsim
 from radarsim.app import doctor, repeat
 from radarsim.app import run as experiment
 from radarsim.app.configs import load, new
+from radarsim.cli import main
 from radarsim.config.lookup import SHIPPED
 from radarsim.errors import ConfigError, StoreError
 from radarsim.report import files, index
@@ -91,8 +93,8 @@ def test_the_command_of_a_result_repeats_it(tmp_path, monkeypatch, options, endi
     told = record(tmp_path / "results", "rls2")["command"]
     assert told == f"radarsim run {ending}"
     before = {path.name: path.read_bytes() for path in (tmp_path / "results" / "rls2").glob("*.csv")}
-    command = [sys.executable, "-m", "radarsim", *told.split()[1:], "--out", "again", "--no-figures", "-q"]
-    subprocess.run(command, check=True)
+    repeated = [*told.split()[1:], "--out", "again", "--no-figures", "-q"]
+    assert CliRunner().invoke(main, repeated, catch_exceptions=False).exit_code == 0
     assert {path.name: path.read_bytes() for path in (tmp_path / "again" / "rls2").glob("*.csv")} == before
 
 

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.warm import Start
+
 PR_CAPBSET_DROP, PASS_OVER = 24, (1, 2)  # CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
 NO_FIGURES = ("-n", "4000", "--no-figures")
 
@@ -20,20 +21,12 @@ pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="ri
 
 
 def drop():
-    """In the child, before it starts the command: permissions hold for it whoever it is."""
+    """In a process before it starts its program: permissions hold for it whoever it is."""
     if os.geteuid() == 0:
         library = ctypes.CDLL(None, use_errno=True)
         for right in PASS_OVER:
             if library.prctl(PR_CAPBSET_DROP, right, 0, 0, 0) != 0:
                 raise OSError(ctypes.get_errno(), "PR_CAPBSET_DROP")
-
-
-def command(*words):
-    """What the command answers to somebody for whom permissions hold."""
-    shell = [sys.executable, "-m", "radarsim", *map(str, words)]
-    done = subprocess.run(shell, cwd=ROOT, capture_output=True, text=True, check=False, preexec_fn=drop)
-    assert "Traceback" not in done.stderr
-    return done
 
 
 def contents(folder):
@@ -59,7 +52,20 @@ def closed():
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def command(tmp_path_factory):
+    """What the command answers to somebody for whom permissions hold."""
+
+    def answer(*words, **options):
+        done = start.run(*words, **options)
+        assert "Traceback" not in done.stderr
+        return done
+
+    with Start(tmp_path_factory.mktemp("printed"), preexec_fn=drop) as start:
+        yield answer
+
+
+@pytest.fixture(scope="module")
+def made(command, tmp_path_factory):
     """Results of another user."""
     out = tmp_path_factory.mktemp("another") / "results"
     assert command("run", "rls2", *NO_FIGURES, "--out", out).returncode == 0
@@ -74,7 +80,7 @@ def test_the_other_user_may_not_write(closed, tmp_path):
     assert "PermissionError" in done.stderr
 
 
-def test_a_run_into_a_closed_folder(closed, tmp_path):
+def test_a_run_into_a_closed_folder(command, closed, tmp_path):
     closed(tmp_path)
     done = command("run", "rls2", *NO_FIGURES, "--out", tmp_path)
     assert (done.returncode, done.stdout) == (4, "")
@@ -85,7 +91,7 @@ def test_a_run_into_a_closed_folder(closed, tmp_path):
 
 
 @pytest.mark.parametrize(("part", "more"), [("rls2", 5000), (".blocks", 9000), ("", 9000)])
-def test_results_of_another_user_stay_whole(closed, made, part, more):
+def test_results_of_another_user_stay_whole(command, closed, made, part, more):
     """Their tables, their blocks or both: more realisations than they have cannot be stored there."""
     before = contents(made / part)
     closed(made / part)
@@ -95,7 +101,7 @@ def test_results_of_another_user_stay_whole(closed, made, part, more):
     assert contents(made / part) == before
 
 
-def test_they_can_be_read(closed, made, tmp_path):
+def test_they_can_be_read(command, closed, made, tmp_path):
     closed(made)
     before = contents(made)
     assert command("doctor", made / "rls2").returncode == 0
@@ -104,15 +110,15 @@ def test_they_can_be_read(closed, made, tmp_path):
     assert "P1." in listed.stdout
     compared = command("compare", made / "rls2", made / "rls2", "--no-figures", "--out", tmp_path / "compared")
     assert compared.returncode == 0, compared.stderr
-    loaded = f"import radarsim; print(len(radarsim.load('rls2', out={str(made)!r}).curves))"
-    shell = [sys.executable, "-c", loaded]
-    done = subprocess.run(shell, cwd=ROOT, capture_output=True, text=True, check=False, preexec_fn=drop)
+    loads = f"import radarsim; print(len(radarsim.load('rls2', out={str(made)!r}).curves))"
+    (tmp_path / "loads.py").write_text(loads)
+    done = command(module="loads", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert int(done.stdout) > 50
     assert contents(made) == before
 
 
-def test_a_report_that_cannot_be_written_again(closed, made):
+def test_a_report_that_cannot_be_written_again(command, closed, made):
     closed(made)
     done = command("report", "rls2", "--out", made, "--no-figures")
     assert done.returncode == 4
@@ -120,7 +126,7 @@ def test_a_report_that_cannot_be_written_again(closed, made):
     assert str(made) in line
 
 
-def test_results_that_may_not_be_read(closed, made):
+def test_results_that_may_not_be_read(command, closed, made):
     """A table closed to everybody is named, not taken for damaged."""
     table = made / "rls2/curves.csv"
     mode = table.stat().st_mode
