@@ -6,6 +6,7 @@ others read from the cache of kernels.
 """
 
 import gc
+import os
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ TESTS = Path(__file__).parent
 # Folders, in the order in which their groups begin; what is short is left for the end, where processes wait.
 LONG = ("studies", "trust", "cli", "app", "engine", "docs", "report", "language", "kernels", "recorded")
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does; no module of tests has loaded NumPy yet
 gc.set_threshold(100_000)  # as the command does; of the suite's time 7 % went into looking through objects that stay
 
 

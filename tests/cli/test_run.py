@@ -217,6 +217,17 @@ def test_help_needs_no_heavy_import():
     assert finished.stdout.strip() == "[]"
 
 
+@pytest.mark.parametrize(("given", "threads"), [({}, "[1]"), ({"OPENBLAS_NUM_THREADS": "2"}, "2")])
+def test_linear_algebra_takes_one_thread_unless_told_otherwise(given, threads):
+    """A second one is slower for matrices of a few rows; other BLAS libraries than NumPy's own are left alone."""
+    surroundings = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")} | given
+    pools = "sorted({one['num_threads'] for one in threadpool_info() if one['internal_api'] == 'openblas'})"
+    asked = "os.environ['OPENBLAS_NUM_THREADS']" if given else pools
+    code = f"import os, radarsim.cli, numpy, scipy.linalg; from threadpoolctl import threadpool_info; print({asked})"
+    done = subprocess.run([sys.executable, "-c", code], env=surroundings, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() in (threads, "[]")
+
+
 def test_config_outside_a_checkout_runs_by_path(tmp_path):
     text = (
         Path("configs/rls2.yaml")
