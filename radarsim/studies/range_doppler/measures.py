@@ -240,12 +240,16 @@ def _gain_at(seen: Evidence, key: tuple[int, float]) -> Series:
     return seen.marked(seen.gain(key, seen.filter(key, RV), "r"), key)
 
 
-def ineffective_from(radar: int) -> Measure:
-    """The first time at which the acceleration gain is gone (zero or a loss)."""
+def ineffective_from(radar: int, asked_s: float) -> Measure:
+    """The first time at which the acceleration gain is gone (zero or a loss); missing where the run is over before
+    the time that is asked about.
+    """
 
     def measure(seen: Evidence) -> Estimate:
         gain = seen.k_gain(radar, "ar")
         gain.last()
+        if gain.t[-1] < asked_s and gain.value.min() > 0:
+            raise claims.Missing(f"the run of RLS {radar} ends at {gain.t[-1]:g} s, before {asked_s:g} s")
         times = []
         for part in (gain.value, gain.lo, gain.hi):
             gone = np.flatnonzero(part <= 0)

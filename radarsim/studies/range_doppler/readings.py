@@ -20,16 +20,20 @@ from radarsim.studies.range_doppler.measures import RADARS
 
 ALGEBRA = ("P1.16", "P1.31", "P1.34")  # of the table of radars alone
 NUMBERS = tuple(claim.id for claim in CLAIMS if claim.id not in ALGEBRA)
+FIGURE_1A = ("P1.14", "P1.18")  # sentences on figure 1a, which is drawn for several D_M
+LEVEL = ("P1.20",)  # what a curve converges to is no matter of where it is cut
 FAST = tuple(  # those that look at a radar of Δt = 5 s
     claim.id
     for claim in CLAIMS
-    if claim.id in NUMBERS
-    for keys in [{key[0] if isinstance(key, tuple) else key for part in claim.parts for key in part.cases}]
+    if claim.id in NUMBERS and claim.id not in LEVEL
+    for parts in [[part for part in claim.parts if part.asserted]]
+    for keys in [{key[0] if isinstance(key, tuple) else key for part in parts for key in part.cases}]
     if keys & {3, 5}
 )
 FALLS = ("P1.5", "P1.6")
 FALLING = ("P1.26", "P1.27")  # as far as a settled curve may rise again
 SETTLES = ("P1.14", "P1.15", *FALLING)
+SHIPPED = "0.001"  # D_M, (m/s³)²
 SWEPT = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # D_M of the config manoeuvre_variance
 FIFTEEN = 15  # points, as printed
 LONG = 250  # scans after which a filter is taken as steady
@@ -107,6 +111,18 @@ CHOICES = (
         SETTLES,
     ),
     Choice(
+        "shown_variance",
+        "D_M of figure 1a, (m/s³)²",
+        "Ошибки фильтрации дальности … получены по результатам моделирования при различных D_M для РЛС 2 и приведены "
+        "на рис. 1.",
+        "The errors of range … were found by simulation at various D_M for RLS 2 and are shown in figure 1.",
+        (
+            Alternative("0.001", UNSTATED, "that of the other figures"),
+            *(Alternative(name, UNSTATED, "of the decades about it") for name in ("0.00001", "0.0001", "0.01", "0.1")),
+        ),
+        FIGURE_1A,
+    ),
+    Choice(
         "manoeuvre_variance",
         "D_M of the gains, (m/s³)²",
         "… графически представлены на рис. 1, б для пяти типов РЛС (см. табл.) при D_M = 10⁻³.",
@@ -118,7 +134,7 @@ CHOICES = (
             Alternative("0.0015", AGAINST, "another value than printed: RLS 2 then falls to 25 %"),
             Alternative("0.003", AGAINST, "another value than printed"),
         ),
-        NUMBERS,
+        tuple(one for one in NUMBERS if one not in FIGURE_1A),
     ),
     Choice(
         "process_noise",
@@ -246,7 +262,8 @@ class ExactEvidence(measures.Evidence):
         super().__init__((), {}, {})
         self._reading, self._limit_s = reading, limit_s
         self.extremum = 0.0 if reading["extremum"] == "the largest value" else measures.Evidence.extremum
-        self._own = float(reading["manoeuvre_variance"])
+        shown = reading["shown_variance"]
+        self._own = float(shown if shown != SHIPPED else reading["manoeuvre_variance"])
         self._cases: dict[Any, _Radar] = {}
         self._curves: dict[tuple[Any, str, str], Series] = {}
 
@@ -331,4 +348,7 @@ class ExactEvidence(measures.Evidence):
         scans = FIFTEEN if self._reading["points"] == "fifteen each" else len(axes.k)
         values = values[: len(axes.k)]
         kept = np.isfinite(values) & (axes.t_s <= self._limit_s + 1e-6) & (axes.k <= scans)
-        return Series(axes.k[kept], axes.t_s[kept], *(values[kept],) * 3)
+        end, asked = float(axes.t_s[min(scans, len(axes.k)) - 1]), self._limit_s
+        short = f"the run of RLS {self.case(key).number} ends at {end:g} s, before {asked:g} s"
+        ends = short if np.isfinite(asked) and end < asked - 1e-6 else ""
+        return Series(axes.k[kept], axes.t_s[kept], *(values[kept],) * 3, short=ends)
