@@ -16,7 +16,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.report.claims import page
-from radarsim.report.claims.rule import UNDECIDED
+from radarsim.report.claims.rule import UNDECIDED, roughly
 from radarsim.report.precision import looks
 
 
@@ -66,7 +66,7 @@ def undecided(rows: Sequence[dict[str, Any]]) -> list[str]:
         if parts[0]["class"] != UNDECIDED or page.extension(parts):
             continue
         needed = page.number(parts[0]["needed"])
-        would = "its value lies on a border: no number would" if needed is None else f"about {needed:,.0f} would"
+        would = "its value lies on a border: no number would" if needed is None else f"about {roughly(needed):,} would"
         lines.append(f"{parts[0]['claim']} not yet decided at {_most(parts):,.0f} realisations; {would}")
     return lines
 

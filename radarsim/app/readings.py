@@ -6,6 +6,8 @@ import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +21,12 @@ from radarsim.report.claims.declared import Claim
 from radarsim.report.claims.joint import Joint, joint
 from radarsim.report.claims.over import Over, Under, columns, depth, rows
 from radarsim.report.claims.readings import PaperReadings
-from radarsim.report.claims.rule import UNDECIDED
+from radarsim.report.claims.rule import UNDECIDED, roughly
 from radarsim.report.claims.search import Search
 from radarsim.studies import registry
 
 FOLDER, TABLE, DRAWN = *PLACE.parts, "drawn.json"
+DRAW = (("claims", "curve.py"), *((name,) for name in ("figures.py", "legends.py", "drawing.py", "chart_look.py")))
 
 
 @dataclass(frozen=True)
@@ -169,7 +172,7 @@ def _left(over: Over) -> str:
     if over.outcome is None or over.outcome.kind != UNDECIDED:
         return ""
     needed = over.outcome.needed
-    would = "a value lies on a border: no number would" if needed is None else f"about {needed:,} would"
+    would = "a value lies on a border: no number would" if needed is None else f"about {roughly(needed):,} would"
     open_, n = len(over.undecided), over.looked
     return f"{over.claim.id} not yet decided under {open_} readings at {n:,} realisations; {would}"
 
@@ -187,7 +190,8 @@ def _after(progress: Progress | None, before: int, total: int) -> Progress | Non
 def _write(done: Done, figures: bool) -> tuple[str, ...]:
     """Write the table, with the stored rows of claims that were not asked for, and a curve a claim.
 
-    A curve whose claim came out as it did before is not drawn again: `drawn.json` keeps what the files were drawn of.
+    A curve whose claim came out as it did before is not drawn again, unless what draws it has changed: `drawn.json`
+    keeps what the files were drawn of.
     """
     contents = {TABLE: _table(done).encode()}
     if figures:
@@ -204,7 +208,7 @@ def _curve(done: Done, over: Over, drawn: dict[str, str]) -> dict[str, bytes]:
     """The files of a claim's specification curve; none where they stand there already."""
     of = next(read.paper.readings for read in done.read if over in read.over)
     content = repr([(one.name, one.kind, depth(one), one.why) for one in over.under]) + over.sentence()
-    mark = hashlib.sha256(content.encode()).hexdigest()
+    mark = hashlib.sha256(content.encode() + _sources()).hexdigest()
     name = f"{over.claim.id}.svg"
     if drawn.get(name) == mark and (done.folder / name).is_file():
         return {}
@@ -213,6 +217,12 @@ def _curve(done: Done, over: Over, drawn: dict[str, str]) -> dict[str, bytes]:
 
     drawn[name] = mark
     return {name: drawing.save(curve.specification(of, over), ("svg",))["svg"]}
+
+
+@cache
+def _sources() -> bytes:
+    """What draws the curves."""
+    return b"".join(resources.files("radarsim.report").joinpath(*name).read_bytes() for name in DRAW)
 
 
 def _drawn(folder: Path) -> dict[str, str]:

@@ -543,7 +543,7 @@ def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
         if (exact := page.number(row["exact"])) is not None:
             said.append(tr("exactly {value}", value=page.plain(exact)))
         if (missed := page.number(row["miss"])) is not None and missed:
-            said.append(tr("misses by {miss:.3g} margins", miss=missed))
+            said.append(tr("off by {miss:.3g} margins", miss=missed))
         if row["verdict"] == "not judged here":
             said.append(reasons.said(row["why"]))
         say(f"       {tr(row['verdict']):<20} {'; '.join(said)}")
@@ -562,8 +562,8 @@ def print_readings(done: "Done", detailed: bool) -> None:
                     )
                     say(f"       {one.kind}  {outcome:<24} {one.name}")
             found = over.outcome
-            words = page.class_words(found.words) if found else tr("not judged")
-            say(f"{over.claim.id:<6} {words:<24} {over.sentence()}")
+            words = tr(found.kind) if found else tr("not judged")  # on what it depends, the sentence says
+            say(f"{over.claim.id:<6} {words:<27} {over.sentence()}")
         if read.counted is not None:
             say(f"{read.paper.readings.paper}: {read.counted.sentence()}")
     if done.files:

@@ -145,6 +145,16 @@ def test_a_damaged_table_is_reported(tmp_path):
         app.readings(app.asked(["P1.4"]), out=tmp_path, figures=False)
 
 
+def test_a_curve_is_drawn_again_where_what_draws_it_has_changed(tmp_path, monkeypatch):
+    def drawn():
+        return app.readings(app.asked(["P1.7"]), out=tmp_path).files
+
+    assert "P1.7.svg" in drawn()
+    assert "P1.7.svg" not in drawn()
+    monkeypatch.setattr(app, "_sources", lambda: b"other colours")
+    assert "P1.7.svg" in drawn()
+
+
 def test_the_command(tmp_path):
     def run(*arguments, code=0):
         result = CliRunner().invoke(main, ["readings", *arguments, "--out", str(tmp_path)], catch_exceptions=False)

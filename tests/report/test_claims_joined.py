@@ -60,7 +60,7 @@ def test_what_would_decide_is_of_all_readings_that_are_open():
     ]
     (joined,) = with_readings([row(kind=CONFIRMED)], stored)
     assert (joined["class"], joined["needed"]) == (UNDECIDED, 64000)
-    assert "6.4e+04 realisations would decide" in page.verdict_of([joined])
+    assert "64,000 realisations would decide" in page.verdict_of([joined])
     stored[1]["needed"] = ""  # a value on a border
     (joined,) = with_readings([row(kind=CONFIRMED)], stored)
     assert math.isnan(joined["needed"])

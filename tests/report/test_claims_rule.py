@@ -139,6 +139,10 @@ def test_realisations_that_would_decide():
     assert rule.claim([NUMBER]).needed is None
 
 
+def test_realisations_are_said_to_two_digits_and_never_fewer():
+    assert [rule.roughly(n) for n in (1, 99, 100, 101, 1_589_927, 64_000)] == [1, 99, 100, 110, 1_600_000, 64_000]
+
+
 def test_variants_of_a_number_one_suffices():
     right, wrong = at(NUMBER, 25, number="T", variant="a"), at(NUMBER, 50, number="T", variant="b")
     assert rule.claim([right, wrong]).kind == CONFIRMED

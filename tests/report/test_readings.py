@@ -176,7 +176,7 @@ def test_what_is_open_says_what_would_decide_it():
     needed = every[1].outcome.needed
     assert 1000 < needed < every[2].outcome.needed
     assert (found.outcome.kind, found.outcome.needed, found.looked) == (UNDECIDED, needed, 1000)
-    assert f"1 open at 1,000 realisations, about {needed:,} would decide" in found.sentence()
+    assert f"1 open at 1,000 realisations, about {rule.roughly(needed):,} would decide" in found.sentence()
     assert {row["needed"] for each in every[1:2] for row in rows(each, columns([of]))} == {needed}
     assert found.still_open() in page(of, "Nobody 1900", [found], joint(of, [found]))
     assert over(Small(), claim(2, "1")).still_open() == ""

@@ -6,14 +6,15 @@ from radarsim.language import term, tr
 from radarsim.report.claims import rule
 from radarsim.report.claims.over import Over, Under, depth
 from radarsim.report.claims.readings import Choice, PaperReadings
-from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
+from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
 
 FURTHEST = 5.0  # margins: what lies further is drawn there
 LETTERS = 44  # of an alternative beside the panel
+HEADING = 1.5  # lines that the name of a choice takes above its alternatives
 KINDS = {
     rule.EQUIVALENT: (term("as shipped, or equivalent"), Style(colour=0, dash=None, marker=0)),
-    rule.UNSTATED: (term("the paper does not say"), Style(colour=1, dash=None, marker=1)),
-    rule.AGAINST: (term("against the print"), Style(colour=2, dash=None, marker=2)),
+    rule.UNSTATED: (term("the paper does not say"), Style(colour=4, dash=None, marker=1)),
+    rule.AGAINST: (term("against the print"), Style(colour=GREY, dash=None, marker=2)),
 }
 
 
@@ -38,7 +39,7 @@ def specification(of: PaperReadings, over: Over) -> Figure:
         ),
         panels=(_above(every, where, ends, over), *([_below(varied, every, where)] if varied else [])),
         width_mm=PAGE_MM,
-        panel_height_mm=max(62.0, 4.2 * sum(len(choice.alternatives) + 1 for choice in varied)),
+        panel_height_mm=max(62.0, 4.2 * sum(len(choice.alternatives) + HEADING for choice in varied)),
     )
 
 
@@ -51,7 +52,7 @@ def _above(every: list[Under], where: np.ndarray, ends: np.ndarray, over: Over) 
             marks.append(Line(where[of], value, tr(label), style, lo, hi))
     return Panel(
         Axis(tr("reading, sorted"), limits=(0, len(every) + 1)),
-        Axis(tr("distance of the worst part, margins")),
+        Axis(tr("distance of the worst part, margins (cut at ± {furthest:g})", furthest=FURTHEST)),
         (*marks, Reference(0.0, label=tr("as the paper says")), Reference(1.0, label=tr("beyond the margin"))),
         title=f"{over.claim.id}: {over.sentence()}",
         direct=False,
@@ -59,18 +60,19 @@ def _above(every: list[Under], where: np.ndarray, ends: np.ndarray, over: Over) 
 
 
 def _below(varied: list[Choice], every: list[Under], where: np.ndarray) -> Panel:
-    ticks, marks, height = [], [], 0
-    for number, choice in enumerate(varied):
+    ticks, marks, height = [], [], HEADING - 1.0
+    for choice in varied:
+        height -= HEADING
+        ticks.append((float(height), _short(f"{choice.key}:")))
         for one in choice.alternatives:
             height -= 1
-            ticks.append((float(height), _short(f"{choice.key}: {one.name}")))
+            ticks.append((float(height), _short(one.name)))
             taken = np.array([reading.reading[choice.key] == one.name for reading in every])
             if taken.any():
                 style = Style(
                     colour=KINDS[one.kind][1].colour, dash=None, marker=KINDS[one.kind][1].marker, size_pt=2.6
                 )
                 marks.append(Line(where[taken], np.full(taken.sum(), float(height)), "", style))
-        height -= 1 if number + 1 < len(varied) else 0
     return Panel(
         Axis(tr("reading, sorted"), limits=(0, len(every) + 1)),
         Axis("", limits=(height - 1.0, 0.0), ticks=tuple(reversed(ticks))),

@@ -146,7 +146,8 @@ def _rows(claim: Claim, paper: str, papers: _Papers, own: bool) -> list[dict[str
     here = [(one, one.judged) for one in tried if one.judged is not None]
     outcome = rule.claim([of for _, of in here], **claim.how) if here else None
     many = sum(of.sampled and not of.void and of.asserted for _, of in here)
-    whole = len(here) == len(tried) or (outcome is not None and outcome.kind == REFUTED)
+    asked = [one for one in tried if one.part.asserted] or tried  # what else is shown beside them decides nothing
+    whole = all(one.judged is not None for one in asked) or (outcome is not None and outcome.kind == REFUTED)
     return [_row(claim, paper, one, outcome if whole else None, many) for one in tried]
 
 

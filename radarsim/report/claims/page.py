@@ -18,9 +18,11 @@ from radarsim.report.claims.rule import (
     UNDECIDED,
     UNJUDGEABLE,
     VOID,
+    roughly,
 )
 from radarsim.report.text import interval
 
+MANY_MARGINS = 1000  # a miss by more is told as that: of an identity the margin is rounding
 HEAD = """# The papers' claims
 
 Made from results by `make claims-page`, never by hand, by [one rule](verdicts.md) that was written down before anything
@@ -116,9 +118,13 @@ def verdict_of(parts: Sequence[Mapping]) -> str:
         text = MARKS[said].replace(said, text)
     notes = []
     if first["class"] in (REFUTED, CONTRADICTORY) and (number(first["worst_miss"]) or 0.0) > 1:
-        notes.append(tr("by {miss:.3g} margins", miss=number(first["worst_miss"])))
-    if first["class"] == UNDECIDED and number(first["needed"]) is not None:
-        notes.append(tr("{needed:.2g} realisations would decide", needed=number(first["needed"])))
+        miss = number(first["worst_miss"]) or 0.0
+        far = miss >= MANY_MARGINS
+        words = tr("by over {many:,} margins", many=MANY_MARGINS) if far else tr("by {miss:.3g} margins", miss=miss)
+        notes.append(words)
+    needed = number(first["needed"])
+    if first["class"] == UNDECIDED and needed is not None:
+        notes.append(tr("{needed} realisations would decide", needed=f"{roughly(needed):,}"))
     if number(first["of"]) is not None:
         holds, of = number(first["holds"]), number(first["of"])
         notes.append(tr("in {holds:.0f} of {of:.0f} readings", holds=holds, of=of))

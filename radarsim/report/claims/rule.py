@@ -296,6 +296,12 @@ def most_needed(every: Iterable[int | None]) -> int | None:
     return None if not known or None in known else max(one for one in known if one is not None)
 
 
+def roughly(n: float) -> int:
+    """A number of realisations as it is said: up to two digits, never fewer."""
+    step = 10 ** max(len(str(math.ceil(n))) - 2, 0)
+    return math.ceil(n / step) * step
+
+
 def _joint(parts: Sequence[Judged], many: int) -> Outcome:
     by_variant: dict[str, list[str]] = {}
     by_number: dict[str, list[str]] = {}
