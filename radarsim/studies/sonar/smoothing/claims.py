@@ -29,13 +29,25 @@ def _claim(
 
 def _formula(what: str, n: int) -> Part:
     return Part(
-        (TEXTBOOK,), f"{what} σ after {n} plots, over the formula", "", measured.over_formula(what, n), IN_SIGMA
+        (TEXTBOOK,),
+        f"{what} σ after {n} plots, over the formula",
+        "",
+        measured.over_formula(what, n),
+        IN_SIGMA,
+        exact=measured.exact_over_formula(what, n),
     )
 
 
 def _gain(letter: str, n: int) -> Part:
     words = f"{letter}_n from the measured errors at n = {n}, over the formula"
-    return Part((TEXTBOOK,), words, "", measured.gain_over_formula(letter, n), IN_VARIANCE)
+    return Part(
+        (TEXTBOOK,),
+        words,
+        "",
+        measured.gain_over_formula(letter, n),
+        IN_VARIANCE,
+        exact=measured.exact_gain_over_formula(letter, n),
+    )
 
 
 def _optimal(rho: float) -> Part:
@@ -72,6 +84,7 @@ CLAIMS = (
             "plots",
             measured.enough,
             within(5, 6),
+            exact=measured.exact_enough,
         ),
         original="Анализ показывает, что при оптимальной фильтрации и экстраполяции по методу максимального "
         "правдоподобия для получения высокой точности оценки координат необходим одновременный учет "
@@ -130,8 +143,17 @@ CLAIMS = (
         7,
         "step 5, last sentences",
         "With growing n new plots count less and less; the filter stops following a real, fluctuating target",
-        Part((TEXTBOOK,), "A_40 over A_5, measured", "", measured.gain_falls("A", 5, 40), less()),
-        Part((TEXTBOOK,), "B_40 over B_5, measured", "", measured.gain_falls("B", 5, 40), less()),
+        *(
+            Part(
+                (TEXTBOOK,),
+                f"{letter}_40 over {letter}_5, measured",
+                "",
+                measured.gain_falls(letter, 5, 40),
+                less(),
+                exact=measured.exact_gain_falls(letter, 5, 40),
+            )
+            for letter in "AB"
+        ),
         Part(
             (FLUCTUATING,),
             "σ of the range at the end over its own least, growing memory",
@@ -145,6 +167,7 @@ CLAIMS = (
             "%",
             measured.bounded,
             above(0),
+            exact=measured.exact_bounded,
         ),
         original="Из последних выражений следует, что с увеличением n результаты последних наблюдений при "
         "сглаживании координаты и скорости учитываются – все с меньшим весом и алгоритм перестает "
@@ -217,6 +240,7 @@ CLAIMS = (
             "",
             measured.bought(20, 6),
             less(),
+            exact=measured.exact_bought(20, 6),
             statement="accuracy",
         ),
         Part(

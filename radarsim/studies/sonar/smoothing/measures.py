@@ -1,17 +1,23 @@
 """How P3's claims on smoothing are measured: the cases they mean, and the numbers taken from tables and sums."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
+from radarsim.physics.motion import transition
 from radarsim.report import statistics
 from radarsim.report.claims import Missing, certain, ratio
+from radarsim.report.claims.declared import Number
 from radarsim.report.statistics import Estimate
 from radarsim.studies.sonar import exact
 from radarsim.studies.sonar.measures import CaseKey, Evidence, Measure
 from radarsim.studies.sonar.smoothing.tables import textbook
+
+
+MOST_PLOTS = 100
 
 
 # ---- the cases ----------------------------------------------------------------------------------------------------
@@ -67,6 +73,47 @@ def correlated(rho: float) -> CaseKey:
     return CaseKey(f"errors of neighbouring plots correlated to {rho:g}", _first(matches))
 
 
+# ---- exact values: least squares on n plots of one scan apart and of one σ, in units of these ------------------------
+@cache
+def _covariance(n: int, size: int = 2) -> np.ndarray:
+    """Covariance (size, size) of the state at the last of n plots, by a factorisation that knows no closed form."""
+    return exact.generalised_least_squares(np.arange(n, dtype=float), np.eye(n), size)[1]
+
+
+def _least_squares(what: str, n: int) -> float:
+    """σ of what is smoothed, extrapolated by a scan, or of the acceleration."""
+    if what == "acceleration":
+        return float(np.sqrt(_covariance(n, 3)[2, 2]))
+    F = transition(1.0 if what == "extrapolated" else 0.0, 2)
+    return float(np.sqrt((F @ _covariance(n) @ F.T)[0, 0]))
+
+
+def exact_over_formula(what: str, n: int) -> Number:
+    """What `over_formula` measures."""
+    formula = {
+        "smoothed": exact.sigma_smoothed(n),
+        "extrapolated": exact.sigma_extrapolated(n) if n > 1 else np.inf,
+        "acceleration": exact.sigma_acceleration(n, 1.0) if n > 2 else np.inf,
+    }
+    return lambda seen: float(_least_squares(what, n) / formula[what])
+
+
+def exact_gain(letter: str, n: int) -> float:
+    """A_n or B_n."""
+    return float(_covariance(n)[0, "AB".index(letter)])
+
+
+def exact_gain_over_formula(letter: str, n: int) -> Number:
+    """What `gain_over_formula` measures."""
+    closed = exact.gains_closed(np.array([n]))["AB".index(letter)][0]
+    return lambda seen: float(exact_gain(letter, n) / closed)
+
+
+def exact_enough(seen: Evidence) -> float:
+    """What `enough` measures."""
+    return float(next(n for n in range(2, MOST_PLOTS) if _least_squares("extrapolated", n) <= 1))
+
+
 # ---- the numbers --------------------------------------------------------------------------------------------------
 def over_formula(what: str, n: int) -> Measure:
     """σ of growing memory after n plots over the paper's formula, of the range."""
@@ -80,8 +127,9 @@ def over_formula(what: str, n: int) -> Measure:
 
 
 def bought(more: int, few: int) -> Measure:
-    """Smoothed σ of growing memory after more plots over that after few; of the same realisations, taken as "
-    "independent."""
+    """Smoothed σ of growing memory after more plots over that after few; of the same realisations, taken as
+    independent.
+    """
 
     def measure(seen: Evidence) -> Estimate:
         name = seen.case(TEXTBOOK).name
@@ -92,6 +140,11 @@ def bought(more: int, few: int) -> Measure:
         return ratio(found[0], found[1])
 
     return measure
+
+
+def exact_bought(more: int, few: int) -> Number:
+    """What `bought` measures."""
+    return lambda seen: _least_squares("smoothed", more) / _least_squares("smoothed", few)
 
 
 def with_manoeuvres(seen: Evidence) -> Estimate:
@@ -135,6 +188,11 @@ def gain_falls(letter: str, early: int, late: int) -> Measure:
         return ratio(a, b)
 
     return measure
+
+
+def exact_gain_falls(letter: str, early: int, late: int) -> Number:
+    """What `gain_falls` measures."""
+    return lambda seen: exact_gain(letter, late) / exact_gain(letter, early)
 
 
 def _gain_row(seen: Evidence, n: int) -> Mapping[str, Any]:
@@ -222,6 +280,11 @@ def bounded(seen: Evidence) -> Estimate:
         raise Missing("gains against growing memory")
     own, other = case.sums["error"][f, -1, 0], case.sums["error"][base, -1, 0]
     return statistics.gain(own[1], own[3], other[1], other[3], case.sums["paired"][f, -1, 0], case.count)
+
+
+def exact_bounded(seen: Evidence) -> float:
+    """What `bounded` measures, by the exact σ of both."""
+    return seen.exactly().gain(FLUCTUATING, seen.filter(FLUCTUATING, "window", 1, 10), "r").last().value
 
 
 def kept(algorithm: str) -> Measure:

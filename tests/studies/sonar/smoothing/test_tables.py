@@ -99,6 +99,22 @@ def test_claims_are_judged_where_their_cases_are(results):
     assert [claim.id for claim in STUDY.claims().claims] == [f"P3.{n}" for n in range(1, 18)]
 
 
+def test_what_is_known_exactly_is_judged_exactly(results):
+    """Least squares that knows no closed form against the exact σ of the filter, and in every part that has one."""
+    result = results["sonar_smoothing"]
+    rows = result.tables["claims"]
+    own = rows[rows["claim"].isin([f"P3.{n}" for n in (1, 2, 3, 4, 11, 14)])]
+    assert len(own) > 20
+    assert own["exact"].notna().all()
+    curves = result.tables["curves"].set_index(["filter", "component", "k"])["exact_sigma"]
+    sigma = curves["growing", "r", 1]
+    bought = own[own["what"].str.startswith("σ of the recursion after 20")]["exact"].item()
+    assert bought == pytest.approx(curves["growing", "r", 20] / curves["growing", "r", 6], rel=1e-12)
+    for n in (2, 3, 5, 8, 20):
+        row = own[own["what"] == f"smoothed σ after {n} plots, over the formula"]
+        assert row["exact"].item() * exact.sigma_smoothed(n) == pytest.approx(curves["growing", "r", n] / sigma, rel=1e-9)
+
+
 def test_words_of_the_report(results):
     for stem, result in results.items():
         question = STUDY.question(load(stem))
