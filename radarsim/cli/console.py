@@ -551,7 +551,7 @@ def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
 
 def print_readings(done: "Done", detailed: bool) -> None:
     """A line a claim, of single claims a line a reading too, and what the joint search came to."""
-    from radarsim.report.claims import page, reasons
+    from radarsim.report.claims import reasons
 
     for read in done.read:
         for over in read.over:

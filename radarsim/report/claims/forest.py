@@ -87,7 +87,10 @@ def _panel(paper: str, found: Sequence[tuple[Sequence[Mapping], Mapping]]) -> Pa
             marks.append(_line(kind, style, of))
     return Panel(
         Axis(tr("claim of {paper}", paper=key), limits=(0, len(found) + 1), ticks=tuple(ticks)),
-        Axis(tr("distance from the words, margins (cut at ± {furthest:g})", furthest=FURTHEST), limits=(-FURTHEST - 0.3, FURTHEST + 0.3)),
+        Axis(
+            tr("distance from the words, margins (cut at ± {furthest:g})", furthest=FURTHEST),
+            limits=(-FURTHEST - 0.3, FURTHEST + 0.3),
+        ),
         (*marks, Reference(0.0), Reference(1.0, label=tr("beyond the margin"))),
         title=f"{key} {tr(paper)}",
         direct=False,

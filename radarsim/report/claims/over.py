@@ -159,7 +159,9 @@ class Over:
         told, needed = {"count": len(self.undecided), "n": f"{self.looked:,}"}, self.outcome.needed
         if needed is None:
             return tr("{count} open at {n} realisations, a value on a border: no number would decide", **told)
-        return tr("{count} open at {n} realisations, about {needed} would decide", **told, needed=f"{rule.roughly(needed):,}")
+        return tr(
+            "{count} open at {n} realisations, about {needed} would decide", **told, needed=f"{rule.roughly(needed):,}"
+        )
 
 
 def columns(every: Iterable[PaperReadings]) -> tuple[str, ...]:

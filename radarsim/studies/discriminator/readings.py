@@ -12,6 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from radarsim.bursts import schedule
 from radarsim.config.experiment import Case
 from radarsim.report.claims import Evidence, certain
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
@@ -28,8 +29,8 @@ PRINTED_PRIOR = (6.1, 67.5, 6.1e3, 183.38e3, 2.426e6)  # rad, Hz, Hz/s, Hz/s², 
 SHIPPED_NOISE = measures.READINGS[COMPUTED][0]
 ITERATIONS = "12"  # the number of the part that counts windows
 LEAST_RATIO = 5.0  # μ_min
-EXACT = ("P4.1", "P4.2", "P4.3", "P4.8", "P4.11", "P4.13")
-WINDOWS = ("P4.2", "P4.3", "P4.8", "P4.11", "P4.13")
+EXACT = ("P4.1", "P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13")
+WINDOWS = ("P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13")
 RUN = ("P4.4", "P4.5", "P4.6", "P4.7", "P4.9", "P4.10")
 NO_ROOT = "(15) has no root: with the phase in it, its left side is over c at every length"
 
@@ -311,6 +312,12 @@ class ExactEvidence(measures.Evidence):
 
     def potential(self, key: Any, component: str) -> Estimate:
         return certain(_designed()[self._version][0][COMPONENTS.index(component)])
+
+    def worst_handover(self, key: Any) -> Estimate:
+        """The largest probability over the hand-overs that Z passes c, by its own law; the last one is cut short."""
+        own = self._version
+        weights = versions.handovers(BURST, own, windows(own)[:-1])
+        return certain(max(schedule.tail_probability(one, own.threshold) for one in weights))
 
     def shortest_window(self, key: Any, amplitude: float) -> Estimate:
         """T_min (17), ms: one sample a pulse."""

@@ -86,6 +86,19 @@ def designed(burst: Burst, versions: Sequence[Version]) -> Windows:
     return Windows(of.spreads(), sequence)
 
 
+def handovers(burst: Burst, version: Version, windows: Sequence[int]) -> list[np.ndarray]:
+    """The weights (size,) of Z, a sum of χ²₁, at each hand-over from one of these windows, in pulses, to the next.
+
+    H is that of the window that is handed to, as the paper defines it, whichever (16) was solved with.
+    """
+    of = _Problem(burst, [version])
+    information, H = of.posterior(np.zeros(len(windows), dtype=int), np.array(windows, dtype=float))
+    covariance = _inverse(information)
+    roots = np.linalg.cholesky(H[1:])
+    error = covariance[:-1] - covariance[1:]
+    return list(np.maximum(np.linalg.eigvalsh(roots.transpose(0, 2, 1) @ error @ roots), 0.0))
+
+
 class _Problem:
     """Information matrices of B versions in units in which all are of one size: parameters over the whole burst."""
 
@@ -132,7 +145,7 @@ class _Problem:
         order = np.arange(self.size)
         return self._level[of, None, None] * np.array(moments)[order[:, None] + order].transpose(2, 0, 1)
 
-    def _posterior(self, of: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def posterior(self, of: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Φ + R_pr⁻¹ and H = (Φ + R_pr⁻¹)/2μ, of which Φ's first element is 2μ."""
         fisher = self._fisher(of, n)
         information = fisher + self._prior[of, None, :] * np.eye(self.size)
@@ -146,7 +159,7 @@ class _Problem:
 
     def _first_excess(self, of: np.ndarray, n: np.ndarray) -> np.ndarray:
         """(15) of each version, with the phase as it says."""
-        information, H = self._posterior(of, n)
+        information, H = self.posterior(of, n)
         prior = 1 / self._prior[of, None, :] * np.eye(self.size)
         found = np.empty(len(of))
         for phase in np.unique(self._phase[of]):
@@ -173,13 +186,13 @@ class _Problem:
 
     def following(self, of: np.ndarray, before: np.ndarray) -> np.ndarray:
         """The windows after those of these lengths, in pulses."""
-        information, H_before = self._posterior(of, before.astype(float))
+        information, H_before = self.posterior(of, before.astype(float))
         covariance = _inverse(information)
         place = {int(i): k for k, i in enumerate(of)}
 
         def excess(some: np.ndarray, n: np.ndarray) -> np.ndarray:
             own = [place[int(i)] for i in some]
-            after, H = self._posterior(some, n)
+            after, H = self.posterior(some, n)
             old = self._curvature[some, None, None]
             first = np.where(old == "next", H, H_before[own])
             second = np.where(old == "before", H_before[own], H)

@@ -367,8 +367,8 @@ CLAIMS = (
         "RLS 2: the difference Δσ_r(k) = σ_r(r) − σ_r(r,V) grows and stabilises",
         Part((2,), "Δσ of range at the end, of its largest value", "%", measured.final_share, about("100")),
         original="Разность суммарных ошибок Δσ_r(k) = σ_r(r)(k) − σ_r(r,Vr)(k) нарастает и стабилизируется.",
-        reading="of figure 1a, at the D_M of the other figures; what grows and stabilises ends at its largest value, to "
-        "10 %",
+        reading="of figure 1a, at the D_M of the other figures; what grows and stabilises ends at its largest "
+        "value, to 10 %",
     ),
     _claim(
         19,

@@ -1,11 +1,17 @@
 """P4's readings: the shipped one is the config as printed; what is exact is what a prepared case has."""
 
+from functools import partial
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from radarsim.app.configs import load
+from radarsim.bursts import fisher as exact
+from radarsim.bursts import schedule
 from radarsim.report.claims.readings import Unreadable
 from radarsim.studies import registry
+from radarsim.studies.discriminator import study
 from radarsim.studies.discriminator.readings import PRINTED_PRIOR, ExactEvidence, Readings, windows
 
 OF = Readings()
@@ -33,6 +39,22 @@ def test_exact_windows_are_those_that_a_run_designs(cases):
         designed = axes.duration_s[0][np.isfinite(axes.duration_s[0])]
         seen = ExactEvidence(OF.reading(**taken))
         np.testing.assert_allclose(seen.windows("computed"), designed, rtol=1e-12)
+
+
+def test_the_probability_of_a_miss_is_that_of_the_prepared_case(cases):
+    """By the covariances of many versions at once, and by the designer of a run: forms of their own, one law."""
+    for noise, taken in ((9.0, {}), (2.25, {"noise_variance": "2.25", "threshold": "1", "forecast": "multiples"})):
+        result = registry.study("discriminator").prepare(cases[noise])
+        spec, axes = cases[noise].spec, result.axes
+        burst = study.burst_of(spec)
+        fisher = partial(exact.fisher, burst, 5)
+        condition = schedule.Condition(threshold=float(taken.get("threshold", "0.5")))
+        designer = schedule.Designer(burst, axes.prior_sigma, fisher, condition)
+        times = burst.pulse_period_s * np.array(axes.pulses[0])
+        forms = [designer.handover(before)(after).values for before, after in pairwise(times[:-1])]
+        wanted = max(schedule.tail_probability(form, condition.threshold) for form in forms)
+        assert ExactEvidence(OF.reading(**taken)).worst_handover("any").value == pytest.approx(wanted, rel=1e-6)
+        assert 0.02 < wanted < 0.025
 
 
 def test_other_windows_go_into_the_config(cases):

@@ -16,7 +16,6 @@ from radarsim.studies.sonar import exact
 from radarsim.studies.sonar.measures import CaseKey, Evidence, Measure
 from radarsim.studies.sonar.smoothing.tables import textbook
 
-
 MOST_PLOTS = 100
 
 

@@ -112,7 +112,9 @@ def test_what_is_known_exactly_is_judged_exactly(results):
     assert bought == pytest.approx(curves["growing", "r", 20] / curves["growing", "r", 6], rel=1e-12)
     for n in (2, 3, 5, 8, 20):
         row = own[own["what"] == f"smoothed σ after {n} plots, over the formula"]
-        assert row["exact"].item() * exact.sigma_smoothed(n) == pytest.approx(curves["growing", "r", n] / sigma, rel=1e-9)
+        assert row["exact"].item() * exact.sigma_smoothed(n) == pytest.approx(
+            curves["growing", "r", n] / sigma, rel=1e-9
+        )
 
 
 def test_words_of_the_report(results):
