@@ -563,7 +563,7 @@ def print_readings(done: "Done", detailed: bool) -> None:
                     say(f"       {one.kind}  {outcome:<24} {one.name}")
             found = over.outcome
             words = tr(found.kind) if found else tr("not judged")  # on what it depends, the sentence says
-            say(f"{over.claim.id:<6} {words:<27} {over.sentence()}")
+            say(f"{over.claim.id:<6} {words:<28} {over.sentence()}")
         if read.counted is not None:
             say(f"{read.paper.readings.paper}: {read.counted.sentence()}")
     if done.files:
