@@ -8,7 +8,7 @@ from making.pick import part
 SIX = ("MMA2-122", "MMA2-11", "Kalman-1 20", "Kalman-1 5", "Kalman-2 20", "Kalman-2 1")
 STAGES = ("start", "ballistic", "manoeuvre", "after")
 CLAIMS = ("multimodel", "multimodel_trajectories", "multimodel_rules", "multimodel_transition", "multimodel_banks")
-VERDICTS = ("confirmed", "refuted", "not distinguishable")
+VERDICTS = ("confirmed", "refuted", "no material difference", "not yet decided")
 HEIGHT, CLIMB = "height", "rate of climb"
 
 

@@ -172,7 +172,7 @@ def _numbers(search: Search) -> str:
         counts = [str(int(search.count(rule)[place])) for place in places.values()]
         rows.append(("", name, str(len(search.printed)), *counts))
     words = [f"*{tr(name)}*: {search.words(place)}." for name, place in places.items() if place != search.place]
-    return "\n\n".join([_table((*PRINTED, *places), rows), *words])
+    return "\n\n".join([*([tr(search.read_as)] if search.read_as else []), _table((*PRINTED, *places), rows), *words])
 
 
 def _value(search: Search, number: int, place: tuple[int, ...]) -> str:

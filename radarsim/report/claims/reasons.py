@@ -10,6 +10,7 @@ PLACE = re.compile(r"\{(\w+)\}")
 WHOLE = (  # `changed` is made of differences, case by case
     term("not the paper's experiment: {changed}"),
     term("{case} ends at {end} s, the paper's run at {duration} s"),
+    term("the run of RLS {number} ends at {end} s, before {asked} s"),
     term(
         "exact value and simulation differ by more than {errors} standard errors: exact {exact}, simulated {simulated} "
         "[{lo}, {hi}]"

@@ -42,6 +42,7 @@ class Search:
 
     axes: key of a choice → its values, the shipped one given by `shipped`. strict and granular (n, *lengths of axes)
     say whether a number comes out, `values` what it is. fine: for choices whose values are numbers without steps.
+    read_as says in words what strict and granular are.
     """
 
     paper: str
@@ -52,6 +53,7 @@ class Search:
     granular: np.ndarray
     values: np.ndarray
     fine: Mapping[str, Fine] = field(default_factory=dict)
+    read_as: str = ""
 
     @property
     def readings(self) -> int:

@@ -23,6 +23,7 @@ AXES: dict[str, tuple[str, ...]] = {
 }
 FURTHER = {"counted": COUNTED, "amplitude": tuple(AMPLITUDES)}
 SHARE = 0.01  # of a number, under the granular rule
+READ_AS = "To the digit: what rounds to the print. To the steps of the print: within 1 % of it."
 
 
 def _printed(claim: str, what: str, unit: str, text: str) -> Printed:
@@ -56,7 +57,8 @@ def search() -> Search:
     values = values.reshape(len(PRINTED), *shape)
     strict, granular = (_inside(values, [getattr(one, rule) for one in PRINTED]) for rule in ("strict", "granular"))
     axes = AXES | FURTHER
-    return Search("P4", PRINTED, axes, {key: own[0] for key, own in axes.items()}, strict, granular, values)
+    shipped = {key: own[0] for key, own in axes.items()}
+    return Search("P4", PRINTED, axes, shipped, strict, granular, values, read_as=READ_AS)
 
 
 def _version(*names: str) -> Version:

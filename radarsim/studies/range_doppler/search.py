@@ -61,6 +61,11 @@ def _over(claim: str, what: str, least: float) -> Printed:
 # The numbers in the order of `_numbers`. Strict: rounds to the print, "about" within 10 %. Granular: multiples of five
 # to ± 2.5, "about 10 %" to ± 5, times to the slower radar's period; 7 and 18, no multiples of five, as in strict.
 FIVES = 2.5
+READ_AS = (
+    'To the digit: what rounds to the print; of times and of "about 10 %", within 10 %. To the steps of the print: '
+    'multiples of five ± 2.5, limits by as much, "about 10 %" ± 5, times to one period of the slower radar; 7 and 18, '
+    "which are no multiples of five, as to the digit."
+)
 PRINTED = (
     _printed("P1.1", "RLS 1, least range gain", "%", "7", (6.5, 15.5)),
     _printed("P1.1", "RLS 1, largest range gain", "%", "15", (6.5, 15.5), (6.5, 17.5)),
@@ -229,7 +234,7 @@ def search() -> Search:
         **{"process_noise": FORMS, "manoeuvre_variance": tuple(f"{v:g}" for v in VARIANCES), "start": START_NAMES},
         **{"truth": TRUTHS, "scans": tuple(str(n) for n in SCANS), "span": SPANS},
     }
-    return Search("P1", PRINTED, axes, SHIPPED, strict, granular, values, {"manoeuvre_variance": _fine()})
+    return Search("P1", PRINTED, axes, SHIPPED, strict, granular, values, {"manoeuvre_variance": _fine()}, READ_AS)
 
 
 def _inside(values: np.ndarray, ends: Sequence[tuple[float, float]]) -> np.ndarray:
