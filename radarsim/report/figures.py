@@ -4,10 +4,11 @@ Legible in grey: the colours are steps of lightness, and dash and marker tell th
 on the data and on the versions of Matplotlib and its fonts alone.
 """
 
+import gc
 import io
 import math
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
@@ -47,6 +48,7 @@ AXIS_MM = 9.0  # of the ticks and the label of an axis of x
 SIDE_MM = 14.0  # of those of an axis of y, with the gap to the next panel
 LETTER_EM = 0.62  # of a number, in its size: how wide a figure of the font is
 TICK_GAP_PT = 3.0  # between numbers of ticks
+REMEMBERED = ("_update_ticks", "_get_ticklabel_bboxes")  # methods of Matplotlib's axes: of no argument; ticks, renderer
 MARKED = 16  # at most about so many markers or crosses a line
 WHOLE = (0, 1)  # limits of a share
 EXACT: dict[str, Any] = {
@@ -72,6 +74,7 @@ STYLE: dict[Any, Any] = {  # Matplotlib names every key that it knows as a type 
     "axes.spines.right": False,
     "axes.grid": True,
     "axes.axisbelow": True,
+    "axes.titley": 1.0,  # else every title is placed anew, by all that its panel has, each time anything is measured
     "grid.color": "#dddddd",
     "grid.linewidth": 0.4,
     "xtick.major.width": 0.6,
@@ -131,11 +134,64 @@ def _laid_out(figure: Figure) -> Canvas:
         _legend(grid.flat[len(plan.panels)], common, common.columns(cell), loc="center")
     elif common is not None:
         _legend(canvas, common, common.columns(figure.width_mm), loc="outside lower center")
-    layout.execute(canvas)
+    with _measured_once(canvas):
+        layout.execute(canvas)
     canvas.set_layout_engine(None)  # not "none": an engine that does nothing still has savefig draw everything twice
     for texts in ended:
         _spread(texts)
     return canvas
+
+
+@contextmanager
+def _measured_once(canvas: Canvas) -> Iterator[None]:
+    """Ticks are placed, and their numbers measured, once for each place, size and resolution of a panel.
+
+    Matplotlib places them four times for every axis that it lays out and three times for every one that it draws. The
+    methods that remember lie over its own for as long as this lasts; a version of it that has no such methods draws
+    the same, only more slowly.
+    """
+    sides = [side for axes in canvas.axes for side in (axes.xaxis, axes.yaxis)]
+    for side in sides:
+        vars(side).update(_remembering(side))
+    try:
+        yield
+    finally:
+        for side in sides:
+            for name in REMEMBERED:
+                vars(side).pop(name, None)
+
+
+def _remembering(side: Any) -> dict[str, Callable]:
+    """Methods of an axis that remember their last answer for as long as what it depends on is as it was."""
+
+    def remembering(method: Callable) -> Callable:
+        asked: tuple[Any, ...] = ()
+        held: tuple[Any, ...] = ()  # the arguments, so that nothing else gets their ids
+        answer: Any = None
+
+        def remembered(*args: Any) -> Any:
+            nonlocal asked, held, answer
+            axes = side.axes
+            key = (*side.get_view_interval(), *axes.bbox.bounds, axes.figure.dpi, *map(id, args))
+            if key != asked:
+                asked, held, answer = key, args, method(*args)
+            return answer
+
+        return remembered
+
+    return {name: remembering(getattr(side, name)) for name in REMEMBERED if hasattr(side, name)}
+
+
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Without Python's search for cyclic garbage: a figure is full of cycles, and all of it is needed to its end."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def _wrapped(axis: Ends, side_mm: float) -> Ends:
@@ -167,8 +223,10 @@ def save(
     At a width in place of its own its letters keep their size. Title, caption and made_by (what it was made of, and
     with what) stand in each file's metadata.
     """
-    canvas = render(legends.at_width(figure, width_mm))
-    return {kind: _bytes(canvas, kind, figure, made_by) for kind in formats}
+    with _without_collection():
+        canvas = render(legends.at_width(figure, width_mm))
+        with _measured_once(canvas):
+            return {kind: _bytes(canvas, kind, figure, made_by) for kind in formats}
 
 
 def _bytes(canvas: Canvas, kind: str, figure: Figure, made_by: str) -> bytes:

@@ -1,5 +1,6 @@
 """Figures: what is drawn is what is described, in the same bytes each time, and no user's name breaks them."""
 
+import gc
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -185,6 +186,82 @@ def test_separated(wanted):
 
 def test_same_bytes_each_time():
     assert figures.save(one(line()), ("svg", "png", "pdf")) == figures.save(one(line()), ("svg", "png", "pdf"))
+
+
+def of_all_kinds():
+    """A narrow figure of logarithmic axes, fewer ticks than wanted, a remark, a long title, a map, a ground track."""
+    decades = replace(line(), x=10.0 ** np.arange(20), y=np.logspace(-3, 2, 20), lo=None, hi=None, exact=None)
+    long = replace(line(), x=np.linspace(20.0, 4e5, 20))
+    heat = Heat(np.arange(3.0), np.arange(2.0), np.arange(6.0).reshape(2, 3), "value")
+    log = Axis("$x$, s", "log"), Axis("$\\sigma$ of $y$, m", "log")
+    whole = (
+        *(
+            Panel(*log, (decades,), title="a title, of two, parts of a line", remark="said"),
+            Panel(Axis("x"), Axis("y"), (long,)),
+        ),
+        *(Panel(Axis("x", ticks=((1.0, "one"),)), Axis("y"), (line(),)), Panel(Axis("x"), Axis("y"), (heat,))),
+        Panel(Axis("east, m"), Axis("north, m"), (line(), Reference(0.5, label="half")), equal=True),
+    )
+    return Figure("all", "All", "Every kind.", whole, columns=3, width_mm=100.0)
+
+
+def narrowed():
+    """A figure whose layout leaves so little to its panel that fewer numbers stand at it than before."""
+    names = Axis("y", ticks=((0.0, "a long name of no deviation"), (0.5, "and of one")))
+    x = np.linspace(20.0, 4e5, 20)
+    return Figure("narrow", "Narrow", "Wide names.", (Panel(Axis("x"), names, (replace(line(), x=x),)),), width_mm=70.0)
+
+
+def shared():
+    """Two panels with one axis of y."""
+    return replace(of_all_kinds(), panels=of_all_kinds().panels[:2], share_y=True)
+
+
+@pytest.mark.parametrize("make", [of_all_kinds, narrowed, shared])
+def test_what_is_remembered_of_axes_changes_no_picture(monkeypatch, make):
+    kinds = ("png", "svg") if make is of_all_kinds else ("png", "svg", "pdf")
+    remembered = figures.save(make(), kinds)
+    monkeypatch.setattr(figures, "REMEMBERED", ())
+    assert figures.save(make(), kinds) == remembered
+
+
+def test_ticks_are_placed_once_for_each_place_of_a_panel(monkeypatch):
+    placed = []
+    for name in figures.REMEMBERED:  # of this version of Matplotlib
+        assert hasattr(figures.XAxis, name)
+    plain = figures.XAxis._update_ticks
+    monkeypatch.setattr(figures.XAxis, "_update_ticks", lambda axis: placed.append(axis) or plain(axis))
+    figures.save(one(line()), ("png", "svg"))
+    assert len(placed) == 4  # by the layout twice, for each picture once
+
+
+def test_a_figure_that_is_handed_out_remembers_nothing():
+    axes = drawn(one(line()))
+    assert not [side for side in (axes.xaxis, axes.yaxis) if vars(side).keys() & set(figures.REMEMBERED)]
+    axes.set_xticks([3.0])
+    axes.figure.canvas.draw()
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == ["3"]
+
+
+def test_titles_stand_where_matplotlib_would_place_them(monkeypatch):
+    chosen = figures.save(of_all_kinds())
+    monkeypatch.setitem(figures.STYLE, "axes.titley", None)
+    assert figures.save(of_all_kinds()) == chosen
+
+
+def test_garbage_is_collected_again_after_a_figure_whatever_comes_of_it():
+    assert gc.isenabled()
+    figures.save(one(line()), ("svg",))
+    assert gc.isenabled()
+    with pytest.raises(KeyError, match="no format"):
+        figures.save(one(line()), ("no format",))
+    assert gc.isenabled()
+    gc.disable()
+    try:
+        figures.save(one(line()), ("svg",))
+        assert not gc.isenabled()
+    finally:
+        gc.enable()
 
 
 def test_size_in_millimetres():
