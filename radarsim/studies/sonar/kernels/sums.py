@@ -48,26 +48,47 @@ class Counted(NamedTuple):
     used: np.ndarray
 
 
+class Rows(NamedTuple):
+    """Where the arrays of an estimate are, those of Estimate, Course and Counted: x, shift, truth, n, used.
+
+    Passed on in place of the arrays, references to which Numba would count at each call.
+    """
+
+    x: int
+    shift: int
+    truth: int
+    n: int
+    used: int
+
+
+@inline
+def rows_of(x, course, counted):
+    """The rows of an estimate x (4, CHUNK) with its course and count, which must outlive them."""
+    return Rows(address(x), address(course.shift), address(course.truth), address(counted.n), address(counted.used))
+
+
 @part
-def component_sums(j, x, x_base, course, counted, out):
-    """Write the number of estimates, Σe, Σe², Σe³, Σe⁴ and Σe²f² of component j to out (6,); x, x_base (4, CHUNK)."""
-    ax, ab, moved, zero = address(x), address(x_base), address(course.shift[j]), full(0.0)
-    an, au, truth = address(counted.n), address(counted.used), course.truth[j]
+def component_sums(j, rows, base, out):
+    """Write the number of estimates, Σe, Σe², Σe³, Σe⁴ and Σe²f² of component j to out (6,).
+
+    base is the address of the baseline's estimate, out that of an array.
+    """
+    zero, truth = full(0.0), rows.truth[j]
     need, s0, s1, s2, s3, s4, s5 = full(j + 0.5), zero, zero, zero, zero, zero, zero
     for i in range(GROUPS):
-        known = where_greater(get(an, i), need, get(au, i), zero)
-        place = truth + get(moved, i)
-        e, f = known * (get(ax, j * GROUPS + i) - place), get(ab, j * GROUPS + i) - place
+        known = where_greater(get(rows.n, i), need, get(rows.used, i), zero)
+        place = truth + get(rows.shift, j * GROUPS + i)
+        e, f = known * (get(rows.x, j * GROUPS + i) - place), get(base, j * GROUPS + i) - place
         ee = e * e
         s0, s1, s2, s3, s4, s5 = s0 + known, s1 + e, s2 + ee, s3 + ee * e, s4 + ee * ee, s5 + ee * (f * f)
     out[0], out[1], out[2], out[3], out[4], out[5] = total(s0), total(s1), total(s2), total(s3), total(s4), total(s5)
 
 
 @inline
-def nominal_errors(x, shift, truth, i, units):
+def nominal_errors(rows, i, units):
     """Errors (3) of group i in units of the nominal σ and of the period; units (σ, period)."""
     sigma, period = units
-    per = 1.0 / sigma
+    x, shift, truth, per = rows.x, rows.shift, rows.truth, 1.0 / sigma
     return (
         per * (get(x, i) - truth[0] - get(shift, i)),
         (period * per) * (get(x, GROUPS + i) - truth[1] - get(shift, GROUPS + i)),
@@ -86,25 +107,24 @@ def quadratic_form(Y, e):
 
 
 @part
-def joint_sums(x, P, size, course, counted, units, out):
+def joint_sums(rows, P, size, units, out):
     """Write Σ of the diagonal of P, where estimated, and Σq, Σq², Σp, Σp², where the state is complete, to out (7,).
 
-    q = eᵀ P⁻¹ e and p is the product of the errors in value and rate. x (4, CHUNK); P (6, CHUNK) and the first three
-    sums are in nominal units; units (σ, period).
+    q = eᵀ P⁻¹ e and p is the product of the errors in value and rate. P (6, CHUNK) and the first three sums are in
+    nominal units; units (σ, period). P and out are addresses.
     """
-    ax, ap, moved, truth = address(x), address(P), address(course.shift), course.truth
-    an, au, (sigma, period) = address(counted.n), address(counted.used), units
+    sigma, period = units
     zero, one, two, three = full(0.0), full(0.5), full(1.5), full(2.5)
     need, most = full(size - 0.5), full(float(size))
     s0, s1, s2, q1, q2, p1, p2 = zero, zero, zero, zero, zero, zero, zero
     to_units = sigma * sigma / period
     for i in range(GROUPS):
-        n, used, P_now = get(an, i), get(au, i), six(ap, i)
+        n, used, P_now = get(rows.n, i), get(rows.used, i), six(P, i)
         s0 = s0 + where_greater(n, one, used, zero) * P_now[0]
         s1 = s1 + where_greater(n, two, used, zero) * P_now[3]
         s2 = s2 + where_greater(n, three, used, zero) * P_now[5]
         Y = inverse(P_now, where_greater(n, need, most, zero))
-        e = nominal_errors(ax, moved, truth, i, units)
+        e = nominal_errors(rows, i, units)
         complete = where_greater(n, need, used, zero)
         q, p = complete * quadratic_form(Y, e), complete * (to_units * (e[0] * e[1]))
         q1, q2, p1, p2 = q1 + q, q2 + q * q, p1 + p, p2 + p * p
@@ -113,15 +133,14 @@ def joint_sums(x, P, size, course, counted, units, out):
 
 
 @part
-def ahead_sums(x, size, course, counted, dt, out):
-    """Write Σe, Σe², Σe³, Σe⁴ of the value extrapolated by dt, where the state was complete, to out (4,)."""
-    ax, moved, truth = address(x), address(course.shift), course.truth[0]
-    an, au, zero = address(counted.n), address(counted.used), full(0.0)
+def ahead_sums(rows, size, dt, out):
+    """Write Σe, Σe², Σe³, Σe⁴ of the value extrapolated by dt, where the state was complete, to out (4,), as there."""
+    x, truth, zero = rows.x, rows.truth[0], full(0.0)
     half, need, s1, s2, s3, s4 = 0.5 * dt * dt, full(size - 0.5), zero, zero, zero, zero
     for i in range(GROUPS):
-        known = where_greater(get(an, i), need, get(au, i), zero)
-        predicted = get(ax, i) + dt * get(ax, GROUPS + i) + half * get(ax, 2 * GROUPS + i)
-        e = known * (predicted - truth - get(moved, i))
+        known = where_greater(get(rows.n, i), need, get(rows.used, i), zero)
+        predicted = get(x, i) + dt * get(x, GROUPS + i) + half * get(x, 2 * GROUPS + i)
+        e = known * (predicted - truth - get(rows.shift, i))
         ee = e * e
         s1, s2, s3, s4 = s1 + e, s2 + ee, s3 + ee * e, s4 + ee * ee
     out[0], out[1], out[2], out[3] = total(s1), total(s2), total(s3), total(s4)
@@ -130,19 +149,22 @@ def ahead_sums(x, size, course, counted, dt, out):
 @part
 def add_sums(estimate, course, counted, units, at, out, sums):
     """Add the errors of one filter in one coordinate; units (σ, period), at (f, k, c), out (7,) scratch."""
-    (sigma, period), (f, k, c) = units, at
-    for j in range(estimate.size):
-        component_sums(j, estimate.x, estimate.x_base, course, counted, out)
-        sums.estimates[f, k, c, j] += out[0]
+    (sigma, period), (f, k, c), size = units, at, estimate.size
+    rows, base, of = rows_of(estimate.x, course, counted), address(estimate.x_base), address(out)
+    error, paired, joint = address(sums.error[f, k, c]), address(sums.paired[f, k, c]), address(sums.joint[f, k, c])
+    believed, estimates = address(sums.believed[f, k, c]), address(sums.estimates[f, k, c])
+    for j in range(size):
+        component_sums(j, rows, base, of)
+        estimates[j] += of[0]
         for power in range(4):
-            sums.error[f, k, c, j, power] += out[1 + power]
+            error[4 * j + power] += of[1 + power]
         if j < estimate.size_base:
-            sums.paired[f, k, c, j] += out[5]
-    joint_sums(estimate.x, estimate.P, estimate.size, course, counted, units, out)
-    for j in range(estimate.size):
-        sums.believed[f, k, c, j] += out[j] * sigma * sigma / period ** (2 * j)
+            paired[j] += of[5]
+    joint_sums(rows, address(estimate.P), size, units, of)
+    for j in range(size):
+        believed[j] += of[j] * sigma * sigma / period ** (2 * j)
     for power in range(4):
-        sums.joint[f, k, c, power] += out[3 + power]
+        joint[power] += of[3 + power]
 
 
 @part
@@ -151,9 +173,10 @@ def add_ahead(sizes, x, course, counted, k, dt, out, sums):
 
     x (F, C, 4, CHUNK); course and counted of all coordinates, n of plots before scan k.
     """
-    for f in range(x.shape[0]):
-        for c in range(x.shape[1]):
-            own = Course(course.truth[c], course.shift[c])
-            ahead_sums(x[f, c], sizes[f], own, Counted(counted.n[c], counted.used), dt, out)
+    of = address(out)
+    for c in range(x.shape[1]):
+        own, plots = Course(course.truth[c], course.shift[c]), Counted(counted.n[c], counted.used)
+        for f in range(x.shape[0]):
+            ahead_sums(rows_of(x[f, c], own, plots), sizes[f], dt, of)
             for power in range(4):
-                sums.ahead[f, k - 1, c, power] += out[power]
+                sums.ahead[f, k - 1, c, power] += of[power]

@@ -15,6 +15,7 @@ import math
 from typing import NamedTuple
 
 from radarsim.kernels.compile import inline, kernel
+from radarsim.kernels.random import log_polynomial
 
 LEAST_DENSITY = 1e-9  # per m², in scores: without false plots a score would be infinite
 OPEN = 1e30  # χ² of a gate that contains everything
@@ -142,7 +143,7 @@ def associated(gated, rule, r, S, settled):
     density, root = rule.density * r, 2.0 * math.pi * math.sqrt(S[0] * S[2] - S[1] * S[1])
     missed = 1.0 - rule.detection * rule.inside
     ratio = missed + rule.detection * gated.weight / (root * max(density, LEAST_DENSITY * r))
-    score = math.log(max(ratio, 1e-12))
+    score = log_polynomial(max(ratio, 1e-12))
     if gated.count == 0.0:
         return Association(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, score)
     none = density * root * missed / rule.detection

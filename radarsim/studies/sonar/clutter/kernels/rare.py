@@ -161,6 +161,7 @@ def associate_false(field, shift, trackers, f, scan, work, own, counts):
     """
     draws, out, tally, status = draws_of(field), work.association, address(counts), work.status[f]
     predicted, plots, rule, m, n = work.predicted, work.plots[f], rule_of(trackers, f), trackers.m[f], trackers.n[f]
+    lives, taken = address(status), address(out)
     keys, most, held_on = (shift.plots[0], shift.plots[1]), trackers.misses[f], shift.shares[2] > 0.0
     for i in range(scan.count):
         if status[STATE, i] == NONE:
@@ -178,7 +179,7 @@ def associate_false(field, shift, trackers, f, scan, work, own, counts):
             own[LONG, i] = min(own[LONG, i] * factor, LARGEST)
         else:
             found = associate_track(draws, rule, scan.first + i, scan.k, (0.0, 0.0, 0.0), gate, tally)
-        settle(status, i, found, out)
+        settle(lives, i, found, taken)
 
 
 @part

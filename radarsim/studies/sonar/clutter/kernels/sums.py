@@ -4,7 +4,8 @@ Letters as in `sonar.kernels.sums`; f numbers trackers, c the lines in range and
 """
 
 from radarsim.kernels.compile import part
-from radarsim.studies.sonar.kernels.sums import Course, Estimate, add_sums, ahead_sums
+from radarsim.kernels.lanes import address
+from radarsim.studies.sonar.kernels.sums import Course, Estimate, add_sums, ahead_sums, rows_of
 
 
 @part
@@ -44,8 +45,8 @@ def add_errors(trackers, tracks, f, k, course, counted, out, sums):
 @part
 def add_ahead(tracks, f, k, dt, course, counted, out, sums):
     """Add the errors of tracker f at scan k of values extrapolated from scan k - 1."""
-    size = tracks.x.shape[0]
+    size, of = tracks.x.shape[0], address(out)
     for c in range(size):
-        ahead_sums(tracks.x[c], size, Course(course.truth[c], course.shift[c]), counted, dt, out)
+        ahead_sums(rows_of(tracks.x[c], Course(course.truth[c], course.shift[c]), counted), size, dt, of)
         for power in range(4):
-            sums.ahead[f, k - 1, c, power] += out[power]
+            sums.ahead[f, k - 1, c, power] += of[power]

@@ -182,21 +182,27 @@ def gate_of(place, S, settled, reach):
 
 @inline
 def settle(status, i, found, out):
-    """Write the Association of track i to the rows of out (6, CHUNK), and count it in the track's status."""
-    out[0, i], out[1, i], out[2, i] = found.taken, found.nu_r, found.nu_b
-    out[3, i], out[4, i], out[5, i] = found.rr, found.rb, found.bb
-    if status[STATE, i] == CONFIRMED:
-        status[WRONG, i] += found.false_share
-        status[TAKEN, i] += found.taken
-    status[AGE, i] += 1.0
-    status[SCORE, i] += found.score
-    if status[FIRST, i] > 0.0:
-        status[BEST, i] = max(status[BEST, i], status[SCORE, i])
+    """Write the Association of track i to the rows of out (6, CHUNK), and count it in the track's status (ROWS, CHUNK).
+
+    Both are addresses: Numba may count references to arrays for every track.
+    """
+    rows = (found.taken, found.nu_r, found.nu_b, found.rr, found.rb, found.bb)
+    for j in range(6):
+        out[j * CHUNK + i] = rows[j]
+    if status[STATE * CHUNK + i] == CONFIRMED:
+        status[WRONG * CHUNK + i] += found.false_share
+        status[TAKEN * CHUNK + i] += found.taken
+    status[AGE * CHUNK + i] += 1.0
+    score = status[SCORE * CHUNK + i] + found.score
+    status[SCORE * CHUNK + i] = score
+    if status[FIRST * CHUNK + i] > 0.0:
+        status[BEST * CHUNK + i] = max(status[BEST * CHUNK + i], score)
     if found.taken > 0.0:
-        status[HITS, i] += 1.0
-        status[MISSES, i], status[SINCE, i] = 0.0, 0.0
+        status[HITS * CHUNK + i] += 1.0
+        status[MISSES * CHUNK + i] = 0.0
+        status[SINCE * CHUNK + i] = 0.0
     else:
-        status[MISSES, i] += 1.0
+        status[MISSES * CHUNK + i] += 1.0
 
 
 @part
@@ -208,7 +214,7 @@ def associate(field, rule, scan, tracks, status, target, work, counts):
     """
     # Arrays are taken out of their records once, because every access counts a reference.
     draws, out, tally, plots = draws_of(field), work.association, address(counts), tracks.plots
-    detected, z, predicted = target.detected, target.z, work.predicted
+    detected, z, predicted, lives, taken = target.detected, target.z, work.predicted, address(status), address(out)
     for i in range(scan.count):
         if status[STATE, i] == NONE:
             out[:, i] = 0.0
@@ -220,7 +226,7 @@ def associate(field, rule, scan, tracks, status, target, work, counts):
         gate = gate_of(place, S, plots[i] > 1.5, rule.speed * status[SINCE, i])
         plot = (detected[i], z[0, i], z[1, i])
         found = associate_track(draws, rule, scan.first + i, scan.k, plot, gate, tally)
-        settle(status, i, found, out)
+        settle(lives, i, found, taken)
 
 
 @part
