@@ -212,6 +212,15 @@ def noted(quantity: Quantity, result: CaseResult) -> str:
     return str(rows["note"].iloc[-1]) if len(rows) else ""
 
 
+def scan(quantity: Quantity, axes: Axes) -> int:
+    """The scan that a quantity at a time is read at, or the later of two; 0 where it is asked for by its number."""
+    k, t_s = np.asarray(axes.k), np.asarray(axes.t_s, dtype=float)
+    if quantity.at_k is not None or not len(k):
+        return 0
+    last = len(k) - 1
+    return int(k[last if quantity.at_s is None else min(int(np.searchsorted(t_s, quantity.at_s * (1 - 1e-12))), last)])
+
+
 def courses(kind: str, table: "pd.DataFrame") -> dict[tuple[str, str], Series]:
     """The values of every filter and component from a table of a kind that is at hand, without their intervals."""
     value, k, t_s = (table[name].to_numpy(dtype=float) for name in (KINDS[kind].columns[0], "k", "t_s"))

@@ -192,6 +192,7 @@ class Curve:
         self.threads, self.progress, self.realisations = threads, progress, realisations
         self.known: dict[tuple[float, int], Estimate] = {}
         self.refused: dict[float, ConfigError] = {}
+        self.scans = set[int]()  # of the values that were simulated, where the quantity was read
         self.from_tables = False
         self.rough = False  # whether there are values for less work, for a search to look about
         self.expected = 1
@@ -251,7 +252,9 @@ class Curve:
         return Estimate(value, value, value)
 
     def _sampled(self, case: Case, realisations: int) -> tuple[Estimate, float]:
-        return quantities.sampled(self.quantity, self._result(case, realisations))
+        result = self._result(case, realisations)
+        self.scans.add(quantities.scan(self.quantity, result.axes))
+        return quantities.sampled(self.quantity, result)
 
     def _result(self, case: Case, realisations: int) -> CaseResult:
         work = CaseWork(case)

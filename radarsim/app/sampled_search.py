@@ -33,6 +33,7 @@ PILOT_SHARE, PILOT_LEAST = 16, 200  # realisations of the scan: a share of all, 
 PILOT_POINTS = 13
 WITH_ALL = 13  # values with all realisations: a bracket, the value, both ends of its interval
 MOST_STEPS = 3  # of the scan, by which the pilot's noise may have moved a crossing
+UNPAIRED = 4  # times the realisations where values have noise of other scans, as `sensitivity` has them
 RESIDUE = 0.02  # of its interval: how near a sampled quantity is brought to the target, so that the noise decides
 
 
@@ -56,6 +57,10 @@ def by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> A
     if not known:
         raise nowhere(asked, curve)
     refuse_without_effect(asked, [y for _, y in known])
+    apart = unpaired(asked, curve)
+    if apart:
+        told("; ".join(apart))
+        count = curve.realisations = UNPAIRED * count
     answer = partial(answered, asked, attained_now, exact=False)
     best, _ = min(known, key=lambda one: abs(one[1]))
     places = _changes(scanned) or [grid.index(best)]
@@ -77,7 +82,7 @@ def by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> A
             unit=tr(asked.unit),
         )
         notes = (doubt,) if near else boundary(asked, curve, best)
-        return answer(limit=limit.value, limit_at=best, notes=notes)
+        return answer(limit=limit.value, limit_at=best, notes=notes + apart)
     value = nearest([one.value for one in found], asked)
     own, there = next(one for one in found if one.value == value), curve.simulated(value, count)
     jumps = not over.whole and not there.lo <= asked.equals <= there.hi
@@ -85,8 +90,24 @@ def by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> A
         **{"value": value, "lo": own.lo, "hi": own.hi, "attained": there.value},
         slope=None if jumps else _sampled_slope(curve, own),
         others=tuple(one.value for one in found if not own.lo <= one.value <= own.hi),
-        notes=((JUMPS,) if jumps else ()) + ((WHOLE,) if over.whole else ()) + curve.noted(value),
+        notes=((JUMPS,) if jumps else ()) + ((WHOLE,) if over.whole else ()) + apart + curve.noted(value),
     )
+
+
+def unpaired(asked: Question, curve: Curve) -> tuple[str, ...]:
+    """Where the key moves the scans, that values are not compared with the same noise, in words.
+
+    The quantity at a time is then read at another scan, whose noise is another.
+    """
+    if len(curve.scans) < 2:
+        return ()
+    words = tr(
+        "{key} moves the scans, whose noise differs: each value has {count} realisations, {times} times as many",
+        key=asked.key,
+        count=UNPAIRED * curve.realisations,
+        times=UNPAIRED,
+    )
+    return (words,)
 
 
 def _changes(scanned: Sequence[tuple[float, float]]) -> list[int]:

@@ -7,6 +7,7 @@ on the data and on the versions of Matplotlib and its fonts alone.
 import gc
 import io
 import math
+import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -51,6 +52,8 @@ TICK_GAP_PT = 3.0  # between numbers of ticks
 REMEMBERED = ("_update_ticks", "_get_ticklabel_bboxes")  # methods of Matplotlib's axes: of no argument; ticks, renderer
 MARKED = 16  # at most about so many markers or crosses a line
 WHOLE = (0, 1)  # limits of a share
+SYMBOL = re.compile(r"\$\\?\w+\$")  # a label that is one letter: on its side Λ would read as <
+UPRIGHT = {"rotation": 0, "ha": "right", "va": "center"}
 EXACT: dict[str, Any] = {
     "linestyle": "none",
     "marker": "+",
@@ -260,7 +263,7 @@ def _draw(axes: Axes, panel: Panel, maps: Colours) -> None:
             case Note():
                 _note(axes, mark)
     axes.set_xlabel(panel.x.label)
-    axes.set_ylabel(panel.y.label)
+    axes.set_ylabel(panel.y.label, **(UPRIGHT if SYMBOL.fullmatch(panel.y.label) else {}))
     axes.set_title(panel.title, loc="left", fontweight="bold")
     for limits, put in ((panel.x.limits, axes.set_xlim), (panel.y.limits, axes.set_ylim)):
         if limits != (None, None):

@@ -197,6 +197,46 @@ def test_the_interval_holds_the_root_where_the_quantity_s_own_interval_there_hol
             assert (found.lo <= exact <= found.hi) == (inside > 0), seed
 
 
+MOVED = {"overrides": ["duration_s=140"], "between": (5, 9)}  # of the scan period, s: 60 s lie at scan 7 to 13
+SEEN = Quantity("sigma", "r", "r", at_s=60.0)
+
+
+def test_a_key_that_moves_the_scans_is_said_not_to_be_paired():
+    exact = solve("rls2", "radar.scan_period_s", SEEN, 190, **MOVED)
+    sampled = {"sampled": True, "realisations": 200, "threads": 1}
+    said = []
+    found = solve("rls2", "radar.scan_period_s", SEEN, 190, told=said.append, **MOVED, **sampled)
+    words = "radar.scan_period_s moves the scans, whose noise differs: each value has 800 realisations, 4 times as many"
+    assert found.notes == (words,)
+    assert said[-1] == words
+    assert found.lo <= exact.value <= found.hi
+    more = Curve(Cases("rls2", tuple(MOVED["overrides"])), "radar.scan_period_s", SEEN, 1, None, 800)
+    assert found.attained == more.simulated(found.value, 800).value
+
+
+@pytest.mark.parametrize(
+    ("key", "quantity"),
+    [("radar.sigma_range_m", SEEN), ("radar.scan_period_s", Quantity("sigma", "r", "r", at_k=9))],
+)
+def test_a_key_that_leaves_the_scans_is_paired(key, quantity):
+    curve = Curve(Cases("rls2", ("duration_s=140",)), key, quantity, 1, None, 100)
+    for value in (6, 7, 8):
+        curve.simulated(value, 100)
+    assert len(curve.scans) == 1
+
+
+@pytest.mark.slow
+def test_the_interval_of_a_key_that_moves_the_scans_covers_a_known_root():
+    """Of 40 seeds at least as many as of a binomial number of 0.95 (4 σ): it covers more, as noise makes it wider."""
+    exact = solve("rls2", "radar.scan_period_s", SEEN, 190, **MOVED).value
+    inside = 0
+    for seed in range(40):
+        given = MOVED | {"overrides": [*MOVED["overrides"], f"seed={seed}"], "sampled": True, "threads": 1}
+        found = solve("rls2", "radar.scan_period_s", SEEN, 190, realisations=500, **given)
+        inside += found.lo <= exact <= found.hi
+    assert inside >= 0.95 * 40 - 4 * math.sqrt(40 * 0.95 * 0.05)
+
+
 # ---- what is refused -------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("arguments", "words"),

@@ -460,3 +460,9 @@ def test_a_gain_that_is_nowhere_known_is_drawn_as_nothing_and_cuts_no_axis():
     assert axis.limits == Axis("gain").limits
     assert marks[1:] == (nowhere,)
     assert panels._cut(Axis("gain"), [nowhere, loss])[0].limits == (-panels.LOSS, 100.0)
+
+
+@pytest.mark.parametrize(("label", "turned"), [("$\\Lambda$", 0), ("$c$", 0), ("$\\sigma$, m", 90), ("gain, %", 90)])
+def test_a_letter_beside_an_axis_stands_upright(label, turned):
+    figure = Figure("one", "One", "A figure.", (Panel(Axis("x, s"), Axis(label), (line(),)),))
+    assert drawn(figure).yaxis.label.get_rotation() == turned
