@@ -53,7 +53,7 @@ REMEMBERED = ("_update_ticks", "_get_ticklabel_bboxes")  # methods of Matplotlib
 MARKED = 16  # at most about so many markers or crosses a line
 WHOLE = (0, 1)  # limits of a share
 SYMBOL = re.compile(r"\$\\?\w+\$")  # a label that is one letter: on its side Λ would read as <
-UPRIGHT = {"rotation": 0, "ha": "right", "va": "center"}
+UPRIGHT: dict[str, Any] = {"rotation": 0, "ha": "right", "va": "center"}
 EXACT: dict[str, Any] = {
     "linestyle": "none",
     "marker": "+",
