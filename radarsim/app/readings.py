@@ -143,6 +143,8 @@ def readings(
     `realisations` is then the most. Runs go through the store of blocks under out, so that a second call continues.
     Raises TargetUnmet where a time limit left something undone, Interrupted where `stop` saw a signal.
     """
+    if realisations is not None and realisations < 1:
+        raise ConfigError(f"--realisations: must be >= 1, got {realisations}")
     options = replace(options or RunOptions(), out=out)
     plans = [Plan(one, _first(one.paper.readings, realisations, decide)) for one in wanted]
     total, done = sum(plan.total for plan in plans), 0

@@ -138,6 +138,11 @@ def test_unknown_names_say_what_is_allowed():
     assert "no value 'none' of start; values: weighted, unweighted" in caught.value.lines[1]
 
 
+def test_no_realisations_are_refused(tmp_path):
+    with pytest.raises(ConfigError, match="--realisations: must be >= 1, got 0"):
+        app.readings(app.asked(["P3.8"]), out=tmp_path, realisations=0, figures=False)
+
+
 def test_a_damaged_table_is_reported(tmp_path):
     (tmp_path / "readings").mkdir()
     (tmp_path / "readings/readings.csv").write_text("a,b\n1,2\n")
