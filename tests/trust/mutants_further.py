@@ -353,6 +353,43 @@ SAID = (
         ),
     ),
     *mutants(
+        "radarsim/report/claims/judge.py",
+        (
+            "asked = [one for one in tried if one.part.asserted] or tried",
+            "asked = tried",
+            "report/test_claims.py::test_what_does_not_hang_on_the_end_is_judged_of_a_shorter_run",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/range_doppler/readings.py",
+        (
+            'float(shown if shown != SHIPPED else reading["manoeuvre_variance"])',
+            'float(reading["manoeuvre_variance"])',
+            "app/test_readings.py::test_figure_1a_is_of_several_variances",
+        ),
+        (
+            "ends = short if np.isfinite(asked) and end < asked - 1e-6 else",
+            "ends = short if not short else",
+            "app/test_readings.py::test_a_run_that_is_over_before_the_time_asked_about_is_not_judged",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/discriminator/versions.py",
+        (
+            "error = covariance[:-1] - covariance[1:]",
+            "error = covariance[:-1]",
+            "studies/discriminator/test_readings.py::test_the_probability_of_a_miss_is_that_of_the_prepared_case",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/sonar/smoothing/measures.py",
+        (
+            "(F @ _covariance(n) @ F.T)[0, 0]",
+            "_covariance(n)[0, 0]",
+            "studies/sonar/smoothing/test_tables.py::test_what_is_known_exactly_is_judged_exactly",
+        ),
+    ),
+    *mutants(
         "radarsim/studies/sonar/manoeuvre/readings.py",
         (
             "measure=measures.further(part.cases[0], measures.ENOUGH, delay, rate)",

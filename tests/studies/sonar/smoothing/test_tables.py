@@ -106,6 +106,9 @@ def test_what_is_known_exactly_is_judged_exactly(results):
     own = rows[rows["claim"].isin([f"P3.{n}" for n in (1, 2, 3, 4, 11, 14)])]
     assert len(own) > 20
     assert own["exact"].notna().all()
+    formulas = own[own["what"].str.endswith("over the formula")]
+    assert len(formulas) == 20
+    assert formulas["exact"].to_numpy() == pytest.approx(1, rel=1e-9)
     curves = result.tables["curves"].set_index(["filter", "component", "k"])["exact_sigma"]
     sigma = curves["growing", "r", 1]
     bought = own[own["what"].str.startswith("σ of the recursion after 20")]["exact"].item()
