@@ -28,6 +28,7 @@ myst_dmath_allow_digits = False  # a price is no formula
 html_math_renderer = "mathml"
 
 default_role = "code"  # of single backticks in docstrings
+toc_object_entries = False  # thousands of functions, copied into the contents of every page: a quarter of the build
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"

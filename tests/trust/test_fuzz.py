@@ -1,6 +1,6 @@
 """Spoiled configs and spoiled files of plots: an answer or our own error in words, quickly and in little memory.
 
-FUZZ_CASES is how many there are in all: 500 in the ordinary suite; `make slow` runs 100 000, each in limited time.
+FUZZ_CASES is how many there are in all: 200 in the ordinary suite; `make slow` runs 100 000, each in limited time.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.config.lookup import SHIPPED
 from radarsim.errors import ConfigError
 
-CASES = int(os.environ.get("FUZZ_CASES", "500"))
+CASES = int(os.environ.get("FUZZ_CASES", "200"))
 RELEASE = max(CASES, 100_000)
 SECONDS, MEGABYTES = 2.0, 300
 CONFIGS = sorted((SHIPPED / "configs").glob("*.yaml"))
