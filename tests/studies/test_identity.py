@@ -227,7 +227,7 @@ def test_the_shared_rooms(path, expected, moved):
         ("studies/registry.py", '"multimodel": ', '"another": "elsewhere.study",\n    "multimodel": ', NONE),
         # The declared study: what it is called and shows, and how it computes.
         ("studies/range_doppler/__init__.py", 'about="', 'about="Indeed: ', NONE),
-        ("studies/range_doppler/__init__.py", '"inputs", ', "", NONE),
+        ("studies/range_doppler/__init__.py", '"inputs",', "", NONE),
         ("studies/folder.py", ".tables(results)", ".tables(results[:1])", NONE),
         ("studies/folder.py", ".prepare(case)", ".prepare(case, 1)", ALL - SONAR),
         ("studies/folder.py", ".simulate(plan, first, count)", ".simulate(plan, first + 1, count)", ALL - SONAR),
