@@ -164,8 +164,8 @@ def range_of(found: Sequence[numeric.NumericKey], name: str, between: tuple[floa
     if math.isfinite(key.low) and math.isfinite(key.high) and not key.whole:
         return search.searched(key.low, key.high)
     if not values:
-        what = "not given" if key.value is None else f"{key.value:g}"
-        raise ConfigError(f"{name}: is {what} in the config, and its own range has no end: give --between LO HI")
+        what = "there is no value to search about" if key.value is None else f"is {key.value:g} in the config"
+        raise ConfigError(f"{name}: {what}, and its own range has no end: give --between LO HI")
     if key.low >= 0:
         low, high = max(rounded(min(values) / FACTOR), key.low), min(rounded(max(values) * FACTOR), key.high)
         return search.searched(math.ceil(low) if key.whole else low, math.floor(high) if key.whole else high, key.whole)

@@ -253,6 +253,11 @@ def test_the_interval_of_a_key_that_moves_the_scans_covers_a_known_root():
         (("rls2", "radar.sigma_range_m", Quantity("lock", "r"), 30), "makes no locks.csv"),
         (("range_doppler", "radar.sigma_range_m", GAIN, 30), "choose one with --case: 'rls1', "),
         (("nosuch", "radar.sigma_range_m", GAIN, 30), "no such config"),
+        (
+            ("rls2", "duration_s", GAIN, 30),
+            "duration_s: there is no value to search about, and its own range has no end",
+        ),
+        (("rls2", "radar.bias_range_m", GAIN, 30), "radar.bias_range_m: is 0 in the config, and its own range has no"),
     ],
 )
 def test_faults(arguments, words):
