@@ -398,4 +398,28 @@ SAID = (
         ),
     ),
 )
-FURTHER = (*MANOEUVRES, *FALSE_PLOTS, *SCORES, *LAWS_EXACT, *RUNS, *PULSES, *DRAWN_FLIGHTS, *MISSED_PLOTS, *SAID)
+PICTURES = mutants(
+    "radarsim/report/figures.py",
+    (
+        "*side.get_view_interval(), *axes.bbox.bounds,",
+        "*side.get_view_interval(),",
+        "report/test_figures.py::test_what_is_remembered_of_axes_changes_no_picture",
+    ),
+    (
+        "vars(side).pop(name, None)",
+        "pass",
+        "report/test_figures.py::test_a_figure_that_is_handed_out_remembers_nothing",
+    ),
+)
+FURTHER = (
+    *MANOEUVRES,
+    *FALSE_PLOTS,
+    *SCORES,
+    *LAWS_EXACT,
+    *RUNS,
+    *PULSES,
+    *DRAWN_FLIGHTS,
+    *MISSED_PLOTS,
+    *SAID,
+    *PICTURES,
+)
