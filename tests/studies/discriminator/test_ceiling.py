@@ -28,3 +28,11 @@ def test_windows_only_take_away():
     one, two = (ceiling.always_within(BURST, windows, SIGMA) for windows in ((3000,), (300, 3000)))
     assert two < one < math.erf(3 / math.sqrt(2))
     assert ceiling.always_within(BURST, (300, 3000), SIGMA, 40.0) == 1.0
+
+
+def test_louder_noise_than_believed_is_a_narrower_limit():
+    """Where the forecast says nothing, noise of twice the σ under 3 σ is noise as believed under 1.5 σ."""
+    nothing = tuple(1e4 * np.array(SIGMA))
+    louder = ceiling.always_within(BURST, (3000,), nothing, 3.0, 2.0)
+    assert louder == pytest.approx(ceiling.always_within(BURST, (3000,), nothing, 1.5), abs=3e-4)
+    assert louder < 0.8 * ceiling.always_within(BURST, (3000,), nothing)
