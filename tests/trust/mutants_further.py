@@ -315,8 +315,8 @@ SAID = (
             f"{STAGES}::test_what_rare_errors_add_is_as_a_twin_counts_it",
         ),
         (
-            "few_of_gain = n**2 * log_variance",
-            "few_of_gain = n**2 / effective",
+            "events_of_gain = n**2 * log_variance",
+            "events_of_gain = n**2 / effective",
             f"{STAGES}::test_a_gain_may_be_narrower_than_what_its_filters_lack",
         ),
         (
