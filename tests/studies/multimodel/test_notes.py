@@ -100,11 +100,11 @@ def test_a_gain_may_be_narrower_than_what_its_filters_lack():
 
 
 def test_a_gain_is_marked_by_the_axis_that_shows_rare_errors_most():
-    """Errors of 15 σ along x alone: gains of y, whose own have no tail, bear the mark; those of the speed do not."""
+    """Errors of 15 σ along x alone: gains of y, whose own have no tail, bear the mark; those of speeds do not."""
     rng = np.random.default_rng(6)
-    components = [("x", "m"), ("vx", "m/s"), ("y", "m"), ("vy", "m/s")]
+    components = [("x", "m"), ("vx", "m/s"), ("ax", "m/s2"), ("y", "m"), ("vy", "m/s"), ("ay", "m/s2")]
     errors = np.stack([errors_of(rng) for _ in components], axis=-1)
     errors[1, :3, 4, 0] += 15
     said = notes.of_stages(parts_of(errors, components)[0])
-    assert said[1, 0].tolist() == [notes.RARE, "", notes.OF_GAIN + notes.RARE, ""]
-    assert said[0].tolist() == [[""] * 4] * 2
+    assert said[1, 0].tolist() == [notes.RARE, "", "", notes.OF_GAIN + notes.RARE, "", ""]
+    assert said[0].tolist() == [[""] * 6] * 2
