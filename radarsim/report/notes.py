@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import rare
 from radarsim.report import tables as common
 from radarsim.report.statistics import ALIKE as ALIKE_SQUARES
 from radarsim.report.statistics import FEW, FEW_EFFECTIVE, FEW_EVENTS, FEW_HEAVY, Z95, root_mean_square
@@ -136,8 +135,8 @@ def _noted(
     columns = [column for column in (*SHARES.get(name, ()), *FORETOLD.get(name, ())) if column in table]
     shares = [table[column].to_numpy(dtype=float) for column in columns]
     events = np.min([n * np.minimum(share, 1 - share) for share in shares], axis=0) if shares else np.inf
-    if name in SHARES and "rare" in made:
-        events = rare.of_rows(table, made["rare"], events)
+    if name in SHARES and "rare" in made:  # their rates are weighted, and have notes of their own
+        events = np.where(table["case"].isin(made["rare"]["case"]), np.inf, events)
     if name in BOUNDED:
         effective = np.full(n.shape, np.inf)
     notes = notes_on(n, events, effective, None if name in BOUNDED else nearby)

@@ -63,7 +63,7 @@ def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted,
 
     variance_factor is how many times more plain realisations would know the probability as well. The interval is known
     from Σw², and that by (Σw²)²/Σw⁴ realisations: where few weigh most, larger weights may be missing, and the rate and
-    its interval are too small together (`note`).
+    its interval are too small together: see `note`.
     """
     estimate, size = rate(of, drawn), len(sought)
     variance = of.squared / drawn.n - estimate.value**2
@@ -72,7 +72,6 @@ def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted,
     mean = drawn.weight / drawn.n
     spread = np.sqrt(np.maximum(drawn.squared / drawn.n - mean**2, 0) / max(drawn.n - 1, 1))
     effective = statistics.effective_events(of.weight, of.squared)
-    behind = statistics.effective_events(of.squared, of.fourth)
     return {
         **labels,
         "event": np.full(size, event, dtype=object),
@@ -85,8 +84,24 @@ def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted,
         "plain": np.full(size, drawn.plain).astype(np.int64),
         "mean_weight": np.full(size, mean),
         "mean_weight_se": np.full(size, spread),
-        "note": np.where(effective < FEW_EVENTS, FEW, np.where(behind < FEW_EVENTS, HEAVY, "")).astype(object),
+        "note": note(drawn, of),
     }
+
+
+def note(drawn: Drawn, *events: Counted) -> np.ndarray:
+    """What is to be said (rows,) of rows with the rates of these events: of the first of which there is something.
+
+    Any row of any table with weighted rates has one: shifts lead to the last scan alone, so that few weights, of any
+    size, stand behind others. Where an event is common, those that do not have it are counted too.
+    """
+    said = np.full(events[0].weight.shape, "", dtype=object)
+    for of in events:
+        having = statistics.effective_events(of.weight, of.squared)
+        lacking = statistics.effective_events(drawn.weight - of.weight, drawn.squared - of.squared)
+        few = np.minimum(having, lacking) < FEW_EVENTS
+        heavy = statistics.effective_events(of.squared, of.fourth) < FEW_EVENTS
+        said = np.where(said != "", said, np.where(few, FEW, np.where(heavy, HEAVY, "")).astype(object))
+    return said
 
 
 def table(parts: "list[dict[str, Any]]") -> "dict[str, pd.DataFrame]":
@@ -179,18 +194,3 @@ def _unaimed(made: "pd.DataFrame") -> Iterator[str]:
                 percent=100 * part / whole,
                 event=row["event_part"],
             )
-
-
-def of_rows(table: "pd.DataFrame", made: "pd.DataFrame", events: "np.ndarray | float") -> np.ndarray:
-    """Events (rows,) behind the shares of a table by realisations, those of cases with weights from the table `rare`.
-
-    Where it has no row for the filter and scan, nothing is said of them: infinite. Of several events the first counts.
-    """
-    keys = ["case", "filter", "k"]
-    if not set(keys) <= set(table):
-        return np.asarray(events)
-    behind = made.drop_duplicates(keys)
-    behind = behind.assign(n_eff=behind["n_eff"].where(behind["note"] == "", 0.0))[[*keys, "n_eff"]]
-    known = table[keys].merge(behind, on=keys, how="left")["n_eff"].to_numpy(dtype=float)
-    weighted = table["case"].isin(made["case"]).to_numpy()
-    return np.asarray(np.where(weighted, np.where(np.isnan(known), np.inf, known), events))

@@ -1,6 +1,7 @@
 """How often the intervals of a study's tables hold what they are of, over many runs of its own realisations."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -97,6 +98,14 @@ def kept(experiment: Experiment, n: int, runs: int) -> dict[tuple[str, str], Kep
                 found[name, value].held[place] += held
                 found[name, value].by_run[run] += (by_chance.sum(), held.sum())
     return {key: one for key, one in found.items() if one.unmarked.any()}
+
+
+def with_intervals(experiment: Experiment, n: int, cases: int) -> set[tuple[str, str]]:
+    """Table and column of every interval that the first so many cases of an experiment have, from n realisations."""
+    first = replace(experiment, cases=experiment.cases[:cases])
+    works = [CaseWork(case) for case in first.cases]
+    made = _tables(first, works, [work.simulate(0, n) for work in works], n)
+    return {(name, column) for name, table in made.items() if len(table) for column, *_ in _intervals(name, table)}
 
 
 def _tables(experiment: Experiment, works: list[CaseWork], sums: list[np.ndarray], n: int) -> dict[str, pd.DataFrame]:

@@ -12,9 +12,10 @@ import pandas as pd
 import pytest
 
 from radarsim.app.configs import load
+from radarsim.config.lookup import SHIPPED
 from radarsim.report import notes, statistics
 from radarsim.studies.range_doppler import study as range_doppler
-from tests.report.coverage import HIGH, LOW, kept
+from tests.report.coverage import HIGH, LOW, kept, with_intervals
 from tests.trust.cases import CASES
 
 
@@ -56,6 +57,7 @@ def test_coverage_over_two_thousand_repetitions(count, radar_config):
         check(shares, 2000)
 
 
+CONFIGS = SHIPPED / "configs"
 SEEDS, N = 200, 1000  # the least N at which tables of no known n_eff bear no note
 # Times on a grid of scans: their intervals, of whole scans, hold too often.
 DISCRETE = {("steady", "settling_s")}
@@ -63,7 +65,17 @@ DISCRETE = {("steady", "settling_s")}
 FURTHER = (
     *("rls2", "multimodel_1hz", "multimodel_families_1hz", "orders"),
     *("sonar_smoothing", "sonar_missed", "sonar_conversion"),
+    *("discriminator", "pulses_snr", "pulses_folds"),
 )
+SOME = {"pulses_snr": ["sweep.burst.snr_db=[-2]"], "pulses_folds": ["sweep.burst.snr_db=[0]"]}  # of their cases
+# Configs with `rare`: overrides, and realisations.
+WEIGHTED = {
+    "discriminator_rare": (["sweep.estimators.0.lock_probability=[0.99]"], 4000),
+    "sonar_clutter_rare": (["sweep.sensor.false_plots_per_km2=[0.01, 0.1]"], N),
+    "ambiguous_rare": (["sweep.radar.repetition_rate_hz=[700, 900, 1100]"], N),
+}
+# What a detector's use is worth is a ratio to a believed σ that varies: every row bears that note.
+ALWAYS_MARKED = {("sonar", "uses", "ratio"), ("sonar", "uses", "sigma")}
 
 
 def right(experiment, n, seeds):
@@ -87,10 +99,45 @@ def test_unmarked_intervals_of_every_study_cover(case):
     right(CASES[case].loaded(N), N, SEEDS)
 
 
+def further(config):
+    """A config of FURTHER, of N realisations."""
+    return load(config, [*SOME.get(config, ()), f"realisations={N}"])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("config", FURTHER)
 def test_unmarked_intervals_of_further_configs_cover(config):
-    right(load(config, [f"realisations={N}"]), N, SEEDS)
+    right(further(config), N, SEEDS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("config", WEIGHTED)
+def test_unmarked_weighted_rates_cover(config):
+    """Of rates by importance sampling, and of the shares that other tables take from the same weights."""
+    overrides, n = WEIGHTED[config]
+    found = kept(load(config, [*overrides, f"realisations={n}"]), n, SEEDS)
+    assert ("rare", "rate") in found
+    for key in found.keys() & {("rare", "rate"), ("folds", "right"), ("folds", "beyond"), ("locks", "lock_rate")}:
+        one = found[key]
+        assert not one.wrong(SEEDS).size, (key, one.held[one.wrong(SEEDS)])
+        if one.unmarked.sum() >= len(one.held) * SEEDS / 20:
+            assert LOW - 2 * one.error <= one.share <= HIGH + 2 * one.error, (key, one.share, one.error)
+
+
+@pytest.mark.slow
+def test_every_interval_of_a_shipped_config_is_in_a_test_above():
+    """By study: each column of each table is unmarked somewhere in a config whose coverage is tested."""
+    tested = [CASES[case].loaded(N) for case in CASES] + [further(config) for config in FURTHER]
+    covered = {(one.study, *key) for one in tested for key in kept(one, N, 6)}
+    for config, (overrides, n) in WEIGHTED.items():
+        one = load(config, [*overrides, f"realisations={n}"])
+        covered |= {(one.study, *key) for key in kept(one, n, 6)}
+    shown: dict[tuple[str, str, str], str] = {}
+    for config in sorted(path.stem for path in CONFIGS.glob("*.yaml")):
+        one = load(config, ["realisations=8"])
+        shown |= {(one.study, *key): config for key in with_intervals(one, 8, cases=3)}
+    assert {key: shown[key] for key in shown.keys() - covered - ALWAYS_MARKED} == {}
+    assert not ALWAYS_MARKED - shown.keys()
 
 
 @pytest.mark.parametrize("reach", [0.0, None])

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Result = CaseResult[FoldedAxes]
 FOLDS = (
     *("case", "filter", "k", "t_s", "n", "right", "right_lo", "right_hi", "exact_right"),
-    *("listed", "hypotheses", "beyond", "beyond_lo", "beyond_hi"),
+    *("listed", "hypotheses", "beyond", "beyond_lo", "beyond_hi", "note"),
 )
 ORDERS = (
     *("case", "filter", "order", "k", "t_s", "n", "weight", "weight_lo", "weight_hi"),
@@ -85,10 +85,12 @@ def _folds(result: Result) -> dict[str, np.ndarray]:
     n = np.asarray(result.sums["estimates"])[..., 0][at]
     of = np.asarray(result.sums["folds"])[at]
     right, beyond, every = statistics.rate(of[:, RIGHT_SUM], n), statistics.rate(of[:, BEYOND_SUM], n), n
+    note = np.full(f.size, "", dtype=object)
     if "events" in result.sums:
         every = np.full(f.size, float(result.count))
-        right = rare.complement(rare.rate(events(result, (f, k), WRONG), drawn(result)))
-        beyond = rare.rate(events(result, (f, k), BEYOND), drawn(result))
+        wrong, off = (events(result, (f, k), event) for event in (WRONG, BEYOND))
+        right, beyond = rare.complement(rare.rate(wrong, drawn(result))), rare.rate(off, drawn(result))
+        note = rare.note(drawn(result), wrong, off)
     return {
         "case": np.full(f.size, result.name, dtype=object),
         "filter": common.names(axes.filters, f),
@@ -100,6 +102,7 @@ def _folds(result: Result) -> dict[str, np.ndarray]:
         "listed": of[:, LISTED_SUM] / n,
         "hypotheses": of[:, COUNT_SUM] / n,
         **dict(zip(("beyond", "beyond_lo", "beyond_hi"), beyond, strict=True)),
+        "note": note,
     }
 
 

@@ -85,7 +85,7 @@ LOCKS = (
     *("case", "filter", "k", "t_s", "n", "lock_rate", "lock_lo", "lock_hi", "lock_rate_3sigma"),
     *("posterior_rate", "posterior_rate_3sigma"),
     *("always_rate_3sigma", "always_lo", "always_hi", "always_posterior_rate_3sigma", "always_posterior_lo"),
-    *("always_posterior_hi", "energy_ratio"),
+    *("always_posterior_hi", "energy_ratio", "note"),
 )
 
 
@@ -94,11 +94,11 @@ def _locks(result: CaseResult) -> dict[str, np.ndarray]:
     f, k = _at_windows(result)
     count = result.sums["locks"][f, k]
     rates = {name: statistics.rate(count[:, i], result.count) for i, name in enumerate(COUNTED)}
+    note = np.full(f.size, "", dtype=object)
     if "losses" in result.sums:
-        every = (losses(result, (f, k, np.full(f.size, i))) for i in range(len(COUNTED)))
-        rates = {
-            name: rare.complement(rare.rate(lost, drawn(result))) for name, lost in zip(COUNTED, every, strict=True)
-        }
+        every = {name: losses(result, (f, k, np.full(f.size, i))) for i, name in enumerate(COUNTED)}
+        rates = {name: rare.complement(rare.rate(lost, drawn(result))) for name, lost in every.items()}
+        note = rare.note(drawn(result), every["lock"], every["always_three"], every["always_posterior_three"])
     lock, always, always_posterior = rates["lock"], rates["always_three"], rates["always_posterior_three"]
     return {
         **_labels(result, f, k),
@@ -110,6 +110,7 @@ def _locks(result: CaseResult) -> dict[str, np.ndarray]:
         **common.interval("always_rate_3sigma", always, "always"),
         **common.interval("always_posterior_rate_3sigma", always_posterior, "always_posterior"),
         "energy_ratio": result.axes.energy_ratio[f, k],
+        "note": note,
     }
 
 

@@ -19,6 +19,7 @@ from radarsim.report import rare as report
 from radarsim.report import statistics
 from radarsim.studies.discriminator import rare, study
 from radarsim.studies.discriminator.kernels import rare as kernels
+from radarsim.studies.discriminator.tables import COUNTED
 from tests.studies.discriminator.test_study import BASE, FROM_TRUTH
 
 RARELY = {"name": "a", "tail": "exact", "lock_probability": 0.999}
@@ -297,16 +298,36 @@ def test_an_interval_that_few_heavy_weights_make_is_marked():
     """Forty equal weights are enough; a hundred of which three make the variance are not, though n_eff is over 20."""
     equal, mixed = np.ones(40), np.r_[np.ones(97), np.full(3, 6.0)]
     sums = np.array([[w.sum(), (w**2).sum(), len(w), (w**4).sum()] for w in (equal, mixed, equal[:10])])
-    drawn = report.Drawn(10_000, 1000.0, 10_000.0, 10_001.0)
+    drawn = report.Drawn(10_000, 1000.0, 10_000.0, 10_300.0)
     made = report.rows({}, "loss", np.full(3, True), report.Counted(*sums.T), drawn)
     assert made["n_eff"] == pytest.approx([40, 115**2 / 205, 10])
     assert list(made["note"]) == ["", report.HEAVY, report.FEW]
+    common = report.Counted(*np.array([10_000.0 - 19, 10_300.0 - 19, 9981, 1e4]))
+    assert report.note(drawn, common) == report.FEW  # nineteen do not have it
+    assert report.note(drawn, common._replace(weight=common.weight - 1, squared=common.squared - 1)) == ""
     labels = {"case": "a", "filter": list("fgh"), "k": 1, "t_s": 0.0}
     said = report.warnings(pd.DataFrame({**labels, **made}))
     assert [line.partition(": ")[2].split(":")[0] for line in said] == ["h", "g"]
     assert "rests on 10.0 effective events" in said[0]
     assert "heavy weights" in said[1]
     assert not report.warnings(pd.DataFrame({**labels, **made, "sought": False}))
+
+
+def test_every_window_is_marked_by_its_own_weights():
+    """Shifts lead to the last window: before it a few weights of any size make a rate, and its interval."""
+    result = result_of(4000, RARELY)
+    locks, sums = result.tables["locks"], result.cases[0].sums["losses"][0]
+    at = [COUNTED.index(name) for name in ("lock", "always_three", "always_posterior_three")]
+    expected = []
+    for window in sums[: len(locks)]:
+        weight, square, _, fourth = window[at].T
+        with np.errstate(invalid="ignore"):
+            few, heavy = ~(weight**2 / square >= 20), ~(square**2 / fourth >= 20)
+        said = np.where(few, report.FEW, np.where(heavy, report.HEAVY, ""))
+        expected.append(next((words for words in said if words), ""))
+    assert list(locks["note"]) == expected
+    assert locks["note"].iloc[0] == report.FEW
+    assert len(set(expected)) > 1
 
 
 def test_weights_whose_mean_is_not_one_are_told():
