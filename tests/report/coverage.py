@@ -91,6 +91,8 @@ def kept(experiment: Experiment, n: int, runs: int) -> dict[tuple[str, str], Kep
             unmarked = table["note"].eq("").to_numpy() if "note" in table else np.full(len(table), True)
             for value, lo, hi in _intervals(name, table):
                 truth = whole[name][value].to_numpy(dtype=float)
+                if np.isnan(truth).all():
+                    continue
                 size = SAME * max(np.nanmedian(abs(truth)), np.finfo(float).tiny)
                 by_chance = unmarked & (hi > lo + size) & np.isfinite(truth[place])
                 found[name, value].unmarked[place] += by_chance
