@@ -93,7 +93,7 @@ LIBRARIES = {  # library: the files and rooms that may import it
     "click": {"cli"},
     "rich": {"cli/console.py"},
     "jinja2": {"report/html.py"},
-    "numba": {"kernels/cache.py", "kernels/compile.py", "kernels/lanes.py"},
+    "numba": {"kernels/cache.py", "kernels/compile.py", "kernels/lanes.py", "kernels/resolving.py"},
     "llvmlite": {"kernels/cache.py", "kernels/compile.py", "kernels/lanes.py"},
     "pydantic": {"config", "studies/*/config.py", "studies/*/*/config.py", "studies/*/schema.py"},
     "pydantic_core": {"config/check.py", "config/fields.py", "config/starter.py"},

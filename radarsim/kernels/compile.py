@@ -8,10 +8,11 @@ whole process, but only where no other user of Numba came first, and the order o
 Numba optimises every function together with all that it calls and makes machine code of it, so that what is called at
 the fifth level is translated five times. Functions without an entry from Python (`inline`, `part`) are therefore kept
 untranslated until the kernel that calls them is compiled: the nine-state filters take two thirds of the time, and run
-at the same speed.
+at the same speed. A kernel that another calls is compiled for it apart, without an entry and without machine code.
 """
 
 import ctypes
+import functools
 import math
 from collections.abc import Callable
 
@@ -25,6 +26,7 @@ from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
 
 from radarsim.kernels import cache
+from radarsim.kernels.resolving import resolving
 
 # No `reassoc` (part of fastmath=True): it folds rounding tricks such as (x + M) - M and changes the order of sums.
 FLAGS = frozenset({"contract", "arcp", "nsz", "nnan", "ninf"})
@@ -42,6 +44,13 @@ class Untranslated(JITCodeLibrary):
         self._finalized = True
 
 
+class Called(JITCodeLibrary):
+    """A kernel as other kernels link it: optimised as it is alone, so that its numbers are the same; not translated."""
+
+    def _finalize_final_module(self):
+        self._finalized = True
+
+
 class SelfContained(JITCodeLibrary):
     """A kernel's machine code, in which all that it calls is its own.
 
@@ -52,11 +61,6 @@ class SelfContained(JITCodeLibrary):
     """
 
     def _finalize_final_module(self):
-        shared = self._final_module.clone()  # what other kernels link, as Numba has it
-        for function in shared.functions:
-            if not function.is_declaration and function.linkage == Linkage.external:
-                function.linkage = "linkonce_odr"
-        self._shared_module = shared
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == Linkage.linkonce_odr:
                 function.linkage = "internal"
@@ -90,7 +94,7 @@ class WideLowering(NativeLowering):
             state.library = SelfContained(state.targetctx.codegen(), state.func_id.func_qualname)
             state.library.enable_object_caching()
             return super().run_pass(state)
-        state.library = Untranslated(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = state.pipeline.linked(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.inlined = state.flags.forceinline
         state.flags.no_compile = True
         mutated = super().run_pass(state)
@@ -104,7 +108,13 @@ class WideLowering(NativeLowering):
 
 
 class WideCompiler(CompilerBase):
-    """Numba's ordinary pipeline but for that pass."""
+    """Numba's ordinary pipeline but for that pass, with a memory for the types of operations."""
+
+    linked = Untranslated  # what becomes of a function without an entry
+
+    def __init__(self, typingctx, *rest):
+        super().__init__(typingctx, *rest)
+        self.state.typingctx = resolving(typingctx)
 
     def define_pipelines(self):
         manager = DefaultPassBuilder.define_nopython_pipeline(self.state, "wide")
@@ -113,9 +123,29 @@ class WideCompiler(CompilerBase):
         return [manager]
 
 
+class CalledCompiler(WideCompiler):
+    """The same for a kernel that another calls."""
+
+    linked = Called
+
+
 def compiler(**options) -> Callable:
     """A decorator that compiles with `options`, cached in our own directory; other users of Numba keep theirs."""
-    return lambda function: cache.kept(njit(**COMMON, **options)(function))
+
+    def decorated(function: Callable) -> Callable:
+        kernel = cache.kept(njit(**COMMON, **options)(function))
+        if hasattr(kernel, "targetctx"):  # not plain Python
+
+            @functools.cache
+            def called():
+                return njit(**COMMON | {"pipeline_class": CalledCompiler}, no_cpython_wrapper=True, **options)(function)
+
+            # What Numba asks of a function that a kernel calls.
+            kernel.get_call_template = lambda *types: called().get_call_template(*types)
+            kernel.get_overload = lambda types: called().get_overload(types)
+        return kernel
+
+    return decorated
 
 
 # Nobody takes a kernel's C address; its wrapper is a tenth of the time to compile.

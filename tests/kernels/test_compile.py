@@ -1,18 +1,22 @@
 """The compiler's settings: cache by the hash of all sources, wide registers, the same numbers in plain Python."""
 
+import operator
 import os
 import subprocess
 import sys
 import textwrap
+import types
 from pathlib import Path
 
 import numba
 import numpy as np
 import pytest
 from numba.core.registry import cpu_target
+from numba.core.typing import Context
 
 from radarsim.kernels import cache
 from radarsim.kernels import compile as compiling
+from radarsim.kernels.resolving import resolving
 
 SOURCES = Path(compiling.__file__).parent
 
@@ -35,7 +39,7 @@ def house(tmp_path):
     """A package with copies of compile.py and what it needs, a helper file, a kernel that uses it, and a cache."""
     kernels = tmp_path / "copied" / "kernels"
     kernels.mkdir(parents=True)
-    for name in ("compile.py", "cache.py", "sources.py", "trees.py"):
+    for name in ("compile.py", "resolving.py", "cache.py", "sources.py", "trees.py"):
         (kernels / name).write_text((SOURCES / name).read_text().replace("radarsim.kernels", "copied.kernels"))
     begin = "from copied.kernels"
     (kernels / "helper.py").write_text(f"{begin}.compile import inline\n@inline\ndef grown(x):\n    return x + 1.0\n")
@@ -197,3 +201,59 @@ def test_functions_without_an_entry_refuse_python():
         with pytest.raises(TypeError, match="not callable"):
             function(4.0)
     assert compiling.kernel(lambda x: grown(x))(4.0) == 3.0
+
+
+def test_a_kernel_that_another_calls_is_compiled_for_it_apart(monkeypatch):
+    """Without an entry and machine code of its own, until Python calls it; it gives both the same bytes."""
+    monkeypatch.setattr(cache, "kept", lambda function: function)
+
+    @compiling.kernel
+    def total(x):
+        out = 0.0
+        for i in range(x.size):
+            out += x[i] * 0.1
+        return out
+
+    @compiling.kernel
+    def twice(x):
+        return 2.0 * total(x)
+
+    x = np.random.default_rng(1).normal(size=37)
+    outer = twice(x)
+    assert not total.signatures
+    assert twice.signatures
+    assert outer == 2.0 * total(x)
+    assert total.signatures
+
+
+def test_the_type_of_an_operation_is_found_once(monkeypatch):
+    """However often it stands in kernels; what Numba compiles on the way is asked for each time, as it was."""
+    asked = []
+    monkeypatch.setattr(cache, "kept", lambda function: function)
+    monkeypatch.setattr(resolving(cpu_target.typing_context), "_known", {})
+    numba_finds = Context.resolve_function_type
+
+    def counted(self, func, args, kws):
+        asked.append(getattr(func, "typing_key", func))
+        return numba_finds(self, func, args, kws)
+
+    monkeypatch.setattr(Context, "resolve_function_type", counted)
+
+    def powers(x, flags):
+        y = x % 3.5
+        y = y % 3.5 % 3.5 % 3.5 % 3.5
+        return y if np.any(flags) or np.any(flags) else x
+
+    for _ in range(2):  # a second kernel finds what the first has found
+        assert compiling.kernel(types.FunctionType(powers.__code__, globals()))(5.0, np.ones(2, bool)) == 1.5
+    assert asked.count(operator.mod) == 1
+    assert asked.count(np.any) > 2
+
+
+def test_numba_takes_a_context_with_a_memory_for_its_own():
+    """Else its caches would hold everything twice; and what is added to the one is in the other."""
+    context = cpu_target.typing_context
+    found = resolving(context)
+    assert found is resolving(context)
+    assert (found == context, context == found, hash(found)) == (True, True, hash(context))
+    assert found.__dict__ is context.__dict__
