@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 RADARSIM := $(BIN)/radarsim
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e
 # Smoke runs keep out of results/, which holds what was made at full size.
 SMOKE := $(VENV)/smoke
 # Drawing takes twice as long as all the rest: `make smoke SMOKE_FLAGS=` draws too.
@@ -101,7 +102,7 @@ docs-house: $(VENV)/installed
 # All that the other targets install, in one step: the search for versions takes as long as each of theirs.
 environment:
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,docs]'
+	$(INSTALL) '.[test,docs]'
 	touch $(VENV)/installed $(VENV)/tested $(VENV)/documented
 
 clean:
@@ -109,13 +110,13 @@ clean:
 
 $(VENV)/installed: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	$(INSTALL) .
 	touch $@
 
 $(VENV)/tested: $(VENV)/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	$(INSTALL) '.[test]'
 	touch $@
 
 $(VENV)/documented: $(VENV)/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	$(INSTALL) '.[docs]'
 	touch $@

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 UNKNOWN = Estimate(np.nan, np.nan, np.nan)
+UNPAIRED = 4  # times the realisations where a change moves the scans, so that the noise compared is of other scans
 
 
 class Kind(NamedTuple):

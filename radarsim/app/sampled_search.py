@@ -11,6 +11,7 @@ from functools import partial
 from itertools import pairwise
 
 from radarsim.app import search
+from radarsim.app.quantities import UNPAIRED
 from radarsim.app.question import (
     JUMPS,
     WHOLE,
@@ -33,7 +34,6 @@ PILOT_SHARE, PILOT_LEAST = 16, 200  # realisations of the scan: a share of all, 
 PILOT_POINTS = 13
 WITH_ALL = 13  # values with all realisations: a bracket, the value, both ends of its interval
 MOST_STEPS = 3  # of the scan, by which the pilot's noise may have moved a crossing
-UNPAIRED = 4  # times the realisations where values have noise of other scans, as `sensitivity` has them
 RESIDUE = 0.02  # of its interval: how near a sampled quantity is brought to the target, so that the noise decides
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from radarsim.app import arguments, quantities
-from radarsim.app.quantities import Quantity
+from radarsim.app.quantities import UNPAIRED, Quantity
 from radarsim.app.question import Cases, Config
 from radarsim.app.work import CaseWork
 from radarsim.config import numeric
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MORE = 0.1
-UNPAIRED = 4  # times the realisations behind a change of the scan times, whose noise falls on other times
 BATCHES = 20  # of one case: their spread has 19 degrees of freedom
 MOST_BARS = 16
 NOTHING = 1e-9  # per cent: what rounding may make of no change
