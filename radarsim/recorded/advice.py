@@ -17,7 +17,8 @@ from radarsim.studies.interface import BIAS, OUTLIERS, Likelihood
 
 LEVEL = 0.05  # of finding something where nothing is wrong
 MOST_FOUND = 3
-CLOSE = 0.01  # to which values are looked for, in the logarithm of a key and of the likelihood
+ROUGH = 0.01  # to which explanations are compared, in the logarithm of a key and of the likelihood
+CLOSE = 1e-6  # to which the values of the one that is named are found: far finer than what is printed
 LOWEST, HIGHEST = np.log(1e-4), np.log(1e4)  # of a key's factor
 MOST_BIAS = 50.0  # in σ of the velocity
 SHARES = (1e-3, 0.4)  # of outliers
@@ -105,6 +106,7 @@ def findings(likelihood: Likelihood, progress: Progress = silent) -> list[Findin
         values, top = trials[what]
         if top - reached < needed:
             break
+        values, top = _climbed(of, [*chosen, what], values, ROUGH, CLOSE)
         found.append(Finding(what, values[what], top - reached))
         chosen, start, reached = [*chosen, what], values, top
     final = start
@@ -129,25 +131,37 @@ def _value(likelihood: _Counted, changed: dict[str, float]) -> float:
 
 
 def _best(likelihood: _Counted, whats: list[str], start: dict[str, float]) -> tuple[dict[str, float], float]:
-    """Where the likelihood is largest along some explanations, and its logarithm there."""
+    """The top along some explanations, and the logarithm of the likelihood there, from three starts of the last."""
+    scale = _scale(whats[-1], _units(likelihood))
+    starts = ({**start, whats[-1]: scale[0](first)} for first in (-2.0, 0.0, 2.0))
+    return max((_climbed(likelihood, whats, one, 0.5, ROUGH) for one in starts), key=lambda found: found[1])
+
+
+def _climbed(
+    likelihood: _Counted, whats: list[str], start: dict[str, float], step: float, close: float
+) -> tuple[dict[str, float], float]:
+    """The top reached from a start, and the logarithm of the likelihood there; with first steps of `step`, until the
+    search stands still within `close`."""
     from scipy.optimize import minimize
 
-    unit = dict(zip(likelihood.keys, units(likelihood.of).tolist(), strict=True))
+    unit = _units(likelihood)
     scales = [_scale(what, unit) for what in whats]
 
-    def cost(at: np.ndarray) -> float:
-        return -_value(likelihood, {what: of(x) for what, (of, _), x in zip(whats, scales, at, strict=True)})
+    def natural(at: np.ndarray) -> dict[str, float]:
+        return {what: of(x) for what, (of, _), x in zip(whats, scales, at, strict=True)}
 
-    best: tuple[dict[str, float], float] = ({}, -np.inf)
-    new = whats[-1]
-    for first in (-2.0, 0.0, 2.0):
-        at = np.array([scales[i][1](start[what]) if what != new else first for i, what in enumerate(whats)])
-        simplex = np.concatenate([at[None], at + 0.5 * np.eye(len(at))])
-        options: Any = {"initial_simplex": simplex, "xatol": CLOSE, "fatol": CLOSE, "maxfev": 400}
-        found = minimize(cost, at, method="Nelder-Mead", options=options)
-        if -found.fun > best[1]:
-            best = {what: of(x) for what, (of, _), x in zip(whats, scales, found.x, strict=True)}, -float(found.fun)
-    return best
+    def cost(at: np.ndarray) -> float:
+        return -_value(likelihood, natural(at))
+
+    at = np.array([back(start[what]) for what, (_, back) in zip(whats, scales, strict=True)])
+    simplex = np.concatenate([at[None], at + step * np.eye(len(at))])
+    options: Any = {"initial_simplex": simplex, "xatol": close, "fatol": close, "maxfev": 400}
+    found = minimize(cost, at, method="Nelder-Mead", options=options)
+    return natural(found.x), -float(found.fun)
+
+
+def _units(likelihood: _Counted) -> dict[str, float]:
+    return dict(zip(likelihood.keys, units(likelihood.of).tolist(), strict=True))
 
 
 def _scale(what: str, unit: dict[str, float]) -> tuple[Callable[[float], float], Callable[[float], float]]:

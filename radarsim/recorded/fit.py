@@ -21,9 +21,12 @@ from radarsim.studies.interface import OUTLIERS, Likelihood
 
 HALF_CHI2_95 = 1.9207294103470  # half the 95 % point of chi-square with one degree of freedom
 LEAST_ROWS = 10  # of a track; shorter ones say next to nothing
+FIRST_STEP, ROUGH = 0.3, 1e-4  # of a search, and where it stands still before it is carried on, in the same logarithms
 REACH = 1e4  # how many times larger or smaller than the estimate an end of an interval is looked for
 EVALUATIONS = 2000
-CLOSE = 1e-3  # to which an end of an interval is found, of the logarithm of a key and of the likelihood
+# To which a top and an end of an interval are found, in the logarithm of a key; the likelihood's own to a tenth. That
+# is far finer than what is printed: which way a search goes hangs on last digits, and these differ between processors.
+CLOSE = 1e-6
 IMPOSSIBLE = -1e300  # what counts as the logarithm of no likelihood: a search needs a number
 FAR_FROM_ZERO = 1e4  # times what counts as zero of a key
 
@@ -138,15 +141,17 @@ class _Search:
         start = np.log(units(likelihood))
         if robust:
             start = np.append(start, _logit(0.05))
-        self.best, self.top = self._climbed(start, None)
+        self.best, self.top = self._climbed(start, None, FIRST_STEP, ROUGH)
         # A second start far away: the likelihood of manoeuvre and plot errors may have two hills.
         for factor in (0.1, 10.0):
             moved = self.best + math.log(factor) * np.append(
                 np.ones(len(likelihood.stated)), np.zeros(int(self.robust))
             )
-            other, top = self._climbed(moved, None)
+            other, top = self._climbed(moved, None, FIRST_STEP, ROUGH)
             if top > self.top + 1e-6:
                 self.best, self.top = other, top
+        self.best, self.top = self._climbed(self.best, None, ROUGH, CLOSE)
+        self.raised = {i: self._raised(i) for i in range(len(likelihood.stated)) if self._maybe_zero(i)}
 
     def natural(self, searched: np.ndarray) -> np.ndarray:
         """The keys, and the share of outliers at the end where they are allowed for."""
@@ -163,9 +168,9 @@ class _Search:
         found = self.likelihood(values[:count], float(values[count]) if self.robust else 0.0)
         return found if math.isfinite(found) else IMPOSSIBLE
 
-    def _climbed(self, start: np.ndarray, held: int | None) -> tuple[np.ndarray, float]:
-        """The top reached from a start, one coordinate held or none, and the logarithm of the likelihood there."""
-        near, top = (1e-4, 1e-5) if held is None else (3 * CLOSE, CLOSE)
+    def _climbed(self, start: np.ndarray, held: int | None, step: float, close: float) -> tuple[np.ndarray, float]:
+        """The top reached from a start, one coordinate held or none, and the logarithm of the likelihood there; with
+        first steps of `step`, until the search stands still within `close`."""
         from scipy.optimize import minimize
 
         free = np.array([i for i in range(len(start)) if i != held])
@@ -177,8 +182,8 @@ class _Search:
 
         if not free.size:
             return start, self._value(start)
-        simplex = np.concatenate([start[free][None], start[free] + 0.3 * np.eye(free.size)])
-        options: Any = {"initial_simplex": simplex, "xatol": near, "fatol": top, "maxfev": EVALUATIONS}
+        simplex = np.concatenate([start[free][None], start[free] + step * np.eye(free.size)])
+        options: Any = {"initial_simplex": simplex, "xatol": close, "fatol": close / 10, "maxfev": EVALUATIONS}
         found = minimize(cost, start[free], method="Nelder-Mead", options=options)
         whole[free] = found.x
         return whole, -float(found.fun)
@@ -187,8 +192,30 @@ class _Search:
         """The largest likelihood with key i held at the logarithm `at`, and where that is."""
         start = near.copy()
         start[i] = at
-        found, top = self._climbed(start, i)
-        return top, found
+        found = [self._climbed(start, i, FIRST_STEP, CLOSE)]
+        if others := {j: log for j, log in self.raised.items() if j != i}:
+            start[list(others)] = list(others.values())
+            found.append(self._climbed(start, i, FIRST_STEP, CLOSE))
+        where, top = max(found, key=lambda one: one[1])
+        return top, where
+
+    def _maybe_zero(self, i: int) -> bool:
+        """Whether the plots hardly tell a key from zero: near zero its logarithm is a plain without slope, on which a
+        search stands still wherever it comes to lie, though the key has to rise where another one is held too low."""
+        return self._sliced(i, math.log(self.likelihood.least[i])) > self.top - HALF_CHI2_95
+
+    def _raised(self, i: int) -> float:
+        """The logarithm of such a key from which a search sees the slope: where the likelihood falls above the top."""
+        log = max(float(self.best[i]), math.log(self.likelihood.least[i]))
+        while self._sliced(i, log) > self.top - HALF_CHI2_95 and log < math.log(units(self.likelihood)[i] * REACH):
+            log += 1.0
+        return log
+
+    def _sliced(self, i: int, log: float) -> float:
+        """The likelihood with one key changed and all others at the top."""
+        at = self.best.copy()
+        at[i] = log
+        return self._value(at)
 
     def interval(self, i: int) -> Fitted:
         """The 95 % profile interval of key i."""

@@ -148,4 +148,4 @@ def _explained(one: Finding) -> str:
     if one.what == advice.BIAS:
         size = significant_digits(one.value, "#.3g")
         return tr("the measured velocities are off by {size} of their σ, all alike", size=size)
-    return f"--set {one.what}={one.value:.4g}"
+    return f"--set {one.what}={one.value:.3g}"

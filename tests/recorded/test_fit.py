@@ -67,6 +67,92 @@ def test_the_ends_of_an_interval_are_where_the_profile_falls_by_1_92():
         assert one(best) + others.fun == pytest.approx(1.9207, abs=0.01)
 
 
+class LastDigits:
+    """A likelihood whose last digits are another processor's."""
+
+    def __init__(self, of):
+        self.of, self.rng = of, np.random.default_rng(5)
+
+    def __getattr__(self, name):
+        return getattr(self.of, name)
+
+    def __call__(self, *arguments):
+        return self.of(*arguments) * (1 + 1e-13 * self.rng.normal())
+
+
+def flown(*overrides):
+    """Plots of the config's own target, without manoeuvre: the manoeuvre variance may as well be zero."""
+    columns = follow.simulated(loaded(*overrides))
+    return {name: columns[name] for name in ("t_s", "range_m", "velocity_mps")}
+
+
+@pytest.mark.parametrize(
+    ("track", "robust"),
+    [
+        (recording(np.random.default_rng(1)), True),
+        (recording(np.random.default_rng(1)), False),
+        (flown("radar.sigma_range_m=500"), False),
+    ],
+)
+def test_last_digits_do_not_show_in_the_fit(track, robust):
+    """Of the likelihood a part in 10¹³; of what is found less than the four digits that are printed can show, a part in
+    10⁵. The top is known to √(10⁻¹³ · 10³ / 60) = 10⁻⁶: 10³ is the logarithm of the likelihood, 60 its curvature."""
+    one = likelihood(track)
+    mine, theirs = (fit.fitted(of, robust) for of in (one, LastDigits(one)))
+    for here, there in zip(mine.keys, theirs.keys, strict=True):
+        assert (there.lo, there.hi) == pytest.approx((here.lo, here.hi), rel=1e-5)
+        if here.identifiable:
+            assert there.value == pytest.approx(here.value, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"changed": {"radar.sigma_range_m": 2, "radar.sigma_velocity_mps": 0.4}},
+        {"bias_mps": 30.0, "share": 0.1},
+        {"changed": {"manoeuvre_variance": 300}},
+    ],
+)
+def test_what_is_advised_is_the_top(options):
+    """Found to a part in 2000, by a parabola through the neighbours: three digits are printed, on every processor."""
+    one = likelihood(recording(np.random.default_rng(3), **options))
+    values = {found.what: found.value for found in advice.findings(one)}
+    assert values
+
+    def at(what, factor):
+        changed = values | {what: values[what] * factor}
+        keys = np.array([changed.get(key, stated) for key, stated in zip(one.keys, one.stated, strict=True)])
+        return one(keys, changed.get(advice.OUTLIERS, 0.0), changed.get(advice.BIAS, 0.0))
+
+    for what in values:
+        below, here, above = (at(what, 1 + step) for step in (-0.01, 0.0, 0.01))
+        assert below + above < 2 * here
+        assert abs(0.5 * 0.01 * (above - below) / (2 * here - below - above)) < 5e-4
+
+
+def test_an_end_is_found_where_another_key_has_to_rise_from_zero():
+    """σ of range held too low makes the plots look like manoeuvres. Outside the interval no manoeuvre variance makes
+    the plots likely enough, inside some does: the profile by a grid of it, σ of velocity at its best."""
+    from scipy.optimize import minimize_scalar
+
+    one = likelihood(flown("radar.sigma_range_m=500"))
+    found = fit.fitted(one)
+    best = np.array([key.value for key in found.keys])
+
+    def profile(sigma_range):
+        def with_variance(variance):
+            def cost(log):
+                return -one(np.array([sigma_range, np.exp(log), variance]))
+
+            return -minimize_scalar(cost, bounds=(np.log(5), np.log(45)), method="bounded").fun
+
+        return max(with_variance(variance) for variance in (0.0, *np.geomspace(1e-9, 1e-3, 61)))
+
+    lo = found.keys[0].lo
+    limit = one(best) - fit.HALF_CHI2_95
+    assert profile(0.997 * lo) < limit < profile(1.003 * lo)
+
+
 def test_a_straight_flight_has_no_manoeuvre_variance(tmp_path):
     """The plots of the config's own target: an upper end, and no lower one."""
     columns = follow.simulated(loaded())
