@@ -94,8 +94,11 @@ def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answ
     study, base = registry.study(asked.cases.base.study), quantities.shortened(asked.quantity, asked.cases.base)
     curve.rough = study.costly(base) and not asked.over.whole
     elsewhere = grid[len(grid) // 3]  # not the config's own, which a study may still know
-    each, roughly = timed(partial(curve.exactly, elsewhere)), timed(partial(curve.roughly, elsewhere))
     near = study.exact_but_for(base)
+    roughly = timed(partial(curve.roughly, elsewhere))
+    # One exact value beside the search's own where it may take seconds: where each pattern of plots is followed it
+    # takes a twentieth of one.
+    each = timed(partial(curve.exactly, elsewhere)) if near or not curve.rough else 0.0
     what = tr("computes the {quantity} at about {count} values of {key}", **said_of(asked), count=curve.expected)
     seconds = TO_CLOSE * each + len(grid) * (AROUND * roughly if curve.rough else each)
     predict(told, what + (tr(", each {near}", near=tr(near)) if near else ""), seconds)
@@ -143,7 +146,7 @@ def roots(asked: Question, curve: Curve) -> search.Found:
     exactly = [x for x in near if x is not None]
     if len(exactly) < len(near) or (not near and abs(found.at_nearest) < DOUBT * size):
         return search.roots(missing, asked.over)
-    return search.Found(tuple(exactly), found.nearest, missing(found.nearest))
+    return search.Found(tuple(exactly), found.nearest, found.at_nearest if exactly else missing(found.nearest))
 
 
 def exact_near(

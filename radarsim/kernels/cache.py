@@ -28,6 +28,7 @@ import llvmlite
 import numba
 from numba.core.caching import Cache
 from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from radarsim.kernels import sources
@@ -86,7 +87,8 @@ class KernelCache(Cache):
 
     def load_overload(self, sig, target_context):
         """The compiled function of a signature; None where there is no such entry, or one that is damaged."""
-        target_context.refresh()  # Numba loads what it needs to translate types
+        # What an entry needs of Numba. What it takes to compile (`refresh`: SciPy among it, 0.3 s) its compiler loads.
+        rtsys.initialize(target_context)
         key = self._key(sig, target_context.codegen())
         path = self._entry(key)
         try:
