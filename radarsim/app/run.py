@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.app import arguments, simulation, stored_claims
-from radarsim.app.configs import load
+from radarsim.app.configs import load, shipped
 from radarsim.app.records import made_by_other_code
 from radarsim.app.repeat import RESULTS, command, repeated
 from radarsim.app.result import Result
@@ -369,23 +369,26 @@ def _keys(ids: Iterable[str]) -> list[str]:
 def claims(configs: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, Any]]:
     """Rows of the claims, as stored under `out` or as not run; of some configs only if any are given.
 
+    Of a config that judges none: those of its study's paper, with the reason why each of them is not judged by it.
     Each row has the columns of claims.csv and `config`. Raises ConfigError for a config that does not exist.
     """
     from radarsim.report.claims.joined import with_readings
-    from radarsim.report.claims.judge import listed
+    from radarsim.report.claims.judge import listed, unstored
 
     every = papers()
     if faults := _no_configs(configs, every):
         raise ConfigError(*faults)
     readings = stored_readings(Path(out))
-    stems = [one.stem for one in load_all(configs)] or sorted({claim.config for of in every for claim in of.claims})
+    asked = load_all(configs)
+    stems = [one.stem for one in asked] or sorted({claim.config for of in every for claim in of.claims})
     held = {stem: rows for stem in stems if (rows := stored_claims.stored(Path(out) / stem / "claims.csv")) is not None}
     if not configs:
         return with_readings(listed(every, held), readings)
     rows = []
-    for stem in stems:
-        if stem in held:
-            rows += [row | {"config": stem} for row in held[stem]]
-        else:
-            rows += [row for row in listed(every, {}) if row["config"] == stem]
+    for one in asked:
+        stem = one.stem
+        own = held.get(stem) or [row for row in listed(every, {}) if row["config"] == stem]
+        if not own and one.cases and (of := registry.study(one.cases[0].study).claims()) is not None:
+            own = unstored(of, one.cases, shipped, stem)
+        rows += [row | {"config": stem} for row in own]
     return with_readings(rows, readings)

@@ -118,14 +118,19 @@ def sensitivity(
     )
 
 
+TARGET = "target"  # the key whose own keys are called like others: a duration, a range
+
+
 def named(spec: Study, path: str) -> Label:
-    """What people call a key: of a filter with its name, of a list's item with its number."""
+    """What people call a key: of a filter with its name, of the target as its own, of a list's item with its number."""
     found = label(spec, path)
     text, steps = tr(found.text), path.split(".")
     if steps[-1].isdecimal():
         text = f"{text} {int(steps[-1]) + 1}"
     if steps[0] == spec.bare_keys:
         text = f"{spec.members[int(steps[1])].name}: {text}"
+    elif steps[0] == TARGET:
+        text = f"{tr(label(spec, TARGET).text)}: {text}"
     return found._replace(text=text)
 
 

@@ -483,8 +483,42 @@ DROPPED = term("dropped {files} of {cases}, {size:.1f} MB in {folder}")
 def print_claims(rows: Sequence[dict[str, Any]]) -> None:
     """Each claim with its class, and below it what was measured, or the command that would judge it.
 
-    On a terminal a table; where it is piped, lines that can be searched.
+    On a terminal a table; where it is piped, lines that can be searched. Of experiments that are not the paper's a line
+    for each reason, with the claims that cannot be judged for it.
     """
+    from radarsim.report.claims import page, reasons
+
+    foreign = [row for row in rows if row["class"] == NOT_JUDGED and not row["what"]]
+    rows = [row for row in rows if row not in foreign]
+    if rows:
+        _print_stated(rows)
+    for stem, why in dict.fromkeys((row["config"], row["why"]) for row in foreign):
+        names = [row["claim"] for row in foreign if (row["config"], row["why"]) == (stem, why)]
+        told = {"stem": stem, "names": _in_a_row(names), "reason": reasons.said(why)}
+        say(tr("{stem}: not judged: {names}: {reason}", **told))
+    say(page.counted(rows) or tr("no claims are judged by this"))
+    if rows and all(row["class"] == "not run" for row in rows):
+        say(tr(NOTHING_RUN))
+
+
+NOTHING_RUN = term(
+    "nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has the results at full size"
+)
+NOT_JUDGED = "not judged here"
+
+
+def _in_a_row(claims: Sequence[str]) -> str:
+    """Names of claims, those with numbers in a row by the first and last: `P1.1–P1.34`."""
+    runs: list[list[str]] = []
+    for name in claims:
+        paper, _, number = name.rpartition(".")
+        follows = runs and number.isdecimal() and runs[-1][-1] == f"{paper}.{int(number) - 1}"
+        runs[-1].append(name) if follows else runs.append([name])
+    return ", ".join(f"{run[0]}–{run[-1]}" if len(run) > 2 else ", ".join(run) for run in runs)
+
+
+def _print_stated(rows: Sequence[dict[str, Any]]) -> None:
+    """Claims with what was measured."""
     from radarsim.report.claims import page
 
     if sys.stdout.isatty():
@@ -500,14 +534,6 @@ def print_claims(rows: Sequence[dict[str, Any]]) -> None:
     else:
         for own in page.grouped(rows):
             _print_claim(own)
-    say(page.counted(rows) or tr("no claims are judged by this"))
-    if rows and all(row["class"] == "not run" for row in rows):
-        say(tr(NOTHING_RUN))
-
-
-NOTHING_RUN = term(
-    "nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has the results at full size"
-)
 
 
 def _measured(row: Mapping[str, Any]) -> str:

@@ -32,10 +32,25 @@ OPTIONS = {
 }
 
 
+class Named(click.ParamType):
+    """A name after an option; not the next option, which click would take for it and then stumble over what is left."""
+
+    def __init__(self, metavar: str):
+        self.name = metavar
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        text = str(value)
+        if text.startswith("--"):
+            filters = "" if self.name == "COMPONENT" else ", of the filter itself, without --filter"
+            self.fail(f"must be followed by a {self.name}{filters}, got {text}", param, ctx)
+        return text
+
+
 def quantity_options(command: Any) -> Any:
     """The options that name a quantity."""
     for kind, (metavar, text) in reversed(OPTIONS.items()):
-        command = click.option(f"--{kind.replace('_', '-')}", kind, metavar=metavar, help=text)(command)
+        name = f"--{kind.replace('_', '-')}"
+        command = click.option(name, kind, type=Named(metavar), metavar=metavar, help=text)(command)
     return command
 
 

@@ -290,7 +290,7 @@ def claims(configs: tuple[str, ...], out: str, as_json: bool, markdown: bool, fi
     reading that the paper allows, where `radarsim readings` has judged these.
 
     Without CONFIG all claims of all papers; those without stored results are listed as not run, with the command that
-    would judge them.
+    would judge them. Of a CONFIG that is not a paper's experiment, the claims that it cannot judge, and why.
 
     \b
     Examples

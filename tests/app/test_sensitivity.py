@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from radarsim.app import sensitivity as finding
+from radarsim.app.configs import load
 from radarsim.app.sensitivity import sensitivity
 from radarsim.cli import main
 from radarsim.errors import ConfigError
@@ -178,3 +179,13 @@ def test_a_changed_period_is_not_paired_and_has_more_realisations(monkeypatch):
     assert abs(one - exactly) < 2 * half
     assert half < 2 * 100 * 1.96 / np.sqrt(2 * 2000)
     assert known.not_paired == ()
+
+
+def test_what_is_the_targets_own_says_so():
+    """A duration and a range are other keys' too."""
+    turn = "kind: turn, range_m: 1e5, speed_mps: 280, aspect_rad: 3, start_s: 50, acceleration_g: 3, duration_s: 9"
+    keys = load("rls2", [f"target={{{turn}}}"])
+    spec = keys.cases[0].spec
+    assert finding.named(spec, "target.duration_s") == ("target: duration", "", "s")
+    assert finding.named(spec, "target.start_s").text == "target: start time"
+    assert finding.named(spec, "radar.sigma_range_m").text == "σ of the measured range"

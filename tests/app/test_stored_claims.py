@@ -5,9 +5,11 @@ import json
 import os
 
 import pytest
+from click.testing import CliRunner
 
 from radarsim.app import run as experiment
 from radarsim.app import stored_claims
+from radarsim.cli import main
 from radarsim.errors import StoreError
 
 
@@ -67,3 +69,53 @@ def test_a_file_that_cannot_be_read_is_told_in_words(out, name):
     with pytest.raises(StoreError) as caught:
         experiment.claims(["rls2"], out)
     assert caught.value.lines == (f"{file}: cannot be read: Too many levels of symbolic links",)
+
+
+FOREIGN = """
+study: range_doppler
+radar: {name: RLS 2, band: decimetre, wavelength_m: 0.15, sigma_range_m: 250, sigma_velocity_mps: 15, scan_period_s: 10}
+target: {kind: fly_by, distance_m: 15e3, speed_mps: 280, start_range_m: 40e3}
+filters:
+  - {name: r, observes: [range], manoeuvre_variance: 1e-3}
+  - {name: r+Vr, observes: [range, velocity], manoeuvre_variance: 1e-3}
+scans: 15
+realisations: 1e3
+"""
+
+
+def test_an_experiment_that_is_not_the_papers_names_the_claims_that_it_cannot_judge(tmp_path):
+    config = tmp_path / "foreign.yaml"
+    config.write_text(FOREIGN)
+    (of,) = [one for one in experiment.papers() if one.claims[0].id == "P1.1"]
+    for key, said in (("radar.detection_probability", "0.9"), ("radar.bias_range_m", "30")):
+        config.write_text(FOREIGN.replace("name: RLS 2", f"name: RLS 2, {key.partition('.')[2]}: {said}"))
+        rows = experiment.claims([str(config)], tmp_path)
+        assert [row["claim"] for row in rows] == [claim.id for claim in of.claims]
+        assert {(row["class"], row["verdict"], row["config"]) for row in rows} == {
+            ("not judged here",) * 2 + ("foreign",)
+        }
+        reasons = {row["why"] for row in rows}
+        assert all(f"{key} is {said}, the paper's none" in why for why in reasons)
+        assert all(
+            "target.kind is fly_by, the paper's polynomial" in why and "distance_m" not in why for why in reasons
+        )
+
+
+def test_an_experiment_of_the_papers_that_is_not_run_says_so_and_what_it_does_not_hold(tmp_path):
+    rows = experiment.claims(["rls2"], tmp_path)
+    assert {row["class"] for row in rows} == {"not run"}
+    experiment.run("rls2", realisations=2000, out=tmp_path, figures=False)
+    assert {row["claim"] for row in rows} == {row["claim"] for row in experiment.claims(["rls2"], tmp_path)}
+
+
+def test_claims_that_cannot_be_judged_stand_in_one_line_a_reason(tmp_path):
+    config = tmp_path / "foreign.yaml"
+    config.write_text(FOREIGN)
+    done = CliRunner().invoke(main, ["claims", str(config), "--out", str(tmp_path)])
+    assert done.exit_code == 0
+    first, last = done.output.splitlines()
+    (of,) = [one for one in experiment.papers() if one.claims[0].id == "P1.1"]
+    assert first.startswith(
+        f"foreign: not judged: P1.1–{of.claims[-1].id}: not the paper's experiment: foreign: target.kind"
+    )
+    assert last == "no claims are judged by this"

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from numba import njit
+from numba.core.registry import cpu_target
 
 from radarsim.app import selftest
 from radarsim.kernels import cache, sources
@@ -50,6 +51,13 @@ def test_a_kernel_is_read_from_where_it_was_kept(tmp_path, troubles):
     assert [used(tmp_path / "kernels") for _ in range(3)] == [False, True, True]
     assert [path.suffix for path in (tmp_path / "kernels").iterdir()] == [".kernel"]
     assert not troubles
+
+
+def test_what_it_takes_to_compile_is_not_loaded_for_a_kept_kernel(tmp_path, monkeypatch):
+    """Numba's refresh: SciPy's linear algebra and a hundred files more."""
+    used(tmp_path)
+    monkeypatch.setattr(type(cpu_target.target_context), "refresh", lambda context: pytest.fail("it compiles"))
+    assert used(tmp_path)
 
 
 def test_flushing_removes_the_entries_of_the_kernel(tmp_path):

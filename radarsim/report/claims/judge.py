@@ -17,7 +17,11 @@ from radarsim.report.statistics import FEW, Estimate
 if TYPE_CHECKING:
     import pandas as pd
 
+    from radarsim.config.experiment import Case
+
 UNCLEAR, NOT_RUN, NOT_JUDGED = "not distinguishable", "not run", "not judged here"
+MOST_SAID, MOST_OF_ONE = 3, 8  # keys and cases that a reason names; keys where it names one case
+NOT_THE_PAPERS = "not the paper's experiment: {changed}"
 
 
 def verdict(of: Estimate, strict: tuple[float, float]) -> str:
@@ -88,13 +92,13 @@ class _Papers:
         """The evidence that claims of a config may see, None where no case is the paper's; what differs in others."""
         if config not in self._seen:
             of = self._of
-            specs = [described(spec, of.may_grow, of.may_shorten) for spec in self._shipped(config) or ()]
-            self._seen[config] = self._evidence(specs), self._differences(specs)
+            specs = _papers(of, config, self._shipped)
+            self._seen[config] = self._evidence(specs), _differences(of, self._results, specs)
         return self._seen[config]
 
     def _evidence(self, shipped: Sequence[Described]) -> Evidence | None:
         grow = self._of.may_grow
-        every = {result.name: own_members(self._described(result), shipped, grow) for result in self._results}
+        every = {result.name: own_members(_described(self._of, result), shipped, grow) for result in self._results}
         places = {name: own for name, own in every.items() if own is not None}
         if not places:
             return None
@@ -103,20 +107,26 @@ class _Papers:
             made = {name: _of_cases(table, set(places)) for name, table in made.items()}
         return self._of.evidence([result for result in self._results if result.name in places], made, places)
 
-    def _described(self, result: CaseResult) -> Described:
-        return described(result.spec, self._of.may_grow, self._of.may_shorten)
 
-    def _differences(self, shipped: Sequence[Described]) -> str:
-        """In which keys cases that are not the paper's differ from the nearest of these."""
-        said = []
-        for result in self._results:
-            found = differences(self._described(result), shipped, self._of.may_grow)
-            if found:
-                said.append(f"{result.name}: {', '.join(found[:MOST_SAID])}" + (" …" if len(found) > MOST_SAID else ""))
-        return "; ".join(said[:MOST_SAID]) + (f"; and {len(said) - MOST_SAID} more" if len(said) > MOST_SAID else "")
+def _papers(of: PaperClaims, config: str, shipped: Shipped) -> list[Described]:
+    """The paper's cases, by the shipped config that claims name."""
+    return [described(spec, of.may_grow, of.may_shorten) for spec in shipped(config) or ()]
 
 
-MOST_SAID = 3  # keys and cases that a reason names
+def _described(of: PaperClaims, one: "CaseResult | Case") -> Described:
+    return described(one.spec, of.may_grow, of.may_shorten)
+
+
+def _differences(
+    of: PaperClaims, held: "Sequence[CaseResult | Case]", papers: Sequence[Described], most: int = MOST_SAID
+) -> str:
+    """In which keys cases that are not the paper's differ from the nearest of these: at most so many a case."""
+    said = []
+    for one in held:
+        found = differences(_described(of, one), papers, of.may_grow)
+        if found:
+            said.append(f"{one.name}: {', '.join(found[:most])}" + (" …" if len(found) > most else ""))
+    return "; ".join(said[:MOST_SAID]) + (f"; and {len(said) - MOST_SAID} more" if len(said) > MOST_SAID else "")
 
 
 def _of_cases(table: "pd.DataFrame", names: set[str]) -> "pd.DataFrame":
@@ -154,7 +164,7 @@ def _rows(claim: Claim, paper: str, papers: _Papers, own: bool) -> list[dict[str
 def _tried(part: Part, seen: Evidence | None, changed: str) -> _Tried:
     """Measure a part; say why where it cannot be."""
     if seen is None:
-        return _Tried(part, why=f"not the paper's experiment: {changed}")
+        return _Tried(part, why=NOT_THE_PAPERS.format(changed=changed))
     seen.looked.clear()
     try:
         measured = part.measure(seen)
@@ -162,7 +172,7 @@ def _tried(part: Part, seen: Evidence | None, changed: str) -> _Tried:
         scale = part.scale(seen) if part.scale else 1.0
         ceiling = part.ceiling(seen) if part.ceiling else math.nan
     except Missing as missing:
-        other = f"not the paper's experiment: {changed}" if changed else "a case that it needs is not there"
+        other = NOT_THE_PAPERS.format(changed=changed) if changed else "a case that it needs is not there"
         reason = missing.why or other
         return _Tried(part, why=reason)
     value, lo, hi = (float(one) for one in measured)
@@ -296,6 +306,27 @@ def listed(papers: Sequence[PaperClaims], stored: Mapping[str, Sequence[Mapping]
             own = [blank(claim, paper) | {"verdict": NOT_RUN, "overall": NOT_RUN, "class": NOT_RUN}]
             own[0] |= dict.fromkeys(NUMBERS, "")
         rows += [row | {"config": claim.config} for row in own]
+    return rows
+
+
+def unstored(of: PaperClaims, cases: "Sequence[Case]", shipped: Shipped, stem: str) -> list[dict]:
+    """A row for each claim of which an experiment without stored verdicts is known to judge it, or known not to.
+
+    With the columns of claims.csv. cases are all of the experiment's. Where none is the paper's the claim is not
+    judged, and the row says why; where the shipped config `stem` holds it, it is not run. What a run might judge has no
+    row.
+    """
+    rows: list[dict] = []
+    for claim in of.claims:
+        papers, state, why = _papers(of, claim.config, shipped), NOT_RUN, claim.unstated
+        if all(own_members(_described(of, case), papers, of.may_grow) is None for case in cases):
+            changed = _differences(of, cases[:1], papers, MOST_OF_ONE)
+            more = f"; and {len(cases) - 1} more" if len(cases) > 1 else ""
+            state, why = NOT_JUDGED, NOT_THE_PAPERS.format(changed=changed + more)
+        elif not of.holds(claim, stem):
+            continue
+        row = blank(claim, of.paper) | dict.fromkeys(NUMBERS, "") | {"why": why}
+        rows.append(row | dict.fromkeys(("verdict", "overall", "class"), state))
     return rows
 
 

@@ -81,6 +81,8 @@ def _differing(mine: object, papers: object, path: str = "") -> list[str]:
     if equal(mine, papers):
         return []
     if isinstance(mine, dict) and isinstance(papers, dict):
+        if mine.get("kind") != papers.get("kind"):  # the keys of one kind say nothing to those of another
+            return _differing(mine.get("kind"), papers.get("kind"), f"{path}.kind".strip("."))
         keys = dict.fromkeys((*mine, *papers))
         return [line for key in keys for line in _differing(mine.get(key), papers.get(key), f"{path}.{key}".strip("."))]
     if isinstance(mine, list) and isinstance(papers, list) and len(mine) == len(papers):
@@ -90,6 +92,8 @@ def _differing(mine: object, papers: object, path: str = "") -> list[str]:
 
 
 def _short(value: object) -> str:
+    if value is None:
+        return "none"
     text = f"{value:g}" if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
     return text if len(text) <= LONGEST else text[:LONGEST] + "…"
 
