@@ -19,11 +19,13 @@ from collections.abc import Callable
 import numpy as np
 from llvmlite.binding import Linkage
 from numba import _dynfunc, njit
+from numba.core import cgutils, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
+from numba.np.arrayobj import make_array
 
 from radarsim.kernels import cache
 from radarsim.kernels.resolving import resolving
@@ -32,23 +34,24 @@ from radarsim.kernels.resolving import resolving
 FLAGS = frozenset({"contract", "arcp", "nsz", "nnan", "ninf"})
 
 
-class Untranslated(JITCodeLibrary):
-    """Code that is only ever linked into a kernel's, to be optimised and made machine code there."""
+class Linked(JITCodeLibrary):
+    """Code that is only ever linked into a kernel's: here it is not made machine code."""
+
+    def _finalize_final_module(self):
+        self._finalized = True
+
+
+class Untranslated(Linked):
+    """A function without an entry, to be optimised in the kernel that calls it."""
 
     def _optimize_final_module(self):
         # Functions that are not inlined are optimised in the kernel as they would have been alone.
         if self.inlined:
             super()._optimize_final_module()
 
-    def _finalize_final_module(self):
-        self._finalized = True
 
-
-class Called(JITCodeLibrary):
-    """A kernel as other kernels link it: optimised as it is alone, so that its numbers are the same; not translated."""
-
-    def _finalize_final_module(self):
-        self._finalized = True
+class Called(Linked):
+    """A kernel as other kernels link it: optimised as it is alone, so that its numbers are the same."""
 
 
 class SelfContained(JITCodeLibrary):
@@ -71,8 +74,39 @@ class SelfContained(JITCodeLibrary):
 NO_ENTRY = ctypes.cast(ctypes.pythonapi.PyObject_Call, ctypes.c_void_p).value
 
 
+def holds_arrays(kind: types.Type) -> bool:
+    """Whether a value of a type is an array or a tuple with one in it."""
+    return isinstance(kind, types.Array) or any(map(holds_arrays, getattr(kind, "types", ())))
+
+
+def borrowed(lower: Lower, kind: types.Type, value):
+    """An argument whose arrays are not counted: whoever called the kernel keeps them until it returns.
+
+    Numba counts references to an array wherever it is passed on or cut, with locked instructions.
+    """
+    if isinstance(kind, types.Array):
+        array = make_array(kind)(lower.context, lower.builder, value)
+        array.meminfo = cgutils.get_null_value(array.meminfo.type)
+        return array._getvalue()
+    if isinstance(kind, types.BaseTuple):
+        for i, one in enumerate(kind.types):
+            if holds_arrays(one):
+                fewer = borrowed(lower, one, lower.builder.extract_value(value, i))
+                value = lower.builder.insert_value(value, fewer, i)
+    return value
+
+
 class WideLower(Lower):
     """Numba's translation to LLVM, with the attribute that lets loops use registers of 512 bits."""
+
+    def extract_function_arguments(self):
+        arguments = super().extract_function_arguments()
+        # What is returned is counted: it outlives the call.
+        if isinstance(self.library, SelfContained) and not holds_arrays(self.fndesc.restype):
+            kinds = self.fndesc.argtypes
+            arguments = [borrowed(self, kind, one) for kind, one in zip(kinds, arguments, strict=True)]
+            self.fnargs = arguments
+        return arguments
 
     def setup_function(self, fndesc):
         super().setup_function(fndesc)

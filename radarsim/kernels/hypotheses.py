@@ -56,29 +56,33 @@ def greatest(x):
 
 @part
 def least_kept(weights, count, copy, most):
-    """The `most`-th greatest of `count` weights (Hoare's selection on a copy); most < count."""
+    """The `most`-th greatest of `count` weights; most < count.
+
+    By halves as in Hoare's selection, on a copy. What is kept of it moves to its front without a branch: as good as
+    random, half of the branches would be foretold wrongly.
+    """
     for i in range(count):
         copy[i] = weights[i]
-    low, high, wanted = 0, count - 1, most - 1
-    while low < high:
-        pivot = copy[(low + high) // 2]
-        i, j = low, high
-        while i <= j:
-            while copy[i] > pivot:
-                i += 1
-            while copy[j] < pivot:
-                j -= 1
-            if i <= j:
-                copy[i], copy[j] = copy[j], copy[i]
-                i += 1
-                j -= 1
-        if wanted <= j:
-            high = j
-        elif wanted >= i:
-            low = i
+    while count > 1:
+        pivot, above, equal, kept = copy[count // 2], 0, 0, 0
+        for i in range(count):
+            above += 1 if copy[i] > pivot else 0
+            equal += 1 if copy[i] == pivot else 0
+        if most <= above:
+            for i in range(count):
+                weight = copy[i]
+                copy[kept] = weight
+                kept += 1 if weight > pivot else 0
+        elif most <= above + equal:
+            return pivot
         else:
-            break
-    return copy[wanted]
+            most -= above + equal
+            for i in range(count):
+                weight = copy[i]
+                copy[kept] = weight
+                kept += 1 if weight < pivot else 0
+        count = kept
+    return copy[0]
 
 
 @part

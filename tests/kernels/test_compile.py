@@ -6,7 +6,9 @@ import subprocess
 import sys
 import textwrap
 import types
+import weakref
 from pathlib import Path
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -257,3 +259,40 @@ def test_numba_takes_a_context_with_a_memory_for_its_own():
     assert found is resolving(context)
     assert (found == context, context == found, hash(found)) == (True, True, hash(context))
     assert found.__dict__ is context.__dict__
+
+
+class Pair(NamedTuple):
+    """Arrays as kernels take them."""
+
+    first: np.ndarray
+    second: np.ndarray
+
+
+def chosen(pair, more):
+    kept, total = pair.first, 0.0
+    for i in range(pair.first.size):
+        kept = pair.second if kept[i] > 0.0 else more[0]
+        total += kept[i]
+    return total
+
+
+def test_references_to_a_kernels_arguments_are_not_counted():
+    sums = types.FunctionType(chosen.__code__, {"__name__": "nowhere"})  # of no file, so not from a cache
+    second, counted = np.arange(3.0), []
+    for compiled in (numba.njit(sums), compiling.kernel(sums)):
+        assert compiled(Pair(np.ones(3), second), (second, 1.0)) == 3.0
+        [made] = compiled.overloads.values()
+        [inner] = (one for one in made.library._final_module.functions if one.name == made.fndesc.mangled_name)
+        counted.append(str(inner).count("@NRT_incref"))
+    assert counted[0] > 0
+    assert counted[1] == 0
+
+
+def test_what_a_kernel_returns_is_counted():
+    passed = types.FunctionType((lambda pair, x: (pair.first[1:], x)).__code__, {"__name__": "nowhere"})
+    first = np.arange(1e6)
+    rest, _ = compiling.kernel(passed)(Pair(first, first), 1.0)
+    held = weakref.ref(first)
+    del first
+    assert held() is not None
+    assert rest[-1] == 999_999.0

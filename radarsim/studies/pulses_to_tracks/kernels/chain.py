@@ -48,10 +48,10 @@ def take_ranges(world, own, k, first, tracks):
         if k == 0:
             x, P = begun(world, first + i, noise)
         else:
-            x, P = state_of(tracks[i])
+            x, P = state_of(tracks, i)
             x, P = predicted(world, own, k, x, P)
             x, P = range_taken(x, P, noise, variance)
-        put_state(tracks[i], x, P)
+        put_state(tracks, i, x, P)
 
 
 @inline
@@ -102,7 +102,8 @@ def in_order(entries):
 def estimate_all(world, filters, f, k, first, work):
     """Estimates (n, 2) of the bursts of scan k, less the truth, an entry at a time; passes are counted."""
     who, eight, found = np.empty(WIDTH, np.int64), np.empty((WIDTH, 2)), np.empty((WIDTH, 2))
-    entries, measured = work.entries, work.measured
+    entries, measured, forecasts, passes = work.entries, work.measured, work.forecasts, work.passes
+    made = work.room[0]
     order = in_order(entries)
     begin = 0
     while begin < order.size:
@@ -111,11 +112,11 @@ def estimate_all(world, filters, f, k, first, work):
             end += 1
         for n in range(WIDTH):
             i = order[min(begin + n, end - 1)]  # a strip that is not full repeats its last
-            who[n], eight[n, 0], eight[n, 1] = first + i, work.forecasts[i, 0], work.forecasts[i, 1]
+            who[n], eight[n, 0], eight[n, 1] = first + i, forecasts[i, 0], forecasts[i, 1]
         estimate(world, filters, f, k, entry, who, eight, work.room, found)
         for n in range(end - begin):
             measured[order[begin + n], 0], measured[order[begin + n], 1] = found[n, 0], found[n, 1]
-            work.passes[order[begin + n]] += work.room[0][lane(PASSES, n)]
+            passes[order[begin + n]] += made[lane(PASSES, n)]
         begin = end
 
 
@@ -123,14 +124,15 @@ def estimate_all(world, filters, f, k, first, work):
 def take_estimates(world, filters, f, k, work, sums):
     """Take the estimates (n, 2) of a scan into the tracks; counts and errors of them are added to the sums."""
     own, sigma, span, tracks = filters.filters[f], filters.sigma[f, k], world.span, work.tracks
-    locks, takes = sums.locks[f, k], own.takes
+    locks, of_measured, takes = sums.locks[f, k], sums.measured[f, k], own.takes
+    measured, ages = work.measured, work.ages
     for i in range(tracks.shape[0]):
-        x, P = state_of(tracks[i])
-        v, a = work.measured[i, 0], work.measured[i, 1]
+        x, P = state_of(tracks, i)
+        v, a = measured[i, 0], measured[i, 1]
         e = v - x[1] if own.kind == BOUND else folded(v - x[1], span)
         wrong = 1.0 if abs(e + x[1]) > 0.5 * span else 0.0
         v = v if own.kind == BOUND else folded(v, span)
-        scored(sigma, takes, v, a, i, work.ages, locks, sums.measured[f, k])
+        scored(sigma, takes, v, a, i, ages, locks, of_measured)
         y, R, S = velocity_taken(x, P, e, sigma[0] ** 2)
         distance, determinant = e * e / S, S
         if takes == 2:
@@ -146,7 +148,7 @@ def take_estimates(world, filters, f, k, work, sums):
             x, P = y, R
         elif weight > 0.0:
             x, P = mixed(x, P, y, R, weight)
-        put_state(tracks[i], x, P)
+        put_state(tracks, i, x, P)
         locks[TAKEN] += weight
         locks[WRONG_FOLD] += wrong * weight
 

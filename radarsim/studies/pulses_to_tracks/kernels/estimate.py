@@ -3,37 +3,58 @@
 As in P4's kernels an estimate is its deviation from the truth, in turns over the burst.
 """
 
+import numpy as np
+
 from radarsim.bursts.kernels.lanes import LIVE, PASSES, PRIOR, X, lane, merge, step
 from radarsim.bursts.kernels.lanes import ROWS as WORK
 from radarsim.bursts.kernels.scoring import SIZE
 from radarsim.bursts.kernels.strip import evaluate, put_drawn, take_window
 from radarsim.kernels.compile import kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, rows
-from radarsim.kernels.random import LANE_BITS, U, normals
+from radarsim.kernels.random import LANE_BITS, U, normal_pair, threefry
 from radarsim.studies.pulses_to_tracks.kernels.records import BOUND, SEQUENCE
 from radarsim.studies.pulses_to_tracks.kernels.spectrum import highest_line
+
+AT_ONCE = 64  # blocks whose normals are drawn before their sums are made: 32 KiB
+
+
+@part
+def draw_pairs(k0, k1, who, pair, a, b):
+    """Unit normals of the realisations who (8,) over draw pairs `pair`, `pair` + 1, … into flat a and b, eight a pair.
+
+    Who is read and the pairs are counted so that all but the first loop run in vector registers: five times faster.
+    """
+    x, y = a.view(np.uint64), b.view(np.uint64)
+    for i in range(a.size):
+        x[i] = U(who[i & (WIDTH - 1)])
+    for i in range(a.size):
+        x[i], y[i] = threefry(x[i], pair + (U(i) >> U(LANE_BITS)), k0, k1)
+    for i in range(a.size):
+        a[i], b[i] = normal_pair(x[i], y[i])
 
 
 @kernel
 def draw_sums(world, k, who, a, b, drawn):
     """Block sums of scan k of the realisations who (8,) into rows; as `bursts.kernels.strip.draw_strip`."""
     k0, k1 = world.keys[1, 0], world.keys[1, 1]
-    pair = U(2 * world.mean.shape[0] * k)
-    for i in range(a.size):
-        a[i], b[i] = normals(k0, k1, U(who[i & (WIDTH - 1)]), pair + U(i >> LANE_BITS))
-    put_drawn(world.mean, world.factor[world.law[k]], a, b, drawn)
+    blocks, factor = world.mean.shape[0], world.factor[world.law[k]]
+    for begin in range(0, blocks, AT_ONCE):
+        end = min(begin + AT_ONCE, blocks)
+        pair = U(2 * (blocks * k + begin))
+        draw_pairs(k0, k1, who, pair, a[: 2 * WIDTH * (end - begin)], b)
+        put_drawn(world.mean[begin:end], factor[begin:end], a, b, drawn[4 * WIDTH * begin :])
 
 
 @part
 def put_forecast(world, forecast, work):
     """Errors of the forecast (8, 2) of velocity and acceleration as those of the phase's coefficients."""
-    zero = full(0.0)
+    zero, turns = full(0.0), world.to_turns
     for j in range(SIZE):
         put(work, PRIOR + j, zero)
     for n in range(WIDTH):
         v, a = forecast[n, 0], forecast[n, 1]
-        work[lane(PRIOR + 1, n)] = world.to_turns[0, 0] * v + world.to_turns[0, 1] * a
-        work[lane(PRIOR + 2, n)] = world.to_turns[1, 1] * a
+        work[lane(PRIOR + 1, n)] = turns[0, 0] * v + turns[0, 1] * a
+        work[lane(PRIOR + 2, n)] = turns[1, 1] * a
     for j in range(SIZE):
         put(work, X + j, get(work, PRIOR + j))
 
@@ -81,17 +102,18 @@ def estimate(world, filters, f, k, entry, who, forecast, room, found):
             )
         # What goes to the filter must not hold the forecast once more: the last step is on the likelihood alone.
         take_window(physics, drawn, tables, free, filters.last[f], own.kind != SEQUENCE, work, sums)
+    measured = world.measured
     for n in range(WIDTH):
         for c in range(2):
             total = 0.0
             for j in range(SIZE):
-                total += world.measured[c, j] * work[lane(X + j, n)]
+                total += measured[c, j] * work[lane(X + j, n)]
             found[n, c] = total
 
 
 def room_for(blocks: int, lines: int) -> tuple:
     """Work arrays for eight bursts: estimates, sums of a window, sums drawn, normals, a spectrum."""
     return (
-        *(rows(WORK), rows(4 * blocks), rows(4 * blocks), rows(2 * blocks), rows(2 * blocks)),
+        *(rows(WORK), rows(4 * blocks), rows(4 * blocks), rows(2 * AT_ONCE), rows(2 * AT_ONCE)),
         *(rows(lines), rows(lines)),
     )

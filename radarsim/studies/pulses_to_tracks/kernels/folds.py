@@ -47,17 +47,17 @@ def ranges_to_hypotheses(world, own, k, first, work):
         if k == 0:
             held.count[i], held.right[i, 0], weights[0] = 1, 1.0, 0.0
             x, P = begun(world, first + i, noise)
-            put_state(states[0], x, P)
+            put_state(states, 0, x, P)
         else:
             for h in range(held.count[i]):
-                x, P = state_of(states[h])
+                x, P = state_of(states, h)
                 x, P = predicted(world, own, k, x, P)
                 e, S = noise - x[0], P[0] + variance
                 weights[h] -= 0.5 * (e * e / S + math.log(S))
                 x, P = range_taken(x, P, noise, variance)
-                put_state(states[h], x, P)
-        x, P = state_of(states[heaviest(weights, held.count[i])])
-        put_state(work.tracks[i], x, P)
+                put_state(states, h, x, P)
+        x, P = state_of(states, heaviest(weights, held.count[i]))
+        put_state(work.tracks, i, x, P)
 
 
 @part
@@ -72,8 +72,9 @@ def branches(own, sigma, measured, span, held, i, lists):
     mixture, lock, lost = own.use == MIXTURE, 0.0, NOTHING
     if mixture:
         lock, lost = math.log(own.lock), math.log((1.0 - own.lock) * own.density)
+    states = held.states[i]
     for h in range(held.count[i]):
-        x, P = state_of(held.states[i, h])
+        x, P = state_of(states, h)
         weight = held.weights[i, h] + lock
         if own.takes == 2:
             off = a - x[2]
@@ -104,11 +105,11 @@ def inherited(own, sigma, measured, span, held, i, made, lists):
     """
     weights, found = lists.children, row(lists.children, lists.most // WIDTH)
     best = weights[heaviest(weights, made)]
-    taken, wrong, whole = 0.0, 0.0, 0.0
+    states, taken, wrong, whole = held.states[i], 0.0, 0.0, 0.0
     for j in range(made):
         parent, weight = lists.parents[j], math.exp(weights[j] - best)
         h = parent if parent >= 0 else -1 - parent
-        x, P = state_of(held.states[i, h])
+        x, P = state_of(states, h)
         right = held.right[i, h]
         if parent >= 0:
             if own.takes == 2:
@@ -117,7 +118,7 @@ def inherited(own, sigma, measured, span, held, i, made, lists):
             x, P, _ = velocity_taken(x, P, found[j], sigma[0] ** 2)
             right, taken, wrong = 0.0 if off else right, taken + weight, wrong + (weight if off else 0.0)
         whole += weight
-        put_state(held.fresh[j], x, P)
+        put_state(held.fresh, j, x, P)
         held.fresh[j, 9] = right
     for j in range(made):
         held.weights[i, j], held.right[i, j] = weights[j] - best, held.fresh[j, 9]

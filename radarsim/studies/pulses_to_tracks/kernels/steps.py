@@ -16,16 +16,23 @@ from radarsim.studies.pulses_to_tracks.kernels.records import AGES, LOCKED, LOCK
 
 
 @inline
-def state_of(row):
-    """x (3) and P (6) of a row (9,)."""
-    return (row[0], row[1], row[2]), (row[3], row[4], row[5], row[6], row[7], row[8])
+def state_of(rows, i):
+    """x (3) and P (6) of row i of rows (n, 9); a row cut out of them would be counted, a fifth of the time."""
+    return (rows[i, 0], rows[i, 1], rows[i, 2]), (
+        rows[i, 3],
+        rows[i, 4],
+        rows[i, 5],
+        rows[i, 6],
+        rows[i, 7],
+        rows[i, 8],
+    )
 
 
 @inline
-def put_state(row, x, P):
-    """Write x and P into a row (9,)."""
-    row[0], row[1], row[2] = x
-    row[3], row[4], row[5], row[6], row[7], row[8] = P
+def put_state(rows, i, x, P):
+    """Write x and P into row i of rows (n, 9)."""
+    rows[i, 0], rows[i, 1], rows[i, 2] = x
+    rows[i, 3], rows[i, 4], rows[i, 5], rows[i, 6], rows[i, 7], rows[i, 8] = P
 
 
 @inline
