@@ -278,23 +278,25 @@ def report(
 
 
 @main.command()
-@click.argument("configs", nargs=-1, metavar="[CONFIG…]", shell_complete=completed)
+@click.argument("names", nargs=-1, metavar="[CONFIG | CLAIM | PAPER …]", shell_complete=completed)
 @out_option
 @json_option
 @click.option("--markdown", is_flag=True, help="The page docs/claims.md on stdout in place of text.")
 @click.option("--figure", metavar="FILE", help="Also draw them, in margins of what the papers say, to this file.")
-def claims(configs: tuple[str, ...], out: str, as_json: bool, markdown: bool, figure: str | None) -> None:
+def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figure: str | None) -> None:
     """The papers' claims: stated, measured with interval, exact value, class; computes nothing.
 
     How they are judged stands in docs/verdicts.md: exact values first, each number with a margin, and over every
     reading that the paper allows, where `radarsim readings` has judged these.
 
-    Without CONFIG all claims of all papers; those without stored results are listed as not run, with the command that
-    would judge them. Of a CONFIG that is not a paper's experiment, the claims that it cannot judge, and why.
+    PAPER is P1, P2, P3 or P4. Without any, all claims of all papers; those without stored results are listed as not
+    run, with the command that would judge them. Of a CONFIG that is not a paper's experiment, the claims that it cannot
+    judge, and why.
 
     \b
     Examples
       radarsim claims range_doppler
+      radarsim claims P1.3 P4
       radarsim claims --json
       radarsim claims --figure claims.svg
     """
@@ -302,7 +304,7 @@ def claims(configs: tuple[str, ...], out: str, as_json: bool, markdown: bool, fi
     from radarsim.app import run as experiment
     from radarsim.cli import console
 
-    rows = experiment.claims(configs, out)
+    rows = experiment.claims(names, out)
     if figure is not None:
         experiment.draw_claims(rows, figure)
     if as_json:

@@ -242,19 +242,37 @@ def test_config_outside_a_checkout_runs_by_path(tmp_path):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("P1.4", "claims: P1.4 is a claim of the config range_doppler: `radarsim claims range_doppler`"),
-        ("P1.99", "claims: P1.99 is no claim of P1; its claims are of the configs ambiguous, orders, range_doppler"),
-        ("P1", "claims: P1 is a paper, whose claims are of the configs ambiguous, orders, range_doppler"),
+        ("P4.99", "claims: P4.99 is no claim of P4; its claims: {all}"),
         ("P99", "claims: P99 is no claim and no paper; papers: P1, P2, P3, P4"),
     ],
 )
-def test_a_claim_in_place_of_a_config_is_told_its_config(name, said):
+def test_what_is_written_like_a_claim_and_is_none_is_told_which_there_are(name, said):
     from radarsim.app.run import claims
     from radarsim.errors import ConfigError
 
     with pytest.raises(ConfigError) as caught:
         claims([name], "nowhere")
-    assert list(caught.value.lines) == [said]
+    every = [row["claim"] for row in claims([name.partition(".")[0]], "nowhere")] if "." in name else []
+    assert list(caught.value.lines) == [said.format(all=", ".join(every))]
+
+
+def test_claims_are_shown_by_name_by_paper_and_beside_those_of_a_config(tmp_path):
+    from radarsim.app.run import claims
+
+    def named(*names):
+        return [row["claim"] for row in claims(names, tmp_path)]
+
+    everything = named()
+    assert named("P1.3") == ["P1.3"]
+    assert named("P4.2", "P1.3", "P1.3") == ["P1.3", "P4.2"]
+    assert named("P4") == [claim for claim in everything if claim.startswith("P4.")]
+    assert named("P1.3", "range_doppler") == named("range_doppler")
+    assert named("rls2", "P4.2") == ["P4.2"]
+    radarsim("run", "discriminator_paper", "-n", 64, "--no-figures", "--out", tmp_path)
+    own = claims(["P4.2"], tmp_path)
+    assert own
+    assert own == [row for row in claims(["discriminator_paper"], tmp_path) if row["claim"] == "P4.2"]
+    assert "P4.2" in radarsim("claims", "P4.2", "--out", tmp_path).stdout
 
 
 def test_claims_of_a_config_not_yet_run_are_listed_as_such(tmp_path):
