@@ -18,13 +18,12 @@ from radarsim.errors import ConfigError
 from radarsim.report.claims import page
 from radarsim.report.claims.rule import UNDECIDED, roughly
 from radarsim.report.precision import looks
+from radarsim.studies import registry
 
 
 def check(experiment: Experiment) -> None:
     """ConfigError for a config that no claim names."""
-    from radarsim.studies.registry import study
-
-    of = study(experiment.study).claims()
+    of = registry.study(experiment.study).claims()
     if of is None or all(claim.config != experiment.stem for claim in of.claims):
         configs = sorted({claim.config for claim in of.claims}) if of else []
         hint = f"; of this study: {', '.join(configs)}" if configs else ""
@@ -57,6 +56,17 @@ def rows_of(experiment: Experiment, found: SimulatedCases) -> list[dict[str, Any
         return []
     table = output.tables(results, stem=experiment.stem)["claims"]
     return list(table.to_dict("records"))
+
+
+def left(experiment: Experiment, found: SimulatedCases) -> list[str]:
+    """What is to be said of claims that were not decided, or, where the time was up before all cases, not judged."""
+    if len(found.cases) == len(experiment.cases):
+        return undecided(rows_of(experiment, found))
+    of = registry.study(experiment.study).claims()
+    names = [claim.id for claim in of.claims if claim.config == experiment.stem] if of else []
+    return [
+        f"{len(found.cases)} of {len(experiment.cases)} cases were done by then, too few to decide {', '.join(names)}"
+    ]
 
 
 def undecided(rows: Sequence[dict[str, Any]]) -> list[str]:

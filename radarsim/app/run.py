@@ -7,7 +7,7 @@ import re
 import sys
 import time
 import unicodedata
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -145,7 +145,7 @@ def run(
     if kept is not None:
         facts["seconds_kept_for_writing"] = kept
     if decide:
-        left = deciding.undecided(deciding.rows_of(experiment, simulated))
+        left = deciding.left(experiment, simulated)
         facts |= {"unmet": [*facts["unmet"], *left], "stop": "; ".join((*facts["unmet"], *left)) or "done"}
     ended_by = None if simulated.stopped or precision is None else (precision, of)
     result = result_of(experiment, simulated, facts, repeated(experiment, simulated.done, overrides, ended_by))
@@ -342,22 +342,18 @@ def papers() -> "list[PaperClaims]":
     return [of for of in registry.parts(lambda study: study.claims()).values() if of is not None]
 
 
-def _no_configs(names: Sequence[str], every: "Sequence[PaperClaims]") -> list[str]:
-    """A line for each name that is no config but one of a claim or of a paper, or is written like one."""
-    of = {claim.id: claim.config for paper in every for claim in paper.claims}
-    found = []
+def _unknown_claims(names: Sequence[str], known: Collection[str]) -> list[str]:
+    """A line for each name that is written like a claim or a paper, and is none."""
+    found, every = [], _keys(known)
     for name in names:
-        paper = re.fullmatch(r"(P\d+)(\.\w+)?", name)
-        if paper is None or Path(name).is_file():
+        paper = name.partition(".")[0]
+        if name in known or name in every:
             continue
-        own = sorted({config for claim, config in of.items() if claim.startswith(f"{paper[1]}.")})
-        if name in of:
-            found.append(f"claims: {name} is a claim of the config {of[name]}: `radarsim claims {of[name]}`")
-        elif own:
-            what = "a paper, whose" if name == paper[1] else f"no claim of {paper[1]}; its"
-            found.append(f"claims: {name} is {what} claims are of the configs {', '.join(own)}")
+        if paper in every:
+            own = [claim for claim in known if claim.startswith(f"{paper}.")]
+            found.append(f"claims: {name} is no claim of {paper}; its claims: {', '.join(own)}")
         else:
-            found.append(f"claims: {name} is no claim and no paper; papers: {', '.join(_keys(of))}")
+            found.append(f"claims: {name} is no claim and no paper; papers: {', '.join(every)}")
     return found
 
 
@@ -366,29 +362,32 @@ def _keys(ids: Iterable[str]) -> list[str]:
     return sorted({claim.partition(".")[0] for claim in ids})
 
 
-def claims(configs: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, Any]]:
-    """Rows of the claims, as stored under `out` or as not run; of some configs only if any are given.
+def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, Any]]:
+    """Rows of the claims, as stored under `out` or as not run; if any names are given, of these configs, papers (P1)
+    and claims (P1.4) alone.
 
     Of a config that judges none: those of its study's paper, with the reason why each of them is not judged by it.
-    Each row has the columns of claims.csv and `config`. Raises ConfigError for a config that does not exist.
+    Each row has the columns of claims.csv and `config`. Raises ConfigError for what does not exist.
     """
     from radarsim.report.claims.joined import with_readings
     from radarsim.report.claims.judge import listed, unstored
 
     every = papers()
-    if faults := _no_configs(configs, every):
+    of = {claim.id: claim.config for paper in every for claim in paper.claims}
+    wanted = [name for name in names if re.fullmatch(r"P\d+(\.\w+)?", name) and not Path(name).is_file()]
+    if faults := _unknown_claims(wanted, of):
         raise ConfigError(*faults)
-    readings = stored_readings(Path(out))
-    asked = load_all(configs)
-    stems = [one.stem for one in asked] or sorted({claim.config for of in every for claim in of.claims})
+    asked = load_all([name for name in names if name not in wanted])
+    shown = [claim for claim in of if not names or claim in wanted or claim.partition(".")[0] in wanted]
+    stems = dict.fromkeys([*(one.stem for one in asked), *(of[claim] for claim in shown)])
     held = {stem: rows for stem in stems if (rows := stored_claims.stored(Path(out) / stem / "claims.csv")) is not None}
-    if not configs:
-        return with_readings(listed(every, held), readings)
     rows = []
     for one in asked:
-        stem = one.stem
-        own = held.get(stem) or [row for row in listed(every, {}) if row["config"] == stem]
-        if not own and one.cases and (of := registry.study(one.cases[0].study).claims()) is not None:
-            own = unstored(of, one.cases, shipped, stem)
-        rows += [row | {"config": stem} for row in own]
-    return with_readings(rows, readings)
+        own = held.get(one.stem) or [row for row in listed(every, {}) if row["config"] == one.stem]
+        if not own and one.cases and (paper := registry.study(one.cases[0].study).claims()) is not None:
+            own = unstored(paper, one.cases, shipped, one.stem)
+        rows += [row | {"config": one.stem} for row in own]
+    known = {(row["claim"], row["config"]) for row in rows}
+    own = [row for row in listed(every, held) if row["claim"] in shown]
+    rows += [row for row in own if (row["claim"], row["config"]) not in known]
+    return with_readings(rows, stored_readings(Path(out)))

@@ -28,6 +28,18 @@ def test_what_is_left_says_what_it_would_take():
     assert decide.undecided([row | {"extension": True}]) == []
 
 
+def test_a_time_limit_before_all_cases_names_the_claims_that_wait(tmp_path):
+    def one_case():
+        return "time limit of 1 s" if len(list((tmp_path / ".blocks").glob("*/*"))) > 1 else None
+
+    done = radarsim.run(
+        "range_doppler", realisations=8000, decide=True, time_limit=one_case, out=tmp_path, figures=False
+    )
+    assert done.unmet[0] == "time limit of 1 s"
+    assert len(done.cases) < 30
+    assert done.unmet[1].startswith(f"{len(done.cases)} of 30 cases were done by then, too few to decide P1.1, P1.2,")
+
+
 def test_undecided_at_the_most_is_exit_code_3(tmp_path):
     """Eight bursts leave P4.4 open; a look at the most is made though it is no 2000·2^m."""
     command = ["run", "discriminator_paper", "-n", "60", "--decide", "--out", str(tmp_path), "--no-figures", "-q"]
