@@ -147,7 +147,9 @@ def joint(of: PaperReadings, over: Sequence[Over]) -> Joint:
         judged = tuple(one.under.claim.id for one in own)
         found.append(Together(reading, of.name(reading), of.kind(reading), held, judged, outcomes))
     found.sort(key=lambda one: (-one.count(False), -one.count(True), -len(one.held), changed(of, one.reading)))
-    numbers = {key: asserted for own in claims for one in own.values() for key, asserted in one.numbers.items()}
+    numbers: dict[Key, Asserted] = {}
+    for one in (one for own in claims for one in own.values()):
+        numbers = one.numbers | numbers  # a number has the name that it has as shipped, of the first reading
     return Joint(of, tuple(found), numbers)
 
 

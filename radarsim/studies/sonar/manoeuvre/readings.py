@@ -147,11 +147,17 @@ class Readings(PaperReadings):
 
     def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
         if claim.id == ENOUGH:
-            plots = _enough(reading["high_accuracy"])
-            return [replace(part, measure=lambda seen: certain(plots)) for part in claim.parts]
+            plots, criterion = _enough(reading["high_accuracy"])
+            return [replace(part, what=criterion, measure=lambda seen: certain(plots)) for part in claim.parts]
         if claim.id == SINGLE:
-            probability = float(exact.detection(1.0, SHIFTS[reading["strength"]]))
-            return [replace(part, measure=lambda seen: certain(probability), exact=None) for part in claim.parts]
+            strength = SHIFTS[reading["strength"]]
+            probability = float(exact.detection(1.0, strength))
+            what = f"alarms a test at k = 1, five plots, acceleration of {strength:g} times its own spread"
+            if strength == 1:
+                what = claim.parts[0].what
+            return [
+                replace(part, what=what, measure=lambda seen: certain(probability), exact=None) for part in claim.parts
+            ]
         if claim.id == SWITCHES and reading["memory"] in MEMORIES:
             return [_switched(part, reading) for part in claim.parts]
         asserted = [part for part in claim.parts if part.asserted]
@@ -178,17 +184,20 @@ class Readings(PaperReadings):
         return super().evidence(claim, reading, seen, of)
 
 
-def _enough(criterion: str) -> int:
-    """Fewest plots that meet a criterion of high accuracy, by the closed forms after (2)."""
+def _enough(criterion: str) -> tuple[int, str]:
+    """Fewest plots that meet a criterion of high accuracy, by the closed forms after (2), and what these are."""
     n = np.arange(2, 100)
     smoothed, ahead = 2 * (2 * n - 1) / (n * (n + 1)), 2 * (2 * n + 1) / (n * (n - 1))  # variances, of a plot's
-    met = {
-        "predicted as measured": ahead <= 1,
-        "half the variance": smoothed <= 0.5,
-        "under 5 % more": np.append(np.sqrt(smoothed[1:] / smoothed[:-1]) > 0.95, True),
-        "two thirds": smoothed <= (2 / 3) ** 2,
-    }
-    return int(n[met[criterion]][0])
+    met, what = {
+        "predicted as measured": (ahead <= 1, "that extrapolate no worse than a plot measures"),
+        "half the variance": (smoothed <= 0.5, "that smooth to half of a plot's variance"),
+        "under 5 % more": (
+            np.append(np.sqrt(smoothed[1:] / smoothed[:-1]) > 0.95, True),
+            "to which a further one lowers the smoothed σ by under 5 %",
+        ),
+        "two thirds": (smoothed <= (2 / 3) ** 2, "that smooth to two thirds of a plot's σ"),
+    }[criterion]
+    return int(n[met][0]), f"fewest plots {what}"
 
 
 EXTREMES = (measures.WEAK, measures.STRONG)
@@ -205,12 +214,16 @@ def _with_rate(one: Any, reading: Reading) -> Any:
 
 def _delay(part: Part, reading: Reading) -> Part:
     """A part on times to see a manoeuvre, at the reading's rate and of what it wants to be seen."""
-    rate = RATES[reading["false_alarms"]]
-    delay = measures.both_ends if reading["seen"] == "beginning and end" else measures.mean_delay
+    rate, both = RATES[reading["false_alarms"]], reading["seen"] == "beginning and end"
+    delay = measures.both_ends if both else measures.mean_delay
+    at = "k = 1" if rate == measures.AT_ONE else f"{rate:g} false alarms a test"
+    seen = f"mean time to see {reading['seen'] if both else 'the beginning'} of the {part.cases[0]} at {at}"
     if part.statement == "time":
-        return replace(part, measure=measures.delays_ratio(part.cases[0], 8, 5, delay, rate))
+        what, measure = f"{seen}, 8 plots over 5", measures.delays_ratio(part.cases[0], 8, 5, delay, rate)
+        return replace(part, what=what, measure=measure)
     if part.statement == "not worth while":
-        return replace(part, measure=measures.further(part.cases[0], measures.ENOUGH, delay, rate))
+        what = f"{seen}, over 5 plots against the best of 4–5"
+        return replace(part, what=what, measure=measures.further(part.cases[0], measures.ENOUGH, delay, rate))
     return part
 
 
@@ -225,7 +238,7 @@ def _switched(part: Part, reading: Reading) -> Part:
         held = of.line if degree == 1 else of.parabola
         return certain(float(np.sqrt(np.mean(held**2) / np.mean(of.switched**2))))
 
-    return replace(part, measure=measure)
+    return replace(part, what=part.what.replace("five plots", f"{reading['memory']}"), measure=measure)
 
 
 SIGMA_M, PERIOD_S, SCANS = 10.0, 5.0, 45  # of the shipped config
