@@ -20,8 +20,8 @@ def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
     names = list(dict.fromkeys(e.name for case in experiment.cases for e in case.spec.estimators))
     return tr(
-        "How often do {estimators} lock onto the Doppler frequency and its derivatives, and how accurate are they "
-        "then?",
+        "How often does an estimate by {estimators} lock onto the Doppler frequency and its derivatives, and how "
+        "accurate is it then?",
         estimators=few(names),
     )
 
