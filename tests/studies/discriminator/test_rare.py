@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.integrate import quad
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 from radarsim.app.configs import load
 from radarsim.bursts.kernels import lanes
@@ -295,11 +295,21 @@ def test_a_rate_that_rests_on_few_events_is_told():
 
 
 def test_an_interval_that_few_heavy_weights_make_is_marked():
-    """Forty equal weights are enough; a hundred of which three make the variance are not, though n_eff is over 20."""
+    """Forty equal weights are enough; a hundred of which three make the variance are not, though n_eff is over 20.
+
+    Nor are those of which logarithms spread by 3, where the sample lacks the largest: none that it has is heavy.
+    """
     equal, mixed = np.ones(40), np.r_[np.ones(97), np.full(3, 6.0)]
-    sums = np.array([[w.sum(), (w**2).sum(), len(w), (w**4).sum()] for w in (equal, mixed, equal[:10])])
+    middle = ndtri((np.arange(1000) + 0.5) / 1000)
+    spread, closer = (np.exp(by * (middle[middle < 2] - 2)) for by in (3, 1.5))
+    every = (equal, mixed, equal[:10], spread, closer)
+    sums = np.array([[w.sum(), (w**2).sum(), len(w), (w**4).sum()] for w in every])
     drawn = report.Drawn(10_000, 1000.0, 10_000.0, 10_300.0)
-    made = report.rows({}, "loss", np.full(3, True), report.Counted(*sums.T), drawn)
+    of_spread = report.rows({}, "loss", np.full(2, True), report.Counted(*sums[3:].T), drawn)
+    assert min(of_spread["n_eff"]) > 90
+    assert min(sums[3:, 1] ** 2 / sums[3:, 3]) > 20  # this alone would mark neither
+    assert list(of_spread["note"]) == [report.HEAVY, ""]
+    made = report.rows({}, "loss", np.full(3, True), report.Counted(*sums[:3].T), drawn)
     assert made["n_eff"] == pytest.approx([40, 115**2 / 205, 10])
     assert list(made["note"]) == ["", report.HEAVY, report.FEW]
     common = report.Counted(*np.array([10_000.0 - 19, 10_300.0 - 19, 9981, 1e4]))
@@ -320,9 +330,10 @@ def test_every_window_is_marked_by_its_own_weights():
     at = [COUNTED.index(name) for name in ("lock", "always_three", "always_posterior_three")]
     expected = []
     for window in sums[: len(locks)]:
-        weight, square, _, fourth = window[at].T
+        weight, square, number, fourth = window[at].T
         with np.errstate(invalid="ignore"):
             few, heavy = ~(weight**2 / square >= 20), ~(square**2 / fourth >= 20)
+            heavy |= ~((weight**2 / square) ** 2 / number >= 20)
         said = np.where(few, report.FEW, np.where(heavy, report.HEAVY, ""))
         expected.append(next((words for words in said if words), ""))
     assert list(locks["note"]) == expected
