@@ -11,7 +11,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import tables as common
 from radarsim.report.statistics import ALIKE as ALIKE_SQUARES
-from radarsim.report.statistics import FEW, FEW_EFFECTIVE, FEW_EVENTS, FEW_HEAVY, Z95, root_mean_square
+from radarsim.report.statistics import FEW, FEW_EFFECTIVE, FEW_EVENTS, FEW_HEAVY, Z95, Estimate, root_mean_square
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,19 +95,31 @@ def _rows(result: CaseResult) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     moments = np.asarray(result.sums["error"], dtype=float)
     largest = _of_tail(result, variance, kurtosis).max(axis=1, keepdims=True)  # over the scans
     with np.errstate(invalid="ignore", divide="ignore"):
-        sigma = root_mean_square(moments[..., 1], moments[..., 3], every)
-        missed = MISSED / every
-        of_sigma = missed * largest / sigma.value**2 / 2 > MOVED * (sigma.hi - sigma.lo) / 2 / sigma.value
-        of_bias = missed * np.sqrt(largest) > MOVED * Z95 * np.sqrt(variance / every)
+        of_sigma = decides_sigma(largest, root_mean_square(moments[..., 1], moments[..., 3], every), every)
+        of_bias = MISSED / every * np.sqrt(largest) > MOVED * Z95 * np.sqrt(variance / every)
         effective = every / np.maximum(kurtosis - 1, ALIKE_SQUARES)
     return n, effective[at], ((of_sigma | of_bias) & (largest > 0) & (every > 0))[at]
 
 
-def _about_mean(result: CaseResult) -> tuple[np.ndarray, np.ndarray]:
-    """Variance and κ (F, K, C) of the errors about their mean; κ not-a-number where the mean is all but rounding."""
-    moments = np.asarray(result.sums["error"], dtype=float)
+def decides_sigma(largest: np.ndarray, sigma: Estimate, n: np.ndarray) -> np.ndarray:
+    """Where `MISSED` of n realisations with an error of this squared size would move σ by `MOVED` of its half-width."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        m1, m2, m3, m4 = np.moveaxis(moments / common.realisations(result)[..., None], -1, 0)
+        moved = MISSED / n * largest / sigma.value**2 / 2
+        return np.asarray(moved > MOVED * (sigma.hi - sigma.lo) / 2 / sigma.value)
+
+
+def _about_mean(result: CaseResult) -> tuple[np.ndarray, np.ndarray]:
+    """`about_mean` of a case's errors (F, K, C)."""
+    return about_mean(np.asarray(result.sums["error"], dtype=float), common.realisations(result))
+
+
+def about_mean(moments: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Variance and κ (…) of errors about their mean, from Σe, Σe², Σe³, Σe⁴ (…, 4) of n (…) realisations.
+
+    κ is not-a-number where the mean is all but rounding.
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        m1, m2, m3, m4 = np.moveaxis(moments / n[..., None], -1, 0)
         variance = np.maximum(m2 - m1**2, 0.0)
         fourth = np.maximum(m4 - 4 * m1 * m3 + 6 * m1**2 * m2 - 3 * m1**4, 0.0)
         return variance, np.where(variance > ROUNDING * m2, fourth / variance**2, np.nan)
@@ -120,7 +132,12 @@ def tails(result: CaseResult) -> np.ndarray:
 
 def _of_tail(result: CaseResult, variance: np.ndarray, kurtosis: np.ndarray) -> np.ndarray:
     """`tails` of known moments about the mean."""
-    return np.where(result.axes.available & (kurtosis > TAIL), kurtosis * variance, 0.0)
+    return np.where(result.axes.available, size_of_tail(variance, kurtosis), 0.0)
+
+
+def size_of_tail(variance: np.ndarray, kurtosis: np.ndarray) -> np.ndarray:
+    """Squared size of the errors that make a tail, of moments about the mean; 0 where there is none."""
+    return np.where(kurtosis > TAIL, kurtosis * variance, 0.0)
 
 
 def _noted(

@@ -9,6 +9,7 @@ from radarsim.bursts import fisher as exact
 from radarsim.engine.results import CaseResult
 from radarsim.report import rare, statistics
 from radarsim.report import tables as common
+from radarsim.studies.discriminator import notes
 from radarsim.studies.discriminator.kernels.sums import LOCKS as COUNTED
 from radarsim.studies.discriminator.kernels.sums import bin_edges
 
@@ -39,7 +40,7 @@ def plain(result: CaseResult) -> int:
     return int(result.sums["drawn"][0]) if "drawn" in result.sums else result.count
 
 
-CURVES = (*common.CURVES, "sigma_all", "posterior_sigma")
+CURVES = (*common.CURVES, "sigma_all", "posterior_sigma", "note")
 
 
 def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
@@ -51,7 +52,8 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
     """σ of the locked bursts, window by window; sigma_all of all of them, none dropped."""
     axes, at = result.axes, common.shown(result)
     f, k, c = at
-    n, bound = result.sums["locks"][f, k, COUNTED.index("lock")], axes.exact_sigma[at]
+    locked = np.broadcast_to(result.sums["locks"][..., [COUNTED.index("lock")]], axes.available.shape)
+    n, bound = locked[at], axes.exact_sigma[at]
     moments = result.sums["error"][at]
     of = statistics.errors(moments, n)
     every = statistics.errors(result.sums["error_all"][at], plain(result))
@@ -66,6 +68,7 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
         "n_eff": statistics.effective(moments[..., 1], moments[..., 3], n),
         "sigma_all": every.sigma.value * bound,
         "posterior_sigma": axes.posterior_sigma[at],
+        "note": notes.of_curves(result, locked)[at],
     }
 
 
