@@ -328,7 +328,8 @@ def _wilson(p: Values, trials: Values) -> Estimate:
     with np.errstate(divide="ignore", invalid="ignore"):
         zz = Z95**2 / trials
         middle, half = (p + zz / 2) / (1 + zz), np.sqrt(np.maximum(zz * p * (1 - p), 0) + zz**2 / 4) / (1 + zz)
-    return Estimate(p, np.clip(middle - half, 0, 1), np.clip(middle + half, 0, 1))
+    # Of a share of 0 or 1 the end is the share itself: rounding must not leave it outside.
+    return Estimate(p, np.clip(np.minimum(middle - half, p), 0, 1), np.clip(np.maximum(middle + half, p), 0, 1))
 
 
 def weighted_rate(total: Values, square: Values, n: Values, plain: Values) -> Estimate:

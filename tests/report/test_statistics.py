@@ -173,3 +173,14 @@ def test_the_skewness_taken_off_is_halls(n):
     a = -math.sqrt(8 / n) / 3
     left = np.maximum(1 + a * np.abs(t), 0)
     np.testing.assert_allclose(statistics.unskewed(t, n), (left**3 - 1) / (3 * a), rtol=1e-12)
+
+
+@pytest.mark.parametrize("n", [1, 3, 100, 106, 109, 315, 1000, 12345])
+def test_the_interval_of_a_share_holds_the_share(n):
+    """Of none and of all too, where rounding once left 1 above the upper end."""
+    for count in {0, 1, n // 3, n - 1, n}:
+        of = statistics.rate(count, n)
+        assert of.lo <= of.value <= of.hi
+    every = statistics.rate(n, n)
+    assert every.hi == 1
+    assert statistics.rate(0, n).lo == 0
