@@ -8,6 +8,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels, statistics
 from radarsim.report import tables as common
+from radarsim.report.notes import THIN
 from radarsim.studies.pulses_to_tracks.axes import PulsesAxes
 from radarsim.studies.pulses_to_tracks.kernels.records import (
     LISTED,
@@ -30,7 +31,7 @@ LOCKS = (
 )
 ESTIMATES = (
     *("case", "filter", "component", "unit", "k", "t_s", "n", "sigma", "sigma_lo", "sigma_hi"),
-    *("sigma_all", "sigma_all_lo", "sigma_all_hi", "bound", "energy_db"),
+    *("sigma_all", "sigma_all_lo", "sigma_all_hi", "bound", "energy_db", "note"),
 )
 LOSSES = ("case", "filter", "component", "unit", "k", "t_s", "since_loss", "n", "sigma", "sigma_lo", "sigma_hi")
 IDEAL = ("case", "filter", "ideal", "component", "unit", "k", "t_s", "over_ideal", "over_ideal_lo", "over_ideal_hi")
@@ -38,6 +39,7 @@ FOLDS = ("case", "filter", "k", "t_s", "n", "right", "right_lo", "right_hi", "li
 PASSES = ("case", "filter", "passes", "passes_lo", "passes_hi")
 
 
+OF_ALL = f"sigma_all: {THIN}"  # where the lost among all bursts, few of them, decide
 # A lost burst is rare and decides σ: where it is missing in a sample, nothing else in that tells of it. As many more
 # are supposed as the sample leaves possible (95 %); what they would add is marked from half of the interval on.
 UNSEEN = "bursts lost more rarely than seen here may decide"
@@ -74,6 +76,8 @@ def noted(table: "pd.DataFrame", found: Mapping[tuple[str, str, str, int], str])
     if "baseline" in table:
         of[1] = table["baseline"]
         notes = [note or found.get(row, "") for note, row in zip(notes, zip(*of, strict=True), strict=True)]
+    if "note" in table:
+        notes = [note or own for note, own in zip(notes, table["note"], strict=True)]
     return table.assign(note=notes) if any(notes) else table
 
 
@@ -118,6 +122,7 @@ def _estimates(result: Result) -> dict[str, np.ndarray]:
     f, c, k = np.nonzero(np.moveaxis(np.isfinite(axes.bound), 1, 2))
     of, locked = np.asarray(result.sums["measured"])[f, k, c], np.asarray(result.sums["locks"])[f, k, LOCKED]
     n = np.full(f.size, float(result.count))
+    few = statistics.effective(of[:, 1, 0], of[:, 1, 1], n) < statistics.FEW_EFFECTIVE
     return {
         **common.leading(result, f, k, **common.components(result, MEASURED + c)),
         "n": locked.astype(np.int64),
@@ -125,6 +130,7 @@ def _estimates(result: Result) -> dict[str, np.ndarray]:
         **common.interval("sigma_all", statistics.root_mean_square(of[:, 1, 0], of[:, 1, 1], n)),
         "bound": axes.bound[f, k, c],
         "energy_db": axes.energy_db[k],
+        "note": np.where(few, OF_ALL, "").astype(object),
     }
 
 

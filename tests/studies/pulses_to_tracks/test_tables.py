@@ -7,7 +7,8 @@ import radarsim
 from radarsim.app.configs import load
 from radarsim.report.drawing import Line
 from radarsim.studies import registry
-from radarsim.studies.pulses_to_tracks import study
+from radarsim.studies.pulses_to_tracks import study, tables
+from radarsim.studies.pulses_to_tracks.tables import OF_ALL
 from tests.studies.pulses_to_tracks import naive
 from tests.studies.pulses_to_tracks.conftest import CURED, made
 
@@ -47,6 +48,19 @@ def test_estimates_beside_the_bound(found):
     assert (table["sigma"] <= table["sigma_all"] * (1 + 1e-12)).all()
     assert set(table["component"]) == {"Vr"}
     np.testing.assert_allclose(table["energy_db"], 17.28, atol=0.011)
+
+
+def test_sigma_of_all_bursts_is_marked_where_few_lost_ones_decide(swept):
+    """At −4 dB 94 of 600 bursts of the spectrum are lost and make its σ_all; at 14 dB none is."""
+    for result, expected in zip(swept.cases, (OF_ALL, None, ""), strict=True):
+        if expected is None:  # marked already, as losses may be missing
+            continue
+        made = tables.tables([result])["estimates"]
+        own = made[made["filter"] == "spectrum"]
+        square, fourth = result.sums["measured"][result.axes.filters.index("spectrum"), :, 0, 1].T
+        few = 600 / (600 * fourth / square**2 - 1) < 200
+        assert few.tolist() == [expected == OF_ALL] * 4
+        assert own["note"].tolist() == [expected] * 4
 
 
 def test_losses_hold_every_realisation(found):
