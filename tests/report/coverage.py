@@ -62,10 +62,12 @@ class Kept(NamedTuple):
         return float(np.sqrt(np.sum(np.square(held - self.share * unmarked))) / unmarked.sum())
 
     def wrong(self, runs: int, high: float = HIGH) -> np.ndarray:
-        """Rows, unmarked in half of the runs or more, whose share is no chance of 93 … 97 %."""
+        """Rows, unmarked in half of the runs or more, whose share is no chance of 93 … 97 %; and all rows of which an
+        interval is unmarked and does not hold in so many of the runs that it is no chance of 7 %.
+        """
         n, k = self.unmarked, self.held
         few, many = binom.cdf(k, n, LOW) < RARE, binom.sf(k - 1, n, high) < RARE
-        return np.flatnonzero((n >= runs / 2) & (few | many))
+        return np.flatnonzero((n >= runs / 2) & (few | many) | (binom.sf(n - k - 1, runs, 1 - LOW) < RARE))
 
 
 def kept(experiment: Experiment, n: int, runs: int) -> dict[tuple[str, str], Kept]:
