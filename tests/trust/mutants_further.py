@@ -212,8 +212,8 @@ PULSES = (
     *mutants(
         "radarsim/studies/pulses_to_tracks/kernels/estimate.py",
         (
-            "pair = U(2 * world.mean.shape[0] * k)",
-            "pair = U(0 * k)",
+            "pair = U(2 * (blocks * k + begin))",
+            "pair = U(2 * begin)",
             f"{BURSTS}::test_sampled_idealisations_have_their_exact_errors",
         ),
     ),
@@ -306,7 +306,29 @@ MISSED_PLOTS = (
 )
 MARKS = "report/test_notes.py"
 STAGES = "studies/multimodel/test_notes.py"
+LOCKED = "studies/discriminator/test_notes.py"
 SAID = (
+    *mutants(
+        "radarsim/studies/discriminator/notes.py",
+        (
+            "length[f, max(k - 1, 0)]",
+            "length[f, k]",
+            f"{LOCKED}::test_windows_are_beside_each_other_by_their_length",
+        ),
+        (
+            "_tails(moments, n) * bound",
+            "_tails(moments, n)",
+            f"{LOCKED}::test_errors_are_compared_in_hertz_not_in_potential_sigma",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/pulses_to_tracks/tables.py",
+        (
+            "statistics.effective(of[:, 1, 0], of[:, 1, 1], n)",
+            "statistics.effective(of[:, 0, 0], of[:, 0, 1], n)",
+            "studies/pulses_to_tracks/test_tables.py::test_sigma_of_all_bursts_is_marked_where_few_lost_ones_decide",
+        ),
+    ),
     *mutants(
         "radarsim/studies/multimodel/notes.py",
         (

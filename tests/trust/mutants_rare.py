@@ -37,6 +37,19 @@ LOSSES = (
             "np.where((p > 0) & (p < 1) & (variance > 0), n, plain)",
             f"{LOCKS}::test_the_interval_of_a_weighted_rate_follows_the_weights",
         ),
+        (
+            "np.maximum(middle + half, p)",
+            "middle + half",
+            "report/test_statistics.py::test_the_interval_of_a_share_holds_the_share",
+        ),
+    ),
+    *mutants(
+        "radarsim/report/rare.py",
+        (
+            "np.minimum(statistics.effective_events(of.squared, of.fourth), _weighing(of))",
+            "statistics.effective_events(of.squared, of.fourth)",
+            f"{LOCKS}::test_an_interval_that_few_heavy_weights_make_is_marked",
+        ),
     ),
 )
 TRACKS = "studies/sonar/clutter/test_rare.py"
