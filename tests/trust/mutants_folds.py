@@ -42,6 +42,7 @@ FOLDS = (
         "radarsim/kernels/hypotheses.py",
         ("if side * e[i] <= 0.0:", "if side * e[i] >= 0.0:", f"{MANY} {LIST}"),
         ("weight = w[i] - c[i] * f * f", "weight = w[i] - c[0] * f * f", LIST),
+        ("if most <= above:", "if most < above:", "kernels/test_hypotheses.py"),
     ),
     *mutants(
         f"{STUDY}/kernels/orders.py",
