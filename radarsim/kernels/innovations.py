@@ -44,7 +44,10 @@ def log_likelihood(x, P, F, Q, H, z, variance, there, manoeuvre, share, score):
 
 @kernel
 def extrapolate(x, P, room, moved, F, Q, manoeuvre):
-    """x = F x and P = F P F' + manoeuvre Q, in place; room (d, d) and moved (d,) are for the sums."""
+    """x = F x and P = F P F' + manoeuvre Q, in place; room (d, d) and moved (d,) are for the sums.
+
+    P stays symmetric to the last digit, here and in `take`: what its halves differ by grows from row to row.
+    """
     d = x.size
     for a in range(d):
         moved[a] = 0.0
@@ -55,10 +58,11 @@ def extrapolate(x, P, room, moved, F, Q, manoeuvre):
                 room[a, b] += F[a, c] * P[c, b]
     for a in range(d):
         x[a] = moved[a]
-        for b in range(d):
+        for b in range(a + 1):
             P[a, b] = manoeuvre * Q[a, b]
             for c in range(d):
                 P[a, b] += room[a, c] * F[b, c]
+            P[b, a] = P[a, b]
 
 
 @kernel
@@ -77,6 +81,7 @@ def take(x, P, p, e, spread, variance, share):
     shrink = gain - w * v * e * e * difference * difference
     for a in range(x.size):
         x[a] += gain * e * p[a]
-        for b in range(x.size):
+        for b in range(a + 1):
             P[a, b] -= shrink * p[a] * p[b]
+            P[b, a] = P[a, b]
     return density

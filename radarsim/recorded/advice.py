@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from radarsim.recorded.fit import LEAST_ROWS, Progress, silent, units
+from radarsim.recorded.fit import LEAST_ROWS, Progress, polished, silent, units
 from radarsim.recorded.follow import Followed, recorded_of
 from radarsim.studies.interface import BIAS, OUTLIERS, Likelihood
 
 LEVEL = 0.05  # of finding something where nothing is wrong
 MOST_FOUND = 3
 ROUGH = 0.01  # to which explanations are compared, in the logarithm of a key and of the likelihood
-CLOSE = 1e-6  # to which the values of the one that is named are found: far finer than what is printed
 LOWEST, HIGHEST = np.log(1e-4), np.log(1e4)  # of a key's factor
 MOST_BIAS = 50.0  # in σ of the velocity
 SHARES = (1e-3, 0.4)  # of outliers
@@ -106,7 +105,7 @@ def findings(likelihood: Likelihood, progress: Progress = silent) -> list[Findin
         values, top = trials[what]
         if top - reached < needed:
             break
-        values, top = _climbed(of, [*chosen, what], values, ROUGH, CLOSE)
+        values, top = _exactly(of, values)
         found.append(Finding(what, values[what], top - reached))
         chosen, start, reached = [*chosen, what], values, top
     final = start
@@ -130,38 +129,48 @@ def _value(likelihood: _Counted, changed: dict[str, float]) -> float:
     return found if np.isfinite(found) else -1e300
 
 
-def _best(likelihood: _Counted, whats: list[str], start: dict[str, float]) -> tuple[dict[str, float], float]:
-    """The top along some explanations, and the logarithm of the likelihood there, from three starts of the last."""
-    scale = _scale(whats[-1], _units(likelihood))
-    starts = ({**start, whats[-1]: scale[0](first)} for first in (-2.0, 0.0, 2.0))
-    return max((_climbed(likelihood, whats, one, 0.5, ROUGH) for one in starts), key=lambda found: found[1])
+class _Along:
+    """A likelihood along some explanations, each on the scale on which it is searched."""
+
+    def __init__(self, likelihood: _Counted, whats: Sequence[str]):
+        unit = dict(zip(likelihood.keys, units(likelihood.of).tolist(), strict=True))
+        self.likelihood, self.scales = likelihood, {what: _scale(what, unit) for what in whats}
+
+    def searched(self, values: Mapping[str, float]) -> np.ndarray:
+        return np.array([back(values[what]) for what, (_, back) in self.scales.items()])
+
+    def natural(self, at: np.ndarray) -> dict[str, float]:
+        return {what: of(x) for (what, (of, _)), x in zip(self.scales.items(), at, strict=True)}
+
+    def __call__(self, at: np.ndarray) -> float:
+        return _value(self.likelihood, self.natural(at))
 
 
-def _climbed(
-    likelihood: _Counted, whats: list[str], start: dict[str, float], step: float, close: float
-) -> tuple[dict[str, float], float]:
-    """The top reached from a start, and the logarithm of the likelihood there; with first steps of `step`, until the
-    search stands still within `close`."""
+def _best(likelihood: _Counted, whats: Sequence[str], start: dict[str, float]) -> tuple[dict[str, float], float]:
+    """Where the likelihood is largest along some explanations, and its logarithm there: roughly, from three starts of
+    the last one."""
     from scipy.optimize import minimize
 
-    unit = _units(likelihood)
-    scales = [_scale(what, unit) for what in whats]
-
-    def natural(at: np.ndarray) -> dict[str, float]:
-        return {what: of(x) for what, (of, _), x in zip(whats, scales, at, strict=True)}
+    along, best = _Along(likelihood, whats), (start, -np.inf)
 
     def cost(at: np.ndarray) -> float:
-        return -_value(likelihood, natural(at))
+        return -along(at)
 
-    at = np.array([back(start[what]) for what, (_, back) in zip(whats, scales, strict=True)])
-    simplex = np.concatenate([at[None], at + step * np.eye(len(at))])
-    options: Any = {"initial_simplex": simplex, "xatol": close, "fatol": close, "maxfev": 400}
-    found = minimize(cost, at, method="Nelder-Mead", options=options)
-    return natural(found.x), -float(found.fun)
+    for first in (-2.0, 0.0, 2.0):
+        at = along.searched({**start, whats[-1]: along.scales[whats[-1]][0](first)})
+        simplex = np.concatenate([at[None], at + 0.5 * np.eye(len(at))])
+        options: Any = {"initial_simplex": simplex, "xatol": ROUGH, "fatol": ROUGH, "maxfev": 400}
+        found = minimize(cost, at, method="Nelder-Mead", options=options)
+        if -found.fun > best[1]:
+            best = along.natural(found.x), -float(found.fun)
+    return best
 
 
-def _units(likelihood: _Counted) -> dict[str, float]:
-    return dict(zip(likelihood.keys, units(likelihood.of).tolist(), strict=True))
+def _exactly(likelihood: _Counted, near: dict[str, float]) -> tuple[dict[str, float], float]:
+    """The top near values that were found roughly: what is printed must not hang on a processor's last digits."""
+    along = _Along(likelihood, list(near))
+    at = polished(along, along.searched(near))
+    return along.natural(at), along(at)
 
 
 def _scale(what: str, unit: dict[str, float]) -> tuple[Callable[[float], float], Callable[[float], float]]:

@@ -28,6 +28,8 @@ EVALUATIONS = 2000
 # is far finer than what is printed: which way a search goes hangs on last digits, and these differ between processors.
 CLOSE = 1e-6
 IMPOSSIBLE = -1e300  # what counts as the logarithm of no likelihood: a search needs a number
+STEP = 1e-3  # over which a slope is taken, in the logarithm of a key
+LEAST_SHARE, MOST_SHARE = 1e-6, 0.5  # of outliers; less is none
 FAR_FROM_ZERO = 1e4  # times what counts as zero of a key
 
 
@@ -132,15 +134,35 @@ def units(likelihood: Likelihood) -> np.ndarray:
     return np.where(near_zero, FAR_FROM_ZERO * np.asarray(likelihood.least), likelihood.stated)
 
 
+def polished(value: Callable[[np.ndarray], float], at: np.ndarray) -> np.ndarray:
+    """The top of a likelihood near one that a simplex has found, by quasi-Newton steps. A simplex compares, and stands
+    still where last digits decide: at their root. A difference over STEP is 10⁻⁷ wrong by them, and so is the top."""
+    from scipy.optimize import minimize
+
+    def slope(at: np.ndarray) -> np.ndarray:
+        return np.array([(value(at - step) - value(at + step)) / (2 * STEP) for step in STEP * np.eye(at.size)])
+
+    def cost(at: np.ndarray) -> float:
+        return -value(at)
+
+    bounds = [(x - FIRST_STEP, x + FIRST_STEP) for x in at]
+    found = minimize(cost, at, method="L-BFGS-B", jac=slope, bounds=bounds, options={"gtol": CLOSE, "ftol": 0.0})
+    return found.x if -found.fun >= value(at) else at
+
+
 class _Search:
     """The maximum of a likelihood, and its profile along each key. Searched are logarithms of the keys, and the logit
     of the share of outliers."""
 
     def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress):
         self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, 0
-        start = np.log(units(likelihood))
+        start, self.lowest = np.log(units(likelihood)), np.log(likelihood.least)
+        self.highest = start + math.log(REACH)
         if robust:
-            start = np.append(start, _logit(0.05))
+            start, self.lowest, self.highest = (
+                np.append(keys, _logit(share))
+                for keys, share in ((start, 0.05), (self.lowest, LEAST_SHARE), (self.highest, MOST_SHARE))
+            )
         self.best, self.top = self._climbed(start, None, FIRST_STEP, ROUGH)
         # A second start far away: the likelihood of manoeuvre and plot errors may have two hills.
         for factor in (0.1, 10.0):
@@ -150,15 +172,18 @@ class _Search:
             other, top = self._climbed(moved, None, FIRST_STEP, ROUGH)
             if top > self.top + 1e-6:
                 self.best, self.top = other, top
-        self.best, self.top = self._climbed(self.best, None, ROUGH, CLOSE)
-        self.raised = {i: self._raised(i) for i in range(len(likelihood.stated)) if self._maybe_zero(i)}
+        self.best = polished(self._value, self._climbed(self.best, None, ROUGH, CLOSE)[0])
+        self.top = self._value(self.best)
+        self.raised = {i: self._raised(i) for i in range(start.size) if self._maybe_zero(i)}
 
     def natural(self, searched: np.ndarray) -> np.ndarray:
-        """The keys, and the share of outliers at the end where they are allowed for."""
+        """The keys, and the share of outliers at the end where they are allowed for: at most MOST_SHARE, for all plots
+        as outliers of a tenth of the σ are as likely as none."""
         count = len(self.likelihood.stated)
         keys = np.exp(np.clip(searched[:count], -200, 200))
         keys = np.where(keys <= self.likelihood.least, 0.0, keys)
-        return np.append(keys, 1 / (1 + np.exp(-searched[count:]))) if self.robust else keys
+        share = 1 / (1 + np.exp(-searched[count:]))
+        return np.append(keys, np.minimum(share, MOST_SHARE)) if self.robust else keys
 
     def _value(self, searched: np.ndarray) -> float:
         values = self.natural(searched)
@@ -170,7 +195,8 @@ class _Search:
 
     def _climbed(self, start: np.ndarray, held: int | None, step: float, close: float) -> tuple[np.ndarray, float]:
         """The top reached from a start, one coordinate held or none, and the logarithm of the likelihood there; with
-        first steps of `step`, until the search stands still within `close`."""
+        first steps of `step`, until the search stands still within `close`, and does so again when it begins anew from
+        there: on a plain a simplex may shrink before it has found the way up."""
         from scipy.optimize import minimize
 
         free = np.array([i for i in range(len(start)) if i != held])
@@ -182,11 +208,14 @@ class _Search:
 
         if not free.size:
             return start, self._value(start)
-        simplex = np.concatenate([start[free][None], start[free] + step * np.eye(free.size)])
-        options: Any = {"initial_simplex": simplex, "xatol": close, "fatol": close / 10, "maxfev": EVALUATIONS}
-        found = minimize(cost, start[free], method="Nelder-Mead", options=options)
-        whole[free] = found.x
-        return whole, -float(found.fun)
+        at, top, gain = start[free], IMPOSSIBLE, math.inf
+        while gain > close:
+            simplex = np.concatenate([at[None], at + step * np.eye(free.size)])
+            options: Any = {"initial_simplex": simplex, "xatol": close, "fatol": close / 10, "maxfev": EVALUATIONS}
+            found = minimize(cost, at, method="Nelder-Mead", options=options)
+            at, top, gain = found.x, -float(found.fun), -float(found.fun) - top
+        whole[free] = at
+        return whole, top
 
     def _profile(self, i: int, at: float, near: np.ndarray) -> tuple[float, np.ndarray]:
         """The largest likelihood with key i held at the logarithm `at`, and where that is."""
@@ -200,14 +229,15 @@ class _Search:
         return top, where
 
     def _maybe_zero(self, i: int) -> bool:
-        """Whether the plots hardly tell a key from zero: near zero its logarithm is a plain without slope, on which a
-        search stands still wherever it comes to lie, though the key has to rise where another one is held too low."""
-        return self._sliced(i, math.log(self.likelihood.least[i])) > self.top - HALF_CHI2_95
+        """Whether the plots hardly tell a key, or the share of outliers, from zero: near zero its logarithm is a plain
+        without slope, on which a search stands still, though it has to rise where another one is held too low. Asked a
+        little above zero: a σ of nothing is no filter's."""
+        return self._sliced(i, self.lowest[i] + CLOSE) > self.top - HALF_CHI2_95
 
     def _raised(self, i: int) -> float:
         """The logarithm of such a key from which a search sees the slope: where the likelihood falls above the top."""
-        log = max(float(self.best[i]), math.log(self.likelihood.least[i]))
-        while self._sliced(i, log) > self.top - HALF_CHI2_95 and log < math.log(units(self.likelihood)[i] * REACH):
+        log = max(float(self.best[i]), float(self.lowest[i]))
+        while self._sliced(i, log) > self.top - HALF_CHI2_95 and log < self.highest[i]:
             log += 1.0
         return log
 
@@ -222,7 +252,7 @@ class _Search:
         limit = self.top - HALF_CHI2_95
         lo, hi = (self._end(i, direction, limit) for direction in (-1, 1))
         value = float(self.natural(self.best)[i])
-        least = math.log(self.likelihood.least[i])
+        least = self.lowest[i]
         ends = (0.0 if lo is None or lo <= least else math.exp(lo), math.inf if hi is None else math.exp(hi))
         stated = float(self.likelihood.stated[i])
         return Fitted(self.likelihood.keys[i], stated, value, *ends, ends[0] > 0 and math.isfinite(ends[1]))
@@ -231,7 +261,7 @@ class _Search:
         """The logarithm of key i at which the profile falls to a limit; None where it does not within REACH."""
         from scipy.optimize import brentq
 
-        least = math.log(self.likelihood.least[i])
+        least = float(self.lowest[i])
         near, step = self.best, 0.1
         home = inside = max(float(self.best[i]), least)
         while abs(inside - home) < math.log(REACH):

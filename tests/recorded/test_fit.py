@@ -130,6 +130,18 @@ def test_what_is_advised_is_the_top(options):
         assert abs(0.5 * 0.01 * (above - below) / (2 * here - below - above)) < 5e-4
 
 
+def test_all_plots_as_outliers_are_no_fit():
+    """Ten times the σ with no outliers is as likely as the σ with nothing but outliers: the share stays under a half,
+    from wherever the search begins."""
+    one = likelihood(recording(np.random.default_rng(1)))
+    for share in (0.05, 0.95):
+        search = fit._Search(one, True, fit.silent)
+        mirrored = search.best + np.array([*[np.log(0.1)] * 2, 0.0, np.log(share / (1 - share)) - search.best[3]])
+        at, top = search._climbed(mirrored, None, fit.FIRST_STEP, fit.CLOSE)
+        assert search.natural(at)[3] <= 0.5
+        assert top <= search.top + 1e-6
+
+
 def test_an_end_is_found_where_another_key_has_to_rise_from_zero():
     """σ of range held too low makes the plots look like manoeuvres. Outside the interval no manoeuvre variance makes
     the plots likely enough, inside some does: the profile by a grid of it, σ of velocity at its best."""
