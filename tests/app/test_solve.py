@@ -227,7 +227,7 @@ def test_a_key_that_leaves_the_scans_is_paired(key, quantity):
 
 @pytest.mark.slow
 def test_the_interval_of_a_key_that_moves_the_scans_covers_a_known_root():
-    """Of 40 seeds at least as many as of a binomial number of 0.95 (4 σ): it covers more, as noise makes it wider."""
+    """Of 40 seeds at least as many as a binomial number of 0.95 allows (4 σ); measured: 37."""
     exact = solve("rls2", "radar.scan_period_s", SEEN, 190, **MOVED).value
     inside = 0
     for seed in range(40):
