@@ -221,3 +221,17 @@ def test_track_in_the_cartesian_frame(frame):
     assert [name for name, _ in track.components] == ["x", "vx", "y", "vy"]
     assert track.estimate[0, -1, 0] == pytest.approx(-8890, rel=0.01)
     assert np.isfinite(track.estimate[0, -1]).all()
+
+
+def test_growing_memory_falls_behind_whatever_the_fluctuation():
+    """A smaller one only later: exact σ of the range, first plot at which growing memory is worse (docs/sonar.md)."""
+    for size, of_window, of_kalman in (("0.05", 25, 11), ("0.02", 49, 35)):
+        changes = ["target=sonar_fluctuating", f"target.fluctuation_mps2={size}", "scans=60", "realisations=8"]
+        axes = CaseWork(load("sonar_smoothing", changes).cases[0]).plan.axes
+        growing, window, kalman = (
+            axes.exact_sigma[axes.filters.index(name), 10:, 0] for name in ("growing", "window 10", "kalman q")
+        )
+        for other, first in ((window, of_window), (kalman, of_kalman)):
+            worse = growing > other
+            assert 11 + int(np.argmax(worse)) == first
+            assert worse[first - 11 :].all()
