@@ -64,6 +64,15 @@ def number(value: object, powers: bool = False) -> str:
     return text.number(value)
 
 
+def in_short(value: object, among: Sequence[object]) -> object:
+    """A mapping by its kind and what sets it apart from others of the kind, as words; any other value as it is."""
+    if not isinstance(value, Mapping) or "kind" not in value:
+        return value
+    alike = [one for one in among if isinstance(one, Mapping) and one.get("kind") == value["kind"]]
+    own = {key: one for key, one in value.items() if any(other.get(key) != one for other in alike)}
+    return ", ".join(filter(None, (number(value["kind"]), number(own))))
+
+
 def literal(name: str) -> str:
     """Text of a user's for a figure: a dollar is a dollar."""
     return name.replace("$", r"\$")
@@ -415,7 +424,8 @@ def lines_of(members: Sequence[CaseResult], rows: Mapping, component: str, draw:
                 marks.append(draw(own, literal(f), style, literal(f)))
             else:
                 key, value = result.swept[-1] if result.swept else ("", device(result))
-                words = _shown_value(result, key, value) if key else number(value)
+                among = [dict(one.swept).get(key) for one in members]
+                words = _shown_value(result, key, in_short(value, among)) if key else number(value)
                 marks.append(draw(own, words, style, f"{literal(f)}, {swept(result)}"))
     return marks
 

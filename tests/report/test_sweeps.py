@@ -1,6 +1,7 @@
 """Figures that a sweep has by itself: what is drawn is σ at the last scan; and the page of claims."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -168,6 +169,25 @@ def test_lists_and_long_names_at_an_axis_and_in_titles():
     assert [words for _, words in axis.ticks] == ["1000, 1200", "1000, 1200,\n1400"]
     _, axis = sweeps.places(first, key, ["aeroballistic_gentle", "weaving"])
     assert [words for _, words in axis.ticks] == ["aeroballistic\ngentle", "weaving"]
+
+
+def test_targets_that_are_swept_are_named_by_their_kind_and_what_sets_them_apart():
+    """In whole they are wider than a page."""
+    past = {"kind": "fly_by", "distance_m": 15e3, "speed_mps": 280.0, "start_range_m": 40e3}
+    targets = [past, past | {"speed_mps": 100.0, "sigma_position_m": 800.0}, {"kind": "recorded", "file": "flight.csv"}]
+    words = ["fly by, speed mps 280", "fly by, speed mps 100, sigma position m 800", "recorded"]
+    assert [panels.number(panels.in_short(one, targets)) for one in targets] == words
+    result = experiment.run("rls2", realisations=8, figures=False, overrides=["scans=4"]).cases[0]
+    x, axis = sweeps.places(result, "target", targets)
+    assert x.tolist() == [0, 1, 2]
+    assert [" ".join(shown.split()) for _, shown in axis.ticks] == words
+    lines = panels.lines_of(
+        [replace(result, name=f"rls2 {n}", swept=(("target", one),)) for n, one in enumerate(targets)],
+        {(f"rls2 {n}", "r", "r"): n for n in range(3)},
+        "r",
+        lambda own, label, style, name: label,
+    )
+    assert lines == words
 
 
 def test_panels_of_several_configs_that_would_be_called_the_same_are_told_by_their_config():
