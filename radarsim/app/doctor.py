@@ -80,7 +80,7 @@ def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
     found = Inspection(Path(folder))
     blocks = _blocks(found.folder)
     record = _settled(found)
-    if hashlib.sha256(_json(record["resolved"])).hexdigest() != record["resolved_sha256"]:
+    if _digest(record["resolved"]) != record["resolved_sha256"]:
         found.faults.append(f"{found.folder / 'run.json'}: damaged: the config in it is not the one that ran")
     elsewhere = []
     for name, stored_as in record["identities"].items():
@@ -139,10 +139,14 @@ def _record(folder: Path) -> dict[str, Any]:
     return record
 
 
-def _json(value: object) -> bytes:
+def _digest(value: object) -> str | None:
+    """SHA-256 of what run.json holds, in hexadecimal; None for what no run writes, such as NaN."""
     from radarsim.report.provenance import to_json
 
-    return to_json(value)
+    try:
+        return hashlib.sha256(to_json(value)).hexdigest()
+    except (ValueError, RecursionError):
+        return None
 
 
 def _outputs(found: Inspection, outputs: dict[str, str]) -> None:

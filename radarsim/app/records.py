@@ -17,13 +17,13 @@ NAMED = 3  # cases in a line
 
 def recorded_case(record: Mapping, name: str) -> Case | None:
     """A case as run.json resolved it; None where it no longer reads as a config."""
-    for case in record["resolved"]["cases"]:
-        if case["case"] == name:
-            keys = {key: value for key, value in case.items() if key not in LABELS}
-            try:
+    try:
+        for case in record["resolved"]["cases"]:
+            if case["case"] == name:
+                keys = {key: value for key, value in case.items() if key not in LABELS}
                 return load({"study": record["study"], **keys}).cases[0]
-            except RadarsimError:
-                return None
+    except (RadarsimError, LookupError, TypeError):
+        pass
     return None
 
 

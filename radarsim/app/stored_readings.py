@@ -20,7 +20,9 @@ def stored_readings(out: Path) -> list[dict[str, Any]]:
         rows, names = list(table), set(table.fieldnames or ())
     except FileNotFoundError:
         return []
-    except (OSError, ValueError, csv.Error) as error:
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
+    except (ValueError, csv.Error) as error:
         raise StoreError(f"{path}: cannot be read: {error}") from error
     if not names >= NEEDED:
         raise StoreError(f"{path}: is no table of readings; remove it, `radarsim readings` makes it again")

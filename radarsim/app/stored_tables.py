@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.errors import StoreError
-from radarsim.report import files
+from radarsim.report import files, provenance
 from radarsim.report import tables as common
 
 if TYPE_CHECKING:
@@ -20,11 +20,14 @@ def record(folder: Path) -> dict[str, Any] | None:
     path = folder / "run.json"
     try:
         found = json.loads(files.read(path))
+        provenance.to_json(found)  # ValueError for what no run writes, such as NaN or half a character
         if all(isinstance(found[key], dict) for key in ("cases", "outputs", "resolved")):
             return dict(found)
     except (FileNotFoundError, NotADirectoryError):
         return None
-    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
+    except (ValueError, LookupError, TypeError, RecursionError):
         pass
     raise StoreError(f"{path}: is no record of a run; {AGAIN}")
 

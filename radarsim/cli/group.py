@@ -62,7 +62,8 @@ class Commands(click.Group):
             sys.exit(0)
         except OSError as error:
             sys.stdout = open(os.devnull, "w")  # noqa: SIM115
-            fail(StoreError(f"{error.filename or 'output'}: cannot be written: {error.strerror or error}"))
+            what = f"{error.filename}: cannot be read or written" if error.filename else "output: cannot be written"
+            fail(StoreError(f"{what}: {error.strerror or error}"))
 
 
 @contextlib.contextmanager
@@ -103,9 +104,10 @@ def fail(error: RadarsimError) -> NoReturn:
     """Report a fault, a line each, and leave with its exit code."""
     from radarsim.cli.console import broken
 
-    for line in dict.fromkeys(error.lines):
-        for part in broken(line, sys.stderr):
-            click.echo(part, err=True)
+    with contextlib.suppress(OSError):  # errors that cannot be written either: the exit code remains
+        for line in dict.fromkeys(error.lines):
+            for part in broken(line, sys.stderr):
+                click.echo(part, err=True)
     if isinstance(error, Interrupted):
         # The interpreter's orderly end takes most of a second, which whoever sent the signal need not wait for.
         os._exit(error.exit_code)

@@ -1,11 +1,14 @@
 """`radarsim compare`: what it reads, what it writes, how it fails."""
 
 import json
+import math
+import shutil
 
 import pytest
 from click.testing import CliRunner
 
 from radarsim.app import run as experiment
+from radarsim.app.records import recorded_case
 from radarsim.cli import main
 from radarsim.report import tables
 
@@ -66,6 +69,27 @@ def test_a_table_that_was_altered_is_no_result(out, tmp_path):
     with (tmp_path / "rls2" / "curves.csv").open("a") as file:
         file.write("\n")
     assert "altered" in radarsim("compare", "rls4", tmp_path / "rls2", "--out", out, code=4).stderr
+
+
+@pytest.mark.parametrize(
+    "alter",
+    [
+        lambda record: record.update(resolved_sha256={"\ud800": "x"}),  # half a character: no file can hold it
+        lambda record: record.update(seconds=math.nan),
+    ],
+)
+def test_a_record_that_no_run_writes_is_no_result(out, tmp_path, alter):
+    copy = shutil.copytree(out / "rls2", tmp_path / "rls2")
+    record = json.loads((copy / "run.json").read_text())
+    alter(record)
+    (copy / "run.json").write_text(json.dumps(record))
+    assert "is no record of a run" in radarsim("compare", "rls4", copy, "--out", out, code=4).stderr
+
+
+@pytest.mark.parametrize("cases", [None, [[[]]], [{}], [{"case": "rls2", "radar": "\ud800"}]])
+def test_a_case_that_no_longer_reads_as_a_config_is_none(cases):
+    record = {"study": "range_doppler", "resolved": {"cases": cases}}
+    assert recorded_case(record, "rls2") is None
 
 
 def test_a_result_of_an_earlier_config_is_marked(out):

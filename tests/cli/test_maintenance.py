@@ -1,6 +1,7 @@
 """`radarsim doctor` and `radarsim clean`: every damage named, nothing but blocks removed."""
 
 import json
+import math
 import os
 import random
 import re
@@ -97,6 +98,18 @@ def test_forged_sums_are_found_by_computing_them_again(out):
     assert f"{cut}: computed again, the sums are others" in result.stderr
 
 
+def rewritten(path, alter):
+    """Change the record in a run.json."""
+    record = json.loads(path.read_text())
+    alter(record)
+    path.write_text(json.dumps(record))
+
+
+def nested(levels):
+    """Lists in lists: read by json.loads, too deep for json.dumps with an indent."""
+    return [nested(levels - 1)] if levels else []
+
+
 @pytest.mark.parametrize(
     ("spoil", "code", "words"),
     [
@@ -106,6 +119,16 @@ def test_forged_sums_are_found_by_computing_them_again(out):
         (lambda path: path.write_text("[" * 100_000), 4, "run.json: damaged"),
         (lambda path: path.write_text(re.sub('"rls2": "[0-9a-f]+"', '"rls2": "../x"', path.read_text())), 4, "damaged"),
         (lambda path: path.write_text(path.read_text().replace('"r+Vr"', '"r+vr"')), 4, "run.json: damaged"),
+        (lambda path: rewritten(path, lambda record: record["resolved"].update(cases=[[[]]])), 4, "run.json: damaged"),
+        (lambda path: rewritten(path, lambda record: record["resolved"].update(cases=[{}])), 4, "run.json: damaged"),
+        (lambda path: rewritten(path, lambda record: record["resolved"].update(cases=None)), 4, "run.json: damaged"),
+        (lambda path: rewritten(path, lambda record: record["resolved"].update(odd="\ud800")), 4, "run.json: damaged"),
+        (lambda path: rewritten(path, lambda record: record["resolved"].update(odd=math.nan)), 4, "run.json: damaged"),
+        (
+            lambda path: rewritten(path, lambda record: record["resolved"].update(odd=nested(400))),
+            4,
+            "run.json: damaged",
+        ),
         (
             lambda path: path.write_text(path.read_text().replace('"curves.csv"', '"../../etc"')),
             4,

@@ -312,6 +312,11 @@ def test_output_that_cannot_be_written_and_output_that_nobody_reads():
     assert (piped.returncode, piped.stderr) == (0, b"")
 
 
+def test_errors_that_cannot_be_written_leave_the_exit_code():
+    done = subprocess.run(f"{sys.executable} -m radarsim check nope 2> /dev/full", shell=True, check=False)
+    assert done.returncode == 2
+
+
 def test_streams_that_know_no_greek(tmp_path):
     environment = {**os.environ, "PYTHONIOENCODING": "latin-1"}
     arguments = ("run", "rls2", "-n", "1000", "--no-figures", "--out", str(tmp_path))

@@ -138,3 +138,28 @@ def test_results_that_may_not_be_read(command, closed, made):
     assert done.returncode != 0
     assert "curves.csv" in done.stdout + done.stderr
     assert "ermission denied" in done.stdout + done.stderr
+
+
+def test_blocks_that_may_not_be_read_are_not_said_to_be_written(command, made):
+    blocks = made / ".blocks"
+    mode = blocks.stat().st_mode
+    blocks.chmod(0)
+    try:
+        done = command("doctor", made / "rls2")
+    finally:
+        blocks.chmod(mode)
+    assert done.returncode == 4
+    assert "ermission denied" in done.stderr
+    assert "cannot be written" not in done.stderr
+
+
+def test_a_record_that_may_not_be_read_is_not_taken_for_a_damaged_one(command, made, tmp_path):
+    record = made / "rls2/run.json"
+    mode = record.stat().st_mode
+    record.chmod(0)
+    try:
+        done = command("compare", made / "rls2", made / "rls2", "--no-figures", "--out", tmp_path)
+    finally:
+        record.chmod(mode)
+    assert done.returncode == 4
+    assert done.stderr == f"{record}: cannot be read: Permission denied\n"
