@@ -6,6 +6,7 @@ identity of the work tells.
 """
 
 import contextlib
+import ipaddress
 import logging
 import os
 import pickle
@@ -80,7 +81,7 @@ def trust(address: str) -> str | None:
     """What computing with the scheduler at an address rests on, in one line; None for one of this machine."""
     host = address.partition("://")[2] or address
     host = host.rpartition(":")[0].strip("[]")
-    if host in ("localhost", "::1") or host.startswith("127."):
+    if host == "localhost" or _is_loopback(host):
         return None
     if address.startswith("tls://"):
         return f"{address}: whoever holds a certificate of its authority may run programs on its workers"
@@ -88,6 +89,14 @@ def trust(address: str) -> str | None:
         f"{address}: neither encrypted nor authenticated: whoever reaches it may run programs on its workers and give "
         "this run false sums; on a network that you do not trust use tls:// (docs/scale.md)"
     )
+
+
+def _is_loopback(host: str) -> bool:
+    """Whether a host is an address of this machine alone; 127.example.com is a name, and may be anywhere."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def _security(distributed: ModuleType) -> "Security | None":

@@ -207,11 +207,20 @@ def test_addresses_that_cannot_be_used_are_told_at_once(address, words):
 
 @pytest.mark.parametrize(
     ("address", "words"),
-    [("tcp://h:8786", "neither encrypted nor authenticated"), ("tls://h:8786", "certificate"), ("h:8786", "neither")],
+    [
+        ("tcp://h:8786", "neither encrypted nor authenticated"),
+        ("tls://h:8786", "certificate"),
+        ("h:8786", "neither"),
+        ("tcp://127.example.com:8786", "neither"),
+    ],
 )
 def test_what_a_scheduler_elsewhere_rests_on_is_told(address, words):
     assert words in cluster.trust(address)
-    assert cluster.trust("tcp://127.0.0.1:8786") is None
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:8786", "tcp://127.1.2.3:1", "tls://[::1]:8786", "localhost:8786"])
+def test_a_scheduler_of_this_machine_takes_no_trust(address):
+    assert cluster.trust(address) is None
 
 
 def certificates(folder):
