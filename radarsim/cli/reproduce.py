@@ -19,7 +19,8 @@ from radarsim.errors import RadarsimError, StoreError
 
 def main(arguments: Sequence[str]) -> int:
     """The shipped configs of some names, or all, into a directory; the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m radarsim.cli.reproduce", description=__doc__.splitlines()[0])
+    about = (__doc__ or "").partition("\n")[0]  # none with -OO
+    parser = argparse.ArgumentParser(prog="python -m radarsim.cli.reproduce", description=about)
     parser.add_argument("out", nargs="?", default=RESULTS, help="directory; results where none is given")
     parser.add_argument("configs", nargs="*", help="names of configs; all where none is given")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="of every config")

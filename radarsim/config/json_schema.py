@@ -49,7 +49,7 @@ def schema(studies: Studies) -> dict[str, Any]:
 def _experiment(name: str, study: dict[str, Any], common: dict[str, Any]) -> dict[str, Any]:
     """A config of one study: the common keys and its own."""
     kept = {key: value for key, value in common.items() if key not in ("study", "include")}
-    about = {"const": name, "description": study["description"]}
+    about = {"const": name, "description": study.get("description", name)}  # of a docstring, which -OO leaves out
     return {
         **study,
         "title": name,

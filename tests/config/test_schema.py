@@ -3,6 +3,8 @@
 import json
 import math
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -58,6 +60,15 @@ def test_shipped_scenarios_name_themselves(file):
     comments = [line for line in file.read_text(encoding="utf-8").splitlines() if line.startswith("#")]
     assert any(line.startswith(f"# scenarios/{file.name} — ") for line in comments)
     assert "# yaml-language-server: $schema=../docs/schema.json" in comments
+
+
+def test_json_schema_is_told_without_docstrings_too():
+    """PYTHONOPTIMIZE=2 takes the docstrings away that describe the studies."""
+    command = [sys.executable, "-OO", "-m", "radarsim", "schema"]
+    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    bare, whole = (json.loads(text)["$defs"]["range_doppler"]["properties"] for text in (told, schema_json()))
+    assert bare["study"]["const"] == "range_doppler"
+    assert bare["scans"] == whole["scans"]
 
 
 def test_json_schema_tells_studies_apart_and_says_nothing_idle():
