@@ -148,8 +148,8 @@ def joint(of: PaperReadings, over: Sequence[Over]) -> Joint:
         found.append(Together(reading, of.name(reading), of.kind(reading), held, judged, outcomes))
     found.sort(key=lambda one: (-one.count(False), -one.count(True), -len(one.held), changed(of, one.reading)))
     numbers: dict[Key, Asserted] = {}
-    for one in (one for own in claims for one in own.values()):
-        numbers = one.numbers | numbers  # a number has the name that it has as shipped, of the first reading
+    for key, asserted in (item for own in claims for one in own.values() for item in one.numbers.items()):
+        numbers.setdefault(key, asserted)  # a number has the name that it has as shipped, of the first reading
     return Joint(of, tuple(found), numbers)
 
 
