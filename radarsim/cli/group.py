@@ -88,7 +88,15 @@ def stoppable() -> Iterator[None]:
         late.start()
         raise error
 
+    told = sys.unraisablehook
+
+    def silent_of_it(what: "sys.UnraisableHookArgs") -> None:
+        """Of a handler's exception that Python has to swallow nothing is printed: the process ends a little later."""
+        if not isinstance(what.exc_value, Interrupted):
+            told(what)
+
     before = {number: signal.signal(number, stop) for number in numbers}
+    sys.unraisablehook = silent_of_it
     try:
         yield
     except Exception:
@@ -96,6 +104,7 @@ def stoppable() -> Iterator[None]:
             raise received[0] from None
         raise
     finally:
+        sys.unraisablehook = told
         for number, handler in before.items():
             signal.signal(number, handler)
 

@@ -105,6 +105,25 @@ def test_a_signal_that_is_swallowed_ends_the_process_a_little_later(monkeypatch)
     assert [error.exit_code for error in left] == [143]
 
 
+def test_what_python_swallows_of_a_signal_is_not_printed(capsys, monkeypatch):
+    """As in a finaliser, or in what a C library calls; faults of another kind are printed as ever."""
+
+    class Dying:
+        def __init__(self, fault):
+            self.fault = fault
+
+        def __del__(self):
+            raise self.fault
+
+    monkeypatch.setattr(sys, "unraisablehook", sys.__unraisablehook__)
+    with group.stoppable():
+        Dying(Interrupted(signal.SIGTERM, goes_on=False))
+        assert capsys.readouterr().err == ""
+        Dying(ValueError("another"))
+        assert "another" in capsys.readouterr().err
+    assert sys.unraisablehook is sys.__unraisablehook__
+
+
 def test_other_faults_pass_and_handlers_are_as_before():
     before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     with pytest.raises(KeyError), group.stoppable():

@@ -331,12 +331,12 @@ def result_of(n, *others, **keys):
 
 
 def test_tables_tell_the_rate_and_how_well_it_is_known():
-    result = result_of(3000, NEAREST | {"manoeuvre_variance": 1e-3})
+    result = result_of(6000, NEAREST | {"manoeuvre_variance": 1e-3})
     table = result.tables["rare"]
     assert list(table.columns[: len(report.COLUMNS)]) == list(report.COLUMNS)
     row, sums = table.iloc[0], result.cases[0].sums
     weight, square, number, _ = sums["events"][0, -1, kernels.WRONG]
-    assert row["rate"] == weight / 3000
+    assert row["rate"] == weight / 6000
     assert row["events"] == number
     assert row["n_eff"] == pytest.approx(weight**2 / square)
     assert row["rate_lo"] < row["rate"] < row["rate_hi"]
@@ -348,7 +348,7 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
     assert last["right"] == pytest.approx(1 - row["rate"], rel=1e-15)
     assert last["right_hi"] == pytest.approx(1 - row["rate_lo"], rel=1e-15)
     weight = sums["events"][0, -1, kernels.BEYOND, 0]
-    assert last["beyond"] == weight / 3000
+    assert last["beyond"] == weight / 6000
     assert result.curves["n"].max() <= row["plain"]
     assert "by importance sampling" in " ".join(result.answer)
     assert not any("rare event" in line for line in result.warnings)
