@@ -9,6 +9,7 @@ import itertools
 from abc import ABC
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
@@ -114,11 +115,16 @@ class PaperReadings(ABC):
 
     def of_claim(self, claim: str) -> list[Reading]:
         """The declared readings that differ for a claim: what does not bear on it is left at its default."""
-        return list(dict.fromkeys(self.bearing(one, claim) for one in self.declared()))
+        return list(dict.fromkeys(self.bearing(one, claim) for one in self._declared))
+
+    @cached_property
+    def _declared(self) -> Sequence[Reading]:
+        return self.declared()
 
     def bearing(self, reading: Reading, claim: str) -> Reading:
         """A reading with what does not bear on a claim left at its default."""
-        return self.reading(**{one.key: reading[one.key] for one in self.choices if one.bears_on(claim)})
+        pairs = zip(reading.taken, self.choices, strict=True)
+        return Reading(tuple((key, name if one.bears_on(claim) else one.default) for (key, name), one in pairs))
 
     def kind(self, reading: Reading) -> str:
         """E, U or N: the last of the kinds of its alternatives that are not the default; E of the default itself."""
