@@ -2,7 +2,7 @@
 
 Each is a place of the program where a slip would give plausible, wrong numbers: a sign, a transposed index, a lost
 term, a bound one off. A test of the ordinary suite keeps the list in step with the sources. The list goes on in
-`mutants_further` and `mutants_folds`.
+the other files `mutants_…`.
 """
 
 from tests.trust.mutant import mutants
@@ -10,6 +10,7 @@ from tests.trust.mutants_controls import CONTROLS
 from tests.trust.mutants_folds import FOLDS
 from tests.trust.mutants_further import FURTHER
 from tests.trust.mutants_rare import RARE
+from tests.trust.mutants_recorded import RECORDED
 
 LINEAR, RANDOM = "kernels/test_linear.py", "kernels/test_random.py"
 TEXTBOOK = f"{LINEAR}::test_estimates_are_the_textbook_filter"
@@ -341,4 +342,16 @@ ENGINE = (
     ),
 )
 
-ALL = (*KERNELS, *FILTERS, *FRAMES_AND_MODELS, *EXACT_VALUES, *NUMBERS, *ENGINE, *FURTHER, *FOLDS, *RARE, *CONTROLS)
+ALL = (
+    *KERNELS,
+    *FILTERS,
+    *FRAMES_AND_MODELS,
+    *EXACT_VALUES,
+    *NUMBERS,
+    *ENGINE,
+    *FURTHER,
+    *FOLDS,
+    *RARE,
+    *CONTROLS,
+    *RECORDED,
+)
