@@ -486,25 +486,28 @@ def print_claims(rows: Sequence[dict[str, Any]]) -> None:
     On a terminal a table; where it is piped, lines that can be searched. Of experiments that are not the paper's a line
     for each reason, with the claims that cannot be judged for it.
     """
-    from radarsim.report.claims import page, reasons
+    from radarsim.report.claims import NOT_JUDGED, NOT_RUN, page, reasons
 
-    foreign = [row for row in rows if row["class"] == NOT_JUDGED and not row["what"]]
-    rows = [row for row in rows if row not in foreign]
-    if rows:
-        _print_stated(rows)
-    for stem, why in dict.fromkeys((row["config"], row["why"]) for row in foreign):
-        names = [row["claim"] for row in foreign if (row["config"], row["why"]) == (stem, why)]
+    stated: list[dict[str, Any]] = []
+    foreign: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        if row["class"] == NOT_JUDGED and not row["what"]:
+            foreign.setdefault((row["config"], row["why"]), []).append(row["claim"])
+        else:
+            stated.append(row)
+    if stated:
+        _print_stated(stated)
+    for (stem, why), names in foreign.items():
         told = {"stem": stem, "names": _in_a_row(names), "reason": reasons.said(why)}
         say(tr("{stem}: not judged: {names}: {reason}", **told))
-    say(page.counted(rows) or tr("no claims are judged by this"))
-    if rows and all(row["class"] == "not run" for row in rows):
+    say(page.counted(stated) or tr("no claims are judged by this"))
+    if stated and all(row["class"] == NOT_RUN for row in stated):
         say(tr(NOTHING_RUN))
 
 
 NOTHING_RUN = term(
     "nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has the results at full size"
 )
-NOT_JUDGED = "not judged here"
 
 
 def _in_a_row(claims: Sequence[str]) -> str:

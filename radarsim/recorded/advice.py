@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from radarsim.recorded.fit import LEAST_ROWS, Progress, polished, silent, units
+from radarsim.recorded.fit import IMPOSSIBLE, LEAST_ROWS, Progress, polished, silent, units
 from radarsim.recorded.follow import Followed, recorded_of
 from radarsim.studies.interface import BIAS, OUTLIERS, Likelihood
 
@@ -126,7 +126,7 @@ def _value(likelihood: _Counted, changed: dict[str, float]) -> float:
     stated = zip(likelihood.keys, likelihood.stated, strict=True)
     values = np.array([changed.get(key, value) for key, value in stated])
     found = likelihood(values, changed.get(OUTLIERS, 0.0), changed.get(BIAS, 0.0))
-    return found if np.isfinite(found) else -1e300
+    return found if np.isfinite(found) else IMPOSSIBLE
 
 
 class _Along:

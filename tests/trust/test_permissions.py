@@ -4,6 +4,7 @@ The other user is this process without the right to pass over permissions, which
 root and for anybody else.
 """
 
+import contextlib
 import ctypes
 import os
 import subprocess
@@ -126,28 +127,29 @@ def test_a_report_that_cannot_be_written_again(command, closed, made):
     assert str(made) in line
 
 
+@contextlib.contextmanager
+def unreadable(path):
+    """A file or folder closed to everybody for a while."""
+    mode = path.stat().st_mode
+    path.chmod(0)
+    try:
+        yield
+    finally:
+        path.chmod(mode)
+
+
 def test_results_that_may_not_be_read(command, closed, made):
     """A table closed to everybody is named, not taken for damaged."""
-    table = made / "rls2/curves.csv"
-    mode = table.stat().st_mode
-    table.chmod(0)
-    try:
+    with unreadable(made / "rls2/curves.csv"):
         done = command("doctor", made / "rls2")
-    finally:
-        table.chmod(mode)
     assert done.returncode != 0
     assert "curves.csv" in done.stdout + done.stderr
     assert "ermission denied" in done.stdout + done.stderr
 
 
 def test_blocks_that_may_not_be_read_are_not_said_to_be_written(command, made):
-    blocks = made / ".blocks"
-    mode = blocks.stat().st_mode
-    blocks.chmod(0)
-    try:
+    with unreadable(made / ".blocks"):
         done = command("doctor", made / "rls2")
-    finally:
-        blocks.chmod(mode)
     assert done.returncode == 4
     assert "ermission denied" in done.stderr
     assert "cannot be written" not in done.stderr
