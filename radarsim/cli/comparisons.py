@@ -44,7 +44,7 @@ def compare(
     """
     from radarsim.app import compare as comparing
     from radarsim.app import documents
-    from radarsim.cli import console
+    from radarsim.cli import outcomes
 
     if len(sources) < 2:
         raise click.UsageError(f"compare takes two results or more, got {len(sources)}")
@@ -52,4 +52,4 @@ def compare(
     if as_json:
         click.echo(documents.text(documents.fields(compared)))
     else:
-        console.print_comparison(compared)
+        outcomes.print_comparison(compared)

@@ -152,7 +152,7 @@ def _compute_each(
 ) -> None:
     """Compute experiments one by one and print what came of each; raises TargetUnmet at the end for what was not."""
     from radarsim.app import documents, simulation
-    from radarsim.cli import console
+    from radarsim.cli import console, outcomes
 
     made: list[dict[str, Any]] = []
     unmet: list[str] = []
@@ -173,11 +173,11 @@ def _compute_each(
         if isinstance(done, simulation.Shares):
             made.append(documents.share(done))
             if not (quiet or as_json):
-                console.print_share(done, out)
+                outcomes.print_share(done, out)
         else:
             made.append(documents.result(done))
             if not (quiet or as_json):
-                console.print_result(done)
+                outcomes.print_result(done)
     if as_json:
         click.echo(documents.text(made))
     if wrong:
@@ -220,7 +220,7 @@ def check(
     from radarsim.app import documents
     from radarsim.app import outlook as overview
     from radarsim.app import run as experiment
-    from radarsim.cli import console
+    from radarsim.cli import console, outcomes
 
     made = []
     for one in experiment.load_all(configs, experiment.merged(overrides, realisations, seed)):
@@ -228,7 +228,7 @@ def check(
             outlook = overview.outlook(one, precision=precision, progress=bar.update, of=of)
         made.append(documents.outlook(one, outlook))
         if not as_json:
-            console.print_outlook(one, outlook)
+            outcomes.print_outlook(one, outlook)
     if as_json:
         click.echo(documents.text(made))
 
@@ -263,7 +263,7 @@ def report(
     """
     from radarsim.app import documents
     from radarsim.app import run as experiment
-    from radarsim.cli import console
+    from radarsim.cli import outcomes
 
     overrides = experiment.merged(overrides, realisations, seed)
     made = []
@@ -272,7 +272,7 @@ def report(
         result = experiment.report(one, out=out, overrides=overrides, figures=figures, width_mm=width_mm)
         made.append(documents.result(result))
         if not as_json:
-            console.print_result(result)
+            outcomes.print_result(result)
     if as_json:
         click.echo(documents.text(made))
 
@@ -302,7 +302,7 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
     """
     from radarsim.app import documents
     from radarsim.app import run as experiment
-    from radarsim.cli import console
+    from radarsim.cli import verdicts
 
     rows = experiment.claims(names, out)
     if figure is not None:
@@ -314,4 +314,4 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
 
         click.echo(page.page(rows, {of.paper: of.page for of in experiment.papers()}), nl=False)
     else:
-        console.print_claims(rows)
+        verdicts.print_claims(rows)

@@ -23,13 +23,13 @@ def list_(words: tuple[str, ...], as_json: bool) -> None:
     """
     from radarsim.app import documents
     from radarsim.app.inventory import inventory, selected
-    from radarsim.cli import console
+    from radarsim.cli import outcomes
 
     found = selected(inventory(), words)
     if as_json:
         click.echo(documents.text(documents.inventory(found)))
     else:
-        console.print_inventory(found)
+        outcomes.print_inventory(found)
 
 
 @main.command()
@@ -65,7 +65,7 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
     if recompute and result is None:
         raise click.UsageError("--recompute needs a RESULT: a folder such as results/rls2")
     from radarsim.app import doctor, documents
-    from radarsim.cli import console
+    from radarsim.cli import console, outcomes
 
     if result is None:
         from radarsim.app import selftest
@@ -84,7 +84,7 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
         if as_json:
             click.echo(documents.text(documents.fields(found)))
         else:
-            console.print_inspection(found)
+            outcomes.print_inspection(found)
         bad = found.faults
     if bad:
         raise StoreError(*bad)
@@ -112,7 +112,7 @@ def clean(
     from radarsim.app import clean as cleaning
     from radarsim.app import documents
     from radarsim.app import run as experiment
-    from radarsim.cli import console
+    from radarsim.cli import outcomes
 
     if not configs and (overrides or seed is not None):
         raise click.UsageError("--set and --seed need a CONFIG whose blocks they mean")
@@ -121,4 +121,4 @@ def clean(
     if as_json:
         click.echo(documents.text(documents.fields(cleaned) | {"dry_run": dry_run}))
     else:
-        console.print_cleaned(cleaned, dry_run)
+        outcomes.print_cleaned(cleaned, dry_run)

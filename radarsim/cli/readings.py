@@ -61,7 +61,7 @@ def readings(
         from radarsim.app import documents
         from radarsim.app import readings as app
         from radarsim.app.simulation import RunOptions
-        from radarsim.cli import console
+        from radarsim.cli import console, verdicts
 
         wanted = app.asked(names, only)
         silent = quiet or as_json or markdown
@@ -82,6 +82,6 @@ def readings(
         elif markdown:
             click.echo(app.pages(done), nl=False)
         elif not quiet:
-            console.print_readings(done, detailed=any("." in name for name in names))
+            verdicts.print_readings(done, detailed=any("." in name for name in names))
         if done.left:
             raise TargetUnmet(*done.left)

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from radarsim.cli import console, main
+from radarsim.cli import console, main, outcomes
 from radarsim.report import notes
 from radarsim.report.text import significant_digits
 
@@ -30,8 +30,8 @@ def test_numbers_of_tables_are_those_of_sentences(value, form, text):
 
 
 def test_a_number_that_is_not_known_has_no_unit():
-    assert console.known(np.nan, ".2f", " %") == ""
-    assert console.known(3.0, ".2f", " %") == "3.00 %"
+    assert outcomes.known(np.nan, ".2f", " %") == ""
+    assert outcomes.known(3.0, ".2f", " %") == "3.00 %"
 
 
 def test_claims_without_results_say_where_to_find_them(tmp_path):
@@ -114,7 +114,7 @@ def test_every_marked_interval_is_marked_on_the_terminal(capsys):
         {"filter": "i", "note": "", "gain_note": ""},
         {"filter": "j", "note": "", "gain_note": float("nan"), "gain_lo": float("nan"), "gain_hi": float("nan")},
     ]
-    console.show_last_scan(pd.DataFrame([row | own for own in said]))
+    outcomes.show_last_scan(pd.DataFrame([row | own for own in said]))
     lines = capsys.readouterr().out.splitlines()[1:]
     found = [re.findall(r"\((.*?)\)", line) for line in lines]
     assert found == [["20 effective"] * 2, ["heavy tails", "marked"], ["heavy tails"], [], []]

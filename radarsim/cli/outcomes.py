@@ -1,0 +1,252 @@
+"""What the terminal shows of runs, forecasts, comparisons and upkeep: the answer, tables, where files were written."""
+
+import math
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from radarsim.cli.console import counted_cases, field, print_warnings, say, show
+from radarsim.language import Term, few, listed, numeral, plural, term, tr
+from radarsim.report.text import clock, known, significant_digits
+from radarsim.report.text import unit as unit_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from radarsim.app.clean import Cleaned
+    from radarsim.app.compare import Compared
+    from radarsim.app.doctor import Inspection
+    from radarsim.app.inventory import Inventory
+    from radarsim.app.outlook import Need, Outlook
+    from radarsim.app.result import Result
+    from radarsim.app.simulation import Shares
+    from radarsim.config.experiment import Experiment
+
+MOST_ROWS = 36  # of the last scan's table; of a larger experiment the answer and the files are enough
+DROPPED = term("dropped {files} of {cases}, {size:.1f} MB in {folder}")
+
+
+def print_result(result: "Result") -> None:
+    """The answer of a run, σ at the last scan, the verdicts, and where the files are."""
+    written = result.written
+    assert written is not None  # the commands write what they print
+    for line in written.answer:
+        say(line)
+    show_last_scan(result.last_scan)
+    verdicts = result.verdicts()
+    if verdicts:
+        from radarsim.report.claims import reasons
+
+        for verdict, names in verdicts.items():
+            field("claims", tr("{count} {kind}: {names}", count=len(names), kind=Term(verdict), names=", ".join(names)))
+        for reason, names in result.unjudged().items():
+            field("", tr("not judged: {names}: {reason}", names=", ".join(names), reason=reasons.said(reason)))
+        field("", tr("`radarsim claims {stem}` says what each of them is", stem=result.experiment.stem))
+    drawn = [Path(name) for name in written.files if name.startswith("figures/") and not name.endswith(".md")]
+    others = sum(name.endswith(".csv") for name in written.files) - 1
+    field("tables", tr("{file} and {count} more there", file=str(written.folder / "curves.csv"), count=others))
+    if drawn:
+        kinds = listed(sorted({path.suffix[1:].upper() for path in drawn}, reverse=True))
+        told = {"folder": str(written.folder / "figures"), "count": len({path.stem for path in drawn}), "kinds": kinds}
+        field("figures", tr("{folder} ({count}, each as {kinds})", **told))
+    field("report", str(written.folder / "report.html"))
+    if written.removed:
+        gone = few(written.removed, 3)
+        field("removed", tr("of an earlier run, not made by this one: {names}", names=gone))
+    print_warnings(result.warnings)
+
+
+def show_last_scan(last: "pd.DataFrame") -> None:
+    """σ with interval, exact σ and gain of each case, filter and component at the last scan, unless too many."""
+    if not 0 < len(last) <= MOST_ROWS:
+        return
+    found: Iterable[Any] = last.itertuples()  # named by column, which pandas' stubs do not know
+    rows = [
+        (
+            *(row.case, row.filter, row.component, tr("{t_s:g} s", t_s=row.t_s)),
+            f"{significant_digits(row.sigma)} {tr(unit_of(row.unit))}",
+            f"{significant_digits(row.sigma_lo)} … {significant_digits(row.sigma_hi)}" + too_narrow(row, "note"),
+            known(row.exact_sigma),
+            known(row.gain_percent, ".2f", " %"),
+            known(row.gain_lo, ".2f", " … ") + known(row.gain_hi, ".2f") + too_narrow(row, "gain_note"),
+        )
+        for row in found
+    ]
+    columns = ("case", "filter", "component", "at", "sigma", "95 %", "exact", "gain", "95 % of gain")
+    show("", columns, rows, right=columns[3:], spare=("95 % of gain", "exact", "95 %", "gain"))
+
+
+def print_comparison(compared: "Compared") -> None:
+    """What stored results differ by at the last common time, and where the files are."""
+    from radarsim.report.compare import words
+
+    rows = [
+        (
+            f"{row['label']}, {row['filter']}",
+            *(row["component"] or str(row["model"]), tr("{t_s:g} s", t_s=row["t_s"])),
+            *(f"{words.value(row[key])} {tr(unit_of(row['unit']))}" for key in ("value", "against")),
+            words.change(row),
+        )
+        for row in compared.last
+        if row["quantity"] == compared.last[0]["quantity"]
+    ]
+    if len(rows) <= MOST_ROWS:
+        against = {row["against_label"] for row in compared.last}
+        columns = (
+            "",
+            "of",
+            "at",
+            "σ",
+            tr("σ of {name}", name=against.pop()) if len(against) == 1 else "σ against",
+            "change",
+        )
+        show("", columns, rows, right=columns[2:5], spare=("at",))
+    for line in compared.sentences if len(rows) > MOST_ROWS else ():
+        say(line)
+    for line in compared.notes:
+        field("note", line)
+    field("table", str(compared.folder / "comparison.csv"))
+    if drawn := {Path(n).stem for n in compared.files if n.startswith("figures/") and not n.endswith(".md")}:
+        field("figures", f"{compared.folder / 'figures'} ({len(drawn)})")
+    field("page", str(compared.folder / "compare.html"))
+    print_warnings(compared.warnings)
+
+
+def too_narrow(row: Any, column: str) -> str:
+    """A mark behind an interval, of a row of `last_scan`, by the column that says where it rests on too little."""
+    from radarsim.report import notes
+
+    note = getattr(row, column, "")
+    if not isinstance(note, str):  # of a gain that a row does not have
+        return ""
+    if note == notes.THIN and row.n_eff < notes.FEW_EFFECTIVE:  # of a gain the baseline may have fewer
+        return tr(" ({n_eff:.0f} effective)", n_eff=row.n_eff)
+    if note in notes.HEAVY:
+        return tr(" (heavy tails)")
+    return tr(" (marked)") if note else ""
+
+
+def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
+    """What a run would do."""
+    say(tr("{config}: valid", config=str(experiment.path or experiment.stem)))
+    rows = [
+        (
+            case.name,
+            case.filters,
+            str(case.scans),
+            numeral(f"{case.realisations:,}"),
+            tr("{t_s:.3g} s", t_s=case.seconds) if case.timed else tr("under {t_s:.2g} s", t_s=case.seconds),
+        )
+        for case in outlook.cases
+    ]
+    columns = ("case", "filters", "scans", "realisations", "one thread")
+    show("", columns, rows, right=columns[2:], spare=("scans",))
+    if outlook.precision is not None:
+        print_needs(experiment, outlook)
+    short = outlook.seconds < 1
+    seconds = tr("under a second") if short else tr("about {time}", time=clock(outlook.seconds))
+    told = {
+        "cases": counted_cases(len(outlook.cases)),
+        "realisations": plural(
+            "{count:,} realisation", "{count:,} realisations", sum(case.realisations for case in outlook.cases)
+        ),
+        "threads": plural("{count} thread", "{count} threads", outlook.threads),
+    }
+    words = tr(
+        "{cases}, {realisations}, {seconds} on {threads}, {memory:.0f} MB; figures and tables take some seconds more",
+        **told,
+        seconds=seconds,
+        memory=outlook.memory_mb,
+    )
+    field("total", words)
+    print_warnings(outlook.warnings)
+
+
+def print_needs(experiment: "Experiment", outlook: "Outlook") -> None:
+    """How many realisations a precision takes, and whether the run may do so many."""
+    asked = {case.name: case.realisations for case in experiment.cases}
+    needs = {case.name: need for case in outlook.cases if (need := case.controlled or case.need) is not None}
+    ways = [("", case.need, case.seconds_plain, case.name) for case in outlook.cases]
+    ways += [(tr(", control variate"), case.controlled, case.seconds_controlled, case.name) for case in outlook.cases]
+    rows = [
+        (
+            f"{name}{way}",
+            numeral(f"{need.realisations:,}") if need.realisations is not None else _unreached(need),
+            tr("{t_s:.3g} s", t_s=float(seconds or 0)),
+            need.known_by,
+            need.last,
+        )
+        for way, need, seconds, name in ways
+        if need is not None
+    ]
+    unit = tr("points") if outlook.of == "gain" else "%"
+    wanted = tr("for ± {percent:g} {unit}", percent=outlook.precision, unit=unit)
+    columns = ("case", wanted, "one thread", "known from", "last to get there")
+    show("", columns, rows, right=columns[1:3], spare=columns[4:])
+    short = [name for name, need in needs.items() if need.realisations is None or need.realisations > asked[name]]
+    if short:
+        most = max((need.realisations or math.inf) for need in needs.values())
+        cure = tr("; -n {most} would do", most=str(most)) if math.isfinite(most) else ""
+        cases = counted_cases(len(short))
+        say(
+            tr(
+                "precision not within reach of {cases}: {names}{cure}",
+                cases=cases,
+                names=", ".join(short[:3]),
+                cure=cure,
+            )
+        )
+
+
+def _unreached(need: "Need") -> str:
+    """Why a pilot foretells no number of realisations."""
+    return tr("out of reach") if need.below is None else tr("none seen: below {rate:.2g}", rate=need.below)
+
+
+def print_share(share: "Shares", out: str | os.PathLike[str]) -> None:
+    """What was done of a share of an experiment, and what to do with it."""
+    done = sum(one.done for one in share.cases.values())
+    held = sum(one.from_store for one in share.cases.values())
+    told = {"number": share.number, "of": share.of, "config": share.config, "done": done, "held": held}
+    field("share", tr("{number} of {of} of {config}: {done:,} realisations, {held:,} were stored before", **told))
+    folder = str(Path(out) / ".blocks")
+    field("blocks", tr("{folder}; copy all shares into one, and `radarsim run` finds them", folder=folder))
+    print_warnings(share.warnings)
+
+
+def print_inspection(found: "Inspection") -> None:
+    """What an inspection of a result found; its faults are reported as errors."""
+    outputs = plural("{count} output", "{count} outputs", found.outputs)
+    pieces = plural("{count} stored piece", "{count} stored pieces", found.pieces)
+    say(tr("{folder}: {outputs} and {pieces} checked", folder=str(found.folder), outputs=outputs, pieces=pieces))
+    if found.recomputed:
+        pieces = plural("{count} piece", "{count} pieces", len(found.recomputed))
+        say(tr("computed again: {pieces}, {count:,} realisations", pieces=pieces, count=found.realisations))
+    for note in found.notes:
+        say(tr("note: {words}", words=note))
+    say(
+        tr("all whole")
+        if not found.faults
+        else plural("{count} fault found", "{count} faults found", len(found.faults))
+    )
+
+
+def print_cleaned(cleaned: "Cleaned", dry_run: bool) -> None:
+    """How much was dropped, or would be."""
+    told = {
+        "files": plural("{count} file", "{count} files", cleaned.files),
+        "cases": counted_cases(cleaned.identities),
+        "size": cleaned.size / 1e6,
+        "folder": str(cleaned.path),
+    }
+    would, done = tr("would drop {files} of {cases}, {size:.1f} MB in {folder}", **told), tr(DROPPED, **told)
+    say(would if dry_run else done)
+
+
+def print_inventory(inventory: "Inventory") -> None:
+    """Filters, studies, scenarios and configs, with a line on each: what is asked for most stands last."""
+    for n, (title, columns, rows) in enumerate(reversed(inventory)):
+        if n:
+            say("")
+        show(tr(title), columns, [(*row[:-1], tr(row[-1])) for row in rows])
