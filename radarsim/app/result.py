@@ -175,9 +175,11 @@ class Result:
 
     def unjudged(self) -> dict[str, list[str]]:
         """The claims of this config that it cannot judge any more, or not in every part, by the reason."""
+        from radarsim.report.claims import NOT_JUDGED
+
         table = self._tables["claims"]
         found: dict[str, list[str]] = {}
-        for row in table[table["verdict"] == "not judged here"].to_dict("records"):
+        for row in table[table["verdict"] == NOT_JUDGED].to_dict("records"):
             names = found.setdefault(row["why"], [])
             if row["claim"] not in names:
                 names.append(row["claim"])

@@ -53,12 +53,12 @@ def _in_a_row(claims: Sequence[str]) -> str:
 
 def _print_stated(rows: Sequence[dict[str, Any]]) -> None:
     """Claims with what was measured."""
-    from radarsim.report.claims import page
+    from radarsim.report.claims import NOT_RUN, page
 
     if sys.stdout.isatty():
         cells = []
         for own in page.grouped(rows):
-            first, done = own[0], own[0]["class"] != "not run"
+            first, done = own[0], own[0]["class"] != NOT_RUN
             measured = "\n".join(map(_measured, own)) if done else f"radarsim run {first['config']}"
             said = tr(first["statement"]) + (f"\n«{first['original']}»" if first["original"] else "")
             verdict = page.verdict_of(own).replace("*", "")
@@ -85,7 +85,7 @@ def _named(row: Mapping[str, Any]) -> str:
 
 def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
     """A claim in lines: its class, statement and original sentence, and a line a part."""
-    from radarsim.report.claims import page, reasons
+    from radarsim.report.claims import NOT_JUDGED, NOT_RUN, page, reasons
 
     first = parts[0]
     verdict = page.verdict_of(parts).replace("*", "")
@@ -93,7 +93,7 @@ def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
     say(f"{first['claim']:<6} {verdict:<20} {tr(first['statement'])}  [{place}]")
     if first["original"]:
         say(f"       «{first['original']}»")
-    if first["class"] == "not run":
+    if first["class"] == NOT_RUN:
         say(f"       radarsim run {first['config']}")
         return
     for row in parts:
@@ -104,7 +104,7 @@ def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
             said.append(tr("exactly {value}", value=page.plain(exact)))
         if (missed := page.number(row["miss"])) is not None and missed:
             said.append(tr("off by {miss:.3g} margins", miss=missed))
-        if row["verdict"] == "not judged here":
+        if row["verdict"] == NOT_JUDGED:
             said.append(reasons.said(row["why"]))
         say(f"       {tr(row['verdict']):<20} {'; '.join(said)}")
 
