@@ -9,6 +9,7 @@ from pathlib import Path
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.audit import removable
+from radarsim.engine.store import is_directory
 from radarsim.errors import ConfigError, StoreError
 from radarsim.studies.identity import identity
 
@@ -32,7 +33,7 @@ def clean(
     `out` does not exist or its .blocks is a link, StoreError if a file cannot be removed.
     """
     blocks = Path(out) / ".blocks"
-    if not Path(out).is_dir():
+    if not is_directory(Path(out)):
         raise ConfigError(f"{out}: no such directory of results")
     if blocks.is_symlink():
         raise ConfigError(f"{blocks}: is a link; clean the directory that it points to")
@@ -40,7 +41,7 @@ def clean(
     if experiments is not None:
         wanted = {identity(case) for experiment in experiments for case in experiment.cases}
     try:
-        folders = [path for path in sorted(blocks.iterdir()) if _is_identity(path)] if blocks.is_dir() else []
+        folders = [path for path in sorted(blocks.iterdir()) if _is_identity(path)] if is_directory(blocks) else []
         folders = [path for path in folders if wanted is None or path.name in wanted]
         files = [one for folder in folders for one in removable(folder)]
         if not dry_run:

@@ -20,6 +20,7 @@ from radarsim.engine.audit import Audit, audited
 from radarsim.engine.blocks import Node, Partial, simulated
 from radarsim.engine.machine import available_cores, described, instruction_set, platform_name
 from radarsim.engine.moments import Sums
+from radarsim.engine.store import is_directory
 from radarsim.errors import ConfigError, StoreError
 from radarsim.report import files
 from radarsim.studies.identity import identity
@@ -85,7 +86,7 @@ def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
     elsewhere = []
     for name, stored_as in record["identities"].items():
         store = blocks / stored_as
-        if not store.is_dir():
+        if not is_directory(store):
             found.notes.append(f"{store}: no blocks of {name} are stored; the tables stand on their own")
             continue
         audit = audited(store, int(record["cases"][name]["done"]))
@@ -105,7 +106,7 @@ def inspected(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
 def _blocks(folder: Path) -> Path:
     """Where the blocks of a folder of results lie, which may be `.` or a link: beside its name, or what it leads to."""
     beside = [Path(os.path.abspath(folder)).parent, folder.resolve().parent]
-    return next((one / ".blocks" for one in beside if (one / ".blocks").is_dir()), folder.parent / ".blocks")
+    return next((one / ".blocks" for one in beside if is_directory(one / ".blocks")), folder.parent / ".blocks")
 
 
 def _settled(found: Inspection) -> dict[str, Any]:

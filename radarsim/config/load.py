@@ -1,6 +1,7 @@
 """YAML to checked experiments. The only file that imports yaml: it reads text, with line and column of every value."""
 
 import os
+import stat
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path as FilePath
 from typing import Any
@@ -100,14 +101,15 @@ def read(file: FilePath, faults: Faults) -> Document | None:
     """The document in a file; None, and a fault noted, if there is none."""
     shown = str(file)
     try:
-        if not file.is_file():
-            missing = (
-                "is a directory" if file.is_dir() else "is not a regular file" if file.exists() else "no such file"
-            )
-            faults.add(Origin(shown), (), missing)
+        kind = file.stat().st_mode  # Path.is_file says no, from Python 3.14 on, of what may not be looked at
+        if not stat.S_ISREG(kind):
+            faults.add(Origin(shown), (), "is a directory" if stat.S_ISDIR(kind) else "is not a regular file")
             return None
         with file.open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
+    except (FileNotFoundError, NotADirectoryError):
+        faults.add(Origin(shown), (), "no such file")
+        return None
     except (OSError, ValueError) as error:
         faults.add(Origin(shown), (), f"cannot be read: {getattr(error, 'strerror', None) or error}")
         return None

@@ -233,6 +233,17 @@ def encoded(header: Mapping, values: np.ndarray) -> bytes:
     return body + hashlib.sha256(body).digest()
 
 
+def is_directory(path: Path) -> bool:
+    """Whether a directory is there; raises OSError where nobody may look.
+
+    Path.is_dir raises it up to Python 3.13 alone: later it takes what may not be seen for what is not there.
+    """
+    try:
+        return stat.S_ISDIR(path.stat().st_mode)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+
+
 def content(path: Path) -> bytes:
     """What a stored file holds; Damage for a pipe, a device or a directory, which nobody here has put there."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # or a pipe would wait for a writer

@@ -7,6 +7,7 @@ import shutil
 import threading
 import time
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from radarsim.engine import executors, keeper
 from radarsim.engine.blocks import Node, Partial, Total
 from radarsim.engine.collect import collect, stored
 from radarsim.engine.moments import Sums
-from radarsim.engine.store import Store, decoded, piece_named
+from radarsim.engine.store import Store, decoded, is_directory, piece_named
 from radarsim.errors import NonFiniteError
 from tests.engine.fake import NAMES, WORK, Fake, N, contents, names, same
 from tests.engine.tree import decomposition
@@ -317,3 +318,18 @@ def test_a_keeper_looks_again_at_what_it_wrote(tmp_path):
     (store.path / "L00-0.sums").unlink()
     own.finish(pieces)
     assert store.pieces() == set(pieces)
+
+
+def test_a_directory_that_may_not_be_looked_at_is_not_taken_for_none(monkeypatch, tmp_path):
+    assert is_directory(tmp_path)
+    assert not is_directory(tmp_path / "none")
+    (tmp_path / "file").touch()
+    assert not is_directory(tmp_path / "file")
+    assert not is_directory(tmp_path / "file" / "below")
+
+    def closed(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "stat", closed)
+    with pytest.raises(PermissionError):
+        is_directory(tmp_path)

@@ -155,6 +155,19 @@ def test_blocks_that_may_not_be_read_are_not_said_to_be_written(command, made):
     assert "cannot be written" not in done.stderr
 
 
+def test_what_may_not_be_looked_at_is_not_said_to_be_missing(command, made, tmp_path):
+    """A config, and a folder of results to be cleaned: Python's own Path.is_file says no of both from 3.14 on."""
+    hidden = tmp_path / "hidden"
+    (hidden / "results").mkdir(parents=True)
+    (hidden / "mine.yaml").write_text("study: range_doppler\n")
+    with unreadable(hidden):
+        refused = [command("check", hidden / "mine.yaml"), command("clean", "--out", hidden / "results")]
+    for done in refused:
+        assert done.returncode != 0
+        assert "ermission denied" in done.stderr
+        assert "no such" not in done.stderr
+
+
 def test_a_record_that_may_not_be_read_is_not_taken_for_a_damaged_one(command, made, tmp_path):
     record = made / "rls2/run.json"
     mode = record.stat().st_mode

@@ -1,6 +1,7 @@
 """The sonar's three parts: each rests on the common base alone, and an edit in one leaves the blocks of the others."""
 
 import ast
+import inspect
 import json
 from pathlib import Path
 
@@ -79,7 +80,7 @@ def test_numbers_rest_on_the_base_and_their_own_part(part, stem):
 def test_labels_are_typed_and_described():
     for kind in (SonarAxes, GivenPlotsAxes, ManoeuvreAxes, ClutterAxes):
         for name in set(kind.__annotations__) - set(Axes.__annotations__):
-            assert f"        {name}: " in kind.__doc__, f"{kind.__name__}.{name}"
+            assert f"\n    {name}: " in inspect.getdoc(kind), f"{kind.__name__}.{name}"
     kinds = {"sonar_smoothing": GivenPlotsAxes, "sonar_manoeuvre": ManoeuvreAxes, "sonar_clutter": ClutterAxes}
     for stem, kind in kinds.items():
         case = load(stem).cases[0]
