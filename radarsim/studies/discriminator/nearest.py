@@ -28,10 +28,11 @@ from radarsim.kernels.lanes import WIDTH, rows
 
 FIVE = 5.0  # potential σ that a locked component is within
 # All distances are multiples of STEP/64, without rounding: a search takes the same turns everywhere.
-BEGIN, STEP, FARTHEST = 1.0, 0.25, 12.0  # σ along a direction at which a loss is looked for
+BEGIN, STEP, END_OF_SEARCH = 1.0, 0.25, 12.0  # σ along a direction at which a loss is looked for
+FARTHEST = 8.0  # σ of a loss that is told: once in 10¹⁵
 LEAST_GAIN = 1 / 64  # σ by which a turn has to bring the loss nearer
 MOST_TURNS = 12
-NEARLY = 0.05  # σ by which the losses on two sides may differ
+NEARLY = 0.03  # σ by which losses on the two sides of a direction may differ: e^0.15 in a weight
 TURNS = (1.0, 0.5, 0.25, 0.125)  # to the normal: as far as the loss comes nearer
 ASTRAY = 1.0  # posterior σ between bursts on either side of the boundary, where one has lost its lock
 APART = 0.3  # the same after so many steps that the boundary's normal is what they tell, …
@@ -125,13 +126,18 @@ class Room:
 def either_side(room: Room, f: int, unit: np.ndarray) -> Iterator[Loss]:
     """The nearest losses of estimator f on both sides of a direction, if there are any within `FARTHEST`.
 
-    What is found on one side is where to begin on the other.
+    What is found on one side is where to begin on the other, and to end if it is nearly as near there.
     """
     ahead = nearest(room, f, unit)
-    behind = nearest(room, f, -unit, *([] if ahead is None else [mirrored(ahead.unit)]))
+    if ahead is None:
+        behind = nearest(room, f, -unit)
+    else:
+        enough = ahead.distance + NEARLY if ahead.distance <= FARTHEST else 0.0
+        behind = nearest(room, f, -unit, mirrored(ahead.unit), enough=enough)
     if behind is not None and (ahead is None or behind.distance < ahead.distance - NEARLY):
-        ahead = nearest(room, f, unit if ahead is None else ahead.unit, mirrored(behind.unit))
-    yield from (loss for loss in (ahead, behind) if loss is not None)
+        starts = [unit if ahead is None else ahead.unit, mirrored(behind.unit)]
+        ahead = nearest(room, f, *starts, enough=behind.distance + NEARLY)
+    yield from (loss for loss in (ahead, behind) if loss is not None and loss.distance <= FARTHEST)
 
 
 def mirrored(unit: np.ndarray) -> np.ndarray:
@@ -142,16 +148,21 @@ def mirrored(unit: np.ndarray) -> np.ndarray:
     return unit * np.r_[-np.ones(SIZE), np.tile((1.0, -1.0), (len(unit) - SIZE) // 2)]
 
 
-def nearest(room: Room, f: int, *starts: np.ndarray) -> Loss | None:
-    """The nearest loss of estimator f that is found from the nearest of unit vectors (6 + 4B,); None if it has none."""
-    begun = [(crossing(room, f, one, BEGIN, FARTHEST), one) for one in map(rounded, starts)]
+def nearest(room: Room, f: int, *starts: np.ndarray, enough: float = 0.0) -> Loss | None:
+    """The nearest loss of estimator f that is found from the nearest of unit vectors (6 + 4B,); None if it has none.
+
+    The search ends where one is near `enough`.
+    """
+    begun = [(crossing(room, f, one, BEGIN, END_OF_SEARCH), one) for one in map(rounded, starts)]
     found = [(at, one) for at, one in begun if at is not None]
     if not found:
         return None
     at, unit = min(found, key=lambda each: each[0])
     for _ in range(MOST_TURNS):
-        towards = normal(room, f, unit, at)
-        for share in TURNS if towards is not None else ():
+        towards = normal(room, f, unit, at) if at > enough else None
+        if towards is None:
+            break
+        for share in TURNS:
             turned = rounded(share * towards + (1.0 - share) * unit)
             nearer = crossing(room, f, turned, STEP * (0.5 * at // STEP), at - LEAST_GAIN)
             if nearer is not None:
@@ -181,6 +192,14 @@ def crossing(room: Room, f: int, unit: np.ndarray, begin: float, farthest: float
     return found if found <= farthest else None
 
 
+class Watched(NamedTuple):
+    """What a gradient is of: which window's estimate, under which options, in differences of how many σ."""
+
+    window: int
+    options: np.void
+    difference: float
+
+
 def normal(room: Room, f: int, unit: np.ndarray, at: float) -> np.ndarray | None:
     """The boundary's unit normal (6 + 4B,), outwards, where estimator f loses its lock: at σ along a unit vector.
 
@@ -188,46 +207,42 @@ def normal(room: Room, f: int, unit: np.ndarray, at: float) -> np.ndarray | None
     """
     plan, options = room.plan, room.plan.options[f].copy()
     sides = np.array([at - STEP / WIDTH**2, at])[:, None] * unit
-    size, last = plan.layout.shapes["error"][2], int(options["windows"]) - 1
+    size, last, middle = plan.layout.shapes["error"][2], int(options["windows"]) - 1, sides.mean(axis=0)
     ends = room.errors(f, sides)[:2, : last + 1, :size]
     astray = (np.abs(ends[1] - ends[0]) / plan.posterior[f, : last + 1, :size] > ASTRAY).any(axis=1)
     if not astray.any():
         passed = int(np.argmax(np.abs(ends[1, last]) / plan.potential[f, last, :size]))
         along = np.where(np.arange(size) == passed, np.sign(ends[1, last]), 0.0)
-        return gradient(room, f, sides.mean(axis=0), along, (last, options, SMOOTH_DIFFERENCE))
-    k = int(np.argmax(astray))
-    options["windows"], most = k + 1, int(options["steps"])
+        return gradient(room, f, middle, along, Watched(last, options, SMOOTH_DIFFERENCE))
+    k, most = int(np.argmax(astray)), int(options["steps"])
+    options["windows"], sigma = k + 1, plan.posterior[f, k, :size]
     for steps in range(FEWEST_STEPS, most + 1):
         options["steps"] = steps
         ends = room.errors(f, sides, options)[:2, k, :size]
-        apart = from_turn(ends[1] - ends[0]) / plan.posterior[f, k, :size]
+        apart = from_turn(ends[1] - ends[0]) / sigma
         if np.linalg.norm(apart) > APART:
-            return gradient(room, f, sides.mean(axis=0), apart / plan.posterior[f, k, :size], (k, options, DIFFERENCE))
+            return gradient(room, f, middle, apart / sigma, Watched(k, options, DIFFERENCE))
     return None
 
 
 def from_turn(errors: np.ndarray) -> np.ndarray:
     """Differences of errors (…, size), the phases to the nearest turn."""
-    errors[..., 0] -= np.rint(errors[..., 0])
-    return errors
+    return np.concatenate([errors[..., :1] - np.rint(errors[..., :1]), errors[..., 1:]], axis=-1)
 
 
-def gradient(
-    room: Room, f: int, z: np.ndarray, along: np.ndarray, how: tuple[int, np.void, float]
-) -> np.ndarray | None:
-    """The direction (6 + 4B,) in which alongᵀ(error) of a window grows fastest at z, along (size,), by differences.
+def gradient(room: Room, f: int, z: np.ndarray, along: np.ndarray, of: Watched) -> np.ndarray | None:
+    """The unit vector (6 + 4B,) in which alongᵀ(error) of a window grows fastest at z, along (size,), by differences.
 
-    how: the window, the options that end there, and the difference in σ. None where nothing changes it.
+    None where nothing changes it.
     """
-    k, options, difference = how
-    plan, window = room.plan, room.plan.windows[f, k]
+    plan, window = room.plan, room.plan.windows[f, of.window]
     ends = plan.tables[0].reshape(-1, COLUMNS)[int(window["table"]) + int(window["blocks"]) - 1, END]
     used = SIZE + 4 * int(ends)  # what is drawn later is not in the estimate
     found, size = np.zeros(len(z)), len(along)
-    middle = room.errors(f, z[None], options)[:1, k, :size]
+    before = room.errors(f, z[None], of.options)[:1, of.window, :size]
     for first in range(0, used, WIDTH):
-        moved = z + difference * np.eye(min(WIDTH, used - first), len(z), first)
-        change = from_turn(room.errors(f, moved, options)[: len(moved), k, :size] - middle)
-        found[first : first + len(moved)] = change @ along
+        moved = z + of.difference * np.eye(min(WIDTH, used - first), len(z), first)
+        after = room.errors(f, moved, of.options)[: len(moved), of.window, :size]
+        found[first : first + len(moved)] = from_turn(after - before) @ along
     length = np.linalg.norm(found)
     return found / length if length > 0.0 else None

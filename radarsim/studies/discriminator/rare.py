@@ -21,7 +21,6 @@ from radarsim.studies.discriminator import nearest
 from radarsim.studies.discriminator.kernels import rare as kernels
 
 LEAST_SHARE = 0.1  # of a direction, over that of the likeliest
-FARTHEST = 8.0  # σ up to which a loss is shifted to: once in 10¹⁵
 
 
 class Plan(nearest.Plan, Protocol):
@@ -110,13 +109,12 @@ def mixture(plan: Plan, f: int, plain: float) -> kernels.Mixture:
     """The mixture for the losses of estimator f at its last window, with a share of plain bursts.
 
     From each direction the nearest losses on both sides are looked for; each is shifted to, and has a share by the
-    probability of what lies beyond it. Raises NoLoss where none is within `FARTHEST`.
+    probability of what lies beyond it. Raises NoLoss where there is none.
     """
     room = nearest.Room(plan)
     found = [loss for unit in directions(plan, f) for loss in nearest.either_side(room, f, unit)]
-    found = [loss for loss in found if loss.distance <= FARTHEST]
     if not found:
-        raise NoLoss(f"loses no lock within {FARTHEST:g} σ along any direction: far rarer than 10⁻¹²")
+        raise NoLoss(f"loses no lock within {nearest.FARTHEST:g} σ along any direction: far rarer than 10⁻¹²")
     units, shift = np.array([loss.unit for loss in found]), np.array([loss.distance for loss in found])
     chance = np.array([math.erfc(one / math.sqrt(2.0)) for one in shift])
     return made(plan, units, shift, chance + LEAST_SHARE * chance.max(), plain)

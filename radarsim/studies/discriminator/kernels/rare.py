@@ -1,9 +1,9 @@
 """Bursts whose noise is shifted towards a loss of lock, and the weights that make up for it (importance sampling).
 
-The unit normals z of a burst are drawn from the mixture α₀ N(0, 1) + Σ α_m ½ [N(s_m u_m, 1) + N(−s_m u_m, 1)], u_m unit
-vectors. The ratio of the law that they should have to the one that they have is
+The unit normals z of a burst are drawn from the mixture α₀ N(0, 1) + Σ α_m N(s_m u_m, 1), u_m unit vectors. The ratio
+of the law that they should have to the one that they have is
 
-    w(z) = 1 / (α₀ + Σ α_m e^{−s_m²/2} cosh(s_m u_mᵀ z)),
+    w(z) = 1 / (α₀ + Σ α_m e^{s_m u_mᵀ z − s_m²/2}),
 
 at most 1/α₀ (Owen & Zhou, Journal of the American Statistical Association 95, 2000, 135).
 """
@@ -43,7 +43,7 @@ class Mixture(NamedTuple):
 def choose(key, first, cumulative, chosen):
     """Which part of the mixture each of realisations first, first + 1, … is drawn from, into chosen (n,).
 
-    0 is the plain law, m the positive and −m the negative shift along direction m − 1.
+    0 is the plain law, m the shift along direction m − 1.
     """
     for i in range(chosen.size):
         which, _ = uniforms(key[0], key[1], first + i, 0)
