@@ -64,6 +64,15 @@ def test_a_turn_brings_every_loss_nearer(room, found):
             assert not room.lost(0, (loss.distance - 1 / 128) * loss.unit[None]).any()
 
 
+def test_bounds_of_a_component_are_nearer_than_its_linear_map_says(plan, room):
+    """Of the phase at the end, on both sides by itself: more than first order is in an estimate at five σ."""
+    unit = rare.directions(plan, 0)[-5]
+    for side in (1, -1):
+        straight = nearest.crossing(room, 0, nearest.rounded(side * unit), 1.0, 12.0)
+        assert straight == pytest.approx(5.06, abs=0.02)
+        assert nearest.nearest(room, 0, side * unit).distance < straight - 0.08
+
+
 def test_no_direction_around_loses_its_lock_sooner(room, found):
     """Of 64 directions a tenth of a radian away none is nearer by more than the search goes on for."""
     draw = np.random.default_rng(4)
