@@ -73,7 +73,7 @@ FURTHER = (
 SWEPT = {"pulses_snr": ["sweep.burst.snr_db=[-2, 1]"]}
 # Configs with `rare`: overrides, and realisations.
 WEIGHTED = {
-    "discriminator_rare": (["sweep.estimators.0.lock_probability=[0.99, 0.999, 0.9999]"], 4000),
+    "discriminator_rare": (["sweep.estimators.0.lock_probability=[0.99, 0.9999, 0.999999]"], 4000),
     "sonar_clutter_rare": (["sweep.sensor.false_plots_per_km2=[0.01, 0.1]"], N),
     "ambiguous_rare": (["sweep.radar.repetition_rate_hz=[700, 900, 1100]"], N),
 }

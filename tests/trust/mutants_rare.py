@@ -1,18 +1,38 @@
-"""Planted faults of rare events: weights dropped, one side alone, shifts, events and boxes not those meant."""
+"""Planted faults of rare events: weights dropped, shifts, events and boxes not those meant, a search gone astray."""
 
 from tests.trust.mutant import mutants
 
 LOCKS = "studies/discriminator/test_rare.py"
-EITHER_SIDE = f"{LOCKS}::test_weights_bring_back_the_normal_law_on_either_side"
+LAW = f"{LOCKS}::test_weights_bring_back_the_normal_law"
 SUMS = f"{LOCKS}::test_sums_are_those_of_the_weights_and_add_up"
 
+NEAREST = "studies/discriminator/test_nearest.py"
+TURNED = f"{NEAREST}::test_a_turn_brings_every_loss_nearer"
 LOSSES = (
     *mutants(
+        "radarsim/studies/discriminator/nearest.py",
+        ("np.tile((1.0, -1.0)", "np.tile((-1.0, -1.0)", f"{NEAREST}::test_the_conjugate_burst_errs_the_other_way"),
+        ("share * towards + (1.0 - share) * unit", "unit", TURNED),
+        ("(at[np.argmax(lost)] - width, width / WIDTH)", "(at[np.argmax(lost)], width / WIDTH)", TURNED),
+        (
+            "from_turn(after - before) @ along",
+            "np.abs(after - before) @ along",
+            f"{NEAREST}::test_the_normal_is_that_of_the_boundary",
+        ),
+        ("short / math.sqrt(math.fsum(short * short))", "short", f"{NEAREST}::test_units_have_length_one"),
+        (
+            "np.round(vector / np.linalg.norm(vector), DIGITS)",
+            "vector / np.linalg.norm(vector)",
+            f"{NEAREST}::test_last_bits_of_a_direction_are_not_in_what_is_found",
+        ),
+        ("np.sign(ends[1, last])", "1.0", f"{NEAREST}::test_bounds_of_a_component_are_nearer_than_its_linear_map_says"),
+    ),
+    *mutants(
         "radarsim/studies/discriminator/kernels/rare.py",
-        ("weights[n] = 1.0 / density[n]", "weights[n] = 1.0", EITHER_SIDE),
-        ("chosen[i] = m if side < 0.5 else -m", "chosen[i] = m", EITHER_SIDE),
-        ("half * (math.exp(up - level) + math.exp(-up - level))", "half * 2.0 * math.exp(up - level)", EITHER_SIDE),
-        ("b[lane(r, n)] += step * mixture.second[m, r]", "b[lane(r, n)] += 0.0", EITHER_SIDE),
+        ("weights[n] = 1.0 / density[n]", "weights[n] = 1.0", LAW),
+        ("chosen[i] = m", "chosen[i] = min(m, 1)", LAW),
+        ("math.exp(shift[m] * along[n] - level)", "math.exp(shift[m] * along[n] - 2.0 * level)", LAW),
+        ("b[lane(r, n)] += step * mixture.second[m, r]", "b[lane(r, n)] += 0.0", LAW),
     ),
     *mutants(
         "radarsim/studies/discriminator/kernels/sums.py",

@@ -239,15 +239,17 @@ class Work:
 
 
 def work(config, overrides):
-    """The last case of a config; a pilot of it takes few realisations."""
+    """The last case of a config; a pilot of it takes few realisations, a search for rare losses few turns."""
     from radarsim.app.configs import load
+    from radarsim.studies.discriminator import nearest
     from radarsim.studies.multimodel import controls
 
-    usual, controls.PILOT = controls.PILOT, 40
+    usual = controls.PILOT, nearest.MOST_TURNS
+    controls.PILOT, nearest.MOST_TURNS = 40, 1
     try:
         return Work(load(config, overrides).cases[-1])
     finally:
-        controls.PILOT = usual
+        controls.PILOT, nearest.MOST_TURNS = usual
 
 
 def sums(config, overrides, count):

@@ -12,39 +12,22 @@ from typing import Protocol
 
 import numpy as np
 
-from radarsim.bursts.estimators import World
 from radarsim.bursts.kernels import strip as strips
-from radarsim.bursts.kernels.lanes import COLUMNS, END, PASSES, PRIOR, RATIO, SHIFT, WEIGHTS, M, S
+from radarsim.bursts.kernels.lanes import COLUMNS, END, RATIO, SHIFT, WEIGHTS, M, S
 from radarsim.bursts.kernels.scoring import SIZE, TURN
-from radarsim.engine.moments import Layout
-from radarsim.kernels.lanes import WIDTH, rows
+from radarsim.kernels.lanes import WIDTH
 from radarsim.kernels.random import fill_normal_strip
+from radarsim.studies.discriminator import nearest
 from radarsim.studies.discriminator.kernels import rare as kernels
 
-FIVE = 5.0  # potential σ that a locked component is within
 LEAST_SHARE = 0.1  # of a direction, over that of the likeliest
-STEPS = np.arange(1.0, 8.01, 0.25)  # σ along a direction at which a loss is looked for
 
 
-class Plan(Protocol):
+class Plan(nearest.Plan, Protocol):
     """What of the study's plan is used; see there."""
 
     @property
-    def layout(self) -> Layout: ...
-    @property
-    def world(self) -> World: ...
-    @property
-    def tables(self) -> tuple[np.ndarray, np.ndarray]: ...
-    @property
-    def windows(self) -> np.ndarray: ...
-    @property
-    def options(self) -> np.ndarray: ...
-    @property
     def keys(self) -> np.ndarray: ...
-    @property
-    def prior_sigma(self) -> np.ndarray: ...
-    @property
-    def potential(self) -> np.ndarray: ...
     @property
     def mixture(self) -> kernels.Mixture | None: ...
 
@@ -125,16 +108,16 @@ def leading(matrix: np.ndarray) -> np.ndarray:
 def mixture(plan: Plan, f: int, plain: float) -> kernels.Mixture:
     """The mixture for the losses of estimator f at its last window, with a share of plain bursts.
 
-    A direction is shifted to where a burst without other noise loses lock, and has a share by the probability of that.
-    One along which no lock is lost is left out. Raises NoLoss where none is.
+    From each direction the nearest losses on both sides are looked for; each is shifted to, and has a share by the
+    probability of what lies beyond it. Raises NoLoss where there is none.
     """
-    units = directions(plan, f)
-    reach = np.array([first_loss(plan, f, unit) for unit in units])
-    lost = np.isfinite(reach)
-    if not lost.any():
-        raise NoLoss(f"loses no lock within {STEPS[-1]:g} σ along any direction: far rarer than 10⁻¹²")
-    chance = np.array([math.erfc(shift / math.sqrt(2.0)) for shift in reach[lost]])
-    return made(plan, units[lost], reach[lost], chance + LEAST_SHARE * chance.max(), plain)
+    room = nearest.Room(plan)
+    found = [loss for unit in directions(plan, f) for loss in nearest.either_side(room, f, unit)]
+    if not found:
+        raise NoLoss(f"loses no lock within {nearest.FARTHEST:g} σ along any direction: far rarer than 10⁻¹²")
+    units, shift = np.array([loss.unit for loss in found]), np.array([loss.distance for loss in found])
+    chance = np.array([math.erfc(one / math.sqrt(2.0)) for one in shift])
+    return made(plan, units, shift, chance + LEAST_SHARE * chance.max(), plain)
 
 
 def made(plan: Plan, units: np.ndarray, shift: np.ndarray, shares: np.ndarray, plain: float) -> kernels.Mixture:
@@ -152,56 +135,13 @@ def made(plan: Plan, units: np.ndarray, shift: np.ndarray, shares: np.ndarray, p
     )
 
 
-class Room:
-    """Work arrays for eight bursts, and what is done with them."""
-
-    def __init__(self, plan: Plan):
-        self.plan = plan
-        self.work, self.sums, self.drawn, self.a, self.b = strips.room_for(len(plan.world.factor))
-        self.along = rows(1)
-
-    def follow(self, f: int, errors: np.ndarray) -> None:
-        """Errors (up to 8, K, 6) of estimator f on the normals that are in place; passes are left in work."""
-        plan = self.plan
-        strips.run_strip(
-            *(plan.world.physics, self.drawn, plan.tables, plan.windows[f], plan.options[f]),
-            *(self.work, self.sums, errors),
-        )
-
-    def row(self, number: int) -> np.ndarray:
-        """A row of work, of eight bursts."""
-        return self.work[WIDTH * number : WIDTH * (number + 1)]
-
-    def put(self) -> None:
-        """Block sums of the normals in place."""
-        strips.put_drawn(self.plan.world.sums, self.plan.world.factor, self.a, self.b, self.drawn)
-
-
-def first_loss(plan: Plan, f: int, unit: np.ndarray) -> float:
-    """How many σ along a unit vector (6 + 4B,) a burst without other noise is shifted where its lock is first lost."""
-    room, count = Room(plan), int(plan.options[f]["windows"])
-    errors = np.zeros((WIDTH, plan.windows.shape[1], SIZE))
-    noise = unit[SIZE:].reshape(-1, 4)
-    for start in range(0, len(STEPS), WIDTH):
-        steps = np.resize(STEPS[start : start + WIDTH], WIDTH)
-        for j in range(SIZE):
-            room.row(PRIOR + j)[:] = steps * unit[j] * plan.prior_sigma[j]
-        room.a[:] = (noise[:, [0, 2]].reshape(-1, 1) * steps).ravel()
-        room.b[:] = (noise[:, [1, 3]].reshape(-1, 1) * steps).ravel()
-        room.put()
-        room.follow(f, errors)
-        lost = (np.abs(errors[:, count - 1]) >= FIVE * plan.potential[f, count - 1]).any(axis=1)
-        if lost.any():
-            return float(steps[int(np.argmax(lost))])
-    return float("inf")
-
-
 def estimate(plan: Plan, first: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Errors (count, F, K, 6) and passes (count, F) as `study.estimate`, weights (count,), and whether it is plain."""
     law, shape = plan.mixture, plan.windows.shape
     assert law is not None  # a case with `rare` has one
     errors, passes = np.zeros((count, *shape, SIZE)), np.zeros((count, shape[0]), np.int64)
-    weights, chosen, room = np.empty(count), np.zeros(-(-count // WIDTH) * WIDTH, np.int64), Room(plan)
+    weights, chosen = np.empty(count), np.zeros(-(-count // WIDTH) * WIDTH, np.int64)
+    room = nearest.Room(plan)
     kernels.choose(plan.keys[2], first, law.cumulative, chosen)
     for start in range(0, count, WIDTH):
         stop = min(start + WIDTH, count)
@@ -212,5 +152,5 @@ def estimate(plan: Plan, first: int, count: int) -> tuple[np.ndarray, np.ndarray
         room.put()
         for f in range(shape[0]):
             room.follow(f, errors[start:stop, f])
-            passes[start:stop, f] = room.row(PASSES)[: stop - start]
+            passes[start:stop, f] = room.passes[: stop - start]
     return errors, passes, weights, chosen[:count] == 0

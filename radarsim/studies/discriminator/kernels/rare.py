@@ -1,9 +1,9 @@
 """Bursts whose noise is shifted towards a loss of lock, and the weights that make up for it (importance sampling).
 
-The unit normals z of a burst are drawn from the mixture α₀ N(0, 1) + Σ α_m ½ [N(s_m u_m, 1) + N(−s_m u_m, 1)], u_m unit
-vectors. The ratio of the law that they should have to the one that they have is
+The unit normals z of a burst are drawn from the mixture α₀ N(0, 1) + Σ α_m N(s_m u_m, 1), u_m unit vectors. The ratio
+of the law that they should have to the one that they have is
 
-    w(z) = 1 / (α₀ + Σ α_m e^{−s_m²/2} cosh(s_m u_mᵀ z)),
+    w(z) = 1 / (α₀ + Σ α_m e^{s_m u_mᵀ z − s_m²/2}),
 
 at most 1/α₀ (Owen & Zhou, Journal of the American Statistical Association 95, 2000, 135).
 """
@@ -43,14 +43,14 @@ class Mixture(NamedTuple):
 def choose(key, first, cumulative, chosen):
     """Which part of the mixture each of realisations first, first + 1, … is drawn from, into chosen (n,).
 
-    0 is the plain law, m the positive and −m the negative shift along direction m − 1.
+    0 is the plain law, m the shift along direction m − 1.
     """
     for i in range(chosen.size):
-        which, side = uniforms(key[0], key[1], first + i, 0)
+        which, _ = uniforms(key[0], key[1], first + i, 0)
         m = 0
         while which > cumulative[m]:
             m += 1
-        chosen[i] = m if side < 0.5 else -m
+        chosen[i] = m
 
 
 @kernel
@@ -59,8 +59,8 @@ def move(mixture, chosen, work, a, b):
     for n in range(WIDTH):
         if chosen[n] == 0:
             continue
-        m = abs(chosen[n]) - 1
-        step = mixture.shift[m] if chosen[n] > 0 else -mixture.shift[m]
+        m = chosen[n] - 1
+        step = mixture.shift[m]
         for j in range(SIZE):
             work[lane(PRIOR + j, n)] += step * mixture.forecast[m, j]
         for r in range(mixture.first.shape[1]):
@@ -86,9 +86,8 @@ def weigh(mixture, work, a, b, along, weights):
     density = np.full(WIDTH, law[0])
     for m in range(shift.size):
         project(mixture, m, address(work), address(a), address(b), address(along))
-        half = 0.5 * (law[m + 1] - law[m])
+        share, level = law[m + 1] - law[m], 0.5 * shift[m] * shift[m]
         for n in range(WIDTH):
-            up, level = shift[m] * along[n], 0.5 * shift[m] * shift[m]
-            density[n] += half * (math.exp(up - level) + math.exp(-up - level))
+            density[n] += share * math.exp(shift[m] * along[n] - level)
     for n in range(weights.size):
         weights[n] = 1.0 / density[n]

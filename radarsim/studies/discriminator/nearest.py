@@ -1,0 +1,248 @@
+"""The nearest loss of lock: of all unit normals z of forecast and noise with which a lock is lost, those of least |z|.
+
+What is lost is densest there, and a law shifted there has it without heavy weights (the design point of structural
+reliability: Hasofer & Lind, Journal of the Engineering Mechanics Division 100, 1974, 111; the search: Rackwitz &
+Fiessler, Computers & Structures 9, 1978, 489). Along a unit vector u lock is first lost at s u. If n is the normal of
+the boundary there, the plane that touches it is only s nᵀu from the origin: so u turns to n, as long as that brings the
+loss nearer.
+
+The normal is a gradient. Of two bursts on either side of the boundary, close to each other, one goes astray in a
+window. After a few steps of scoring in it they are still close, but what led across the boundary has grown by each
+step, and nothing else has: how far an estimate has gone along their difference is a smooth function of z, and its
+gradient the normal. If no window tells them apart, a component of the last one has passed its bounds, and is that
+function itself.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from radarsim.bursts.estimators import World
+from radarsim.bursts.kernels import strip as strips
+from radarsim.bursts.kernels.lanes import COLUMNS, END, PASSES, PRIOR
+from radarsim.bursts.kernels.scoring import SIZE
+from radarsim.engine.moments import Layout
+from radarsim.kernels.lanes import WIDTH, rows
+
+FIVE = 5.0  # potential σ that a locked component is within
+# All distances are multiples of STEP/64, without rounding: a search takes the same turns everywhere.
+BEGIN, STEP, END_OF_SEARCH = 1.0, 0.25, 12.0  # σ along a direction at which a loss is looked for
+FARTHEST = 8.0  # σ of a loss that is told: once in 10¹⁵
+LEAST_GAIN = 1 / 64  # σ by which a turn has to bring the loss nearer
+MOST_TURNS = 12
+NEARLY = 0.03  # σ by which losses on the two sides of a direction may differ: e^0.15 in a weight
+TURNS = (1.0, 0.5, 0.25, 0.125)  # to the normal: as far as the loss comes nearer
+ASTRAY = 1.0  # posterior σ between bursts on either side of the boundary, where one has lost its lock
+APART = 0.3  # the same after so many steps that the boundary's normal is what they tell, …
+FEWEST_STEPS = 4  # … which are those in windows before it too
+DIFFERENCE, SMOOTH_DIFFERENCE = 1 / 256, 0.05  # σ, of the gradient's differences at a boundary and at bounds
+DIGITS = 6  # of a unit vector: the last bits of another processor or LAPACK are not in it
+
+
+class Plan(Protocol):
+    """What of the study's plan is used; see there."""
+
+    @property
+    def layout(self) -> Layout: ...
+    @property
+    def world(self) -> World: ...
+    @property
+    def tables(self) -> tuple[np.ndarray, np.ndarray]: ...
+    @property
+    def windows(self) -> np.ndarray: ...
+    @property
+    def options(self) -> np.ndarray: ...
+    @property
+    def prior_sigma(self) -> np.ndarray: ...
+    @property
+    def potential(self) -> np.ndarray: ...
+    @property
+    def posterior(self) -> np.ndarray: ...
+
+
+class Loss(NamedTuple):
+    """A unit vector (6 + 4B,) and how many σ along it a burst without other noise is shifted where it loses its lock.
+
+    Its elements: those of the forecast, then of each block four.
+    """
+
+    unit: np.ndarray
+    distance: float
+
+
+class Room:
+    """Work arrays for eight bursts, and what is done with them."""
+
+    def __init__(self, plan: Plan):
+        self.plan = plan
+        self.work, self.sums, self.drawn, self.a, self.b = strips.room_for(len(plan.world.factor))
+        self.along = rows(1)
+
+    def row(self, number: int) -> np.ndarray:
+        """A row of work, of eight bursts."""
+        return self.work[WIDTH * number : WIDTH * (number + 1)]
+
+    @property
+    def passes(self) -> np.ndarray:
+        """Passes (8,) of what was followed last."""
+        return self.row(PASSES)
+
+    def put(self) -> None:
+        """Block sums of the normals in place."""
+        strips.put_drawn(self.plan.world.sums, self.plan.world.factor, self.a, self.b, self.drawn)
+
+    def follow(self, f: int, errors: np.ndarray, options: np.void | None = None) -> None:
+        """Errors (up to 8, K, 6) of estimator f on what is in place, with its own options or others."""
+        plan = self.plan
+        strips.run_strip(
+            *(plan.world.physics, self.drawn, plan.tables, plan.windows[f]),
+            *(plan.options[f] if options is None else options, self.work, self.sums, errors),
+        )
+
+    def errors(self, f: int, z: np.ndarray, options: np.void | None = None) -> np.ndarray:
+        """Errors (n, K, 6) of estimator f with the normals z (n, 6 + 4B), n at most eight; see `Loss` for their order.
+
+        In turns over the burst; zero at windows that the options leave out.
+        """
+        z = np.concatenate([z, np.repeat(z[-1:], WIDTH - len(z), axis=0)])
+        for j in range(SIZE):
+            self.row(PRIOR + j)[:] = self.plan.prior_sigma[j] * z[:, j]
+        noise = z[:, SIZE:].reshape(WIDTH, -1, 2)
+        self.a.reshape(-1, WIDTH)[:], self.b.reshape(-1, WIDTH)[:] = noise[..., 0].T, noise[..., 1].T
+        self.put()
+        errors = np.zeros((WIDTH, self.plan.windows.shape[1], SIZE))
+        self.follow(f, errors, options)
+        return errors
+
+    def lost(self, f: int, z: np.ndarray) -> np.ndarray:
+        """Whether estimator f loses its lock (n,) with the normals z (n, 6 + 4B)."""
+        last = int(self.plan.options[f]["windows"]) - 1
+        away = np.abs(self.errors(f, z)[: len(z), last]) >= FIVE * self.plan.potential[f, last]
+        return np.asarray(away.any(axis=1))
+
+
+def either_side(room: Room, f: int, unit: np.ndarray) -> Iterator[Loss]:
+    """The nearest losses of estimator f on both sides of a direction, if there are any within `FARTHEST`.
+
+    What is found on one side is where to begin on the other, and to end if it is nearly as near there.
+    """
+    ahead = nearest(room, f, unit)
+    if ahead is None:
+        behind = nearest(room, f, -unit)
+    else:
+        enough = ahead.distance + NEARLY if ahead.distance <= FARTHEST else 0.0
+        behind = nearest(room, f, -unit, mirrored(ahead.unit), enough=enough)
+    if behind is not None and (ahead is None or behind.distance < ahead.distance - NEARLY):
+        starts = [unit if ahead is None else ahead.unit, mirrored(behind.unit)]
+        ahead = nearest(room, f, *starts, enough=behind.distance + NEARLY)
+    yield from (loss for loss in (ahead, behind) if loss is not None and loss.distance <= FARTHEST)
+
+
+def mirrored(unit: np.ndarray) -> np.ndarray:
+    """A unit vector (6 + 4B,) with which errors have the other sign, but for the image: that of the conjugate burst.
+
+    Of the normals of a block's Z₀ and Z₁ those of the imaginary parts turn, those of the real ones do not.
+    """
+    return unit * np.r_[-np.ones(SIZE), np.tile((1.0, -1.0), (len(unit) - SIZE) // 2)]
+
+
+def nearest(room: Room, f: int, *starts: np.ndarray, enough: float = 0.0) -> Loss | None:
+    """The nearest loss of estimator f that is found from the nearest of unit vectors (6 + 4B,); None if it has none.
+
+    The search ends where one is near `enough`.
+    """
+    begun = [(crossing(room, f, one, BEGIN, END_OF_SEARCH), one) for one in map(rounded, starts)]
+    found = [(at, one) for at, one in begun if at is not None]
+    if not found:
+        return None
+    at, unit = min(found, key=lambda each: each[0])
+    for _ in range(MOST_TURNS):
+        towards = normal(room, f, unit, at) if at > enough else None
+        if towards is None:
+            break
+        for share in TURNS:
+            turned = rounded(share * towards + (1.0 - share) * unit)
+            nearer = crossing(room, f, turned, STEP * (0.5 * at // STEP), at - LEAST_GAIN)
+            if nearer is not None:
+                at, unit = nearer, turned
+                break
+        else:
+            break
+    return Loss(unit, at)
+
+
+def rounded(vector: np.ndarray) -> np.ndarray:
+    """The unit vector of a vector (n,), of few digits but of length one."""
+    short = np.round(vector / np.linalg.norm(vector), DIGITS)
+    return np.asarray(short / math.sqrt(math.fsum(short * short)))
+
+
+def crossing(room: Room, f: int, unit: np.ndarray, begin: float, farthest: float) -> float | None:
+    """How many σ along a unit vector estimator f first loses its lock, to STEP/64; None if not up to the farthest."""
+    width = STEP
+    while width >= STEP / WIDTH**2:
+        at = begin + width * np.arange(1, WIDTH + 1)
+        lost = room.lost(f, at[:, None] * unit)
+        begin, width = (at[np.argmax(lost)] - width, width / WIDTH) if lost.any() else (at[-1], width)
+        if begin >= farthest:
+            return None
+    found = float(begin + width * WIDTH)
+    return found if found <= farthest else None
+
+
+class Watched(NamedTuple):
+    """What a gradient is of: which window's estimate, under which options, in differences of how many σ."""
+
+    window: int
+    options: np.void
+    difference: float
+
+
+def normal(room: Room, f: int, unit: np.ndarray, at: float) -> np.ndarray | None:
+    """The boundary's unit normal (6 + 4B,), outwards, where estimator f loses its lock: at σ along a unit vector.
+
+    None where the two sides do not part in small steps.
+    """
+    plan, options = room.plan, room.plan.options[f].copy()
+    sides = np.array([at - STEP / WIDTH**2, at])[:, None] * unit
+    size, last, middle = plan.layout.shapes["error"][2], int(options["windows"]) - 1, sides.mean(axis=0)
+    ends = room.errors(f, sides)[:2, : last + 1, :size]
+    astray = (np.abs(ends[1] - ends[0]) / plan.posterior[f, : last + 1, :size] > ASTRAY).any(axis=1)
+    if not astray.any():
+        passed = int(np.argmax(np.abs(ends[1, last]) / plan.potential[f, last, :size]))
+        along = np.where(np.arange(size) == passed, np.sign(ends[1, last]), 0.0)
+        return gradient(room, f, middle, along, Watched(last, options, SMOOTH_DIFFERENCE))
+    k, most = int(np.argmax(astray)), int(options["steps"])
+    options["windows"], sigma = k + 1, plan.posterior[f, k, :size]
+    for steps in range(FEWEST_STEPS, most + 1):
+        options["steps"] = steps
+        ends = room.errors(f, sides, options)[:2, k, :size]
+        apart = from_turn(ends[1] - ends[0]) / sigma
+        if np.linalg.norm(apart) > APART:
+            return gradient(room, f, middle, apart / sigma, Watched(k, options, DIFFERENCE))
+    return None
+
+
+def from_turn(errors: np.ndarray) -> np.ndarray:
+    """Differences of errors (…, size), the phases to the nearest turn."""
+    return np.concatenate([errors[..., :1] - np.rint(errors[..., :1]), errors[..., 1:]], axis=-1)
+
+
+def gradient(room: Room, f: int, z: np.ndarray, along: np.ndarray, of: Watched) -> np.ndarray | None:
+    """The unit vector (6 + 4B,) in which alongᵀ(error) of a window grows fastest at z, along (size,), by differences.
+
+    None where nothing changes it.
+    """
+    plan, window = room.plan, room.plan.windows[f, of.window]
+    ends = plan.tables[0].reshape(-1, COLUMNS)[int(window["table"]) + int(window["blocks"]) - 1, END]
+    used = SIZE + 4 * int(ends)  # what is drawn later is not in the estimate
+    found, size = np.zeros(len(z)), len(along)
+    before = room.errors(f, z[None], of.options)[:1, of.window, :size]
+    for first in range(0, used, WIDTH):
+        moved = z + of.difference * np.eye(min(WIDTH, used - first), len(z), first)
+        after = room.errors(f, moved, of.options)[: len(moved), of.window, :size]
+        found[first : first + len(moved)] = from_turn(after - before) @ along
+    length = np.linalg.norm(found)
+    return found / length if length > 0.0 else None
