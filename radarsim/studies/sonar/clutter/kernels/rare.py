@@ -39,7 +39,7 @@ from radarsim.studies.sonar.clutter.kernels.rules import (
     TENTATIVE,
     judge_false,
 )
-from radarsim.studies.sonar.clutter.kernels.sums import add_scores
+from radarsim.studies.sonar.clutter.kernels.sums import add_drawn, add_scores, add_weight
 from radarsim.studies.sonar.clutter.kernels.tracker import (
     Scan,
     Target,
@@ -204,22 +204,8 @@ def add_held(shares, own, state, n, held):
     """Count a scan of the n tracks that are confirmed, by their weights so far; state (CHUNK,)."""
     for i in range(n):
         if state[i] == CONFIRMED:
-            w, j = weight_of(shares, own, i), int(own[HELD, i])
-            held[j, 0] += w
-            held[j, 1] += w * w
-            held[j, 2] += 1.0
-            held[j, 3] += w**4
+            add_weight(weight_of(shares, own, i), held, int(own[HELD, i]))
             own[HELD, i] += 1.0
-
-
-@part
-def add_drawn(shares, own, n, drawn):
-    """Add how n tracks were drawn to the sums of one tracker."""
-    for i in range(n):
-        w = weight_of(shares, own, i)
-        drawn[0] += own[LAW, i] == 0.0
-        drawn[1] += w
-        drawn[2] += w * w
 
 
 @part
@@ -256,5 +242,6 @@ def simulate_false(seeds, field, shift, trackers, work, dt, first, total, scores
                 add_held(shift.shares, own, status[STATE], n, sums.held[f])
                 if not left:
                     break
-            add_drawn(shift.shares, own, n, sums.drawn[f])
+            for i in range(n):
+                add_drawn(weight_of(shift.shares, own, i), own[LAW, i] == 0.0, sums.drawn[f])
             add_scores(trackers.thresholds, n, status[FIRST], status[BEST], scores[f])
