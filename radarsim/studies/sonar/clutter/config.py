@@ -143,13 +143,13 @@ class Filter(config.Filter):
 class RareTracks(Model):
     """Events that are rare: realisations drawn where they are frequent, and weights that make up for it."""
 
-    events: Annotated[
-        tuple[Literal["false_tracks", "long_false_tracks", "ended_tracks"], ...], Field(min_length=1)
-    ] = Field(
-        title="events that are sought",
-        description="false_tracks: tracks that false plots begin, of all trackers, are drawn with more plots in their "
-        "gates until they are confirmed; long_false_tracks: until they end; ended_tracks: further realisations of the "
-        "target's track are drawn with more misses once it is confirmed, to know how rarely it ends",
+    events: Annotated[tuple[Literal["false_tracks", "long_false_tracks", "ended_tracks"], ...], Field(min_length=1)] = (
+        Field(
+            title="events that are sought",
+            description="false_tracks: tracks that false plots begin, of all trackers, are drawn with more plots in their "
+            "gates until they are confirmed; long_false_tracks: until they end; ended_tracks: further realisations of the "
+            "target's track are drawn with more misses once it is confirmed, to know how rarely it ends",
+        )
     )
     plain_share: Annotated[float, Strict(), Field(ge=0.01, le=0.9)] = Field(
         0.1,
@@ -204,7 +204,9 @@ class Keys(config.Keys):
         elif self.rare.seeks_false_tracks and not self.sensor.false_plots_per_km2:
             yield at("rare", "needs false plots: sensor.false_plots_per_km2 must be > 0")
         elif self.rare.seeks_ends and self.sensor.detection_probability == 1:
-            yield at("rare.events", "ended_tracks needs plots that are missed: sensor.detection_probability must be < 1")
+            yield at(
+                "rare.events", "ended_tracks needs plots that are missed: sensor.detection_probability must be < 1"
+            )
 
     @cross_check
     def _trackers_fit(self) -> Iterator[At]:

@@ -1,4 +1,4 @@
-"""How the target's track is drawn where it ends: laws under which runs of misses come, prepared for the kernels.
+"""How the target's track is drawn where it ends: laws that lead there, prepared for the kernels.
 
 A track ends after misses in a row, or because of what such a run leads to: its gate grows, a false plot falls into it,
 its velocity carries it away. So there is a law for each of some lengths of a run, under which a run of that length
@@ -7,17 +7,25 @@ the gate, the probability V(i, k) that it comes, with i misses in a row before s
 to draw a miss with the probability h = p V(i + 1, k + 1) / V(i, k) would give all tracks with such a run the same
 weight, 1 / V: Doob's transform, of no variance (Juneja and Shahabuddin 2006, Handbooks in Operations Research and
 Management Science 13, 291). Here it is as near to that as misses are to being independent; weights make up for the rest.
+
+A young track may also be wrong from its first plots on: because of their errors, so that the next plots are outside its
+gate one after the other, or because one of them is false. So there is a law for each of its first innovations, under
+which that is stretched to the gate, and one under which a false plot is in its gate.
 """
+
+import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.studies.noise import noise_key
-from radarsim.studies.sonar.clutter.filters import TrackerSpec
+from radarsim.studies.sonar.clutter.axes import ClutterAxes
+from radarsim.studies.sonar.clutter.filters import Conditions, TrackerSpec, gate_threshold
 from radarsim.studies.sonar.clutter.kernels.ends import Ends
-from radarsim.studies.sonar.kernels.patterns import Detections
 
 MOST_RUNS = 6
+YOUNG = 6  # scans whose plots' errors may be stretched
 LONGEST = 20  # misses in a row that are drawn for: a track that needs more is dropped, or far off, before
 
 
@@ -55,17 +63,55 @@ def undetected(probability: np.ndarray, inside: float, length: int) -> np.ndarra
     return np.where((probability > 0.0) & (probability < 1.0), drawn, 1.0 - probability)
 
 
-def ends(case: Case, specs: list[TrackerSpec], detections: Detections) -> Ends:
-    """How the target's track of each tracker is drawn; its shares are equal but for the plain one's."""
-    plain = case.spec.rare.plain_share
-    probability = np.where(detections.certain < 0, detections.probability, detections.certain)
+def directions(t: np.ndarray) -> np.ndarray:
+    """Unit vectors (J - 2, J) of the errors of J plots at t (J,), s, in the innovations of a line from the third on.
+
+    The line through the plots before is fitted by least squares, as a track without manoeuvres begins.
+    """
+    out = np.zeros((max(len(t) - 2, 0), len(t)))
+    for j in range(2, len(t)):
+        line = np.stack([np.ones(j), t[:j] - t[j]])
+        out[j - 2, :j], out[j - 2, j] = -np.linalg.solve(line @ line.T, line)[0], 1.0
+    return out / np.linalg.norm(out, axis=1, keepdims=True)
+
+
+def stretch(gate: float) -> float:
+    """How much an innovation is stretched for a gate, χ² of two components: s² = gate / 2, the best for its tail."""
+    return math.sqrt(max(gate / 2.0, 2.0))
+
+
+def family_shares(plain: float, sizes: Sequence[int]) -> np.ndarray:
+    """Shares of the law itself and of laws in families of these sizes: equal for all families that are there."""
+    each = (1.0 - plain) / max(sum(size > 0 for size in sizes), 1)
+    return np.concatenate([[plain], *(np.full(size, each / size) for size in sizes if size)])
+
+
+def ends(case: Case, specs: Sequence[TrackerSpec], given: Conditions, labels: ClutterAxes) -> Ends:
+    """How the target's track of each tracker is drawn."""
+    certain, K = labels.detections.certain, len(labels.k)
+    probability = np.where(certain < 0, labels.detections.probability, certain)
+    start = int(np.argmax(certain != 0))
+    direction = directions(np.asarray(labels.t_s, dtype=float)[start : start + YOUNG])
     runs = [lengths(one.misses) for one in specs]
-    most, longest = max(map(len, runs)), max(run[-1] for run in runs)
-    length, shares = np.zeros((len(specs), most), dtype=np.int64), np.zeros((len(specs), 1 + most))
-    drawn = np.ones((len(specs), most, longest, len(probability)))
+    most, longest = max(map(len, runs)), max(int(run[-1]) for run in runs)
+    length = np.zeros((len(specs), most), dtype=np.int64)
+    shares = np.zeros((len(specs), 1 + most + len(direction) + 1))
+    drawn = np.ones((len(specs), most, longest, K))
     for f, (one, run) in enumerate(zip(specs, runs, strict=True)):
         length[f, : len(run)] = run
-        shares[f, 0], shares[f, 1 : 1 + len(run)] = plain, (1.0 - plain) / len(run)
+        far = len(direction) if one.gate_probability < 1.0 else 0
+        own = family_shares(case.spec.rare.plain_share, (len(run), far, int(given.density > 0.0)))
+        places = [*range(1 + len(run)), *range(1 + most, 1 + most + far), *[-1][: len(own) - 1 - len(run) - far]]
+        shares[f, places] = own
         for j, each in enumerate(run):
             drawn[f, j, :each] = undetected(probability, one.gate_probability, int(each))
-    return Ends(noise_key(case, "rare ends"), shares, length, drawn)
+    return Ends(
+        choice=noise_key(case, "rare ends"),
+        plots=noise_key(case, "rare plots about the target"),
+        shares=shares,
+        length=length,
+        undetected=drawn,
+        start=start,
+        direction=direction,
+        stretch=np.array([stretch(gate_threshold(one.gate_probability)) for one in specs]),
+    )

@@ -89,7 +89,7 @@ def prepare(case: Case) -> Plan:
         shift = rare.Shift(noise_key(case, "rare"), noise_key(case, "rare plots"), np.array(spec.rare.shares()))
     if spec.rare is not None and spec.rare.seeks_ends:
         own |= {"ended": (F, K, KINDS, 4), "ended_drawn": (F, 3)}
-        drawn = sought.ends(case, specs, labels.detections)
+        drawn = sought.ends(case, specs, given, labels)
     return Plan(
         layout=Layout(**common, **own),
         axes=labels,

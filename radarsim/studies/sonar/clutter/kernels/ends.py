@@ -1,17 +1,23 @@
-"""The target's track, drawn where it ends: runs of missed plots, and weights that make up for them.
+"""The target's track, drawn where it ends, and weights that make up for it (importance sampling).
 
-Of a share of the realisations the target's plots are missed more often than they should, once its track is confirmed,
-until as many misses in a row as the law of a realisation is for have come; each counts with the ratio of the laws
-(importance sampling). False plots, and the errors of the plots, are drawn as they are. For a tracker a plot outside its
-gate is a miss like one that is not there, so the ratio is that of the answers "taken into the gate or not" alone:
+A share of the realisations is drawn as it is, the others by laws of three kinds:
+
+    runs        the target's plots are missed more often than they should, once its track is confirmed, until as many
+                misses in a row have come as the law is for
+    far         an innovation of the young track is stretched: the part of the plots' errors in it, in range and bearing
+    false       the gate of the young track contains a false plot more often than it should, until one has come
+
+Each realisation counts with the law itself over the mixture of all. Of runs, the ratio of the laws is at first that of
+the answers "detected or not". For a tracker a plot outside its gate is a miss like one that is not there; so where the
+plots' errors are no longer stretched, it is that of the answers "in the gate or not" alone,
 
     (1 - h) / P_D   for a plot in the gate,     (h + (1 - h) c) / (1 - P_D + P_D c)   for none,
 
 with h the probability that the target is not detected, as drawn, and c that its plot, if there is one, is outside the
-gate: both follow from the scans before. Were the ratio that of "detected or not", a track that ends by plots outside
-its gate, which laws for misses hardly draw, would have a large weight. Letters as in `gate`, and
+gate: both follow from the scans before. Of false plots it is that of `rare`. Letters as in `gate`, and
 
     c           probability that the target's plot is outside the gate
+    u, s        direction of the plots' errors in an innovation, a unit vector; how much it is stretched
     ratio       of a law that is drawn from over the law itself
 """
 
@@ -21,11 +27,14 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.kernels.compile import inline, kernel, part
+from radarsim.kernels.lanes import address
 from radarsim.kernels.random import uniforms
 from radarsim.studies.sonar.clutter.kernels.blocks import measure_target
 from radarsim.studies.sonar.clutter.kernels.counts import COUNTS
-from radarsim.studies.sonar.clutter.kernels.gate import KNOWN, OPEN, PDA, distance_squared, inverse_two
-from radarsim.studies.sonar.clutter.kernels.rules import CONFIRMED, MISSES, STATE, judge, off_target
+from radarsim.studies.sonar.clutter.kernels.field import draws_of
+from radarsim.studies.sonar.clutter.kernels.gate import KNOWN, OPEN, PDA, Rule, distance_squared, inverse_two
+from radarsim.studies.sonar.clutter.kernels.rare import LARGEST, MOST_MEAN, associate_drawn, box_of
+from radarsim.studies.sonar.clutter.kernels.rules import AGE, CONFIRMED, MISSES, NONE, SINCE, STATE, judge, off_target
 from radarsim.studies.sonar.clutter.kernels.rules import ENDS as TRACKS_ENDED
 from radarsim.studies.sonar.clutter.kernels.sums import add_drawn, add_weight
 from radarsim.studies.sonar.clutter.kernels.tracker import (
@@ -33,62 +42,80 @@ from radarsim.studies.sonar.clutter.kernels.tracker import (
     Target,
     Workspace,
     associate,
+    associate_track,
+    begin,
+    gate_of,
     reset,
     rule_of,
+    settle,
     tracks_of,
 )
 from radarsim.studies.sonar.clutter.kernels.tracks import predict, update
+from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK
 from radarsim.studies.sonar.kernels.sums import Course
 
 NODES = 32
 WIDEST = 8.5  # σ of a plot: further from its mean it is once in 10¹⁶
-LARGEST = 1e280  # of a ratio: far beyond any whose reciprocal counts
 KINDS = 2
 DROPPED, LOST = range(KINDS)
-# Which law a track is drawn from; the longest run of misses since its confirmation; whether it has ended; then the
-# ratio so far of each law.
-LAW, LONGEST, ENDED, RATIO = range(4)
+# Which law a track is drawn from, 0 being the law itself; the longest run of misses since its confirmation; whether it
+# has ended; whether a false plot has come; by how much errors in range and bearing are stretched; ratios of the laws.
+LAW, LONGEST, ENDED, CAME, PUSH_R, PUSH_B, RATIO = range(7)
 
 
 class Ends(NamedTuple):
-    """How the target's tracks of F trackers are drawn, by R laws beside the law itself.
+    """How the target's tracks of F trackers are drawn, by R laws of runs, N of far plots, and one of false plots.
 
-    choice (2,) is the key of the stream that chooses the law of each realisation. shares (F, 1 + R) of the law itself
-    and of the others; the sum is one. length (F, R) of the run of misses that a law is for; undetected (F, R, L, K) the
-    probability that the target is not detected at scan k by tracks with i misses in a row.
+    choice (2,) is the key of the stream that chooses the law of each realisation, plots (2,) that of false plots in
+    boxes. shares (F, 1 + R + N + 1) of the law itself and of the others, in this order; the sum is one. length (F, R)
+    of the run of misses that a law is for; undetected (F, R, L, K) the probability that the target is not detected at
+    scan k by tracks with i misses in a row. direction (N, J) of the errors at J scans from scan `start` on, and stretch
+    (F,) of them.
     """
 
     choice: np.ndarray
+    plots: np.ndarray
     shares: np.ndarray
     length: np.ndarray
     undetected: np.ndarray
+    start: int
+    direction: np.ndarray
+    stretch: np.ndarray
 
 
 class Laws(NamedTuple):
-    """What `Ends` holds of one tracker, and the χ² of its gate."""
+    """What `Ends` holds of one tracker, its rule, and the n scans in which it is young."""
 
     shares: np.ndarray
     length: np.ndarray
     undetected: np.ndarray
-    gate: float
+    stretch: float
+    rule: Rule
+    young: float
 
 
 class Plots(NamedTuple):
-    """The law of the target's plots at a scan: their course, about which they lie, and their σ (2,) in m and rad."""
+    """The law of the target's plots at a scan: their course, about which they lie, and their σ (2,) in m and rad.
+
+    free: no law stretches their errors.
+    """
 
     course: Course
     sigma: np.ndarray
+    free: bool
 
 
 class Chunk(NamedTuple):
-    """Arrays of a chunk: work arrays of the trackers, own (F, RATIO + R, CHUNK), the target's plots and their law, and
-    what `judge` writes.
+    """Arrays of a chunk: work arrays of the trackers, own (F, RATIO + laws, CHUNK), the target's plots as measured and
+    as drawn (2, CHUNK), whether they are detected (CHUNK,), their law, and what `judge` writes.
     """
 
     work: Workspace
     own: np.ndarray
-    target: Target
+    measured: np.ndarray
+    z: np.ndarray
+    detected: np.ndarray
     plots: Plots
     kept: np.ndarray
     counts: np.ndarray
@@ -141,29 +168,89 @@ def outside(off, S, threshold, sigma):
 
 # ---- laws -----------------------------------------------------------------------------------------------------------
 @part
-def begin_drawn(ends, f, first, n, own):
-    """Choose the laws of n realisations from number `first` on, for tracker f."""
+def young_errors(world, start, first, errors):
+    """Write the errors of the target's plots, over their σ, to errors (J, 2, CHUNK): J scans from scan `start` on."""
+    plots = np.zeros((2, 4, CHUNK))
+    for j in range(errors.shape[0]):
+        move_and_measure(world, first, start + j, plots)
+        for c in range(2):
+            for i in range(CHUNK):
+                errors[j, c, i] = plots[c, 1, i] / world.fresh[start + j, c]
+
+
+@inline
+def along(direction, errors, c, i):
+    """uᵀ of the errors (J, 2, CHUNK) of realisation i in coordinate c."""
+    total = 0.0
+    for j in range(direction.size):
+        total += direction[j] * errors[j, c, i]
+    return total
+
+
+@inline
+def between(one, other):
+    """uᵀu of two directions."""
+    total = 0.0
+    for j in range(one.size):
+        total += one[j] * other[j]
+    return total
+
+
+@part
+def begin_drawn(ends, laws, first, n, errors, own):
+    """Choose the laws of n realisations from number `first` on, stretch their errors, and set the ratios that follow."""
+    runs, direction, stretch = laws.length.size, ends.direction, laws.stretch
     for i in range(n):
         u, _ = uniforms(ends.choice[0], ends.choice[1], first + i, 0)
-        law, total = 0, ends.shares[f, 0]
-        while u >= total and law < ends.length.shape[1]:
+        law, total = 0, laws.shares[0]
+        while u >= total and law < laws.shares.size - 1:
             law += 1
-            total += ends.shares[f, law]
-        own[LAW, i], own[LONGEST, i], own[ENDED, i] = float(law), 0.0, 0.0
-        own[RATIO:, i] = 1.0
+            total += laws.shares[law]
+        own[:, i] = 0.0
+        own[LAW, i], own[RATIO:, i] = float(law), 1.0
+        far = law - 1 - runs
+        if 0 <= far < len(direction):
+            own[PUSH_R, i] = (stretch - 1.0) * along(direction[far], errors, 0, i)
+            own[PUSH_B, i] = (stretch - 1.0) * along(direction[far], errors, 1, i)
+        else:
+            far = 0  # nothing is added
+        for j in range(len(direction)):
+            part_of = between(direction[j], direction[far])
+            r = along(direction[j], errors, 0, i) + part_of * own[PUSH_R, i]
+            b = along(direction[j], errors, 1, i) + part_of * own[PUSH_B, i]
+            grown = math.exp(min(0.5 * (r * r + b * b) * (1.0 - 1.0 / (stretch * stretch)), 600.0))
+            own[RATIO + runs + j, i] = grown / (stretch * stretch)
+
+
+@part
+def stretched(ends, laws, k, n, z, sigma, own, out):
+    """Write the target's plots (2, CHUNK) at scan k to out, with their errors as each realisation's law has them."""
+    runs, j = laws.length.size, k - ends.start
+    for i in range(n):
+        far, out[0, i], out[1, i] = int(own[LAW, i]) - 1 - runs, z[0, i], z[1, i]
+        if 0 <= j < ends.direction.shape[1] and 0 <= far < len(ends.direction):
+            out[0, i] += ends.direction[far, j] * own[PUSH_R, i] * sigma[0]
+            out[1, i] += ends.direction[far, j] * own[PUSH_B, i] * sigma[1]
+
+
+@inline
+def laws_of(ends, trackers, f):
+    """The laws of tracker f."""
+    rule, young = rule_of(trackers, f), trackers.n[f]
+    return Laws(ends.shares[f], ends.length[f], ends.undetected[f], ends.stretch[f], rule, young)
 
 
 @inline
 def undetected_by(laws, law, longest, misses, k, detection):
     """h: the probability that the target of a confirmed track is not detected under a law; 0 is the law itself."""
-    if law > 0 and longest < laws.length[law - 1]:
+    if 0 < law <= laws.length.size and longest < laws.length[law - 1]:
         return laws.undetected[law - 1, misses, k]
     return 1.0 - detection
 
 
 @part
 def detect_drawn(detections, laws, scan, status, predicted, target, plots, own):
-    """Set target.detected as each realisation's law has it, and bring the ratios in own (RATIO + R, CHUNK) up to date.
+    """Set target.detected as each realisation's law has it, and bring the ratios of runs in own up to date.
 
     Before association: predicted (5, CHUNK) is of this scan. A realisation whose track has ended has no more plots.
     """
@@ -182,19 +269,55 @@ def detect_drawn(detections, laws, scan, status, predicted, target, plots, own):
         if longest >= most:  # whatever law it is drawn from, the rest is as it is
             continue
         hit, c = detected[i] > 0.0, 0.0
-        S = (predicted[2, i], predicted[3, i], predicted[4, i])
-        if hit:
+        if plots.free:
+            S = (predicted[2, i], predicted[3, i], predicted[4, i])
             irr, irb, ibb, _ = inverse_two(S[0], S[1], S[2])
-            hit = distance_squared(z[0, i] - predicted[0, i], z[1, i] - predicted[1, i], (irr, irb, ibb)) <= laws.gate
-        if not hit:
-            mean_r, mean_b = plots.course.shift[0, 0, i], plots.course.shift[1, 0, i]
-            mean_r, mean_b = mean_r + plots.course.truth[0, 0], mean_b + plots.course.truth[1, 0]
-            off = (mean_r - predicted[0, i], mean_b - predicted[1, i])
-            c = outside(off, S, laws.gate, (plots.sigma[0], plots.sigma[1]))
+            nu = (z[0, i] - predicted[0, i], z[1, i] - predicted[1, i])
+            hit = hit and distance_squared(nu[0], nu[1], (irr, irb, ibb)) <= laws.rule.gate
+            if not hit:
+                off_r = plots.course.truth[0, 0] + plots.course.shift[0, 0, i] - predicted[0, i]
+                off_b = plots.course.truth[1, 0] + plots.course.shift[1, 0, i] - predicted[1, i]
+                c = outside((off_r, off_b), S, laws.rule.gate, (plots.sigma[0], plots.sigma[1]))
         for j in range(laws.length.size):
             h = undetected_by(laws, j + 1, longest, misses, k, detection)
             factor = (1.0 - h) / detection if hit else (h + (1.0 - h) * c) / (1.0 - detection + detection * c)
             own[RATIO + j, i] = min(own[RATIO + j, i] * factor, LARGEST)
+
+
+@part
+def associate_young(field, ends, laws, scan, tracks, status, chunk, own):
+    """Associate a scan's plots with every track, as `tracker.associate`; about young tracks false plots are drawn.
+
+    The ratio of the law of false plots, the last one, is brought up to date.
+    """
+    draws, out, rule, tally = draws_of(field), chunk.work.association, laws.rule, address(chunk.counts)
+    predicted, detected, z, lives, taken = (
+        chunk.work.predicted,
+        chunk.detected,
+        chunk.z,
+        address(status),
+        address(out),
+    )
+    keys, last, law = (ends.plots[0], ends.plots[1]), own.shape[0] - 1, float(laws.shares.size - 1)
+    for i in range(scan.count):
+        if status[STATE, i] == NONE:
+            out[:, i] = 0.0
+            if detected[i] > 0.0:
+                begin(tracks, status, i, z, out)
+            continue
+        status[SINCE, i] += scan.dt
+        place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
+        gate = gate_of(place, S, tracks.plots[i] > 1.5, rule.speed * status[SINCE, i])
+        plot, box, age = (detected[i], z[0, i], z[1, i]), box_of(draws.cells, gate, rule.gate), status[AGE, i]
+        if age < laws.young and 0.0 < box.mean <= MOST_MEAN:
+            needed = 1.0 / (laws.young - age) if own[CAME, i] == 0.0 else 0.0
+            drawn = (scan.first + i, scan.k, gate, plot, box, needed, own[LAW, i] == law)
+            found, factor, some = associate_drawn(keys, rule, *drawn)
+            own[last, i] = min(own[last, i] * factor, LARGEST)
+            own[CAME, i] = 1.0 if some else own[CAME, i]
+        else:
+            found = associate_track(draws, rule, scan.first + i, scan.k, plot, gate, tally)
+        settle(lives, i, found, taken)
 
 
 # ---- sums -----------------------------------------------------------------------------------------------------------
@@ -221,43 +344,55 @@ def add_ended(limit, n, tracks, status, course, laws, own, ended):
 
 # ---- a block --------------------------------------------------------------------------------------------------------
 @part
-def scan_target(detections, field, trackers, laws, f, scan, chunk):
-    """Process a scan of the target's tracks of tracker f: detection as drawn, association, update, and the rules."""
-    work, own, target, plots, kept, counts = chunk
+def scan_target(detections, field, trackers, ends, laws, f, scan, chunk):
+    """Process a scan of the target's tracks of tracker f: its plots as drawn, association, update, and the rules."""
+    work, own, counts = chunk.work, chunk.own[f], chunk.counts
     tracks, status, manoeuvre = tracks_of(work, f), work.status[f], trackers.manoeuvre[f]
     predict(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, work.predicted)
-    detect_drawn(detections, laws, scan, status, work.predicted, target, plots, own[f])
-    associate(field, rule_of(trackers, f), scan, tracks, status, target, work, counts)
+    target = Target(chunk.detected, chunk.z, True)
+    stretched(ends, laws, scan.k, scan.count, chunk.measured, chunk.plots.sigma, own, target.z)
+    detect_drawn(detections, laws, scan, status, work.predicted, target, chunk.plots, own)
+    if laws.shares[-1] > 0.0:
+        associate_young(field, ends, laws, scan, tracks, status, chunk, own)
+    else:
+        associate(field, laws.rule, scan, tracks, status, target, work, counts)
     joint = trackers.association[f] == PDA
     update(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, joint, work.association)
-    judge(trackers, f, scan.count, tracks, status, plots.course, kept, counts)
+    judge(trackers, f, scan.count, tracks, status, chunk.plots.course, chunk.kept, counts)
 
 
 @kernel
 def simulate_ends(world, detections, field, trackers, ends, work, first, total, sums):
     """Add the weighted ends of the target's first confirmed tracks to sums, an EndSums.
 
-    Arguments as those of `blocks.simulate_block`: of realisations drawn as they are the tracks are the same.
+    Arguments as those of `blocks.simulate_block`.
     """
-    F, K, R = trackers.gate.size, world.dt.size, ends.length.shape[1]
-    plots, shift, z = np.empty((2, 4, CHUNK)), np.zeros((2, 3, CHUNK)), np.empty((2, CHUNK))
-    own, kept, counts = np.empty((F, RATIO + R, CHUNK)), np.empty(CHUNK), np.zeros(COUNTS)
-    target = Target(np.empty(CHUNK), z, True)
+    F, K, J = trackers.gate.size, world.dt.size, ends.direction.shape[1]
+    plots, shift, measured, z = (
+        np.empty((2, 4, CHUNK)),
+        np.zeros((2, 3, CHUNK)),
+        np.empty((2, CHUNK)),
+        np.empty((2, CHUNK)),
+    )
+    own, kept, counts = np.empty((F, RATIO + ends.shares.shape[1] - 1, CHUNK)), np.empty(CHUNK), np.zeros(COUNTS)
+    detected, errors = np.empty(CHUNK), np.empty((J, 2, CHUNK))
     for done in range(0, total, CHUNK):
         reset(work)
         plots[:] = 0.0
         n = min(CHUNK, total - done)
+        young_errors(world, ends.start, first + done, errors)
         for f in range(F):
-            begin_drawn(ends, f, first + done, n, own[f])
+            begin_drawn(ends, laws_of(ends, trackers, f), first + done, n, errors, own[f])
         for k in range(K):
             scan, course = Scan(first + done, n, k, world.dt[k]), Course(world.truth[k], shift)
-            measure_target(world, first + done, k, plots, z, shift)
-            chunk = Chunk(work, own, target, Plots(course, world.fresh[k]), kept, counts)
+            measure_target(world, first + done, k, plots, measured, shift)
+            law_of_plots = Plots(course, world.fresh[k], k >= ends.start + J)
+            chunk = Chunk(work, own, measured, z, detected, law_of_plots, kept, counts)
             for f in range(F):
                 if trackers.association[f] == KNOWN:
                     continue
-                laws = Laws(ends.shares[f], ends.length[f], ends.undetected[f], trackers.gate[f])
-                scan_target(detections, field, trackers, laws, f, scan, chunk)
+                laws = laws_of(ends, trackers, f)
+                scan_target(detections, field, trackers, ends, laws, f, scan, chunk)
                 limit = (trackers.lost[f] * trackers.sigma[0], trackers.lost[f] * trackers.sigma[1])
                 add_ended(limit, n, tracks_of(work, f), work.status[f], course, laws, own[f], sums.ended[f, k])
         for f in range(F):
