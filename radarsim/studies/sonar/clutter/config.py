@@ -140,16 +140,17 @@ class Filter(config.Filter):
             yield at("association", "needs a filter of kind kalman and degree 1")
 
 
+Event = Literal["false_tracks", "long_false_tracks", "ended_tracks"]
+
+
 class RareTracks(Model):
     """Events that are rare: realisations drawn where they are frequent, and weights that make up for it."""
 
-    events: Annotated[tuple[Literal["false_tracks", "long_false_tracks", "ended_tracks"], ...], Field(min_length=1)] = (
-        Field(
-            title="events that are sought",
-            description="false_tracks: tracks that false plots begin, of all trackers, are drawn with more plots in their "
-            "gates until they are confirmed; long_false_tracks: until they end; ended_tracks: further realisations of the "
-            "target's track are drawn with more misses once it is confirmed, to know how rarely it ends",
-        )
+    events: Annotated[tuple[Event, ...], Field(min_length=1)] = Field(
+        title="events that are sought",
+        description="false_tracks: tracks that false plots begin, of all trackers, are drawn with more plots in their "
+        "gates until they are confirmed; long_false_tracks: until they end; ended_tracks: further realisations of the "
+        "target's track are drawn where it ends, with more misses, and worse or false plots while it is young",
     )
     plain_share: Annotated[float, Strict(), Field(ge=0.01, le=0.9)] = Field(
         0.1,

@@ -6,14 +6,14 @@ comes in the scans that are left. Were misses independent, with the probability 
 the gate, the probability V(i, k) that it comes, with i misses in a row before scan k, would be known by recursion, and
 to draw a miss with the probability h = p V(i + 1, k + 1) / V(i, k) would give all tracks with such a run the same
 weight, 1 / V: Doob's transform, of no variance (Juneja and Shahabuddin 2006, Handbooks in Operations Research and
-Management Science 13, 291). Here it is as near to that as misses are to being independent; weights make up for the rest.
+Management Science 13, 291). Here it is as near to that as misses are to being independent.
 
 A young track may also be wrong from its first plots on: because of their errors, so that the next plots are outside its
-gate one after the other, or because one of them is false. So there is a law for each of its first innovations, under
-which that is stretched to the gate, and one under which a false plot is in its gate.
+gate one after the other, or because one of them is false. So there is a law for the track of each number of plots
+from that which confirms it on, under which the errors that lead there are stretched, and one under which a false plot
+is in its gate.
 """
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -25,7 +25,8 @@ from radarsim.studies.sonar.clutter.filters import Conditions, TrackerSpec, gate
 from radarsim.studies.sonar.clutter.kernels.ends import Ends
 
 MOST_RUNS = 6
-YOUNG = 6  # scans whose plots' errors may be stretched
+FURTHER = 3  # plots after that which confirms a track, up to which it may be wrong by their errors
+OUT = 3  # plots in a row that then leave its gate: more follow by themselves
 LONGEST = 20  # misses in a row that are drawn for: a track that needs more is dropped, or far off, before
 
 
@@ -63,21 +64,28 @@ def undetected(probability: np.ndarray, inside: float, length: int) -> np.ndarra
     return np.where((probability > 0.0) & (probability < 1.0), drawn, 1.0 - probability)
 
 
-def directions(t: np.ndarray) -> np.ndarray:
-    """Unit vectors (J - 2, J) of the errors of J plots at t (J,), s, in the innovations of a line from the third on.
+def directions(t: np.ndarray, least: int) -> np.ndarray:
+    """The shortest errors (n, J) of J plots at t (J,), s, with which OUT plots in a row leave the gate of a track.
 
-    The line through the plots before is fitted by least squares, as a track without manoeuvres begins.
+    Of the track after `least` and more plots, a line fitted to them by least squares, as a track without manoeuvres
+    begins. The innovations of the next OUT plots are rows A of the errors, each with its own variance S = |A|²; all of
+    them are √S at the errors Aᵀ(A Aᵀ)⁻¹√S, the shortest with which they are, in units of the root of a gate.
     """
-    out = np.zeros((max(len(t) - 2, 0), len(t)))
-    for j in range(2, len(t)):
-        line = np.stack([np.ones(j), t[:j] - t[j]])
-        out[j - 2, :j], out[j - 2, j] = -np.linalg.solve(line @ line.T, line)[0], 1.0
-    return out / np.linalg.norm(out, axis=1, keepdims=True)
+    out = np.zeros((max(len(t) - OUT - least + 1, 0), len(t)))
+    for row, j in zip(out, range(least, len(t)), strict=False):
+        A = np.zeros((OUT, len(t)))
+        for h in range(OUT):
+            line = np.stack([np.ones(j), t[:j] - t[j + h]])
+            A[h, :j], A[h, j + h] = -np.linalg.solve(line @ line.T, line)[0], 1.0
+        row[:] = A.T @ np.linalg.solve(A @ A.T, np.linalg.norm(A, axis=1))
+    return out
 
 
-def stretch(gate: float) -> float:
-    """How much an innovation is stretched for a gate, χ² of two components: s² = gate / 2, the best for its tail."""
-    return math.sqrt(max(gate / 2.0, 2.0))
+def stretch(gate: float, radius: np.ndarray) -> np.ndarray:
+    """How much errors along directions are stretched for a gate, χ² of two components: s² is half the least square
+    there, the best for the tail of a Gaussian in two components; radius (n,) of the directions.
+    """
+    return np.sqrt(np.maximum(gate * radius**2 / 2.0, 2.0))
 
 
 def family_shares(plain: float, sizes: Sequence[int]) -> np.ndarray:
@@ -91,7 +99,10 @@ def ends(case: Case, specs: Sequence[TrackerSpec], given: Conditions, labels: Cl
     certain, K = labels.detections.certain, len(labels.k)
     probability = np.where(certain < 0, labels.detections.probability, certain)
     start = int(np.argmax(certain != 0))
-    direction = directions(np.asarray(labels.t_s, dtype=float)[start : start + YOUNG])
+    few = min(one.m for one in specs)
+    t = np.asarray(labels.t_s, dtype=float)[start : start + max(one.m for one in specs) + FURTHER + OUT]
+    direction = directions(t, few)
+    radius = np.linalg.norm(direction, axis=1)
     runs = [lengths(one.misses) for one in specs]
     most, longest = max(map(len, runs)), max(int(run[-1]) for run in runs)
     length = np.zeros((len(specs), most), dtype=np.int64)
@@ -99,9 +110,9 @@ def ends(case: Case, specs: Sequence[TrackerSpec], given: Conditions, labels: Cl
     drawn = np.ones((len(specs), most, longest, K))
     for f, (one, run) in enumerate(zip(specs, runs, strict=True)):
         length[f, : len(run)] = run
-        far = len(direction) if one.gate_probability < 1.0 else 0
-        own = family_shares(case.spec.rare.plain_share, (len(run), far, int(given.density > 0.0)))
-        places = [*range(1 + len(run)), *range(1 + most, 1 + most + far), *[-1][: len(own) - 1 - len(run) - far]]
+        far = [j for j in range(len(direction)) if one.gate_probability < 1.0 and 0 <= j + few - one.m <= FURTHER]
+        own = family_shares(case.spec.rare.plain_share, (len(run), len(far), int(given.density > 0.0)))
+        places = [*range(1 + len(run)), *(1 + most + j for j in far), *[-1][: len(own) - 1 - len(run) - len(far)]]
         shares[f, places] = own
         for j, each in enumerate(run):
             drawn[f, j, :each] = undetected(probability, one.gate_probability, int(each))
@@ -112,6 +123,6 @@ def ends(case: Case, specs: Sequence[TrackerSpec], given: Conditions, labels: Cl
         length=length,
         undetected=drawn,
         start=start,
-        direction=direction,
-        stretch=np.array([stretch(gate_threshold(one.gate_probability)) for one in specs]),
+        direction=direction / radius[:, None],
+        stretch=np.array([stretch(gate_threshold(one.gate_probability), radius) for one in specs]),
     )

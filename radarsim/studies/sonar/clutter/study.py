@@ -37,8 +37,8 @@ class Plan:
     """A plan of trackers of a target and of false tracks.
 
     field_about_false holds the false plots among which false tracks live; seeds (2,) is the key of the stream of their
-    first plots. shift: how false tracks are drawn where they are rare; None: as they are. ends: how further tracks of the
-    target are drawn where its ends are rare; None: there are none.
+    first plots. shift: how false tracks are drawn where they are rare; None: as they are. ends: how further tracks of
+    the target are drawn where its ends are rare; None: there are none.
     """
 
     layout: Layout

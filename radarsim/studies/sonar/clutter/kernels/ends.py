@@ -4,7 +4,7 @@ A share of the realisations is drawn as it is, the others by laws of three kinds
 
     runs        the target's plots are missed more often than they should, once its track is confirmed, until as many
                 misses in a row have come as the law is for
-    far         an innovation of the young track is stretched: the part of the plots' errors in it, in range and bearing
+    far         errors of the plots of a young track are stretched along one direction, in range and bearing
     false       the gate of the young track contains a false plot more often than it should, until one has come
 
 Each realisation counts with the law itself over the mixture of all. Of runs, the ratio of the laws is at first that of
@@ -17,7 +17,7 @@ with h the probability that the target is not detected, as drawn, and c that its
 gate: both follow from the scans before. Of false plots it is that of `rare`. Letters as in `gate`, and
 
     c           probability that the target's plot is outside the gate
-    u, s        direction of the plots' errors in an innovation, a unit vector; how much it is stretched
+    u, s        direction of errors, a unit vector; how much they are stretched along it
     ratio       of a law that is drawn from over the law itself
 """
 
@@ -56,6 +56,7 @@ from radarsim.studies.sonar.kernels.steps import CHUNK
 from radarsim.studies.sonar.kernels.sums import Course
 
 NODES = 32
+MOST_LOG = 600.0  # of a ratio: far beyond any whose reciprocal counts
 WIDEST = 8.5  # σ of a plot: further from its mean it is once in 10¹⁶
 KINDS = 2
 DROPPED, LOST = range(KINDS)
@@ -71,7 +72,7 @@ class Ends(NamedTuple):
     boxes. shares (F, 1 + R + N + 1) of the law itself and of the others, in this order; the sum is one. length (F, R)
     of the run of misses that a law is for; undetected (F, R, L, K) the probability that the target is not detected at
     scan k by tracks with i misses in a row. direction (N, J) of the errors at J scans from scan `start` on, and stretch
-    (F,) of them.
+    (F, N) of them.
     """
 
     choice: np.ndarray
@@ -90,7 +91,7 @@ class Laws(NamedTuple):
     shares: np.ndarray
     length: np.ndarray
     undetected: np.ndarray
-    stretch: float
+    stretch: np.ndarray
     rule: Rule
     young: float
 
@@ -198,7 +199,7 @@ def between(one, other):
 
 @part
 def begin_drawn(ends, laws, first, n, errors, own):
-    """Choose the laws of n realisations from number `first` on, stretch their errors, and set the ratios that follow."""
+    """Choose the laws of n realisations from number `first` on, stretch errors, and set the ratios that follow."""
     runs, direction, stretch = laws.length.size, ends.direction, laws.stretch
     for i in range(n):
         u, _ = uniforms(ends.choice[0], ends.choice[1], first + i, 0)
@@ -210,16 +211,16 @@ def begin_drawn(ends, laws, first, n, errors, own):
         own[LAW, i], own[RATIO:, i] = float(law), 1.0
         far = law - 1 - runs
         if 0 <= far < len(direction):
-            own[PUSH_R, i] = (stretch - 1.0) * along(direction[far], errors, 0, i)
-            own[PUSH_B, i] = (stretch - 1.0) * along(direction[far], errors, 1, i)
+            own[PUSH_R, i] = (stretch[far] - 1.0) * along(direction[far], errors, 0, i)
+            own[PUSH_B, i] = (stretch[far] - 1.0) * along(direction[far], errors, 1, i)
         else:
             far = 0  # nothing is added
         for j in range(len(direction)):
             part_of = between(direction[j], direction[far])
             r = along(direction[j], errors, 0, i) + part_of * own[PUSH_R, i]
             b = along(direction[j], errors, 1, i) + part_of * own[PUSH_B, i]
-            grown = math.exp(min(0.5 * (r * r + b * b) * (1.0 - 1.0 / (stretch * stretch)), 600.0))
-            own[RATIO + runs + j, i] = grown / (stretch * stretch)
+            squared = stretch[j] * stretch[j]
+            own[RATIO + runs + j, i] = math.exp(min(0.5 * (r * r + b * b) * (1.0 - 1.0 / squared), MOST_LOG)) / squared
 
 
 @part
