@@ -98,10 +98,9 @@ def ends(case: Case, specs: Sequence[TrackerSpec], given: Conditions, labels: Cl
     """How the target's track of each tracker is drawn."""
     certain, K = labels.detections.certain, len(labels.k)
     probability = np.where(certain < 0, labels.detections.probability, certain)
-    start = int(np.argmax(certain != 0))
-    few = min(one.m for one in specs)
-    t = np.asarray(labels.t_s, dtype=float)[start : start + max(one.m for one in specs) + FURTHER + OUT]
-    direction = directions(t, few)
+    few, many = min(one.m for one in specs), max(one.m for one in specs)
+    young = np.flatnonzero(certain != 0)[: many + FURTHER + OUT]
+    direction = directions(np.asarray(labels.t_s, dtype=float)[young], few)
     radius = np.linalg.norm(direction, axis=1)
     runs = [lengths(one.misses) for one in specs]
     most, longest = max(map(len, runs)), max(int(run[-1]) for run in runs)
@@ -122,7 +121,7 @@ def ends(case: Case, specs: Sequence[TrackerSpec], given: Conditions, labels: Cl
         shares=shares,
         length=length,
         undetected=drawn,
-        start=start,
+        young=young,
         direction=direction / radius[:, None],
         stretch=np.array([stretch(gate_threshold(one.gate_probability), radius) for one in specs]),
     )

@@ -52,7 +52,7 @@ from radarsim.studies.sonar.clutter.kernels.tracker import (
 )
 from radarsim.studies.sonar.clutter.kernels.tracks import predict, update
 from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
-from radarsim.studies.sonar.kernels.steps import CHUNK
+from radarsim.studies.sonar.kernels.steps import CHUNK, copy_row
 from radarsim.studies.sonar.kernels.sums import Course
 
 NODES = 32
@@ -71,8 +71,8 @@ class Ends(NamedTuple):
     choice (2,) is the key of the stream that chooses the law of each realisation, plots (2,) that of false plots in
     boxes. shares (F, 1 + R + N + 1) of the law itself and of the others, in this order; the sum is one. length (F, R)
     of the run of misses that a law is for; undetected (F, R, L, K) the probability that the target is not detected at
-    scan k by tracks with i misses in a row. direction (N, J) of the errors at J scans from scan `start` on, and stretch
-    (F, N) of them.
+    scan k by tracks with i misses in a row. direction (N, J) of the errors at the first J scans that may give a plot,
+    whose numbers are young (J,), and stretch (F, N) of them.
     """
 
     choice: np.ndarray
@@ -80,7 +80,7 @@ class Ends(NamedTuple):
     shares: np.ndarray
     length: np.ndarray
     undetected: np.ndarray
-    start: int
+    young: np.ndarray
     direction: np.ndarray
     stretch: np.ndarray
 
@@ -169,14 +169,14 @@ def outside(off, S, threshold, sigma):
 
 # ---- laws -----------------------------------------------------------------------------------------------------------
 @part
-def young_errors(world, start, first, errors):
-    """Write the errors of the target's plots, over their σ, to errors (J, 2, CHUNK): J scans from scan `start` on."""
+def young_errors(world, young, first, errors):
+    """Write the errors of the target's plots at the scans `young` (J,), over their σ, to errors (J, 2, CHUNK)."""
     plots = np.zeros((2, 4, CHUNK))
-    for j in range(errors.shape[0]):
-        move_and_measure(world, first, start + j, plots)
+    for j in range(young.size):
+        move_and_measure(world, first, young[j], plots)
         for c in range(2):
             for i in range(CHUNK):
-                errors[j, c, i] = plots[c, 1, i] / world.fresh[start + j, c]
+                errors[j, c, i] = plots[c, 1, i] / world.fresh[young[j], c]
 
 
 @inline
@@ -226,12 +226,15 @@ def begin_drawn(ends, laws, first, n, errors, own):
 @part
 def stretched(ends, laws, k, n, z, sigma, own, out):
     """Write the target's plots (2, CHUNK) at scan k to out, with their errors as each realisation's law has them."""
-    runs, j = laws.length.size, k - ends.start
-    for i in range(n):
-        far, out[0, i], out[1, i] = int(own[LAW, i]) - 1 - runs, z[0, i], z[1, i]
-        if 0 <= j < ends.direction.shape[1] and 0 <= far < len(ends.direction):
-            out[0, i] += ends.direction[far, j] * own[PUSH_R, i] * sigma[0]
-            out[1, i] += ends.direction[far, j] * own[PUSH_B, i] * sigma[1]
+    runs = laws.length.size
+    copy_row(z[0], out[0])
+    copy_row(z[1], out[1])
+    for j in range(ends.young.size):
+        for i in range(n if ends.young[j] == k else 0):
+            far = int(own[LAW, i]) - 1 - runs
+            if 0 <= far < len(ends.direction):
+                out[0, i] += ends.direction[far, j] * own[PUSH_R, i] * sigma[0]
+                out[1, i] += ends.direction[far, j] * own[PUSH_B, i] * sigma[1]
 
 
 @inline
@@ -292,13 +295,7 @@ def associate_young(field, ends, laws, scan, tracks, status, chunk, own):
     The ratio of the law of false plots, the last one, is brought up to date.
     """
     draws, out, rule, tally = draws_of(field), chunk.work.association, laws.rule, address(chunk.counts)
-    predicted, detected, z, lives, taken = (
-        chunk.work.predicted,
-        chunk.detected,
-        chunk.z,
-        address(status),
-        address(out),
-    )
+    predicted, detected, z, lives = chunk.work.predicted, chunk.detected, chunk.z, address(status)
     keys, last, law = (ends.plots[0], ends.plots[1]), own.shape[0] - 1, float(laws.shares.size - 1)
     for i in range(scan.count):
         if status[STATE, i] == NONE:
@@ -318,7 +315,7 @@ def associate_young(field, ends, laws, scan, tracks, status, chunk, own):
             own[CAME, i] = 1.0 if some else own[CAME, i]
         else:
             found = associate_track(draws, rule, scan.first + i, scan.k, plot, gate, tally)
-        settle(lives, i, found, taken)
+        settle(lives, i, found, address(out))
 
 
 # ---- sums -----------------------------------------------------------------------------------------------------------
@@ -332,15 +329,17 @@ def weight_of(shares, own, i):
 
 
 @part
-def add_ended(limit, n, tracks, status, course, laws, own, ended):
+def add_ended(limits, n, tracks, status, course, laws, own, ended):
     """Count the n realisations whose first confirmed track ends at this scan by their weights, in ended (KINDS, 4).
 
-    limit (r, b): the error, in m and rad, beyond which a track has lost its target.
+    limits: misses in a row that drop a track, and the error (r, b), in m and rad, with which it has lost its target.
     """
+    misses, beyond = limits
     for i in range(n):
         if status[TRACKS_ENDED, i] > 0.0 and own[ENDED, i] == 0.0:
             own[ENDED, i] = 1.0
-            add_weight(weight_of(laws.shares, own, i), ended, LOST if off_target(tracks, course, limit, i) else DROPPED)
+            lost = status[MISSES, i] < misses and off_target(tracks, course, beyond, i)
+            add_weight(weight_of(laws.shares, own, i), ended, LOST if lost else DROPPED)
 
 
 # ---- a block --------------------------------------------------------------------------------------------------------
@@ -369,33 +368,30 @@ def simulate_ends(world, detections, field, trackers, ends, work, first, total, 
     Arguments as those of `blocks.simulate_block`.
     """
     F, K, J = trackers.gate.size, world.dt.size, ends.direction.shape[1]
-    plots, shift, measured, z = (
-        np.empty((2, 4, CHUNK)),
-        np.zeros((2, 3, CHUNK)),
-        np.empty((2, CHUNK)),
-        np.empty((2, CHUNK)),
-    )
+    plots, shift = np.empty((2, 4, CHUNK)), np.zeros((2, 3, CHUNK))
+    measured, z = np.empty((2, CHUNK)), np.empty((2, CHUNK))
     own, kept, counts = np.empty((F, RATIO + ends.shares.shape[1] - 1, CHUNK)), np.empty(CHUNK), np.zeros(COUNTS)
     detected, errors = np.empty(CHUNK), np.empty((J, 2, CHUNK))
     for done in range(0, total, CHUNK):
         reset(work)
         plots[:] = 0.0
         n = min(CHUNK, total - done)
-        young_errors(world, ends.start, first + done, errors)
+        young_errors(world, ends.young, first + done, errors)
         for f in range(F):
             begin_drawn(ends, laws_of(ends, trackers, f), first + done, n, errors, own[f])
         for k in range(K):
             scan, course = Scan(first + done, n, k, world.dt[k]), Course(world.truth[k], shift)
             measure_target(world, first + done, k, plots, measured, shift)
-            law_of_plots = Plots(course, world.fresh[k], k >= ends.start + J)
+            law_of_plots = Plots(course, world.fresh[k], J == 0 or k > ends.young[J - 1])
             chunk = Chunk(work, own, measured, z, detected, law_of_plots, kept, counts)
             for f in range(F):
                 if trackers.association[f] == KNOWN:
                     continue
                 laws = laws_of(ends, trackers, f)
                 scan_target(detections, field, trackers, ends, laws, f, scan, chunk)
-                limit = (trackers.lost[f] * trackers.sigma[0], trackers.lost[f] * trackers.sigma[1])
-                add_ended(limit, n, tracks_of(work, f), work.status[f], course, laws, own[f], sums.ended[f, k])
+                beyond = (trackers.lost[f] * trackers.sigma[0], trackers.lost[f] * trackers.sigma[1])
+                limits, tracks, status = (trackers.misses[f], beyond), tracks_of(work, f), work.status[f]
+                add_ended(limits, n, tracks, status, course, laws, own[f], sums.ended[f, k])
         for f in range(F):
             for i in range(n):
                 if trackers.association[f] != KNOWN:
