@@ -65,14 +65,15 @@ def undetected(probability: np.ndarray, inside: float, length: int) -> np.ndarra
 
 
 def directions(t: np.ndarray, least: int) -> np.ndarray:
-    """The shortest errors (n, J) of J plots at t (J,), s, with which OUT plots in a row leave the gate of a track.
+    """The shortest errors (1 + FURTHER, J) of J plots at t (J,), s, with which OUT plots in a row leave a track's gate.
 
     Of the track after `least` and more plots, a line fitted to them by least squares, as a track without manoeuvres
     begins. The innovations of the next OUT plots are rows A of the errors, each with its own variance S = |A|²; all of
-    them are √S at the errors Aᵀ(A Aᵀ)⁻¹√S, the shortest with which they are, in units of the root of a gate.
+    them are √S at the errors Aᵀ(A Aᵀ)⁻¹√S, the shortest with which they are, in units of the root of a gate. Zero where
+    there are too few plots.
     """
-    out = np.zeros((max(len(t) - OUT - least + 1, 0), len(t)))
-    for row, j in zip(out, range(least, len(t)), strict=False):
+    out = np.zeros((1 + FURTHER, len(t)))
+    for row, j in zip(out, range(least, len(t) - OUT + 1), strict=False):
         A = np.zeros((OUT, len(t)))
         for h in range(OUT):
             line = np.stack([np.ones(j), t[:j] - t[j + h]])
@@ -81,9 +82,10 @@ def directions(t: np.ndarray, least: int) -> np.ndarray:
     return out
 
 
-def stretch(gate: float, radius: np.ndarray) -> np.ndarray:
-    """How much errors along directions are stretched for a gate, χ² of two components: s² is half the least square
-    there, the best for the tail of a Gaussian in two components; radius (n,) of the directions.
+def stretch(gate: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """How much errors along directions of some radius are stretched for a gate, χ² of two components.
+
+    s² is half the least square with which plots leave the gate, the best for the tail of a Gaussian of two components.
     """
     return np.sqrt(np.maximum(gate * radius**2 / 2.0, 2.0))
 
@@ -96,25 +98,25 @@ def family_shares(plain: float, sizes: Sequence[int]) -> np.ndarray:
 
 def ends(case: Case, specs: Sequence[TrackerSpec], given: Conditions, labels: ClutterAxes) -> Ends:
     """How the target's track of each tracker is drawn."""
-    certain, K = labels.detections.certain, len(labels.k)
+    certain, t, F, K = labels.detections.certain, np.asarray(labels.t_s, dtype=float), len(specs), len(labels.k)
     probability = np.where(certain < 0, labels.detections.probability, certain)
-    few, many = min(one.m for one in specs), max(one.m for one in specs)
-    young = np.flatnonzero(certain != 0)[: many + FURTHER + OUT]
-    direction = directions(np.asarray(labels.t_s, dtype=float)[young], few)
-    radius = np.linalg.norm(direction, axis=1)
     runs = [lengths(one.misses) for one in specs]
-    most, longest = max(map(len, runs)), max(int(run[-1]) for run in runs)
-    length = np.zeros((len(specs), most), dtype=np.int64)
-    shares = np.zeros((len(specs), 1 + most + len(direction) + 1))
-    drawn = np.ones((len(specs), most, longest, K))
-    for f, (one, run) in enumerate(zip(specs, runs, strict=True)):
-        length[f, : len(run)] = run
-        far = [j for j in range(len(direction)) if one.gate_probability < 1.0 and 0 <= j + few - one.m <= FURTHER]
+    scans = [np.flatnonzero(certain != 0)[: one.m + FURTHER + OUT] for one in specs]
+    most, longest, J = max(map(len, runs)), max(int(run[-1]) for run in runs), max(map(len, scans))
+    length, young = np.zeros((F, most), dtype=np.int64), np.full((F, J), -1, dtype=np.int64)
+    shares, drawn = np.zeros((F, 1 + most + 1 + FURTHER + 1)), np.ones((F, most, longest, K))
+    direction, radius = np.zeros((F, 1 + FURTHER, J)), np.zeros((F, 1 + FURTHER))
+    for f, (one, run, at) in enumerate(zip(specs, runs, scans, strict=True)):
+        length[f, : len(run)], young[f, : len(at)] = run, at
+        direction[f, :, : len(at)] = directions(t[at], one.m)
+        radius[f] = np.linalg.norm(direction[f], axis=1)
+        far = np.flatnonzero(radius[f] > 0.0) if one.gate_probability < 1.0 else np.empty(0, dtype=np.int64)
         own = family_shares(case.spec.rare.plain_share, (len(run), len(far), int(given.density > 0.0)))
-        places = [*range(1 + len(run)), *(1 + most + j for j in far), *[-1][: len(own) - 1 - len(run) - len(far)]]
-        shares[f, places] = own
+        laws = [0, *range(1, 1 + len(run)), *(1 + most + far), *([-1] if given.density > 0.0 else [])]
+        shares[f, laws] = own
         for j, each in enumerate(run):
             drawn[f, j, :each] = undetected(probability, one.gate_probability, int(each))
+    gates = np.array([[gate_threshold(one.gate_probability)] for one in specs])
     return Ends(
         choice=noise_key(case, "rare ends"),
         plots=noise_key(case, "rare plots about the target"),
@@ -122,6 +124,6 @@ def ends(case: Case, specs: Sequence[TrackerSpec], given: Conditions, labels: Cl
         length=length,
         undetected=drawn,
         young=young,
-        direction=direction / radius[:, None],
-        stretch=np.array([stretch(gate_threshold(one.gate_probability), radius) for one in specs]),
+        direction=direction / np.maximum(radius, 1e-300)[..., None],
+        stretch=stretch(gates, radius),
     )

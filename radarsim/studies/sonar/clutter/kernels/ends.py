@@ -55,7 +55,7 @@ from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK, copy_row
 from radarsim.studies.sonar.kernels.sums import Course
 
-NODES = 32
+NODES = 48  # error under 10⁻¹³ for gates up to 60 σ² wide
 MOST_LOG = 600.0  # of a ratio: far beyond any whose reciprocal counts
 WIDEST = 8.5  # σ of a plot: further from its mean it is once in 10¹⁶
 KINDS = 2
@@ -71,8 +71,8 @@ class Ends(NamedTuple):
     choice (2,) is the key of the stream that chooses the law of each realisation, plots (2,) that of false plots in
     boxes. shares (F, 1 + R + N + 1) of the law itself and of the others, in this order; the sum is one. length (F, R)
     of the run of misses that a law is for; undetected (F, R, L, K) the probability that the target is not detected at
-    scan k by tracks with i misses in a row. direction (N, J) of the errors at the first J scans that may give a plot,
-    whose numbers are young (J,), and stretch (F, N) of them.
+    scan k by tracks with i misses in a row. direction (F, N, J) of the errors at the first scans that may give a plot,
+    whose numbers are young (F, J), -1 where there are fewer, and stretch (F, N) of them.
     """
 
     choice: np.ndarray
@@ -86,25 +86,23 @@ class Ends(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """What `Ends` holds of one tracker, its rule, and the n scans in which it is young."""
+    """What `Ends` holds of one tracker, its rule, and the scans of the rule that confirms."""
 
     shares: np.ndarray
     length: np.ndarray
     undetected: np.ndarray
+    young: np.ndarray
+    direction: np.ndarray
     stretch: np.ndarray
     rule: Rule
-    young: float
+    scans: float
 
 
 class Plots(NamedTuple):
-    """The law of the target's plots at a scan: their course, about which they lie, and their σ (2,) in m and rad.
-
-    free: no law stretches their errors.
-    """
+    """The law of the target's plots at a scan: their course, about which they lie, and their σ (2,) in m and rad."""
 
     course: Course
     sigma: np.ndarray
-    free: bool
 
 
 class Chunk(NamedTuple):
@@ -173,10 +171,10 @@ def young_errors(world, young, first, errors):
     """Write the errors of the target's plots at the scans `young` (J,), over their σ, to errors (J, 2, CHUNK)."""
     plots = np.zeros((2, 4, CHUNK))
     for j in range(young.size):
-        move_and_measure(world, first, young[j], plots)
+        move_and_measure(world, first, max(young[j], 0), plots)
         for c in range(2):
             for i in range(CHUNK):
-                errors[j, c, i] = plots[c, 1, i] / world.fresh[young[j], c]
+                errors[j, c, i] = plots[c, 1, i] / world.fresh[young[j], c] if young[j] >= 0 else 0.0
 
 
 @inline
@@ -198,11 +196,11 @@ def between(one, other):
 
 
 @part
-def begin_drawn(ends, laws, first, n, errors, own):
+def begin_drawn(choice, laws, first, n, errors, own):
     """Choose the laws of n realisations from number `first` on, stretch errors, and set the ratios that follow."""
-    runs, direction, stretch = laws.length.size, ends.direction, laws.stretch
+    runs, direction, stretch = laws.length.size, laws.direction, laws.stretch
     for i in range(n):
-        u, _ = uniforms(ends.choice[0], ends.choice[1], first + i, 0)
+        u, _ = uniforms(choice[0], choice[1], first + i, 0)
         law, total = 0, laws.shares[0]
         while u >= total and law < laws.shares.size - 1:
             law += 1
@@ -224,24 +222,24 @@ def begin_drawn(ends, laws, first, n, errors, own):
 
 
 @part
-def stretched(ends, laws, k, n, z, sigma, own, out):
+def stretched(laws, k, n, z, sigma, own, out):
     """Write the target's plots (2, CHUNK) at scan k to out, with their errors as each realisation's law has them."""
     runs = laws.length.size
     copy_row(z[0], out[0])
     copy_row(z[1], out[1])
-    for j in range(ends.young.size):
-        for i in range(n if ends.young[j] == k else 0):
+    for j in range(laws.young.size):
+        for i in range(n if laws.young[j] == k else 0):
             far = int(own[LAW, i]) - 1 - runs
-            if 0 <= far < len(ends.direction):
-                out[0, i] += ends.direction[far, j] * own[PUSH_R, i] * sigma[0]
-                out[1, i] += ends.direction[far, j] * own[PUSH_B, i] * sigma[1]
+            if 0 <= far < len(laws.direction):
+                out[0, i] += laws.direction[far, j] * own[PUSH_R, i] * sigma[0]
+                out[1, i] += laws.direction[far, j] * own[PUSH_B, i] * sigma[1]
 
 
 @inline
 def laws_of(ends, trackers, f):
     """The laws of tracker f."""
-    rule, young = rule_of(trackers, f), trackers.n[f]
-    return Laws(ends.shares[f], ends.length[f], ends.undetected[f], ends.stretch[f], rule, young)
+    far = (ends.young[f], ends.direction[f], ends.stretch[f])
+    return Laws(ends.shares[f], ends.length[f], ends.undetected[f], *far, rule_of(trackers, f), trackers.n[f])
 
 
 @inline
@@ -259,7 +257,7 @@ def detect_drawn(detections, laws, scan, status, predicted, target, plots, own):
     Before association: predicted (5, CHUNK) is of this scan. A realisation whose track has ended has no more plots.
     """
     k, certain, detection = scan.k, detections.certain[scan.k], detections.probability
-    detected, z, most = target.detected, target.z, laws.length.max()
+    detected, z, most, free = target.detected, target.z, laws.length.max(), k > laws.young.max()
     for i in range(scan.count):
         u, _ = uniforms(detections.key[0], detections.key[1], scan.first + i, k)
         if own[ENDED, i] > 0.0 or certain >= 0 or status[STATE, i] != CONFIRMED:
@@ -273,7 +271,7 @@ def detect_drawn(detections, laws, scan, status, predicted, target, plots, own):
         if longest >= most:  # whatever law it is drawn from, the rest is as it is
             continue
         hit, c = detected[i] > 0.0, 0.0
-        if plots.free:
+        if free:
             S = (predicted[2, i], predicted[3, i], predicted[4, i])
             irr, irb, ibb, _ = inverse_two(S[0], S[1], S[2])
             nu = (z[0, i] - predicted[0, i], z[1, i] - predicted[1, i])
@@ -307,8 +305,8 @@ def associate_young(field, ends, laws, scan, tracks, status, chunk, own):
         place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
         gate = gate_of(place, S, tracks.plots[i] > 1.5, rule.speed * status[SINCE, i])
         plot, box, age = (detected[i], z[0, i], z[1, i]), box_of(draws.cells, gate, rule.gate), status[AGE, i]
-        if age < laws.young and 0.0 < box.mean <= MOST_MEAN:
-            needed = 1.0 / (laws.young - age) if own[CAME, i] == 0.0 else 0.0
+        if age < laws.scans and 0.0 < box.mean <= MOST_MEAN:
+            needed = 1.0 / (laws.scans - age) if own[CAME, i] == 0.0 else 0.0
             drawn = (scan.first + i, scan.k, gate, plot, box, needed, own[LAW, i] == law)
             found, factor, some = associate_drawn(keys, rule, *drawn)
             own[last, i] = min(own[last, i] * factor, LARGEST)
@@ -350,7 +348,7 @@ def scan_target(detections, field, trackers, ends, laws, f, scan, chunk):
     tracks, status, manoeuvre = tracks_of(work, f), work.status[f], trackers.manoeuvre[f]
     predict(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, work.predicted)
     target = Target(chunk.detected, chunk.z, True)
-    stretched(ends, laws, scan.k, scan.count, chunk.measured, chunk.plots.sigma, own, target.z)
+    stretched(laws, scan.k, scan.count, chunk.measured, chunk.plots.sigma, own, target.z)
     detect_drawn(detections, laws, scan, status, work.predicted, target, chunk.plots, own)
     if laws.shares[-1] > 0.0:
         associate_young(field, ends, laws, scan, tracks, status, chunk, own)
@@ -367,22 +365,22 @@ def simulate_ends(world, detections, field, trackers, ends, work, first, total, 
 
     Arguments as those of `blocks.simulate_block`.
     """
-    F, K, J = trackers.gate.size, world.dt.size, ends.direction.shape[1]
+    F, K = trackers.gate.size, world.dt.size
     plots, shift = np.empty((2, 4, CHUNK)), np.zeros((2, 3, CHUNK))
     measured, z = np.empty((2, CHUNK)), np.empty((2, CHUNK))
     own, kept, counts = np.empty((F, RATIO + ends.shares.shape[1] - 1, CHUNK)), np.empty(CHUNK), np.zeros(COUNTS)
-    detected, errors = np.empty(CHUNK), np.empty((J, 2, CHUNK))
+    detected, errors = np.empty(CHUNK), np.empty((ends.young.shape[1], 2, CHUNK))
     for done in range(0, total, CHUNK):
         reset(work)
         plots[:] = 0.0
         n = min(CHUNK, total - done)
-        young_errors(world, ends.young, first + done, errors)
         for f in range(F):
-            begin_drawn(ends, laws_of(ends, trackers, f), first + done, n, errors, own[f])
+            young_errors(world, ends.young[f], first + done, errors)
+            begin_drawn(ends.choice, laws_of(ends, trackers, f), first + done, n, errors, own[f])
         for k in range(K):
             scan, course = Scan(first + done, n, k, world.dt[k]), Course(world.truth[k], shift)
             measure_target(world, first + done, k, plots, measured, shift)
-            law_of_plots = Plots(course, world.fresh[k], J == 0 or k > ends.young[J - 1])
+            law_of_plots = Plots(course, world.fresh[k])
             chunk = Chunk(work, own, measured, z, detected, law_of_plots, kept, counts)
             for f in range(F):
                 if trackers.association[f] == KNOWN:
