@@ -75,6 +75,7 @@ SWEPT = {"pulses_snr": ["sweep.burst.snr_db=[-2, 1]"]}
 WEIGHTED = {
     "discriminator_rare": (["sweep.estimators.0.lock_probability=[0.99, 0.9999, 0.999999]"], 4000),
     "sonar_clutter_rare": (["sweep.sensor.false_plots_per_km2=[0.01, 0.1]"], N),
+    "sonar_clutter_ends": (["sweep.sensor.false_plots_per_km2=[0, 0.001]"], 4000),
     "ambiguous_rare": (["sweep.radar.repetition_rate_hz=[700, 900, 1100]"], N),
 }
 # What a detector's use is worth is a ratio to a believed σ that varies: every row bears that note.

@@ -83,9 +83,12 @@ FALSE_TRACKS = (
         ("min(high, b0 + sector - b)", "high", PAIRS),
         ("number_when_any(box.mean, p, uniform(u) / h)", "number_when_any(box.mean, p, uniform(u))", TWINS),
         ("box.q + box.dq * u_q", "box.q + box.dq * u_b", TWINS),
-        ("held[j, 1] += w * w", "held[j, 1] += w", TWINS),
         ("own[FOUND, i] * (factor if tentative else 1.0)", "own[FOUND, i] * factor", TWINS),
         ("shares[2] * own[LONG, i]", "shares[2] * own[FOUND, i]", TWINS),
+    ),
+    *mutants(
+        "radarsim/studies/sonar/clutter/kernels/sums.py",
+        ("sums[j, 1] += w * w", "sums[j, 1] += w", TWINS),
         ("drawn[1] += w", "drawn[1] += 1.0", TWINS),
     ),
     *mutants(
@@ -94,6 +97,39 @@ FALSE_TRACKS = (
             "held(result, (f,)).weight.sum()",
             "held(result, (f,)).number.sum()",
             f"{TRACKS}::test_tables_tell_the_rate_and_how_well_it_is_known",
+        ),
+    ),
+)
+
+TARGET = "studies/sonar/clutter/test_ends.py"
+ENDS = f"{TARGET}::test_weights_and_ends_are_the_twins"
+RUNS = f"{TARGET}::test_runs_of_misses_end_tracks_as_their_exact_law_says"
+LOST_TRACKS = (
+    *mutants(
+        "radarsim/studies/sonar/clutter/kernels/ends.py",
+        ("slope * x - off_b", "-off_b", f"{TARGET}::test_the_probability_outside_a_gate_is_that_of_a_sum"),
+        ("(h + (1.0 - h) * c) / (1.0 - detection + detection * c)", "h / (1.0 - detection)", ENDS),
+        ("max(own[LONGEST, i], status[MISSES, i])", "status[MISSES, i]", ENDS),
+        ("b = along(direction[j], errors, 1, i) + part_of * own[PUSH_B, i]", "b = 0.0", ENDS),
+        ("MOST_LOG)) / squared", "MOST_LOG)) / stretch[j]", ENDS),
+        ("if own[CAME, i] == 0.0 else 0.0", "if own[CAME, i] >= 0.0 else 0.0", ENDS),
+        ("status[MISSES, i] < misses and off_target", "off_target", ENDS),
+        ("k > laws.young.max()", "k >= 0", ENDS),
+        ("shares[1 + j] * own[RATIO + j, i]", "shares[1] * own[RATIO + j, i]", ENDS),
+        ("1.0 if seen and own[ENDED, i] == 0.0 else 0.0", "1.0 if seen else 0.0", ENDS),
+    ),
+    *mutants(
+        "radarsim/studies/sonar/clutter/rare.py",
+        ("(1.0 - miss[k]) * out[0, k + 1]", "(1.0 - miss[k]) * out[:length, k + 1]", RUNS),
+        ("np.clip(1.0 - hits / inside, 1.0 - probability, 1.0)", "np.clip(1.0 - hits, 1.0 - probability, 1.0)", ENDS),
+        ("np.linalg.norm(A, axis=1))", "np.ones(OUT))", ENDS),
+    ),
+    *mutants(
+        "radarsim/studies/sonar/clutter/tables.py",
+        (
+            'np.cumsum(result.sums["ended"][f], axis=0)',
+            'np.asarray(result.sums["ended"][f])',
+            f"{TARGET}::test_tables_tell_the_curve_and_how_tracks_end",
         ),
     ),
 )
@@ -131,4 +167,4 @@ WRONG_FOLDS = (
         ),
     ),
 )
-RARE = (*LOSSES, *FALSE_TRACKS, *WRONG_FOLDS)
+RARE = (*LOSSES, *FALSE_TRACKS, *LOST_TRACKS, *WRONG_FOLDS)

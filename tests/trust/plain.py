@@ -195,6 +195,7 @@ RUNS = {
     "sonar manoeuvre": ("sonar_manoeuvre", MANOEUVRE, 9),
     "sonar clutter": ("sonar_clutter", ["scans=8", "sweep.sensor.false_plots_per_km2=[0.3]"], 9),
     "sonar rare false tracks": ("sonar_clutter_rare", ["scans=8", "sweep.sensor.false_plots_per_km2=[0.1]"], 20),
+    "sonar rare ends": ("sonar_clutter_ends", ["scans=14", "sweep.sensor.false_plots_per_km2=[0.1]"], 20),
     "multimodel families": ("multimodel_families", SHORT, 8),
     "multimodel irregular": ("multimodel_irregular", SHORT, 8),
     "multimodel controls": ("multimodel_irregular", CONTROLLED, 8),

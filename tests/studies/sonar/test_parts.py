@@ -28,7 +28,7 @@ FOLDER = Path(radarsim.__file__).parent / "studies" / "sonar"
 SHIPPED = {
     "smoothing": ("sonar_smoothing", "sonar_missed", "sonar_correlated", "sonar_asynchronous", "sonar_conversion"),
     "manoeuvre": ("sonar_manoeuvre", "sonar_manoeuvre_turning"),
-    "clutter": ("sonar_clutter", "sonar_clutter_gate", "sonar_clutter_rare"),
+    "clutter": ("sonar_clutter", "sonar_clutter_gate", "sonar_clutter_rare", "sonar_clutter_ends"),
 }
 CASES = [(part, stem) for part, stems in SHIPPED.items() for stem in stems]
 TOGETHER = ("__init__.py", "schema.py")  # the declared study, and the schema that puts the keys of the parts together

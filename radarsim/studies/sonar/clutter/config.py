@@ -140,13 +140,17 @@ class Filter(config.Filter):
             yield at("association", "needs a filter of kind kalman and degree 1")
 
 
+Event = Literal["false_tracks", "long_false_tracks", "ended_tracks"]
+
+
 class RareTracks(Model):
     """Events that are rare: realisations drawn where they are frequent, and weights that make up for it."""
 
-    events: Annotated[tuple[Literal["false_tracks", "long_false_tracks"], ...], Field(min_length=1)] = Field(
+    events: Annotated[tuple[Event, ...], Field(min_length=1)] = Field(
         title="events that are sought",
         description="false_tracks: tracks that false plots begin, of all trackers, are drawn with more plots in their "
-        "gates until they are confirmed; long_false_tracks: until they end",
+        "gates until they are confirmed; long_false_tracks: until they end; ended_tracks: further realisations of the "
+        "target's track are drawn where it ends, with more misses, and worse or false plots while it is young",
     )
     plain_share: Annotated[float, Strict(), Field(ge=0.01, le=0.9)] = Field(
         0.1,
@@ -158,9 +162,20 @@ class RareTracks(Model):
 
     def shares(self) -> tuple[float, float, float]:
         """Shares of the laws that false tracks are drawn from: as they are, so that they are confirmed, and held on."""
-        each = (1.0 - self.plain_share) / len(self.events)
-        found, long = (each if event in self.events else 0.0 for event in ("false_tracks", "long_false_tracks"))
+        laws = ("false_tracks", "long_false_tracks")
+        each = (1.0 - self.plain_share) / max(sum(event in self.events for event in laws), 1)
+        found, long = (each if event in self.events else 0.0 for event in laws)
         return self.plain_share, found, long
+
+    @property
+    def seeks_false_tracks(self) -> bool:
+        """Whether false tracks are drawn where they are confirmed, or held on."""
+        return "false_tracks" in self.events or "long_false_tracks" in self.events
+
+    @property
+    def seeks_ends(self) -> bool:
+        """Whether the target's track is drawn where it ends."""
+        return "ended_tracks" in self.events
 
     @cross_check
     def _differ(self) -> Iterator[At]:
@@ -176,7 +191,8 @@ class Keys(config.Keys):
     rare: Annotated[RareTracks | None, Design(), Added()] = Field(
         None,
         title="rare events",
-        description="importance sampling of false tracks, for trackers that hardly have any: rare.csv",
+        description="importance sampling of false tracks, for trackers that hardly have any, and of the target's "
+        "track, for those that hardly lose it: rare.csv",
     )
 
     @cross_check
@@ -186,8 +202,12 @@ class Keys(config.Keys):
         kinds = {member.association for member in self.filters}
         if not kinds & {"nearest", "pda"}:
             yield at("rare", "needs a filter that has to find its plots, with association nearest or pda")
-        elif not self.sensor.false_plots_per_km2:
+        elif self.rare.seeks_false_tracks and not self.sensor.false_plots_per_km2:
             yield at("rare", "needs false plots: sensor.false_plots_per_km2 must be > 0")
+        elif self.rare.seeks_ends and self.sensor.detection_probability == 1:
+            yield at(
+                "rare.events", "ended_tracks needs plots that are missed: sensor.detection_probability must be < 1"
+            )
 
     @cross_check
     def _trackers_fit(self) -> Iterator[At]:

@@ -1,8 +1,10 @@
 """P3's second half: tracks among false and missed plots.
 
 The errors in the sums of `sonar.study` are those of the tracks kept, which are confirmed and on the target. The sums
-`counts`, `begun`, `ratios` and `scores` are described in `kernels.counts`. With `rare`, `held` and `drawn` of
-`kernels.rare` are in place of `begun`, and the scores of false tracks are those of the plain ones.
+`counts`, `begun`, `ratios` and `scores` are described in `kernels.counts`. Where false tracks are sought (`rare`),
+`held` and `drawn` of `kernels.rare` are in place of `begun`, and the scores of false tracks are those of the plain
+ones. Where ends of the target's track are sought, they are those of further realisations: `ended` and `ended_drawn`
+of `kernels.ends`.
 """
 
 from dataclasses import dataclass
@@ -15,10 +17,12 @@ from radarsim.studies.noise import noise_key
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.clutter import exact
 from radarsim.studies.sonar.clutter import filters as design
+from radarsim.studies.sonar.clutter import rare as sought
 from radarsim.studies.sonar.clutter import world as observed
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.config import Keys
 from radarsim.studies.sonar.clutter.kernels import blocks, counts, rare
+from radarsim.studies.sonar.clutter.kernels.ends import KINDS, Ends, EndSums, simulate_ends
 from radarsim.studies.sonar.clutter.kernels.field import Field
 from radarsim.studies.sonar.clutter.kernels.tracker import Trackers, workspace
 from radarsim.studies.sonar.exact_values import exact_values
@@ -33,7 +37,8 @@ class Plan:
     """A plan of trackers of a target and of false tracks.
 
     field_about_false holds the false plots among which false tracks live; seeds (2,) is the key of the stream of their
-    first plots. shift: how false tracks are drawn where they are rare; None: as they are.
+    first plots. shift: how false tracks are drawn where they are rare; None: as they are. ends: how further tracks of
+    the target are drawn where its ends are rare; None: there are none.
     """
 
     layout: Layout
@@ -42,6 +47,7 @@ class Plan:
     field_about_false: Field
     seeds: np.ndarray
     shift: rare.Shift | None = None
+    ends: Ends | None = None
     block: int = base.BLOCK
     gaussian = False
 
@@ -62,6 +68,10 @@ class Plan:
         elif axes.field.cells.density > 0:
             false = (self.seeds, self.field_about_false, self.trackers)
             blocks.simulate_false(*false, work, axes.world.dt, first, count, track_sums)
+        if self.ends is not None:
+            ended = EndSums(np.zeros((F, K, KINDS, 4)), np.zeros((F, 3)))
+            simulate_ends(*inputs, self.ends, work, first, count, ended)
+            own |= ended._asdict()
         return base.packed(self.layout, sums, **own)
 
 
@@ -72,18 +82,22 @@ def prepare(case: Case) -> Plan:
     F, K = len(specs), len(scene.t)
     common = base.shapes(F, K, COORDINATES, SIZE)
     del common["paired"]  # trackers keep tracks in different realisations
-    own, shift = counts.shapes(F, K, len(design.THRESHOLDS)), None
-    if spec.rare is not None:
+    own, labels, shift, drawn = counts.shapes(F, K, len(design.THRESHOLDS)), axes(case, scene, specs, given), None, None
+    if spec.rare is not None and spec.rare.seeks_false_tracks:
         del own["begun"]
         own |= {"held": (F, K, 4), "drawn": (F, 3)}
         shift = rare.Shift(noise_key(case, "rare"), noise_key(case, "rare plots"), np.array(spec.rare.shares()))
+    if spec.rare is not None and spec.rare.seeks_ends:
+        own |= {"ended": (F, K, KINDS, 4), "ended_drawn": (F, 3)}
+        drawn = sought.ends(case, specs, given, labels)
     return Plan(
         layout=Layout(**common, **own),
-        axes=axes(case, scene, specs, given),
+        axes=labels,
         trackers=design.trackers(specs, given),
         field_about_false=design.field(noise_key(case, "seeds"), spec.sensor.sector, given),
         seeds=noise_key(case, "places"),
         shift=shift,
+        ends=drawn,
     )
 
 

@@ -11,10 +11,15 @@ from radarsim.report.statistics import Z95, Estimate, Values
 from radarsim.report.tables import interval, leading
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.kernels import counts as at
+from radarsim.studies.sonar.clutter.kernels.ends import DROPPED, LOST
 from radarsim.studies.sonar.tables import Columns, stacked
 
 if TYPE_CHECKING:
     import pandas as pd
+
+FALSE = "false track"
+ENDED = "target's track ended"
+HOW = {DROPPED: "target's track dropped", LOST: "target's track lost"}
 
 
 def tables(results: Sequence[CaseResult[ClutterAxes]]) -> "dict[str, pd.DataFrame]":
@@ -24,7 +29,7 @@ def tables(results: Sequence[CaseResult[ClutterAxes]]) -> "dict[str, pd.DataFram
         "tracking": stacked(_tracking(result) for result in results),
         "gates": stacked(_gates(result) for result in results),
         "track_classes": stacked(_classes(result) for result in results),
-        **rare.table([_rare(result) for result in results if "held" in result.sums]),
+        **rare.table([part for result in results for part in _rare(result)]),
     }
 
 
@@ -225,7 +230,13 @@ def _classes(result: CaseResult[ClutterAxes]) -> Columns:
     }
 
 
-def _rare(result: CaseResult[ClutterAxes]) -> dict[str, Any]:
+def _rare(result: CaseResult[ClutterAxes]) -> list[dict[str, Any]]:
+    """Of a case the events that are sought."""
+    made = {"held": _rare_false, "ended": _rare_ends}
+    return [rows(result) for name, rows in made.items() if name in result.sums]
+
+
+def _rare_false(result: CaseResult[ClutterAxes]) -> dict[str, Any]:
     """Probabilities that a track begun by a false plot is confirmed (k = 1), and that it is held to its k-th scan.
 
     Scans and t_s count from the confirmation.
@@ -235,5 +246,29 @@ def _rare(result: CaseResult[ClutterAxes]) -> dict[str, Any]:
     shown[:, 0] = True
     row, k = np.nonzero(shown)
     f, sought = chosen[row], k == 0
-    rows = rare.rows(leading(result, f, k), "false track held", sought, held(result, (f, k)), drawn(result, f))
-    return {**rows, "event": np.where(sought, "false track", rows["event"])}
+    rows = rare.rows(leading(result, f, k), f"{FALSE} held", sought, held(result, (f, k)), drawn(result, f))
+    return {**rows, "event": np.where(sought, FALSE, rows["event"])}
+
+
+def _rare_ends(result: CaseResult[ClutterAxes]) -> dict[str, Any]:
+    """Probabilities that the target's first confirmed track has ended by a scan; by the last one, how it ended, too.
+
+    Scans count from the first one.
+    """
+    parts = [_ended(result, f) for f in trackers(result)]
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _ended(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
+    by_scan, last = np.cumsum(result.sums["ended"][f], axis=0), len(result.axes.k) - 1
+    ended = by_scan.sum(axis=1)
+    k = np.flatnonzero((ended[:, 2] > 0) | (np.arange(last + 1) == last))
+    drawn = rare.Drawn(result.count, *result.sums["ended_drawn"][f])
+    made = [
+        rare.rows(leading(result, np.full(len(k), f), k), ENDED, k == last, rare.Counted(*ended[k].T), drawn),
+        *(
+            rare.rows(leading(result, np.array([f]), np.array([last])), event, np.array([False]), counted, drawn)
+            for event, counted in ((how, rare.Counted(*by_scan[last, [kind]].T)) for kind, how in HOW.items())
+        ),
+    ]
+    return {name: np.concatenate([part[name] for part in made]) for name in made[0]}

@@ -7,9 +7,10 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, tr
-from radarsim.report import panels, text
+from radarsim.report import panels, rare, text
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.config import Keys
+from radarsim.studies.sonar.clutter.tables import ENDED, FALSE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,7 +34,9 @@ def answer(results: Sequence[CaseResult[ClutterAxes]], made: "Mapping[str, pd.Da
         sentences.append(panels.at_its_place(result, f"{trackers}."))
         if result.spec.rare is not None:
             found = made["rare"][(made["rare"]["case"] == result.name) & made["rare"]["sought"]]
-            sentences.append(panels.at_its_place(result, _by_importance(found)))
+            for event, said in ((FALSE, _by_importance), (ENDED, _ends_by_importance)):
+                if (found["event"] == event).any():
+                    sentences.append(panels.at_its_place(result, said(found[found["event"] == event])))
     return [*sentences, *others]
 
 
@@ -72,3 +75,20 @@ def _by_importance(rows: "pd.DataFrame") -> str:
         for _, row in rows.iterrows()
     )
     return tr("False tracks are drawn by importance sampling: {found}.", found="; ".join(found))
+
+
+def _ends_by_importance(rows: "pd.DataFrame") -> str:
+    """How rarely the target's track ends, and what stands behind these rates, by tracker."""
+    found = (
+        tr(
+            "{filter} {rate:.3g} [{low:.3g}, {high:.3g}] from {events:,} of them, {n_eff:,.0f} effective",
+            filter=row["filter"],
+            **rare.told(row),
+        )
+        for _, row in rows.iterrows()
+    )
+    return tr(
+        "The probability that the target's first confirmed track has ended by the last scan, by importance sampling: "
+        "{found}.",
+        found="; ".join(found),
+    )

@@ -8,7 +8,7 @@ confirmed. Letters as in `tracker`.
 
 import numpy as np
 
-from radarsim.kernels.compile import kernel
+from radarsim.kernels.compile import kernel, part
 from radarsim.studies.sonar.clutter.kernels.counts import COUNTS, ENDS_PER_SCAN, WRONG_PER_PLOT
 from radarsim.studies.sonar.clutter.kernels.field import even_places
 from radarsim.studies.sonar.clutter.kernels.gate import KNOWN
@@ -31,6 +31,19 @@ from radarsim.studies.sonar.kernels.steps import CHUNK, copy_row
 from radarsim.studies.sonar.kernels.sums import Counted, Course
 
 
+@part
+def measure_target(world, first, k, plots, z, shift):
+    """Write the target's plots at scan k to z (2, CHUNK), and where it has moved off its course to shift (2, 3, CHUNK).
+
+    In realisations from number `first` on; plots (2, 4, CHUNK) as in `move_and_measure`.
+    """
+    move_and_measure(world, first, k, plots)
+    for c in range(2):
+        copy_row(plots[c, 0], z[c])
+        copy_row(plots[c, 2], shift[c, 0])
+        copy_row(plots[c, 3], shift[c, 1])
+
+
 @kernel
 def simulate_block(world, detections, field, trackers, work, first, total, sums):
     """Add the sums of the target's tracks in realisations first … first + total - 1 to sums, a TrackSums."""
@@ -45,12 +58,8 @@ def simulate_block(world, detections, field, trackers, work, first, total, sums)
         used[n:] = 0.0
         for k in range(K):
             scan, course = Scan(first + done, n, k, world.dt[k]), Course(world.truth[k], shift)
-            move_and_measure(world, first + done, k, plots)
+            measure_target(world, first + done, k, plots, z, shift)
             detect(detections, first + done, k, detected)
-            for c in range(2):
-                copy_row(plots[c, 0], z[c])
-                copy_row(plots[c, 2], shift[c, 0])
-                copy_row(plots[c, 3], shift[c, 1])
             for f in range(F):
                 tracks, counted = tracks_of(work, f), Counted(kept[f], used)
                 if k > 0:

@@ -39,7 +39,7 @@ from radarsim.studies.sonar.clutter.kernels.rules import (
     TENTATIVE,
     judge_false,
 )
-from radarsim.studies.sonar.clutter.kernels.sums import add_scores
+from radarsim.studies.sonar.clutter.kernels.sums import add_drawn, add_scores, add_weight
 from radarsim.studies.sonar.clutter.kernels.tracker import (
     Scan,
     Target,
@@ -55,6 +55,7 @@ from radarsim.studies.sonar.clutter.kernels.tracks import predict, update
 from radarsim.studies.sonar.kernels.steps import CHUNK
 
 MOST_MEAN = 16.0  # of a box: where it is larger, false plots are in the gate anyway, and the field is as it is
+NO_PLOT = (0.0, 0.0, 0.0)  # of the target
 LARGEST = 1e280  # of the ratio: far beyond any whose reciprocal counts
 # Which law a track is drawn from; ratios so far of the laws under which tracks are confirmed, and held on; scans held.
 ROWS = 4
@@ -142,15 +143,20 @@ def with_drawn_plots(keys, realisation, k, gate, threshold, box, p, h):
 
 
 @inline
-def associate_drawn(keys, rule, realisation, k, gate, box, needed, shifted):
+def associate_drawn(keys, rule, realisation, k, gate, plot, box, needed, shifted):
     """The Association of one track with plots drawn in its box, and the factor of the ratio of the law that shifts it.
 
-    needed: the probability h of that law, if it is not under p; shifted: whether the track is drawn from it.
+    Then whether there are any in the box. plot as in `associate_track`: of the target. needed: the probability h of
+    that law, if it is not under p; shifted: whether the track is drawn from it.
     """
     p = -math.expm1(-box.mean)
     h = max(needed, p)
     gated, some = with_drawn_plots(keys, realisation, k, gate, rule.gate, box, p, h if shifted else p)
-    return associated(gated, rule, gate.r, gate.S, gate.settled), h / p if some else (1.0 - h) / (1.0 - p)
+    if plot[0] > 0.0:
+        irr, irb, ibb, _ = inverse_two(gate.S[0], gate.S[1], gate.S[2])
+        gated = with_plot(gated, plot[1] - gate.r, plot[2] - gate.b, 0.0, (irr, irb, ibb), rule.gate)
+    found = associated(gated, rule, gate.r, gate.S, gate.settled)
+    return found, h / p if some else (1.0 - h) / (1.0 - p), some
 
 
 @part
@@ -173,12 +179,12 @@ def associate_false(field, shift, trackers, f, scan, work, own, counts):
         box, tentative = box_of(draws.cells, gate, rule.gate), status[STATE, i] == TENTATIVE
         if (tentative or held_on) and 0.0 < box.mean <= MOST_MEAN:
             rest = (m - status[HITS, i]) / (n - status[AGE, i]) if tentative else 1.0 / (most - status[MISSES, i])
-            drawn = (scan.first + i, scan.k, gate, box, rest, own[LAW, i] > (0.0 if tentative else 1.0))
-            found, factor = associate_drawn(keys, rule, *drawn)
+            shifted = own[LAW, i] > (0.0 if tentative else 1.0)
+            found, factor, _ = associate_drawn(keys, rule, scan.first + i, scan.k, gate, NO_PLOT, box, rest, shifted)
             own[FOUND, i] = min(own[FOUND, i] * (factor if tentative else 1.0), LARGEST)
             own[LONG, i] = min(own[LONG, i] * factor, LARGEST)
         else:
-            found = associate_track(draws, rule, scan.first + i, scan.k, (0.0, 0.0, 0.0), gate, tally)
+            found = associate_track(draws, rule, scan.first + i, scan.k, NO_PLOT, gate, tally)
         settle(lives, i, found, taken)
 
 
@@ -204,22 +210,8 @@ def add_held(shares, own, state, n, held):
     """Count a scan of the n tracks that are confirmed, by their weights so far; state (CHUNK,)."""
     for i in range(n):
         if state[i] == CONFIRMED:
-            w, j = weight_of(shares, own, i), int(own[HELD, i])
-            held[j, 0] += w
-            held[j, 1] += w * w
-            held[j, 2] += 1.0
-            held[j, 3] += w**4
+            add_weight(weight_of(shares, own, i), held, int(own[HELD, i]))
             own[HELD, i] += 1.0
-
-
-@part
-def add_drawn(shares, own, n, drawn):
-    """Add how n tracks were drawn to the sums of one tracker."""
-    for i in range(n):
-        w = weight_of(shares, own, i)
-        drawn[0] += own[LAW, i] == 0.0
-        drawn[1] += w
-        drawn[2] += w * w
 
 
 @part
@@ -256,5 +248,6 @@ def simulate_false(seeds, field, shift, trackers, work, dt, first, total, scores
                 add_held(shift.shares, own, status[STATE], n, sums.held[f])
                 if not left:
                     break
-            add_drawn(shift.shares, own, n, sums.drawn[f])
+            for i in range(n):
+                add_drawn(weight_of(shift.shares, own, i), own[LAW, i] == 0.0, sums.drawn[f])
             add_scores(trackers.thresholds, n, status[FIRST], status[BEST], scores[f])

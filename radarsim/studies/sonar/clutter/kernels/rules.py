@@ -3,7 +3,7 @@
 Letters as in `tracker`; i numbers the realisations of a chunk.
 """
 
-from radarsim.kernels.compile import kernel, part
+from radarsim.kernels.compile import inline, kernel, part
 from radarsim.studies.sonar.clutter.kernels import counts as at
 
 NONE, TENTATIVE, CONFIRMED = range(3)
@@ -38,6 +38,14 @@ def judge_known(tracks, status, n, kept, counts):
         status[HELD, i] += kept[i] > 0.0
 
 
+@inline
+def off_target(tracks, course, limit, i):
+    """Whether the track of realisation i is further from the target than limit (r, b), in m and rad."""
+    x, truth, shift = tracks.x, course.truth, course.shift
+    off = abs(x[0, 0, i] - truth[0, 0] - shift[0, 0, i]) > limit[0]
+    return off | (abs(x[1, 0, i] - truth[1, 0] - shift[1, 0, i]) > limit[1])
+
+
 @part
 def judge(trackers, f, n, tracks, status, course, kept, counts):
     """Apply the rules to the target's track in n realisations after a scan; kept (CHUNK,) is 2 where there is one.
@@ -46,8 +54,7 @@ def judge(trackers, f, n, tracks, status, course, kept, counts):
     when it is lost: too far from the target.
     """
     limit, m, of, misses = trackers.lost[f], trackers.m[f], trackers.n[f], trackers.misses[f]
-    x, P, truth, shift = tracks.x, tracks.P, course.truth, course.shift
-    limit_r, limit_b = limit * trackers.sigma[0], limit * trackers.sigma[1]
+    P, beyond = tracks.P, (limit * trackers.sigma[0], limit * trackers.sigma[1])
     for i in range(n):
         state = status[STATE, i]
         kept[i] = 0.0
@@ -55,8 +62,7 @@ def judge(trackers, f, n, tracks, status, course, kept, counts):
             continue
         now = next_state(state, status[HITS, i], status[MISSES, i], status[AGE, i], m, of, misses)
         if now == CONFIRMED:
-            off = abs(x[0, 0, i] - truth[0, 0] - shift[0, 0, i]) > limit_r
-            off |= abs(x[1, 0, i] - truth[1, 0] - shift[1, 0, i]) > limit_b
+            off = off_target(tracks, course, beyond, i)
             uncertain = max(P[0, 0, i], P[1, 0, i]) > limit * limit
             if state == CONFIRMED and (off or uncertain):
                 counts[at.LOST if off else at.DROPPED] += 1.0

@@ -1,9 +1,9 @@
-"""Sums over a chunk of tracks: errors, scores, and ratios of two numbers of each realisation.
+"""Sums over a chunk of tracks: errors, scores, ratios of two numbers of each realisation, and weights.
 
 Letters as in `sonar.kernels.sums`; f numbers trackers, c the lines in range and bearing, k scans.
 """
 
-from radarsim.kernels.compile import part
+from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import address
 from radarsim.studies.sonar.kernels.sums import Course, Estimate, add_sums, ahead_sums, rows_of
 
@@ -50,3 +50,20 @@ def add_ahead(tracks, f, k, dt, course, counted, out, sums):
         ahead_sums(rows_of(tracks.x[c], Course(course.truth[c], course.shift[c]), counted), size, dt, of)
         for power in range(4):
             sums.ahead[f, k - 1, c, power] += of[power]
+
+
+@inline
+def add_weight(w, sums, j):
+    """Add an event of weight w to row j of sums (n, 4): Σw, Σw², number and Σw⁴."""
+    sums[j, 0] += w
+    sums[j, 1] += w * w
+    sums[j, 2] += 1.0
+    sums[j, 3] += w**4
+
+
+@inline
+def add_drawn(w, plain, drawn):
+    """Add a realisation of weight w, drawn as it is or not, to drawn (3,): number of plain ones, Σw and Σw²."""
+    drawn[0] += plain
+    drawn[1] += w
+    drawn[2] += w * w

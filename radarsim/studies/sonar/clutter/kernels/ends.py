@@ -1,0 +1,396 @@
+"""The target's track, drawn where it ends, and weights that make up for it (importance sampling).
+
+A share of the realisations is drawn as it is, the others by laws of three kinds:
+
+    runs        the target's plots are missed more often than they should, once its track is confirmed, until as many
+                misses in a row have come as the law is for
+    far         errors of the plots of a young track are stretched along one direction, in range and bearing
+    false       the gate of the young track contains a false plot more often than it should, until one has come
+
+Each realisation counts with the law itself over the mixture of all. Of runs, the ratio of the laws is at first that of
+the answers "detected or not". For a tracker a plot outside its gate is a miss like one that is not there; so where the
+plots' errors are no longer stretched, it is that of the answers "in the gate or not" alone,
+
+    (1 - h) / P_D   for a plot in the gate,     (h + (1 - h) c) / (1 - P_D + P_D c)   for none,
+
+with h the probability that the target is not detected, as drawn, and c that its plot, if there is one, is outside the
+gate: both follow from the scans before. Of false plots it is that of `rare`. Letters as in `gate`, and
+
+    c           probability that the target's plot is outside the gate
+    u, s        direction of errors, a unit vector; how much they are stretched along it
+    ratio       of a law that is drawn from over the law itself
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from radarsim.kernels.compile import inline, kernel, part
+from radarsim.kernels.lanes import address
+from radarsim.kernels.random import uniforms
+from radarsim.studies.sonar.clutter.kernels.blocks import measure_target
+from radarsim.studies.sonar.clutter.kernels.counts import COUNTS
+from radarsim.studies.sonar.clutter.kernels.field import draws_of
+from radarsim.studies.sonar.clutter.kernels.gate import KNOWN, OPEN, PDA, Rule, distance_squared, inverse_two
+from radarsim.studies.sonar.clutter.kernels.rare import LARGEST, MOST_MEAN, associate_drawn, box_of
+from radarsim.studies.sonar.clutter.kernels.rules import AGE, CONFIRMED, MISSES, NONE, SINCE, STATE, judge, off_target
+from radarsim.studies.sonar.clutter.kernels.rules import ENDS as TRACKS_ENDED
+from radarsim.studies.sonar.clutter.kernels.sums import add_drawn, add_weight
+from radarsim.studies.sonar.clutter.kernels.tracker import (
+    Scan,
+    Target,
+    Workspace,
+    associate,
+    associate_track,
+    begin,
+    gate_of,
+    reset,
+    rule_of,
+    settle,
+    tracks_of,
+)
+from radarsim.studies.sonar.clutter.kernels.tracks import predict, update
+from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
+from radarsim.studies.sonar.kernels.steps import CHUNK, copy_row
+from radarsim.studies.sonar.kernels.sums import Course
+
+NODES = 48  # error under 10⁻¹³ for gates up to 60 σ² wide
+MOST_LOG = 600.0  # of a ratio: far beyond any whose reciprocal counts
+WIDEST = 8.5  # σ of a plot: further from its mean it is once in 10¹⁶
+KINDS = 2
+DROPPED, LOST = range(KINDS)
+# Which law a track is drawn from, 0 being the law itself; the longest run of misses since its confirmation; whether it
+# has ended; whether a false plot has come; by how much errors in range and bearing are stretched; ratios of the laws.
+LAW, LONGEST, ENDED, CAME, PUSH_R, PUSH_B, RATIO = range(7)
+
+
+class Ends(NamedTuple):
+    """How the target's tracks of F trackers are drawn, by R laws of runs, N of far plots, and one of false plots.
+
+    choice (2,) is the key of the stream that chooses the law of each realisation, plots (2,) that of false plots in
+    boxes. shares (F, 1 + R + N + 1) of the law itself and of the others, in this order; the sum is one. length (F, R)
+    of the run of misses that a law is for; undetected (F, R, L, K) the probability that the target is not detected at
+    scan k by tracks with i misses in a row. direction (F, N, J) of the errors at the first scans that may give a plot,
+    whose numbers are young (F, J), -1 where there are fewer, and stretch (F, N) of them.
+    """
+
+    choice: np.ndarray
+    plots: np.ndarray
+    shares: np.ndarray
+    length: np.ndarray
+    undetected: np.ndarray
+    young: np.ndarray
+    direction: np.ndarray
+    stretch: np.ndarray
+
+
+class Laws(NamedTuple):
+    """What `Ends` holds of one tracker, its rule, and the scans of the rule that confirms."""
+
+    shares: np.ndarray
+    length: np.ndarray
+    undetected: np.ndarray
+    young: np.ndarray
+    direction: np.ndarray
+    stretch: np.ndarray
+    rule: Rule
+    scans: float
+
+
+class Plots(NamedTuple):
+    """The law of the target's plots at a scan: their course, about which they lie, and their σ (2,) in m and rad."""
+
+    course: Course
+    sigma: np.ndarray
+
+
+class Chunk(NamedTuple):
+    """Arrays of a chunk: work arrays of the trackers, own (F, RATIO + laws, CHUNK), the target's plots as measured and
+    as drawn (2, CHUNK), whether they are detected (CHUNK,), their law, and what `judge` writes.
+    """
+
+    work: Workspace
+    own: np.ndarray
+    measured: np.ndarray
+    z: np.ndarray
+    detected: np.ndarray
+    plots: Plots
+    kept: np.ndarray
+    counts: np.ndarray
+
+
+class EndSums(NamedTuple):
+    """Sums of a block by weights w, for F trackers over K scans.
+
+    ended (F, K, KINDS, 4): Σw, Σw², number and Σw⁴ of realisations whose first confirmed track of the target ends at a
+    scan: is dropped, or lost; ended_drawn (F, 3): number of plain ones, Σw and Σw² of all.
+    """
+
+    ended: np.ndarray
+    ended_drawn: np.ndarray
+
+
+@inline
+def normal_below(x):
+    """Distribution function of the unit normal."""
+    return 0.5 * math.erfc(-math.sqrt(0.5) * x)
+
+
+@kernel
+def outside(off, S, threshold, sigma):
+    """c: the probability that a plot is outside a gate of covariance S (rr, rb, bb), from whose centre its mean is off.
+
+    off and sigma (r, b), in m and rad: the plot's errors in range and bearing are independent. The integral over the
+    range of the density there times the share between both ends of the gate in bearing; with the sine of an angle for
+    the range it is smooth and periodic, so that the midpoint rule converges exponentially.
+    """
+    (off_r, off_b), (sigma_r, sigma_b) = off, sigma
+    if threshold >= OPEN:
+        return 0.0
+    wide, slope = math.sqrt(threshold * S[0]), S[1] / S[0]
+    low, high = max(-wide, off_r - WIDEST * sigma_r), min(wide, off_r + WIDEST * sigma_r)
+    if low >= high:
+        return 1.0
+    across = (S[2] - S[1] * slope) / S[0]
+    middle, half, total = 0.5 * (low + high), 0.5 * (high - low), 0.0
+    for j in range(NODES):
+        angle = math.pi * ((j + 0.5) / NODES - 0.5)
+        x = middle + half * math.sin(angle)
+        deep = math.sqrt(max((wide * wide - x * x) * across, 0.0))
+        z, centre = (x - off_r) / sigma_r, slope * x - off_b
+        inside = normal_below((centre + deep) / sigma_b) - normal_below((centre - deep) / sigma_b)
+        total += math.cos(angle) * math.exp(-0.5 * z * z) * inside
+    share = total * half * math.pi / NODES / (sigma_r * math.sqrt(2.0 * math.pi))
+    return min(max(1.0 - share, 0.0), 1.0)
+
+
+# ---- laws -----------------------------------------------------------------------------------------------------------
+@part
+def young_errors(world, young, first, errors):
+    """Write the errors of the target's plots at the scans `young` (J,), over their σ, to errors (J, 2, CHUNK)."""
+    plots = np.zeros((2, 4, CHUNK))
+    for j in range(young.size):
+        move_and_measure(world, first, max(young[j], 0), plots)
+        for c in range(2):
+            for i in range(CHUNK):
+                errors[j, c, i] = plots[c, 1, i] / world.fresh[young[j], c] if young[j] >= 0 else 0.0
+
+
+@inline
+def along(direction, errors, c, i):
+    """uᵀ of the errors (J, 2, CHUNK) of realisation i in coordinate c."""
+    total = 0.0
+    for j in range(direction.size):
+        total += direction[j] * errors[j, c, i]
+    return total
+
+
+@inline
+def between(one, other):
+    """uᵀu of two directions."""
+    total = 0.0
+    for j in range(one.size):
+        total += one[j] * other[j]
+    return total
+
+
+@part
+def begin_drawn(choice, laws, first, n, errors, own):
+    """Choose the laws of n realisations from number `first` on, stretch errors, and set the ratios that follow."""
+    runs, direction, stretch = laws.length.size, laws.direction, laws.stretch
+    for i in range(n):
+        u, _ = uniforms(choice[0], choice[1], first + i, 0)
+        law, total = 0, laws.shares[0]
+        while u >= total and law < laws.shares.size - 1:
+            law += 1
+            total += laws.shares[law]
+        own[:, i] = 0.0
+        own[LAW, i], own[RATIO:, i] = float(law), 1.0
+        far = law - 1 - runs
+        if 0 <= far < len(direction):
+            own[PUSH_R, i] = (stretch[far] - 1.0) * along(direction[far], errors, 0, i)
+            own[PUSH_B, i] = (stretch[far] - 1.0) * along(direction[far], errors, 1, i)
+        else:
+            far = 0  # nothing is added
+        for j in range(len(direction)):
+            part_of = between(direction[j], direction[far])
+            r = along(direction[j], errors, 0, i) + part_of * own[PUSH_R, i]
+            b = along(direction[j], errors, 1, i) + part_of * own[PUSH_B, i]
+            squared = stretch[j] * stretch[j]
+            own[RATIO + runs + j, i] = math.exp(min(0.5 * (r * r + b * b) * (1.0 - 1.0 / squared), MOST_LOG)) / squared
+
+
+@part
+def stretched(laws, k, n, z, sigma, own, out):
+    """Write the target's plots (2, CHUNK) at scan k to out, with their errors as each realisation's law has them."""
+    runs = laws.length.size
+    copy_row(z[0], out[0])
+    copy_row(z[1], out[1])
+    for j in range(laws.young.size):
+        for i in range(n if laws.young[j] == k else 0):
+            far = int(own[LAW, i]) - 1 - runs
+            if 0 <= far < len(laws.direction):
+                out[0, i] += laws.direction[far, j] * own[PUSH_R, i] * sigma[0]
+                out[1, i] += laws.direction[far, j] * own[PUSH_B, i] * sigma[1]
+
+
+@inline
+def laws_of(ends, trackers, f):
+    """The laws of tracker f."""
+    far = (ends.young[f], ends.direction[f], ends.stretch[f])
+    return Laws(ends.shares[f], ends.length[f], ends.undetected[f], *far, rule_of(trackers, f), trackers.n[f])
+
+
+@inline
+def undetected_by(laws, law, longest, misses, k, detection):
+    """h: the probability that the target of a confirmed track is not detected under a law; 0 is the law itself."""
+    if 0 < law <= laws.length.size and longest < laws.length[law - 1]:
+        return laws.undetected[law - 1, misses, k]
+    return 1.0 - detection
+
+
+@part
+def detect_drawn(detections, laws, scan, status, predicted, target, plots, own):
+    """Set target.detected as each realisation's law has it, and bring the ratios of runs in own up to date.
+
+    Before association: predicted (5, CHUNK) is of this scan. A realisation whose track has ended has no more plots.
+    """
+    k, certain, detection = scan.k, detections.certain[scan.k], detections.probability
+    detected, z, most, free = target.detected, target.z, laws.length.max(), k > laws.young.max()
+    for i in range(scan.count):
+        u, _ = uniforms(detections.key[0], detections.key[1], scan.first + i, k)
+        if own[ENDED, i] > 0.0 or certain >= 0 or status[STATE, i] != CONFIRMED:
+            seen = u < detection if certain < 0 else certain > 0
+            detected[i] = 1.0 if seen and own[ENDED, i] == 0.0 else 0.0
+            continue
+        misses, longest = int(status[MISSES, i]), max(own[LONGEST, i], status[MISSES, i])
+        own[LONGEST, i] = longest
+        h = undetected_by(laws, int(own[LAW, i]), longest, misses, k, detection)
+        detected[i] = 1.0 if u < 1.0 - h else 0.0
+        if longest >= most:  # whatever law it is drawn from, the rest is as it is
+            continue
+        hit, c = detected[i] > 0.0, 0.0
+        if free:
+            S = (predicted[2, i], predicted[3, i], predicted[4, i])
+            irr, irb, ibb, _ = inverse_two(S[0], S[1], S[2])
+            nu = (z[0, i] - predicted[0, i], z[1, i] - predicted[1, i])
+            hit = hit and distance_squared(nu[0], nu[1], (irr, irb, ibb)) <= laws.rule.gate
+            if not hit:
+                off_r = plots.course.truth[0, 0] + plots.course.shift[0, 0, i] - predicted[0, i]
+                off_b = plots.course.truth[1, 0] + plots.course.shift[1, 0, i] - predicted[1, i]
+                c = outside((off_r, off_b), S, laws.rule.gate, (plots.sigma[0], plots.sigma[1]))
+        for j in range(laws.length.size):
+            h = undetected_by(laws, j + 1, longest, misses, k, detection)
+            factor = (1.0 - h) / detection if hit else (h + (1.0 - h) * c) / (1.0 - detection + detection * c)
+            own[RATIO + j, i] = min(own[RATIO + j, i] * factor, LARGEST)
+
+
+@part
+def associate_young(field, ends, laws, scan, tracks, status, chunk, own):
+    """Associate a scan's plots with every track, as `tracker.associate`; about young tracks false plots are drawn.
+
+    The ratio of the law of false plots, the last one, is brought up to date.
+    """
+    draws, out, rule, tally = draws_of(field), chunk.work.association, laws.rule, address(chunk.counts)
+    predicted, detected, z, lives = chunk.work.predicted, chunk.detected, chunk.z, address(status)
+    keys, last, law = (ends.plots[0], ends.plots[1]), own.shape[0] - 1, float(laws.shares.size - 1)
+    for i in range(scan.count):
+        if status[STATE, i] == NONE:
+            out[:, i] = 0.0
+            if detected[i] > 0.0:
+                begin(tracks, status, i, z, out)
+            continue
+        status[SINCE, i] += scan.dt
+        place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
+        gate = gate_of(place, S, tracks.plots[i] > 1.5, rule.speed * status[SINCE, i])
+        plot, box, age = (detected[i], z[0, i], z[1, i]), box_of(draws.cells, gate, rule.gate), status[AGE, i]
+        if age < laws.scans and 0.0 < box.mean <= MOST_MEAN:
+            needed = 1.0 / (laws.scans - age) if own[CAME, i] == 0.0 else 0.0
+            drawn = (scan.first + i, scan.k, gate, plot, box, needed, own[LAW, i] == law)
+            found, factor, some = associate_drawn(keys, rule, *drawn)
+            own[last, i] = min(own[last, i] * factor, LARGEST)
+            own[CAME, i] = 1.0 if some else own[CAME, i]
+        else:
+            found = associate_track(draws, rule, scan.first + i, scan.k, plot, gate, tally)
+        settle(lives, i, found, address(out))
+
+
+# ---- sums -----------------------------------------------------------------------------------------------------------
+@inline
+def weight_of(shares, own, i):
+    """The weight of realisation i so far: the law itself over the mixture of all."""
+    total = shares[0]
+    for j in range(shares.size - 1):
+        total += shares[1 + j] * own[RATIO + j, i]
+    return 1.0 / total
+
+
+@part
+def add_ended(limits, n, tracks, status, course, laws, own, ended):
+    """Count the n realisations whose first confirmed track ends at this scan by their weights, in ended (KINDS, 4).
+
+    limits: misses in a row that drop a track, and the error (r, b), in m and rad, with which it has lost its target.
+    """
+    misses, beyond = limits
+    for i in range(n):
+        if status[TRACKS_ENDED, i] > 0.0 and own[ENDED, i] == 0.0:
+            own[ENDED, i] = 1.0
+            lost = status[MISSES, i] < misses and off_target(tracks, course, beyond, i)
+            add_weight(weight_of(laws.shares, own, i), ended, LOST if lost else DROPPED)
+
+
+# ---- a block --------------------------------------------------------------------------------------------------------
+@part
+def scan_target(detections, field, trackers, ends, laws, f, scan, chunk):
+    """Process a scan of the target's tracks of tracker f: its plots as drawn, association, update, and the rules."""
+    work, own, counts = chunk.work, chunk.own[f], chunk.counts
+    tracks, status, manoeuvre = tracks_of(work, f), work.status[f], trackers.manoeuvre[f]
+    predict(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, work.predicted)
+    target = Target(chunk.detected, chunk.z, True)
+    stretched(laws, scan.k, scan.count, chunk.measured, chunk.plots.sigma, own, target.z)
+    detect_drawn(detections, laws, scan, status, work.predicted, target, chunk.plots, own)
+    if laws.shares[-1] > 0.0:
+        associate_young(field, ends, laws, scan, tracks, status, chunk, own)
+    else:
+        associate(field, laws.rule, scan, tracks, status, target, work, counts)
+    joint = trackers.association[f] == PDA
+    update(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, joint, work.association)
+    judge(trackers, f, scan.count, tracks, status, chunk.plots.course, chunk.kept, counts)
+
+
+@kernel
+def simulate_ends(world, detections, field, trackers, ends, work, first, total, sums):
+    """Add the weighted ends of the target's first confirmed tracks to sums, an EndSums.
+
+    Arguments as those of `blocks.simulate_block`.
+    """
+    F, K = trackers.gate.size, world.dt.size
+    plots, shift = np.empty((2, 4, CHUNK)), np.zeros((2, 3, CHUNK))
+    measured, z = np.empty((2, CHUNK)), np.empty((2, CHUNK))
+    own, kept, counts = np.empty((F, RATIO + ends.shares.shape[1] - 1, CHUNK)), np.empty(CHUNK), np.zeros(COUNTS)
+    detected, errors = np.empty(CHUNK), np.empty((ends.young.shape[1], 2, CHUNK))
+    for done in range(0, total, CHUNK):
+        reset(work)
+        plots[:] = 0.0
+        n = min(CHUNK, total - done)
+        for f in range(F):
+            young_errors(world, ends.young[f], first + done, errors)
+            begin_drawn(ends.choice, laws_of(ends, trackers, f), first + done, n, errors, own[f])
+        for k in range(K):
+            scan, course = Scan(first + done, n, k, world.dt[k]), Course(world.truth[k], shift)
+            measure_target(world, first + done, k, plots, measured, shift)
+            law_of_plots = Plots(course, world.fresh[k])
+            chunk = Chunk(work, own, measured, z, detected, law_of_plots, kept, counts)
+            for f in range(F):
+                if trackers.association[f] == KNOWN:
+                    continue
+                laws = laws_of(ends, trackers, f)
+                scan_target(detections, field, trackers, ends, laws, f, scan, chunk)
+                beyond = (trackers.lost[f] * trackers.sigma[0], trackers.lost[f] * trackers.sigma[1])
+                limits, tracks, status = (trackers.misses[f], beyond), tracks_of(work, f), work.status[f]
+                add_ended(limits, n, tracks, status, course, laws, own[f], sums.ended[f, k])
+        for f in range(F):
+            for i in range(n):
+                if trackers.association[f] != KNOWN:
+                    add_drawn(weight_of(ends.shares[f], own[f], i), own[f, LAW, i] == 0.0, sums.ended_drawn[f])

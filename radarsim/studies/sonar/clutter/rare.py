@@ -1,0 +1,129 @@
+"""How the target's track is drawn where it ends: laws that lead there, prepared for the kernels.
+
+A track ends after misses in a row, or because of what such a run leads to: its gate grows, a false plot falls into it,
+its velocity carries it away. So there is a law for each of some lengths of a run, under which a run of that length
+comes in the scans that are left. Were misses independent, with the probability p of a plot that is missed or outside
+the gate, the probability V(i, k) that it comes, with i misses in a row before scan k, would be known by recursion, and
+to draw a miss with the probability h = p V(i + 1, k + 1) / V(i, k) would give all tracks with such a run the same
+weight, 1 / V: Doob's transform, of no variance (Juneja and Shahabuddin 2006, Handbooks in Operations Research and
+Management Science 13, 291). Here it is as near to that as misses are to being independent.
+
+A young track may also be wrong from its first plots on: because of their errors, so that the next plots are outside its
+gate one after the other, or because one of them is false. So there is a law for the track of each number of plots
+from that which confirms it on, under which the errors that lead there are stretched, and one under which a false plot
+is in its gate.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from radarsim.config.experiment import Case
+from radarsim.studies.noise import noise_key
+from radarsim.studies.sonar.clutter.axes import ClutterAxes
+from radarsim.studies.sonar.clutter.filters import Conditions, TrackerSpec, gate_threshold
+from radarsim.studies.sonar.clutter.kernels.ends import Ends
+
+MOST_RUNS = 6
+FURTHER = 3  # plots after that which confirms a track, up to which it may be wrong by their errors
+OUT = 3  # plots in a row that then leave its gate: more follow by themselves
+LONGEST = 20  # misses in a row that are drawn for: a track that needs more is dropped, or far off, before
+
+
+def lengths(misses: int) -> np.ndarray:
+    """Lengths of the runs that are drawn for: from one miss to those that drop a track, even, six at most."""
+    longest = min(misses, LONGEST)
+    return np.unique(np.round(np.linspace(1, longest, min(longest, MOST_RUNS)))).astype(np.int64)
+
+
+def chances(miss: np.ndarray, length: int) -> np.ndarray:
+    """Probability (length + 1, K + 1) that a run of so many misses comes from scan k on, with i in a row before it.
+
+    miss (K,): the probability of a miss at each scan.
+    """
+    out = np.zeros((length + 1, len(miss) + 1))
+    out[length] = 1.0
+    for k in range(len(miss) - 1, -1, -1):
+        out[:length, k] = miss[k] * out[1:, k + 1] + (1.0 - miss[k]) * out[0, k + 1]
+    return out
+
+
+def undetected(probability: np.ndarray, inside: float, length: int) -> np.ndarray:
+    """Probability (length, K) that the target is not detected at scan k, with i misses in a row before it, as drawn.
+
+    probability (K,) of detection as it is; inside: that the gate contains a plot. A miss is drawn with h if this is
+    drawn with 1 - (1 - h) / inside, since plots outside the gate are misses too. Where detection is certain, or not
+    possible, nothing is shifted.
+    """
+    p = 1.0 - probability * inside
+    to_come = chances(p, length)
+    missed, hit = p * to_come[1:, 1:], (1.0 - p) * to_come[0, 1:]
+    with np.errstate(invalid="ignore"):
+        hits = np.where(missed + hit > 0.0, hit / (missed + hit), 1.0 - p)
+    drawn = np.clip(1.0 - hits / inside, 1.0 - probability, 1.0)
+    return np.where((probability > 0.0) & (probability < 1.0), drawn, 1.0 - probability)
+
+
+def directions(t: np.ndarray, least: int) -> np.ndarray:
+    """The shortest errors (1 + FURTHER, J) of J plots at t (J,), s, with which OUT plots in a row leave a track's gate.
+
+    Of the track after `least` and more plots, a line fitted to them by least squares, as a track without manoeuvres
+    begins. The innovations of the next OUT plots are rows A of the errors, each with its own variance S = |A|²; all of
+    them are √S at the errors Aᵀ(A Aᵀ)⁻¹√S, the shortest with which they are, in units of the root of a gate. Zero where
+    there are too few plots.
+    """
+    out = np.zeros((1 + FURTHER, len(t)))
+    for row, j in zip(out, range(least, len(t) - OUT + 1), strict=False):
+        A = np.zeros((OUT, len(t)))
+        for h in range(OUT):
+            line = np.stack([np.ones(j), t[:j] - t[j + h]])
+            A[h, :j], A[h, j + h] = -np.linalg.solve(line @ line.T, line)[0], 1.0
+        row[:] = A.T @ np.linalg.solve(A @ A.T, np.linalg.norm(A, axis=1))
+    return out
+
+
+def stretch(gate: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """How much errors along directions of some radius are stretched for a gate, χ² of two components.
+
+    s² is half the least square with which plots leave the gate, the best for the tail of a Gaussian of two components.
+    """
+    return np.sqrt(np.maximum(gate * radius**2 / 2.0, 2.0))
+
+
+def family_shares(plain: float, sizes: Sequence[int]) -> np.ndarray:
+    """Shares of the law itself and of laws in families of these sizes: equal for all families that are there."""
+    each = (1.0 - plain) / max(sum(size > 0 for size in sizes), 1)
+    return np.concatenate([[plain], *(np.full(size, each / size) for size in sizes if size)])
+
+
+def ends(case: Case, specs: Sequence[TrackerSpec], given: Conditions, labels: ClutterAxes) -> Ends:
+    """How the target's track of each tracker is drawn."""
+    certain, t, F, K = labels.detections.certain, np.asarray(labels.t_s, dtype=float), len(specs), len(labels.k)
+    probability = np.where(certain < 0, labels.detections.probability, certain)
+    runs = [lengths(one.misses) for one in specs]
+    scans = [np.flatnonzero(certain != 0)[: one.m + FURTHER + OUT] for one in specs]
+    most, longest, J = max(map(len, runs)), max(int(run[-1]) for run in runs), max(map(len, scans))
+    length, young = np.zeros((F, most), dtype=np.int64), np.full((F, J), -1, dtype=np.int64)
+    shares, drawn = np.zeros((F, 1 + most + 1 + FURTHER + 1)), np.ones((F, most, longest, K))
+    direction, radius = np.zeros((F, 1 + FURTHER, J)), np.zeros((F, 1 + FURTHER))
+    for f, (one, run, at) in enumerate(zip(specs, runs, scans, strict=True)):
+        length[f, : len(run)], young[f, : len(at)] = run, at
+        direction[f, :, : len(at)] = directions(t[at], one.m)
+        radius[f] = np.linalg.norm(direction[f], axis=1)
+        far = np.flatnonzero(radius[f] > 0.0) if one.gate_probability < 1.0 else np.empty(0, dtype=np.int64)
+        own = family_shares(case.spec.rare.plain_share, (len(run), len(far), int(given.density > 0.0)))
+        laws = [0, *range(1, 1 + len(run)), *(1 + most + far), *([-1] if given.density > 0.0 else [])]
+        shares[f, laws] = own
+        for j, each in enumerate(run):
+            drawn[f, j, :each] = undetected(probability, one.gate_probability, int(each))
+    gates = np.array([[gate_threshold(one.gate_probability)] for one in specs])
+    return Ends(
+        choice=noise_key(case, "rare ends"),
+        plots=noise_key(case, "rare plots about the target"),
+        shares=shares,
+        length=length,
+        undetected=drawn,
+        young=young,
+        direction=direction / np.maximum(radius, 1e-300)[..., None],
+        stretch=stretch(gates, radius),
+    )

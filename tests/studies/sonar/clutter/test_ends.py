@@ -1,0 +1,317 @@
+"""Rare ends of the target's track: against a chain's exact law, a textbook twin, and plain sampling."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import radarsim
+from radarsim.app import run as experiment
+from radarsim.app.configs import load
+from radarsim.config.identity import canonical
+from radarsim.errors import ConfigError
+from radarsim.kernels import random
+from radarsim.report.tables import to_csv
+from radarsim.studies.sonar import STUDY
+from radarsim.studies.sonar.clutter import filters as design
+from radarsim.studies.sonar.clutter import track as plots
+from radarsim.studies.sonar.clutter.kernels import counts as places
+from radarsim.studies.sonar.clutter.kernels.ends import outside
+from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
+from radarsim.studies.sonar.kernels.steps import CHUNK
+from tests.engine.test_collect import Shuffled
+from tests.studies.sonar.clutter import naive_ends
+from tests.studies.sonar.clutter.test_rare import words_of
+from tests.studies.sonar.clutter.test_study import config, simulated, tracker
+
+RARE = {"events": ["ended_tracks"]}
+SECTOR = ((7e3, 11e3), (math.radians(5), math.radians(40)))
+N = 20_000
+
+
+def keys_of(filters, density, detection, scans, sought=True, share=0.1, **more):
+    """The keys of a case whose ends of the target's track are sought, or are not."""
+    keys = config(filters, density, detection, scans) | more
+    return keys | ({"rare": RARE | {"plain_share": share}} if sought else {})
+
+
+def plan_of(*of, **more):
+    return STUDY.prepare(load(keys_of(*of, **more)).cases[0])
+
+
+def reseeded(plan, seed):
+    """The plan with other noise."""
+    keys = [random.stream(seed, str(i)) for i in range(5)]
+    axes = plan.axes
+    axes = replace(
+        axes,
+        world=axes.world._replace(plots=keys[0]),
+        detections=axes.detections._replace(key=keys[1]),
+        field=axes.field._replace(key=keys[2]),
+    )
+    ends = None if plan.ends is None else plan.ends._replace(choice=keys[3], plots=keys[4])
+    return replace(plan, axes=axes, ends=ends)
+
+
+def shares(plan, n=N):
+    """The weighted shares (F, K) that have ended by each scan, their standard errors, and effective events."""
+    weight, squared = np.moveaxis(simulated(plan, n)["ended"].sum(axis=2).cumsum(axis=1)[..., :2], -1, 0)
+    p = weight / n
+    return p, np.sqrt(np.maximum(squared / n - p * p, 0) / n), weight**2 / np.maximum(squared, 1e-300)
+
+
+def one_law(plan):
+    """The plan with every realisation drawn as it is: how plain sampling knows the first ends."""
+    own = np.zeros_like(plan.ends.shares)
+    own[:, 0] = 1.0
+    return replace(plan, ends=plan.ends._replace(shares=own))
+
+
+# ---- exact ----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("gate", [4.0, 9.21, 30.0])
+def test_the_probability_outside_a_gate_is_that_of_a_sum(gate):
+    """Off the centre by nothing, by the gate and beyond it; gates narrow and wide, correlated or not."""
+    sigma, generator = np.array([30.0, 0.0175]), np.random.default_rng(3)
+    for size in (1.0, 1.2, 2.0, 8.0, 60.0):
+        for correlation in (0.0, 0.7):
+            S = size * np.array([[1, correlation * (size > 1)], [correlation * (size > 1), 1]])
+            S *= np.outer(sigma, sigma)
+            for reach in (0.0, 0.5, 1.0, 1.5):
+                off = reach * math.sqrt(gate * size) * sigma * generator.uniform(-1, 1, 2)
+                c = outside(tuple(off), (S[0, 0], S[0, 1], S[1, 1]), gate, tuple(sigma))
+                assert c == pytest.approx(naive_ends.missing(off, S, gate, sigma), abs=1e-9)
+    assert outside((1.0, 0.0), (900.0, 0.0, 3e-4), 1e30, tuple(sigma)) == 0.0
+
+
+RULES = [(0.9, 3, 4, 4), (0.95, 3, 4, 4), (0.98, 4, 6, 4), (0.98, 3, 4, 5), (0.99, 2, 3, 5), (0.98, 3, 5, 6)]
+
+
+@pytest.mark.parametrize(("detection", "m", "n", "misses"), RULES)
+def test_runs_of_misses_end_tracks_as_their_exact_law_says(detection, m, n, misses):
+    """Open gates, no false plots, a target never far: from 10⁻³ down to 10⁻⁹, at every scan of the curve."""
+    plan = plan_of(
+        [tracker("a", m=m, n=n, gate=1.0, drop_after_misses=misses, lost_beyond_sigmas=1e9)], 0, detection, 25
+    )
+    exactly = naive_ends.ended_by(detection, m, n, misses, 25)
+    p, error, effective = (of[0] for of in shares(plan))
+    possible = exactly > 0
+    assert not p[~possible].any()
+    assert (np.abs(p - exactly) <= 4 * error)[possible].all(), (p, exactly, error)
+    assert error[-1] < 0.025 * exactly[-1]
+    assert effective[-1] > 2000
+    assert 1e-9 < exactly[-1] < 5e-3
+
+
+def test_the_mean_weight_is_one_and_none_is_over_one_by_the_plain_share():
+    plan = plan_of([tracker("a"), tracker("b", "pda", 4, 6)], 0.1, 0.9, 15, share=0.2)
+    plain, weight, squared = np.moveaxis(simulated(plan, N)["ended_drawn"], 1, 0)
+    error = np.sqrt((squared / N - (weight / N) ** 2) / N)
+    assert (np.abs(weight / N - 1) < 4 * error).all()
+    assert (np.abs(plain - 0.2 * N) < 4 * math.sqrt(0.16 * N)).all()
+    for i in range(50):
+        assert plan.layout.unpack(STUDY.simulate(plan, i, 1))["ended_drawn"][:, 1].max() <= 5.0
+
+
+# ---- a twin ---------------------------------------------------------------------------------------------------------
+def errors_of(plan, realisation, scans):
+    """The errors (K, 2) of the target's plots, over their σ."""
+    out, own = np.zeros((2, 4, CHUNK)), np.empty((scans, 2))
+    for k in range(scans):
+        move_and_measure(plan.axes.world, realisation, k, out)
+        own[k] = out[:, 1, 0] / plan.axes.world.fresh[k, :2]
+    return own
+
+
+def uniform_of(key, realisation, pair):
+    a, b = np.empty(1), np.empty(1)
+    random.fill_uniform_pairs(key, realisation, pair, a, b)
+    return a[0]
+
+
+@pytest.mark.parametrize(("density", "detection"), [(0.0, 0.9), (0.05, 0.8), (2.0, 0.9)])
+def test_weights_and_ends_are_the_twins(density, detection):
+    """Nearest plot and PDA, four rules: when and how a track ends, and its weight, realisation by one."""
+    filters = [
+        tracker("near", drop_after_misses=2),
+        tracker("pda", "pda", 3, 5, 0.999),
+        tracker("open", m=2, n=3, gate=1.0, lost_beyond_sigmas=3.0),
+        tracker("early", m=4, n=6, gate=0.9),
+    ]
+    scans = 18
+    keys = keys_of(filters, density, detection, scans)
+    case = load(keys).cases[0]
+    plan = STUDY.prepare(case)
+    given, ends, seen = design.conditions(case.spec), plan.ends, np.zeros(4)
+    truth = plan.axes.world.truth[:, :2, 0]
+    for realisation in range(40):
+        sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
+        errors = errors_of(plan, realisation, scans)
+        u = np.array([uniform_of(plan.axes.detections.key, realisation, k) for k in range(scans)])
+        field = lambda k, i=realisation: plots.false_plots(plan.axes.field, i, k).T  # noqa: E731
+        for f, choice in enumerate(design.tracker_specs(case.spec)):
+            gate = design.gate_threshold(choice.gate_probability)
+            laws = naive_ends.Laws(choice, given, gate, scans, choice.misses)
+            mixed = ends.shares[f][ends.shares[f] > 0]
+            law = int(np.searchsorted(np.cumsum(mixed), uniform_of(ends.choice, realisation, 0)))
+            twin = naive_ends.TargetTrack(choice, given, gate, SECTOR, words_of(ends.plots, realisation), field)
+            k, lost, weight = twin.end(laws, law, mixed, truth, errors, u, scans)
+            assert sums["ended_drawn"][f] == pytest.approx([float(law == 0), weight, weight**2], rel=1e-6, abs=0)
+            expected = np.zeros((scans, 2, 4))
+            if k is not None:
+                expected[k, int(lost)] = weight, weight**2, 1, weight**4
+            assert sums["ended"][f] == pytest.approx(expected, rel=1e-6, abs=0)
+            seen += k is not None, lost, law == 0, k is not None and k > 12
+    assert (seen > [20, 1, 5, 1]).all(), seen
+
+
+# ---- plain sampling -------------------------------------------------------------------------------------------------
+HARD = [
+    (0.9, 0.0, 0.9999, 4),
+    (0.98, 0.0, 0.999, 4),
+    (0.98, 0.003, 0.9999, 3),
+    (0.9, 0.03, 0.999, 3),
+    (0.98, 0.01, 0.99, 3),
+]
+
+
+def compared(detection, density, gate, misses, scans=20):
+    """Nearest plot and PDA: a plan with ends sought, and one of other noise without, drawn as it is."""
+    filters = [tracker(kind, kind, gate=gate, drop_after_misses=misses) for kind in ("nearest", "pda")]
+    return plan_of(filters, density, detection, scans)
+
+
+@pytest.mark.parametrize("of", [(0.7, 0.03, 0.99, 3), (0.8, 0.0, 0.9, 4)])
+def test_ends_are_those_of_plain_sampling(of):
+    """At 10⁻¹ and 10⁻², by each scan; and the first ends drawn as they are, without weights."""
+    plan = compared(*of)
+    (p, error, _), (other, its, _) = shares(plan), shares(reseeded(one_law(plan), 5), 30_000)
+    seen = its > 0
+    assert (np.abs(p - other)[seen] < 4.5 * np.hypot(error, its)[seen]).all()
+    assert (p[:, -1] > 0.005).all()
+
+
+def test_realisations_drawn_as_they_are_have_the_tracks_of_plain_sampling():
+    """Without false plots those of the other tables, as long as no track has ended before."""
+    plan = one_law(compared(0.8, 0.0, 0.99, 2, 12))
+    for i in range(40):
+        sums = plan.layout.unpack(STUDY.simulate(plan, i, 1))
+        for f in range(2):
+            ends = sums["counts"][f][:, [places.DROPPED, places.LOST]]
+            first = ends * (np.cumsum(ends.sum(axis=1)) == 1)[:, None] * (ends.sum(axis=1) > 0)[:, None]
+            assert (sums["ended"][f, :, :, 2] == first).all()
+            assert (sums["ended"][f, :, :, 0] == first).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("of", HARD)
+def test_ends_are_those_of_plain_sampling_on_twenty_seeds(of):
+    """From 10⁻² to 2·10⁻⁴: every difference within its 99.99 % bounds, their mean within three standard errors."""
+    plan = compared(*of)
+    z = []
+    for seed in range(20):
+        p, error, _ = shares(reseeded(plan, seed))
+        other, its, _ = shares(reseeded(one_law(plan), 100 + seed), 200_000)
+        z.append(((p - other) / np.hypot(error, its))[:, -1])
+    assert np.abs(z).max() < 3.9
+    assert (np.abs(np.mean(z, axis=0)) < 3 / math.sqrt(20)).all()
+
+
+# ---- tables, words, keys --------------------------------------------------------------------------------------------
+def test_the_target_and_false_tracks_are_left_alone():
+    """All other sums have the bits that they have without the event, with false tracks sought and not."""
+    for others in ([], ["false_tracks"]):
+        alone = keys_of([tracker("a")], 0.3, 0.9, 10, sought=False)
+        both = alone | {"rare": {"events": [*others, "ended_tracks"]}}
+        alone |= {"rare": {"events": others}} if others else {}
+        alone, both = (STUDY.prepare(load(keys).cases[0]) for keys in (alone, both))
+        sums, more = (plan.layout.unpack(STUDY.simulate(plan, 0, 700)) for plan in (alone, both))
+        assert set(more) - set(sums) == {"ended", "ended_drawn"}
+        assert all((sums[name] == more[name]).all() for name in sums)
+
+
+def test_blocks_add_up():
+    plan = plan_of([tracker("a"), tracker("told", "known")], 0.3, 0.9, 10)
+    whole = plan.layout.unpack(STUDY.simulate(plan, 0, 700))
+    parts = [plan.layout.unpack(STUDY.simulate(plan, *part)) for part in ((0, 130), (130, 570))]
+    for name in ("ended", "ended_drawn"):
+        assert parts[0][name] + parts[1][name] == pytest.approx(whole[name], rel=1e-9, abs=1e-9)
+        assert not whole[name][1].any()
+
+
+def test_tables_tell_the_curve_and_how_tracks_end():
+    filters = [tracker("a", gate=0.999, drop_after_misses=4), tracker("told", "known"), tracker("b", "pda", gate=1.0)]
+    result = radarsim.run(keys_of(filters, 0.0, 0.95, 20), realisations=5000)
+    table, sums = result.tables["rare"], result.cases[0].sums
+    assert list(table["filter"].unique()) == ["a", "b"]
+    for f, name in ((0, "a"), (2, "b")):
+        own = table[table["filter"] == name]
+        curve = own[own["event"] == "target's track ended"]
+        assert (np.diff(curve["rate"]) >= 0).all()
+        assert list(curve["sought"]) == [False] * (len(curve) - 1) + [True]
+        assert curve.iloc[-1][["k", "t_s"]].tolist() == [20, 95.0]
+        weight, squared, number, _ = sums["ended"][f].sum(axis=(0, 1))
+        assert curve.iloc[-1]["rate"] == pytest.approx(weight / 5000, rel=1e-12)
+        assert curve.iloc[-1]["events"] == number
+        assert curve.iloc[-1]["n_eff"] == pytest.approx(weight**2 / squared)
+        how = own[own["event"] != "target's track ended"].set_index("event")["rate"]
+        assert list(how.index) == ["target's track dropped", "target's track lost"]
+        assert how.sum() == pytest.approx(curve.iloc[-1]["rate"], rel=1e-12)
+    assert "has ended by the last scan, by importance sampling: a " in " ".join(result.answer)
+    assert not result.tables["rare"]["event"].str.contains("false").any()
+
+
+def test_a_rate_that_rests_on_few_events_is_told():
+    result = radarsim.run(keys_of([tracker("a")], 0.0, 0.98, 12), realisations=10)
+    assert any("a: the rate of a rare event rests on" in line for line in result.warnings)
+
+
+def test_bytes_are_those_of_any_threads_and_order():
+    keys = keys_of([tracker("a"), tracker("b", "pda")], 0.1, 0.9, 6) | {"realisations": 9001}
+    one, three, shuffled = (
+        {name: to_csv(table) for name, table in experiment.run(load(keys), **means).tables.items()}
+        for means in ({"threads": 1}, {"threads": 3}, {"executor": Shuffled(1)})
+    )
+    assert one == three == shuffled
+
+
+def test_without_the_event_a_case_is_the_one_it_was():
+    case = load(keys_of([tracker("a")], 0.1, 0.9, 6, sought=False)).cases[0]
+    assert "rare" not in canonical(case.spec)
+    assert "ended" not in STUDY.prepare(case).layout.shapes
+
+
+@pytest.mark.parametrize(
+    ("detection", "events", "words"),
+    [
+        (1.0, ["ended_tracks"], "rare.events: ended_tracks needs plots that are missed: sensor.detection_probability"),
+        (0.9, ["ended_tracks"] * 2, "rare.events: must differ: ended_tracks is there twice"),
+        (0.9, ["ended_tracks", "false_tracks"], "rare: needs false plots"),
+    ],
+)
+def test_wrong_values_are_told_by_their_key(detection, events, words):
+    with pytest.raises(ConfigError) as error:
+        load(config([tracker("a")], 0.0, detection) | {"rare": {"events": events}})
+    assert any(words in line for line in error.value.lines), error.value.lines
+
+
+# ---- coverage -------------------------------------------------------------------------------------------------------
+@pytest.mark.slow
+@pytest.mark.parametrize("of", [(0.9, 0.0, 0.9999, 4), (0.98, 0.001, 0.9999, 3), (0.98, 0.0, 0.999, 4)])
+def test_intervals_of_unmarked_rows_cover(of):
+    """Of 200 seeds of 4000 realisations, about the mean of them all: 91 % to 99 % where half are unmarked at least."""
+    from radarsim.report import rare
+
+    plan, unmarked, covered = compared(*of), [], []
+    sums = [simulated(reseeded(plan, seed), 4000) for seed in range(200)]
+    ended = np.array([one["ended"].sum(axis=(1, 2)) for one in sums])
+    for f in range(2):
+        rate = ended[:, f, 0].mean() / 4000
+        for one, of_seed in zip(sums, ended, strict=True):
+            drawn, counted = rare.Drawn(4000, *one["ended_drawn"][f]), rare.Counted(*of_seed[f][:, None])
+            estimate = rare.rate(counted, drawn)
+            unmarked.append(rare.note(drawn, counted)[0] == "")
+            covered.append(float(estimate.lo[0]) <= rate <= float(estimate.hi[0]))
+    unmarked, covered = np.array(unmarked), np.array(covered)
+    if unmarked.mean() > 0.5:
+        assert 0.91 < covered[unmarked].mean() < 0.99
