@@ -24,8 +24,9 @@ COLUMNS = (
 )
 UNAIMED = 0.1  # share of Σw² that no shift leads to, from which on it is told
 FEW = f"under {FEW_EVENTS} effective events"
-# 20 such events behind the rate do not tell: of `discriminator_rare` at 10⁻⁶, 200 × 10 000 bursts, its interval covers
-# 81 %, and 5 are behind the interval. docs/rare.md has both conditions and what they were measured to leave.
+# 20 such events behind the rate do not tell: losses of lock of 10⁻⁶, shifted along the linear direction of each
+# hand-over, 200 × 10 000 bursts, had intervals that covered 81 %, and 5 events behind these. docs/rare.md has both
+# conditions and what they were measured to leave.
 HEAVY = f"interval of {FEW}: heavy weights"
 ERRORS = 4.0  # standard errors of the mean weight beyond which it is not one
 

@@ -124,7 +124,7 @@ class Room:
 
 
 def either_side(room: Room, f: int, unit: np.ndarray) -> Iterator[Loss]:
-    """The nearest losses of estimator f on both sides of a direction, if there are any within `FARTHEST`.
+    """The nearest losses of estimator f on both sides of a unit vector (6 + 4B,), those within `FARTHEST`.
 
     What is found on one side is where to begin on the other, and to end if it is nearly as near there.
     """
@@ -180,7 +180,7 @@ def rounded(vector: np.ndarray) -> np.ndarray:
 
 
 def crossing(room: Room, f: int, unit: np.ndarray, begin: float, farthest: float) -> float | None:
-    """How many σ along a unit vector estimator f first loses its lock, to STEP/64; None if not up to the farthest."""
+    """How many σ along a unit vector (6 + 4B,) estimator f first loses its lock, to STEP/64; None if not so far."""
     width = STEP
     while width >= STEP / WIDTH**2:
         at = begin + width * np.arange(1, WIDTH + 1)
