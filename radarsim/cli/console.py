@@ -528,7 +528,9 @@ def _print_stated(rows: Sequence[dict[str, Any]]) -> None:
         cells = []
         for own in page.grouped(rows):
             first, done = own[0], own[0]["class"] != "not run"
-            measured = "\n".join(map(_measured, own)) if done else f"radarsim run {first['config']}"
+            beside = "" if page.extension(own) else f" ({tr(page.NOT_COUNTED)})"
+            lines = [_measured(row) + (beside if page.extension([row]) else "") for row in own]
+            measured = "\n".join(lines) if done else f"radarsim run {first['config']}"
             said = tr(first["statement"]) + (f"\n«{first['original']}»" if first["original"] else "")
             verdict = page.verdict_of(own).replace("*", "")
             cells.append((first["claim"], said, tr(first["place"]), measured, verdict, first["config"]))
@@ -575,6 +577,8 @@ def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
             said.append(tr("off by {miss:.3g} margins", miss=missed))
         if row["verdict"] == "not judged here":
             said.append(reasons.said(row["why"]))
+        if page.extension([row]) and not page.extension(parts):
+            said.append(tr(page.NOT_COUNTED))
         say(f"       {tr(row['verdict']):<20} {'; '.join(said)}")
 
 
