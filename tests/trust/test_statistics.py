@@ -123,7 +123,7 @@ def test_rates_cover_exactly(n):
 
 
 def test_rates_that_only_a_lucky_sample_leaves_unmarked():
-    """What is marked by the events that came is a choice: of rates of 12 to 19 events to come the unmarked are too high.
+    """What is marked by the events that came is a choice: with 12 to 19 to come the unmarked shares are too high.
 
     So they cover 0 to 93 %, while all samples cover 95: from 20 events to come on either holds. At no rate is more than
     6 % of the samples unmarked and wrong, at those few events 4 %. A share seen of `pulses_snr` is foretold by this.

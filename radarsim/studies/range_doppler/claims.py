@@ -1,4 +1,4 @@
-"""P1.1 … P1.25: what Gorshkov & Zavizhenets (2017) say, read from their words alone, before anything was measured.
+"""P1.1 … P1.35: what Gorshkov & Zavizhenets (2017) say, read from their words alone, before anything was measured.
 
 Places are the sections of the article (Doklady BGUIR 2017, no. 4, pp. 19–26): "figures" is the text around figures
 1 to 3, "conclusion" the last section. "At the end" is the last of the paper's fifteen points, 140 s.
@@ -640,5 +640,18 @@ CLAIMS = (
         "станциях данное явление не возникает …",
         reading="of the paper's own example, 300 m/s at 1 kHz; ambiguous: over half of the repetition rate, on either "
         "side of zero",
+    ),
+    _claim(
+        35,
+        "introduction",
+        "A radial velocity beside the range raises the quality of filtering of both (quoted from the authors' papers)",
+        *(
+            gain_part(n, component, "least", "least", above(0), first=first)
+            for n in RADARS
+            for component, first in (("r", 2), ("Vr", 3))
+        ),
+        original="Использование разовых оценок радиальной скорости вместе с оценками дальности повышает качество "
+        "фильтрации этих параметров [1–3].",
+        reading="of each of the five radars, at every scan at which both filters have an estimate and differ",
     ),
 )
