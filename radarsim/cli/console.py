@@ -257,6 +257,13 @@ def print_result(result: "Result") -> None:
             field("claims", tr("{count} {kind}: {names}", count=len(names), kind=Term(verdict), names=", ".join(names)))
         for reason, names in result.unjudged().items():
             field("", tr("not judged: {names}: {reason}", names=", ".join(names), reason=reasons.said(reason)))
+        if alone := result.as_shipped():
+            every = tr(
+                "as shipped: {names}; `radarsim readings {paper}` judges under all that the paper allows",
+                names=_in_a_row(alone),
+                paper=alone[0].partition(".")[0],
+            )
+            field("", every)
         field("", tr("`radarsim claims {stem}` says what each of them is", stem=result.experiment.stem))
     drawn = [Path(name) for name in written.files if name.startswith("figures/") and not name.endswith(".md")]
     others = sum(name.endswith(".csv") for name in written.files) - 1

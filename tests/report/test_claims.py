@@ -244,6 +244,11 @@ def test_what_does_not_hang_on_the_end_is_judged_of_a_shorter_run():
         assert len(own), lost
         assert own["why"].str.contains("ends at 70 s, the paper's run at 140 s").all()
     assert set(result.unjudged()) >= {"rls3 ends at 70 s, the paper's run at 140 s"}
+    assert {"P1.1", "P1.3"} <= set(result.as_shipped())  # what the paper leaves open was not looked at
+    assert not {"P1.4", "P1.16", "P1.34"} & set(result.as_shipped())  # not judged; algebra
+    result._tables["claims"] = table.assign(of=table["of"].mask(table["claim"] == "P1.3", 3))
+    assert "P1.3" not in result.as_shipped()
+    assert "P1.1" in result.as_shipped()
 
 
 def test_a_changed_radar_says_what_differs():
