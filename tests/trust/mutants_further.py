@@ -399,6 +399,11 @@ SAID = (
             "ends = short if not short else",
             "app/test_readings.py::test_a_run_that_is_over_before_the_time_asked_about_is_not_judged",
         ),
+        (
+            'reading["curves_of"] == EACH or part.cases == (2,)',
+            'reading["curves_of"] == EACH or part.cases == (1,)',
+            "app/test_readings.py::test_sentences_on_figures_2a_and_3a_speak_of_their_radar_or_of_each",
+        ),
     ),
     *mutants(
         "radarsim/studies/discriminator/versions.py",
