@@ -185,6 +185,20 @@ class Result:
                 names.append(row["claim"])
         return found
 
+    def as_shipped(self) -> list[str]:
+        """The claims judged under the shipped reading alone although their paper leaves open what they hang on."""
+        from radarsim.report.claims import NOT_JUDGED, page, rule
+
+        if (readings := study(self.experiment.study).readings()) is None:
+            return []
+        found = []
+        for parts in page.grouped(self._tables["claims"].to_dict("records")):
+            first = parts[0]
+            over = page.number(first["of"]) is not None or first["class"] in (NOT_JUDGED, rule.UNJUDGEABLE)
+            if not over and not page.extension(parts) and any(one.bears_on(first["claim"]) for one in readings.choices):
+                found.append(first["claim"])
+        return found
+
     def _join_readings(self, out: Path) -> None:
         """The classes of claims over all readings, where `radarsim readings` has stored them under out."""
         from radarsim.app.stored_readings import stored_readings

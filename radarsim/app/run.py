@@ -342,6 +342,10 @@ def papers() -> "list[PaperClaims]":
     return [of for of in registry.parts(lambda study: study.claims()).values() if of is not None]
 
 
+# P1.3 and P4, known or not; a small letter and names joined by commas are taken for what they are meant to be.
+LIKE_A_CLAIM = re.compile(r"P\d+(\.\w+)?|[Pp]\d+(\.[Ee]?\d+\w?)?(,.+)?")
+
+
 def _unknown_claims(names: Sequence[str], known: Collection[str]) -> list[str]:
     """A line for each name that is written like a claim or a paper, and is none."""
     found, every = [], _keys(known)
@@ -374,7 +378,7 @@ def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, 
 
     every = papers()
     of = {claim.id: claim.config for paper in every for claim in paper.claims}
-    wanted = [name for name in names if re.fullmatch(r"P\d+(\.\w+)?", name) and not Path(name).is_file()]
+    wanted = [name for name in names if LIKE_A_CLAIM.fullmatch(name) and not Path(name).is_file()]
     if faults := _unknown_claims(wanted, of):
         raise ConfigError(*faults)
     asked = load_all([name for name in names if name not in wanted])

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.cli.console import counted_cases, field, print_warnings, say, show
+from radarsim.cli.verdicts import in_a_row
 from radarsim.language import Term, few, listed, numeral, plural, term, tr
 from radarsim.report.text import clock, known, significant_digits
 from radarsim.report.text import unit as unit_of
@@ -42,6 +43,13 @@ def print_result(result: "Result") -> None:
             field("claims", tr("{count} {kind}: {names}", count=len(names), kind=Term(verdict), names=", ".join(names)))
         for reason, names in result.unjudged().items():
             field("", tr("not judged: {names}: {reason}", names=", ".join(names), reason=reasons.said(reason)))
+        if alone := result.as_shipped():
+            every = tr(
+                "as shipped: {names}; `radarsim readings {paper}` judges under all that the paper allows",
+                names=in_a_row(alone),
+                paper=alone[0].partition(".")[0],
+            )
+            field("", every)
         field("", tr("`radarsim claims {stem}` says what each of them is", stem=result.experiment.stem))
     drawn = [Path(name) for name in written.files if name.startswith("figures/") and not name.endswith(".md")]
     others = sum(name.endswith(".csv") for name in written.files) - 1

@@ -34,14 +34,14 @@ def print_claims(rows: Sequence[dict[str, Any]]) -> None:
     if stated:
         _print_stated(stated)
     for (stem, why), names in foreign.items():
-        told = {"stem": stem, "names": _in_a_row(names), "reason": reasons.said(why)}
+        told = {"stem": stem, "names": in_a_row(names), "reason": reasons.said(why)}
         say(tr("{stem}: not judged: {names}: {reason}", **told))
     say(page.counted(stated) or tr("no claims are judged by this"))
     if stated and all(row["class"] == NOT_RUN for row in stated):
         say(tr(NOTHING_RUN))
 
 
-def _in_a_row(claims: Sequence[str]) -> str:
+def in_a_row(claims: Sequence[str]) -> str:
     """Names of claims, those with numbers in a row by the first and last: `P1.1–P1.34`."""
     runs: list[list[str]] = []
     for name in claims:
@@ -59,7 +59,9 @@ def _print_stated(rows: Sequence[dict[str, Any]]) -> None:
         cells = []
         for own in page.grouped(rows):
             first, done = own[0], own[0]["class"] != NOT_RUN
-            measured = "\n".join(map(_measured, own)) if done else f"radarsim run {first['config']}"
+            beside = "" if page.extension(own) else f" ({tr(page.NOT_COUNTED)})"
+            lines = [_measured(row) + (beside if page.extension([row]) else "") for row in own]
+            measured = "\n".join(lines) if done else f"radarsim run {first['config']}"
             said = tr(first["statement"]) + (f"\n«{first['original']}»" if first["original"] else "")
             verdict = page.verdict_of(own).replace("*", "")
             cells.append((first["claim"], said, tr(first["place"]), measured, verdict, first["config"]))
@@ -106,6 +108,8 @@ def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
             said.append(tr("off by {miss:.3g} margins", miss=missed))
         if row["verdict"] == NOT_JUDGED:
             said.append(reasons.said(row["why"]))
+        if page.extension([row]) and not page.extension(parts):
+            said.append(tr(page.NOT_COUNTED))
         say(f"       {tr(row['verdict']):<20} {'; '.join(said)}")
 
 

@@ -106,6 +106,21 @@ def test_what_falls_may_rise_by_the_tolerance_of_the_reading(first):
     assert "settled_within" in next(one for one in done.read[0].over if one.claim.id == "P1.27").outcome.depends_on
 
 
+def test_sentences_on_figures_2a_and_3a_speak_of_their_radar_or_of_each(first):
+    """RLS 4 and 5 keep a third of their gain in acceleration; of RLS 2 alone errors fall to 5 %."""
+    out, done = first
+    over = {one.claim.id: one for one in done.read[0].over}
+    steps = over["P1.28"].outcome
+    assert (steps.depends_on, steps.holds_in, steps.readings) == (("first_steps_of",), 3, 6)
+    each = [row for row in table(out) if (row["claim"], row["reading"]) == ("P1.28", "first_steps_of: each radar")]
+    assert [float(row["exact"]) for row in each[7::2]] == pytest.approx([33, 30], abs=1.5)
+    assert [row["verdict"] for row in each[1::2]].count("refuted") == 2
+    rows = {row["reading"]: row for row in table(out) if row["claim"] == "P1.27"}
+    assert rows["as shipped"]["outcome"] == "refuted"
+    assert rows["curves_of: RLS 2"]["outcome"] == "confirmed"
+    assert rows["settled_within: 2 %; curves_of: RLS 2"]["outcome"] == "refuted"
+
+
 def test_the_readings_agree_with_the_stored_run_of_the_shipped_config(first, tmp_path):
     """Exact values as shipped against the exact columns of a run: the two recursions are apart."""
     import radarsim

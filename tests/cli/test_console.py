@@ -1,6 +1,7 @@
 """What the terminal shows: numbers as sentences have them, and where claims without results are to be had."""
 
 import io
+import math
 import re
 
 import numpy as np
@@ -41,6 +42,31 @@ def test_claims_without_results_say_where_to_find_them(tmp_path):
     assert re.fullmatch(r"\d+ not run; \d+ extensions not counted", counted.strip())
     assert "make reproduce-figures" in pointer
     assert "docs/claims.md" in pointer
+
+
+def parts(*extensions):
+    """Parts of a refuted claim, of which these are not counted."""
+    common = {"claim": "P9.1", "paper": "P", "place": "there", "overall": "confirmed", "class": "confirmed"}
+    common |= {"statement": "It is so", "original": "", "config": "c", "what": "size", "case": "", "unit": "m"}
+    common |= {"measured": 9.0, "lo": 9.0, "hi": 9.0, "exact": 9.0, "expected": "≤ 5", "miss": 8.0}
+    common |= dict.fromkeys(("needed", "of", "holds", "worst_miss"), math.nan)
+    return [{**common, "verdict": "refuted", "extension": one} for one in extensions]
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_a_part_that_is_not_counted_says_so(terminal, monkeypatch, capsys):
+    """Beside the paper's own parts, once; of a claim that is an extension as a whole its first line says it."""
+    shown = []
+    monkeypatch.setattr("sys.stdout.isatty", lambda: terminal)
+    monkeypatch.setattr(console, "show", lambda head, columns, cells, spare: shown.extend(map(str, cells)))
+    console._print_stated([*parts(False, True)])
+    told = shown[0] if terminal else capsys.readouterr().out
+    lines = told.split("size")[1:]
+    assert ["extension, not counted" in line for line in lines] == [False, True]
+    shown.clear()
+    console._print_stated([*parts(True, True)])
+    told = shown[0] if terminal else capsys.readouterr().out
+    assert told.count("extension, not counted") == 1
 
 
 @pytest.mark.parametrize(

@@ -244,6 +244,8 @@ def test_config_outside_a_checkout_runs_by_path(tmp_path):
     [
         ("P4.99", "claims: P4.99 is no claim of P4; its claims: {all}"),
         ("P99", "claims: P99 is no claim and no paper; papers: P1, P2, P3, P4"),
+        ("p4.5", "claims: p4.5 is no claim and no paper; papers: P1, P2, P3, P4"),
+        ("P4.5,P4.6", "claims: P4.5,P4.6 is no claim of P4; its claims: {all}"),
     ],
 )
 def test_what_is_written_like_a_claim_and_is_none_is_told_which_there_are(name, said):
@@ -252,7 +254,7 @@ def test_what_is_written_like_a_claim_and_is_none_is_told_which_there_are(name, 
 
     with pytest.raises(ConfigError) as caught:
         claims([name], "nowhere")
-    every = [row["claim"] for row in claims([name.partition(".")[0]], "nowhere")] if "." in name else []
+    every = [row["claim"] for row in claims([name.partition(".")[0]], "nowhere")] if "{all}" in said else []
     assert list(caught.value.lines) == [said.format(all=", ".join(every))]
 
 
@@ -277,7 +279,7 @@ def test_claims_are_shown_by_name_by_paper_and_beside_those_of_a_config(tmp_path
 
 def test_claims_of_a_config_not_yet_run_are_listed_as_such(tmp_path):
     result = radarsim("claims", "range_doppler", "--out", tmp_path)
-    assert "34 not run" in result.stdout
+    assert "35 not run" in result.stdout
     radarsim("run", "rls2", "-n", 3000, "--no-figures", "--out", tmp_path)
     assert "P1.18" in radarsim("claims", "rls2", "--out", tmp_path).stdout
 

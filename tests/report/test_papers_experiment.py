@@ -167,7 +167,7 @@ def test_a_file_of_the_users_is_no_measure_of_the_paper(tmp_path, monkeypatch):
 
 
 HELD_TOO = {stem: ids for of in papers() for stem, ids in of.held_too.items()}
-QUICK = ("rls1", "rls2", "rls3", "discriminator_as_printed", "sonar_fluctuating")
+QUICK = ("rls1", "rls2", "rls3", "manoeuvre_variance", "discriminator_as_printed", "sonar_fluctuating")
 
 
 @pytest.mark.parametrize(

@@ -342,9 +342,14 @@ SAID = (
             f"{STAGES}::test_a_gain_may_be_narrower_than_what_its_filters_lack",
         ),
         (
-            "alike = np.array([own == unit for own in units])",
-            "alike = np.array([own != unit for own in units])",
+            "telling = np.isin(units, [unit, SHOWN_BY.get(unit, unit)])",
+            "telling = ~np.isin(units, [unit, SHOWN_BY.get(unit, unit)])",
             f"{STAGES}::test_a_gain_is_marked_by_the_axis_that_shows_rare_errors_most",
+        ),
+        (
+            'SHOWN_BY = {"m/s": "m/s2"}',
+            'SHOWN_BY = {"m/s2": "m/s"}',
+            f"{STAGES}::test_a_gain_in_speed_is_marked_by_the_acceleration_of_its_stage",
         ),
     ),
     *mutants(
@@ -393,6 +398,11 @@ SAID = (
             "ends = short if np.isfinite(asked) and end < asked - 1e-6 else",
             "ends = short if not short else",
             "app/test_readings.py::test_a_run_that_is_over_before_the_time_asked_about_is_not_judged",
+        ),
+        (
+            'reading["curves_of"] == EACH or part.cases == (2,)',
+            'reading["curves_of"] == EACH or part.cases == (1,)',
+            "app/test_readings.py::test_sentences_on_figures_2a_and_3a_speak_of_their_radar_or_of_each",
         ),
     ),
     *mutants(

@@ -37,6 +37,7 @@ words were read stands in italics. Extensions are ours and are not counted.
 """
 MARKS = {CONFIRMED: "**confirmed**", REFUTED: "**refuted**"}
 ORDER = (*CLASSES, NOT_JUDGED, NOT_RUN)
+NOT_COUNTED = term("extension, not counted")  # a claim, or a part of one, that is ours
 SHOWN = 3  # parts of a claim in its paper's first table
 WORDS = {  # of each class, for the headline
     CONFIRMED: "true as stated",
@@ -131,7 +132,7 @@ def verdict_of(parts: Sequence[Mapping]) -> str:
     if first["class"] in (UNJUDGEABLE, NOT_JUDGED) and first["why"]:
         notes.append(reasons.said(first["why"]))
     if extension(parts):
-        notes.append(tr("extension, not counted"))
+        notes.append(tr(NOT_COUNTED))
     return f"{text} ({'; '.join(notes)})" if notes else text
 
 

@@ -7,7 +7,7 @@ scan to scan … filters of order zero as well as one and two … combined by th
 from radarsim.report.claims import Claim, Part, above, at_most, below, less
 from radarsim.studies.ambiguous_doppler import measures
 
-CONCLUSION = "conclusion, last sentences"
+CONCLUSION = "last sentences"
 WISH = (
     "для фильтрации радиальной дальности с использованием частоты Доплера следует использовать многогипотезные "
     "фильтры, с межобзорной памятью гипотез, для различных моделей движения с учетом и без учета F"

@@ -1,4 +1,4 @@
-"""P4.1 … P4.17: what Uss, Baryshev & Djavad (2010) say, read from their words alone.
+"""P4.1 … P4.19: what Uss, Baryshev & Djavad (2010) say, read from their words alone.
 
 Places are the article's sections (Aviacionno-kosmicheskaya tehnika i tehnologiya 2010, no. 6): 3 holds the method, 4
 the experiment. Its numbers are judged in both readings of its noise and threshold, see discriminator_measures.
@@ -15,6 +15,7 @@ from radarsim.report.claims import (
     Range,
     about,
     above,
+    at_least,
     at_most,
     below,
     certain,
@@ -400,9 +401,11 @@ CLAIMS = (
         ),
         original="… радиальная скорость меняется соответственно от 0 до 350 м/c, далее от 350 м/c до 450 м/c и от 450 "
         "м/c до 475 м/c. … Пересчитывая мгновенную радиальную скорость в доплеровскую частоту и аппроксимируя ее … "
-        "полиномом …, получим, что f_0 = 10·10³ Гц, f_1 ≈ 180·10³ Гц², f_2 ≈ −750·10³ Гц³, f_3 ≈ 1000·10³ Гц⁴.",
+        "полиномом второго порядка, получим, что f_0 = 10·10³ Гц, f_1 ≈ 180·10³ Гц², f_2 ≈ −750·10³ Гц³, "
+        "f_3 ≈ 1000·10³ Гц⁴.",
         reading="2v/λ at the ends of the stated intervals; approximate: 10 %, and 1 kHz where the speed is nil. If the "
-        "10 kHz are the offset to which the receiver moves the signal, it fails at the other three by 7 to 9 kHz",
+        "10 kHz are the offset to which the receiver moves the signal, it fails at the other three by 7 to 9 kHz. A "
+        "polynomial of the second order has no f₃ at all; the printed one is taken as it stands",
         internal=True,
     ),
     _claim(
@@ -446,5 +449,48 @@ CLAIMS = (
         original="На первом этапе оценивается амплитуда сигнала по выражению (7): Â = 1,17.",
         reading="one burst: it contradicts the parameters if fewer than one in twenty is as far from A = 1. (7) as "
         "printed gives the square; of the samples within pulses",
+    ),
+    _claim(
+        18,
+        "section 3, after (9)",
+        "From its maximum to the mean level of its side lobes the log-likelihood falls by about 2μ",
+        Part(
+            (PRINTED,),
+            "fall of ln L over 2μ, of the burst's own samples",
+            "",
+            lambda seen: seen.span(PRINTED),
+            about("1"),
+        ),
+        original="Размах функции ln L(u(T)/θ) от ее максимального значения до среднего уровня боковых лепестков "
+        "приближенно равен 2μ [6].",
+        reading="of the signal without noise, which adds 5/2 to 2μ = 1667 on the mean; quoted from a book",
+    ),
+    _claim(
+        19,
+        "conclusions",
+        "The sequence works from a poor forecast, and so keeps a track that a narrow discriminator loses",
+        *(
+            replace(part, statement="keeps")
+            for part in _both(
+                "share of bursts locked by the sequence less that by the whole burst alone",
+                "",
+                lambda seen, key: difference(seen.lock(key, "sequence"), seen.lock(key, "narrow")),
+                above(0, 0.01),
+            )
+        ),
+        *(
+            replace(part, statement="works")
+            for part in _both(
+                "share of bursts locked by the sequence over what its design allows",
+                "",
+                lambda seen, key: seen.robust(key),
+                at_least(1, 0.01),
+            )
+        ),
+        original="Его основным достоинством является способность функционировать при низкой точности вектора "
+        "начального приближения (вектора прогноза). Это позволяет не допустить срыв сопровождения при выполнении "
+        "сопровождаемым объектом маневра, когда точность прогноза резко падает.",
+        reading="of the experiment's forecast, a hundred to two thousand times worse than the potential accuracy; the "
+        "design allows each hand-over to fail once in a hundred, of K windows 1 − 0.99^K",
     ),
 )

@@ -29,6 +29,7 @@ WORDS = {COMPUTED: "σ² = 2.25, c = 1", PRINTED: "σ² = 9, c = 0.5"}
 DOPPLER = (10e3, 180e3, -750e3, 1000e3)
 COMPONENTS = ("phi0", "f0", "f1", "f2", "f3")
 Key = str | tuple[str, float]  # a reading, or a swept key and its value
+PER_HANDOVER = 0.99  # P_Δ
 ESTIMATE = 1.17  # the paper's own estimate of the amplitude, which it puts into (17)
 
 
@@ -123,6 +124,24 @@ class Evidence(claims.Evidence):
         spread = 2 * math.sqrt((2 * noise**2 + 2 * noise * square) / samples)
         return math.erfc(abs(value - square) / spread / math.sqrt(2))
 
+    def span(self, key: Key) -> Estimate:
+        """How far ln L of the signal falls from its maximum to the mean level of its side lobes, over 2μ.
+
+        Without noise it falls by Σ(s − s')²/2σ²; a side lobe's s' is as strong, and of any phase: its mean square is
+        A²/2 a sample and its mean product with s nil. Σs² is that of the true phase.
+        """
+        burst = study.burst_of(self.case(key).spec)
+        samples = burst.pulses * burst.samples_per_pulse
+        level = burst.amplitude**2 / burst.noise_variance
+        of_sines = exact.fisher_sums(burst, 1, [burst.pulses], np.array([0.0, *DOPPLER]))[0][0, 0]
+        fall = (level * samples - of_sines + level * samples / 2) / 2
+        return certain(fall / (2 * exact.energy_ratio(burst, burst.duration_s)))
+
+    def robust(self, key: Key) -> Estimate:
+        """Lock of the sequence over what its design allows: 0.99 of each hand-over, the first window's too."""
+        designed = PER_HANDOVER ** len(self.windows(key))
+        return Estimate(*(part / designed for part in self.lock(key, "sequence")))
+
     def efficient(self, key: Key) -> float:
         """What an efficient estimator would score in `always`, over the windows of the sequence."""
         result, i = self.case(key), self.estimator(key, "sequence")
@@ -203,7 +222,7 @@ def kind_of(estimator: Any, threshold: float) -> str:
     if e.schedule != "designed":
         whole = len(e.schedule) == 1 and np.isclose(e.schedule[0], 0.3)
         return {"truth": "truth", "prior": "narrow"}[e.start] if whole else "other"
-    if e.main_lobe_threshold != threshold or e.lock_probability != 0.99 or e.start != "prior":
+    if e.main_lobe_threshold != threshold or e.lock_probability != PER_HANDOVER or e.start != "prior":
         return "other"
     if e.first_windows == 1:
         return "wide"

@@ -31,7 +31,7 @@ ITERATIONS = "12"  # the number of the part that counts windows
 LEAST_RATIO = 5.0  # μ_min
 EXACT = ("P4.1", "P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13")
 WINDOWS = ("P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13")
-RUN = ("P4.4", "P4.5", "P4.6", "P4.7", "P4.9", "P4.10")
+RUN = ("P4.4", "P4.5", "P4.6", "P4.7", "P4.9", "P4.10", "P4.19")
 NO_ROOT = "(15) has no root: with the phase in it, its left side is over c at every length"
 
 CHOICES = (
@@ -109,7 +109,7 @@ CHOICES = (
             Alternative("as printed", UNSTATED, "at T_k in the first term, as printed in (16)"),
             Alternative("before", AGAINST, "at T_k in both"),
         ),
-        (*WINDOWS, "P4.4", "P4.5"),
+        (*WINDOWS, "P4.4", "P4.5", "P4.19"),
     ),
     Choice(
         "pulses",

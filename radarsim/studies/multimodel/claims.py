@@ -334,10 +334,16 @@ CLAIMS = (
         *_said(
             "strong", gain_part(BANKS, MMA2_122, WEAK, "manoeuvre", "y", above(0), "weak and strong over weak alone")
         ),
+        *_said(
+            "transients", gain_part(BANKS, MMA2_122, WEAK, "after", "y", above(0), "weak and strong over weak alone")
+        ),
         original="Исследование многомодельных алгоритмов показало, что хорошо себя зарекомендовали те из них, "
         "которые используют как слабо возмущенные модели движения и как минимум одну сильно возмущенную "
-        "модель.",
-        reading="better than strong models alone where nothing manoeuvres, than weak ones alone where something does",
+        "модель. В этом случае удается достичь высокой точности … в условиях, когда одна из слабо возмущенных моделей "
+        "соответствует текущему движению объекта, и избежать больших динамических ошибок и длительных переходных "
+        "процессов при маневрировании или смене типа движения.",
+        reading="better than strong models alone where nothing manoeuvres, than weak ones alone where something does "
+        "and over the stage after it",
         config="multimodel_banks",
     ),
     _claim(

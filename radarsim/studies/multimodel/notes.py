@@ -22,6 +22,11 @@ make m₂. A model is best for all three axes at once, so what its mistakes do t
 them most: of components with one unit the least r counts. For σ that would mark rows that cover: its interval has the
 variance of the bulk in it, which a gain's has not where both filters share their noise.
 
+Nor has a speed more rare errors than the acceleration along the same stage: they are the same mistakes, of which it is
+the sum over time. Acceleration shows them with the least bulk beside them, as noise of plots enters it last. So a gain
+in speed has the least r of both. Not one in place: that is measured at every scan, which takes a mistake out of it
+before it adds up; there the bulk decides, and the count in acceleration would mark what covers.
+
 What came out stands in docs/trust.md.
 """
 
@@ -39,6 +44,7 @@ if TYPE_CHECKING:
 
 RARE = f"under {statistics.FEW_EVENTS} rare errors: heavy tails"
 OF_GAIN = "gain: "  # before what is to be said of the gain alone
+SHOWN_BY = {"m/s": "m/s2"}  # unit of a component, and of the one that shows its rare errors as well
 
 
 def of_stages(result: "CaseResult[FlightAxes]") -> np.ndarray:
@@ -59,11 +65,11 @@ def of_stages(result: "CaseResult[FlightAxes]") -> np.ndarray:
 
 
 def _least_of_axes(events: np.ndarray, units: Sequence[str]) -> np.ndarray:
-    """The least (F, S, C) over components of the same unit: place, velocity or acceleration along each axis."""
+    """The least (F, S, C) over all axes: of place, velocity or acceleration alone, of velocity of acceleration too."""
     least = np.full(events.shape, np.inf)
     for unit in set(units):
-        alike = np.array([own == unit for own in units])
-        least[..., alike] = np.fmin.reduce(events[..., alike], axis=-1, keepdims=True)
+        telling = np.isin(units, [unit, SHOWN_BY.get(unit, unit)])
+        least[..., np.isin(units, [unit])] = np.fmin.reduce(events[..., telling], axis=-1, keepdims=True)
     return least
 
 

@@ -1,4 +1,4 @@
-"""P1.1 … P1.25: what Gorshkov & Zavizhenets (2017) say, read from their words alone, before anything was measured.
+"""P1.1 … P1.35: what Gorshkov & Zavizhenets (2017) say, read from their words alone, before anything was measured.
 
 Places are the sections of the article (Doklady BGUIR 2017, no. 4, pp. 19–26): "figures" is the text around figures
 1 to 3, "conclusion" the last section. "At the end" is the last of the paper's fifteen points, 140 s.
@@ -55,6 +55,14 @@ def _falls(component: str, words: str, first_k: int) -> list[Part]:
         )
         for n in RADARS
         for observes, of in BOTH
+    ]
+
+
+def first_steps(radar: int) -> list[Part]:
+    """That velocity helps a radar's acceleration at the first steps, and at the end no more."""
+    return [
+        gain_part(radar, "ar", "first", "first", above(0)),
+        gain_part(radar, "ar", "last", "final", same(0, 10)),
     ]
 
 
@@ -514,9 +522,8 @@ CLAIMS = (
     _claim(
         28,
         "figures, before figure 3",
-        "RLS 2: velocity lowers the error of the acceleration at the first steps only",
-        gain_part(2, "ar", "first", "first", above(0)),
-        gain_part(2, "ar", "last", "final", same(0, 10)),
+        "Velocity lowers the error of the acceleration at the first steps only",
+        *first_steps(2),
         original="Использование оценок радиальной скорости уменьшает ошибки фильтрации лишь на первых шагах обзора.",
         reading="of figure 3a, which shows RLS 2; only: at the end no gain, to 10 %",
     ),
@@ -640,5 +647,18 @@ CLAIMS = (
         "станциях данное явление не возникает …",
         reading="of the paper's own example, 300 m/s at 1 kHz; ambiguous: over half of the repetition rate, on either "
         "side of zero",
+    ),
+    _claim(
+        35,
+        "introduction",
+        "A radial velocity beside the range raises the quality of filtering of both (quoted from the authors' papers)",
+        *(
+            gain_part(n, component, "least", "least", above(0), first=first)
+            for n in RADARS
+            for component, first in (("r", 2), ("Vr", 3))
+        ),
+        original="Использование разовых оценок радиальной скорости вместе с оценками дальности повышает качество "
+        "фильтрации этих параметров [1–3].",
+        reading="of each of the five radars, at every scan at which both filters have an estimate and differ",
     ),
 )

@@ -15,7 +15,7 @@ from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED
 from radarsim.report.claims.search import Search
 from radarsim.report.statistics import Estimate
 from radarsim.studies.range_doppler import measures, recursion
-from radarsim.studies.range_doppler.claims import CLAIMS
+from radarsim.studies.range_doppler.claims import CLAIMS, first_steps
 from radarsim.studies.range_doppler.measures import RADARS
 
 ALGEBRA = ("P1.16", "P1.31", "P1.34")  # of the table of radars alone
@@ -33,6 +33,8 @@ FAST = tuple(  # those that look at a radar of Δt = 5 s
 FALLS = ("P1.5", "P1.6")
 FALLING = ("P1.26", "P1.27")  # as far as a settled curve may rise again
 SETTLES = ("P1.14", "P1.15", *FALLING)
+FIRST_STEPS = "P1.28"
+EACH, SHOWN = "each radar", "RLS 2"
 SHIPPED = "0.001"  # D_M, (m/s³)²
 SWEPT = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # D_M of the config manoeuvre_variance
 FIFTEEN = 15  # points, as printed
@@ -123,6 +125,36 @@ CHOICES = (
         FIGURE_1A,
     ),
     Choice(
+        "curves_of",
+        "Of which radars it is said that errors fall to a steady value",
+        "Начиная со 2-го шага, все ошибки фильтрации убывают до установившегося значения … […] Ошибки фильтрации "
+        "радиального ускорения … получены по результатам моделирования РЛС 2 при D_M = 10⁻³ и приведены в виде "
+        "графиков на рис. 3, а. Все зависимости … убывают до предела, который определяется параметрами станции …",
+        "From the 2nd step on all errors of filtering fall to a steady value … […] The errors of the radial "
+        "acceleration … were found by simulation of RLS 2 and are shown in figure 3a. All curves … fall to a limit "
+        "that is determined by the parameters of the radar …",
+        (
+            Alternative(EACH, UNSTATED, "all errors, and parameters of the radar: each of the five"),
+            Alternative(SHOWN, UNSTATED, "the radar of figure 3a; that of figure 2a is lost with the scan"),
+        ),
+        FALLING,
+    ),
+    Choice(
+        "first_steps_of",
+        "Of which radars it is said that velocity helps the acceleration at the first steps only",
+        "Ошибки фильтрации радиального ускорения … получены по результатам моделирования РЛС 2 … и приведены … на "
+        "рис. 3, а. […] Использование оценок радиальной скорости уменьшает ошибки фильтрации лишь на первых шагах "
+        "обзора. Уменьшение периода повторения (РЛС 3, РЛС 5) привело к росту начального значения ошибок …",
+        "The errors of the radial acceleration … were found by simulation of RLS 2 … and are shown in figure 3a. […] "
+        "Estimates of the velocity lower the errors at the first steps only. A shorter period (RLS 3, RLS 5) has "
+        "raised the first errors …",
+        (
+            Alternative(SHOWN, UNSTATED, "the radar of figure 3a, of which the paragraph begins to speak"),
+            Alternative(EACH, UNSTATED, "each of the five: the next sentence speaks of others"),
+        ),
+        (FIRST_STEPS,),
+    ),
+    Choice(
         "manoeuvre_variance",
         "D_M of the gains, (m/s³)²",
         "… графически представлены на рис. 1, б для пяти типов РЛС (см. табл.) при D_M = 10⁻³.",
@@ -174,11 +206,14 @@ class Readings(PaperReadings):
         return True
 
     def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
-        """All; what falls to a steady value may rise by as much as the reading's tolerance."""
+        """Those of the radars that the reading means; what falls to a steady value may rise by its tolerance."""
+        if claim.id == FIRST_STEPS and reading["first_steps_of"] == EACH:
+            return [part for radar in RADARS for part in first_steps(radar)]
         if claim.id not in FALLING:
             return claim.parts
         wide = same(0, _tolerance(reading, 100))
-        return [replace(part, expected=wide) for part in claim.parts]
+        meant = [part for part in claim.parts if reading["curves_of"] == EACH or part.cases == (2,)]
+        return [replace(part, expected=wide) for part in meant]
 
     def evidence(self, claim: Claim, reading: Reading, seen: Seen | None, of: PaperClaims) -> "ExactEvidence":
         return _evidence(reading)

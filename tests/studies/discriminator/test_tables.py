@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from radarsim.app import run as experiment
+from radarsim.bursts.burst import phase_turns, sample_times, signal
 from radarsim.report.drawing import Line
 from radarsim.studies.discriminator import claims, measures, study, words
 from radarsim.studies.discriminator import tables as report
@@ -123,11 +124,33 @@ def test_answer_names_every_estimator(made):
 
 
 def test_all_claims_are_there_and_find_their_estimators(made):
-    assert [claim.id for claim in claims.CLAIMS] == [f"P4.{i}" for i in range(1, 18)]
+    assert [claim.id for claim in claims.CLAIMS] == [f"P4.{i}" for i in range(1, 20)]
     kinds = [measures.kind_of(e, 1.0) for e in made.cases[0].spec.estimators]
     assert kinds == ["sequence", "other", "other", "other", "narrow", "wide", "truth", "other", "cured"]
     dense = replace_estimator(made.cases[0].spec.estimators[0], main_lobe_threshold=0.5)
     assert measures.kind_of(dense, 1.0) == "other"
+
+
+def test_the_fall_to_side_lobes_is_that_of_the_likelihood_itself(made):
+    """Of the burst without noise: ln L at random phases and frequencies far from the true ones, sample by sample."""
+    burst, rng = study.burst_of(made.cases[0].spec), np.random.default_rng(1)
+    t = sample_times(burst, burst.pulses).ravel()
+    theta = np.array([0.0, *measures.DOPPLER])
+    true = signal(burst, phase_turns(theta, t))
+    falls = []
+    for _ in range(40):
+        aside = theta + np.array([rng.uniform(0, 2 * np.pi), rng.uniform(500, 4000), 0, 0, 0])
+        falls.append(np.sum((true - signal(burst, phase_turns(aside, t))) ** 2) / (2 * burst.noise_variance))
+    found = measures.Evidence(made.cases, made.tables, {}).span(measures.COMPUTED).value
+    mu = 0.3 / (4 * burst.noise_variance * 1e-6) * 0.1
+    assert found == pytest.approx(np.mean(falls) / (2 * mu), rel=0.005)
+
+
+def test_what_a_design_allows_to_fail_is_a_share_of_each_hand_over(made):
+    places = {"discriminator": {"estimators": range(len(made.cases[0].spec.estimators))}}
+    evidence = measures.Evidence(made.cases, made.tables, places)
+    lock = evidence.lock(measures.COMPUTED, "sequence")
+    assert tuple(evidence.robust(measures.COMPUTED)) == pytest.approx([part / 0.99**13 for part in lock])
 
 
 def replace_estimator(estimator, **change):

@@ -108,3 +108,18 @@ def test_a_gain_is_marked_by_the_axis_that_shows_rare_errors_most():
     said = notes.of_stages(parts_of(errors, components)[0])
     assert said[1, 0].tolist() == [notes.RARE, "", "", notes.OF_GAIN + notes.RARE, "", ""]
     assert said[0].tolist() == [[""] * 6] * 2
+
+
+@pytest.mark.parametrize(("wrong", "marked"), [("ax", ["vx", "vy", "ax", "ay"]), ("vx", ["vx", "vy"])])
+def test_a_gain_in_speed_is_marked_by_the_acceleration_of_its_stage(wrong, marked):
+    """The same mistakes, which a speed's own errors hide; a place's gain and another stage's are not touched."""
+    rng = np.random.default_rng(7)
+    components = [("x", "m"), ("vx", "m/s"), ("ax", "m/s2"), ("y", "m"), ("vy", "m/s"), ("ay", "m/s2")]
+    names = [name for name, _ in components]
+    errors = np.stack([errors_of(rng) for _ in components], axis=-1)
+    errors[1, :3, 4, names.index(wrong)] += 17
+    said = notes.of_stages(parts_of(errors, components)[0])
+    own = {wrong: notes.RARE}
+    assert said[1, 0].tolist() == [own.get(n, notes.OF_GAIN + notes.RARE if n in marked else "") for n in names]
+    assert said[1, 1].tolist() == [""] * 6
+    assert said[0].tolist() == [[""] * 6] * 2

@@ -1,4 +1,4 @@
-"""P3.1 … P3.7, P3.11 … P3.17: what Butyrskiy says of smoothing, from his words alone, before anything was measured.
+"""P3.1 … P3.7, P3.11 … P3.18: what Butyrskiy says of smoothing, from his words alone, before anything was measured.
 
 The paper has no experiment and prints few numbers, so most statements are formulas. A formula holds when what is
 measured is within 1 % of it in σ, within 2 % in a variance or covariance; an identity, to 10⁻⁹. Places are the
@@ -310,5 +310,25 @@ CLAIMS = (
         original="Наличие предсказуемой части позволяет прогнозировать и сглаживать ошибки измерения.",
         reading="it pays: the filter that estimates the errors is better than one that takes them as independent",
         config="sonar_correlated",
+    ),
+    _claim(
+        18,
+        "principle of optimal construction, before (1)",
+        "Smoothing the plots makes extrapolation more accurate",
+        *(
+            Part(
+                (TEXTBOOK,),
+                f"extrapolated σ of {n} plots smoothed over that of the last two as they are",
+                "",
+                measured.bought(n, 2, "extrapolated"),
+                less(),
+                exact=measured.exact_bought(n, 2, "extrapolated"),
+            )
+            for n in (3, 6, 20)
+        ),
+        original="Экстраполяция состоит в том, что по координатам ранее полученных отметок вычисляются координаты "
+        "будущей отметки. … Для более точного решения задачи экстраполяции … осуществляется сглаживание измеренных "
+        "координат отметок или параметров траекторий целей.",
+        reading="a scan ahead; without smoothing: the straight line through the last two plots",
     ),
 )

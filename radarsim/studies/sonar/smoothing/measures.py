@@ -125,25 +125,25 @@ def over_formula(what: str, n: int) -> Measure:
     return measure
 
 
-def bought(more: int, few: int) -> Measure:
-    """Smoothed σ of growing memory after more plots over that after few; of the same realisations, taken as
-    independent.
+def bought(more: int, few: int, what: str = "smoothed") -> Measure:
+    """Smoothed or extrapolated σ of growing memory after more plots over that after few; of the same realisations,
+    taken as independent.
     """
 
     def measure(seen: Evidence) -> Estimate:
         name = seen.case(TEXTBOOK).name
         found = []
         for n in (more, few):
-            row = seen.row("plots", case=name, component="r", what="smoothed", plots=n, degree=1)
+            row = seen.row("plots", case=name, component="r", what=what, plots=n, degree=1)
             found.append(Estimate(*(row[key] for key in ("ratio", "ratio_lo", "ratio_hi"))))
         return ratio(found[0], found[1])
 
     return measure
 
 
-def exact_bought(more: int, few: int) -> Number:
+def exact_bought(more: int, few: int, what: str = "smoothed") -> Number:
     """What `bought` measures."""
-    return lambda seen: _least_squares("smoothed", more) / _least_squares("smoothed", few)
+    return lambda seen: _least_squares(what, more) / _least_squares(what, few)
 
 
 def with_manoeuvres(seen: Evidence) -> Estimate:

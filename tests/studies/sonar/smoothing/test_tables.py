@@ -96,14 +96,14 @@ def test_claims_are_judged_where_their_cases_are(results):
     assert found["sonar_missed"] == {"P3.5"}
     rows = results["sonar_missed"].tables["claims"]
     assert set(rows["verdict"]) == {claims.CONFIRMED}
-    assert [claim.id for claim in STUDY.claims().claims] == [f"P3.{n}" for n in range(1, 18)]
+    assert [claim.id for claim in STUDY.claims().claims] == [f"P3.{n}" for n in range(1, 19)]
 
 
 def test_what_is_known_exactly_is_judged_exactly(results):
     """Least squares that knows no closed form against the exact σ of the filter, and in every part that has one."""
     result = results["sonar_smoothing"]
     rows = result.tables["claims"]
-    own = rows[rows["claim"].isin([f"P3.{n}" for n in (1, 2, 3, 4, 11, 14)])]
+    own = rows[rows["claim"].isin([f"P3.{n}" for n in (1, 2, 3, 4, 11, 14, 18)])]
     assert len(own) > 20
     assert own["exact"].notna().all()
     formulas = own[own["what"].str.endswith("over the formula")]
@@ -113,6 +113,8 @@ def test_what_is_known_exactly_is_judged_exactly(results):
     sigma = curves["growing", "r", 1]
     bought = own[own["what"].str.startswith("σ of the recursion after 20")]["exact"].item()
     assert bought == pytest.approx(curves["growing", "r", 20] / curves["growing", "r", 6], rel=1e-12)
+    ahead = own.loc[own["claim"] == "P3.18", "exact"].to_numpy()
+    assert ahead[:2] == pytest.approx(np.array([1.528, 0.931]) / 2.236, abs=3e-4)  # σ of the formula, of 3 and 6 plots
     for n in (2, 3, 5, 8, 20):
         row = own[own["what"] == f"smoothed σ after {n} plots, over the formula"]
         assert row["exact"].item() * exact.sigma_smoothed(n) == pytest.approx(
