@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from radarsim.cli import console, main, outcomes
+from radarsim.cli import console, main, outcomes, verdicts
 from radarsim.report import notes
 from radarsim.report.text import significant_digits
 
@@ -58,13 +58,13 @@ def test_a_part_that_is_not_counted_says_so(terminal, monkeypatch, capsys):
     """Beside the paper's own parts, once; of a claim that is an extension as a whole its first line says it."""
     shown = []
     monkeypatch.setattr("sys.stdout.isatty", lambda: terminal)
-    monkeypatch.setattr(console, "show", lambda head, columns, cells, spare: shown.extend(map(str, cells)))
-    console._print_stated([*parts(False, True)])
+    monkeypatch.setattr(verdicts, "show", lambda head, columns, cells, spare: shown.extend(map(str, cells)))
+    verdicts._print_stated([*parts(False, True)])
     told = shown[0] if terminal else capsys.readouterr().out
     lines = told.split("size")[1:]
     assert ["extension, not counted" in line for line in lines] == [False, True]
     shown.clear()
-    console._print_stated([*parts(True, True)])
+    verdicts._print_stated([*parts(True, True)])
     told = shown[0] if terminal else capsys.readouterr().out
     assert told.count("extension, not counted") == 1
 
