@@ -279,7 +279,7 @@ def test_claims_are_shown_by_name_by_paper_and_beside_those_of_a_config(tmp_path
 
 def test_claims_of_a_config_not_yet_run_are_listed_as_such(tmp_path):
     result = radarsim("claims", "range_doppler", "--out", tmp_path)
-    assert "35 not run" in result.stdout
+    assert "36 not run" in result.stdout
     radarsim("run", "rls2", "-n", 3000, "--no-figures", "--out", tmp_path)
     assert "P1.18" in radarsim("claims", "rls2", "--out", tmp_path).stdout
 

@@ -406,6 +406,14 @@ SAID = (
         ),
     ),
     *mutants(
+        "radarsim/studies/range_doppler/measures.py",
+        (
+            "1.5 * dt**2 * f",
+            "0.5 * dt**2 * f",
+            "report/test_claims.py::test_measures_what_it_says",
+        ),
+    ),
+    *mutants(
         "radarsim/studies/discriminator/versions.py",
         (
             "error = covariance[:-1] - covariance[1:]",

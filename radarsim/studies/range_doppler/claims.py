@@ -1,4 +1,4 @@
-"""P1.1 … P1.35: what Gorshkov & Zavizhenets (2017) say, read from their words alone, before anything was measured.
+"""P1.1 … P1.36: what Gorshkov & Zavizhenets (2017) say, read from their words alone, before anything was measured.
 
 Places are the sections of the article (Doklady BGUIR 2017, no. 4, pp. 19–26): "figures" is the text around figures
 1 to 3, "conclusion" the last section. "At the end" is the last of the paper's fifteen points, 140 s.
@@ -660,5 +660,23 @@ CLAIMS = (
         original="Использование разовых оценок радиальной скорости вместе с оценками дальности повышает качество "
         "фильтрации этих параметров [1–3].",
         reading="of each of the five radars, at every scan at which both filters have an estimate and differ",
+    ),
+    _claim(
+        36,
+        "equations (8) and (12)",
+        "The printed elements of the forecast's covariance and of the gains are those of the matrices (5) and (9)",
+        *(
+            Part(
+                (n,),
+                "largest relative difference of (8) and (12) from (5) and (9)",
+                "",
+                measured.closed_forms(n),
+                at_most(1e-9),
+            )
+            for n in RADARS
+        ),
+        original="… нормированная к D_fr корреляционная матрица ошибок экстраполяции, элементы которой вычисляются "
+        "следующим образом: … (8) / Вычисляя (9) с использованием выражений (6), (7), (8) и (11), получим: … (12)",
+        reading="algebra, on covariances drawn at random",
     ),
 )

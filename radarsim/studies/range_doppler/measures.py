@@ -400,3 +400,51 @@ def doppler(radar: int) -> Measure:
 def c_theta(radar: int) -> Measure:
     """C_θ (11) of a radar: algebra."""
     return lambda seen: certain(seen.case(radar).axes.C_theta)
+
+
+def closed_forms(radar: int) -> Measure:
+    """The largest relative difference of (8) and (12), as printed, from the matrices of (5) and (9).
+
+    Of covariances R̄_k drawn at random; an element of (8) counts against the root of the two variances it is between.
+    """
+
+    def measure(seen: Evidence) -> Estimate:
+        axes = seen.case(radar).axes
+        dt, theta = axes.scan_period_s, axes.C_theta
+        C_M = VARIANCE / RADARS[radar][0] ** 2
+        B = np.array([[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]])
+        g = np.array([dt**3 / 6, dt**2 / 2, dt])
+        H, noise = np.eye(2, 3), np.diag([1.0, 1 / (dt**2 * theta)])
+        rng, faults = np.random.default_rng(1), []
+        for root in rng.normal(size=(50, 3, 3)) / np.array([1, dt, dt**2])[:, None]:
+            forecast = B @ (root @ root.T) @ B.T + C_M * np.outer(g, g)
+            spreads = np.sqrt(np.diag(forecast))
+            faults.append(np.abs(_forecast(root @ root.T, dt, C_M) - forecast) / np.outer(spreads, spreads))
+            gains = forecast @ H.T @ np.linalg.inv(H @ forecast @ H.T + noise)
+            faults.append(np.abs(_gains(forecast, noise[1, 1]) / gains - 1))
+        return certain(max(float(fault.max()) for fault in faults))
+
+    return measure
+
+
+def _forecast(R: np.ndarray, dt: float, C_M: float) -> np.ndarray:
+    """R̄₀ (3, 3) by (8) from R̄ = [[b, c, e], [c, d, f], [e, f, g]]."""
+    (b, c, e), (_, d, f), (_, _, g) = R
+    b3 = b + 2 * dt * c + dt**2 * (e + d) + dt**3 * f + dt**4 * g / 4 + dt**6 * C_M / 36
+    c3 = c + dt * (e + d) + 1.5 * dt**2 * f + 0.5 * dt**3 * g + dt**5 * C_M / 12
+    e3 = e + dt * f + 0.5 * dt**2 * g + dt**4 * C_M / 6
+    d3 = d + 2 * dt * f + dt**2 * g + 0.25 * dt**4 * C_M
+    f3 = f + dt * g + 0.5 * dt**3 * C_M
+    return np.array([[b3, c3, e3], [c3, d3, f3], [e3, f3, g + dt**2 * C_M]])
+
+
+def _gains(R: np.ndarray, velocity_variance: float) -> np.ndarray:
+    """K (3, 2) by (12) from R̄₀ and D_fVr / D_fr."""
+    (b, c, e), (_, d, f), _ = R
+    b_sum, d_sum = b + 1, d + velocity_variance
+    rows = [
+        [b * d_sum - c**2, c * (b_sum - b)],
+        [c * (d_sum - d), d * b_sum - c**2],
+        [e * d_sum - f * c, f * b_sum - e * c],
+    ]
+    return np.array(rows) / (b_sum * d_sum - c**2)

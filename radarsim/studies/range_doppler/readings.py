@@ -18,7 +18,7 @@ from radarsim.studies.range_doppler import measures, recursion
 from radarsim.studies.range_doppler.claims import CLAIMS, first_steps
 from radarsim.studies.range_doppler.measures import RADARS
 
-ALGEBRA = ("P1.16", "P1.31", "P1.34")  # of the table of radars alone
+ALGEBRA = ("P1.16", "P1.31", "P1.34", "P1.36")  # of the table of radars, and of the equations
 NUMBERS = tuple(claim.id for claim in CLAIMS if claim.id not in ALGEBRA)
 FIGURE_1A = ("P1.14", "P1.18")  # sentences on figure 1a, which is drawn for several D_M
 LEVEL = ("P1.20",)  # what a curve converges to is no matter of where it is cut
