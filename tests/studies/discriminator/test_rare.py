@@ -365,13 +365,12 @@ def test_a_weighted_rate_is_wilsons_where_all_weights_are_one():
     assert np.array(none) == pytest.approx(np.array(statistics.rate(0.0, 100.0)))
 
 
-def test_without_the_key_a_case_is_the_one_it_was():
+def test_without_the_key_a_case_is_the_one_it_was(plan):
     case = case_of(RARELY, sought=None)
     assert "rare" not in canonical(case.spec)
     assert "rare" in canonical(case_of(RARELY).spec)
     assert "losses" not in study.prepare(case).layout.shapes
-    plain = plan_of(RARELY)
-    assert np.array_equal(plain.keys[:2], study.prepare(case).keys)
+    assert np.array_equal(plan.keys[:2], study.prepare(case).keys)
 
 
 @pytest.mark.parametrize(
