@@ -166,7 +166,7 @@ class TargetTrack(FalseTrack):
                 continue
             plots = np.empty((0, 2)) if not self.given.density else self.field(k) if not p else None
             if plots is None:
-                needed = 1 / (choice.n - k + begun) if k - begun < choice.n and not came else 0.0
+                needed = 0.0 if came else 1 / (choice.n + 3 - (k - begun))
                 drawn = needed if law == len(ratios) - 2 else eta / h if lured and eta and not seen else 0.0
                 plots, _ = self.drawn(k, place, S, drawn, True)
                 some = len(plots) > 0

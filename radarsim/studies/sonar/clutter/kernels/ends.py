@@ -58,7 +58,7 @@ from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK, copy_row
 from radarsim.studies.sonar.kernels.sums import Course
 
-SEDUCIBLE = 3.0  # scans after those of the rule that confirms in which a track may be seduced
+FURTHER = 3.0  # scans after those of the rule that confirms in which a track is young
 NODES = 48  # error under 10⁻¹³ for gates up to 60 σ² wide
 MOST_LOG = 600.0  # of a ratio: far beyond any whose reciprocal counts
 WIDEST = 8.5  # σ of a plot: further from its mean it is once in 10¹⁶
@@ -91,10 +91,7 @@ class Ends(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """What `Ends` holds of one tracker, its rule, and the scans of the rule that confirms.
-
-    seducible: the scans since its first plot in which a false plot may be drawn in place of the target's.
-    """
+    """What `Ends` holds of one tracker, its rule, and the scans since its first plot in which it is young."""
 
     shares: np.ndarray
     length: np.ndarray
@@ -103,8 +100,7 @@ class Laws(NamedTuple):
     direction: np.ndarray
     stretch: np.ndarray
     rule: Rule
-    scans: float
-    seducible: float
+    young_age: float
 
 
 class Plots(NamedTuple):
@@ -248,15 +244,7 @@ def stretched(laws, k, n, z, sigma, own, out):
 def laws_of(ends, trackers, f):
     """The laws of tracker f."""
     far = (ends.young[f], ends.direction[f], ends.stretch[f])
-    return Laws(
-        ends.shares[f],
-        ends.length[f],
-        ends.undetected[f],
-        *far,
-        rule_of(trackers, f),
-        trackers.n[f],
-        trackers.n[f] + SEDUCIBLE,
-    )
+    return Laws(ends.shares[f], ends.length[f], ends.undetected[f], *far, rule_of(trackers, f), trackers.n[f] + FURTHER)
 
 
 @inline
@@ -273,7 +261,7 @@ def look(field, laws, scan, tracks, status, predicted, own):
     cells, plots = field.cells, tracks.plots
     for i in range(scan.count):
         own[BOX, i] = 0.0
-        if status[STATE, i] != NONE and status[AGE, i] < laws.seducible and laws.shares[-1] > 0.0:
+        if status[STATE, i] != NONE and status[AGE, i] < laws.young_age and laws.shares[-1] > 0.0:
             place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
             reach = laws.rule.speed * (status[SINCE, i] + scan.dt)
             mean = box_of(cells, gate_of(place, S, plots[i] > 1.5, reach), laws.rule.gate).mean
@@ -283,7 +271,7 @@ def look(field, laws, scan, tracks, status, predicted, own):
 @inline
 def seduction(laws, age, missed, p):
     """η: the probability that the target's plot is missed and a false one is in the box, as it is drawn."""
-    return max(1.0 / (laws.seducible - age), missed * p)
+    return max(1.0 / (laws.young_age - age), missed * p)
 
 
 @inline
@@ -345,7 +333,7 @@ def drawn_false(laws, k, certain, missed, detected, status, own, i):
     it is not shifted. missed: the probability that the target is not detected; detected: whether it is.
     """
     age, law, last = status[AGE, i], int(own[LAW, i]), laws.shares.size - 1
-    needed = 1.0 / (laws.scans - age) if own[CAME, i] == 0.0 and age < laws.scans else 0.0
+    needed = 1.0 / (laws.young_age - age) if own[CAME, i] == 0.0 else 0.0
     eta = seduction(laws, age, missed, own[BOX, i]) if may_be_seduced(laws, k, certain, own, i) else 0.0
     drawn = needed if law == last - 1 else 0.0
     if law == last and eta > 0.0 and not detected:
