@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 FALSE = "false track"
 ENDED = "target's track ended"
+PART = 0.05  # of a rate: what is less does not decide whether its interval holds
 HOW = {DROPPED: "target's track dropped", LOST: "target's track lost"}
 
 
@@ -263,12 +264,28 @@ def _ended(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
     by_scan, last = np.cumsum(result.sums["ended"][f], axis=0), len(result.axes.k) - 1
     ended = by_scan.sum(axis=1)
     k = np.flatnonzero((ended[:, 2] > 0) | (np.arange(last + 1) == last))
-    drawn = rare.Drawn(result.count, *result.sums["ended_drawn"][f])
+    drawn, whole = rare.Drawn(result.count, *result.sums["ended_drawn"][f]), rare.Counted(*ended[k].T)
+    curve = rare.rows(leading(result, np.full(len(k), f), k), ENDED, k == last, whole, drawn)
+    curve["note"] = ends_note(drawn, whole, [rare.Counted(*by_scan[k, kind].T) for kind in HOW])
+    label = leading(result, np.array([f]), np.array([last]))
     made = [
-        rare.rows(leading(result, np.full(len(k), f), k), ENDED, k == last, rare.Counted(*ended[k].T), drawn),
+        curve,
         *(
-            rare.rows(leading(result, np.array([f]), np.array([last])), event, np.array([False]), counted, drawn)
-            for event, counted in ((how, rare.Counted(*by_scan[last, [kind]].T)) for kind, how in HOW.items())
+            rare.rows(label, how, np.array([False]), rare.Counted(*by_scan[last, [kind]].T), drawn)
+            for kind, how in HOW.items()
         ),
     ]
     return {name: np.concatenate([part[name] for part in made]) for name in made[0]}
+
+
+def ends_note(drawn: rare.Drawn, whole: rare.Counted, parts: list[rare.Counted]) -> np.ndarray:
+    """What is to be said (n,) of rates of ends that these parts make: of the whole, or of a part that matters.
+
+    Runs of misses have equal weights, and many; the few tracks that are lost on false plots have large ones, which the
+    whole does not show while they are few. A part matters where it may be over a share of PART, by its interval.
+    """
+    said, least = [whole], PART * rare.rate(whole, drawn).value
+    for part in parts:
+        matters = rare.rate(part, drawn).hi > least
+        said.append(rare.Counted(*(np.where(matters, own, of) for own, of in zip(part, whole, strict=True))))
+    return rare.note(drawn, *said)

@@ -142,7 +142,7 @@ class TargetTrack(FalseTrack):
             if state:
                 p = self.in_box(k - begun, place, S)
                 left = choice.n + 3 - (k - begun)
-                eta = max(1 / left, d * p) if p and k < J and not seduced else 0.0
+                eta = max(2 / (1 + left), d * p) if p and k < J and not seduced else 0.0
             h = eta + (1 - eta) * d * (1 - p) / (1 - d * p) if lured and eta else d
             if state == 2 and 1 <= law <= n:
                 h = laws.undetected(law, max(longest, misses), misses, k)
@@ -166,7 +166,7 @@ class TargetTrack(FalseTrack):
                 continue
             plots = np.empty((0, 2)) if not self.given.density else self.field(k) if not p else None
             if plots is None:
-                needed = 0.0 if came else 1 / (choice.n + 3 - (k - begun))
+                needed = 0.0 if came else 2 / (1 + left)
                 drawn = needed if law == len(ratios) - 2 else eta / h if lured and eta and not seen else 0.0
                 plots, _ = self.drawn(k, place, S, drawn, True)
                 some = len(plots) > 0

@@ -269,9 +269,18 @@ def look(field, laws, scan, tracks, status, predicted, own):
 
 
 @inline
+def sooner(laws, age):
+    """The probability of what has not come yet to come at this scan of a young track, as drawn: rather sooner.
+
+    With L scans left it is L times as likely now as at the last of them.
+    """
+    return 2.0 / (laws.young_age - age + 1.0)
+
+
+@inline
 def seduction(laws, age, missed, p):
     """η: the probability that the target's plot is missed and a false one is in the box, as it is drawn."""
-    return max(1.0 / (laws.young_age - age), missed * p)
+    return max(sooner(laws, age), missed * p)
 
 
 @inline
@@ -333,7 +342,7 @@ def drawn_false(laws, k, certain, missed, detected, status, own, i):
     it is not shifted. missed: the probability that the target is not detected; detected: whether it is.
     """
     age, law, last = status[AGE, i], int(own[LAW, i]), laws.shares.size - 1
-    needed = 1.0 / (laws.young_age - age) if own[CAME, i] == 0.0 else 0.0
+    needed = sooner(laws, age) if own[CAME, i] == 0.0 else 0.0
     eta = seduction(laws, age, missed, own[BOX, i]) if may_be_seduced(laws, k, certain, own, i) else 0.0
     drawn = needed if law == last - 1 else 0.0
     if law == last and eta > 0.0 and not detected:
