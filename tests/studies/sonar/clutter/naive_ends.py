@@ -112,7 +112,9 @@ class TargetTrack(FalseTrack):
     """One track of the target; see `FalseTrack`. truth (K, 2) are the target's places."""
 
     def end(self, laws, law, shares, truth, errors, u, scans):
-        """The scan of the end, whether it is lost, and the weight; (None, False, weight) if it does not end.
+        """The scan of the end, whether it is lost, whether a false plot came beside the target's, and the weight.
+
+        None for the scan if it does not end.
 
         law counts the law itself, runs, far plots, false plots; shares are of these. errors (K, 2) of the plots over
         σ, u (K,) the numbers that decide on detection.
@@ -198,8 +200,8 @@ class TargetTrack(FalseTrack):
                 confirmed = hits >= choice.m
                 state = 2 * (not off) if confirmed else int(hits + choice.n - (k - begun) - 1 >= choice.m)
             elif misses >= choice.misses or off or vague:
-                return k, bool(off and misses < choice.misses), 1 / (shares @ ratios)
-        return None, False, 1 / (shares @ ratios)
+                return k, bool(off and misses < choice.misses), bool(came and not seduced), 1 / (shares @ ratios)
+        return None, False, False, 1 / (shares @ ratios)
 
     def in_box(self, age, place, S):
         """p of a box about the gate where false plots are drawn in it, else zero."""

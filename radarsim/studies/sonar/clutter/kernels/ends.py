@@ -62,8 +62,8 @@ FURTHER = 3.0  # scans after those of the rule that confirms in which a track is
 NODES = 48  # error under 10⁻¹³ for gates up to 60 σ² wide
 MOST_LOG = 600.0  # of a ratio: far beyond any whose reciprocal counts
 WIDEST = 8.5  # σ of a plot: further from its mean it is once in 10¹⁶
-KINDS = 2
-DROPPED, LOST = range(KINDS)
+KINDS = 4  # the latter two where a false plot came about the young track, though none in place of the target's
+DROPPED, LOST, DROPPED_AFTER, LOST_AFTER = range(KINDS)
 # Which law a track is drawn from, 0 being the law itself; the longest run of misses since its confirmation; whether it
 # has ended; whether a false plot has come, and one in place of the target's; p of this scan, 0 where it is not drawn;
 # by how much errors in range and bearing are stretched; ratios of the laws.
@@ -129,7 +129,7 @@ class EndSums(NamedTuple):
     """Sums of a block by weights w, for F trackers over K scans.
 
     ended (F, K, KINDS, 4): Σw, Σw², number and Σw⁴ of realisations whose first confirmed track of the target ends at a
-    scan: is dropped, or lost; ended_drawn (F, 3): number of plain ones, Σw and Σw² of all.
+    scan, dropped or lost; ended_drawn (F, 3): number of plain ones, Σw and Σw² of all.
     """
 
     ended: np.ndarray
@@ -405,7 +405,9 @@ def add_ended(limits, n, tracks, status, course, laws, own, ended):
         if status[TRACKS_ENDED, i] > 0.0 and own[ENDED, i] == 0.0:
             own[ENDED, i] = 1.0
             lost = status[MISSES, i] < misses and off_target(tracks, course, beyond, i)
-            add_weight(weight_of(laws.shares, own, i), ended, LOST if lost else DROPPED)
+            beside = own[CAME, i] > 0.0 and own[SEDUCED, i] == 0.0
+            kind = (LOST if lost else DROPPED) + (DROPPED_AFTER if beside else 0)
+            add_weight(weight_of(laws.shares, own, i), ended, kind)
 
 
 # ---- a block --------------------------------------------------------------------------------------------------------
