@@ -32,7 +32,7 @@ LONGEST = 20  # misses in a row that are drawn for: a track that needs more is d
 
 
 def lengths(misses: int) -> np.ndarray:
-    """Lengths of the runs that are drawn for: from one miss to those that drop a track, even, six at most."""
+    """Lengths (R,) of the runs that are drawn for: from one miss to those that drop a track, even, six at most."""
     longest = min(misses, LONGEST)
     return np.unique(np.round(np.linspace(1, longest, min(longest, MOST_RUNS)))).astype(np.int64)
 
@@ -84,7 +84,7 @@ def directions(t: np.ndarray, least: int) -> np.ndarray:
 
 
 def stretch(gate: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """How much errors along directions of some radius are stretched for a gate, χ² of two components.
+    """How much (F, n) errors along directions of radius (F, n) are stretched for gates (F, 1), χ² of two components.
 
     s² is half the least square with which plots leave the gate, the best for the tail of a Gaussian of two components.
     """
@@ -92,7 +92,7 @@ def stretch(gate: np.ndarray, radius: np.ndarray) -> np.ndarray:
 
 
 def family_shares(plain: float, sizes: Sequence[int]) -> np.ndarray:
-    """Shares of the law itself and of laws in families of these sizes: equal for all families that are there."""
+    """Shares (1 + laws,) of the law itself and of laws in families of these sizes: equal for all families there are."""
     each = (1.0 - plain) / max(sum(size > 0 for size in sizes), 1)
     return np.concatenate([[plain], *(np.full(size, each / size) for size in sizes if size)])
 

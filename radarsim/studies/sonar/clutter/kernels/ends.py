@@ -91,7 +91,10 @@ class Ends(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """What `Ends` holds of one tracker, its rule, and the scans since its first plot in which it is young."""
+    """What `Ends` holds of one tracker, without the axis F, its rule, and the scans in which a track is young.
+
+    shares (1 + R + N + 2,), length (R,), undetected (R, L, K), young (J,), direction (N, J), stretch (N,).
+    """
 
     shares: np.ndarray
     length: np.ndarray
@@ -372,7 +375,7 @@ def associate_young(field, detections, ends, laws, scan, tracks, status, chunk):
         if own[BOX, i] > 0.0:
             certain, box, seen = detections.certain[scan.k], box_of(draws.cells, gate, rule.gate), detected[i] > 0.0
             needed, drawn, eta = drawn_false(laws, scan.k, certain, missed, seen, status, own, i)
-            found, factor, some = associate_drawn(keys, rule, realisation, scan.k, gate, plot, box, needed, drawn)
+            found, factor, some = associate_drawn(keys, rule, (realisation, scan.k), gate, plot, box, needed, drawn)
             own[last - 1, i] = min(own[last - 1, i] * factor, LARGEST)
             own[CAME, i] = 1.0 if some else own[CAME, i]
             if eta > 0.0:
