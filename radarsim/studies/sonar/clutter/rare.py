@@ -10,8 +10,8 @@ Management Science 13, 291). Here it is as near to that as misses are to being i
 
 A young track may also be wrong from its first plots on: because of their errors, so that the next plots are outside its
 gate one after the other, or because one of them is false. So there is a law for the track of each number of plots
-from that which confirms it on, under which the errors that lead there are stretched, and one under which a false plot
-is in its gate.
+from that which confirms it on, under which the errors that lead there are stretched, and two under which a false plot
+is in its gate, beside the target's or in place of it.
 """
 
 from collections.abc import Sequence
@@ -26,12 +26,13 @@ from radarsim.studies.sonar.clutter.kernels.ends import Ends
 
 MOST_RUNS = 6
 FURTHER = 3  # plots after that which confirms a track, up to which it may be wrong by their errors
+FALSE = 2  # laws of false plots: beside the target's, and in place of it
 OUT = 3  # plots in a row that then leave its gate: more follow by themselves
 LONGEST = 20  # misses in a row that are drawn for: a track that needs more is dropped, or far off, before
 
 
 def lengths(misses: int) -> np.ndarray:
-    """Lengths of the runs that are drawn for: from one miss to those that drop a track, even, six at most."""
+    """Lengths (R,) of the runs that are drawn for: from one miss to those that drop a track, even, six at most."""
     longest = min(misses, LONGEST)
     return np.unique(np.round(np.linspace(1, longest, min(longest, MOST_RUNS)))).astype(np.int64)
 
@@ -83,7 +84,7 @@ def directions(t: np.ndarray, least: int) -> np.ndarray:
 
 
 def stretch(gate: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """How much errors along directions of some radius are stretched for a gate, χ² of two components.
+    """How much (F, n) errors along directions of radius (F, n) are stretched for gates (F, 1), χ² of two components.
 
     s² is half the least square with which plots leave the gate, the best for the tail of a Gaussian of two components.
     """
@@ -91,7 +92,7 @@ def stretch(gate: np.ndarray, radius: np.ndarray) -> np.ndarray:
 
 
 def family_shares(plain: float, sizes: Sequence[int]) -> np.ndarray:
-    """Shares of the law itself and of laws in families of these sizes: equal for all families that are there."""
+    """Shares (1 + laws,) of the law itself and of laws in families of these sizes: equal for all families there are."""
     each = (1.0 - plain) / max(sum(size > 0 for size in sizes), 1)
     return np.concatenate([[plain], *(np.full(size, each / size) for size in sizes if size)])
 
@@ -104,15 +105,15 @@ def ends(case: Case, specs: Sequence[TrackerSpec], given: Conditions, labels: Cl
     scans = [np.flatnonzero(certain != 0)[: one.m + FURTHER + OUT] for one in specs]
     most, longest, J = max(map(len, runs)), max(int(run[-1]) for run in runs), max(map(len, scans))
     length, young = np.zeros((F, most), dtype=np.int64), np.full((F, J), -1, dtype=np.int64)
-    shares, drawn = np.zeros((F, 1 + most + 1 + FURTHER + 1)), np.ones((F, most, longest, K))
+    shares, drawn = np.zeros((F, 1 + most + 1 + FURTHER + FALSE)), np.ones((F, most, longest, K))
     direction, radius = np.zeros((F, 1 + FURTHER, J)), np.zeros((F, 1 + FURTHER))
     for f, (one, run, at) in enumerate(zip(specs, runs, scans, strict=True)):
         length[f, : len(run)], young[f, : len(at)] = run, at
         direction[f, :, : len(at)] = directions(t[at], one.m)
         radius[f] = np.linalg.norm(direction[f], axis=1)
         far = np.flatnonzero(radius[f] > 0.0) if one.gate_probability < 1.0 else np.empty(0, dtype=np.int64)
-        own = family_shares(case.spec.rare.plain_share, (len(run), len(far), int(given.density > 0.0)))
-        laws = [0, *range(1, 1 + len(run)), *(1 + most + far), *([-1] if given.density > 0.0 else [])]
+        own = family_shares(case.spec.rare.plain_share, (len(run), len(far), FALSE * (given.density > 0.0)))
+        laws = [0, *range(1, 1 + len(run)), *(1 + most + far), *(range(-FALSE, 0) if given.density > 0.0 else [])]
         shares[f, laws] = own
         for j, each in enumerate(run):
             drawn[f, j, :each] = undetected(probability, one.gate_probability, int(each))

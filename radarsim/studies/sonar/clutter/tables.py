@@ -11,7 +11,7 @@ from radarsim.report.statistics import Z95, Estimate, Values
 from radarsim.report.tables import interval, leading
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.kernels import counts as at
-from radarsim.studies.sonar.clutter.kernels.ends import DROPPED, LOST
+from radarsim.studies.sonar.clutter.kernels.ends import DROPPED, DROPPED_AFTER, LOST, LOST_AFTER
 from radarsim.studies.sonar.tables import Columns, stacked
 
 if TYPE_CHECKING:
@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 FALSE = "false track"
 ENDED = "target's track ended"
-HOW = {DROPPED: "target's track dropped", LOST: "target's track lost"}
+PART = 0.05  # of a rate: what is less does not decide whether its interval holds
+HOW = {"target's track dropped": [DROPPED, DROPPED_AFTER], "target's track lost": [LOST, LOST_AFTER]}
+BESIDE = [DROPPED_AFTER, LOST_AFTER]
 
 
 def tables(results: Sequence[CaseResult[ClutterAxes]]) -> "dict[str, pd.DataFrame]":
@@ -263,12 +265,32 @@ def _ended(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
     by_scan, last = np.cumsum(result.sums["ended"][f], axis=0), len(result.axes.k) - 1
     ended = by_scan.sum(axis=1)
     k = np.flatnonzero((ended[:, 2] > 0) | (np.arange(last + 1) == last))
-    drawn = rare.Drawn(result.count, *result.sums["ended_drawn"][f])
+    drawn, whole = rare.Drawn(result.count, *result.sums["ended_drawn"][f]), rare.Counted(*ended[k].T)
+    curve = rare.rows(leading(result, np.full(len(k), f), k), ENDED, k == last, whole, drawn)
+    curve["note"] = ends_note(drawn, by_scan[k], false_plots(result) > 0)
+    label = leading(result, np.array([f]), np.array([last]))
     made = [
-        rare.rows(leading(result, np.full(len(k), f), k), ENDED, k == last, rare.Counted(*ended[k].T), drawn),
+        curve,
         *(
-            rare.rows(leading(result, np.array([f]), np.array([last])), event, np.array([False]), counted, drawn)
-            for event, counted in ((how, rare.Counted(*by_scan[last, [kind]].T)) for kind, how in HOW.items())
+            rare.rows(label, how, np.array([False]), rare.Counted(*by_scan[last, kinds].sum(axis=0)[:, None]), drawn)
+            for how, kinds in HOW.items()
         ),
     ]
     return {name: np.concatenate([part[name] for part in made]) for name in made[0]}
+
+
+def ends_note(drawn: rare.Drawn, ended: np.ndarray, among_false: bool) -> np.ndarray:
+    """What is to be said (n,) of rates of ends, from sums (n, KINDS, 4): of the whole, or of a part that matters.
+
+    Runs of misses have equal weights, and many; the few tracks that end by far plots, or by false ones beside the
+    target's, have large ones, which the whole does not show while they are few. A part matters where it may be over a
+    share of PART, by its interval; the last one does anyhow, since it is small where those are missing. among_false:
+    whether there are false plots.
+    """
+    whole = rare.Counted(*ended.sum(axis=1).T)
+    said, rate = [whole], rare.rate(whole, drawn).value
+    for kinds, least in (*((kinds, PART) for kinds in HOW.values()), *([(BESIDE, 0.0)] if among_false else [])):
+        part = rare.Counted(*ended[:, kinds].sum(axis=1).T)
+        matters = rare.rate(part, drawn).hi > least * rate
+        said.append(rare.Counted(*(np.where(matters, own, of) for own, of in zip(part, whole, strict=True))))
+    return rare.note(drawn, *said)

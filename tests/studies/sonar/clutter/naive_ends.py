@@ -112,7 +112,9 @@ class TargetTrack(FalseTrack):
     """One track of the target; see `FalseTrack`. truth (K, 2) are the target's places."""
 
     def end(self, laws, law, shares, truth, errors, u, scans):
-        """The scan of the end, whether it is lost, and the weight; (None, False, weight) if it does not end.
+        """The scan of the end, whether it is lost, whether a false plot came beside the target's, and the weight.
+
+        None for the scan if it does not end.
 
         law counts the law itself, runs, far plots, false plots; shares are of these. errors (K, 2) of the plots over
         σ, u (K,) the numbers that decide on detection.
@@ -125,8 +127,9 @@ class TargetTrack(FalseTrack):
             errors[:J] += (s - 1) * np.outer(along, along @ errors[:J])
         rho = [np.sum((along @ errors[:J]) ** 2) for along in laws.far]
         far = [math.exp(r / 2 * (1 - 1 / s)) / s for r, s in zip(rho, laws.squared, strict=True)]
-        ratios = np.array([1.0, *np.ones(n), *far, *([1.0] if self.given.density else [])])
-        state = longest = came = misses = hits = 0
+        ratios = np.array([1.0, *np.ones(n), *far, *([1.0, 1.0] if self.given.density else [])])
+        lured = self.given.density and law == len(ratios) - 1
+        state = longest = came = seduced = misses = hits = 0
         begun = last = first = x = P = S = place = None
         for k in range(scans):
             z = truth[k] + sigma * errors[k]
@@ -137,10 +140,17 @@ class TargetTrack(FalseTrack):
                 else:
                     x, P, S = foretold(x, P, T, choice.variance, sigma)
                     place = H @ x
-            seen = u[k] < laws.detection
+            d, p, eta = 1 - laws.detection, 0.0, 0.0
+            if state:
+                p = self.in_box(k - begun, place, S)
+                left = choice.n + 3 - (k - begun)
+                eta = max(2 / (1 + left), d * p) if p and k < J and not seduced else 0.0
+            h = eta + (1 - eta) * d * (1 - p) / (1 - d * p) if lured and eta else d
+            if state == 2 and 1 <= law <= n:
+                h = laws.undetected(law, max(longest, misses), misses, k)
+            seen = u[k] < 1 - h
             if state == 2:
                 longest = max(longest, misses)
-                seen = u[k] < 1 - (laws.undetected(law, longest, misses, k) if 1 <= law <= n else 1 - laws.detection)
                 if longest < n:
                     nu, c = z - place, 0.0
                     hit = seen
@@ -148,21 +158,32 @@ class TargetTrack(FalseTrack):
                         hit = seen and nu @ np.linalg.inv(S) @ nu <= self.gate
                         c = 0.0 if hit else missing(truth[k] - place, S, self.gate, sigma)
                     for length in laws.runs:
-                        h, d = laws.undetected(length, longest, misses, k), laws.detection
-                        ratios[length] *= (1 - h) / d if hit else (h + (1 - h) * c) / (1 - d + d * c)
+                        drawn = laws.undetected(length, longest, misses, k)
+                        ratios[length] *= (
+                            (1 - drawn) / (1 - d) if hit else (drawn + (1 - drawn) * c) / (d + (1 - d) * c)
+                        )
             if state == 0:
                 if seen:
                     state, begun, last, hits, misses, first = 1, k, k, 1, 0, z
                 continue
-            plots = self.false_plots(k, k - begun, place, S, came, law == len(ratios) - 1 and law > 0, ratios)
-            came = came or (k - begun < choice.n and self.some)
+            plots = np.empty((0, 2)) if not self.given.density else self.field(k) if not p else None
+            if plots is None:
+                needed = 0.0 if came else 2 / (1 + left)
+                drawn = needed if law == len(ratios) - 2 else eta / h if lured and eta and not seen else 0.0
+                plots, _ = self.drawn(k, place, S, drawn, True)
+                some = len(plots) > 0
+                ratios[-2] *= max(needed, p) / p if some else (1 - max(needed, p)) / (1 - p)
+                came = came or some
+                if eta:
+                    seduced = some and not seen
+                    ratios[-1] *= eta / (d * p) if seduced else (1 - eta) / (1 - d * p)
             plots = np.concatenate([z[None], plots]) if seen else plots
-            d = np.einsum("ni,ij,nj->n", plots - place, np.linalg.inv(S), plots - place)
-            taken = plots[d <= self.gate]
+            squared = np.einsum("ni,ij,nj->n", plots - place, np.linalg.inv(S), plots - place)
+            taken = plots[squared <= self.gate]
             if len(taken) == 0:
                 misses += 1
             elif hits == 1:
-                x, P = second(first, taken[np.argmin(d[d <= self.gate])], (k - last) * T, sigma)
+                x, P = second(first, taken[np.argmin(squared[squared <= self.gate])], (k - last) * T, sigma)
             elif choice.association == "pda":
                 given = (self.given.detection, choice.gate_probability, self.given.density * place[0])
                 x, P = pda(x, P, S, taken, sigma, *given)
@@ -179,18 +200,11 @@ class TargetTrack(FalseTrack):
                 confirmed = hits >= choice.m
                 state = 2 * (not off) if confirmed else int(hits + choice.n - (k - begun) - 1 >= choice.m)
             elif misses >= choice.misses or off or vague:
-                return k, bool(off and misses < choice.misses), 1 / (shares @ ratios)
-        return None, False, 1 / (shares @ ratios)
+                return k, bool(off and misses < choice.misses), bool(came and not seduced), 1 / (shares @ ratios)
+        return None, False, False, 1 / (shares @ ratios)
 
-    def false_plots(self, k, age, place, S, came, shifts, ratios):
-        """The false plots about the gate, and in `self.some` whether there are any where they are drawn in a box."""
-        self.some = False
-        if not self.given.density:
-            return np.empty((0, 2))
+    def in_box(self, age, place, S):
+        """p of a box about the gate where false plots are drawn in it, else zero."""
         (low, high), (left, right) = box_of(place, S, self.gate, self.sector)
-        if age >= self.choice.n or self.given.density * (high - low) * (right - left) > MOST:
-            return self.field(k)
-        plots, factor = self.drawn(k, place, S, 0.0 if came else 1 / (self.choice.n - age), shifts)
-        ratios[-1] *= factor
-        self.some = len(plots) > 0
-        return plots
+        mean = self.given.density * max(high - low, 0.0) * max(right - left, 0.0)
+        return 1 - math.exp(-mean) if age < self.choice.n + 3 and mean <= MOST else 0.0

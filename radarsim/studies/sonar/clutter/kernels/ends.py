@@ -6,6 +6,7 @@ A share of the realisations is drawn as it is, the others by laws of three kinds
                 misses in a row have come as the law is for
     far         errors of the plots of a young track are stretched along one direction, in range and bearing
     false       the gate of the young track contains a false plot more often than it should, until one has come
+    seduced     likewise, in place of the target's plot: that is missed, and a false one comes
 
 Each realisation counts with the law itself over the mixture of all. Of runs, the ratio of the laws is at first that of
 the answers "detected or not". For a tracker a plot outside its gate is a miss like one that is not there; so where the
@@ -14,9 +15,11 @@ plots' errors are no longer stretched, it is that of the answers "in the gate or
     (1 - h) / P_D   for a plot in the gate,     (h + (1 - h) c) / (1 - P_D + P_D c)   for none,
 
 with h the probability that the target is not detected, as drawn, and c that its plot, if there is one, is outside the
-gate: both follow from the scans before. Of false plots it is that of `rare`. Letters as in `gate`, and
+gate: both follow from the scans before. Of false plots it is that of `rare`, of the last law that of the answers "both
+or not". Letters as in `gate`, and
 
     c           probability that the target's plot is outside the gate
+    p           probability that the box about a gate contains a false plot
     u, s        direction of errors, a unit vector; how much they are stretched along it
     ratio       of a law that is drawn from over the law itself
 """
@@ -55,21 +58,23 @@ from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK, copy_row
 from radarsim.studies.sonar.kernels.sums import Course
 
+FURTHER = 3.0  # scans after those of the rule that confirms in which a track is young
 NODES = 48  # error under 10⁻¹³ for gates up to 60 σ² wide
 MOST_LOG = 600.0  # of a ratio: far beyond any whose reciprocal counts
 WIDEST = 8.5  # σ of a plot: further from its mean it is once in 10¹⁶
-KINDS = 2
-DROPPED, LOST = range(KINDS)
+KINDS = 4  # the latter two where a false plot came about the young track, though none in place of the target's
+DROPPED, LOST, DROPPED_AFTER, LOST_AFTER = range(KINDS)
 # Which law a track is drawn from, 0 being the law itself; the longest run of misses since its confirmation; whether it
-# has ended; whether a false plot has come; by how much errors in range and bearing are stretched; ratios of the laws.
-LAW, LONGEST, ENDED, CAME, PUSH_R, PUSH_B, RATIO = range(7)
+# has ended; whether a false plot has come, and one in place of the target's; p of this scan, 0 where it is not drawn;
+# by how much errors in range and bearing are stretched; ratios of the laws.
+LAW, LONGEST, ENDED, CAME, SEDUCED, BOX, PUSH_R, PUSH_B, RATIO = range(9)
 
 
 class Ends(NamedTuple):
-    """How the target's tracks of F trackers are drawn, by R laws of runs, N of far plots, and one of false plots.
+    """How the target's tracks of F trackers are drawn, by R laws of runs, N of far plots, and two of false plots.
 
     choice (2,) is the key of the stream that chooses the law of each realisation, plots (2,) that of false plots in
-    boxes. shares (F, 1 + R + N + 1) of the law itself and of the others, in this order; the sum is one. length (F, R)
+    boxes. shares (F, 1 + R + N + 2) of the law itself and of the others, in this order; the sum is one. length (F, R)
     of the run of misses that a law is for; undetected (F, R, L, K) the probability that the target is not detected at
     scan k by tracks with i misses in a row. direction (F, N, J) of the errors at the first scans that may give a plot,
     whose numbers are young (F, J), -1 where there are fewer, and stretch (F, N) of them.
@@ -86,7 +91,10 @@ class Ends(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """What `Ends` holds of one tracker, its rule, and the scans of the rule that confirms."""
+    """What `Ends` holds of one tracker, without the axis F, its rule, and the scans in which a track is young.
+
+    shares (1 + R + N + 2,), length (R,), undetected (R, L, K), young (J,), direction (N, J), stretch (N,).
+    """
 
     shares: np.ndarray
     length: np.ndarray
@@ -95,7 +103,7 @@ class Laws(NamedTuple):
     direction: np.ndarray
     stretch: np.ndarray
     rule: Rule
-    scans: float
+    young_age: float
 
 
 class Plots(NamedTuple):
@@ -124,7 +132,7 @@ class EndSums(NamedTuple):
     """Sums of a block by weights w, for F trackers over K scans.
 
     ended (F, K, KINDS, 4): Σw, Σw², number and Σw⁴ of realisations whose first confirmed track of the target ends at a
-    scan: is dropped, or lost; ended_drawn (F, 3): number of plain ones, Σw and Σw² of all.
+    scan, dropped or lost; ended_drawn (F, 3): number of plain ones, Σw and Σw² of all.
     """
 
     ended: np.ndarray
@@ -239,7 +247,7 @@ def stretched(laws, k, n, z, sigma, own, out):
 def laws_of(ends, trackers, f):
     """The laws of tracker f."""
     far = (ends.young[f], ends.direction[f], ends.stretch[f])
-    return Laws(ends.shares[f], ends.length[f], ends.undetected[f], *far, rule_of(trackers, f), trackers.n[f])
+    return Laws(ends.shares[f], ends.length[f], ends.undetected[f], *far, rule_of(trackers, f), trackers.n[f] + FURTHER)
 
 
 @inline
@@ -248,6 +256,46 @@ def undetected_by(laws, law, longest, misses, k, detection):
     if 0 < law <= laws.length.size and longest < laws.length[law - 1]:
         return laws.undetected[law - 1, misses, k]
     return 1.0 - detection
+
+
+@part
+def look(field, laws, scan, tracks, status, predicted, own):
+    """Set p of this scan, where false plots are drawn in a box: while a track is young."""
+    cells, plots = field.cells, tracks.plots
+    for i in range(scan.count):
+        own[BOX, i] = 0.0
+        if status[STATE, i] != NONE and status[AGE, i] < laws.young_age and laws.shares[-1] > 0.0:
+            place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
+            reach = laws.rule.speed * (status[SINCE, i] + scan.dt)
+            mean = box_of(cells, gate_of(place, S, plots[i] > 1.5, reach), laws.rule.gate).mean
+            own[BOX, i] = -math.expm1(-mean) if 0.0 < mean <= MOST_MEAN else 0.0
+
+
+@inline
+def sooner(laws, age):
+    """The probability of what has not come yet to come at this scan of a young track, as drawn: rather sooner.
+
+    With L scans left it is L times as likely now as at the last of them.
+    """
+    return 2.0 / (laws.young_age - age + 1.0)
+
+
+@inline
+def seduction(laws, age, missed, p):
+    """η: the probability that the target's plot is missed and a false one is in the box, as it is drawn."""
+    return max(sooner(laws, age), missed * p)
+
+
+@inline
+def missed_if_seduced(eta, missed, p):
+    """The probability that the target's plot is missed, where that and a false plot in the box are drawn with η."""
+    return eta + (1.0 - eta) * missed * (1.0 - p) / (1.0 - missed * p)
+
+
+@inline
+def may_be_seduced(laws, k, certain, own, i):
+    """Whether the law of seduction shifts realisation i at scan k: not where "missed" is "not in the gate"."""
+    return own[BOX, i] > 0.0 and own[SEDUCED, i] == 0.0 and certain < 0 and k <= laws.young.max()
 
 
 @part
@@ -260,13 +308,16 @@ def detect_drawn(detections, laws, scan, status, predicted, target, plots, own):
     detected, z, most, free = target.detected, target.z, laws.length.max(), k > laws.young.max()
     for i in range(scan.count):
         u, _ = uniforms(detections.key[0], detections.key[1], scan.first + i, k)
+        law, h = int(own[LAW, i]), 1.0 - detection
+        if law == laws.shares.size - 1 and may_be_seduced(laws, k, certain, own, i):
+            h = missed_if_seduced(seduction(laws, status[AGE, i], h, own[BOX, i]), h, own[BOX, i])
         if own[ENDED, i] > 0.0 or certain >= 0 or status[STATE, i] != CONFIRMED:
-            seen = u < detection if certain < 0 else certain > 0
+            seen = u < 1.0 - h if certain < 0 else certain > 0
             detected[i] = 1.0 if seen and own[ENDED, i] == 0.0 else 0.0
             continue
         misses, longest = int(status[MISSES, i]), max(own[LONGEST, i], status[MISSES, i])
         own[LONGEST, i] = longest
-        h = undetected_by(laws, int(own[LAW, i]), longest, misses, k, detection)
+        h = undetected_by(laws, law, longest, misses, k, detection) if law <= laws.length.size else h
         detected[i] = 1.0 if u < 1.0 - h else 0.0
         if longest >= most:  # whatever law it is drawn from, the rest is as it is
             continue
@@ -286,15 +337,31 @@ def detect_drawn(detections, laws, scan, status, predicted, target, plots, own):
             own[RATIO + j, i] = min(own[RATIO + j, i] * factor, LARGEST)
 
 
+@inline
+def drawn_false(laws, k, certain, missed, detected, status, own, i):
+    """How a false plot is drawn about the young track of realisation i.
+
+    The probability h of the law of false plots, that of the law that the realisation is drawn from, and η, zero where
+    it is not shifted. missed: the probability that the target is not detected; detected: whether it is.
+    """
+    age, law, last = status[AGE, i], int(own[LAW, i]), laws.shares.size - 1
+    needed = sooner(laws, age) if own[CAME, i] == 0.0 else 0.0
+    eta = seduction(laws, age, missed, own[BOX, i]) if may_be_seduced(laws, k, certain, own, i) else 0.0
+    drawn = needed if law == last - 1 else 0.0
+    if law == last and eta > 0.0 and not detected:
+        drawn = eta / missed_if_seduced(eta, missed, own[BOX, i])
+    return needed, drawn, eta
+
+
 @part
-def associate_young(field, ends, laws, scan, tracks, status, chunk, own):
+def associate_young(field, detections, ends, laws, scan, tracks, status, chunk):
     """Associate a scan's plots with every track, as `tracker.associate`; about young tracks false plots are drawn.
 
-    The ratio of the law of false plots, the last one, is brought up to date.
+    The ratios of the laws of false plots, the last two, are brought up to date. chunk.own is of this tracker.
     """
-    draws, out, rule, tally = draws_of(field), chunk.work.association, laws.rule, address(chunk.counts)
+    draws, out, rule, tally, own = draws_of(field), chunk.work.association, laws.rule, address(chunk.counts), chunk.own
     predicted, detected, z, lives = chunk.work.predicted, chunk.detected, chunk.z, address(status)
-    keys, last, law = (ends.plots[0], ends.plots[1]), own.shape[0] - 1, float(laws.shares.size - 1)
+    keys, last, missed = (ends.plots[0], ends.plots[1]), own.shape[0] - 1, 1.0 - detections.probability
     for i in range(scan.count):
         if status[STATE, i] == NONE:
             out[:, i] = 0.0
@@ -304,15 +371,19 @@ def associate_young(field, ends, laws, scan, tracks, status, chunk, own):
         status[SINCE, i] += scan.dt
         place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
         gate = gate_of(place, S, tracks.plots[i] > 1.5, rule.speed * status[SINCE, i])
-        plot, box, age = (detected[i], z[0, i], z[1, i]), box_of(draws.cells, gate, rule.gate), status[AGE, i]
-        if age < laws.scans and 0.0 < box.mean <= MOST_MEAN:
-            needed = 1.0 / (laws.scans - age) if own[CAME, i] == 0.0 else 0.0
-            drawn = (scan.first + i, scan.k, gate, plot, box, needed, own[LAW, i] == law)
-            found, factor, some = associate_drawn(keys, rule, *drawn)
-            own[last, i] = min(own[last, i] * factor, LARGEST)
+        plot, realisation = (detected[i], z[0, i], z[1, i]), scan.first + i
+        if own[BOX, i] > 0.0:
+            certain, box, seen = detections.certain[scan.k], box_of(draws.cells, gate, rule.gate), detected[i] > 0.0
+            needed, drawn, eta = drawn_false(laws, scan.k, certain, missed, seen, status, own, i)
+            found, factor, some = associate_drawn(keys, rule, (realisation, scan.k), gate, plot, box, needed, drawn)
+            own[last - 1, i] = min(own[last - 1, i] * factor, LARGEST)
             own[CAME, i] = 1.0 if some else own[CAME, i]
+            if eta > 0.0:
+                both, plainly = some and not seen, missed * own[BOX, i]
+                own[last, i] = min(own[last, i] * (eta / plainly if both else (1.0 - eta) / (1.0 - plainly)), LARGEST)
+                own[SEDUCED, i] = 1.0 if both else 0.0
         else:
-            found = associate_track(draws, rule, scan.first + i, scan.k, plot, gate, tally)
+            found = associate_track(draws, rule, realisation, scan.k, plot, gate, tally)
         settle(lives, i, found, address(out))
 
 
@@ -337,7 +408,9 @@ def add_ended(limits, n, tracks, status, course, laws, own, ended):
         if status[TRACKS_ENDED, i] > 0.0 and own[ENDED, i] == 0.0:
             own[ENDED, i] = 1.0
             lost = status[MISSES, i] < misses and off_target(tracks, course, beyond, i)
-            add_weight(weight_of(laws.shares, own, i), ended, LOST if lost else DROPPED)
+            beside = own[CAME, i] > 0.0 and own[SEDUCED, i] == 0.0
+            kind = (LOST if lost else DROPPED) + (DROPPED_AFTER if beside else 0)
+            add_weight(weight_of(laws.shares, own, i), ended, kind)
 
 
 # ---- a block --------------------------------------------------------------------------------------------------------
@@ -349,9 +422,11 @@ def scan_target(detections, field, trackers, ends, laws, f, scan, chunk):
     predict(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, work.predicted)
     target = Target(chunk.detected, chunk.z, True)
     stretched(laws, scan.k, scan.count, chunk.measured, chunk.plots.sigma, own, target.z)
+    look(field, laws, scan, tracks, status, work.predicted, own)
     detect_drawn(detections, laws, scan, status, work.predicted, target, chunk.plots, own)
     if laws.shares[-1] > 0.0:
-        associate_young(field, ends, laws, scan, tracks, status, chunk, own)
+        of_tracker = Chunk(work, own, chunk.measured, chunk.z, chunk.detected, chunk.plots, chunk.kept, counts)
+        associate_young(field, detections, ends, laws, scan, tracks, status, of_tracker)
     else:
         associate(field, laws.rule, scan, tracks, status, target, work, counts)
     joint = trackers.association[f] == PDA

@@ -143,15 +143,15 @@ def with_drawn_plots(keys, realisation, k, gate, threshold, box, p, h):
 
 
 @inline
-def associate_drawn(keys, rule, realisation, k, gate, plot, box, needed, shifted):
+def associate_drawn(keys, rule, place, gate, plot, box, needed, drawn):
     """The Association of one track with plots drawn in its box, and the factor of the ratio of the law that shifts it.
 
-    Then whether there are any in the box. plot as in `associate_track`: of the target. needed: the probability h of
-    that law, if it is not under p; shifted: whether the track is drawn from it.
+    Then whether there are any in the box. place: realisation and scan. plot as in `associate_track`: of the target.
+    needed: the probability h of that law; drawn: of the law that the track is drawn from; each if it is not under p.
     """
     p = -math.expm1(-box.mean)
     h = max(needed, p)
-    gated, some = with_drawn_plots(keys, realisation, k, gate, rule.gate, box, p, h if shifted else p)
+    gated, some = with_drawn_plots(keys, place[0], place[1], gate, rule.gate, box, p, max(drawn, p))
     if plot[0] > 0.0:
         irr, irb, ibb, _ = inverse_two(gate.S[0], gate.S[1], gate.S[2])
         gated = with_plot(gated, plot[1] - gate.r, plot[2] - gate.b, 0.0, (irr, irb, ibb), rule.gate)
@@ -179,8 +179,8 @@ def associate_false(field, shift, trackers, f, scan, work, own, counts):
         box, tentative = box_of(draws.cells, gate, rule.gate), status[STATE, i] == TENTATIVE
         if (tentative or held_on) and 0.0 < box.mean <= MOST_MEAN:
             rest = (m - status[HITS, i]) / (n - status[AGE, i]) if tentative else 1.0 / (most - status[MISSES, i])
-            shifted = own[LAW, i] > (0.0 if tentative else 1.0)
-            found, factor, _ = associate_drawn(keys, rule, scan.first + i, scan.k, gate, NO_PLOT, box, rest, shifted)
+            drawn = rest if own[LAW, i] > (0.0 if tentative else 1.0) else 0.0
+            found, factor, _ = associate_drawn(keys, rule, (scan.first + i, scan.k), gate, NO_PLOT, box, rest, drawn)
             own[FOUND, i] = min(own[FOUND, i] * (factor if tentative else 1.0), LARGEST)
             own[LONG, i] = min(own[LONG, i] * factor, LARGEST)
         else:
