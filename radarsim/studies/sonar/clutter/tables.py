@@ -11,7 +11,7 @@ from radarsim.report.statistics import Z95, Estimate, Values
 from radarsim.report.tables import interval, leading
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.kernels import counts as at
-from radarsim.studies.sonar.clutter.kernels.ends import DROPPED, DROPPED_AFTER, LOST, LOST_AFTER
+from radarsim.studies.sonar.clutter.kernels.ends import DROPPED, DROPPED_AFTER, KINDS, LOST, LOST_AFTER
 from radarsim.studies.sonar.tables import Columns, stacked
 
 if TYPE_CHECKING:
@@ -269,28 +269,30 @@ def _ended(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
     curve = rare.rows(leading(result, np.full(len(k), f), k), ENDED, k == last, whole, drawn)
     curve["note"] = ends_note(drawn, by_scan[k], false_plots(result) > 0)
     label = leading(result, np.array([f]), np.array([last]))
-    made = [
-        curve,
-        *(
-            rare.rows(label, how, np.array([False]), rare.Counted(*by_scan[last, kinds].sum(axis=0)[:, None]), drawn)
-            for how, kinds in HOW.items()
-        ),
-    ]
+    made = [curve]
+    for how, kinds in HOW.items():
+        own = rare.Counted(*by_scan[last, kinds].sum(axis=0)[:, None])
+        rows = rare.rows(label, how, np.array([False]), own, drawn)
+        made.append(rows | {"note": ends_note(drawn, by_scan[[last]], false_plots(result) > 0, kinds)})
     return {name: np.concatenate([part[name] for part in made]) for name in made[0]}
 
 
-def ends_note(drawn: rare.Drawn, ended: np.ndarray, among_false: bool) -> np.ndarray:
-    """What is to be said (n,) of rates of ends, from sums (n, KINDS, 4): of the whole, or of a part that matters.
+def ends_note(
+    drawn: rare.Drawn, ended: np.ndarray, among_false: bool, kinds: Sequence[int] = range(KINDS)
+) -> np.ndarray:
+    """What is to be said (n,) of rates of ends of some kinds, from sums (n, KINDS, 4): of all or a part that matters.
 
     Runs of misses have equal weights, and many; the few tracks that end by far plots, or by false ones beside the
     target's, have large ones, which the whole does not show while they are few. A part matters where it may be over a
     share of PART, by its interval; the last one does anyhow, since it is small where those are missing. among_false:
     whether there are false plots.
     """
-    whole = rare.Counted(*ended.sum(axis=1).T)
+    whole = rare.Counted(*ended[:, list(kinds)].sum(axis=1).T)
     said, rate = [whole], rare.rate(whole, drawn).value
-    for kinds, least in (*((kinds, PART) for kinds in HOW.values()), *([(BESIDE, 0.0)] if among_false else [])):
-        part = rare.Counted(*ended[:, kinds].sum(axis=1).T)
+    parts = [(own, PART) for own in HOW.values() if len(own) < len(kinds)]
+    parts += [([kind for kind in kinds if kind in BESIDE], 0.0)] if among_false else []
+    for own_kinds, least in parts:
+        part = rare.Counted(*ended[:, own_kinds].sum(axis=1).T)
         matters = rare.rate(part, drawn).hi > least * rate
         said.append(rare.Counted(*(np.where(matters, own, of) for own, of in zip(part, whole, strict=True))))
     return rare.note(drawn, *said)
