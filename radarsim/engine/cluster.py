@@ -32,6 +32,7 @@ CONNECT_S = 10
 WORKERS_S = 30  # how long a scheduler may be without a worker
 DEATHS = 20  # of workers under one task, after which it is taken for their cause
 RESULT_S = 60  # how long the sums of a block may take from a worker
+HOLDER_S = 5  # the same on this machine before one looks whether the worker lives
 LOOK_S = 1.0
 SCHEMES = ("tcp", "tls")
 ROLES = ("client", "scheduler", "worker")
@@ -241,7 +242,7 @@ class Cluster:
         self._running.discard(key)
         if future.status == "finished":
             try:
-                return [future.result(timeout=RESULT_S)]
+                return [self._sums(future)]
             except TimeoutError as late:
                 raise ClusterError(
                     f"{self._place}: a worker does not send its sums within {RESULT_S} s; what was done is stored"
@@ -258,6 +259,21 @@ class Cluster:
         if isinstance(error, ConfigError):
             raise error
         raise ClusterError(f"{self._place}: a worker cannot run the blocks: {type(error).__name__}: {error}")
+
+    def _sums(self, future: "Future") -> Outcome:
+        """What a task has found. Raises TimeoutError after RESULT_S.
+
+        If all that hold it have died, it is computed again by others: those of this machine have to be started.
+        """
+        end = time.monotonic() + RESULT_S
+        while self._own is not None:
+            try:
+                return future.result(timeout=HOLDER_S)
+            except TimeoutError:
+                if time.monotonic() > end:
+                    raise
+                self._own.replace()
+        return future.result(timeout=RESULT_S)
 
     def _look(self) -> None:
         """About once a second: is the scheduler there, and which workers are connected?"""

@@ -91,6 +91,23 @@ def test_dead_workers_are_replaced_and_no_byte_is_lost(two):
     assert set(killed).isdisjoint(alive(two))
 
 
+def test_sums_whose_holders_die_before_they_are_asked_for_are_computed_again(two, monkeypatch):
+    """All workers at once: while one waits for the sums, new ones have to come."""
+    monkeypatch.setattr(cluster, "RESULT_S", 20)
+    monkeypatch.setattr(cluster, "HOLDER_S", 0.5)
+    two.submit(WORK, Node(0, 0))
+    future = next(iter(two._tasks.values()))[0]
+    end = time.monotonic() + 20
+    while future.status != "finished" and time.monotonic() < end:
+        time.sleep(0.01)
+    for process in alive(two):
+        os.kill(process, signal.SIGKILL)
+    outcomes = []
+    while not outcomes and time.monotonic() < end + 20:
+        outcomes = two.finished(1.0)
+    assert len(outcomes) == 1
+
+
 def test_numbers_that_are_not_finite_are_named_from_afar(two):
     with pytest.raises(NonFiniteError, match="realisations 992 to 1007"):
         collect(Fake(bad=1_000), N, executor=two)
