@@ -28,7 +28,8 @@ FEW = f"under {FEW_EVENTS} effective events"
 # hand-over, 200 × 10 000 bursts, had intervals that covered 81 %, and 5 events behind these. docs/rare.md has both
 # conditions and what they were measured to leave.
 HEAVY = f"interval of {FEW}: heavy weights"
-ERRORS = 4.0  # standard errors of the mean weight beyond which it is not one
+IN_PART = f"a part of it {FEW}"  # of a rate that is a sum, each part of which has weights of its own size
+ERRORS = 4.0  # standard errors of the mean weight beyond which it is not one; of fewer than FEW weights none is known
 
 
 class Drawn(NamedTuple):
@@ -171,12 +172,23 @@ def warnings(made: "pd.DataFrame | None") -> list[str]:
                 least=FEW_EVENTS,
             )
         )
+    in_part = made["note"].eq(IN_PART) if "note" in made else np.full(len(made), False)
+    for case, own in common.groups(made[in_part & made["sought"].astype(bool)], "case").items():
+        said.append(
+            tr(
+                "{case}: {filters}: a part of the rate of a rare event rests on under {least} effective events; rate "
+                "and interval may be too small",
+                case=case[0] if isinstance(case, tuple) else case,
+                filters=", ".join(own["filter"]),
+                least=FEW_EVENTS,
+            )
+        )
     said += _unaimed(made)
     for case, own in common.groups(made, "case").items():
         means, errors = (own[name].to_numpy(dtype=float) for name in ("mean_weight", "mean_weight_se"))
         worst = int(np.argmax(np.abs(means - 1) - ERRORS * errors))
         mean, error = means[worst], errors[worst]
-        if abs(mean - 1) > ERRORS * error:
+        if abs(mean - 1) > ERRORS * error and own["n"].min() >= statistics.FEW:
             said.append(
                 tr(
                     "{case}: the mean weight is {mean:.4g} ± {error:.2g}, not one: no rate of a rare event is right "

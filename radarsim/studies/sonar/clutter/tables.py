@@ -295,4 +295,6 @@ def ends_note(
         part = rare.Counted(*ended[:, own_kinds].sum(axis=1).T)
         matters = rare.rate(part, drawn).hi > least * rate
         said.append(rare.Counted(*(np.where(matters, own, of) for own, of in zip(part, whole, strict=True))))
-    return rare.note(drawn, *said)
+    own_note, any_note = rare.note(drawn, whole), rare.note(drawn, *said)
+    in_part = np.where(any_note != "", rare.IN_PART, "").astype(object)
+    return np.where(own_note != "", own_note, in_part)

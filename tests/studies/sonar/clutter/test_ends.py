@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import radarsim
@@ -12,6 +13,7 @@ from radarsim.app.configs import load
 from radarsim.config.identity import canonical
 from radarsim.errors import ConfigError
 from radarsim.kernels import random
+from radarsim.report import rare
 from radarsim.report.tables import to_csv
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter import filters as design
@@ -263,6 +265,29 @@ def test_tables_tell_the_curve_and_how_tracks_end():
 def test_a_rate_that_rests_on_few_events_is_told():
     result = radarsim.run(keys_of([tracker("a")], 0.0, 0.98, 12), realisations=10)
     assert any("a: the rate of a rare event rests on" in line for line in result.warnings)
+
+
+def test_few_events_in_one_way_of_ending_are_told():
+    """Of 1000 effective events none is what the note of the row, and the warning, is about: a part of them."""
+    drawn = rare.Drawn(4_000_000, 400_000, 4e6, 4e7)
+    ways = np.zeros((1, 4, 4))  # Σw, Σw², number, Σw⁴ of each way of ending
+    ways[0, 0] = 1e3, 1e3, 1000, 1e3
+    sure, unsure = ways.copy(), ways.copy()
+    sure[0, 2] = ways[0, 0]
+    unsure[0, 2] = 30.0, 90.0, 10, 810.0
+    assert tables.ends_note(drawn, sure, True)[0] == ""
+    assert tables.ends_note(drawn, unsure, True)[0] == rare.IN_PART
+    assert tables.ends_note(drawn, unsure, False)[0] == ""
+    kinds = tables.HOW["target's track dropped"]
+    assert tables.ends_note(drawn, ways, False, kinds)[0] == ""
+    row = {"case": "c", "filter": "f", "k": 9, "t_s": 1.0, "event": "e", "sought": True, "n": 4000, "rate": 1e-3}
+    row |= {"n_eff": 1e3, "mean_weight": 1.0, "mean_weight_se": 0.1, "note": rare.IN_PART}
+    (said,) = rare.warnings(pd.DataFrame([row, row | {"k": 8, "sought": False}]))
+    assert "c: f: a part of the rate" in said
+    # Of few realisations the error of the mean weight is not known.
+    few = {"n": 100, "mean_weight": 0.3, "mean_weight_se": 0.01, "note": ""}
+    assert rare.warnings(pd.DataFrame([row | few])) == []
+    assert "the mean weight is 0.3" in rare.warnings(pd.DataFrame([row | few | {"n": 200}]))[0]
 
 
 def test_bytes_are_those_of_any_threads_and_order():
