@@ -64,7 +64,8 @@ class Pace:
         """log2 of the blocks of the next task: long enough to be worth handing over, short enough to end together."""
         if math.isinf(self._block_s):
             return 0
-        share = self._block_s * blocks_left / (self._executor.workers * SHARES)
+        workers = max(self._executor.workers, 1)  # none are there while dead ones are replaced
+        share = self._block_s * blocks_left / (workers * SHARES)
         fair = math.floor(math.log2(min(share, self._executor.longest_s) / self._block_s))
         worthwhile = math.ceil(math.log2(self._executor.shortest_s / self._block_s))
         return max(0, fair, worthwhile)

@@ -16,6 +16,7 @@ import pytest
 from radarsim.engine.collect import collect
 from radarsim.engine.executors import Serial, Threads, attempted
 from radarsim.engine.machine import available_cores
+from radarsim.engine.run import Pace
 from radarsim.engine.stopping import time_limit
 from radarsim.errors import NonFiniteError
 from tests.engine.fake import Fake, textbook
@@ -248,3 +249,16 @@ def test_memory_is_flat_up_to_a_thousand_million_realisations():
     """
     small, large = subprocess.check_output([sys.executable, "-c", program], text=True).split()
     assert float(large) - float(small) < 10
+
+
+@pytest.mark.parametrize("blocks_left", [1, 64, 4096])
+def test_tasks_are_as_long_as_for_one_worker_while_none_is_connected(blocks_left):
+    """All of a cluster's may have died at once: they are replaced."""
+    levels = []
+    for workers in (0, 1):
+        executor = Serial()
+        executor.workers = workers
+        pace = Pace(executor)
+        pace.note(1, 1e-3)
+        levels.append(pace.level(blocks_left))
+    assert levels[0] == levels[1]
