@@ -7,8 +7,8 @@ import pytest
 
 from radarsim.bursts.kernels.scoring import SIZE
 from radarsim.studies.discriminator import nearest, rare
-from tests.studies.discriminator.test_rare import RARELY, plan_of
-from tests.studies.discriminator.test_study import BASE, FROM_TRUTH
+from tests.studies.discriminator.test_rare import RARELY, lone_window, plan_of
+from tests.studies.discriminator.test_study import BASE
 
 HAND_OVERS = (3, 9, 13)  # of the windows of RARELY, of which there are 16
 
@@ -40,13 +40,7 @@ def distance(room, unit, low, high):
 
 def test_gaussian_errors_pass_their_bounds_along_their_own_maps():
     """A lone window scored from the truth, with little noise: each component is lost at five bounds, on either side."""
-    burst = BASE["burst"] | {"pulses": 2000, "noise_variance": 0.01, "samples": "complex"}
-    keys = {
-        "burst": burst,
-        "truth": {"doppler_derivatives": [10e3]},
-        "prior": {"spread_over_potential": [100.0, 100.0]},
-    }
-    plan = plan_of({**FROM_TRUTH, "name": "a", "schedule": [0.02]}, blocks_per_window=100, **keys)
+    plan = lone_window(0.01)
     room, maps = nearest.Room(plan), rare.linear(plan, 0).errors[0]
     for c, row in enumerate(maps):
         length = np.linalg.norm(row)

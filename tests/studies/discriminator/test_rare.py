@@ -176,15 +176,20 @@ def beyond(correlation, limits):
     return 2 * ndtr(-a) + quad(outside, -a, a, points=[0.0], epsabs=1e-14, limit=200)[0]
 
 
-def test_a_lone_window_loses_as_its_gaussian_integral_says():
-    """Phase and frequency from the truth on: errors are Gaussian, and five bounds are passed once in a million."""
-    burst = BASE["burst"] | {"pulses": 2000, "noise_variance": 0.1, "samples": "complex"}
+def lone_window(noise_variance):
+    """The plan of one window scored from the truth, of phase and frequency."""
+    burst = BASE["burst"] | {"pulses": 2000, "noise_variance": noise_variance, "samples": "complex"}
     keys = {
         "burst": burst,
         "truth": {"doppler_derivatives": [10e3]},
         "prior": {"spread_over_potential": [100.0, 100.0]},
     }
-    plan = plan_of({**FROM_TRUTH, "name": "a", "schedule": [0.02]}, blocks_per_window=100, **keys)
+    return plan_of({**FROM_TRUTH, "name": "a", "schedule": [0.02]}, blocks_per_window=100, **keys)
+
+
+def test_a_lone_window_loses_as_its_gaussian_integral_says():
+    """Phase and frequency from the truth on: errors are Gaussian, and five bounds are passed once in a million."""
+    plan = lone_window(0.1)
     maps = rare.linear(plan, 0).errors[0]
     spread = np.linalg.norm(maps, axis=1)
     correlation = float(maps[0] @ maps[1] / spread.prod())

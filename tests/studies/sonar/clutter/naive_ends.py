@@ -9,8 +9,8 @@ import math
 import numpy as np
 from scipy import integrate, special
 
-from tests.studies.sonar.clutter.naive import H, foretold, nearest, pda
-from tests.studies.sonar.clutter.naive_false import FalseTrack, box_of, second
+from tests.studies.sonar.clutter.naive import H
+from tests.studies.sonar.clutter.naive_false import FalseTrack, box_of
 
 MOST = 16.0  # false plots in a box, in the mean, up to which they are drawn in it
 
@@ -119,7 +119,7 @@ class TargetTrack(FalseTrack):
         law counts the law itself, runs, far plots, false plots; shares are of these. errors (K, 2) of the plots over
         σ, u (K,) the numbers that decide on detection.
         """
-        choice, sigma, T, n = self.choice, self.given.sigma, self.given.period, len(laws.runs)
+        choice, sigma, n = self.choice, self.given.sigma, len(laws.runs)
         J = choice.m + 6
         errors = errors.copy()
         if n < law <= n + len(laws.far):
@@ -134,12 +134,7 @@ class TargetTrack(FalseTrack):
         for k in range(scans):
             z = truth[k] + sigma * errors[k]
             if state:
-                if hits == 1:
-                    reach, place = choice.speed * (k - last) * T, first
-                    S = np.diag(2 * sigma**2) + np.diag([reach**2, (reach / first[0]) ** 2])
-                else:
-                    x, P, S = foretold(x, P, T, choice.variance, sigma)
-                    place = H @ x
+                place, S, x, P = self.foretold(x, P, first, hits, k - last)
             d, p, eta = 1 - laws.detection, 0.0, 0.0
             if state:
                 p = self.in_box(k - begun, place, S)
@@ -178,19 +173,8 @@ class TargetTrack(FalseTrack):
                     seduced = some and not seen
                     ratios[-1] *= eta / (d * p) if seduced else (1 - eta) / (1 - d * p)
             plots = np.concatenate([z[None], plots]) if seen else plots
-            squared = np.einsum("ni,ij,nj->n", plots - place, np.linalg.inv(S), plots - place)
-            taken = plots[squared <= self.gate]
-            if len(taken) == 0:
-                misses += 1
-            elif hits == 1:
-                x, P = second(first, taken[np.argmin(squared[squared <= self.gate])], (k - last) * T, sigma)
-            elif choice.association == "pda":
-                given = (self.given.detection, choice.gate_probability, self.given.density * place[0])
-                x, P = pda(x, P, S, taken, sigma, *given)
-            else:
-                x, P = nearest(x, P, S, taken, sigma)
-            if len(taken):
-                hits, misses, last = hits + 1, 0, k
+            x, P, taken = self.updated(x, P, place, S, plots, first, hits, k - last)
+            hits, misses, last = (hits + 1, 0, k) if taken else (hits, misses + 1, last)
             if hits < 2:
                 state = int(hits + choice.n - (k - begun) - 1 >= choice.m)
                 continue

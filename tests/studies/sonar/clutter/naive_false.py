@@ -75,21 +75,42 @@ class FalseTrack:
             found.append((math.sqrt(2 * (low + (high - low) * u)), left + (right - left) * v))
         return np.array(found), shifted / p
 
+    def foretold(self, x, P, first, hits, since):
+        """Where the next plot is looked for, S about it, and state and covariance there; since: scans since the last
+        of the plots, whose number is hits. A track of one plot, `first`, has no state.
+        """
+        choice, sigma, T = self.choice, self.given.sigma, self.given.period
+        if hits == 1:
+            reach = choice.speed * since * T
+            return first, np.diag(2 * sigma**2) + np.diag([reach**2, (reach / first[0]) ** 2]), x, P
+        x, P, S = foretold(x, P, T, choice.variance, sigma)
+        return H @ x, S, x, P
+
+    def updated(self, x, P, place, S, plots, first, hits, since):
+        """State and covariance after a scan, and whether one of its plots (n, 2) was in the gate; see `foretold`."""
+        choice, sigma = self.choice, self.given.sigma
+        squared = np.einsum("ni,ij,nj->n", plots - place, np.linalg.inv(S), plots - place)
+        taken = plots[squared <= self.gate]
+        if len(taken) == 0:
+            return x, P, False
+        if hits == 1:
+            nearby = taken[np.argmin(squared[squared <= self.gate])]
+            return *second(first, nearby, since * self.given.period, sigma), True
+        if choice.association == "pda":
+            given = (self.given.detection, choice.gate_probability, self.given.density * place[0])
+            return *pda(x, P, S, taken, sigma, *given), True
+        return *nearest(x, P, S, taken, sigma), True
+
     def follow(self, first, scans, law, shares):
         """Weights at the end and at each scan held, of the track that the plot `first` (2,) begins.
 
         law 0: as it is; 1: drawn so that it is confirmed; 2: so that it is held on. shares (3,) of these laws.
         """
-        choice, sigma, T = self.choice, self.given.sigma, self.given.period
+        choice, sigma = self.choice, self.given.sigma
         state, hits, misses, last, held, ratios = 1, 1, 0, 0, [], np.ones(3)
         x = P = None
         for k in range(1, scans):
-            if hits == 1:
-                reach, place = choice.speed * (k - last) * T, first
-                S = np.diag(2 * sigma**2) + np.diag([reach**2, (reach / first[0]) ** 2])
-            else:
-                x, P, S = foretold(x, P, T, choice.variance, sigma)
-                place = H @ x
+            place, S, x, P = self.foretold(x, P, first, hits, k - last)
             if state == 1:
                 plots, factor = self.drawn(k, place, S, (choice.m - hits) / (choice.n - k), law > 0)
                 ratios[1:] *= factor
@@ -98,20 +119,8 @@ class FalseTrack:
                 ratios[2] *= factor
             else:
                 plots = self.field(k)
-            nu = plots - place
-            d = np.einsum("ni,ij,nj->n", nu, np.linalg.inv(S), nu)
-            plots = plots[d <= self.gate]
-            if len(plots) == 0:
-                misses += 1
-            elif hits == 1:
-                x, P = second(first, plots[np.argmin(d[d <= self.gate])], (k - last) * T, sigma)
-            elif choice.association == "pda":
-                given = (self.given.detection, choice.gate_probability, self.given.density * place[0])
-                x, P = pda(x, P, S, plots, sigma, *given)
-            else:
-                x, P = nearest(x, P, S, plots, sigma)
-            if len(plots):
-                hits, misses, last = hits + 1, 0, k
+            x, P, hit = self.updated(x, P, place, S, plots, first, hits, k - last)
+            hits, misses, last = (hits + 1, 0, k) if hit else (hits, misses + 1, last)
             if state == 1:
                 state = 2 if hits >= choice.m else int(hits + choice.n - k - 1 >= choice.m)
             elif misses >= choice.misses or (np.diag(P)[[0, 2]] > (choice.lost * sigma) ** 2).any():
