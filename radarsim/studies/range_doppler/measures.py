@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from radarsim.engine.results import CaseResult
+from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.report import claims
 from radarsim.report.claims import Part, Range, Series, certain, common_times, minus, ratio
 from radarsim.report.statistics import Estimate, difference
@@ -412,12 +413,11 @@ def closed_forms(radar: int) -> Measure:
         axes = seen.case(radar).axes
         dt, theta = axes.scan_period_s, axes.C_theta
         C_M = VARIANCE / RADARS[radar][0] ** 2
-        B = np.array([[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]])
-        g = np.array([dt**3 / 6, dt**2 / 2, dt])
+        B, Q = transition(dt), manoeuvre_covariance(C_M, dt)
         H, noise = np.eye(2, 3), np.diag([1.0, 1 / (dt**2 * theta)])
         rng, faults = np.random.default_rng(1), []
         for root in rng.normal(size=(50, 3, 3)) / np.array([1, dt, dt**2])[:, None]:
-            forecast = B @ (root @ root.T) @ B.T + C_M * np.outer(g, g)
+            forecast = B @ (root @ root.T) @ B.T + Q
             spreads = np.sqrt(np.diag(forecast))
             faults.append(np.abs(_forecast(root @ root.T, dt, C_M) - forecast) / np.outer(spreads, spreads))
             gains = forecast @ H.T @ np.linalg.inv(H @ forecast @ H.T + noise)
