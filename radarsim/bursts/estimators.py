@@ -7,13 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from radarsim.bursts.burst import Burst, signal, turns_per_parameter
+from radarsim.bursts.fisher import image_bias, phase_prior
 from radarsim.bursts.kernels.data import PHYSICS, block_table
 from radarsim.bursts.kernels.scoring import SIZE, Z0
 from radarsim.bursts.kernels.sequence import OPTIONS, WINDOW
 from radarsim.bursts.schedule import Designer, handover_directions
 
 Blocks = Callable[[int], tuple[int, int, int]]
-IMAGE_SHARE = 0.02  # of a window's samples: below it the sum at twice the frequency is left out of the likelihood
+# The sum at twice the frequency is left out of the likelihood where it is less of every window's samples than this, and
+# where that biases no estimate by more than this in its standard deviations: then no σ is over 2 % too large.
+IMAGE_SHARE, IMAGE_BIAS = 0.02, 0.2
 
 
 @dataclass(frozen=True)
@@ -49,11 +52,17 @@ class World:
         return np.ascontiguousarray(self.mean[Z0 : Z0 + 4, : len(self.factor)].T)
 
 
-def has_image(burst: Burst, windows: list[int], truth_turns: np.ndarray) -> bool:
-    """Whether the sum at twice the frequency counts in any window; phases (samples per pulse, pulses) in turns."""
+def has_image(burst: Burst, sigma: np.ndarray, windows: list[int], truth_turns: np.ndarray) -> bool:
+    """Whether the sum at twice the frequency counts in any window, of forecasts of standard deviations sigma (size,).
+
+    Phases (samples per pulse, pulses) are in turns.
+    """
+    if burst.complex_samples:
+        return False
     ends = np.array(windows)
     doubled = np.cumsum(np.exp(-4j * math.pi * (truth_turns - np.rint(truth_turns))).sum(axis=0))[ends - 1]
-    return not burst.complex_samples and bool(np.any(np.abs(doubled) > IMAGE_SHARE * burst.samples_per_pulse * ends))
+    shares = np.abs(doubled) / (burst.samples_per_pulse * ends)
+    return bool(shares.max() > IMAGE_SHARE or image_bias(burst, sigma, windows, truth_turns).max() > IMAGE_BIAS)
 
 
 def world(
@@ -76,14 +85,6 @@ def world(
     mean, factor = block_table(physics[0], edges, reference_turns, clean)
     rows = [clean.real.ravel(), clean.imag.ravel()] if burst.complex_samples else [clean.ravel()]
     return World(physics[0], edges.astype(np.int64), np.stack(rows), mean, factor)
-
-
-def phase_prior(sigma: np.ndarray) -> np.ndarray:
-    """Prior precisions (size,) of θ as the estimator uses them: a phase known no better than π is not known at all."""
-    precision = np.asarray(sigma, dtype=float) ** -2.0
-    if sigma[0] > math.pi:
-        precision[0] = 0.0
-    return precision
 
 
 def step_root(data: np.ndarray, precision: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -46,14 +46,48 @@ def fisher_sums(burst: Burst, size: int, windows: list[int], theta: np.ndarray |
     if theta is not None and not burst.complex_samples:
         turns = phase_turns(theta, t)
         weight = np.sin(2.0 * math.pi * (turns - np.rint(turns))) ** 2
-    ends = np.array(windows) - 1
-    moments = []
-    for _ in range(2 * size - 1):
-        moments.append(np.cumsum(weight.sum(axis=0))[ends])
-        weight = weight * x  # products are the same on every processor, powers are not
+    moments = running_moments(weight, x, windows, 2 * size - 1)
     c, order = sensitivities(size, burst.duration_s), np.arange(size)
     level = burst.amplitude**2 / burst.noise_variance
-    return [level * np.outer(c, c) * np.array(moments)[order[:, None] + order, w] for w in range(len(windows))]
+    return [level * np.outer(c, c) * moments[order[:, None] + order, w] for w in range(len(windows))]
+
+
+def running_moments(weight: np.ndarray, x: np.ndarray, windows: list[int], count: int) -> np.ndarray:
+    """Sums (count, K) of weight · x^j, j = 0 … count − 1, over the samples up to each window (in pulses).
+
+    weight and x are (samples per pulse, pulses).
+    """
+    ends, moments = np.array(windows) - 1, []
+    for _ in range(count):
+        moments.append(np.cumsum(weight.sum(axis=0))[ends])
+        weight = weight * x  # products are the same on every processor, powers are not
+    return np.array(moments)
+
+
+def image_bias(burst: Burst, sigma: np.ndarray, windows: list[int], turns: np.ndarray) -> np.ndarray:
+    """How far real samples' estimates of each window (K,) lie off where the image is left out, in standard deviations.
+
+    That is √(gᵀ (Φ_θ + R_pr⁻¹)⁻¹ g), no less than the bias of any component over its spread with the prior. At the
+    truth the image in Re Σ u e^{-jψ} has the gradient g = (A²/2σ²) Σ sin 2ψ k, which the second sum of (5) takes away.
+    It is the same in every burst, so estimates without that sum are biased, by the more of their spreads the larger
+    A/σ is. sigma (size,) is the prior's, turns (samples per pulse, pulses) the true phase.
+    """
+    x, size = sample_times(burst, max(windows)) / burst.duration_s, len(sigma)
+    turns = turns[:, : max(windows)]
+    sums = running_moments(np.sin(4.0 * math.pi * (turns - np.rint(turns))), x, windows, size)
+    level = burst.amplitude**2 / (2.0 * burst.noise_variance)
+    gradients = level * sensitivities(size, burst.duration_s)[:, None] * sums
+    known = np.diag(phase_prior(sigma))
+    covariances = [balanced_inverse(data + known) for data in fisher_sums(burst, size, windows)]
+    return np.sqrt([max(g @ R @ g, 0.0) for g, R in zip(gradients.T, covariances, strict=True)])
+
+
+def phase_prior(sigma: np.ndarray) -> np.ndarray:
+    """Prior precisions (size,) of θ as the estimator uses them: a phase known no better than π is not known at all."""
+    precision = np.asarray(sigma, dtype=float) ** -2.0
+    if sigma[0] > math.pi:
+        precision[0] = 0.0
+    return precision
 
 
 def spreads(information: np.ndarray) -> np.ndarray:

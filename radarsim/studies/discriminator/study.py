@@ -181,7 +181,7 @@ def prepared(case: Case) -> Plan:
     designer = designer_of(burst, sigma, schedules.Condition())  # of forms, which no condition enters
     windows = windows_of(spec, burst, sigma)
     every = sorted({w for own in windows for w in own})
-    image = plans.has_image(burst, every, phase.turns)
+    image = plans.has_image(burst, sigma, every, phase.turns)
     per_window = spec.blocks_per_window or (IMAGE_BLOCKS_PER_WINDOW if image else BLOCKS_PER_WINDOW)[mode]
     edges = cuts.block_edges(every, per_window, 8 if mode == DEMODULATED else 1)
     world = plans.world(burst, mode, edges, image, phase.turns, phase.reference)
@@ -258,7 +258,7 @@ def bounds(
     shape = (len(windows), most, size)
     potential, posterior = np.ones(shape), np.ones(shape)
     every = sorted({w for own in windows for w in own})
-    known = np.diag(plans.phase_prior(sigma))
+    known = np.diag(exact.phase_prior(sigma))
     found = {
         window: (exact.spreads(information), exact.spreads(information + known))
         for window, information in zip(every, exact.fisher_sums(burst, size, every, theta), strict=True)

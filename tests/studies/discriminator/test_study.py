@@ -9,6 +9,8 @@ import pytest
 from radarsim.app.configs import load
 from radarsim.app.work import CaseWork
 from radarsim.bursts import burst as model
+from radarsim.bursts import estimators as plans
+from radarsim.bursts import fisher as exact
 from radarsim.bursts.kernels import data, scoring
 from radarsim.bursts.kernels import sequence as kernels
 from radarsim.bursts.kernels import strip as strips
@@ -204,6 +206,67 @@ def test_without_the_image_the_crossing_is_estimated_worse():
     plan.world.physics["image"] = 0
     blind, _ = final(plan, 0, 400)
     assert np.sqrt(np.mean((ratio - blind) ** 2)) > 0.03
+
+
+STRONG = {**SEQUENCE, "tail": "exact", "lock_probability": 0.9999}
+
+
+@pytest.mark.parametrize("variance", [1e-3, 1e-4, 1e-5, 1e-8])
+def test_a_strong_echo_is_estimated_to_its_bound(variance):
+    """Where the image was left out, as little of it as the samples hold, σ was 1.4 of the bound at 1e-4, and 5 % of the
+    bursts were lost at 1e-5."""
+    for engine, n in (("auto", 4000), ("samples", 100)):
+        plan = plan_of(STRONG, engine=engine, burst={"noise_variance": variance})
+        ratio, lock = final(plan, 0, n)
+        lost, expected = (~lock).sum(), n * (plan.options["windows"][0] - 1) * (1 - STRONG["lock_probability"])
+        assert lost <= expected + 5 * np.sqrt(expected) + 1
+        right = ratio[lock[:, 0], 0]
+        assert np.sqrt(np.mean(right**2, axis=0)) == pytest.approx(1, abs=5.85 / np.sqrt(2 * n))
+        assert np.abs(right.mean(axis=0)).max() < 5 / np.sqrt(n)
+
+
+def image_biases(plan, spec, n):
+    """Biases of the windows (K,) in standard deviations, as `exact.image_bias` foretells them and as n bursts have."""
+    burst, phase = study.burst_of(spec), study.phase_of(spec, study.burst_of(spec))
+    sigma, windows = study.forecast(spec, burst), [int(one) for one in plan.windows["pulses"][:, 0]]
+    size = len(sigma)
+    means = study.estimate(plan, 0, n)[0][:, :, 0, :size].mean(axis=0) / model.turns_per_parameter(size, 0.3)
+    known = np.diag(exact.phase_prior(sigma))
+    found = [m @ (data + known) @ m for m, data in zip(means, exact.fisher_sums(burst, size, windows), strict=True)]
+    noise = size / n  # of a mean's square
+    return exact.image_bias(burst, sigma, windows, phase.turns), np.sqrt(np.maximum(np.array(found) - noise, 0.0))
+
+
+def fixed_windows(variance):
+    """A case of lone windows, started from the truth, which do not depend on the noise, and its plan."""
+    own = [FROM_TRUTH | {"name": f"{end} s", "schedule": [end]} for end in (0.002, 0.006, 0.03, 0.3)]
+    burst = BASE["burst"] | {"noise_variance": variance}
+    case = load(BASE | {"estimators": own, "engine": "block_sums", "burst": burst}).cases[0]
+    return case.spec, study.prepare(case)
+
+
+def test_the_bias_without_the_image_is_the_one_foretold(monkeypatch):
+    monkeypatch.setattr(plans, "IMAGE_BIAS", np.inf)
+    n = 4000
+    for variance in (1e-3, 1e-5):
+        spec, plan = fixed_windows(variance)
+        assert not plan.world.physics["image"]
+        foretold, found = image_biases(plan, spec, n)
+        assert foretold.max() > 0.5
+        assert found == pytest.approx(foretold, abs=5 / np.sqrt(n), rel=0.02)
+
+
+def test_the_image_is_taken_where_its_bias_would_pass_the_limit():
+    n = 4000
+    spec, plan = fixed_windows(1.0)
+    at_one = image_biases(plan, spec, 8)[0].max()
+    for share, taken in ((0.9, False), (1.1, True)):
+        # The forecast is a multiple of the potential spreads, so that all information is by A²/σ².
+        spec, plan = fixed_windows((at_one / (share * plans.IMAGE_BIAS)) ** 2)
+        assert bool(plan.world.physics["image"]) is taken
+        foretold, found = image_biases(plan, spec, n)
+        assert foretold.max() == pytest.approx(share * plans.IMAGE_BIAS, rel=0.01)
+        assert found == pytest.approx(0 if taken else foretold, abs=5 / np.sqrt(n))
 
 
 def test_demodulated_samples_are_nearly_as_good():
