@@ -106,7 +106,13 @@ def simulate(config: str, output: str, realisation: int, overrides: tuple[str, .
     type=click.Choice(["asterix", "opensky", "ais", "csv"]),
     help="The format; default: what the content shows.",
 )
-@click.option("--at", "place", metavar="LAT,LON,HEIGHT", help="Where the radar stands: degrees, degrees, m (WGS 84).")
+@click.option(
+    "--at",
+    "places",
+    multiple=True,
+    metavar="[SAC/SIC=]LAT,LON,HEIGHT",
+    help="Where the radar stands: degrees, degrees, m (WGS 84); of a recording of several, each by its name.",
+)
 @click.option("--antenna", metavar="AZ,EL", help="Its normal, degrees: adds the angles that multimodel takes.")
 @click.option("--track", "tracks", multiple=True, metavar="ID", help="Only this track; may be given again.")
 @click.option("--truth", metavar="FILE", help="A recording of positions: columns true_… by aircraft and time.")
@@ -123,7 +129,7 @@ def import_(
     recording: str,
     output: str,
     kind: "Format | None",
-    place: str | None,
+    places: tuple[str, ...],
     antenna: str | None,
     tracks: tuple[str, ...],
     **further: "Any",
@@ -153,7 +159,7 @@ def import_(
 
     options = importing.Options(
         kind,
-        site.site_of(place) if place else None,
+        *site.sites_of(places),
         site.antenna_of(antenna) if antenna else None,
         tracks,
         importing.zero_of(further["time_from"]),

@@ -210,6 +210,12 @@ def _named(data: bytes, at: int) -> tuple[list[int], int]:
             return numbers, at
 
 
+def _source(data: bytes, at: int) -> str:
+    """SAC/SIC of the record at `at`: item 010, the first of every category that is read; '' where it has none."""
+    begin = _after_specification(data, at)
+    return f"{data[begin]}/{data[begin + 1]}" if data[at] & 0x80 else ""
+
+
 def _after_specification(data: bytes, at: int) -> int:
     """Where a field specification ends, whatever it names; beyond the data if it does not end."""
     while at < len(data) and data[at] & 1:
@@ -401,6 +407,7 @@ class Asterix:
         self.sectors = _Profile(2, ("030",))
         self.sector_time = field(self.sectors.spec, "030")
         self.clock = Unrolled(DAY_S)
+        self.sources: dict[str, str] = {}  # the first sensor of plots and the first of positions, SAC/SIC
         self.plots = False  # whether there are plots beside the truth
 
     def batches(self) -> Iterator[Batch]:
@@ -450,12 +457,16 @@ class Asterix:
             self.skipped[f"data blocks of category {category:03d}"] += 1
             return
         while at < len(data):
-            track, address, row, at = decoder.row(data, at)
+            begin = at
+            track, address, row, at = decoder.row(data, begin)
             self.records += 1
             if row is None:
                 self.skipped["records without time or position"] += 1
             else:
-                gathered.add(track, address, (self.clock(row[0]), *row[1:]))
+                radar = _source(data, begin)
+                if track and radar != self.sources.setdefault(gathered.kind, radar):
+                    track = f"{radar}:{track}"  # two sensors count their tracks each for itself
+                gathered.add(track, address, (self.clock(row[0]), *row[1:]), radar)
 
     def _sectors(self, data: bytes) -> None:
         """The full time of day, which category 001 leaves to the sector messages of its radar."""

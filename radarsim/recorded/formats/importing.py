@@ -8,6 +8,7 @@ import datetime
 import io
 import math
 import os
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -29,6 +30,8 @@ FORMATS: tuple[Format, ...] = ("asterix", "opensky", "ais", "csv")
 HEAD = 4096  # bytes that the format is found from
 LONGEST_GAP_S = 60.0  # over which truth is not interpolated
 MOST_LISTED = 12
+FARTHEST_TRUTH_M = 5000.0  # of plots from their truth in range, by median: 20 s of an airliner
+NOT_LATER = "rows not later than the one before of their track"
 SIGN_TESTS = 2000  # pairs of plots over which the sign of the Doppler speed is looked at
 LEAST_TESTS = 20
 PLACED = ("range_m", "bearing_rad", "velocity_mps")
@@ -41,14 +44,16 @@ ANGLES = ("elevation_rad", "azimuth_rad")
 class Options:
     """How to read a recording.
 
-    format: found from the content where None. site: where the radar stands. antenna: its normal, for the angles that
-    `multimodel` takes. tracks: those to be written, all where empty. zero: what t_s counts from, "first" (record),
+    format: found from the content where None. site: where the radar stands; sites: where each radar of a recording of
+    several stands, by SAC/SIC, others being left out. antenna: its normal, for the angles that `multimodel` takes.
+    tracks: those to be written, all where empty. zero: what t_s counts from, "first" (record),
     "midnight" (of the first record's day, UTC) or s from 1970. truth: a second recording, of positions. towards:
     Doppler speeds count as positive where the range falls. columns: of a CSV, theirs by ours.
     """
 
     format: Format | None = None
     site: Site | None = None
+    sites: Mapping[str, Site] = field(default_factory=dict)
     antenna: Antenna | None = None
     tracks: tuple[str, ...] = ()
     zero: str | float = "first"
@@ -123,6 +128,8 @@ def import_recording(
     progress is called now and then with the number of records read.
     """
     path = os.fspath(source)
+    if options.truth and not options.site:
+        raise ConfigError("truth: needs the place of one radar, --at LAT,LON,HEIGHT; import other radars by themselves")
     truth = _Truth(path, options) if options.site else None
     with opened(path, options) as (kind, reader):
         work = _Import(kind, reader, options, truth)
@@ -137,6 +144,8 @@ def import_recording(
                 progress(reader.records)
             if first:
                 raise ConfigError(work.nothing())
+            if faults := work.faults():
+                raise ConfigError(*faults)
     return work.finished()
 
 
@@ -148,7 +157,8 @@ class _Import:
         self.done = Imported(kind)
         self.zero: float | None = None
         self.last: dict[str, float] = {}
-        self.left = {"rows not later than the one before of their track": 0, "rows of other tracks": 0}
+        self.left = Counter[str]()
+        self.radars = Counter[str]()
         self.behind = self.unplaced = 0
         self.sign = _Sign()
         self.seen: set[str] = set()
@@ -166,23 +176,26 @@ class _Import:
         """Those records of a batch that are asked for and later than their track's last."""
         wanted, keep = set(self.options.tracks), []
         times = batch.columns["t_s"].tolist()
-        for i, (track, t) in enumerate(zip(batch.track, times, strict=True)):
+        for i, (track, radar, t) in enumerate(zip(batch.track, batch.radar, times, strict=True)):
             if len(self.seen) < MOST_LISTED:
                 self.seen.add(track)
-            if wanted and track not in wanted:
+            if self.options.sites and radar not in self.options.sites:
+                self.left[f"rows of radar {radar or 'without a name'}, whose place --at does not say"] += 1
+            elif wanted and track not in wanted:
                 self.left["rows of other tracks"] += 1
             elif track and t <= self.last.get(track, -math.inf):
-                self.left["rows not later than the one before of their track"] += 1
+                self.left[NOT_LATER] += 1
             else:
                 keep.append(i)
                 self.last[track] = t
+                self.radars[radar] += batch.kind == PLOTS
                 self.done.tracks[track] = self.done.tracks.get(track, 0) + 1
         if not keep:
             return None
-        columns = {name: column[keep] for name, column in batch.columns.items()}
-        if self.options.towards and "velocity_mps" in columns:
-            columns["velocity_mps"] = -columns["velocity_mps"]
-        return Batch(batch.kind, [batch.track[i] for i in keep], [batch.address[i] for i in keep], columns)
+        kept = batch.rows(keep)
+        if self.options.towards and "velocity_mps" in kept.columns:
+            kept.columns["velocity_mps"] *= -1
+        return kept
 
     def _written(self, batch: Batch) -> Iterable[tuple[str, ...]]:
         """The rows of a batch, as text."""
@@ -193,12 +206,13 @@ class _Import:
         if batch.kind == PLOTS:
             self.sign.take(batch)
         if self.truth is not None:
-            columns |= self.truth.columns(batch, self.reader.of_day)
+            columns |= self.truth.columns(batch, columns["range_m"], self.reader.of_day)
+        names = {"track": batch.track} | ({"radar": batch.radar} if isinstance(self.reader, Asterix) else {})
         if not self.done.columns:
-            self.done.columns = ("t_s", "track", *(name for name in columns if name != "t_s"))
+            self.done.columns = ("t_s", *names, *(name for name in columns if name != "t_s"))
         self.done.rows += len(t)
         cells = [[_cell(value) for value in columns[name].tolist()] for name in columns]
-        return zip(cells[0], batch.track, *cells[1:], strict=True)
+        return zip(cells[0], *names.values(), *cells[1:], strict=True)
 
     def _zero(self, first: float) -> float:
         """What t_s counts from, in the times of the recording."""
@@ -221,9 +235,13 @@ class _Import:
             columns = {name: seen[name] for name in (*PLACED, "level_elevation_rad", *LOCAL)}
             return columns | {"altitude_m": given["altitude_m"]} | self._angles(columns)
         columns = {name: given[name] for name in (*PLACED, "span_mps", "altitude_m")}
-        if site is None:
+        if site is None and not self.options.sites:
             return columns
-        local = site.local(given["range_m"], given["bearing_rad"], given["altitude_m"])
+        local = np.full((len(batch.radar), 3), np.nan)
+        for name, own in by_name(batch.radar).items():
+            place = self.options.sites.get(name) or site
+            assert place is not None  # rows of other radars are left out
+            local[own] = place.local(*(given[key][own] for key in ("range_m", "bearing_rad", "altitude_m")))
         self.unplaced += int(np.isnan(local[:, 1]).sum())
         columns |= {"level_elevation_rad": described(local)["level_elevation_rad"]}
         columns |= dict(zip(LOCAL, local.T, strict=True))
@@ -238,16 +256,19 @@ class _Import:
 
     def comment(self) -> list[str]:
         """The lines before the header: what the columns are."""
-        site, antenna = self.options.site, self.options.antenna
+        sites, antenna = self.options.sites or {"": self.options.site}, self.options.antenna
         lines = [
             f"# made by radarsim import from a recording in the format {self.done.format}",
             f"# t_s: seconds from {self._zero_words()}; track: as in the recording",
             "# range_m: slant range; bearing_rad: from north to east; velocity_mps: radial and positive where the "
             "range grows; span_mps: what a folded velocity is ambiguous by",
         ]
-        if site:
-            lat, lon, height = site.place
-            lines.append(f"# radar (WGS 84): {lat:.6f} deg {lon:.6f} deg {height:g} m; x_m north y_m up z_m east of it")
+        for name, site in sites.items():
+            if site:
+                lat, lon, height = site.place
+                place = f"{lat:.6f} deg {lon:.6f} deg {height:g} m; x_m north y_m up z_m east of it"
+                lines.append(f"# radar{f' {name}' if name else ''} (WGS 84): {place}")
+        if any(sites.values()):
             lines.append("# level_elevation_rad: above the plane that is level at the radar")
         if antenna:
             degrees = " ".join(f"{math.degrees(angle):g} deg" for angle in antenna)
@@ -273,6 +294,19 @@ class _Import:
         why = f" ({'; '.join(passed)} passed over)" if passed else ""
         return f"{path}: has no plots; {self.reader.records} records were read{why}"
 
+    def faults(self) -> list[str]:
+        """What makes the rows wrong that were written, seen when all were read."""
+        path, found = getattr(self.reader, "path", "the recording"), []
+        if len(self.radars) > 1 and self.options.site:
+            names = ", ".join(self.radars)
+            found.append(f"at: must say where each radar stands whose plots are wanted, --at SAC/SIC=LAT,LON,HEIGHT: "
+                         f"{path} has plots of {len(self.radars)}: {names}")  # fmt: skip
+        if isinstance(self.reader, Table) and (asked := self.reader.whose(self.left[NOT_LATER])):
+            found.append(asked)
+        if self.truth is not None:
+            found += self.truth.faults(sorted(self.seen))
+        return found
+
     def finished(self) -> Imported:
         """What was done, with what the user should know of it."""
         done = self.done
@@ -284,10 +318,14 @@ class _Import:
         if self.behind:
             fault = "are behind the antenna or without height: elevation_rad and azimuth_rad are empty there"
             done.notes.append(f"{self.behind} of {done.rows} plots {fault}")
+        if len(self.radars) > 1:
+            each = ", ".join(f"{name} ({count})" for name, count in self.radars.items())
+            done.notes.append(f"plots of {len(self.radars)} radars, SAC/SIC (rows): {each}; the tracks of all but the "
+                              "first have its name before their number")  # fmt: skip
         if isinstance(self.reader, Table):
             done.notes += self.reader.notes()
         if self.truth is not None:
-            done.notes += self.truth.notes(done.rows)
+            done.notes += self.truth.notes()
         if unnamed := done.tracks.get("", 0):
             done.notes.append(f"{unnamed} of {done.rows} plots belong to no track; `radarsim track` passes them over")
         if note := self.sign.note(self.options.towards):
@@ -296,11 +334,15 @@ class _Import:
 
 
 class _Truth:
-    """Where each aircraft was: positions of the second recording, or of the same one (category 062 beside 048)."""
+    """Where each aircraft was: positions of the second recording, or of the same one (category 062 beside 048).
+
+    An aircraft is known by its address alone (in a CSV: by its track's name). What has none is no truth of anything.
+    """
 
     def __init__(self, path: str, options: Options):
         assert options.site is not None
-        self.matched = 0
+        self.rows = self.unnamed = 0
+        self.misses: dict[str, list[np.ndarray]] = {}  # of the range, by aircraft
         self.own = options.truth is None
         self.tables: dict[str, list[np.ndarray]] = {}
         self.ready: dict[str, Callable[[np.ndarray], np.ndarray]] = {}
@@ -312,7 +354,8 @@ class _Truth:
             with opened(options.truth, Options(), truth=True) as (_, reader):
                 self._read(reader, options.site)
             if not self.tables:
-                raise ConfigError(f"{options.truth}: has no positions on the earth, which the truth must have")
+                raise ConfigError(f"{options.truth}: must have positions on the earth of aircraft with an address; "
+                                  f"has {self.unnamed} without")  # fmt: skip
 
     def _read_own(self, path: str, options: Options) -> None:
         """The positions beside the plots of one ASTERIX file; a stream, which is read once, has none."""
@@ -338,26 +381,30 @@ class _Truth:
                 continue
             seen = site.seen(batch.columns)
             table = np.stack([batch.columns["t_s"], *(seen[name] for name in LOCAL)], axis=-1)
-            for name in set(batch.address):
-                rows = [i for i, one in enumerate(batch.address) if one == name]
-                self.tables.setdefault(name, []).append(table[rows])
+            for name, rows in by_name(batch.address).items():
+                if name:
+                    self.tables.setdefault(name, []).append(table[rows])
+                else:
+                    self.unnamed += len(rows)
 
-    def columns(self, batch: Batch, of_day: bool) -> dict[str, np.ndarray]:
-        """The truth at the times of a batch: true range, bearing, velocity, coordinates and speeds (n,)."""
+    def columns(self, batch: Batch, range_m: np.ndarray, of_day: bool) -> dict[str, np.ndarray]:
+        """The truth at the times of a batch of plots of these ranges: range, bearing, velocity, place, speeds (n,)."""
         if not self.tables:
             return {}
         t, states = batch.columns["t_s"], np.full((len(batch.track), 6), np.nan)
         if of_day != self.of_day:
             t = t % DAY_S
-        names = batch.address if any(batch.address) else batch.track
-        for name in set(names):
-            rows = [i for i, one in enumerate(names) if one == name]
+        named = by_name(batch.address if any(batch.address) else batch.track)
+        for name, rows in named.items():
             path = self._path(name, of_day)
             if path is not None:
                 states[rows] = path(t[rows])
-        known = np.isfinite(states[:, 0])
-        self.matched += int(known.sum())
         seen = described(states[:, :3])
+        self.rows += len(t)
+        miss = np.abs(range_m - seen["range_m"])
+        for name, rows in named.items():
+            if len(known := miss[rows][np.isfinite(miss[rows])]):
+                self.misses.setdefault(name, []).append(known)
         radial = np.einsum("ni,ni->n", states[:, :3], states[:, 3:]) / seen["range_m"]
         # Named as the components of the studies' filters are.
         columns = {"r_m": seen["range_m"], "Vr_mps": radial, "b_rad": seen["bearing_rad"]}
@@ -365,9 +412,7 @@ class _Truth:
         return {f"true_{name}": column for name, column in columns.items()}
 
     def _path(self, name: str, of_day: bool) -> Callable[[np.ndarray], np.ndarray] | None:
-        """Position and speed (n, 6) of one aircraft by time; of a lone one whatever its name."""
-        if name not in self.tables and len(self.tables) == 1:
-            (name,) = self.tables
+        """Position and speed (n, 6) of one aircraft by time; none where the truth does not name it."""
         if name not in self.tables:
             return None
         if name not in self.ready:
@@ -377,9 +422,39 @@ class _Truth:
             self.ready[name] = interpolated(table)
         return self.ready[name]
 
-    def notes(self, rows: int) -> list[str]:
-        """How much of the plots has a truth."""
-        return [f"truth: {self.matched} of {rows} plots"] if self.tables else []
+    def faults(self, tracks: Sequence[str]) -> list[str]:
+        """What shows that the truth is not that of the plots; tracks: some of theirs."""
+        found = []
+        if self.tables and not self.misses and not self.own:
+            names = list(self.tables)
+            more = " …" if len(names) > MOST_LISTED else ""
+            found.append(f"truth: no plot has the address and a time of an aircraft in it; it has "
+                         f"{', '.join(names[:MOST_LISTED])}{more}, the plots "
+                         f"{', '.join(filter(None, tracks)) or 'no names'}")  # fmt: skip
+        for name, misses in self.misses.items():
+            miss = float(np.median(np.concatenate(misses)))
+            if miss > FARTHEST_TRUTH_M:
+                must = (
+                    f"at most {FARTHEST_TRUTH_M:g} m is allowed: another aircraft, another clock or a wrong place --at"
+                )
+                found.append(f"truth: the plots of {name} lie {miss:.0f} m from it in range (median), {must}")
+        return found
+
+    def notes(self) -> list[str]:
+        """How much of the plots has a truth, and how far from it they lie."""
+        if not self.misses:
+            return ["truth: of no plot"] if self.tables else []
+        misses = np.concatenate([one for own in self.misses.values() for one in own])
+        return [f"truth: of {len(misses)} of {self.rows} plots, which lie {np.median(misses):.3g} m from it in range "
+                "(median)"]  # fmt: skip
+
+
+def by_name(names: Sequence[str]) -> dict[str, np.ndarray]:
+    """The rows of each name."""
+    found: dict[str, list[int]] = {}
+    for i, name in enumerate(names):
+        found.setdefault(name, []).append(i)
+    return {name: np.array(rows) for name, rows in found.items()}
 
 
 def interpolated(table: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

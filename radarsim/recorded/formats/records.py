@@ -1,6 +1,7 @@
 """What every reader of a recording gives: some records at a time, as columns."""
 
 import datetime
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -24,13 +25,20 @@ class Batch(NamedTuple):
 
     kind is PLOTS (measured by a radar: PLOT_COLUMNS) or POSITIONS (on the earth: POSITION_COLUMNS). track holds the
     track of each record, '' where it has none; address what names the aircraft or ship everywhere (24 bits in
-    hexadecimal, MMSI), '' where it is not known; columns, arrays (n,), not-a-number where a record is silent.
+    hexadecimal, MMSI), '' where it is not known; radar what names the sensor (SAC/SIC), '' where the format does not;
+    columns, arrays (n,), not-a-number where a record is silent.
     """
 
     kind: str
     track: list[str]
     address: list[str]
+    radar: list[str]
     columns: dict[str, np.ndarray]
+
+    def rows(self, keep: list[int]) -> "Batch":
+        """Those of its records."""
+        names = ([column[i] for i in keep] for column in (self.track, self.address, self.radar))
+        return Batch(self.kind, *names, {name: column[keep] for name, column in self.columns.items()})
 
 
 class Reader(Protocol):
@@ -60,39 +68,43 @@ class Gathered:
     def _empty(self) -> None:
         self.track: list[str] = []
         self.address: list[str] = []
+        self.radar: list[str] = []
         self.rows: list[tuple[float, ...]] = []
 
     def __len__(self) -> int:
         return len(self.rows)
 
-    def add(self, track: str, address: str, row: tuple[float, ...]) -> None:
+    def add(self, track: str, address: str, row: tuple[float, ...], radar: str = "") -> None:
         """One more record; row in the order of `names`."""
         self.track.append(track)
         self.address.append(address)
+        self.radar.append(radar)
         self.rows.append(row)
 
     def taken(self) -> Batch:
         """The records until now as a batch; it starts again."""
         table = np.array(self.rows, dtype=float).reshape(-1, len(self.names))
-        batch = Batch(self.kind, self.track, self.address, dict(zip(self.names, table.T.copy(), strict=True)))
+        columns = dict(zip(self.names, table.T.copy(), strict=True))
+        batch = Batch(self.kind, self.track, self.address, self.radar, columns)
         self._empty()
         return batch
 
 
 class Unrolled:
     """Times of a clock that starts again after `period_s`, made to run on. Records out of order by half of it are seen
-    as they are."""
+    as they are; so are times that fall from, or to, further than near_s from the clock's turn."""
 
-    def __init__(self, period_s: float):
-        self.period_s, self.turns = period_s, 0
+    def __init__(self, period_s: float, near_s: float = math.inf):
+        self.period_s, self.near_s, self.turns = period_s, near_s, 0
         self.last: float | None = None
 
     def __call__(self, t: float) -> float:
         """t (s) of the clock, with the turns that it has made added."""
         if self.last is not None:
-            if t < self.last - self.period_s / 2:
+            near = max(t, self.last) >= self.period_s - self.near_s and min(t, self.last) <= self.near_s
+            if near and t < self.last - self.period_s / 2:
                 self.turns += 1
-            elif t > self.last + self.period_s / 2 and self.turns:
+            elif near and t > self.last + self.period_s / 2 and self.turns:
                 return t + (self.turns - 1) * self.period_s
         self.last = t
         return t + self.turns * self.period_s

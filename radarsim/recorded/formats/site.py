@@ -5,6 +5,8 @@ those above the plane that is level at the radar; an aircraft far away and low l
 """
 
 import math
+import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -118,6 +120,19 @@ def site_of(text: str) -> Site:
     if faults:
         raise ConfigError(*faults)
     return Site(latitude, longitude, height)
+
+
+def sites_of(texts: Sequence[str]) -> tuple[Site | None, dict[str, Site]]:
+    """The site of the one radar, `LAT,LON,HEIGHT`, or of each of several, `SAC/SIC=LAT,LON,HEIGHT`."""
+    named = {name.strip(): site_of(place) for name, sign, place in (text.partition("=") for text in texts) if sign}
+    plain = [text for text in texts if "=" not in text]
+    if len(plain) > 1 or (plain and named):
+        raise ConfigError(
+            f"at: must be one LAT,LON,HEIGHT, or SAC/SIC=LAT,LON,HEIGHT of each radar; got {' '.join(texts)}"
+        )
+    if faults := [name for name in named if not re.fullmatch(r"\d{1,3}/\d{1,3}", name)]:
+        raise ConfigError(*(f"at: SAC/SIC must be two numbers, as 25/12; got {name!r}" for name in faults))
+    return (site_of(plain[0]) if plain else None), named
 
 
 def antenna_of(text: str) -> Antenna:

@@ -6,7 +6,8 @@ Cells are parted by commas, semicolons or tabulators, whatever the header has mo
 numbers may have a decimal comma.
 
 Where a name has no unit, SI is taken; but positions whose names are those of aviation (`gs`, `groundspeed`, `alt`, …)
-count in feet, knots and feet a minute, as the exports do that use them.
+count in feet, knots and feet a minute, and speeds of ships (`sog`) in knots, as the exports do that use them. What was
+taken is in `notes`. The time is that of the measurement, where the file has it beside another one.
 """
 
 import csv
@@ -20,26 +21,31 @@ from typing import TextIO
 from radarsim.errors import ConfigError
 from radarsim.recorded.formats.records import (
     BATCH,
+    DAY_S,
     PLOT_COLUMNS,
     PLOTS,
     POSITION_COLUMNS,
     POSITIONS,
     Batch,
     Gathered,
+    Unrolled,
     utc_s,
 )
 
 MOST_FAULTS = 20
 LARGEST = 1e15
 UNITS = {
-    "": 1.0, "m": 1.0, "s": 1.0, "mps": 1.0, "m/s": 1.0, "deg": 1.0, "rad": 1.0, "°": 1.0,
+    "": 1.0, "m": 1.0, "s": 1.0, "mps": 1.0, "m/s": 1.0, "deg": 1.0, "degrees": 1.0, "rad": 1.0, "°": 1.0,
     "km": 1e3, "ft": 0.3048, "feet": 0.3048, "nm": 1852.0, "nmi": 1852.0, "kn": 1852 / 3600, "kt": 1852 / 3600,
     "kts": 1852 / 3600, "knots": 1852 / 3600, "kmh": 1 / 3.6, "km/h": 1 / 3.6, "ms": 1e-3, "fpm": 0.3048 / 60,
     "ft/min": 0.3048 / 60,
 }  # fmt: skip
 # Our name of what is read: the names it goes by, in lower case without spaces and units.
 NAMES = {
-    "t_s": ("t", "time", "timestamp", "t_s", "datetime", "date_time", "utc", "time_position", "lastposupdate"),
+    "t_s": (
+        *("lastposupdate", "last_position", "time_position"),  # of the position; what follows may be of a query
+        *("t", "time", "timestamp", "t_s", "datetime", "date_time", "basedatetime", "base_date_time", "utc"),
+    ),
     "track": ("icao24", "icao", "hex", "mmsi", "track_id", "address", "callsign", "flight", "id", "track", "name"),
     "latitude_deg": ("lat", "latitude"),
     "longitude_deg": ("lon", "lng", "long", "longitude"),
@@ -48,7 +54,8 @@ NAMES = {
         *("baroaltitude", "baro_altitude", "alt_baro"),
     ),
     "speed_mps": ("velocity", "groundspeed", "ground_speed", "gs", "speed", "sog"),
-    "course_deg": ("heading", "true_track", "course", "cog", "track_angle", "direction", "track"),
+    # Of a ship the heading is where its bow points; aircraft have their course under this name too.
+    "course_deg": ("true_track", "course", "cog", "track_angle", "direction", "heading", "track"),
     "up_mps": ("vertrate", "vertical_rate", "vert_rate", "geom_rate", "baro_rate", "climb"),
     "range_m": ("range", "slant_range", "distance", "rho"),
     "bearing_rad": ("bearing", "azimuth", "az", "theta"),
@@ -59,6 +66,11 @@ ON_EARTH = ("latitude_deg", "longitude_deg")
 POSITION = "position"  # latitude and longitude in one cell, parted by a comma
 AVIATION = ("gs", "groundspeed", "ground_speed", "alt", "alt_baro", "alt_geom", "direction")  # names without a unit
 AVIATION_UNITS = {"altitude_m": "ft", "speed_mps": "kn", "up_mps": "fpm"}
+MARITIME = ("sog", "cog", "mmsi")  # names of AIS: speeds without a unit are in knots, and these are no numbers:
+NO_SPEED_KN, NO_COURSE_DEG = 102.2, 360.0
+MIDNIGHT_S = 3600.0  # a time of day that falls has passed midnight if both are as near; else a file is sorted by track
+STILL_MPS = 1.0  # below it a position may be the same again
+NAMES_AT_MOST = 10_000  # different cells by which a column may name aircraft
 HIGHEST_M = 20_000.0  # of an aircraft; higher altitudes are feet
 DELIMITERS = ",;\t"
 UNIT = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]$")
@@ -67,8 +79,9 @@ UNIT = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]$")
 class Column:
     """A column of the file: its place, and what makes its numbers into our units."""
 
-    def __init__(self, place: int, name: str, factor: float, angle: bool):
-        self.place, self.name, self.factor, self.angle = place, name, factor, angle
+    def __init__(self, place: int, name: str, factor: float, unit: str):
+        """unit: that which was taken though the name has none."""
+        self.place, self.name, self.factor, self.unit = place, name, factor, unit
 
 
 def split(name: str) -> tuple[str, str]:
@@ -94,9 +107,16 @@ class Table:
         self.width = len(header)
         names = {split(name) for name in header}
         self.aviation = any((name, "") in names for name in AVIATION)
+        self.maritime = any(name in MARITIME for name, _ in names)
+        self.clock = Unrolled(DAY_S, near_s=MIDNIGHT_S)
+        self.before_it: dict[str, tuple[float, float]] = {}  # the last position of each track
         self.columns = self._found(header, given or {})
         self.kind = POSITIONS if set(ON_EARTH) <= set(self.columns) else PLOTS
         self._complete(header)
+        taken = {column.place for column in self.columns.values()}
+        free = [] if "track" in self.columns else [i for i in range(self.width) if i not in taken]
+        self.cells: dict[int, set[str]] = {i: set() for i in free}  # of columns that may name the aircraft
+        self.header = [name.strip() for name in header]
 
     def _opened(self, file: TextIO) -> list[str]:
         """The header; from there on the rows are read with what parts its cells."""
@@ -121,15 +141,29 @@ class Table:
 
     def notes(self) -> list[str]:
         """What was taken for granted of units, and what speaks against it."""
-        if self.kind != POSITIONS:
-            return []
-        if self.aviation:
-            plain = [c.name for ours, c in self.columns.items() if ours in AVIATION_UNITS and not split(c.name)[1]]
-            return [f"taken in feet, knots, feet a minute, as names such as gs and alt are: {', '.join(plain)}"]
-        if self.highest > HIGHEST_M:
+        plain = {ours: c.name for ours, c in self.columns.items() if not split(c.name)[1]}
+        units = {"range_m": "m", "bearing_rad": "degrees", "velocity_mps": "m/s", "span_mps": "m/s", "altitude_m": "m"}
+        units |= {"speed_mps": "m/s", "up_mps": "m/s"} | {ours: c.unit for ours, c in self.columns.items() if c.unit}
+        taken = ", ".join(f"{name} in {units[ours]}" for ours, name in plain.items() if ours in units)
+        found = [f"taken for want of a unit in the name: {taken}"] if taken else []
+        time = self.columns["t_s"].name
+        if others := [name for name in self.header if split(name)[0] in NAMES["t_s"] and name != time]:
+            found.append(f"times are {time}; not used: {', '.join(others)}")
+        if not self.aviation and self.highest > HIGHEST_M:
             name = self.columns["altitude_m"].name
-            return [f"altitudes up to {self.highest:.0f} m: if {name} is in feet, name it {name}_ft"]
-        return []
+            found.append(f"altitudes up to {self.highest:.0f} m: if {name} is in feet, name it {name}_ft")
+        return found
+
+    def whose(self, late: int) -> str | None:
+        """The question which column names the aircraft, where none does and so many rows are out of order of time."""
+        if not late or "track" in self.columns:
+            return None
+        likely = [(i, len(cells)) for i, cells in self.cells.items() if 1 < len(cells) <= self.records / 2]
+        named = ", ".join(f"{self.header[i]} ({count} different)" for i, count in likely) or "none has few names"
+        return (
+            f"{self.path}: track: no column says whose each row is, and {late} rows are not later than the one before; "
+            f"name the column, --column track=THEIRS; it may be: {named}"
+        )
 
     def _found(self, header: list[str], given: Mapping[str, str]) -> dict[str, Column]:
         """Which of our columns the header has; those that were given by name first."""
@@ -154,14 +188,17 @@ class Table:
 
     def _column(self, ours: str, place: int, header: list[str]) -> Column:
         unit = split(header[place])[1]
-        if self.aviation and not unit:
-            unit = AVIATION_UNITS.get(ours, "")
+        taken = ""
+        if not unit and self.aviation:
+            unit = taken = AVIATION_UNITS.get(ours, "")
+        if not unit and self.maritime and ours == "speed_mps":
+            unit = taken = "kn"
         if unit not in UNITS and ours not in ("track", "t_s"):
             raise ConfigError(f"{self.path}:1: {header[place].strip()}: the unit must be one of "
                               f"{', '.join(name for name in UNITS if name)}; got {unit!r}")  # fmt: skip
         angle = ours == "bearing_rad"
         factor = math.pi / 180 if angle and unit != "rad" else UNITS.get(unit, 1.0)
-        return Column(place, header[place].strip(), factor, angle)
+        return Column(place, header[place].strip(), factor, taken)
 
     def _complete(self, header: list[str]) -> None:
         wanted = ("t_s", *ON_EARTH) if self.kind == POSITIONS else ("t_s", "range_m")
@@ -200,12 +237,23 @@ class Table:
         if any(math.isnan(row[i]) for i in ((0, 1, 2) if self.kind == POSITIONS else (0, 1))):
             self.skipped["records without time or position"] += 1
             return
+        for place, seen in self.cells.items():
+            if len(seen) < NAMES_AT_MOST:
+                seen.add(cells[place].strip())
         name = cells[self.columns["track"].place].strip() if "track" in self.columns else "1"
+        if self.kind == POSITIONS:
+            stands = math.hypot(row[4], row[5]) <= STILL_MPS
+            if self.before_it.get(name) == row[1:3] and not stands:
+                self.skipped["rows that repeat the position before them"] += 1
+                return
+            self.before_it[name] = row[1:3]
         gathered.add(name, name.lower(), row)
 
     def _position(self, cells: list[str]) -> tuple[float, ...]:
         """POSITION_COLUMNS of a row."""
         speed, course = self._number(cells, "speed_mps"), math.radians(self._number(cells, "course_deg"))
+        if self.maritime and not (speed <= NO_SPEED_KN * UNITS["kn"] and course < math.radians(NO_COURSE_DEG)):
+            speed = math.nan
         t, up = self._time(cells), self._number(cells, "up_mps")
         lat, lon = self._number(cells, "latitude_deg"), self._number(cells, "longitude_deg")
         for name, value, most in (("latitude_deg", lat, 90), ("longitude_deg", lon, 360)):
@@ -224,7 +272,8 @@ class Table:
         column = self.columns["t_s"]
         text = cells[column.place].strip()
         try:
-            return float(self._pointed(text)) * column.factor if text else math.nan
+            t = float(self._pointed(text)) * column.factor if text else math.nan
+            return self.clock(t) if 0 <= t < DAY_S else t
         except ValueError:
             pass
         try:

@@ -26,13 +26,18 @@ def block(category, *records):
     return bytes([category]) + struct.pack(">H", len(data) + 3) + data
 
 
-def plot_048(time=100.0, rho=12800, theta=5000, **more):
+def plot_048(time=100.0, rho=12800, theta=5000, radar=(25, 10), **more):
     """A record of category 048: field specification and items 010, 140, 020, 040, then those that are given.
 
     time in s; rho in 1/256 NM and theta in 2**-16 turns as they stand in the file; level in 1/4 flight levels; address,
     track; calculated Doppler speed and (raw speed, span, MHz).
     """
-    items = {1: b"\x19\x0a", 2: round(time * 128).to_bytes(3, "big"), 3: b"\x21\x00", 4: struct.pack(">HH", rho, theta)}
+    items = {
+        1: bytes(radar),
+        2: round(time * 128).to_bytes(3, "big"),
+        3: b"\x21\x00",
+        4: struct.pack(">HH", rho, theta),
+    }
     if "level" in more:
         items[6] = struct.pack(">H", more["level"] & 0x3FFF | more.get("invalid", 0) << 15)
     if "address" in more:
@@ -83,7 +88,8 @@ def imported(tmp_path, data, options=PLAIN, name="recording"):
     done = import_recording(source, output, options)
     lines = output.read_text().splitlines()
     rows = list(csv.DictReader(io.StringIO("\n".join(line for line in lines if not line.startswith("#")))))
-    columns = {key: np.array([float(row[key] or "nan") for row in rows]) for key in rows[0] if key != "track"}
+    numbers = [key for key in rows[0] if key not in ("track", "radar")]
+    columns = {key: np.array([float(row[key] or "nan") for row in rows]) for key in numbers}
     return done, columns, [row["track"] for row in rows]
 
 
@@ -172,10 +178,11 @@ def test_category_062_is_the_truth_of_the_plots_beside_it(tmp_path):
     for k in range(30):
         data += block(62, position_062(4.0 * k, 53 + 1000.0 * k / degree, 4.76, address=0xA1, track=7, height_ft=30000))
         if k % 2:
-            data += block(48, plot_048(4.0 * k - 1.5, 12800 + 137 * k, 40, address=0xA1, track=3, level=1200))
+            data += block(48, plot_048(4.0 * k - 1.5, 10750 + 137 * k, 40, address=0xA1, track=3, level=1200))
     done, columns, tracks = imported(tmp_path, data, Options(site=SITE))
     assert tracks == ["3"] * 15
-    assert done.notes[-1] == "truth: 15 of 15 plots"
+    miss = np.median(np.abs(columns["range_m"] - columns["true_r_m"]))
+    assert done.notes[-1] == f"truth: of 15 of 15 plots, which lie {miss:.3g} m from it in range (median)"
     height = 30000 * 0.3048
     t = columns["t_s"] + 2.5
     for half, names in ((0.0, ("x_m", "y_m", "z_m")), (2.0, ("vx_mps", "vy_mps", "vz_mps"))):
@@ -185,6 +192,63 @@ def test_category_062_is_the_truth_of_the_plots_beside_it(tmp_path):
         # A step of the file's latitude is 0.6 m.
         np.testing.assert_allclose(found, wanted, atol=0.6 if not half else 0.3)
     np.testing.assert_allclose(np.sin(columns["true_b_rad"]), 0, atol=1e-5)
+
+
+def test_the_tracks_of_two_radars_stay_apart(tmp_path):
+    """Both count their tracks from 1; the plots of each are placed from where it stands."""
+    places = {"25/12": SITE, "25/13": Site(51.0, 3.0, 0.0)}
+    records = [plot_048(2 * k + n, 6000 * (n + 1), radar=(25, 12 + n), track=1, level=800)
+               for k in range(1, 5) for n in range(2)]  # fmt: skip
+    done, columns, tracks = imported(tmp_path, block(48, *records))
+    assert tracks == ["1", "25/13:1"] * 4
+    assert done.skipped == []
+    assert any("plots of 2 radars, SAC/SIC (rows): 25/12 (4), 25/13 (4)" in note for note in done.notes)
+    assert [line.split(",")[2] for line in (tmp_path / "plots.csv").read_text().splitlines()[-2:]] == ["25/12", "25/13"]
+    (line,) = refused_again(tmp_path, block(48, *records), Options(site=SITE))
+    assert "must say where each radar stands" in line
+    assert line.endswith("has plots of 2: 25/12, 25/13")
+    _, columns, _ = imported(tmp_path, block(48, *records), Options(sites=places))
+    for n, site in enumerate(places.values()):
+        alone = site.local(
+            np.full(4, 6000.0 * (n + 1) * NM / 256), np.full(4, 5000 * STEP), np.full(4, 20_000 * 0.3048)
+        )
+        np.testing.assert_array_equal(np.stack([columns[name][n::2] for name in ("x_m", "y_m", "z_m")], -1), alone)
+    done, _, tracks = imported(tmp_path, block(48, *records), Options(sites={"25/13": places["25/13"]}))
+    assert set(tracks) == {"25/13:1"}
+    assert done.skipped == ["4 rows of radar 25/12, whose place --at does not say"]
+
+
+def flights(*names, speed=250.0, count=30, step=4.0):
+    """Positions (category 062) of aircraft that fly north side by side, 1° of longitude apart; '' has no address."""
+    for k in range(count):
+        for i, name in enumerate(names):
+            address = {"address": int(name, 16)} if name else {}
+            yield position_062(step * k, 53 + speed * step * k / 111_250, 4.76 + i, track=i, height_ft=0, **address)
+
+
+def test_truth_is_never_another_aircraft(tmp_path):
+    """Plots of a1 and of one without address; positions of a1, of another, of several without an address."""
+    plots = block(48, *(plot_048(4.0 * k, 10766 + 138 * k, 0, track=3, address=0xA1, level=0) for k in range(1, 30)))
+    plots += block(48, *(plot_048(4.0 * k + 1, 10766 + 138 * k, 0, track=4, level=0) for k in range(1, 30)))
+    truth, options = tmp_path / "truth", Options(site=SITE, truth=str(tmp_path / "truth"))
+    for names in (("0000a1", "0000b2"), ("0000a1",), ("0000a1", "", "")):
+        truth.write_bytes(block(62, *flights(*names)))
+        _, columns, tracks = imported(tmp_path, plots, options)
+        known = np.isfinite(columns["true_r_m"])
+        assert known.sum() == 29
+        assert {track for track, one in zip(tracks, known, strict=True) if one} == {"3"}
+        np.testing.assert_allclose(columns["range_m"][known], columns["true_r_m"][known], atol=100)
+    for names, expected in (
+        (("0000b2",), "truth: no plot has the address and a time of an aircraft in it; it has 0000b2, the plots 3, 4"),
+        (("", ""), "must have positions on the earth of aircraft with an address; has 60 without"),
+    ):
+        truth.write_bytes(block(62, *flights(*names)))
+        (line,) = refused_again(tmp_path, plots, options)
+        assert expected in line
+    truth.write_bytes(block(62, *flights("0000a1")))
+    (line,) = refused_again(tmp_path, plots, Options(site=Site(52.3, 6.76, 0.0), truth=str(truth)))
+    assert line.startswith("truth: the plots of 0000a1 lie ")
+    assert "at most 5000 m is allowed: another aircraft, another clock or a wrong place --at" in line
 
 
 FIRST = block(48, plot_048(1, track=1), plot_048(2, track=1, comment=2))
@@ -452,12 +516,62 @@ def test_exports_of_positions(tmp_path, header, row, feet):
     np.testing.assert_allclose(columns["altitude_m"], 10000 * (0.3048 if feet else 1), rtol=1e-12)
     speed = 200 * (NM / 3600 if feet else 1)
     assert 0.9 * speed < columns["velocity_mps"][0] < speed
-    assert any("taken in feet, knots" in note for note in done.notes) == feet
+    taken = " ".join(note for note in done.notes if note.startswith("taken for want of a unit in the name"))
+    assert (" in ft" in taken and " in kn" in taken) == feet
 
 
 def test_altitudes_that_no_aircraft_has_are_asked_about(tmp_path):
     done, _, _ = imported(tmp_path, b"time,lat,lon,altitude\n1,52,4,36000\n", Options(site=SITE))
-    assert done.notes == ["altitudes up to 36000 m: if altitude is in feet, name it altitude_ft"]
+    assert done.notes[-1] == "altitudes up to 36000 m: if altitude is in feet, name it altitude_ft"
+
+
+def test_times_are_those_of_the_positions(tmp_path):
+    """A query every 10 s gives positions of other times, and old ones again."""
+    text = "time,icao24,lat,lon,velocity,heading,lastposupdate\n"
+    for k in range(6):
+        old = 7.3 * (k // 2)
+        text += f"{1.7e9 + 10 * k},a1,{52.6 + old * 200 / 111_250},4.76,200,0,{1.7e9 + 10 * k // 20 * 20 + 3.5}\n"
+    done, columns, _ = imported(tmp_path, text.encode(), Options(site=SITE))
+    np.testing.assert_array_equal(columns["t_s"], [0, 20, 40])
+    assert done.skipped == ["3 rows that repeat the position before them"]
+    assert "times are lastposupdate; not used: time" in done.notes
+    at_anchor = b"time,mmsi,lat,lon,sog,cog\n1,7,52,4,0,0\n2,7,52,4,0.1,90\n"
+    assert imported(tmp_path, at_anchor, Options(site=SITE))[0].rows == 2
+
+
+@pytest.mark.parametrize(
+    ("row", "velocity"),
+    [
+        ("12.0,0.0,182", 12 * NM / 3600),  # the course counts, not where the bow points
+        ("12.0,511,511", np.nan),
+        ("102.3,0.0,0", np.nan),
+        ("12.0,360.0,0", np.nan),
+    ],
+)
+def test_ships_in_tables_count_in_knots_by_their_course(tmp_path, row, velocity):
+    text = f"MMSI,BaseDateTime,LAT,LON,SOG,COG,Heading\n244660000,2020-01-01T00:00:00,52.4,4.76,{row}\n"
+    done, columns, _ = imported(tmp_path, text.encode(), Options(site=Site(52.3, 4.76, 0.0)))
+    np.testing.assert_allclose(columns["velocity_mps"], velocity, rtol=1e-4)
+    assert "taken for want of a unit in the name: SOG in kn" in done.notes
+
+
+def test_rows_of_several_aircraft_are_asked_whose(tmp_path):
+    """No known name: two aircraft in turn, twice at the same time."""
+    text = "TIME(s),RHO,THETA,TA,MODE\n"
+    text += "".join(f"{k // 2},{50 + k},{10 * (k % 2)},{'4CA1' if k % 2 else '3C64'},S{k}\n" for k in range(20))
+    (line,) = refused(tmp_path, text.encode())
+    assert "track: no column says whose each row is, and 10 rows are not later than the one before" in line
+    assert line.endswith("name the column, --column track=THEIRS; it may be: TA (2 different)")
+    done, _, tracks = imported(tmp_path, text.encode(), Options(columns={"track": "TA"}))
+    assert (done.rows, set(tracks)) == (20, {"4CA1", "3C64"})
+    assert "taken for want of a unit in the name: RHO in m, THETA in degrees" in done.notes
+
+
+def test_a_table_passes_midnight_and_may_be_sorted_by_track(tmp_path):
+    text = "time,range,track\n" + "".join(f"{(86380 + 10 * k) % 86400},{50 + k},{k % 2}\n" for k in range(6))
+    np.testing.assert_array_equal(imported(tmp_path, text.encode())[1]["t_s"], 10 * np.arange(6))
+    text = "time,range,track\n" + "".join(f"{t},50,{n}\n" for n in range(2) for t in range(0, 60_000, 5000))
+    np.testing.assert_array_equal(imported(tmp_path, text.encode())[1]["t_s"], 2 * [*range(0, 60_000, 5000)])
 
 
 @pytest.mark.parametrize("sign", [";", "\t"])
