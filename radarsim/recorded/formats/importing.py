@@ -256,7 +256,9 @@ class _Import:
 
     def comment(self) -> list[str]:
         """The lines before the header: what the columns are."""
-        sites, antenna = self.options.sites or {"": self.options.site}, self.options.antenna
+        sites, antenna = dict(self.options.sites), self.options.antenna
+        if self.options.site:
+            sites[""] = self.options.site
         lines = [
             f"# made by radarsim import from a recording in the format {self.done.format}",
             f"# t_s: seconds from {self._zero_words()}; track: as in the recording",
@@ -264,11 +266,10 @@ class _Import:
             "range grows; span_mps: what a folded velocity is ambiguous by",
         ]
         for name, site in sites.items():
-            if site:
-                lat, lon, height = site.place
-                place = f"{lat:.6f} deg {lon:.6f} deg {height:g} m; x_m north y_m up z_m east of it"
-                lines.append(f"# radar{f' {name}' if name else ''} (WGS 84): {place}")
-        if any(sites.values()):
+            lat, lon, height = site.place
+            place = f"{lat:.6f} deg {lon:.6f} deg {height:g} m; x_m north y_m up z_m east of it"
+            lines.append(f"# radar{f' {name}' if name else ''} (WGS 84): {place}")
+        if sites:
             lines.append("# level_elevation_rad: above the plane that is level at the radar")
         if antenna:
             degrees = " ".join(f"{math.degrees(angle):g} deg" for angle in antenna)

@@ -37,8 +37,8 @@ class Batch(NamedTuple):
 
     def rows(self, keep: list[int]) -> "Batch":
         """Those of its records."""
-        names = ([column[i] for i in keep] for column in (self.track, self.address, self.radar))
-        return Batch(self.kind, *names, {name: column[keep] for name, column in self.columns.items()})
+        track, address, radar = ([column[i] for i in keep] for column in (self.track, self.address, self.radar))
+        return Batch(self.kind, track, address, radar, {name: column[keep] for name, column in self.columns.items()})
 
 
 class Reader(Protocol):

@@ -109,7 +109,7 @@ class Table:
         self.aviation = any((name, "") in names for name in AVIATION)
         self.maritime = any(name in MARITIME for name, _ in names)
         self.clock = Unrolled(DAY_S, near_s=MIDNIGHT_S)
-        self.before_it: dict[str, tuple[float, float]] = {}  # the last position of each track
+        self.before_it: dict[str, tuple[float, ...]] = {}  # the last position of each track
         self.columns = self._found(header, given or {})
         self.kind = POSITIONS if set(ON_EARTH) <= set(self.columns) else PLOTS
         self._complete(header)
