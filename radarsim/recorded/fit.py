@@ -31,6 +31,7 @@ IMPOSSIBLE = -1e300  # what counts as the logarithm of no likelihood: a search n
 STEP = 1e-3  # over which a slope is taken, in the logarithm of a key
 LEAST_SHARE, MOST_SHARE = 1e-6, 0.5  # of outliers; less is none
 FAR_FROM_ZERO = 1e4  # times what counts as zero of a key
+FINER, LEAP = 1e-3, 0.01  # what counts as zero is this part of before where the likelihood leaps by more there
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,8 @@ def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name
     long = [columns for columns in tracks if len(columns["t_s"]) >= LEAST_ROWS]
     if not long:
         raise ConfigError(f"{source}: must have a track of at least {LEAST_ROWS} rows")
+    if same := [name for name in long[0] if name != "t_s" and all(np.ptp(one[name]) == 0 for one in long)]:
+        raise ConfigError(f"{source}: {same[0]}: must differ between plots, or no σ can be told; all are the same")
     found = of.likelihood(case, filter_name, long)
     if found is None:
         asked = f"filter {filter_name}" if filter_name else f"no filter of {case.name}"
@@ -120,10 +123,16 @@ def fitted(likelihood: Likelihood, robust: bool = False, progress: Progress = si
     if robust and OUTLIERS not in likelihood.explains:
         raise ConfigError(f"robust: the likelihood of filter {likelihood.filter} cannot allow for outliers")
     search = _Search(likelihood, robust, progress)
+    while any(coarse := [search.steps_at_zero(i) for i in range(len(likelihood.keys))]):
+        likelihood.least = np.where(coarse, FINER * np.asarray(likelihood.least), likelihood.least)
+        search = _Search(likelihood, robust, progress)
     if search.top <= IMPOSSIBLE:
         raise ConfigError(f"filter {likelihood.filter} cannot take the plots: `radarsim track` says at which row")
-    keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
     share = float(search.natural(search.best)[-1]) if robust else None
+    if share is not None and share > 0.99 * MOST_SHARE:
+        raise ConfigError("robust: half of the plots would have to be outliers: their errors are of another law (few "
+                          "different values?); fit without it")  # fmt: skip
+    keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
     stated = likelihood(np.array(likelihood.stated), 0.0)
     return Fit(likelihood.filter, likelihood.tracks, likelihood.rows, keys, share, search.top - stated)
 
@@ -227,6 +236,11 @@ class _Search:
             found.append(self._climbed(start, i, FIRST_STEP, CLOSE))
         where, top = max(found, key=lambda one: one[1])
         return top, where
+
+    def steps_at_zero(self, i: int) -> bool:
+        """Whether the likelihood leaps where a key is small enough to count as zero: it is not small enough then."""
+        above, zero = (self._sliced(i, self.lowest[i] + sign * CLOSE) for sign in (1, -1))
+        return zero > IMPOSSIBLE and above > IMPOSSIBLE and abs(above - zero) > LEAP
 
     def _maybe_zero(self, i: int) -> bool:
         """Whether the plots hardly tell a key, or the share of outliers, from zero: near zero its logarithm is a plain

@@ -338,3 +338,31 @@ def test_too_short_a_track_is_refused(tmp_path):
     plots.write_columns({name: column[:9] for name, column in recording(np.random.default_rng(9)).items()}, path)
     with pytest.raises(ConfigError, match="must have a track of at least 10 rows"):
         fit.fit(loaded(), path)
+
+
+def monitor(tmp_path, *values):
+    """Plots of a fixed transponder: ranges in steps of 1/256 NM, some of the second value."""
+    rng, path = np.random.default_rng(3), tmp_path / "monitor.csv"
+    range_m = rng.choice(values, 300, p=[0.7, 0.3][: len(values)] if len(values) > 1 else None)
+    plots.write_columns({"t_s": 4.0 * np.arange(300), "range_m": range_m, "velocity_mps": np.full(300, np.nan)}, path)
+    return path
+
+
+def test_a_fixed_target_in_two_steps_is_fitted_whatever_the_config_states(tmp_path):
+    """What counts as zero of a key must not hang on what the config states: D_M of 10⁻⁶ is far from zero here."""
+    path, found = monitor(tmp_path, 50_000.0, 50_007.234375), []
+    for stated in (1e-6, 1.0):
+        (config,) = load_all(["rls2"], (f"manoeuvre_variance={stated}", "filters.0.observes=[range]"))
+        found.append(fit.fit(config, path, "r").keys)
+        assert found[-1][0].value == pytest.approx(7.234375 * np.sqrt(0.3 * 0.7), rel=0.1)
+        assert (found[-1][1].lo, found[-1][1].identifiable) == (0.0, False)
+    for one, other in zip(*found, strict=True):
+        assert (one.lo, one.hi) == pytest.approx((other.lo, other.hi), rel=1e-4, abs=1e-14)
+
+
+def test_plots_that_tell_no_sigma_are_refused(tmp_path):
+    (config,) = load_all(["rls2"], ("manoeuvre_variance=1e-6",))
+    with pytest.raises(ConfigError, match="range_m: must differ between plots, or no σ can be told"):
+        fit.fit(config, monitor(tmp_path, 50_000.0), "r")
+    with pytest.raises(ConfigError, match="robust: half of the plots would have to be outliers"):
+        fit.fit(config, monitor(tmp_path, 50_000.0, 50_007.234375), "r", robust=True)
