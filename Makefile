@@ -52,10 +52,12 @@ reproduce-figures: $(VENV)/installed
 
 # docs/readings_p1.md …, every claim under every reading: from stored blocks where they are there, else run.
 # READINGS=--decide: longer, until claims are decided; some that are left (exit code 3) are no fault of the page.
+# Their classes are what radarsim ships, and says of a claim wherever it speaks of it.
 READINGS ?=
 readings-pages: $(VENV)/installed
 	for p in 1 2 3 4; do $(RADARSIM) readings P$$p $(READINGS) --out results --markdown > docs/readings_p$$p.md.new; \
 	code=$$?; test $$code -eq 0 -o $$code -eq 3 && mv docs/readings_p$$p.md.new docs/readings_p$$p.md || exit 1; done
+	cp results/readings/classes.csv radarsim/app/classes.csv
 
 # docs/claims.md, from what reproduce-figures left.
 claims-page: $(VENV)/installed

@@ -73,7 +73,7 @@ def undecided(rows: Sequence[dict[str, Any]]) -> list[str]:
     """A line for each claim that is not yet decided, with the realisations that it would take."""
     lines = []
     for parts in page.grouped(rows):
-        if parts[0]["class"] != UNDECIDED or page.extension(parts):
+        if parts[0]["as_shipped"] != UNDECIDED or page.extension(parts):
             continue
         needed = page.number(parts[0]["needed"])
         would = "its value lies on a border: no number would" if needed is None else f"about {roughly(needed):,} would"

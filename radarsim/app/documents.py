@@ -56,6 +56,7 @@ def result(one: "Result") -> dict[str, Any]:
         "answer": list(written.answer),
         "last_scan": one.last_scan.to_dict("records"),
         "claims": one.verdicts(),
+        "claims_as_shipped": one.verdicts("as_shipped"),
         "folder": str(written.folder),
         "files": list(written.files),
         "warnings": one.warnings,

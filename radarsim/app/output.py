@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.app import configs
+from radarsim.app.stored_readings import classes_of
 from radarsim.config.experiment import Experiment
 from radarsim.engine import machine
 from radarsim.engine.results import CaseResult
@@ -15,6 +16,7 @@ from radarsim.report import agreement, claims, controlled, files, notes, provena
 from radarsim.report import tables as common
 from radarsim.report.chart_text import spoken
 from radarsim.report.claims import forest
+from radarsim.report.claims.classes import OVER, with_classes
 from radarsim.report.drawing import Figure
 from radarsim.studies.registry import study
 
@@ -33,8 +35,20 @@ def tables(results: Sequence[CaseResult], control_variate: bool = False, stem: s
     made = measured(results)
     if control_variate and of.exact_errors and not of.own_controls:
         made["controlled"] = controlled.controlled(results)
-    made["claims"] = claims.judged(of.claims(), results, made, configs.shipped, stem)
+    verdicts = claims.judged(of.claims(), results, made, configs.shipped, stem)
+    made["claims"] = over_readings(verdicts, results[0].study)
     return notes.noted(made, results)
+
+
+def over_readings(verdicts: "pd.DataFrame", name: str, out: Path | None = None) -> "pd.DataFrame":
+    """claims.csv of a study with the classes over all readings: those under `out`, else those that are shipped."""
+    of = study(name)
+    readings, papers = of.readings(), of.claims()
+    if readings is None or papers is None or not len(verdicts):
+        return verdicts
+    own: Any = verdicts.to_dict("records")
+    rows = with_classes(own, classes_of([(readings, papers)], out))
+    return verdicts.assign(**{column: [row[column] for row in rows] for column in OVER})
 
 
 def measured(results: Sequence[CaseResult]) -> dict:

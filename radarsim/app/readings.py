@@ -5,20 +5,23 @@ import hashlib
 import io
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from radarsim.app import stored_claims
 from radarsim.app.reading_runs import Asked, Paper, Plan, Progress
 from radarsim.app.simulation import RunOptions
-from radarsim.app.stored_readings import PLACE, stored_readings
+from radarsim.app.stored_readings import CLASSES, PLACE, stored_classes, stored_readings
 from radarsim.engine.stopping import Signals
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, StoreError
 from radarsim.report import files
-from radarsim.report.claims.declared import Claim
+from radarsim.report.claims import classes
 from radarsim.report.claims.joint import Joint, joint
+from radarsim.report.claims.judge import NOT_JUDGED
 from radarsim.report.claims.over import Over, Under, columns, depth, rows
 from radarsim.report.claims.readings import PaperReadings
 from radarsim.report.claims.rule import UNDECIDED, roughly
@@ -42,13 +45,15 @@ class Read:
 class Done:
     """What `readings` made: of each paper asked for, and the files written, by their path under `folder`.
 
-    left has a line for each claim that was to be decided and is not.
+    left has a line for each claim that was to be decided and is not. outdated: the configs beside them whose stored
+    claims have another class.
     """
 
     read: list[Read]
     folder: Path
     files: tuple[str, ...] = field(default=())
     left: tuple[str, ...] = field(default=())
+    outdated: tuple[str, ...] = field(default=())
 
 
 def papers() -> dict[str, Paper]:
@@ -79,7 +84,7 @@ def asked(names: Sequence[str] = (), only: Sequence[str] = ()) -> list[Asked]:
     found = []
     for key, paper in every.items():
         whole = not names or key in names
-        claims = [one for one in paper.claims.claims if (whole or one.id in names) and _open(paper, one)]
+        claims = [one for one in paper.claims.claims if (whole or one.id in names) and paper.readings.open(one)]
         if claims:
             found.append(Asked(paper, claims, whole, kept))
     return found
@@ -87,17 +92,12 @@ def asked(names: Sequence[str] = (), only: Sequence[str] = ()) -> list[Asked]:
 
 def _closed(paper: Paper, names: Sequence[str]) -> list[str]:
     """Faults of claims that are asked for by name, and on which nothing bears that the paper leaves open."""
-    kept = [one.id for one in paper.claims.claims if _open(paper, one)]
+    kept = [one.id for one in paper.claims.claims if paper.readings.open(one)]
     return [
         f"readings: {one.id} depends on nothing that its paper leaves open; claims that do: {', '.join(kept)}"
         for one in paper.claims.claims
         if one.id in names and one.id not in kept
     ]
-
-
-def _open(paper: Paper, claim: Claim) -> bool:
-    """Whether the paper leaves anything open on which a claim of its own may hang."""
-    return not claim.extension and any(choice.bears_on(claim.id) for choice in paper.readings.choices)
 
 
 def _unknown(name: str, every: Mapping[str, Paper], owner: Mapping[str, str]) -> str:
@@ -159,6 +159,7 @@ def readings(
     made = Done(read, Path(out) / FOLDER, left=tuple(left))
     if not any(one.only for one in wanted):
         made.files = _write(made, figures)
+        made.outdated = _outdated(made)
     return made
 
 
@@ -195,7 +196,7 @@ def _write(done: Done, figures: bool) -> tuple[str, ...]:
     A curve whose claim came out as it did before is not drawn again, unless what draws it has changed: `drawn.json`
     keeps what the files were drawn of.
     """
-    contents = {TABLE: _table(done).encode()}
+    contents = {TABLE: _table(done).encode(), CLASSES.name: _classes(done).encode()}
     if figures:
         drawn = _drawn(done.folder)
         for over in (over for read in done.read for over in read.over):
@@ -237,14 +238,38 @@ def _drawn(folder: Path) -> dict[str, str]:
 
 def _table(done: Done) -> str:
     names = columns(paper.readings for paper in papers().values())
-    own = {over.claim.id for read in done.read for over in read.over}
-    kept = [row for row in stored_readings(done.folder.parent) if row["claim"] not in own]
-    every_over = [over for read in done.read for over in read.over]
-    new = [row for over in every_over for one in over.under for row in rows(one, names, over.outcome)]
+    every = [over for read in done.read for over in read.over]
+    new = [row for over in every for one in over.under for row in rows(one, names, over.outcome)]
+    return _with(names, stored_readings(done.folder.parent), new, {over.claim.id for over in every})
+
+
+def _classes(done: Done) -> str:
+    """What each claim came to over its readings."""
+    every = [(read.paper.readings, over) for read in done.read for over in read.over]
+    new = [found.as_row() for of, over in every if (found := classes.of_over(of, over)) is not None]
+    kept = [one.as_row() for one in stored_classes(done.folder.parent)]
+    return _with(classes.COLUMNS, kept, new, {over.claim.id for _, over in every})
+
+
+def _outdated(done: Done) -> tuple[str, ...]:
+    """The configs whose stored claims have another class than their readings gave now."""
+    new = {over.claim.id: over for read in done.read for over in read.over if over.outcome}
+    found = []
+    for config in dict.fromkeys(over.claim.config for over in new.values()):
+        with suppress(StoreError):  # `radarsim claims` tells of a damaged one
+            for row in stored_claims.stored(done.folder.parent / config / "claims.csv") or ():
+                outcome = new[row["claim"]].outcome if row["claim"] in new else None
+                if outcome and row["class"] not in (NOT_JUDGED, outcome.kind):
+                    found.append(config)
+    return tuple(dict.fromkeys(found))
+
+
+def _with(names: Sequence[str], stored: Sequence[Mapping], new: Sequence[Mapping], own: set[str]) -> str:
+    """A table of new rows and those that are stored of claims that were not asked for."""
     text = io.StringIO(newline="")
     table = csv.writer(text, lineterminator="\n")
     table.writerow(names)
-    every = sorted([*kept, *new], key=lambda row: _order(str(row["claim"])))
+    every = sorted([*(row for row in stored if row["claim"] not in own), *new], key=lambda row: _order(row["claim"]))
     table.writerows([row.get(name, "") for name in names] for row in every)
     return text.getvalue()
 

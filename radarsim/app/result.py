@@ -152,7 +152,7 @@ class Result:
         from radarsim.report import claims, controlled, index, provenance
 
         folder = Path(out) / self.experiment.stem
-        self._join_readings(Path(out))
+        self._tables["claims"] = output.over_readings(self._tables["claims"], self.experiment.study, Path(out))
         formats = arguments.formats(figures)
         self.facts["warnings"] = [*self.facts["warnings"], *provenance.replaced(folder, self.experiment)]
         facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
@@ -163,13 +163,17 @@ class Result:
             raise DisagreementError(*errors)
         return self.written
 
-    def verdicts(self) -> dict[str, list[str]]:
-        """The claims that came out so, by verdict; empty where this experiment judges none."""
+    def verdicts(self, column: str = "class") -> dict[str, list[str]]:
+        """The claims of a class over all readings that their papers allow, or `as_shipped`; empty where there are none.
+
+        What is of an extension stands apart.
+        """
         from radarsim.report.claims import page
 
         found: dict[str, list[str]] = {}
-        for parts in page.grouped(self._tables["claims"].to_dict("records")):
-            said = parts[0]["overall"] + (", extension" if page.extension(parts) else "")
+        claims = page.grouped(self._tables["claims"].to_dict("records"))
+        for parts in sorted(claims, key=lambda parts: page.ORDER.index(parts[0][column])):
+            said = parts[0][column] + (", extension" if page.extension(parts) else "")
             found.setdefault(said, []).append(parts[0]["claim"])
         return found
 
@@ -187,28 +191,10 @@ class Result:
 
     def as_shipped(self) -> list[str]:
         """The claims judged under the shipped reading alone although their paper leaves open what they hang on."""
-        from radarsim.report.claims import NOT_JUDGED, page, rule
+        from radarsim.report.claims import classes, first_rows
 
-        if (readings := study(self.experiment.study).readings()) is None:
-            return []
-        found = []
-        for parts in page.grouped(self._tables["claims"].to_dict("records")):
-            first = parts[0]
-            over = page.number(first["of"]) is not None or first["class"] in (NOT_JUDGED, rule.UNJUDGEABLE)
-            if not over and not page.extension(parts) and any(one.bears_on(first["claim"]) for one in readings.choices):
-                found.append(first["claim"])
-        return found
-
-    def _join_readings(self, out: Path) -> None:
-        """The classes of claims over all readings, where `radarsim readings` has stored them under out."""
-        from radarsim.app.stored_readings import stored_readings
-        from radarsim.report import tables
-        from radarsim.report.claims.joined import with_readings
-
-        claims = self._tables["claims"]
-        if len(claims) and (readings := stored_readings(out)):
-            rows = with_readings(claims.to_dict("records"), readings)
-            self._tables["claims"] = tables.frame({name: [row[name] for row in rows] for name in claims.columns})
+        rows = first_rows(self._tables["claims"].to_dict("records"))
+        return [row["claim"] for row in rows if classes.alone(row)]
 
     @property
     def unmet(self) -> list[str]:

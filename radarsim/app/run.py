@@ -19,7 +19,7 @@ from radarsim.app.records import made_by_other_code
 from radarsim.app.repeat import RESULTS, command, repeated
 from radarsim.app.result import Result
 from radarsim.app.simulation import Progress, RunOptions, SimulatedCases
-from radarsim.app.stored_readings import stored_readings
+from radarsim.app.stored_readings import classes_of
 from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Experiment
 from radarsim.engine import stopping
@@ -373,7 +373,8 @@ def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, 
     Of a config that judges none: those of its study's paper, with the reason why each of them is not judged by it.
     Each row has the columns of claims.csv and `config`. Raises ConfigError for what does not exist.
     """
-    from radarsim.report.claims.joined import with_readings
+    from radarsim.app import readings
+    from radarsim.report.claims.classes import with_classes
     from radarsim.report.claims.judge import listed, unstored
 
     every = papers()
@@ -394,4 +395,5 @@ def claims(names: Sequence[str], out: str | os.PathLike[str]) -> list[dict[str, 
     known = {(row["claim"], row["config"]) for row in rows}
     own = [row for row in listed(every, held) if row["claim"] in shown]
     rows += [row for row in own if (row["claim"], row["config"]) not in known]
-    return with_readings(rows, stored_readings(Path(out)))
+    open_ = [(paper.readings, paper.claims) for paper in readings.papers().values()]
+    return with_classes(rows, classes_of(open_, Path(out)))

@@ -1,20 +1,59 @@
-"""Readings as `radarsim readings` has stored them, for the claims beside them."""
+"""What `radarsim readings` came to: rows of its tables under a directory, and the classes that radarsim ships.
+
+classes.csv beside this module is that of the shipped configs, copied by `make readings-pages`; where a directory of
+results has its own, of a claim that was judged there, that one counts.
+"""
 
 import csv
 import io
+from collections.abc import Callable, Iterable
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from radarsim.errors import StoreError
 from radarsim.report import files
+from radarsim.report.claims.classes import COLUMNS, Class, Known, declared
+from radarsim.report.claims.declared import PaperClaims
+from radarsim.report.claims.readings import PaperReadings
 
-PLACE = Path("readings", "readings.csv")
+PLACE, CLASSES = Path("readings", "readings.csv"), Path("readings", "classes.csv")
 NEEDED = {"claim", "reading", "kind", "outcome"}
+SHIPPED = Path(__file__).with_name("classes.csv")
+Row = TypeVar("Row")
 
 
 def stored_readings(out: Path) -> list[dict[str, Any]]:
     """The rows of readings.csv under `out`; none where there is no such file. Raises StoreError for a damaged one."""
-    path = out / PLACE
+    return _rows(out / PLACE, NEEDED, dict)
+
+
+def stored_classes(out: Path | None) -> list[Class]:
+    """The classes that were worked out under `out`. Raises StoreError for a damaged file."""
+    return _rows(out / CLASSES, set(COLUMNS), Class.of_row) if out else []
+
+
+@cache
+def shipped_classes() -> tuple[Class, ...]:
+    """The classes that radarsim ships."""
+    return tuple(_rows(SHIPPED, set(COLUMNS), Class.of_row))
+
+
+def classes_of(papers: Iterable[tuple[PaperReadings, PaperClaims]], out: Path | None) -> Known:
+    """The class over all readings of each claim of which its paper leaves something open; None where it is not known.
+
+    One that was worked out of other words, numbers or choices than the claim has now is none.
+    """
+    found = {(one.claim, one.declared): one for one in (*shipped_classes(), *stored_classes(out))}
+    return {
+        claim.id: found.get((claim.id, declared(readings, claim)))
+        for readings, claims in papers
+        for claim in claims.claims
+        if readings.open(claim)
+    }
+
+
+def _rows(path: Path, needed: set[str], made: Callable[[dict[str, Any]], Row]) -> list[Row]:
     try:
         table = csv.DictReader(io.StringIO(files.read(path).decode("utf-8"), newline=""), strict=True)
         rows, names = list(table), set(table.fieldnames or ())
@@ -24,6 +63,9 @@ def stored_readings(out: Path) -> list[dict[str, Any]]:
         raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
     except (ValueError, csv.Error) as error:
         raise StoreError(f"{path}: cannot be read: {error}") from error
-    if not names >= NEEDED:
-        raise StoreError(f"{path}: is no table of readings; remove it, `radarsim readings` makes it again")
-    return rows
+    try:
+        if names >= needed:
+            return [made(row) for row in rows]
+    except (LookupError, TypeError, ValueError):
+        pass  # reported like any other damaged table
+    raise StoreError(f"{path}: is no table of readings; remove it, `radarsim readings` makes it again")

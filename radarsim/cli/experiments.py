@@ -282,12 +282,14 @@ def report(
 @out_option
 @json_option
 @click.option("--markdown", is_flag=True, help="The page docs/claims.md on stdout in place of text.")
+@click.option("--parts", is_flag=True, help="What was measured of each.")
 @click.option("--figure", metavar="FILE", help="Also draw them, in margins of what the papers say, to this file.")
-def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figure: str | None) -> None:
-    """The papers' claims: stated, measured with interval, exact value, class; computes nothing.
+def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figure: str | None, parts: bool) -> None:
+    """The papers' claims and how far each stands, a line each; what was measured of a CLAIM; computes nothing.
 
     How they are judged stands in docs/verdicts.md: exact values first, each number with a margin, and over every
-    reading that the paper allows, where `radarsim readings` has judged these.
+    reading that the paper allows. "refuted as shipped; depends on start": false with the choices that the config takes
+    where the paper leaves them open, and true with another start.
 
     PAPER is P1, P2, P3 or P4. Without any, all claims of all papers; those without stored results are listed as not
     run, with the command that would judge them. Of a CONFIG that is not a paper's experiment, the claims that it cannot
@@ -296,7 +298,7 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
     \b
     Examples
       radarsim claims range_doppler
-      radarsim claims P1.3 P4
+      radarsim claims P1.3 P4                 with what was measured of P1.3
       radarsim claims --json
       radarsim claims --figure claims.svg
     """
@@ -314,4 +316,4 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
 
         click.echo(page.page(rows, {of.paper: of.page for of in experiment.papers()}), nl=False)
     else:
-        verdicts.print_claims(rows)
+        verdicts.print_claims(rows, {row["claim"] for row in rows if parts or row["claim"] in names})

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.cli.console import counted_cases, field, print_warnings, say, show
-from radarsim.cli.verdicts import in_a_row
-from radarsim.language import Term, few, listed, numeral, plural, term, tr
+from radarsim.cli.verdicts import print_verdicts
+from radarsim.language import few, listed, numeral, plural, term, tr
 from radarsim.report.text import clock, known, significant_digits
 from radarsim.report.text import unit as unit_of
 
@@ -35,22 +35,7 @@ def print_result(result: "Result") -> None:
     for line in written.answer:
         say(line)
     show_last_scan(result.last_scan)
-    verdicts = result.verdicts()
-    if verdicts:
-        from radarsim.report.claims import reasons
-
-        for verdict, names in verdicts.items():
-            field("claims", tr("{count} {kind}: {names}", count=len(names), kind=Term(verdict), names=", ".join(names)))
-        for reason, names in result.unjudged().items():
-            field("", tr("not judged: {names}: {reason}", names=", ".join(names), reason=reasons.said(reason)))
-        if alone := result.as_shipped():
-            every = tr(
-                "as shipped: {names}; `radarsim readings {paper}` judges under all that the paper allows",
-                names=in_a_row(alone),
-                paper=alone[0].partition(".")[0],
-            )
-            field("", every)
-        field("", tr("`radarsim claims {stem}` says what each of them is", stem=result.experiment.stem))
+    print_verdicts(result)
     drawn = [Path(name) for name in written.files if name.startswith("figures/") and not name.endswith(".md")]
     others = sum(name.endswith(".csv") for name in written.files) - 1
     field("tables", tr("{file} and {count} more there", file=str(written.folder / "curves.csv"), count=others))

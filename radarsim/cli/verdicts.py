@@ -1,26 +1,47 @@
 """What the terminal shows of claims and readings: each with its class, what was measured and what was expected."""
 
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from radarsim.cli.console import console, field, say, show
-from radarsim.language import plural, term, tr
+from radarsim.cli.console import field, say
+from radarsim.language import listed, plural, term, tr
 
 if TYPE_CHECKING:
     from radarsim.app.readings import Done
+    from radarsim.app.result import Result
 
-ROOMY = 110  # columns of a terminal from which claims are shown with place and config
+SHORT = 12  # words of a claim in a list
 NOTHING_RUN = term(
     "nothing is run here: `make reproduce-figures` runs it all, docs/claims.md has the results at full size"
 )
 
 
-def print_claims(rows: Sequence[dict[str, Any]]) -> None:
-    """Each claim with its class, and below it what was measured, or the command that would judge it.
+def print_verdicts(result: "Result") -> None:
+    """The claims that a run can judge by their class over all readings, and which of them came out otherwise here."""
+    from radarsim.report.claims import page, reasons
 
-    On a terminal a table; where it is piped, lines that can be searched. Of experiments that are not the paper's a line
-    for each reason, with the claims that cannot be judged for it.
+    verdicts, shipped = result.verdicts(), result.verdicts("as_shipped")
+    for kind, names in verdicts.items():
+        field("claims", f"{page.of_class(kind, len(names))}: {page.in_a_row(names)}")
+        here = {own: [name for name in every if name in names] for own, every in shipped.items() if own != kind}
+        if said := "; ".join(f"{tr(own)}: {page.in_a_row(few)}" for own, few in here.items() if few):
+            field("", tr("as shipped {claims}", claims=said))
+    for reason, names in result.unjudged().items():
+        field("", tr("not judged: {names}: {reason}", names=", ".join(names), reason=reasons.said(reason)))
+    if alone := result.as_shipped():
+        told = {"names": page.in_a_row(alone), "paper": alone[0].partition(".")[0]}
+        words = tr(
+            "as shipped alone: {names}; `radarsim readings {paper}` judges under all that the paper allows", **told
+        )
+        field("", words)
+    if verdicts:
+        field("", tr("`radarsim claims {stem}` says what each of them is", stem=result.experiment.stem))
+
+
+def print_claims(rows: Sequence[dict[str, Any]], detailed: Collection[str] = ()) -> None:
+    """A line a claim: its number, how far it stands, what it says; of those that are detailed what was measured too.
+
+    Of experiments that are not the paper's a line for each reason, with the claims that cannot be judged for it.
     """
     from radarsim.report.claims import NOT_JUDGED, NOT_RUN, page, reasons
 
@@ -31,53 +52,16 @@ def print_claims(rows: Sequence[dict[str, Any]]) -> None:
             foreign.setdefault((row["config"], row["why"]), []).append(row["claim"])
         else:
             stated.append(row)
-    if stated:
-        _print_stated(stated)
+    for own in page.grouped(stated):
+        _print_claim(own, detailed=own[0]["claim"] in detailed)
     for (stem, why), names in foreign.items():
-        told = {"stem": stem, "names": in_a_row(names), "reason": reasons.said(why)}
+        told = {"stem": stem, "names": page.in_a_row(names), "reason": reasons.said(why)}
         say(tr("{stem}: not judged: {names}: {reason}", **told))
     say(page.counted(stated) or tr("no claims are judged by this"))
     if stated and all(row["class"] == NOT_RUN for row in stated):
         say(tr(NOTHING_RUN))
-
-
-def in_a_row(claims: Sequence[str]) -> str:
-    """Names of claims, those with numbers in a row by the first and last: `P1.1–P1.34`."""
-    runs: list[list[str]] = []
-    for name in claims:
-        paper, _, number = name.rpartition(".")
-        follows = runs and number.isdecimal() and runs[-1][-1] == f"{paper}.{int(number) - 1}"
-        runs[-1].append(name) if follows else runs.append([name])
-    return ", ".join(f"{run[0]}–{run[-1]}" if len(run) > 2 else ", ".join(run) for run in runs)
-
-
-def _print_stated(rows: Sequence[dict[str, Any]]) -> None:
-    """Claims with what was measured."""
-    from radarsim.report.claims import NOT_RUN, page
-
-    if sys.stdout.isatty():
-        cells = []
-        for own in page.grouped(rows):
-            first, done = own[0], own[0]["class"] != NOT_RUN
-            beside = "" if page.extension(own) else f" ({tr(page.NOT_COUNTED)})"
-            lines = [_measured(row) + (beside if page.extension([row]) else "") for row in own]
-            measured = "\n".join(lines) if done else f"radarsim run {first['config']}"
-            said = tr(first["statement"]) + (f"\n«{first['original']}»" if first["original"] else "")
-            verdict = page.verdict_of(own).replace("*", "")
-            cells.append((first["claim"], said, tr(first["place"]), measured, verdict, first["config"]))
-        columns = ("claim", "statement", "place", "measured and expected", "class", "config")
-        show("", columns, cells, spare=() if console().width >= ROOMY else ("place", "config"))
-    else:
-        for own in page.grouped(rows):
-            _print_claim(own)
-
-
-def _measured(row: Mapping[str, Any]) -> str:
-    """What was measured for a part of a claim: its name, its value, what was expected."""
-    from radarsim.report.claims import page
-
-    expected = tr("; expected {words}", words=page.expected(row["expected"])) if row["expected"] else ""
-    return f"{_named(row)}: {page.shown(row)}{expected}"
+    elif any(row["class"] != NOT_RUN and row["claim"] not in detailed for row in stated):
+        say(tr("`radarsim claims {claim}` says what was measured; --parts of all of them", claim=stated[0]["claim"]))
 
 
 def _named(row: Mapping[str, Any]) -> str:
@@ -85,14 +69,19 @@ def _named(row: Mapping[str, Any]) -> str:
     return ": ".join(filter(None, (str(row["case"]), tr(str(row["what"])))))
 
 
-def _print_claim(parts: Sequence[Mapping[str, Any]]) -> None:
-    """A claim in lines: its class, statement and original sentence, and a line a part."""
+def _print_claim(parts: Sequence[Mapping[str, Any]], detailed: bool) -> None:
+    """A claim in a line; detailed, its place, config, original sentence and a line a part."""
     from radarsim.report.claims import NOT_JUDGED, NOT_RUN, page, reasons
 
     first = parts[0]
     verdict = page.verdict_of(parts).replace("*", "")
+    if not detailed:
+        words = tr(first["statement"]).split()
+        short = " ".join(words[:SHORT]) + (" …" if len(words) > SHORT else "")
+        say(f"{first['claim']:<6} {verdict}: {short}")
+        return
     place = f"{tr(first['paper'])}, {tr(first['place'])}"
-    say(f"{first['claim']:<6} {verdict:<20} {tr(first['statement'])}  [{place}]")
+    say(f"{first['claim']:<6} {verdict}: {tr(first['statement'])} [{place}; {first['config']}]")
     if first["original"]:
         say(f"       «{first['original']}»")
     if first["class"] == NOT_RUN:
@@ -131,5 +120,9 @@ def print_readings(done: "Done", detailed: bool) -> None:
         if read.counted is not None:
             say(f"{read.paper.readings.paper}: {read.counted.sentence()}")
     if done.files:
-        drawn = plural("{count} figure drawn again", "{count} figures drawn again", len(done.files) - 1)
+        curves = sum(name.endswith(".svg") for name in done.files)
+        drawn = plural("{count} figure drawn again", "{count} figures drawn again", curves)
         field("table", tr("{file}; curves: {drawn}", file=str(done.folder / "readings.csv"), drawn=drawn))
+    if done.outdated:
+        told = {"configs": listed(done.outdated), "command": f"radarsim report {' '.join(done.outdated)}"}
+        field("note", tr("claims and reports of {configs} were written with other classes: `{command}`", **told))

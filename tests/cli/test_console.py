@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from radarsim.cli import console, main, outcomes, verdicts
 from radarsim.report import notes
+from radarsim.report.claims.judge import SAID
 from radarsim.report.text import significant_digits
 
 
@@ -46,27 +47,31 @@ def test_claims_without_results_say_where_to_find_them(tmp_path):
 
 def parts(*extensions):
     """Parts of a refuted claim, of which these are not counted."""
-    common = {"claim": "P9.1", "paper": "P", "place": "there", "overall": "confirmed", "class": "confirmed"}
+    common = {"claim": "P9.1", "paper": "P", "place": "there"} | dict.fromkeys(SAID, "confirmed")
     common |= {"statement": "It is so", "original": "", "config": "c", "what": "size", "case": "", "unit": "m"}
-    common |= {"measured": 9.0, "lo": 9.0, "hi": 9.0, "exact": 9.0, "expected": "≤ 5", "miss": 8.0}
+    common |= {"measured": 9.0, "lo": 9.0, "hi": 9.0, "exact": 9.0, "expected": "≤ 5", "miss": 8.0, "depends_on": ""}
     common |= dict.fromkeys(("needed", "of", "holds", "worst_miss"), math.nan)
     return [{**common, "verdict": "refuted", "extension": one} for one in extensions]
 
 
-@pytest.mark.parametrize("terminal", [False, True])
-def test_a_part_that_is_not_counted_says_so(terminal, monkeypatch, capsys):
+def test_a_part_that_is_not_counted_says_so(capsys):
     """Beside the paper's own parts, once; of a claim that is an extension as a whole its first line says it."""
-    shown = []
-    monkeypatch.setattr("sys.stdout.isatty", lambda: terminal)
-    monkeypatch.setattr(verdicts, "show", lambda head, columns, cells, spare: shown.extend(map(str, cells)))
-    verdicts._print_stated([*parts(False, True)])
-    told = shown[0] if terminal else capsys.readouterr().out
-    lines = told.split("size")[1:]
+    verdicts.print_claims(parts(False, True), {"P9.1"})
+    lines = capsys.readouterr().out.split("size")[1:]
     assert ["extension, not counted" in line for line in lines] == [False, True]
-    shown.clear()
-    verdicts._print_stated([*parts(True, True)])
-    told = shown[0] if terminal else capsys.readouterr().out
-    assert told.count("extension, not counted") == 1
+    verdicts.print_claims(parts(True, True), {"P9.1"})
+    assert capsys.readouterr().out.count("extension, not counted") == 1
+
+
+def test_a_list_of_claims_is_a_line_each(capsys):
+    long = "one two three four five six seven eight nine ten eleven twelve thirteen"
+    verdicts.print_claims([*parts(False, False), *[one | {"claim": "P9.2", "statement": long} for one in parts(False)]])
+    first, second, counted, hint = capsys.readouterr().out.splitlines()
+    assert first == "P9.1   confirmed: It is so"
+    assert second == f"P9.2   confirmed: {long.removesuffix('thirteen')}…"
+    assert counted == "2 confirmed"
+    assert "radarsim claims P9.1" in hint
+    assert "--parts" in hint
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from radarsim.app import run as experiment
 from radarsim.report import chart_text, figures, legends, panels, sweeps
 from radarsim.report import tables as common
 from radarsim.report.claims import page
+from radarsim.report.claims.judge import SAID
 from radarsim.report.drawing import Line
 
 
@@ -78,7 +79,8 @@ ROW = {
     **{"overall": "confirmed", "verdict": "confirmed", "what": "gain", "measured": -1.23456, "lo": -1.3, "hi": -1.2},
     **{"unit": "%", "config": "rls2", "case": "rls2", "expected": "< 0"},
     **{"class": "confirmed", "original": "а", "extension": False, "exact": -1.25, "miss": 0.0, "worst_miss": 0.0},
-    **{"needed": "", "why": "", "holds": "", "of": "", "old_verdict": "confirmed", "ceiling": ""},
+    **{"needed": "", "why": "", "holds": "", "of": "", "old_verdict": "confirmed", "ceiling": "", "number": ""},
+    **{"as_shipped": "confirmed", "depends_on": "", "expected_lo": "", "expected_hi": 0.0, "margin": 1.0},
 }
 
 
@@ -93,30 +95,33 @@ def test_the_page_of_claims():
         "unit": "",
         "exact": "",
     }
-    never = {**ROW, "claim": "P1.3", "overall": "not run", "class": "not run", "measured": "", "reading": "so"}
+    never = {**ROW, "claim": "P1.3", "measured": "", "reading": "so"} | dict.fromkeys(SAID, "not run")
     verdicts = ("refuted", *["confirmed"] * 3)
-    false = {"claim": "P1.4", "overall": "refuted", "class": "refuted", "worst_miss": 2.5}
-    parts = [
-        {**ROW, **false, "verdict": v, "case": f"rls{i}", "miss": 2.5 if v == "refuted" else 0.0}
-        for i, v in enumerate(verdicts)
-    ]
+    false = {"claim": "P1.4"} | dict.fromkeys(SAID, "refuted")
+    parts = [{**ROW, **false, "verdict": v, "case": f"rls{i}", "exact": -1.25 - i} for i, v in enumerate(verdicts)]
+    parts[0] |= {"miss": 2.5, "exact": 2.5}
     text = page.page([ROW, counted, never, *parts], {ROW["paper"]: "range_doppler"})
     lines = [line for line in text.split("\n") if line.startswith("| P1")]
-    words = "a \\| b &lt; c «а»"
-    gain = "gain: −1.25 % exactly"
-    measured = "gain | −1.235 [−1.300, −1.200] % | −1.25 | &lt; 0 %"
+    words, measured = "a \\| b &lt; c", "gain | −1.235 [−1.300, −1.200] %"
     assert lines == [
-        f"| P1.1 | {words} | table | {gain} (confirmed) | **confirmed** | `rls2` |",
-        f"| P1.2 | {words} | table | operations: 7 (confirmed) | **confirmed** | `rls2` |",
-        f"| P1.3 | {words} *Read as: so.* | table |  | not run | `rls2` |",
-        f"| P1.4 | {words} | table | `rls0`: {gain} (refuted)<br>`rls1`: {gain} (confirmed)<br>"
-        f"`rls2`: {gain} (confirmed)<br>(3 confirmed, 1 refuted of 4 parts) | **refuted** (by 2.5 margins) | `rls2` |",
-        f"| P1.1 | {measured} | 0 | **confirmed** | confirmed |",
+        f"| P1.1 | {words} | gain: −1.25 % exactly; expected &lt; 0 % | **confirmed** | `rls2` |",
+        f"| P1.2 | {words} | operations: 7; expected &lt; 0 | **confirmed** | `rls2` |",
+        f"| P1.3 | {words} |  | not run | `rls2` |",
+        f"| P1.4 | {words} | `rls0`: gain: 2.5 % exactly; expected &lt; 0 % | **refuted** | `rls2` |",  # the worst
+        "| P1.1 | «а» | table |  |",
+        "| P1.2 | «а» | table |  |",
+        "| P1.3 | «а» | table | so |",
+        "| P1.4 | «а» | table |  |",
+        f"| P1.1 | {measured} | −1.25 | &lt; 0 % | 0 | **confirmed** | confirmed |",
         "| P1.2 | operations | 7 |  | &lt; 0 | 0 | **confirmed** | confirmed |",
-        f"| P1.4 | `rls0`: {measured} | 2.5 | **refuted** | confirmed |",
-        *(f"| P1.4 | `rls{i}`: {measured} | 0 | **confirmed** | confirmed |" for i in (1, 2, 3)),
+        f"| P1.4 | `rls0`: {measured} | 2.5 | &lt; 0 % | 2.5 | **refuted** | confirmed |",
+        *(
+            f"| P1.4 | `rls{i}`: {measured} | −{1.25 + i} | &lt; 0 % | 0 | **confirmed** | confirmed |"
+            for i in (1, 2, 3)
+        ),
     ]
-    assert "* 2 confirmed: true as stated\n* 1 refuted" in text
+    assert "* **2 confirmed**, true as stated: P1.1, P1.2\n* **1 refuted**" in text
+    assert text.count("<details>") == text.count("</details>") == 1
 
 
 def test_measured_values_are_written_to_two_figures_of_their_half_width():

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from radarsim.language import Term, plural, tr
+from radarsim.language import plural, tr
 from radarsim.report.claims import page
 from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
-from radarsim.report.claims.rule import CLASSES, VOID
+from radarsim.report.claims.rule import CLASSES
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
 
 FURTHEST = 4.0  # margins: what lies further is drawn there
@@ -21,45 +21,20 @@ STYLES = {
 
 
 def depth(value: float, row: Mapping) -> float:
-    """Distance of a value from what the words say, in margins: 0 at an end of the range, negative inside, cut at 4."""
-    lo, hi = page.number(row["expected_lo"]), page.number(row["expected_hi"])
-    below = -math.inf if lo is None else lo - value
-    above = -math.inf if hi is None else value - hi
-    outside = max(below, above)
-    return float(np.clip(outside / (page.number(row["margin"]) or 1.0), -FURTHEST, FURTHEST))
-
-
-def worst(parts: Sequence[Mapping]) -> Mapping | None:
-    """The part that is furthest from its words, of variants of a number the nearest; None where none was measured."""
-    counted = page.extension(parts)
-    best: dict[str, Mapping] = {}
-    for i, row in enumerate(parts):
-        ours = str(row["extension"]).lower() == "true"
-        if page.number(row["measured"]) is None or row["verdict"] == VOID or (ours and not counted):
-            continue
-        key = str(row["number"]) or f"#{i}"
-        if key not in best or depth(_value(row), row) < depth(_value(best[key]), best[key]):
-            best[key] = row
-    return max(best.values(), key=lambda row: depth(_value(row), row), default=None)
-
-
-def _value(row: Mapping) -> float:
-    exact = page.number(row["exact"])
-    return float(row["measured"]) if exact is None else exact
+    """Distance of a value from what the words say, in margins, cut at 4."""
+    return float(np.clip(page.depth(value, row), -FURTHEST, FURTHEST))
 
 
 def figure(rows: Sequence[Mapping]) -> Figure | None:
     """All claims of these rows that were judged, a panel a paper; None where there are none."""
     judged = [own for own in page.grouped(rows) if own[0]["class"] not in (NOT_RUN, NOT_JUDGED)]
-    found = [(own, row) for own in judged if (row := worst(own)) is not None]
+    found = [(own, row) for own in judged if (row := page.worst(own)) is not None]
     papers = list(dict.fromkeys(own[0]["paper"] for own, _ in found))
     panels = [_panel(paper, [(own, row) for own, row in found if own[0]["paper"] == paper]) for paper in papers]
     if not panels:
         return None
     classes = Counter(own[0]["class"] for own in judged)
-    counted = ", ".join(
-        tr("{count} {kind}", count=classes[kind], kind=Term(kind)) for kind in page.ORDER if classes[kind]
-    )
+    counted = ", ".join(page.of_class(kind, classes[kind]) for kind in page.ORDER if classes[kind])
     return Figure(
         name="claims",
         title=tr("Claims, in margins of what their papers say"),
@@ -67,7 +42,7 @@ def figure(rows: Sequence[Mapping]) -> Figure | None:
         + tr(
             "Of each claim the part that lies furthest from the paper's words: measured, with its 95 % interval, and "
             "exactly, in margins of that part, cut at ± {furthest:g}. Under 0 it is as the words say, up to "
-            "1 within their margin. The mark is the class of the claim, over all readings where these are known.",
+            "1 within their margin. The mark is the class of the claim, over all readings that its paper allows.",
             furthest=FURTHEST,
         ),
         panels=tuple(panels),

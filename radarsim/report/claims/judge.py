@@ -46,8 +46,9 @@ CLAIMED = (
     *("claim", "paper", "statement", "case", "measured", "lo", "hi", "expected", "verdict"),
     *("expected_lo", "expected_hi", "what", "unit", "place", "reading", "overall"),
     *("exact", "margin", "miss", "class", "holds", "of", "depends_on", "old_verdict", "original"),
-    *("margin_kind", "ceiling", "n", "worst_miss", "needed", "extension", "number", "why"),
+    *("margin_kind", "ceiling", "n", "worst_miss", "needed", "extension", "number", "why", "as_shipped"),
 )
+SAID = ("verdict", "overall", "class", "as_shipped")  # of these columns
 # Of these columns; empty where there is none.
 NUMBERS = (
     *("measured", "lo", "hi", "expected_lo", "expected_hi", "exact", "margin", "miss", "holds", "of"),
@@ -251,7 +252,7 @@ def _row(claim: Claim, paper: str, one: _Tried, outcome: Outcome | None, many: i
         "number": f"{part.statement}{part.number}" if part.number else "",
         "extension": claim.extension or not part.asserted,
         "overall": outcome.words if outcome else NOT_JUDGED,
-        "class": outcome.kind if outcome else NOT_JUDGED,
+        **dict.fromkeys(("class", "as_shipped"), outcome.kind if outcome else NOT_JUDGED),
         "worst_miss": _end(outcome.miss) if outcome else math.nan,
         "needed": outcome.needed if outcome and outcome.needed else math.nan,
         "verdict": NOT_JUDGED,
@@ -303,7 +304,7 @@ def listed(papers: Sequence[PaperClaims], stored: Mapping[str, Sequence[Mapping]
     for paper, claim in ((of.paper, claim) for of in papers for claim in of.claims):
         own = [dict(row) for row in stored.get(claim.config, ()) if row["claim"] == claim.id]
         if not own:
-            own = [blank(claim, paper) | {"verdict": NOT_RUN, "overall": NOT_RUN, "class": NOT_RUN}]
+            own = [blank(claim, paper) | dict.fromkeys(SAID, NOT_RUN)]
             own[0] |= dict.fromkeys(NUMBERS, "")
         rows += [row | {"config": claim.config} for row in own]
     return rows
@@ -326,7 +327,7 @@ def unstored(of: PaperClaims, cases: "Sequence[Case]", shipped: Shipped, stem: s
         elif not of.holds(claim, stem):
             continue
         row = blank(claim, of.paper) | dict.fromkeys(NUMBERS, "") | {"why": why}
-        rows.append(row | dict.fromkeys(("verdict", "overall", "class"), state))
+        rows.append(row | dict.fromkeys(SAID, state))
     return rows
 
 

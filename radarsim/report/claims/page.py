@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from radarsim.language import numeral, plural, term, tr
-from radarsim.report.claims import reasons
+from radarsim.report.claims import classes, reasons
 from radarsim.report.claims.judge import NOT_JUDGED, NOT_RUN
 from radarsim.report.claims.rule import (
     CLASSES,
@@ -22,29 +22,27 @@ from radarsim.report.claims.rule import (
 )
 from radarsim.report.text import interval
 
-MANY_MARGINS = 1000  # a miss by more is told as that: of an identity the margin is rounding
 HEAD = """# The papers' claims
 
 Made from results by `make claims-page`, never by hand, by [one rule](verdicts.md) that was written down before anything
-was measured. For each paper first every claim: what it says, in English and in the original, and where; what came out;
-its class, with the worst miss in margins; and the config that shows it (`radarsim run CONFIG`, then `radarsim claims
-CONFIG`). Then every part of each: what was measured, with its 95 % interval in brackets where it has a sampling error;
-the exact value where it is known, which then decides; the values that the paper's words leave, with their margin; and
-the miss. "In m of M readings": `radarsim readings` judges a claim under everything that its paper leaves open. How the
-words were read stands in italics. Extensions are ours and are not counted.
+was measured. Of each claim a line: what the paper says; the part of it that lies furthest from these words, measured
+with its 95 % interval or exactly, and what the words leave to it; how far the claim stands; and the config that shows
+it (`radarsim run CONFIG`, then `radarsim claims CONFIG`). The class is over all readings that the paper allows, where
+it leaves anything open (`radarsim readings`): "refuted as shipped; depends on start" is false with the choices that
+the config takes, and true with another start. Below, to be opened: every claim in the original and how it was read,
+and every part: what was measured, the exact value where it is known, which then decides, the values that the words
+leave, and by how many margins it misses them. Extensions are ours and are not counted.
 
 ![All claims, in margins of what their papers say](claims.svg)
 """
-MARKS = {CONFIRMED: "**confirmed**", REFUTED: "**refuted**"}
+MARKS = (CONFIRMED, REFUTED)  # in bold
 ORDER = (*CLASSES, NOT_JUDGED, NOT_RUN)
 NOT_COUNTED = term("extension, not counted")  # a claim, or a part of one, that is ours
-SHOWN = 3  # parts of a claim in its paper's first table
 WORDS = {  # of each class, for the headline
     CONFIRMED: "true as stated",
     REFUTED: "false by more than the margin of their words",
-    DEPENDS: "true or false with what the paper leaves open",
     IMMATERIAL: "about differences too small to matter",
-    CONTRADICTORY: "numbers that come out only under values that the paper prints otherwise",
+    CONTRADICTORY: "its numbers come out only under values that it prints otherwise",
     UNJUDGEABLE: "without what a test needs",
     UNDECIDED: "intervals still too wide",
 }
@@ -59,22 +57,50 @@ def page(rows: Sequence[Mapping], pages: Mapping[str, str]) -> str:
         link = f" Equations and decisions: [{key}]({pages[paper]}.md)." if pages.get(paper) else ""
         claims = [[row for row in own if row["claim"] == claim] for claim in dict.fromkeys(row["claim"] for row in own)]
         text += [f"## {key} {paper}", "", f"{counted(own)}.{link}", ""]
-        text += ["| claim | statement | place | measured | class | config |", "|---|---|---|---|---|---|"]
-        text += [*map(_line, claims), "", f"### {key}, part by part", ""]
+        text += [
+            "| claim | what the paper says | what came out | how far it stands | config |",
+            "|---|---|---|---|---|",
+        ]
+        text += [*map(_line, claims), "", "<details>", f"<summary>{key} in the original, part by part</summary>", ""]
+        text += ["| claim | in the original | place | read as |", "|---|---|---|---|", *map(_original, claims), ""]
         text += ["| claim | part | measured | exact | expected | miss, margins | verdict | rule of 0.1 |"]
         text += ["|---|---|---|---|---|---|---|---|"]
         text += [line for parts in claims for line in _parts(parts)]
-        text.append("")
+        text += ["", "</details>", ""]
     return "\n".join(text)
 
 
 def headline(rows: Sequence[Mapping]) -> list[str]:
-    """The classes with their counts and what they mean, a line each."""
-    classes, extensions = counts(rows)
-    lines = [f"In all {sum(classes.values())} claims, and {extensions} extensions that are not counted:", ""]
-    for kind, count in classes.items():
-        lines.append(f"* {count} {kind}" + (f": {WORDS[kind]}" if kind in WORDS else ""))
+    """The classes with their counts, what they mean and which claims are of them, a line each."""
+    found, extensions = counts(rows)
+    own = [parts[0] for parts in grouped(rows) if not extension(parts)]
+    lines = [f"In all {sum(found.values())} claims, and {extensions} extensions that are not counted:", ""]
+    for kind, count in found.items():
+        names = in_a_row([row["claim"] for row in own if row["class"] == kind])
+        meant = f", {WORDS[kind]}" if kind in WORDS else ""
+        lines.append(f"* **{of_class(kind, count)}**{meant}: {names}")
     return lines
+
+
+def in_a_row(claims: Sequence[str]) -> str:
+    """Names of claims, those with numbers in a row by the first and last: `P1.1–P1.34`."""
+    runs: list[list[str]] = []
+    for name in claims:
+        paper, _, end = name.rpartition(".")
+        follows = runs and end.isdecimal() and runs[-1][-1] == f"{paper}.{int(end) - 1}"
+        runs[-1].append(name) if follows else runs.append([name])
+    return ", ".join(f"{run[0]}–{run[-1]}" if len(run) > 2 else ", ".join(run) for run in runs)
+
+
+def of_class(kind: str, count: int) -> str:
+    """How many claims are of a class, in words."""
+    if kind == DEPENDS:
+        return plural(
+            "{count} depends on what the paper leaves open", "{count} depend on what the paper leaves open", count
+        )
+    if kind == CONTRADICTORY:
+        return tr("{count} where the print contradicts itself", count=count)
+    return tr("{count} {kind}", count=count, kind=term(kind))
 
 
 def counts(rows: Sequence[Mapping]) -> tuple[dict[str, int], int]:
@@ -105,41 +131,32 @@ def extension(parts: Sequence[Mapping]) -> bool:
 def counted(rows: Sequence[Mapping]) -> str:
     """How many claims are of which class, in words."""
     classes, extensions = counts(rows)
-    said = ", ".join(tr("{count} {kind}", count=count, kind=term(kind)) for kind, count in classes.items())
+    said = ", ".join(of_class(kind, count) for kind, count in classes.items())
     more = plural("{count} extension not counted", "{count} extensions not counted", extensions) if extensions else ""
     return "; ".join(filter(None, (said, more)))
 
 
 def verdict_of(parts: Sequence[Mapping]) -> str:
-    """A claim's class in words, with the miss of one that is refuted and what would decide one that is not."""
-    first = parts[0]
-    said = str(first["overall"])
-    text = class_words(said)
-    if said in MARKS:
-        text = MARKS[said].replace(said, text)
-    notes = []
-    if first["class"] in (REFUTED, CONTRADICTORY) and (number(first["worst_miss"]) or 0.0) > 1:
-        miss = number(first["worst_miss"]) or 0.0
-        far = miss >= MANY_MARGINS
-        words = tr("by over {many:,} margins", many=MANY_MARGINS) if far else tr("by {miss:.3g} margins", miss=miss)
-        notes.append(words)
+    """How far a claim stands, with the readings under which it is true, and what would decide one that is not."""
+    first, notes = parts[0], []
+    text = classes.said(first)
+    if first["overall"] in MARKS:
+        text = f"**{text}**"
     needed = number(first["needed"])
-    if first["class"] == UNDECIDED and needed is not None:
+    if UNDECIDED in (first["class"], first["as_shipped"]) and needed is not None:
         notes.append(tr("{needed} realisations would decide", needed=f"{roughly(needed):,}"))
-    if number(first["of"]) is not None:
-        holds, of = number(first["holds"]), number(first["of"])
-        notes.append(tr("in {holds:.0f} of {of:.0f} readings", holds=holds, of=of))
+    if of := number(first["of"]):
+        holds = number(first["holds"])
+        notes.append(
+            tr("true under all {of:.0f} readings", of=of)
+            if holds == of
+            else tr("true under {holds:.0f} of {of:.0f} readings", holds=holds, of=of)
+        )
     if first["class"] in (UNJUDGEABLE, NOT_JUDGED) and first["why"]:
         notes.append(reasons.said(first["why"]))
     if extension(parts):
         notes.append(tr(NOT_COUNTED))
     return f"{text} ({'; '.join(notes)})" if notes else text
-
-
-def class_words(said: str) -> str:
-    """A claim's class as the rule words it, in the language spoken."""
-    keys = said.removeprefix(DEPENDS).strip()
-    return tr("depends on {keys}", keys=keys) if said.startswith(DEPENDS) and keys else tr(said)
 
 
 def number(value: Any) -> float | None:
@@ -150,39 +167,56 @@ def number(value: Any) -> float | None:
 
 
 def _line(parts: Sequence[Mapping]) -> str:
-    """A claim: its words, some parts of those that decide it, its class."""
-    first = parts[0]
-    original = f" «{first['original']}»" if first["original"] else ""
-    reading = f" *Read as: {first['reading']}.*" if first["reading"] else ""
-    said = first["statement"] + original + reading
-    cells = (first["claim"], said, first["place"], "<br>".join(_decisive(parts)), verdict_of(parts))
+    """A claim: its words, the part that is furthest from them, its class."""
+    first, found = parts[0], worst(parts)
+    came = "" if found is None else f"{_named(found, parts)}: {shown(found)}; expected {_expected(found)}"
+    cells = (first["claim"], first["statement"], came, verdict_of(parts))
     return "| " + " | ".join(map(_cell, cells)) + f" | `{first['config']}` |"
 
 
-def _decisive(parts: Sequence[Mapping]) -> list[str]:
-    """Up to three parts, the worst first, and how many came out how."""
-    if parts[0]["class"] == NOT_RUN:
-        return []
-    own = [row for row in parts if str(row["extension"]).lower() != "true"] or list(parts)
-    worst = sorted(own, key=lambda row: -(number(row["miss"]) or 0.0)) if len(own) > SHOWN else own
-    said = [f"{_named(row, parts)}: {shown(row)} ({row['verdict']})" for row in worst[:SHOWN]]
-    if len(own) > SHOWN:
-        said.append(f"({summary(own)} of {len(own)} parts)")
-    return said
+def _original(parts: Sequence[Mapping]) -> str:
+    """A claim as its paper has it, and how it was read."""
+    first = parts[0]
+    original = f"«{first['original']}»" if first["original"] else ""
+    return "| " + " | ".join(map(_cell, (first["claim"], original, first["place"], first["reading"]))) + " |"
 
 
-def summary(parts: Sequence[Mapping]) -> str:
-    """How many parts came out how."""
-    found = Counter(row["verdict"] for row in parts)
-    order = [*ORDER, VOID]
-    return ", ".join(f"{found[one]} {one}" for one in sorted(found, key=order.index))
+def _expected(row: Mapping) -> str:
+    return f"{row['expected']} {row['unit']}".rstrip()
+
+
+def worst(parts: Sequence[Mapping]) -> Mapping | None:
+    """The part that is furthest from its words, of variants of a number the nearest; None where none was measured."""
+    counted = extension(parts)
+    best: dict[str, Mapping] = {}
+    for i, row in enumerate(parts):
+        ours = extension([row]) and not counted
+        if number(row["measured"]) is None or row["verdict"] == VOID or ours:
+            continue
+        key = str(row["number"]) or f"#{i}"
+        if key not in best or depth(_value(row), row) < depth(_value(best[key]), best[key]):
+            best[key] = row
+    return max(best.values(), key=lambda row: depth(_value(row), row), default=None)
+
+
+def depth(value: float, row: Mapping) -> float:
+    """Distance of a value from what the words say, in margins: 0 at an end of the range, negative inside."""
+    lo, hi = number(row["expected_lo"]), number(row["expected_hi"])
+    below = -math.inf if lo is None else lo - value
+    above = -math.inf if hi is None else value - hi
+    return max(below, above) / (number(row["margin"]) or 1.0)
+
+
+def _value(row: Mapping) -> float:
+    exact = number(row["exact"])
+    return float(row["measured"]) if exact is None else exact
 
 
 def _parts(parts: Sequence[Mapping]) -> list[str]:
     """A row for each part of a claim that was run."""
     lines = []
     for row in parts if parts[0]["class"] != NOT_RUN else ():
-        verdict = MARKS.get(row["verdict"], row["verdict"])
+        verdict = f"**{row['verdict']}**" if row["verdict"] in MARKS else row["verdict"]
         if row["verdict"] == VOID:
             verdict = f"void: an efficient estimator reaches {number(row['ceiling']):.3f}"
         if row["verdict"] == NOT_JUDGED:
@@ -192,7 +226,7 @@ def _parts(parts: Sequence[Mapping]) -> list[str]:
         exact, missed = number(row["exact"]), number(row["miss"])
         cells = (
             *(row["claim"], _named(row, parts), measured(row) if number(row["measured"]) is not None else ""),
-            *("" if exact is None else plain(exact), f"{row['expected']} {row['unit']}".rstrip()),
+            *("" if exact is None else plain(exact), _expected(row)),
             *("" if missed is None else f"{missed:.3g}", verdict, row["old_verdict"]),
         )
         lines.append("| " + " | ".join(map(_cell, cells)) + " |")

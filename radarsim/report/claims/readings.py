@@ -90,6 +90,10 @@ class PaperReadings(ABC):
     realisations: int = 1000  # of each run, where none are asked for
     most: int = 16_000  # of a run that is to decide a claim, where none are asked for
 
+    def open(self, claim: Claim) -> bool:
+        """Whether the paper leaves anything open on which a claim of its own may hang."""
+        return not claim.extension and any(choice.bears_on(claim.id) for choice in self.choices)
+
     # ---- the readings --------------------------------------------------------------------------------------------
     def declared(self) -> Sequence[Reading]:
         """The readings that are judged, the default first: all combinations of E and U, and each N alone."""

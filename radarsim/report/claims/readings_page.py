@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from radarsim.language import Term, current, numeral, plural, term, tr
+from radarsim.report.claims.classes import words
 from radarsim.report.claims.joint import Joint, Key, Together
 from radarsim.report.claims.over import Over
-from radarsim.report.claims.page import class_words, expected, plain
+from radarsim.report.claims.page import expected, plain
 from radarsim.report.claims.readings import PaperReadings
 from radarsim.report.claims.reasons import said
 from radarsim.report.claims.search import Search
@@ -75,7 +76,8 @@ def _claims(over: Sequence[Over]) -> str:
     for one in over:
         found = one.outcome
         holds = tr("{count} of {of}", count=found.holds_in or 0, of=found.readings or 0) if found else ""
-        verdict = "; ".join(filter(None, (class_words(found.words), one.still_open()))) if found else tr("not judged")
+        said = words(found.kind, found.kind, ", ".join(found.depends_on), tr) if found else tr("not judged")
+        verdict = "; ".join(filter(None, (said, one.still_open())))
         rows.append((one.claim.id, tr(one.claim.statement), verdict, holds))
     return _table((term("claim"), term("statement"), term("verdict"), term("holds in")), rows)
 

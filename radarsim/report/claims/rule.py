@@ -16,6 +16,7 @@ CONTRADICTORY, UNJUDGEABLE = "the print contradicts itself", "not judgeable as s
 UNDECIDED, DEPENDS = "not yet decided", "depends on"
 VOID = "void"  # of a part: the truth itself would not pass it
 CLASSES = (CONFIRMED, REFUTED, DEPENDS, IMMATERIAL, CONTRADICTORY, UNJUDGEABLE, UNDECIDED)
+NO_READING_MENDS = (CONTRADICTORY, UNJUDGEABLE)
 
 # Kinds of margin. Of the first four the margin belongs to the words: a value within it is what the paper says.
 PRINT, ABOUT, GRID, SAME = "print", "about", "grid", "same"
@@ -348,7 +349,7 @@ def over_readings(own: Outcome, readings: Sequence[Reading]) -> Outcome:
     holds = said[CONFIRMED]
     kind: str = own.kind
     on: tuple[str, ...] = ()
-    if own.kind not in (CONTRADICTORY, UNJUDGEABLE):
+    if own.kind not in NO_READING_MENDS:
         if len(said) == 1:
             (kind,) = said
         elif set(said) == {CONFIRMED, IMMATERIAL}:

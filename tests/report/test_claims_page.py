@@ -1,0 +1,71 @@
+"""The page's headline, its lines, and the forest plot, by hand."""
+
+import numpy as np
+
+from radarsim.report.claims import forest, page
+from radarsim.report.claims.judge import NOT_RUN
+from radarsim.report.claims.rule import CONFIRMED, DEPENDS, REFUTED, UNDECIDED
+
+
+def row(claim="P9.1", kind=REFUTED, **more):
+    numbers = {"measured": 3.0, "lo": 2.5, "hi": 3.5, "expected_lo": 5.0, "expected_hi": "", "margin": 1.0}
+    words = {"paper": "Someone", "statement": "s", "place": "p", "original": "", "reading": "", "number": "", "why": ""}
+    classes = {"class": kind, "overall": kind, "as_shipped": kind, "verdict": kind, "extension": False, "needed": ""}
+    beside = {
+        "exact": "",
+        "miss": 2.0,
+        "of": "",
+        "holds": "",
+        "depends_on": "",
+        "what": "x",
+        "expected": "5",
+        "unit": "m",
+    }
+    return {"claim": claim, **words, **classes, **numbers, **beside, **more}
+
+
+def test_headline_counts_classes_and_leaves_extensions_out():
+    rows = [row(), *(row(f"P9.{n}", CONFIRMED) for n in (2, 3, 4)), row("P9.5", CONFIRMED, extension="true")]
+    rows += [row("P9.6", DEPENDS), row("P9.8", DEPENDS)]
+    assert page.counts(rows) == ({CONFIRMED: 3, REFUTED: 1, DEPENDS: 2}, 1)
+    said = "3 confirmed, 1 refuted, 2 depend on what the paper leaves open; 1 extension not counted"
+    assert page.counted(rows) == said
+    lines = page.headline(rows)
+    assert lines[0].startswith("In all 6 claims, and 1 extensions")
+    assert lines[2:] == [
+        "* **3 confirmed**, true as stated: P9.2–P9.4",
+        "* **1 refuted**, false by more than the margin of their words: P9.1",
+        "* **2 depend on what the paper leaves open**: P9.6, P9.8",
+    ]
+
+
+def test_a_claim_says_how_far_it_stands():
+    flips = {"overall": "", "holds": 1, "of": 2, "depends_on": "flight, start", "as_shipped": REFUTED}
+    said = page.verdict_of([row(kind=DEPENDS, **flips)])
+    assert said == "refuted as shipped; depends on flight, start (true under 1 of 2 readings)"
+    assert page.verdict_of([row(kind=DEPENDS, **flips | {"as_shipped": DEPENDS})]).startswith("depends on flight")
+    few = row(kind=CONFIRMED, overall="", holds=3, of=3, as_shipped=UNDECIDED, needed=8123)
+    words = "not yet decided as shipped; confirmed over all readings"
+    assert page.verdict_of([few]) == f"{words} (8,200 realisations would decide; true under all 3 readings)"
+    assert page.verdict_of([row()]) == "**refuted**"  # by how much stands with its parts
+
+
+def test_forest_stands_in_margins():
+    assert forest.depth(3.0, row()) == 2.0
+    assert forest.depth(6.5, row()) == -1.5
+    assert forest.depth(-100.0, row()) == forest.FURTHEST
+    between = row(expected_hi=7.0)
+    assert forest.depth(6.5, between) == -0.5
+    figure = forest.figure([row(), row("P9.2", CONFIRMED, measured=6.0, lo=5.5, hi=6.5, exact=6.25)])
+    marks = {mark.label: mark for mark in figure.panels[0].marks if mark.label in (CONFIRMED, REFUTED)}
+    refuted, confirmed = marks[REFUTED], marks[CONFIRMED]
+    np.testing.assert_allclose((refuted.lo, refuted.y, refuted.hi), ([1.5], [2.0], [2.5]))
+    np.testing.assert_allclose((confirmed.lo, confirmed.y, confirmed.exact), ([-1.5], [-1.0], [-1.25]))
+    assert forest.figure([row(kind=NOT_RUN)]) is None
+
+
+def test_of_variants_of_a_number_the_nearest_is_drawn():
+    far = row(number="T", measured=-50.0, lo=-51.0, hi=-49.0)
+    near = row(number="T", measured=4.9, lo=4.8, hi=5.0)
+    assert page.worst([far, near]) is near
+    assert page.worst([row(extension=True), near]) is near
