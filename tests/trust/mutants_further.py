@@ -371,12 +371,16 @@ SAID = (
         ),
     ),
     *mutants(
-        "radarsim/report/claims/joined.py",
+        "radarsim/report/claims/classes.py",
         (
-            "over = replace(over, kind=rule.CONTRADICTORY)",
-            "over = replace(over)",
-            "report/test_claims_joined.py"
-            "::test_a_print_that_contradicts_itself_over_its_readings_does_so_beside_the_claims",
+            'every = {"class": found.kind,',
+            'every = {"class": own,',
+            "report/test_classes.py::test_every_claim_has_one_class_wherever_it_is_said",
+        ),
+        (
+            "for end in (part.expected.lo, part.expected.hi, part.expected.margin)",
+            "for end in (part.expected.lo, part.expected.hi)",
+            "report/test_classes.py::test_what_was_judged_of_other_words_is_no_class",
         ),
     ),
     *mutants(
