@@ -16,6 +16,7 @@ from radarsim.app.simulation import result_of
 from radarsim.app.work import CaseWork
 from radarsim.config import numeric
 from radarsim.config.experiment import Case
+from radarsim.config.labels import label
 from radarsim.config.lookup import did_you_mean
 from radarsim.engine.collect import collect
 from radarsim.engine.results import Axes, CaseResult
@@ -283,7 +284,7 @@ def answered(asked: Question, attained_now: float, **given: Any) -> Answer:
     shown = whole["limit_at"] if whole["value"] is None else whole["value"]
     return Answer(
         key=asked.key,
-        unit=numeric.unit(asked.key),
+        unit=label(asked.cases.base.spec, asked.key).unit,
         quantity=asked.quantity,
         quantity_unit=asked.unit,
         equals=asked.equals,

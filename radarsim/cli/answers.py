@@ -81,7 +81,8 @@ def print_sensitivity(found: "Sensitivity", written: "Sequence[str]") -> None:
     for key in dict.fromkeys(row["key"] for row in rows):
         own = {row["filter"]: row for row in rows if row["key"] == key}
         first = next(iter(own.values()))
-        line = [key, f"{_number(first['value'])} → {_number(first['changed_value'])}"]
+        changed = _with_unit(first["changed_value"], found.labels[str(key)].unit)
+        line = [key, f"{_number(first['value'])} → {changed}"]
         line += [_change(own.get(one), "sigma_change", "percent", "%") for one in filters]
         line += [_change(own.get(one), "gain_change", "points", "") for one in gaining]
         cells.append(line)
@@ -162,4 +163,4 @@ def _with_unit(value: float, unit: str, form: str = PLAIN) -> str:
 
 
 def _number(value: float, form: str = PLAIN) -> str:
-    return significant_digits(value, form).replace("e−0", "·10^−").replace("e+", "·10^")
+    return significant_digits(value, form)

@@ -9,10 +9,15 @@ from typing import Any, NamedTuple
 
 from pydantic.fields import FieldInfo
 
-from radarsim.config import numeric
 from radarsim.config.check import models_in
 from radarsim.config.fields import Model, Study, in_radians
 from radarsim.config.schema import Common
+
+UNITS = {
+    **{"m": "m", "s": "s", "mps": "m/s", "mps2": "m/s²", "mps3": "m/s³", "rad": "rad", "deg": "°", "hz": "Hz"},
+    **{"radps": "rad/s", "degps": "°/s", "radps2": "rad/s²", "degps2": "°/s²", "g": "g", "db": "dB"},
+    **{"kgpm2": "kg/m²"},
+}
 
 
 class Label(NamedTuple):
@@ -39,15 +44,17 @@ def label(keys: Study | type[Study] | None, key: str) -> Label:
     Label(text='rise time', symbol='', unit='s')
     """
     steps = [step for step in key.split(".") if not step.isdecimal()]
-    unit = numeric.unit(key)
+    stem, _, end = steps[-1].rpartition("_")
+    unit = UNITS.get(end, "") if stem and not stem.endswith("_per") else ""  # hertz per second are not seconds
     found = _field(keys, steps) if keys is not None else None
     found = found or _field(Common, steps)
     if found is None:
-        name = steps[-1].rpartition("_")[0] if unit else steps[-1]
+        name = stem if unit else steps[-1]
         return Label(name.replace("_", " "), "", unit)
     extra = found.json_schema_extra if isinstance(found.json_schema_extra, dict) else {}
-    text = found.title or (steps[-1].rpartition("_")[0] if unit else steps[-1]).replace("_", " ")
-    return Label(text, str(extra.get("symbol", "")), str(extra.get("unit", unit)))
+    text = found.title or (stem if unit else steps[-1]).replace("_", " ")
+    own = unit if in_radians(steps[-1]) else str(extra.get("unit", unit))  # a twin in degrees has no field of its own
+    return Label(text, str(extra.get("symbol", "")), own)
 
 
 def _field(keys: Model | type[Model], steps: list[str]) -> FieldInfo | None:

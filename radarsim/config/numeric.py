@@ -28,23 +28,6 @@ class NumericKey:
     whole: bool
 
 
-UNITS = {
-    **{"m": "m", "s": "s", "mps": "m/s", "mps2": "m/s²", "mps3": "m/s³", "rad": "rad", "deg": "°", "hz": "Hz"},
-    **{"radps": "rad/s", "degps": "°/s", "radps2": "rad/s²", "degps2": "°/s²", "g": "g", "db": "dB"},
-    **{"kgpm2": "kg/m²"},
-}
-
-
-def unit(path: str) -> str:
-    """The unit that the end of a key names; empty where it names none.
-
-    >>> unit("radar.sigma_velocity_mps")
-    'm/s'
-    """
-    parts = [part for part in path.split(".") if not part.isdecimal()]
-    return UNITS.get(parts[-1].rpartition("_")[2], "") if parts and "_" in parts[-1] else ""
-
-
 def keys(spec: Study) -> list[NumericKey]:
     """Every key of a case that holds a number, in the order of its schema, items of lists by their place."""
     return list(_within(spec, ()))

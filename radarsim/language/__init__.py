@@ -14,6 +14,7 @@ Tables are the same in every language, and so are messages on faults of a config
 """
 
 import os
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -28,6 +29,8 @@ from radarsim.language import catalogue
 
 ENGLISH = "en"
 VARIABLE = "RADARSIM_LANGUAGE"
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+POWER = re.compile(r"(?P<mantissa>\d[\d.,]*)e(?P<exponent>[+-]\d+)")  # of a number in Python's form
 NUMBER = "number"  # context of the point and of the separator of thousands
 
 
@@ -112,11 +115,26 @@ def _forms(code: str) -> frozenset[tuple[str, str]]:
 
 
 def numeral(text: str) -> str:
-    """A number as English writes it (1,234.5), as the language spoken does; with a true minus."""
+    """A number as English writes it (1,234.5), as the language spoken does; with a true minus and raised powers of ten.
+
+    >>> [numeral(one) for one in ("-0.5", "6.678e+09", "1e-05")]
+    ['−0.5', '6.678·10⁹', '10⁻⁵']
+    """
+    text = POWER.sub(_raised, text)
     if current() == ENGLISH:
         return text.replace("-", "−")
     said = translations(current())
     return text.translate({ord(mark): said.pgettext(NUMBER, mark) for mark in ".,"} | {ord("-"): "−"})
+
+
+def power_of_ten(exponent: int) -> str:
+    """10⁻³ of −3."""
+    return f"10{str(exponent).translate(SUPERSCRIPT)}"
+
+
+def _raised(found: re.Match[str]) -> str:
+    power = power_of_ten(int(found["exponent"]))
+    return power if found["mantissa"] == "1" else f"{found['mantissa']}·{power}"
 
 
 def listed(names: Sequence[str]) -> str:

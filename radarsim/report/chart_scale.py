@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from radarsim.language import power_of_ten
 from radarsim.report.drawing import Axis
-from radarsim.report.text import number, power_of_ten
+from radarsim.report.text import number
 
 MARGIN = {"x": 0.02, "y": 0.06}  # of the span of the data, on either side
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)

@@ -10,7 +10,7 @@ import numpy as np
 from radarsim.config.labels import Label
 from radarsim.config.labels import label as label_of
 from radarsim.engine.results import CaseResult
-from radarsim.language import plural, tr
+from radarsim.language import plural, power_of_ten, tr
 from radarsim.report import seen, text
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.report.statistics import Z95
@@ -60,7 +60,7 @@ def number(value: object, powers: bool = False) -> str:
         and float(f"1e{power}") == value
         and (power >= (2 if powers else LONG) or power < (0 if powers else -1))
     ):
-        return text.power_of_ten(power)
+        return power_of_ten(power)
     return text.number(value)
 
 

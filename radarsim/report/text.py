@@ -4,9 +4,8 @@ import math
 import re
 from collections.abc import Iterable
 
-from radarsim.language import numeral, term, tr
+from radarsim.language import numeral, power_of_ten, term, tr
 
-SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 UNITS = {
     "m/s2": "m/s²",
     "rad/s2": "rad/s²",
@@ -52,11 +51,6 @@ def clock(seconds: float) -> str:
 def plural(count: int, noun: str) -> str:
     """1 case, 2 cases."""
     return f"{count} {noun}{'s' * (count != 1)}"
-
-
-def power_of_ten(exponent: int) -> str:
-    """10⁻³ of −3."""
-    return f"10{str(exponent).translate(SUPERSCRIPT)}"
 
 
 def number(value: float, digits: int = 4) -> str:

@@ -102,7 +102,8 @@ def test_the_command_writes_table_and_figure(tmp_path):
     assert rows["exact"].all()
     lines = ended.stdout.splitlines()
     assert lines[0] == "rls2: change of r at 60 s for +10 %"
-    assert lines[2].startswith("radar.sigma_range_m")
+    assert lines[2].split()[:5] == ["radar.sigma_range_m", "250", "→", "275", "m"]
+    assert any(line.startswith("filters.1.manoeuvre_variance  0.001 → 0.0011 (m/s³)² ") for line in lines)
 
 
 def test_the_command_gives_one_json_document(tmp_path):

@@ -78,6 +78,12 @@ def test_all_roots_are_those_of_a_dense_grid():
         assert grid[i] <= value <= grid[i + 1]
 
 
+def test_the_unit_is_that_of_the_label():
+    """No key's end names (m/s³)²."""
+    told = command("rls2", "manoeuvre_variance", "--sigma", "r", "--filter", "r+Vr", "--equals", 160)
+    assert told.output.startswith("manoeuvre_variance = 0.330711 (m/s³)² ")
+
+
 def test_the_slope_is_the_derivative():
     found = solve("rls2", "radar.sigma_velocity_mps", GAIN, 30)
     step = 1e-3

@@ -49,6 +49,8 @@ class Leg(Model):
 
     length_m: Positive = Field(title="length of the leg", json_schema_extra={"symbol": "L"}, description="of a leg, m")
     width_m: Positive = Field(description="of a leg, m")
+    slope_hz_per_s: Positive = Field(title="slope", json_schema_extra={"unit": "Hz/s"}, description="of a chirp, Hz/s")
+    course_rad: Positive = Field(title="course", json_schema_extra={"unit": "rad"}, description="of a leg, rad")
 
 
 class Outside(Study):
@@ -60,6 +62,17 @@ class Outside(Study):
 
 def test_a_study_from_outside_says_its_own():
     assert label(Outside, "length_m") == label(Outside, "legs.0.length_m") == Label("length of the leg", "L", "m")
+    assert label(Outside, "slope_hz_per_s") == Label("slope", "", "Hz/s")
+    assert label(Outside, "course_rad").unit == "rad"
+    assert label(Outside, "course_deg").unit == "°"
+
+
+@pytest.mark.parametrize(
+    ("key", "unit"),
+    [("a.sigma_mps", "m/s"), ("range_m.0", "m"), ("variance", ""), ("b_deg", "°"), ("s", ""), ("slope_hz_per_s", "")],
+)
+def test_the_end_of_a_key_names_its_unit(key, unit):
+    assert label(None, key).unit == unit
 
 
 def test_a_key_without_a_title_is_called_by_its_name():

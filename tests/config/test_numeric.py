@@ -74,17 +74,3 @@ def test_what_is_no_numeric_key(name, words):
     with pytest.raises(ConfigError) as refused:
         numeric.find(load("rls2").cases[0].spec, name)
     assert words in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("path", "unit"),
-    [
-        ("radar.sigma_velocity_mps", "m/s"),
-        ("target.range_m.0", "m"),
-        ("filters.0.manoeuvre_variance", ""),
-        ("scans", ""),
-        ("a.b_deg", "°"),
-    ],
-)
-def test_units(path, unit):
-    assert numeric.unit(path) == unit
