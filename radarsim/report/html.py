@@ -92,7 +92,7 @@ def page(
 
 def in_clauses(answer: Sequence[str]) -> list[str]:
     """The sentences of an answer, a long one in its clauses."""
-    parts = [sentence.split("; ") if len(sentence) > LONG else [sentence] for sentence in answer]
+    parts = [text.clauses(sentence) if len(sentence) > LONG else [sentence] for sentence in answer]
     return [f"{part};" if part is not own[-1] else part for own in parts for part in own]
 
 

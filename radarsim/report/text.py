@@ -103,7 +103,22 @@ def printable(text: str) -> str:
 
 def in_a_row(numbers: Iterable[str]) -> str:
     """Numbers one after the other, parted by semicolons where the language writes a decimal comma."""
-    return (", " if numeral("0.5") == "0.5" else "; ").join(numbers)
+    return (", " if numeral("0.5") == "0.5" else f";{NBSP}").join(numbers)
+
+
+def clauses(sentence: str) -> list[str]:
+    """A sentence's parts between semicolons; one within brackets or between numbers (`in_a_row`) parts nothing.
+
+    >>> clauses("locked in 12 % [11; 13] (of 5; 6 lost); lost in 88 %")
+    ['locked in 12 % [11; 13] (of 5; 6 lost)', 'lost in 88 %']
+    """
+    found: list[str] = []
+    for part in sentence.split("; "):
+        if found and any(found[-1].count(begin) > found[-1].count(end) for begin, end in ("[]", "()")):
+            found[-1] += f"; {part}"
+        else:
+            found.append(part)
+    return found
 
 
 def significant_digits(value: float, form: str = "#.4g") -> str:

@@ -1,9 +1,11 @@
 """report.html in Chromium: it loads offline without a word in the console; sorting, hovering, switching work."""
 
 import base64
+import csv
 import math
 import re
 
+import numpy as np
 import pytest
 
 from radarsim.app import run as experiment
@@ -115,6 +117,38 @@ def test_hovering_shows_the_value_and_its_interval(page, results):
             )  # to two figures of the half-width
     page.move(5, 5)
     assert page.evaluate(f"document.querySelector('{SIGMA} .tip').hidden")
+
+
+READING = """
+(() => {
+  const svg = document.querySelector('#figure-gain_r svg.chart'), axis = svg.getBoundingClientRect();
+  return [axis.x, axis.y, axis.width, axis.height];
+})()
+"""
+
+
+def test_every_value_of_a_tip_is_of_the_time_that_it_names(page, results):
+    """Radars with scans at other times: what is read beside the pointer's time names its own."""
+    page.open(results / "range_doppler" / "report.html", width=1400, height=1200)
+    page.evaluate("document.documentElement.style.scrollBehavior = 'auto'")
+    page.evaluate("document.querySelector('#figure-gain_r').scrollIntoView()")
+    rows = list(csv.DictReader((results / "range_doppler" / "gains.csv").read_text().splitlines()))
+    own = [row for row in rows if row["component"] == "r" and " " not in row["case"] and row["gain_percent"]]
+    x, y, width, height = page.evaluate(READING)
+    apart = 0
+    for share in np.linspace(0.2, 0.9, 40):
+        page.move(x + share * width, y + height / 2)
+        tip = page.evaluate("document.querySelector('#figure-gain_r .tip').innerText")
+        at = re.search(r"time from the first plot, s: ([\d.]+)", tip)[1]
+        told = re.findall(r"^(RLS \d)(?: \(([\d.]+) s\))?: (−?[\d.]+)", tip, re.MULTILINE)
+        assert told
+        for name, other, value in told:
+            t_s, stem = float(other or at), name.lower().replace(" ", "")
+            row = next(one for one in own if one["case"] == stem and float(one["t_s"]) == t_s)
+            half = (float(row["gain_hi"]) - float(row["gain_lo"])) / 2
+            assert float(value.replace("−", "-")) == pytest.approx(float(row["gain_percent"]), abs=0.051 * half)
+            apart += bool(other)
+    assert apart  # else nothing was shown
 
 
 def test_the_keyboard_reads_values_too(page, results):

@@ -1,6 +1,9 @@
 """What belongs to what in a report: figures to tables, claims to figures."""
 
-from radarsim.report import html, links
+import pytest
+
+from radarsim import language
+from radarsim.report import html, links, text
 
 MADE = ("curves", "gains", "locks", "detections", "consistency")
 
@@ -37,3 +40,13 @@ def test_of_an_answer_so_much_stands_above_its_figure_that_both_are_seen():
     assert html.in_clauses([short, long]) == [short, "b" * 150 + ";", "b" * 150 + ";", "b" * 150]
     assert html.seen_at_once([short, short, short]) == 2
     assert html.seen_at_once([long]) == 1
+
+
+@pytest.mark.parametrize("code", language.known())
+def test_no_interval_of_an_answer_is_cut(code):
+    """A decimal comma leaves intervals and rows of numbers a semicolon of their own."""
+    with language.speaking(code):
+        one = f"{text.estimate((98.74, 97.5, 100.0), '%')} ({text.in_a_row(['0.5', '1.5'])}; {text.interval('1', '2')})"
+        row = text.in_a_row(map(text.number, (700.5, 800.5)))
+        parts = html.in_clauses(["; ".join([one, row] * 9)])
+    assert [part.removesuffix(";") for part in parts] == [one, row] * 9

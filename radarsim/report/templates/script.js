@@ -12,6 +12,7 @@ const SEEN = 0.7; // units from the line from which its band is drawn
 const WIDE = 1000, LONG = 600; // pixels of a window that has room for all of an answer, letters that are not too many
 const SIZE = 12, LETTER = 0.62 * SIZE, BOTTOM = 44, RIGHT = 12; // of a panel, as in report/chart.py
 const MARGIN = { x: 0.02, y: 0.06 };
+const NUMERAL = /^−?[\d.,]+(·10[⁰¹²³⁴-⁹⁻]+)?$|^−?10[⁰¹²³⁴-⁹⁻]+$/; // of a tick
 const COMMA = document.documentElement.lang !== "en"; // in place of the point
 
 function local(text) {
@@ -160,6 +161,11 @@ function told(point, unit) {
   if (unit) text += ` ${unit}`;
   if (part("e") !== null) text += `, ${said("exact")} ${put(part("e"))}`;
   return text;
+}
+
+// The unit at the end of an axis' label.
+function unitOf(label) {
+  return label.includes(", ") ? label.split(", ").pop() : "";
 }
 
 function cell(panel, at) {
@@ -532,17 +538,28 @@ class Panel {
     }
     const points = nearest(this, at);
     if (!points.length) return this.leave();
-    const unit = this.yl.includes(", ") ? this.yl.split(", ").pop() : "";
+    const unit = unitOf(this.yl), here = this.across(points[0].value);
     tip.replaceChildren();
     tip.classList.toggle("many", points.length > MANY);
-    make("div", `${this.xl}: ${words(points[0].value)}`, tip, "soft");
+    make("div", [this.xl, here].filter(Boolean).join(": "), tip, "soft");
     for (const one of [...points].sort((a, b) => a.y - b.y)) { // as they stand, the highest first
-      const row = make("div", null, tip);
+      const row = make("div", null, tip), there = this.across(one.value);
       make("i", "", row).style.background = one.line.c[dark() ? 1 : 0];
-      make(one === points[0] ? "b" : "span", `${one.line.n ? one.line.n + ": " : ""}${told(one, unit)}`, row);
+      const own = there === here ? "" : `(${[there, unitOf(this.xl)].filter(Boolean).join(" ")})`; // of other scans
+      const name = [one.line.n, own].filter(Boolean).join(" ");
+      make(one === points[0] ? "b" : "span", `${name ? name + ": " : ""}${told(one, unit)}`, row);
     }
     this.mark(points);
     this.show(points[0]);
+  }
+
+  // A place of the axis of x in words: a number, or what stands at the tick where that is a word.
+  across(value) {
+    for (const one of this.svg.querySelectorAll(":scope > text[data-x]")) {
+      const text = one.textContent.trim();
+      if (Math.abs(Number(one.getAttribute("data-x")) - value) < 0.45 && !NUMERAL.test(text)) return text;
+    }
+    return words(value);
   }
 
   mark(points) {
