@@ -22,6 +22,7 @@ WIDE_MM = 120.0  # one panel of many lines
 MOST_AT_ENDS = 6  # lines of one panel named at their ends; more by colour and dash
 MOST = 8  # cases of a panel; more are named in its caption
 MOST_PANELS = 12
+MOST_GONE = 8  # names of what a figure leaves out
 WIDE = 20  # largest over least value from which an axis is logarithmic
 MOST_LINES = 12  # of a panel that several cases of more than FEW_FILTERS share
 FEW_FILTERS = 3  # told apart by dash, while shades tell the cases apart
@@ -289,13 +290,26 @@ def _of_realisations(counts: Sequence[int]) -> str:
     return plural("{least:,} to {count:,} realisations", "{least:,} to {count:,} realisations", most, least=least)
 
 
-def left_out(count: int) -> str:
-    """Words on cases that a figure does not show, to follow its caption."""
-    if count <= 0:
+def left_out(every: Sequence[str], some: Sequence[str]) -> str:
+    """Words on what a figure does not show, to follow its caption: how many of how many it does, and which not."""
+    gone = [name for name in every if name not in some]
+    if not gone:
         return ""
-    return " " + plural(
-        "One further case is in the tables alone.", "{count} further cases are in the tables alone.", count
-    )
+    told = {"count": len(every) - len(gone), "all": len(every), "names": seen.named(map(plain, gone), MOST_GONE)}
+    return " " + tr("Shown: {count} of {all}; in the tables alone: {names}.", **told)
+
+
+def names_of(results: Sequence[CaseResult]) -> list[str]:
+    """Cases as people call them apart: by swept values, with the device where there are several."""
+    several = len(families(results)) > 1
+    found = [plain_label(one) if several or not one.swept else plain(swept(one)) for one in results]
+    return found if len(set(found)) == len(found) else [one.name for one in results]
+
+
+def cases_left_out(every: Sequence[CaseResult], some: Sequence[CaseResult]) -> str:
+    """`left_out` of cases."""
+    names = dict(zip((one.name for one in every), names_of(every), strict=True))
+    return left_out(list(names.values()), [names[one.name] for one in some])
 
 
 def unswept(results: Sequence[CaseResult]) -> list[CaseResult]:
@@ -304,10 +318,10 @@ def unswept(results: Sequence[CaseResult]) -> list[CaseResult]:
 
 
 def shown(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
-    """The results that a figure shows, of the cases named, at most eight; and words on those left out."""
+    """The results that a figure shows, of the cases named, at most eight evenly spaced; and words on those left out."""
     wanted = [result for result in results if result.name in set(names)]
-    left = len(wanted) - MOST
-    return wanted[:MOST], left_out(left)
+    some = spread_out(wanted, MOST)
+    return some, cases_left_out(wanted, some)
 
 
 def shown_families(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
@@ -318,7 +332,7 @@ def shown_families(results: Sequence[CaseResult], names: Sequence[str]) -> tuple
     wanted = [result for result in results if result.name in set(names)]
     groups = spread_out(list(by_panel(wanted).values()), MOST_PANELS)
     some = [result for members in groups for result in spread_out(members, MOST)]
-    return some, left_out(len(wanted) - len(some))
+    return some, cases_left_out(wanted, some)
 
 
 def fitting_axis(label: str, marks: Sequence[Mark]) -> Axis:
@@ -384,7 +398,7 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
     )
     title = tr("σ of the {quantity}", quantity=of.name)
     figure = in_columns(Figure(name, title, caption, tuple(one_scale(panels))))
-    return seen.begun(figure, seen.at_the_end(figure, unit_in(curves, component)))
+    return seen.begun(figure, seen.at_the_end(figure))
 
 
 def unit_in(curves: Mapping, component: str) -> str:
@@ -541,7 +555,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
 def _gains_said(figure: Figure) -> Figure:
     """A figure of gains with what is to be seen, and that losses are cut, where they are."""
     if any(panel.y.limits[0] == -LOSS for panel in figure.panels):
-        words = tr("Losses of over {loss:g} % lie below the axis.", loss=LOSS)
+        words = tr("Losses of over {loss:g} % lie below the axis: {names}.", loss=LOSS, names=seen.below(figure, -LOSS))
         figure = replace(figure, caption=f"{figure.caption} {words}")
     return seen.begun(figure, seen.most(figure))
 
@@ -579,10 +593,10 @@ def per_component(
             ("dynamic", dynamic_figure, curves),
         ):
             name = f"{kind}_{component}"
-            some, left_out = shown_families(results, chosen(name))
+            some, left = shown_families(results, chosen(name))
             figure = draw(name, some, rows, component, of) if some else None
             if figure and any(isinstance(mark, Line) for panel in figure.panels for mark in panel.marks):
-                made[name] = replace(figure, caption=figure.caption + left_out)
+                made[name] = replace(figure, caption=figure.caption + left)
     return made
 
 
@@ -611,10 +625,11 @@ def dynamic_figure(
         quantity=of.name,
         realisations=realisations(results),
     )
-    caption += left_out(len(drawn) - MOST_PANELS)
+    titles = [panel.title for panel in drawn]
+    caption += left_out(titles, spread_out(titles, MOST_PANELS))
     title = tr("Dynamic and fluctuation error of the {quantity}", quantity=of.name)
     figure = in_columns(Figure(name, title, caption, tuple(spread_out(drawn, MOST_PANELS))))
-    return seen.begun(figure, seen.extremes(figure, unit_in(curves, component)))
+    return seen.begun(figure, seen.extremes(figure))
 
 
 def _dynamic_panel(result: CaseResult, found: Sequence[tuple], of: Quantity) -> Panel:

@@ -1,21 +1,48 @@
 """What is to be seen in a figure, in a sentence with which its caption begins; and what its crosses are.
 
-Read off the marks that are drawn, so that it is true of every run. Lines whose intervals overlap are told together.
+Read off the marks that are drawn, of every named line and every panel. Lines whose intervals overlap are told together;
+of a line whose interval rests on too little "about" is said.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.language import listed, tr
+from radarsim.language import few, listed, plural, term, tr
 from radarsim.report import text
 from radarsim.report.chart_text import spoken
 from radarsim.report.drawing import Figure, Heat, Line, Panel
 
 DIGITS = 3
-MOST_PANELS = 4  # told one by one
+MOST_PANELS = 4  # told by their titles; of more it is counted
 MOST_NAMES = 3  # told of those that share a place
+
+
+class Seen(NamedTuple):
+    """A line as it is told: its name and its panel's title, its points (n,), and the interval of the last."""
+
+    name: str
+    panel: str
+    x: np.ndarray
+    y: np.ndarray
+    lo: float
+    hi: float
+
+    @property
+    def last(self) -> float:
+        return float(self.y[-1])
+
+    @property
+    def rough(self) -> bool:
+        """Whether its interval at the end is not known."""
+        return bool(np.isnan(self.lo) or np.isnan(self.hi))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The interval of its last point: the point itself where none is known."""
+        return (self.last, self.last) if self.rough else (self.lo, self.hi)
 
 
 def begun(figure: Figure, sentence: str) -> Figure:
@@ -44,83 +71,120 @@ def crossed(figure: Figure) -> Figure:
     return replace(figure, caption=f"{figure.caption} {words}")
 
 
-def at_the_end(figure: Figure, unit: str = "") -> str:
-    """Which line ends lowest and which highest, of each panel; nothing for a figure without two lines.
+class Way(NamedTuple):
+    """The sentences on which lines end lowest, or highest; sign is 1 or −1."""
 
-    A line whose interval is not known at its end is neither; where that leaves a panel less than two, the extremes of
-    the figure are told.
+    sign: int
+    one: str
+    every: str
+    some: str
+
+
+LOWEST = Way(
+    1,
+    term("At the end lowest: {lowest} ({low}); highest: {highest} ({high})."),
+    term("At the end lowest in every panel: {names}."),
+    term("At the end lowest: {told}."),
+)
+HIGHEST = Way(
+    -1,
+    term("At the end highest: {highest} ({high}); lowest: {lowest} ({low})."),
+    term("At the end highest in every panel: {names}."),
+    term("At the end highest: {told}."),
+)
+
+
+def at_the_end(figure: Figure, way: Way = LOWEST) -> str:
+    """Which lines end lowest and highest of all that are drawn; of several panels the lowest of each, or the highest.
+
+    A panel of a single line says nothing by itself: of those alone, and of several quantities, the extremes are told.
     """
-    every = [lines for panel in figure.panels if len(lines := _ending(panel)) > 1]
-    drawn = [[line for line in lines if all(np.isfinite(_interval(line)))] for lines in every]
-    if any(len(known) < 2 or _alike(known, lines) for known, lines in zip(drawn, every, strict=True)):
-        return extremes(figure, unit)
-    if len(drawn) == 1:
-        low, high = _lowest(drawn[0], 1), _lowest(drawn[0], -1)
-        if len(low) == len(drawn[0]):
-            return tr("At the end all are within each other's intervals.")
-        return tr(
-            "At the end lowest: {lowest} ({low}); highest: {highest} ({high}).",
-            **{"lowest": _listed(low), "low": _valued(low[0].y, unit)},
-            **{"highest": _listed(high), "high": _valued(high[0].y, unit)},
-        )
-    if not drawn:
-        return ""
-    found = [_listed(_lowest(lines, 1)) for lines in drawn]
-    counted = sorted(dict.fromkeys(found), key=lambda names: -found.count(names))
-    if len(counted) == 1:
-        return tr("At the end lowest in every panel: {lowest}.", lowest=counted[0])
-    told = [tr("{names} in {count}", names=names, count=found.count(names)) for names in counted[:MOST_NAMES]]
-    return tr("At the end lowest: {lowest} of {panels} panels.", lowest=listed(told), panels=len(drawn))
-
-
-def most(figure: Figure, unit: str = "%") -> str:
-    """The highest point of all lines, which line's and when, and where that line ends."""
-    lines = [line for panel in figure.panels for line in _ending(panel)]
-    if not lines:
-        return ""
-    line = max(lines, key=lambda one: float(np.nanmax(one.y)))
-    at = int(np.nanargmax(line.y))
-    return tr(
-        "At most {most} ({name}, at {t_s:g} s); {last} at the end.",
-        **{"name": _name(line), "t_s": float(line.x[at])},
-        **{"most": _valued(line.y[at : at + 1], unit), "last": _valued(line.y, unit)},
-    )
+    drawn = [lines for panel in _drawn(figure) if (lines := _lines(panel))]
+    if len({panel.y.label for panel in _drawn(figure)}) > 1 or not any(len(lines) > 1 for lines in drawn):
+        return extremes(figure)
+    unit = _unit(_drawn(figure)[0].y.label)
+    every = [line for lines in drawn for line in lines]
+    several = len(drawn) > 1
+    if all(_level(lines) for lines in drawn) and (not several or all(len(lines) > 1 for lines in drawn)):
+        return tr("At the end all are within each other's intervals.")
+    both = {
+        **{"lowest": _names(_foremost(every, 1), several), "low": _ending(every, 1, unit)},
+        **{"highest": _names(_foremost(every, -1), several), "high": _ending(every, -1, unit)},
+    }
+    if not several:
+        return tr(way.one, **both)
+    found = [_names(_foremost(lines, way.sign)) for lines in drawn]
+    if len(set(found)) == 1:
+        first = tr(way.every, names=found[0])
+    else:
+        first = tr(way.some, told=_by_panel(found, [lines[0].panel for lines in drawn]))
+    return f"{first} {tr(OF_ALL, **both)}"
 
 
 def highest_at_the_end(figure: Figure) -> str:
-    """Which line ends highest, of each panel: of what adds up to one."""
-    drawn = [(panel, lines) for panel in figure.panels if len(lines := _ending(panel)) > 1]
-    found = [(_title(panel), _listed(_lowest(lines, -1))) for panel, lines in drawn]
-    if not found:
-        return ""
-    if len({names for _, names in found}) == 1:
-        return tr("At the end highest: {highest}.", highest=found[0][1])
-    return tr("At the end highest: {highest}.", highest="; ".join(map(": ".join, found[:MOST_PANELS])))
+    """`at_the_end` where more is better, or what adds up to one: the highest first."""
+    return at_the_end(figure, HIGHEST)
 
 
-def extremes(figure: Figure, unit: str = "") -> str:
-    """The highest and the lowest point of all named lines, whose they are, of the quantity of the first panel."""
-    found = [(panel, line) for panel in figure.panels for line in _named(panel)]
-    if not found:
+OF_ALL = term("Of all panels lowest {low} ({lowest}), highest {high} ({highest}).")
+
+
+def _by_panel(found: Sequence[str], titles: Sequence[str]) -> str:
+    """The names that come first in each panel: by the panels' titles, of more panels how often."""
+    by_names = {names: [title for own, title in zip(found, titles, strict=True) if own == names] for names in found}
+    if len(found) <= MOST_PANELS and all(titles):
+        return "; ".join(f"{named(of)}: {names}" for names, of in by_names.items())
+    ranked = sorted(by_names, key=lambda names: -len(by_names[names]))
+    told = [tr("{names} in {count}", names=names, count=len(by_names[names])) for names in ranked[:MOST_NAMES]]
+    if rest := sum(len(by_names[names]) for names in ranked[MOST_NAMES:]):
+        told.append(tr("others in {count}", count=rest))
+    return tr("{told} of {panels} panels", told="; ".join(told), panels=len(found))
+
+
+def most(figure: Figure) -> str:
+    """The highest point of all lines, %, which line's and when, and where that line ends."""
+    lines = [line for panel in _drawn(figure) for line in _lines(panel)]
+    if not lines:
         return ""
-    axis = found[0][0].y.label
-    several = len({panel.title for panel in figure.panels if panel.y.label == axis}) > 1
-    found = [pair for pair in found if pair[0].y.label == axis]
-    top = max(found, key=lambda pair: float(np.nanmax(pair[1].y)))
-    bottom = min(found, key=lambda pair: float(np.nanmin(pair[1].y)))
-    high, low = np.nanmax(top[1].y), np.nanmin(bottom[1].y)
-    unit = unit or _unit(axis)
+    several = len(_drawn(figure)) > 1
+    line = max(lines, key=lambda one: float(one.y.max()))
+    at = int(line.y.argmax())
+    told = {"most": _valued(line.y[at], "%"), "name": _names([line], several)}
+    if at == len(line.y) - 1:
+        return tr("At most {most} ({name}), at the end.", **told)
     return tr(
-        "{quantity}: highest {high} ({name}), lowest {low} ({other}).",
-        quantity=_quantity(figure, axis),
-        **{"high": _valued(np.array([high]), unit), "name": _whose(*top, several)},
-        **{"low": _valued(np.array([low]), unit), "other": _whose(*bottom, several)},
+        "At most {most} ({name}, at {t_s:g} s); {last} at the end.",
+        **told,
+        **{"t_s": float(line.x[at]), "last": _ending([line], 1, "%")},
     )
 
 
-def first_extremes(figure: Figure) -> str:
-    """The highest and the lowest point of the first panel, with the unit of its axis."""
-    return extremes(replace(figure, panels=figure.panels[:1]))
+def below(figure: Figure, least: float) -> str:
+    """The lines that go below a value somewhere, by their names."""
+    lines = [line for panel in _drawn(figure) for line in _lines(panel) if line.y.min() < least]
+    return _names(lines, len(_drawn(figure)) > 1)
+
+
+def extremes(figure: Figure) -> str:
+    """The highest and the lowest point of all named lines and maps, whose they are, of every quantity that is drawn."""
+    found: dict[str, list[Seen]] = {}
+    for panel in _drawn(figure):
+        for label, line in _shown(panel):
+            found.setdefault(label, []).append(line)
+    several = len({line.panel for lines in found.values() for line in lines}) > 1
+    return " ".join(_extremes(_quantity(figure, label), _unit(label), of, several) for label, of in found.items())
+
+
+def _extremes(quantity: str, unit: str, lines: Sequence[Seen], several: bool) -> str:
+    high, low = max(line.y.max() for line in lines), min(line.y.min() for line in lines)
+    told = {"quantity": quantity, "high": _valued(high, unit), "low": _valued(low, unit)}
+    if told["high"] == told["low"]:
+        return tr("{quantity}: {high} everywhere.", **told)
+    top = _names([line for line in lines if _valued(line.y.max(), unit) == told["high"]], several)
+    bottom = _names([line for line in lines if _valued(line.y.min(), unit) == told["low"]], several)
+    if top == bottom:
+        return tr("{quantity}: from {low} to {high} ({name}).", name=top, **told)
+    return tr("{quantity}: highest {high} ({name}), lowest {low} ({other}).", name=top, other=bottom, **told)
 
 
 def _unit(label: str) -> str:
@@ -136,39 +200,25 @@ def _quantity(figure: Figure, label: str) -> str:
 
 
 def reading_at(x: float) -> Callable[[Figure], str]:
-    """A function that tells which line is highest and which lowest at a place of the axis."""
+    """A function that tells which line is highest and which lowest at a place of the axis, of those that reach it."""
 
     def told(figure: Figure) -> str:
-        found = [
-            (float(np.interp(x, line.x, line.y)), panel, line)
-            for panel in figure.panels
-            for line in _named(panel)
-            if len(line.x) > 1 and line.x[0] <= x <= line.x[-1] and panel.y.label == figure.panels[0].y.label
-        ]
-        if len(found) < 2:
+        every = [line for panel in _drawn(figure) for line in _lines(panel)]
+        there = [line for line in every if len(line.x) > 1 and line.x[0] <= x <= line.x[-1]]
+        if len(there) < 2:
             return extremes(figure)
-        top, bottom = max(found, key=lambda one: one[0]), min(found, key=lambda one: one[0])
-        several = len(figure.panels) > 1
-        return tr(
-            "{quantity} at {x:g}: highest {high} ({name}), lowest {low} ({other}).",
-            x=x,
-            quantity=_quantity(figure, figure.panels[0].y.label),
-            **{"high": text.number(top[0], DIGITS), "name": _whose(*top[1:], several)},
-            **{"low": text.number(bottom[0], DIGITS), "other": _whose(*bottom[1:], several)},
+        read = [line._replace(y=np.array([np.interp(x, line.x, line.y)])) for line in there]
+        label = figure.panels[0].y.label
+        quantity = tr("{quantity} at {x:g}", quantity=_quantity(figure, label), x=x)
+        words = _extremes(quantity, _unit(label), read, len(_drawn(figure)) > 1)
+        if not (left := len(every) - len(there)):
+            return words
+        more = plural(
+            "{count} of {all} lines does not reach it.", "{count} of {all} lines do not reach it.", left, all=len(every)
         )
+        return f"{words} {more}"
 
     return told
-
-
-def over(figure: Figure, unit: str = "") -> str:
-    """The least and the largest value of all maps of a figure; where there is none, of the lines of its first panel."""
-    values = [np.ravel(m.values) for panel in figure.panels for m in panel.marks if isinstance(m, Heat)]
-    found = np.concatenate([np.zeros(0), *values])
-    found = found[np.isfinite(found)]
-    if not found.size:
-        return extremes(replace(figure, panels=figure.panels[:1]), unit)
-    low, high = text.number(float(found.min()), DIGITS), _valued(found[[found.argmax()]], unit)
-    return tr("From {low} to {high}.", low=low, high=high)
 
 
 def _has_crosses(panel: Panel) -> bool:
@@ -176,57 +226,70 @@ def _has_crosses(panel: Panel) -> bool:
     return any(line.exact is not None and np.isfinite(line.exact).any() for line in lines)
 
 
-def _ending(panel: Panel) -> list[Line]:
-    """The lines of a panel that have a name and a last point."""
+def _drawn(figure: Figure) -> list[Panel]:
+    """The panels that show something with a name."""
+    return [panel for panel in figure.panels if _shown(panel)]
+
+
+def _shown(panel: Panel) -> list[tuple[str, Seen]]:
+    """The lines and the maps of a panel, each with the label of what it shows."""
+    maps = [mark for mark in panel.marks if isinstance(mark, Heat) and np.isfinite(mark.values).any()]
+    title = _title(panel)
+    heats = [(m.label, Seen("", title, np.zeros(0), m.values[np.isfinite(m.values)], np.nan, np.nan)) for m in maps]
+    return [*((panel.y.label, line) for line in _lines(panel)), *heats]
+
+
+def _lines(panel: Panel) -> list[Seen]:
+    """The lines of a panel that have a name and a point, by the points that are known."""
     lines = [mark for mark in panel.marks if isinstance(mark, Line) and _name(mark)]
-    return [line for line in lines if len(line.y) and np.isfinite(line.y[-1])]
+    return [_line(line, _title(panel)) for line in lines if np.isfinite(line.y).any()]
 
 
-def _named(panel: Panel) -> list[Line]:
-    """The lines of a panel that have a name and a point."""
-    lines = [mark for mark in panel.marks if isinstance(mark, Line) and _name(mark)]
-    return [line for line in lines if np.isfinite(line.y).any()]
-
-
-def _alike(known: Sequence[Line], lines: Sequence[Line]) -> bool:
-    """Whether those of known intervals are all alike, though there are others."""
-    return len(known) < len(lines) and len(_lowest(known, 1)) == len(known)
+def _line(line: Line, title: str) -> Seen:
+    known = np.flatnonzero(np.isfinite(line.y))
+    x, y = np.asarray(line.x, float)[known], np.asarray(line.y, float)[known]
+    lo, hi = (float(y[-1] if end is None else end[known[-1]]) for end in (line.lo, line.hi))
+    return Seen(_name(line), title, x, y, lo, hi)
 
 
 def _title(panel: Panel) -> str:
     return spoken(panel.title).replace("\n", " ")
 
 
-def _whose(panel: Panel, line: Line, several: bool) -> str:
-    """A line by its name, with its panel's title where there are several panels."""
-    return ", ".join(dict.fromkeys(filter(None, (_title(panel) if several else "", _name(line)))))
+def _level(lines: Sequence[Seen]) -> bool:
+    """Whether the intervals at the end of all lines have a value in common."""
+    return max(line.ends[0] for line in lines) <= min(line.ends[1] for line in lines)
 
 
-def _lowest(lines: Sequence[Line], sign: int) -> list[Line]:
-    """The line that ends lowest (sign 1) or highest (−1), and those whose intervals overlap its own."""
-    first = min(lines, key=lambda line: sign * float(line.y[-1]))
-    low, high = _interval(first)
-    near = [line for line in lines if line is not first and _interval(line)[0] <= high and low <= _interval(line)[1]]
-    return [first, *near]
+def _foremost(lines: Sequence[Seen], sign: int) -> list[Seen]:
+    """The line that ends lowest (sign 1) or highest (−1), and those whose intervals overlap its own, as drawn."""
+    low, high = min(lines, key=lambda line: sign * line.last).ends
+    return [line for line in lines if line.ends[0] <= high and low <= line.ends[1]]
 
 
-def _interval(line: Line) -> tuple[float, float]:
-    """The interval of a line's last point: the point where it has none, not-a-number where it is not known."""
-    if line.lo is None or line.hi is None:
-        return float(line.y[-1]), float(line.y[-1])
-    return float(line.lo[-1]), float(line.hi[-1])
+def _names(lines: Sequence[Seen], several: bool = False) -> str:
+    """Lines by their names as drawn, with their panels' titles where there are several."""
+    found = [", ".join(dict.fromkeys(filter(None, (several * one.panel, one.name)))) for one in lines]
+    return named(found, 1 if several else MOST_NAMES)
 
 
-def _listed(lines: Sequence[Line]) -> str:
-    names = [_name(line) for line in lines]
-    if len(names) > MOST_NAMES:
-        return tr("{name} and {count} more", name=names[0], count=len(names) - 1)
-    return listed(names)
+def named(names: Iterable[str], most: int = MOST_NAMES) -> str:
+    """Names in a sentence, of many the first; of several those that hold a comma themselves are quoted."""
+    told = list(dict.fromkeys(names))
+    if len(told) > 1:
+        told = [tr("“{name}”", name=one) if ", " in one else one for one in told]
+    return few(told, most)
 
 
 def _name(line: Line) -> str:
     return spoken(line.name or line.label)
 
 
-def _valued(values: np.ndarray, unit: str) -> str:
-    return " ".join(filter(None, (text.number(float(values[-1]), DIGITS), tr(text.unit(unit)) if unit else "")))
+def _ending(lines: Sequence[Seen], sign: int, unit: str) -> str:
+    """The lowest (sign 1) or highest (−1) last value of lines, "about" it where its interval is not known."""
+    line = min(lines, key=lambda one: sign * one.last)
+    return tr("about {value}", value=_valued(line.last, unit)) if line.rough else _valued(line.last, unit)
+
+
+def _valued(value: float, unit: str) -> str:
+    return " ".join(filter(None, (text.number(float(value), DIGITS), unit)))

@@ -100,7 +100,7 @@ def line_figure(name: str, key: str, members: Sequence[CaseResult], curves: Mapp
     width = COLUMN_MM if columns == 1 else PAGE_MM
     title = tr("σ over the {key}", key=panels.key_label(members[0], key).text)
     figure = Figure(name, title, caption, tuple(made), columns, width, 60)
-    return seen.begun(figure, seen.over(figure, components(members[0])[0][1]))
+    return seen.begun(figure, seen.extremes(figure))
 
 
 def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], curves: Mapping) -> Figure | None:
@@ -144,13 +144,12 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
         second=second,
         realisations=panels.realisations(members),
     )
-    if len(filters) > MOST_PANELS:
-        caption += " " + tr("{count} further filters are in the tables alone.", count=len(filters) - MOST_PANELS)
+    caption += panels.left_out(filters, filters[:MOST_PANELS])
     title = tr("σ over the {first} and the {second}", first=first, second=second)
     columns = min(2, len(made))
     width = panels.WIDE_MM if columns == 1 else PAGE_MM
     figure = Figure(name, title, caption, tuple(made), columns, width, 62)
-    return seen.begun(figure, seen.over(figure, unit))
+    return seen.begun(figure, seen.extremes(figure))
 
 
 def _hashable(value: object) -> int | float | str:

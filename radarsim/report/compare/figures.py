@@ -11,7 +11,7 @@ from radarsim.report import seen
 from radarsim.report.compare.sides import SERIES, Series, Side
 from radarsim.report.compare.table import filters_of
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
-from radarsim.report.panels import MOST, letter, literal, time_axis, with_unit
+from radarsim.report.panels import MOST, left_out, letter, literal, time_axis, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +41,7 @@ def _figure(
 ) -> Figure:
     taking_part = {*rows["label"], *rows["against_label"]}
     every = [side for side in sides if side.label in taking_part]
-    some, left = every[:MOST], len(every) - MOST
+    some = every[:MOST]
     filters = list(dict.fromkeys(f for side in some for f in filters_of(side)))
     unit = rows["unit"].iloc[0]
     symbol = letter(component) if component else model
@@ -71,10 +71,9 @@ def _figure(
             of=of,
             against=against,
         )
-    ) + (tr(" {left} further cases are in comparison.csv alone.", left=left) if left > 0 else "")
+    ) + left_out([side.label for side in every], [side.label for side in some])
     figure = Figure(name, tr("{what} side by side", what=what), caption, panels, 2, PAGE_MM, HEIGHT_MM)
-    right, in_units = replace(figure, panels=panels[1:]), "%" if series.ratio else unit
-    told = seen.at_the_end(right, in_units) or seen.extremes(right, in_units)
+    told = seen.at_the_end(replace(figure, panels=panels[1:]))
     return seen.crossed(seen.begun(figure, tr("Right: {told}", told=told[0].lower() + told[1:]) if told else ""))
 
 

@@ -44,7 +44,7 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
     return {name: one for name, one in seen.all_begun(drawn, SEEN).items() if one}
 
 
-SEEN = {"right": seen.at_the_end, "lost": seen.at_the_end, "orders": seen.highest_at_the_end}
+SEEN = {"right": seen.highest_at_the_end, "lost": seen.at_the_end, "orders": seen.highest_at_the_end}
 
 SHARES = {  # figure: column of folds.csv, what it is, caption
     "right": (
@@ -94,21 +94,25 @@ def hypotheses_figure(cases: Sequence[Case]) -> dict[str, Figure]:
     """The hypotheses of one realisation as a fan: a panel for each config, of the first filter that remembers."""
     drawn: list[Panel] = []
     shown: dict[str, Fan] = {}
+    stems: list[str] = []
     for case in cases:
         remember = [i for i, one in enumerate(case.spec.filters) if (one.hypotheses or 1) > 1 and one.combine is None]
-        if remember and case.stem not in shown and len(drawn) < FANS:
+        if not remember or case.stem in stems:
+            continue
+        stems.append(case.stem)
+        if len(drawn) < FANS:
             shown[case.stem] = fan(case, remember[-1], min(FAN_SCANS, case.spec.scans))
             drawn.append(_fan_panel(case, shown[case.stem], remember[-1]))
     if not drawn:
         return {}
     counts = [len(velocities) for velocities, _, _ in next(iter(shown.values())).lists]
     caption = tr(
-        "Sequences of folds that are kept: {first} at first, {last} after {scans} scans. "
+        "Sequences of folds that are kept, {name}: {first} at first, {last} after {scans} scans. "
         "The hypotheses of one realisation (number 7): after each scan a line for every sequence of "
         "folds that is kept, at its velocity and with its acceleration, up to the next scan; the "
         "brighter and broader, the more probable. Dots: the true velocity.",
-        **{"first": counts[0], "last": counts[-1], "scans": len(counts)},
-    )
+        **{"first": counts[0], "last": counts[-1], "scans": len(counts), "name": panels.plain(drawn[0].title)},
+    ) + panels.left_out(stems, list(shown))
     columns = min(2, len(drawn))
     width = COLUMN_MM if columns == 1 else PAGE_MM
     return {
@@ -161,11 +165,12 @@ def orders_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: st
         drawn.append(Panel(panels.time_axis(), Axis(tr("mean weight in the range")), marks, words))
     if not drawn:
         return {}
-    caption = (
-        tr("Weights of the orders in the estimate of range, mean over realisations; shares may be negative.") + left_out
-    )
-    columns = min(2, len(drawn))
-    shown = tuple(panels.in_legend(drawn[: panels.MOST])) if len(drawn) > 1 else tuple(drawn)
+    caption = tr("Weights of the orders in the estimate of range, mean over realisations; shares may be negative.")
+    titles = [panel.title for panel in drawn]
+    caption += panels.left_out(titles, panels.spread_out(titles, panels.MOST_PANELS)) + left_out
+    columns = min(3, len(drawn))
+    drawn = panels.spread_out(drawn, panels.MOST_PANELS)
+    shown = tuple(panels.in_legend(drawn)) if len(drawn) > 1 else tuple(drawn)
     return {
         "orders": Figure(
             "orders", tr("Weights of orders"), caption, shown, columns, PAGE_MM if columns > 1 else COLUMN_MM

@@ -156,8 +156,8 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
     """Share of locked bursts at each window of every estimator."""
     rows = common.groups(made["locks"], "case", "filter")
     marks = []
-    left = len(result.axes.filters) - MOST_LINES
-    for n, name in enumerate(result.axes.filters[:MOST_LINES]):
+    drawn = result.axes.filters[:MOST_LINES]
+    for n, name in enumerate(drawn):
         own = rows[(result.name, name)]
         t, value, lo, hi = (own[c].to_numpy(float) for c in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
         marks.append(Line(t, value, name, Style(n, n, n), lo, hi))
@@ -168,7 +168,7 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
             "% intervals.",
             count=result.count,
         )
-    ) + (tr(" {left} further estimators are in locks.csv alone.", left=left) if left > 0 else "")
+    ) + panels.left_out(result.axes.filters, drawn)
     x = Axis(tr(WINDOW), "log")
     whole = Panel(x, Axis(tr("share locked"), limits=(0, 1)), tuple(marks), direct=False)
     upper = Panel(
@@ -276,7 +276,7 @@ def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], ma
     )
     columns = min(2, len(drawn))
     figure = Figure(name, tr("Where the sequence locks"), caption, tuple(drawn), columns, PAGE_MM, 70.0)
-    return seen.begun(figure, seen.over(figure))
+    return seen.begun(figure, seen.extremes(figure))
 
 
 def region(keys: tuple[str, ...], members: Sequence[CaseResult], made: Mapping, x: np.ndarray, y: np.ndarray) -> Panel:

@@ -3,7 +3,6 @@ consistency."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,7 +47,7 @@ def figures(
 
 
 SEEN: dict[str, Callable[[Figure], str]] = {
-    **{"probabilities": seen.highest_at_the_end, "families": partial(seen.over, unit="m")},
+    **{"probabilities": seen.highest_at_the_end, "families": seen.extremes},
     **{"consistency": seen.extremes},
 }
 
@@ -215,7 +214,7 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
     figure = _several(f"sigma_{component}", tr("σ of {quantity}", quantity=quantity), caption, drawn, 76)
     if figure is None:
         return None
-    figure = seen.begun(figure, seen.at_the_end(figure, unit))
+    figure = seen.begun(figure, seen.at_the_end(figure))
     return _of_the_paper(figure, results, {"y": "5", "vy": "6"}[component])
 
 
@@ -247,8 +246,9 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
                 )
             )
     banks = {tuple(mark.label for mark in panel.marks if isinstance(mark, Line)) for panel in drawn}
-    left = len(drawn) - panels.MOST_PANELS
-    drawn = drawn[: panels.MOST_PANELS]
+    titles = [panel.title for panel in drawn]
+    left = panels.left_out(titles, panels.spread_out(titles, panels.MOST_PANELS))
+    drawn = panels.spread_out(drawn, panels.MOST_PANELS)
     if len(drawn) > 2 and len(banks) == 1:
         drawn = panels.in_legend(drawn)
     caption = (
@@ -256,7 +256,7 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
             "Mean posterior probabilities of the models; the numbers behind the motions "
             "are the spreads of the random acceleration, m/s². Dotted: ends of the stages."
         )
-    ) + (tr(" {left} further filters are in probabilities.csv alone.", left=left) if left > 0 else "")
+    ) + left
     return _of_the_paper(_several("probabilities", tr("Probabilities of the models"), caption, drawn, 58), results, "7")
 
 
@@ -285,7 +285,10 @@ def families(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     caption = tr(
         "σ of the height over each stage, by family and rule of the partial merges; one bank, one set of plots."
     )
-    return _several("families", tr("Families and merging rules"), caption, drawn[: panels.MOST], 52)
+    titles = [panel.title for panel in drawn]
+    caption += panels.left_out(titles, panels.spread_out(titles, panels.MOST_PANELS))
+    drawn = panels.spread_out(drawn, panels.MOST_PANELS)
+    return _several("families", tr("Families and merging rules"), caption, drawn, 52)
 
 
 def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:

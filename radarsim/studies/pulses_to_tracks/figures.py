@@ -50,8 +50,8 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
 
 
 SEEN = {
-    **{"locks": seen.extremes, "folds": seen.at_the_end, "measured": seen.first_extremes},
-    **{"losses": seen.first_extremes, "threshold": seen.first_extremes},
+    **{"locks": seen.extremes, "folds": seen.highest_at_the_end, "measured": seen.extremes},
+    **{"losses": seen.extremes, "threshold": seen.extremes},
 }
 
 

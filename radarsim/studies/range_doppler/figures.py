@@ -97,7 +97,7 @@ def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure 
         own = rows[rows["case"].isin([r.name for r in members])].drop_duplicates(["filter", "manoeuvre_variance"])
         if own["manoeuvre_variance"].nunique() > 1:
             drawn.append(_settling_panel(title, members[0], own))
-    left = len(drawn) - panels.MOST_PANELS
+    titles = [panel.title for panel in drawn]
     drawn = panels.spread_out(drawn, panels.MOST_PANELS)
     if not drawn:
         return None
@@ -107,7 +107,7 @@ def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure 
         "Dotted: ten scan periods, the paper's limit; star: the least steady error under it. What "
         "does not settle within the run is named and left out."
     )
-    caption += tr(" {left} further panels: in steady.csv.", left=left) if left > 0 else ""
+    caption += panels.left_out(titles, [panel.title for panel in drawn])
     return panels.in_columns(Figure("settling", tr("Steady error against settling time"), caption, tuple(drawn)))
 
 

@@ -102,4 +102,4 @@ def sigma_figure(
         + left_out
     )
     figure = panels.in_columns(Figure(name, tr("σ of the {name}", name=quantity.name), caption, tuple(drawn)))
-    return seen.begun(figure, seen.at_the_end(figure, unit))
+    return seen.begun(figure, seen.at_the_end(figure))

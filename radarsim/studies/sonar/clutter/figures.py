@@ -41,8 +41,8 @@ def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, F
 
 
 SEEN = {
-    **{"confirmation": seen.at_the_end, "track_life": seen.first_extremes},
-    **{"false_tracks": seen.extremes, "track_classes": seen.first_extremes},
+    **{"confirmation": seen.highest_at_the_end, "track_life": seen.extremes},
+    **{"false_tracks": seen.extremes, "track_classes": seen.extremes},
 }
 
 
@@ -82,7 +82,8 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
     groups = common.groups(tracks, "case", "filter")
     confirmed = ("t_s", "confirmed", "confirmed_lo", "confirmed_hi", "exact_confirmed")
     drawn: list[Panel] = []
-    for result in results[: panels.MOST]:
+    some = panels.spread_out(results, panels.MOST)
+    for result in some:
         marks = []
         for n, f in enumerate(result.axes.filters):
             if (result.name, f) in groups:
@@ -95,14 +96,13 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
             drawn.append(Panel(panels.time_axis(), y, tuple(marks), _swept(result), keys, direct=False))
     if not drawn:
         return None
-    left = len(results) - panels.MOST
     caption = (
         tr(
             "Probability that a track of the target was confirmed by that time, of {realisations}; thin "
             "lines: that a confirmed track is there and on the target. Bands: 95 % intervals.",
             realisations=panels.realisations(results),
         )
-    ) + panels.left_out(left)
+    ) + panels.cases_left_out(results, some)
     title = tr("Probability of a confirmed track")
     return Figure("confirmation", title, caption, tuple(drawn), min(2, len(drawn)), PAGE_MM)
 

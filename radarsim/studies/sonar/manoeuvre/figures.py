@@ -51,14 +51,15 @@ def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, F
 
 
 SEEN = {
-    **{"detection": seen.at_the_end, "roc": seen.reading_at(0.01), "delay": seen.at_the_end},
-    **{"response": seen.first_extremes, "modes": seen.extremes, "uses": seen.extremes},
+    **{"detection": seen.highest_at_the_end, "roc": seen.reading_at(0.01), "delay": seen.highest_at_the_end},
+    **{"response": seen.extremes, "modes": seen.extremes, "uses": seen.extremes},
 }
 
 
 def shown(results: Results) -> tuple[list[CaseResult[ManoeuvreAxes]], str]:
     """Four of the cases at most, evenly spaced from the first to the last, and words on the others."""
-    return panels.spread_out(results, MOST_PANELS), panels.left_out(len(results) - MOST_PANELS)
+    some = panels.spread_out(results, MOST_PANELS)
+    return some, panels.cases_left_out(results, some)
 
 
 def _said(figure: Figure | None, more: str) -> Figure | None:
@@ -239,7 +240,6 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
         y = Axis(tr("measured / believed $\\sigma$"), "log", ticks=shown)
         drawn.append(Panel(Axis("", ticks=ticks), y, tuple(marks), tr("t = {t_s:g} s", t_s=when), direct=False))
     case = f" ({panels.plain(_title(result))})" if result.swept else ""
-    left = len(results) - 1
     caption = (
         tr(
             "σ about the truth over the one computed from the track's covariance to first order{case}, "
@@ -247,7 +247,7 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
             case=case,
             count=result.count,
         )
-    ) + panels.left_out(left)
+    ) + panels.cases_left_out(results, results[:1])
     return _figure("uses", tr("What a track is used for"), caption, drawn, 2)
 
 

@@ -36,8 +36,8 @@ def figures(
 
 
 SEEN = {
-    **{"plots": seen.first_extremes, "smoothing_gains": seen.at_the_end, "conversion": seen.extremes},
-    **{"believed": seen.first_extremes, "missed": seen.first_extremes},
+    **{"plots": seen.extremes, "smoothing_gains": seen.at_the_end, "conversion": seen.extremes},
+    **{"believed": seen.extremes, "missed": seen.extremes},
 }
 
 
