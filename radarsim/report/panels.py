@@ -22,6 +22,7 @@ WIDE_MM = 120.0  # one panel of many lines
 MOST_AT_ENDS = 6  # lines of one panel named at their ends; more by colour and dash
 MOST = 8  # cases of a panel; more are named in its caption
 MOST_PANELS = 12
+RARE = 0.1  # of a share: what is lost of it, below which it is drawn by its logarithm
 MOST_GONE = 8  # names of what a figure leaves out
 WIDE = 20  # largest over least value from which an axis is logarithmic
 MOST_LINES = 12  # of a panel that several cases of more than FEW_FILTERS share
@@ -343,6 +344,29 @@ def fitting_axis(label: str, marks: Sequence[Mark]) -> Axis:
         return Axis(label, limits=(0, None))
     low = NEAR_ZERO * float(values.max())
     return Axis(label, "log", (float(values[values > low].min()) / 2, None) if values.min() < low else (None, None))
+
+
+def lost(line: Line) -> Line:
+    """A line of what a share lacks to one."""
+    lo, hi, exact = (None if part is None else 1 - part for part in (line.hi, line.lo, line.exact))
+    return replace(line, y=1 - line.y, lo=lo, hi=hi, exact=exact)
+
+
+def is_rare(lines: Sequence[Line]) -> bool:
+    """Whether any share of lines comes so near to one that its losses are the question."""
+    return any(bool((line.y > 1 - RARE).any()) for line in lines)
+
+
+def loss_axis(label: str, lines: Sequence[Line]) -> Axis:
+    """A logarithmic axis of losses, from half the least that was seen: where none was there is no point."""
+    values = np.concatenate([line.y for line in lines] or [np.ones(1)])
+    return Axis(label, "log", (float(values[values > 0].min(initial=1.0)) / 2, None))
+
+
+def never_lost(lines: Sequence[Line]) -> str:
+    """Words on the lines of losses that have none anywhere, to follow a caption."""
+    names = [plain(line.name or line.label) for line in lines if not (line.y > 0).any()]
+    return " " + tr("Never lost: {names}.", names=seen.named(names, MOST_GONE)) if names else ""
 
 
 def one_scale(drawn: Sequence[Panel]) -> list[Panel]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from radarsim.config.experiment import Case, Experiment
 from radarsim.language import term, tr
-from radarsim.report import panels, seen
+from radarsim.report import panels, seen, sweeps
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.ambiguous_doppler.map import Fan, fan
@@ -41,10 +41,14 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
     drawn |= hypotheses_figure(experiment.shown_in("hypotheses"))
     some, left_out = panels.shown(results, chosen("orders"))
     drawn |= orders_figure(some, made["orders"], left_out)
-    return {name: one for name, one in seen.all_begun(drawn, SEEN).items() if one}
+    return {name: one for name, one in seen.all_begun(drawn, SEEN).items() if one} | rare_figure(results, made["folds"])
 
 
-SEEN = {"right": seen.highest_at_the_end, "lost": seen.at_the_end, "orders": seen.highest_at_the_end}
+SEEN = {
+    "right": seen.highest_at_the_end,
+    "lost": seen.at_the_end,
+    "orders": seen.highest_at_the_end,
+}
 
 SHARES = {  # figure: column of folds.csv, what it is, caption
     "right": (
@@ -79,6 +83,34 @@ def share_figure(
     return panels.in_columns(Figure(name, of[1], of[2], tuple(drawn)))
 
 
+def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, Figure]:
+    """Instead of `right`, where all folds are right almost always: how often not at the last scan, over a swept key."""
+    drawn: list[Panel] = []
+    rows = common.groups(table, "case", "filter")
+    for (_, keys), members in sweeps.families(results).items():
+        x, axis = sweeps.places(members[0], keys[0], [dict(one.swept)[keys[0]] for one in members])
+        order = np.argsort(x)
+        marks: list[Line] = []
+        for f in members[0].axes.filters:
+            if all((one.name, f) in rows for one in members):
+                ends = [rows[members[i].name, f].iloc[-1] for i in order]
+                y, lo, hi = (np.array([end[c] for end in ends], float) for c in ("right", "right_lo", "right_hi"))
+                marks.append(Line(x[order], y, panels.literal(f), panels.look(len(marks), 0, 1), lo, hi))
+        if len(keys) > 1 or axis.ticks or not marks or min(float(mark.y.min()) for mark in marks) < 1 - panels.RARE:
+            return {}
+        losses = [panels.lost(mark) for mark in marks]
+        drawn.append(Panel(axis, panels.loss_axis(tr("P(a fold is wrong)"), losses), tuple(losses)))
+    if not drawn:
+        return {}
+    caption = tr(
+        "Share of realisations in which a fold is wrong by the last scan, of the best hypothesis, of {realisations} "
+        "each. Bands: 95 % intervals.",
+        realisations=panels.realisations(results),
+    )
+    figure = panels.in_columns(Figure("right", tr("P(a fold is wrong)"), caption, tuple(drawn)))
+    return {"right": seen.begun(figure, seen.extremes(figure))}
+
+
 def _share_panel(title: str, members: Sequence[Result], rows: Mapping, of: tuple[str, str]) -> Panel:
     def draw(own: "pd.DataFrame", label: str, style: Style, name: str) -> Line:
         x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", of[0], f"{of[0]}_lo", f"{of[0]}_hi"))
@@ -86,7 +118,11 @@ def _share_panel(title: str, members: Sequence[Result], rows: Mapping, of: tuple
         return Line(x, y, label, style, lo, hi, exact if np.isfinite(exact).any() else None, name)
 
     marks = panels.lines_of(members, {(*key, of[0]): own for key, own in rows.items()}, of[0], draw)
-    panel = Panel(panels.time_axis(), Axis(of[1], limits=(0, 1)), tuple(marks), title)
+    lines = [mark for mark in marks if isinstance(mark, Line)]
+    rare = lines and max(float(np.nanmax(line.y)) for line in lines) < panels.RARE
+    panel = Panel(
+        panels.time_axis(), panels.loss_axis(of[1], lines) if rare else Axis(of[1], limits=(0, 1)), tuple(marks), title
+    )
     return panels.keyed(panel, members)
 
 

@@ -11,7 +11,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, term, tr
 from radarsim.report import panels, seen
 from radarsim.report import tables as common
-from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
+from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
 from radarsim.studies.discriminator.map import one_burst
 
 if TYPE_CHECKING:
@@ -161,24 +161,28 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
         own = rows[(result.name, name)]
         t, value, lo, hi = (own[c].to_numpy(float) for c in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
         marks.append(Line(t, value, name, Style(n, n, n), lo, hi))
-    caption = (
-        tr(
-            "Share of bursts with every component within five potential spreads of the window (without "
-            "prior; the phase to the nearest turn), of {count:,} bursts; right: its upper end. Bands: 95 "
-            "% intervals.",
-            count=result.count,
-        )
-    ) + panels.left_out(result.axes.filters, drawn)
-    x = Axis(tr(WINDOW), "log")
-    whole = Panel(x, Axis(tr("share locked"), limits=(0, 1)), tuple(marks), direct=False)
-    upper = Panel(
-        x,
-        Axis(tr("share locked"), limits=(0.85, 1)),
-        tuple(replace(m, label="", name=m.label) for m in marks),
-        direct=False,
+    caption = tr(
+        "A burst is locked with every component within five potential spreads of the window (without "
+        "prior; the phase to the nearest turn); of {count:,} bursts. Bands: 95 % intervals.",
+        count=result.count,
     )
-    figure = Figure("locks", tr("Locked bursts against the window"), caption, (whole, upper), 2, PAGE_MM, 80.0)
-    return seen.begun(figure, seen.at_the_end(replace(figure, panels=(whole,))))
+    panel, said = _shares(Axis(tr(WINDOW), "log"), marks)
+    caption += said + panels.left_out(result.axes.filters, drawn)
+    figure = Figure(
+        *("locks", tr("Locked bursts against the window"), caption, (panel,)),
+        width_mm=panels.WIDE_MM,
+        panel_height_mm=80.0,
+    )
+    return seen.begun(figure, seen.at_the_end(figure))
+
+
+def _shares(x: Axis, marks: Sequence[Line]) -> tuple[Panel, str]:
+    """Shares of locked bursts over x, where some lock almost always those that do not; and words for the caption."""
+    if not panels.is_rare(marks):
+        return Panel(x, Axis(tr("share locked"), limits=(0, None)), tuple(marks), direct=False), ""
+    losses = [panels.lost(mark) for mark in marks]
+    panel = Panel(x, panels.loss_axis(tr("share not locked"), losses), tuple(losses), direct=False)
+    return panel, panels.never_lost(losses)
 
 
 def accuracy(result: CaseResult, made: Mapping) -> Figure:
@@ -216,11 +220,12 @@ def final(made: Mapping, result: CaseResult, name: str) -> "pd.Series":
 
 def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mapping) -> Figure:
     """Lock at the end of the burst against one swept key, a line for each estimator."""
+    designed = key.rpartition(".")[2] == "lock_probability"
     x = np.array([float(member.swept[0][1]) for member in members])
-    if key == "lock_probability":
-        x = 1.0 - x
+    if designed:
+        x = np.array([float(f"{1 - one:.9g}") for one in x])
     order = np.argsort(x)
-    marks: list[Line | Reference] = [Reference(SURE)]
+    marks: list[Line] = []
     for n, estimator in enumerate(members[0].axes.filters):
         ends = [final(made, members[i], estimator) for i in order]
         value, lo, hi = (np.array([row[c] for row in ends], float) for c in ("lock_rate", "lock_lo", "lock_hi"))
@@ -228,27 +233,24 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
     scale = "log" if x.min() > 0 and x.max() / x.min() > 20 else "linear"
     called = panels.key_label(members[0], key).text
     caption = tr(
-        "Share of bursts locked at the end of the burst against the {called}, of {count:,} each. "
-        "Bands: 95 % intervals; dotted: {sure:g}.",
+        "Bursts at the end of the burst against the {called}, of {count:,} each. Bands: 95 % intervals.",
         called=called,
         count=members[0].count,
-        sure=SURE,
     )
     ticks = numbers(x[order]) if key in WHOLE else ()
-    panel = Panel(
-        Axis(_called(key, members[0]), scale, ticks=ticks),
-        Axis(tr("share locked"), limits=(None, 1)),
-        tuple(marks),
-        direct=False,
-    )
+    panel, said = _shares(Axis(_called(key, members[0]), scale, ticks=ticks), marks)
+    if designed and panel.y.scale == "log":
+        panel = replace(panel, marks=(*panel.marks, Line(x[order], x[order], "", Style(GREY, 2, width_pt=0.7))))
+        said += " " + tr("Dotted: as often as one hand-over is designed to fail.")
+    caption += said
     title = tr("Lock against the {called}", called=called)
     figure = Figure(name, title, caption, (panel,), width_mm=panels.WIDE_MM, panel_height_mm=70.0)
-    return seen.begun(figure, seen.at_the_end(figure))
+    return seen.begun(figure, seen.extremes(figure))
 
 
 def _called(key: str, result: CaseResult) -> str:
     """A swept key as an axis names it."""
-    return "$1 - P_\\Delta$" if key == "lock_probability" else panels.axis_of(result, key)
+    return "$1 - P_\\Delta$" if key.rpartition(".")[2] == "lock_probability" else panels.axis_of(result, key)
 
 
 def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], made: Mapping) -> Figure:

@@ -11,6 +11,7 @@ from radarsim.language import term, tr
 from radarsim.report import panels, seen, sweeps
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
+from radarsim.report.statistics import FEW_EVENTS
 from radarsim.studies.pulses_to_tracks.kernels.records import AGES
 from radarsim.studies.pulses_to_tracks.tables import Result
 
@@ -83,9 +84,9 @@ def threshold_figure(results: Sequence[Result], made: "Mapping[str, pd.DataFrame
     if not any(panel.marks for panel in drawn):
         return {}
     caption = tr(
-        "Left: share of bursts that lock at the scan where fewest do: velocity (and acceleration, "
-        "where it is taken) within five Fisher bounds of the truth. Right: σ of the range at the "
-        "last scan. Bands: 95 % intervals."
+        "P(not locked): share of bursts that do not lock at the scan where most do not: velocity (or acceleration, "
+        "where it is taken) beyond five Fisher bounds of the truth; estimators that always lock have no line. σ of the "
+        "range at the last scan. Bands: 95 % intervals."
     )
     figure = Figure("threshold", tr("The threshold"), caption, tuple(panels.in_legend(drawn)), 3, PAGE_MM, 60)
     return {"threshold": figure}
@@ -107,7 +108,9 @@ def _threshold_panels(
             shares = np.array([_locked(result, made["locks"], name) for result in members])
             locks.append(Line(x, shares[:, 0], words, style, shares[:, 1], shares[:, 2]))
     of_r = wide(Panel(axis, Axis(tr("$\\sigma$ of $r$ at the end, m")), tuple(sigmas), panels.device(members[0])))
-    return [Panel(axis, Axis(tr("P(locked)"), limits=(0, 1)), tuple(locks), panels.device(members[0])), of_r]
+    lost = tuple(line for line in map(panels.lost, locks) if (line.y > 0).any())
+    axis_y = panels.loss_axis(tr("P(not locked)"), lost)
+    return [*([Panel(axis, axis_y, lost, panels.device(members[0]))] if lost else []), of_r]
 
 
 def _locked(result: Result, locks: "pd.DataFrame", name: str) -> tuple[float, float, float]:
@@ -129,9 +132,10 @@ def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     ideal = {one.name for one in result.spec.filters if one.estimator == "fisher_bound"}
     for (name,), own in rows.items():
         x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
-        if (y < 1).any() and name not in ideal:
-            marks.append(Line(x, y, panels.literal(name), _look(result, name), lo, hi))
-    return Panel(panels.time_axis(), Axis(tr("P(locked)"), limits=(None, 1.0)), tuple(marks), _title(result))
+        if ((1 - y) * own["n"]).sum() >= FEW_EVENTS and name not in ideal:
+            marks.append(panels.lost(Line(x, y, panels.literal(name), _look(result, name), lo, hi)))
+    y_axis = panels.loss_axis(tr("P(not locked)"), marks)
+    return Panel(panels.time_axis(), y_axis, tuple(marks), _title(result))
 
 
 def folds_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
@@ -178,10 +182,10 @@ Draw = Callable[[Result, "Mapping[str, pd.DataFrame]"], Panel]
 OWN: dict[str, tuple[Draw, str, str]] = {
     "locks": (
         locks_panel,
-        term("Bursts that lock"),
+        term("Bursts that do not lock"),
         term(
-            "Share of bursts whose velocity (and acceleration, where it is taken) is within five Fisher "
-            "bounds of the truth. Bands: 95 % intervals. Estimators that always lock are left out, and idealisations."
+            "Share of bursts whose velocity (or acceleration, where it is taken) is beyond five Fisher bounds of the "
+            "truth. Bands: 95 % intervals. Estimators that lost under 20 bursts in all are left out, and idealisations."
         ),
     ),
     "folds": (

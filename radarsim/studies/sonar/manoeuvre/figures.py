@@ -51,7 +51,7 @@ def figures(results: Results, made: "Mapping[str, pd.DataFrame]") -> dict[str, F
 
 
 SEEN = {
-    **{"detection": seen.highest_at_the_end, "roc": seen.reading_at(0.01), "delay": seen.highest_at_the_end},
+    **{"detection": seen.extremes, "roc": seen.reading_at(0.01), "delay": seen.highest_at_the_end},
     **{"response": seen.extremes, "modes": seen.extremes, "uses": seen.extremes},
 }
 
