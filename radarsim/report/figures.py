@@ -376,7 +376,9 @@ def readable(colour: Any) -> str:
 def _line(axes: Axes, line: Line) -> None:
     line = _thinned(line)
     if axes.get_yscale() == "log":  # zero is nowhere on it
-        line = replace(line, y=np.where(line.y > 0, line.y, np.nan))
+        there = np.where(np.asarray(line.y) > 0, 1.0, np.nan)
+        lo, hi = (None if end is None else end * there for end in (line.lo, line.hi))
+        line = replace(line, y=line.y * there, lo=lo, hi=hi)
     scattered = line.style.dash is None
     step = 1 if scattered else max(1, -(-len(line.x) // MARKED))
     every = step if line.exact is None or step == 1 else 2 * step  # of many, markers and crosses by turns

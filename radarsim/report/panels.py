@@ -353,8 +353,8 @@ def lost(line: Line) -> Line:
 
 
 def is_rare(lines: Sequence[Line]) -> bool:
-    """Whether any share of lines comes so near to one that its losses are the question."""
-    return any(bool((line.y > 1 - RARE).any()) for line in lines)
+    """Whether any of some shares is mostly so near to one that its losses are the question, and has losses to show."""
+    return any(float(np.median(line.y)) > 1 - RARE and np.count_nonzero(line.y < 1) > 1 for line in lines)
 
 
 def loss_axis(label: str, lines: Sequence[Line]) -> Axis:

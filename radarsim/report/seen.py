@@ -108,8 +108,8 @@ def at_the_end(figure: Figure, way: Way = LOWEST) -> str:
     if all(_level(lines) for lines in drawn) and (not several or all(len(lines) > 1 for lines in drawn)):
         return tr("At the end all are within each other's intervals.")
     both = {
-        **{"lowest": _names(_foremost(every, 1), several), "low": _ending(every, 1, unit)},
-        **{"highest": _names(_foremost(every, -1), several), "high": _ending(every, -1, unit)},
+        **{"lowest": _names(_foremost(every, 1, several), several), "low": _ending(every, 1, unit)},
+        **{"highest": _names(_foremost(every, -1, several), several), "high": _ending(every, -1, unit)},
     }
     if not several:
         return tr(way.one, **both)
@@ -261,10 +261,14 @@ def _level(lines: Sequence[Seen]) -> bool:
     return max(line.ends[0] for line in lines) <= min(line.ends[1] for line in lines)
 
 
-def _foremost(lines: Sequence[Seen], sign: int) -> list[Seen]:
-    """The line that ends lowest (sign 1) or highest (−1), and those whose intervals overlap its own, as drawn."""
+def _foremost(lines: Sequence[Seen], sign: int, ranked: bool = False) -> list[Seen]:
+    """The line that ends lowest (sign 1) or highest (−1), and those whose intervals overlap its own.
+
+    As they are drawn, so that a set has one order; by their ends where asked for, and where not all will be named.
+    """
     low, high = min(lines, key=lambda line: sign * line.last).ends
-    return [line for line in lines if line.ends[0] <= high and low <= line.ends[1]]
+    found = [line for line in lines if line.ends[0] <= high and low <= line.ends[1]]
+    return sorted(found, key=lambda line: sign * line.last) if ranked or len(found) > MOST_NAMES + 1 else found
 
 
 def _names(lines: Sequence[Seen], several: bool = False) -> str:

@@ -119,7 +119,7 @@ def _share_panel(title: str, members: Sequence[Result], rows: Mapping, of: tuple
 
     marks = panels.lines_of(members, {(*key, of[0]): own for key, own in rows.items()}, of[0], draw)
     lines = [mark for mark in marks if isinstance(mark, Line)]
-    rare = lines and max(float(np.nanmax(line.y)) for line in lines) < panels.RARE
+    rare = lines and max(float(line.y[-1]) for line in lines) < panels.RARE
     panel = Panel(
         panels.time_axis(), panels.loss_axis(of[1], lines) if rare else Axis(of[1], limits=(0, 1)), tuple(marks), title
     )

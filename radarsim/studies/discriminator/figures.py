@@ -166,7 +166,7 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
         "prior; the phase to the nearest turn); of {count:,} bursts. Bands: 95 % intervals.",
         count=result.count,
     )
-    panel, said = _shares(Axis(tr(WINDOW), "log"), marks)
+    panel, said = _shares(Axis(tr(WINDOW), "log"), marks, 0)
     caption += said + panels.left_out(result.axes.filters, drawn)
     figure = Figure(
         *("locks", tr("Locked bursts against the window"), caption, (panel,)),
@@ -176,10 +176,10 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
     return seen.begun(figure, seen.at_the_end(figure))
 
 
-def _shares(x: Axis, marks: Sequence[Line]) -> tuple[Panel, str]:
+def _shares(x: Axis, marks: Sequence[Line], least: float | None = None) -> tuple[Panel, str]:
     """Shares of locked bursts over x, where some lock almost always those that do not; and words for the caption."""
     if not panels.is_rare(marks):
-        return Panel(x, Axis(tr("share locked"), limits=(0, None)), tuple(marks), direct=False), ""
+        return Panel(x, Axis(tr("share locked"), limits=(least, 1)), tuple(marks), direct=False), ""
     losses = [panels.lost(mark) for mark in marks]
     panel = Panel(x, panels.loss_axis(tr("share not locked"), losses), tuple(losses), direct=False)
     return panel, panels.never_lost(losses)

@@ -1,0 +1,210 @@
+"""What captions say of lines that end lowest or highest, read back from their words in any language.
+
+The sentences are found by the catalogue's own translations of their templates and judged by the tables: what drew the
+figures and told of them is not asked again.
+"""
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from radarsim.language import tr
+from radarsim.report import panels, seen
+from radarsim.report.chart_text import spoken
+
+RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"
+POWER = re.compile(rf"(−?)(?:(\d+(?:[.,]\d+)?)·)?10([{RAISED}]+)")
+PLAIN = re.compile(r"−?\d+(?:[.,]\d+)?")
+CLOSE = 0.0051  # of a number told to three figures
+
+LEVEL = "At the end all are within each other's intervals."
+ENDS = (
+    "At the end lowest: {lowest} ({low}); highest: {highest} ({high}).",
+    "At the end highest: {highest} ({high}); lowest: {lowest} ({low}).",
+    "Of all panels lowest {low} ({lowest}), highest {high} ({highest}).",
+)
+EVERY = {1: "At the end lowest in every panel: {names}.", -1: "At the end highest in every panel: {names}."}
+MOST = ("At most {most} ({name}), at the end.", "At most {most} ({name}, at {t_s:g} s); {last} at the end.")
+EXTREMES = (
+    "{quantity}: highest {high} ({name}), lowest {low} ({other}).",
+    "{quantity}: from {low} to {high} ({name}).",
+)
+SHOWN = "Shown: {count} of {all}; in the tables alone: {names}."
+
+
+class Row(NamedTuple):
+    """A line as its table has it: case, filter, times and values (n,), the interval of the last."""
+
+    case: str
+    filter: str
+    t: np.ndarray
+    y: np.ndarray
+    lo: float
+    hi: float
+
+    @property
+    def last(self):
+        return self.y[-1]
+
+
+def table_of(figure, study):
+    """Table, column and its ends, component of a figure of σ, gains or rates against time; None for all others."""
+    kind, _, component = figure.partition("_")
+    if kind == "sigma":
+        return "curves", ("sigma", "sigma_lo", "sigma_hi"), component
+    if kind == "gain":
+        return "gains", ("gain_percent", "gain_lo", "gain_hi"), component
+    if study == "ambiguous_doppler" and figure in ("right", "lost"):
+        column = {"right": "right", "lost": "beyond"}[figure]
+        return "folds", (column, f"{column}_lo", f"{column}_hi"), None
+    return ("locks", ("lock_rate", "lock_lo", "lock_hi"), None) if figure == "locks" else None
+
+
+def found(template, caption):
+    """The places of the first sentence of a template in a caption, by name; None where there is none."""
+    parts = re.split(r"\{(\w+)(?::[^}]*)?\}", tr(template))
+    places = {"t_s": "[^, ]+"}
+    words = "".join(
+        f"(?P<{part}>{places.get(part, '.+?')})" if n % 2 else re.escape(part) for n, part in enumerate(parts)
+    )
+    match = re.search(words, caption)
+    return match and match.groupdict()
+
+
+def value(words):
+    """The last number of words, that may be a power of ten: 278 of "about 278 m"."""
+    words = words.rpartition("(")[2].replace(",", ".")
+    if power := POWER.search(words):
+        sign, mantissa, exponent = power.groups()
+        exponent = exponent.translate(str.maketrans(RAISED, "0123456789-"))
+        return float(f"{'-' if sign else ''}{mantissa or 1}e{exponent}")
+    return float(PLAIN.search(words)[0].replace("−", "-"))
+
+
+def close(told, true):
+    return abs(told - true) <= CLOSE * abs(true) + 1e-15
+
+
+def drawn(result, figure, caption):
+    """The cases of a figure: those that the config wants, less those that its caption names as left out.
+
+    None where too many are left out for a caption to name them all.
+    """
+    cases = [one for one in result.cases if one.name in {case.name for case in result.experiment.shown_in(figure)}]
+    if tr("Alike within the intervals in all {count} cases: the first is shown.", count=len(cases)) in caption:
+        return cases[:1]
+    if (left := found(SHOWN, caption + " ")) is None:
+        return cases
+    names = panels.names_of(cases)
+    gone = [name for name in names if re.search(rf"(^|[ “«]){re.escape(name)}([,”» ]|$)", left["names"])]
+    assert int(left["all"]) == len(cases), (figure, caption)
+    if len(gone) != len(cases) - int(left["count"]):
+        return None
+    return [case for case, name in zip(cases, names, strict=True) if name not in gone]
+
+
+def lines(result, of, cases):
+    """The lines of a figure by its table: those of the cases that are drawn."""
+    name, columns, component = of
+    table = result.tables[name]
+    table = table[table["case"].isin([one.name for one in cases])]
+    if component:
+        table = table[table["component"] == component]
+    made = []
+    for (case, name), own in table.groupby(["case", "filter"], sort=False):
+        y, lo, hi = (own[column].to_numpy(float) for column in columns)
+        if "unit" in own and own["unit"].iloc[0].startswith("rad"):
+            y, lo, hi = (np.degrees(one) for one in (y, lo, hi))
+        known = np.flatnonzero(np.isfinite(y))
+        if known.size:
+            made.append(Row(case, name, own["t_s"].to_numpy(float)[known], y[known], lo[known[-1]], hi[known[-1]]))
+    return made
+
+
+def judged(result, figure, caption):
+    """Faults of a caption of σ, gains or rates against time, and how many of its sentences were judged."""
+    of, study, caption = table_of(figure, result.experiment.study), result.experiment.study, spoken(caption)
+    cases = drawn(result, figure, caption)
+    every = lines(result, of, result.cases if cases is None else cases)
+    faults, told = [], 0
+
+    def says(words, true, names=None, who=()):
+        if not close(value(words), true):
+            faults.append(f"{figure}: {words!r} is {true:.4g}")
+        named = [row for row in who if spoken(panels.literal(row.filter)) in names]
+        if names is not None and not named:
+            faults.append(f"{figure}: {names!r} is {' or '.join(row.filter for row in who)}")
+
+    def at(rows, sign):
+        end = min(sign * row.last for row in rows)
+        return sign * end, [row for row in rows if np.isclose(sign * row.last, end, rtol=1e-9)]
+
+    for template in ENDS if cases is not None else ():
+        if claim := found(template, caption):
+            told += 1
+            (low, lowest), (high, highest) = at(every, 1), at(every, -1)
+            says(claim["low"], low, claim["lowest"], lowest)
+            says(claim["high"], high, claim["highest"], highest)
+    if tr(LEVEL) in caption:
+        told += 1
+        by_panel = panels_of(study, cases or result.cases, every)
+        if any(max(row.lo for row in rows) > min(row.hi for row in rows) for rows in by_panel):
+            faults.append(f"{figure}: not within each other's intervals")
+    for sign, template in EVERY.items():
+        if claim := found(template, caption):
+            told += 1
+            for rows in panels_of(study, cases or result.cases, every):
+                _, first = at(rows, sign)
+                if not any(spoken(panels.literal(row.filter)) in claim["names"] for row in first):
+                    faults.append(f"{figure}: {claim['names']} is {first[0].filter} in {first[0].case}")
+    for template in MOST:
+        if claim := found(template, caption):
+            told += 1
+            top = max(every, key=lambda row: row.y.max())
+            says(claim["most"], top.y.max(), claim["name"], [row for row in every if row.y.max() == top.y.max()])
+            if "t_s" in claim:
+                says(claim["t_s"], top.t[top.y.argmax()])
+                says(claim["last"], top.last)
+            elif top.y.argmax() != len(top.y) - 1:
+                faults.append(f"{figure}: not at the end, but at {top.t[top.y.argmax()]:g} s")
+            break
+    for template in EXTREMES if not told else ():
+        if claim := found(template, caption):
+            told += 1
+            says(claim["high"], max(row.y.max() for row in every))
+            says(claim["low"], min(row.y.min() for row in every))
+            break
+    return faults, told
+
+
+def panels_of(study, cases, rows):
+    """Lines by the panel that they share."""
+    alone = study in ("sonar", "multimodel", "discriminator")
+    groups = [[one] for one in cases] if alone else panels.by_panel(cases).values()
+    by_panel = [[row for row in rows if row.case in {one.name for one in members}] for members in groups]
+    return [rows for rows in by_panel if rows]
+
+
+def checked(result):
+    """Faults of all captions of σ, gains and rates of a result in the language spoken, and how many were judged."""
+    from radarsim.app import output
+
+    faults, told = [], 0
+    for name, figure in output.figures(result.cases, result.tables, result.experiment).items():
+        if table_of(name, result.experiment.study) is None or seen_elsewhere(result, name):
+            continue
+        wrong, own = judged(result, name, figure.caption)
+        faults += wrong
+        told += own
+        if not own:
+            faults.append(f"{name}: nothing was judged of: {figure.caption[:200]}")
+    return faults, told
+
+
+def seen_elsewhere(result, figure):
+    """Figures whose sentence is of losses, or over a sweep."""
+    return figure == "locks" or (figure == "right" and "rare" in result.tables)
+
+
+assert seen.OF_ALL == ENDS[-1]  # the sentences are those that are told
