@@ -68,7 +68,7 @@ def found(template, caption):
     words = "".join(
         f"(?P<{part}>{places.get(part, '.+?')})" if n % 2 else re.escape(part) for n, part in enumerate(parts)
     )
-    match = re.search(words, caption)
+    match = re.search(words + r"(?=\s|$)", caption)
     return match and match.groupdict()
 
 
@@ -91,13 +91,17 @@ def drawn(result, figure, caption):
 
     None where too many are left out for a caption to name them all.
     """
+    component = (table_of(figure, result.experiment.study) or (None,) * 3)[2]
     cases = [one for one in result.cases if one.name in {case.name for case in result.experiment.shown_in(figure)}]
+    cases = [one for one in cases if component is None or component in dict(one.axes.components)]
     if tr("Alike within the intervals in all {count} cases: the first is shown.", count=len(cases)) in caption:
         return cases[:1]
     if (left := found(SHOWN, caption + " ")) is None:
         return cases
     names = panels.names_of(cases)
-    gone = [name for name in names if re.search(rf"(^|[ “«]){re.escape(name)}([,”» ]|$)", left["names"])]
+    quoted = re.findall("[“«](.+?)[”»]", left["names"])
+    bare = re.split(tr("{first} and {last}", first=", |", last=""), re.sub("[“«].+?[”»]", "", left["names"]))
+    gone = [name for name in names if name in (*quoted, *bare)]
     assert int(left["all"]) == len(cases), (figure, caption)
     if len(gone) != len(cases) - int(left["count"]):
         return None
@@ -127,12 +131,13 @@ def judged(result, figure, caption):
     of, study, caption = table_of(figure, result.experiment.study), result.experiment.study, spoken(caption)
     cases = drawn(result, figure, caption)
     every = lines(result, of, result.cases if cases is None else cases)
+    devices = {one.name: panels.plain_label(one) for one in result.cases}
     faults, told = [], 0
 
     def says(words, true, names=None, who=()):
         if not close(value(words), true):
             faults.append(f"{figure}: {words!r} is {true:.4g}")
-        named = [row for row in who if spoken(panels.literal(row.filter)) in names]
+        named = [row for row in who if spoken(panels.literal(row.filter)) in names or devices[row.case] in names]
         if names is not None and not named:
             faults.append(f"{figure}: {names!r} is {' or '.join(row.filter for row in who)}")
 
@@ -207,4 +212,4 @@ def seen_elsewhere(result, figure):
     return figure == "locks" or (figure == "right" and "rare" in result.tables)
 
 
-assert seen.OF_ALL == ENDS[-1]  # the sentences are those that are told
+assert ENDS[-1] == seen.OF_ALL  # the sentences are those that are told

@@ -47,8 +47,9 @@ def figures(
     drawn: dict[str, Figure | None] = {}
     for component in QUANTITIES:
         name = f"sigma_{component}"
-        chosen, left_out = panels.shown(results, [case.name for case in experiment.shown_in(name)])
-        if any(component in dict(result.axes.components) for result in chosen):
+        having = [result for result in results if component in dict(result.axes.components)]
+        chosen, left_out = panels.shown(having, [case.name for case in experiment.shown_in(name)])
+        if chosen:
             drawn[name] = sigma_figure(name, chosen, curves, component, left_out)
     return {name: figure for name, figure in drawn.items() if figure}
 
