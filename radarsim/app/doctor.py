@@ -121,7 +121,8 @@ def _settled(found: Inspection) -> dict[str, Any]:
 
 
 def _record(folder: Path) -> dict[str, Any]:
-    path = folder / "run.json"
+    path, blocks = folder / "run.json", _blocks(folder)
+    hint = f"; `radarsim check CONFIG --out {blocks.parent}` says what is stored there" if is_directory(blocks) else ""
     try:
         record: dict[str, Any] = json.loads(files.read(path))
         for key, kind in (("outputs", dict), ("identities", dict), ("cases", dict), ("resolved", dict)):
@@ -132,7 +133,7 @@ def _record(folder: Path) -> dict[str, Any]:
             if not isinstance(record["cases"][name]["done"], int) or not re.fullmatch("[0-9a-f]{2,128}", recorded):
                 raise ValueError(f"identity or realisations of {name} are invalid")
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise ConfigError(f"{folder}: no run.json in it, so it is no folder of results") from error
+        raise ConfigError(f"{folder}: no run.json in it, so it is no folder of results{hint}") from error
     except OSError as error:
         raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, RecursionError) as error:

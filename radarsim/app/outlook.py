@@ -1,19 +1,24 @@
 """What running an experiment would take."""
 
+import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from radarsim.app.simulation import NO_CONTROL, check_precision, result_of, table_of, unknown
 from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Experiment
+from radarsim.engine.blocks import Total
 from radarsim.engine.collect import collect
 from radarsim.engine.machine import available_cores
 from radarsim.engine.results import Axes
+from radarsim.engine.stock import Stock, stock
+from radarsim.engine.store import Store
 from radarsim.errors import ConfigError
-from radarsim.language import tr
+from radarsim.language import few, listed, tr
 from radarsim.studies import registry
 
 PILOT_S = 0.3  # of all cases together, unless single realisations take longer
@@ -38,6 +43,7 @@ class Need:
 class CaseOutlook:
     """What running a case would take: labels, counts, seconds of one thread's work.
 
+    stock is what a results directory has of these realisations; where one is given, seconds are of those it lacks.
     timed: whether a few realisations were; else it takes at most so many seconds, which is short.
     need is what a precision takes by the plain intervals, controlled by those with control variates, where the config
     asks for these; beside each the seconds of one thread until then. The run ends at the earlier.
@@ -53,11 +59,12 @@ class CaseOutlook:
     controlled: Need | None = None
     seconds_plain: float | None = None
     seconds_controlled: float | None = None
+    stock: Stock | None = None
 
 
 @dataclass(frozen=True)
 class Outlook:
-    """What running an experiment would take, on `threads` threads."""
+    """What running an experiment, or a share of it such as (2, 3), would take, on `threads` threads."""
 
     cases: tuple[CaseOutlook, ...]
     threads: int
@@ -66,6 +73,7 @@ class Outlook:
     precision: float | None = None
     of: str = "sigma"
     warnings: tuple[str, ...] = ()
+    share: tuple[int, int] | None = None
 
 
 def outlook(
@@ -74,8 +82,10 @@ def outlook(
     precision: float | None = None,
     progress: Callable[[int, int, int], None] | None = None,
     of: str = "sigma",
+    out: str | os.PathLike[str] | None = None,
+    share: tuple[int, int] | None = None,
 ) -> Outlook:
-    """Prepare every case and say what the whole would take.
+    """Prepare every case and say what the whole would take, or a share of it; less what is stored in `out`.
 
     A few realisations are timed, compiled beforehand, unless the study knows that all of them are short; then the
     compiler is not loaded. With a precision, in per cent, of a kind of quantity: a case ends when that is reached, or
@@ -95,12 +105,16 @@ def outlook(
         has_controls = experiment.control_variate and (study.own_controls or (study.exact_errors and controls(axes)))
         control |= has_controls
         labels = case.name, ", ".join(axes.filters), len(axes.k)
+        stocked = partial(stock, work, store=out, part=share or (1, 1))
         short = None if precision is not None else surely_short(work, SURELY_SHORT_S / len(experiment.cases))
         if short is not None:
-            cases.append(CaseOutlook(*labels, case.realisations, short, timed=False))
+            held = stocked(case.realisations)
+            short *= (held.asked - held.stored) / case.realisations
+            cases.append(CaseOutlook(*labels, held.asked, short, timed=False, stock=None if out is None else held))
         else:
             ways = precision, of, has_controls and (of == "sigma" or (of == "gain" and study.own_controls))
-            cases.append(measured(experiment, work, labels, PILOT_S / len(experiment.cases), *ways))
+            one = measured(experiment, work, labels, PILOT_S / len(experiment.cases), stocked, *ways)
+            cases.append(one if out is not None else replace(one, stock=None))
             largest = max(largest, work.size)
         if progress is not None:
             progress(done, len(experiment.cases), 0)
@@ -110,7 +124,7 @@ def outlook(
     warnings = [*study.warnings(experiment)]
     if experiment.control_variate and not control:
         warnings.append(NO_CONTROL)
-    return Outlook(tuple(cases), threads, seconds, memory, precision, of, tuple(warnings))
+    return Outlook(tuple(cases), threads, seconds, memory, precision, of, tuple(warnings), share)
 
 
 def surely_short(work: CaseWork, most_s: float) -> float | None:
@@ -127,11 +141,12 @@ def measured(
     work: CaseWork,
     labels: tuple[str, str, int],
     pilot_s: float,
+    stocked: Callable[[int], Stock],
     precision: float | None,
     of: str,
     controlled: bool,
 ) -> CaseOutlook:
-    """The outlook of a case of which a few realisations are timed."""
+    """The outlook of a case of which a few realisations are timed; stocked gives what is stored of so many."""
     case = work.case
     work.simulate(0, 1)
     each = seconds_each(work, case.realisations, pilot_s)
@@ -141,8 +156,10 @@ def measured(
         by_controls = needed(experiment, work, precision, each, of, controls=True) if controlled else None
     ends = [None if one is None else ending(one, case.realisations) for one in (need, by_controls)]
     count = min((end for end in ends if end is not None), default=case.realisations)
-    plain_s, controlled_s = (None if end is None else each * end for end in ends)
-    return CaseOutlook(*labels, count, each * count, True, need, by_controls, plain_s, controlled_s)
+    held, (plain, by) = stocked(count), (None if end is None else stocked(end) for end in ends)
+    plain_s, controlled_s = (None if one is None else each * (one.asked - one.stored) for one in (plain, by))
+    left_s = each * (held.asked - held.stored)
+    return CaseOutlook(*labels, held.asked, left_s, True, need, by_controls, plain_s, controlled_s, held)
 
 
 def controls(axes: Axes) -> bool:
@@ -207,3 +224,57 @@ def timed(work: CaseWork, count: int) -> float:
         work.simulate(0, count)
         seconds.append(time.thread_time() - started)
     return min(seconds)
+
+
+@dataclass(frozen=True)
+class Lacking:
+    """Cases whose blocks lie as shares do that were not all copied, or as a killed run left them.
+
+    How many they are, the realisations asked of them and stored, name and stock of the first one, and seconds for the
+    rest on `threads` threads.
+    """
+
+    cases: int
+    asked: int
+    stored: int
+    name: str
+    first: Stock
+    threads: int
+    seconds: float
+
+
+def lacking(experiment: Experiment, out: str | os.PathLike[str], threads: int | None = None) -> Lacking | None:
+    """What a run would compute first of a store with gaps, and how long that takes; None of a store without.
+
+    A few realisations are timed, as for `outlook`. What no run has stored so far, or all of which is there, is not even
+    prepared.
+    """
+    found: dict[str, tuple[CaseWork, Stock]] = {}
+    for case in experiment.cases:
+        work = CaseWork(case)
+        pieces = Store(out, work).pieces()
+        if pieces and Total(case.realisations) not in pieces:
+            held = stock(work, case.realisations, out)
+            if held.loose and held.missing:
+                found.setdefault(work.identity, (work, held))
+    if not found:
+        return None
+    seconds = 0.0
+    for work, held in found.values():
+        work.simulate(0, 1)
+        each = seconds_each(work, work.case.realisations, PILOT_S / len(found))
+        seconds += each * (held.asked - held.stored)
+    asked, stored = (sum(getattr(held, name) for _, held in found.values()) for name in ("asked", "stored"))
+    work, held = next(iter(found.values()))
+    threads = threads or available_cores()
+    return Lacking(len(found), asked, stored, work.case.name, held, threads, seconds / threads)
+
+
+def missing(held: Stock) -> str:
+    """What a store lacks: which realisations, and which shares these look like."""
+    runs = few([tr("{first:,} to {last:,}", first=first, last=last) for first, last in held.missing], 3)
+    if held.shares is None:
+        return tr("realisations {runs}", runs=runs)
+    numbers, of = held.shares
+    share = tr("share {number} of {of}", number=listed([str(number) for number in numbers]), of=of)
+    return tr("realisations {runs}, as if {share} had not been copied", runs=runs, share=share)

@@ -27,6 +27,7 @@ from radarsim.engine.collect import stored
 from radarsim.engine.executors import Executor
 from radarsim.engine.machine import available_cores
 from radarsim.engine.results import CaseResult
+from radarsim.engine.stock import Stock, stock
 from radarsim.engine.stopping import Signals, Stop
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
 from radarsim.report import files
@@ -242,12 +243,21 @@ def from_store(experiment: Experiment, out: str | os.PathLike[str], overrides: S
             continue
         collected = stored(work, case.realisations, out)
         if collected is None:
-            missing.append(f"{case.name}: {case.realisations} realisations are not stored in {out}")
+            missing.append(lack(case.name, stock(work, case.realisations, out), out))
         else:
             held.cases.append((case, work, collected))
     if missing:
         raise ConfigError(*missing, f"`{command(experiment, overrides, out)}` computes them")
     return result_of(experiment, held, facts_of(held, 0, 0.0), repeated(asked, held.done, overrides, None))
+
+
+def lack(name: str, held: Stock, out: str | os.PathLike[str]) -> str:
+    """The line of a case that is not stored whole: how much of it is, and what is missing."""
+    if not held.stored:
+        return f"{name}: {held.asked} realisations are not stored in {out}"
+    from radarsim.app.outlook import missing
+
+    return f"{name}: {held.stored:,} of {held.asked:,} realisations are stored in {out}; missing: {missing(held)}"
 
 
 def result_of(experiment: Experiment, simulated: SimulatedCases, facts: dict[str, Any], again: str) -> Result:

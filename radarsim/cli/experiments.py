@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from radarsim.cli.group import (
+    Directory,
     Positive,
     Share,
     completed,
@@ -115,7 +116,18 @@ def run(
             compute = partial(draw, overrides=overrides, precision=precision, of=of, decide=decide)
             if shard:
                 compute = partial(experiment.share, part=shard)
-            _compute_each(loaded, partial(compute, **means), out, quiet, as_json)
+            whole, at_once = precision is None and not decide, pool.workers if pool else threads
+            look = None if shard or quiet else partial(_say_what_lacks, out, at_once, whole)
+            _compute_each(loaded, partial(compute, **means), out, quiet, as_json, look)
+
+
+def _say_what_lacks(out: str, threads: int | None, whole: bool, one: "Experiment") -> None:
+    """Of a store with gaps, as without one of its shares: a line on them, and on how long they take."""
+    from radarsim.app.outlook import lacking
+    from radarsim.cli import outcomes
+
+    if (found := lacking(one, out, threads)) is not None:
+        outcomes.print_lacking(one, found, whole)
 
 
 def _refuse_of_nothing(of: str, precision: float | None) -> None:
@@ -148,9 +160,17 @@ def _loaded(
 
 
 def _compute_each(
-    loaded: "list[Experiment]", compute: "Callable[..., Result | Shares]", out: str, quiet: bool, as_json: bool
+    loaded: "list[Experiment]",
+    compute: "Callable[..., Result | Shares]",
+    out: str,
+    quiet: bool,
+    as_json: bool,
+    look: "Callable[[Experiment], None] | None",
 ) -> None:
-    """Compute experiments one by one and print what came of each; raises TargetUnmet at the end for what was not."""
+    """Compute experiments one by one, each after a look at it, and print what came of it.
+
+    Raises TargetUnmet at the end for what was not reached.
+    """
     from radarsim.app import documents, simulation
     from radarsim.cli import console, outcomes
 
@@ -158,6 +178,8 @@ def _compute_each(
     unmet: list[str] = []
     wrong: list[str] = []
     for one in loaded:
+        if look is not None:
+            look(one)
         try:
             with console.Progress(one.stem, quiet=quiet) as progress:
                 done = compute(one, progress=progress.update)
@@ -193,6 +215,8 @@ def _compute_each(
 @set_option
 @precision_option
 @of_option
+@click.option("--shard", type=Share(), metavar="i/n", help="Of this share of the blocks only.")
+@click.option("--out", type=Directory(), metavar="DIR", help="Also what of it is stored there, what is missing.")
 @json_option
 def check(
     configs: tuple[str, ...],
@@ -201,11 +225,14 @@ def check(
     overrides: tuple[str, ...],
     precision: float | None,
     of: str,
+    shard: tuple[int, int] | None,
+    out: str | None,
     as_json: bool,
 ) -> None:
     """Validate configs; say what would run: cases, filters, realisations, time, memory.
 
-    A few realisations are timed for that, unless all are surely done within a second.
+    A few realisations are timed for that, unless all are surely done within a second. With --out the time is that of
+    what the results directory lacks.
 
     With a precision, also how many realisations it takes, and how long: from exact values where the filters are linear,
     else from a pilot of a second or two; where the config asks for a control variate, by these intervals too.
@@ -215,7 +242,10 @@ def check(
       radarsim check configs/range_doppler.yaml -n 1e7
       radarsim check multimodel --precision 1
       radarsim check discriminator_rare -n 1e6 --precision 10 --of lost
+      radarsim check multimodel -n 1e8 --shard 1/3        how long the first of three machines takes
+      radarsim check multimodel -n 1e8 --out results      what of it is stored there, and what is missing
     """
+    _refuse_together(shard, precision, None, None)
     _refuse_of_nothing(of, precision)
     from radarsim.app import documents
     from radarsim.app import outlook as overview
@@ -225,7 +255,7 @@ def check(
     made = []
     for one in experiment.load_all(configs, experiment.merged(overrides, realisations, seed)):
         with console.Progress(one.stem, quiet=as_json, what="cases") as bar:
-            outlook = overview.outlook(one, precision=precision, progress=bar.update, of=of)
+            outlook = overview.outlook(one, None, precision, bar.update, of, out, shard)
         made.append(documents.outlook(one, outlook))
         if not as_json:
             outcomes.print_outlook(one, outlook)

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from radarsim.cli.console import counted_cases, field, print_warnings, say, show
+from radarsim.cli.console import counted_cases, field, print_warnings, say, say_aside, show
 from radarsim.cli.verdicts import print_verdicts
 from radarsim.language import few, listed, numeral, plural, term, tr
 from radarsim.report.text import clock, known, significant_digits
@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     from radarsim.app.compare import Compared
     from radarsim.app.doctor import Inspection
     from radarsim.app.inventory import Inventory
-    from radarsim.app.outlook import Need, Outlook
+    from radarsim.app.outlook import CaseOutlook, Lacking, Need, Outlook
     from radarsim.app.result import Result
     from radarsim.app.simulation import Shares
     from radarsim.config.experiment import Experiment
 
+MOST_BEGUN = 4  # cases of which is said what of them is stored
 MOST_ROWS = 36  # of the last scan's table; of a larger experiment the answer and the files are enough
 DROPPED = term("dropped {files} of {cases}, {size:.1f} MB in {folder}")
 
@@ -129,16 +130,22 @@ def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
             case.filters,
             str(case.scans),
             numeral(f"{case.realisations:,}"),
-            tr("{t_s:.3g} s", t_s=case.seconds) if case.timed else tr("under {t_s:.2g} s", t_s=case.seconds),
+            _seconds(case),
         )
         for case in outlook.cases
     ]
     columns = ("case", "filters", "scans", "realisations", "one thread")
     show("", columns, rows, right=columns[2:], spare=("scans",))
+    from radarsim.app.outlook import missing
+
+    begun = [(case.name, held) for case in outlook.cases if (held := case.stock) and held.stored and held.missing]
+    for name, held in begun[:MOST_BEGUN]:
+        told = {"stored": held.stored, "asked": held.asked, "missing": missing(held)}
+        field(name, tr("{stored:,} of {asked:,} stored; missing: {missing}", **told))
+    if len(begun) > MOST_BEGUN:
+        say(tr("and {cases} more that are stored in part", cases=counted_cases(len(begun) - MOST_BEGUN)))
     if outlook.precision is not None:
         print_needs(experiment, outlook)
-    short = outlook.seconds < 1
-    seconds = tr("under a second") if short else tr("about {time}", time=clock(outlook.seconds))
     told = {
         "cases": counted_cases(len(outlook.cases)),
         "realisations": plural(
@@ -146,14 +153,55 @@ def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
         ),
         "threads": plural("{count} thread", "{count} threads", outlook.threads),
     }
+    stored, seconds = sum(case.stock.stored for case in outlook.cases if case.stock), _about(outlook.seconds)
+    if stored:
+        told["realisations"] = tr("{stored:,} of {realisations} stored", stored=stored, **told)
+        seconds = tr("the rest {seconds}", seconds=seconds)
     words = tr(
         "{cases}, {realisations}, {seconds} on {threads}, {memory:.0f} MB; figures and tables take some seconds more",
         **told,
         seconds=seconds,
         memory=outlook.memory_mb,
     )
+    if outlook.share is not None:
+        number, of = outlook.share
+        field("share", tr("{number} of {of}", number=number, of=of))
     field("total", words)
     print_warnings(outlook.warnings)
+
+
+def _seconds(case: "CaseOutlook") -> str:
+    """What one thread takes for a case."""
+    if case.timed or not case.seconds:
+        return tr("{t_s:.3g} s", t_s=case.seconds)
+    return tr("under {t_s:.2g} s", t_s=case.seconds)
+
+
+def _about(seconds: float) -> str:
+    """A time foretold."""
+    return tr("under a second") if seconds < 1 else tr("about {time}", time=clock(seconds))
+
+
+def print_lacking(experiment: "Experiment", lacking: "Lacking", whole: bool) -> None:
+    """That the store of a run has gaps, and how long they take; whole: whether the run surely computes all of them."""
+    from radarsim.app.outlook import missing
+
+    told = {
+        "config": experiment.stem,
+        "stored": lacking.stored,
+        "asked": lacking.asked,
+        "missing": missing(lacking.first),
+        "seconds": _about(lacking.seconds),
+        "threads": plural("{count} thread", "{count} threads", lacking.threads),
+    }
+    words = tr("{config}: {stored:,} of {asked:,} realisations are stored; missing: {missing}", **told)
+    if lacking.cases > 1:
+        words += tr(" (of {case}, the first of {count} such cases)", case=lacking.name, count=lacking.cases)
+    if whole:
+        words += tr("; computed now, {seconds} on {threads}", **told)
+    else:
+        words += tr("; all of it takes {seconds} on {threads}", **told)
+    say_aside(tr("note: {words}", words=words))
 
 
 def print_needs(experiment: "Experiment", outlook: "Outlook") -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, added, maximal, widest
+from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, added, gaps, maximal, widest
 from radarsim.engine.moments import Sums
 from radarsim.engine.store import SUFFIX, Damage, check_platforms, content, decoded, mixture, piece_named
 from radarsim.errors import StoreError
@@ -47,6 +47,7 @@ def audited(path: Path, reported: int | None = None) -> Audit:
         found.notes.append(f"{path}: {mixture(platforms)}")
     if reported is not None and Total(reported) not in found.pieces:
         _missing(found, Total(reported))
+    _gaps(found)
     for total in sorted((piece for piece in found.pieces if isinstance(piece, Total)), key=lambda piece: piece.count):
         _added_up(found, total)
     return found
@@ -86,6 +87,16 @@ def _check(header: dict, values: np.ndarray, piece: Piece, identity: str) -> Non
         raise Damage("not all numbers are finite")
 
 
+def _gaps(found: Audit) -> None:
+    """A note on realisations that are not stored before others that are, as where a share was not copied."""
+    nodes = [piece for piece in found.pieces if isinstance(piece, Node)]
+    end = max((node.stop for node in nodes), default=0)
+    for first, stop in gaps(maximal(nodes, end), end):
+        block = found.pieces[nodes[0]][0]["block"]
+        span = f"realisations {first * block:,} to {stop * block - 1:,}"
+        found.notes.append(f"{found.path}: {span} are not stored, but later ones are")
+
+
 def _missing(found: Audit, piece: Piece) -> None:
     fault = f"{found.path / (piece.name + SUFFIX)}: missing"
     if not any(known.startswith(fault.removesuffix("missing")) for known in found.faults):
@@ -102,8 +113,9 @@ def _added_up(found: Audit, total: Total) -> None:
     inner = maximal(nodes, full)
     for node in inner:
         forest.add(node, Sums(*_sums(found, node)))
-    gaps = [gap for gap in forest.gaps(full) if not any(_covers(node, gap) for node in nodes)]
-    for first, stop in gaps:
+    for first, stop in forest.gaps(full):
+        if any(_covers(node, (first, stop)) for node in nodes):
+            continue
         for node in _widest(first, stop):
             _missing(found, node)
     cut = Partial(full, rest)

@@ -130,6 +130,28 @@ def maximal(nodes: Collection[Node], stop: int) -> list[Node]:
     return sorted(top, key=lambda node: node.first)
 
 
+def gaps(nodes: Collection[Node], stop: int, start: int = 0) -> list[tuple[int, int]]:
+    """Runs (first, stop) of the blocks start … stop − 1 that none of the nodes holds, which do not overlap."""
+    found, first = [], start
+    for node in sorted(nodes, key=lambda node: node.first):
+        if first < min(node.first, stop):
+            found.append((first, min(node.first, stop)))
+        first = max(first, node.stop)
+    return [*found, (first, stop)] if first < stop else found
+
+
+def share_of(realisations: int, block: int, part: tuple[int, int]) -> tuple[int, int, int]:
+    """A share, as (2, 3) the second of three: its full blocks first … stop − 1, the realisations of its cut one."""
+    full, rest = divmod(realisations, block)
+    first, stop = (min(share_bound(full + (rest > 0), bound, part[1]), full) for bound in (part[0] - 1, part[0]))
+    return first, stop, rest if part[0] == part[1] else 0
+
+
+def share_bound(blocks: int, number: int, of: int) -> int:
+    """The block after the last of share `number` of `of`."""
+    return blocks * number // of
+
+
 def added(left: Sums, right: Sums, first: int) -> Sums:
     """left + right; NonFiniteError if that overflows. `first` is the first realisation of left, for the message."""
     with np.errstate(over="ignore", invalid="ignore"):
@@ -206,12 +228,7 @@ class Forest:
 
     def gaps(self, stop: int) -> list[tuple[int, int]]:
         """Runs (first, stop) of blocks below `stop` that no node holds."""
-        gaps, first = [], 0
-        for node in sorted(self.nodes, key=lambda node: node.first):
-            if node.first > first:
-                gaps.append((first, node.first))
-            first = node.stop
-        return [*gaps, (first, stop)] if first < stop else gaps
+        return gaps(self.nodes, stop)
 
     def total(self) -> Sums:
         """The sums of the prefix, added from left to right; zeros if block 0 is not done."""

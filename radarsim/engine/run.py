@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, Work, added, widest
+from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, Work, added, gaps, share_of, widest
 from radarsim.engine.executors import Executor, Outcome
 from radarsim.engine.keeper import Keeper
 from radarsim.engine.moments import Sums
@@ -127,13 +127,12 @@ class Dispatch:
 
     def missing(self) -> list[tuple[int, int]]:
         """Runs (first, stop) of its blocks that are not done."""
-        cut = ((max(first, self.first), min(stop, self.stop)) for first, stop in self.forest.gaps(self.stop))
-        return [(first, stop) for first, stop in cut if first < stop]
+        return gaps(self.forest.nodes, self.stop, self.first)
 
     def _tasks(self, pace: Pace) -> Iterator[Node | Partial]:
-        gaps = self.missing()
-        left = sum(stop - first for first, stop in gaps)
-        for first, stop in gaps:
+        missing = self.missing()
+        left = sum(stop - first for first, stop in missing)
+        for first, stop in missing:
             while first < stop:
                 node = widest(first, stop, pace.level(left))
                 yield node
@@ -245,10 +244,7 @@ class Share(Dispatch):
     ):
         super().__init__(work, realisations, None, progress)
         self._keeper: Keeper = Keeper(Store(store, work))
-        number, of = part
-        blocks = self.full + (self.rest > 0)
-        self.first, self.stop = (min(blocks * bound // of, self.full) for bound in (number - 1, number))
-        self.rest = self.rest if number == of else 0
+        self.first, self.stop, self.rest = share_of(realisations, work.block, part)
         self.asked = (self.stop - self.first) * work.block + self.rest
 
     def restored(self) -> bool:

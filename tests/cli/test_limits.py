@@ -214,6 +214,114 @@ def test_shares_united_by_copying_are_the_whole_run(tmp_path, of):
     assert csv_bytes(tmp_path / "all" / "rls2") == csv_bytes(tmp_path / "whole" / "rls2")
 
 
+@pytest.fixture(scope="module")
+def shares(tmp_path_factory):
+    """The three shares of 100,000 realisations of rls2, a folder each."""
+    root = tmp_path_factory.mktemp("shares")
+    for number in (1, 2, 3):
+        command("run", "rls2", "-n", "1e5", "--shard", f"{number}/3", "--out", root / str(number))
+    return root
+
+
+def united(shares, to, *numbers):
+    for number in numbers:
+        shutil.copytree(shares / str(number), to, dirs_exist_ok=True)
+    return to
+
+
+MISSING = "realisations 32,768 to 65,535, as if share 2 of 3 had not been copied"
+
+
+def test_a_run_says_which_share_its_store_lacks_and_computes_it(shares, tmp_path):
+    run = ("run", "rls2", "--no-figures", "--out", united(shares, tmp_path, 1, 3), "-n")
+    line = (
+        f"note: rls2: 67,232 of 100,000 realisations are stored; missing: {MISSING}; computed now, under a second on "
+    )
+    assert command(*run, "1e5").stderr.startswith(line)
+    assert record(tmp_path / "rls2")["realisations_computed"] == 32_768
+    assert command(*run, "1e5").stderr == ""  # all is there now
+    assert command(*run, "2e5").stderr == ""  # a larger run goes on where the first one ended
+
+
+def test_a_precision_may_need_less_than_what_lacks(shares, tmp_path):
+    wanted = ("-n", "1e5", "--precision", 20, "--no-figures", "--out", united(shares, tmp_path, 1, 3))
+    assert f"missing: {MISSING}; all of it takes under a second on " in command("run", "rls2", *wanted).stderr
+    assert record(tmp_path / "rls2")["realisations_done"] == 2_000
+
+
+@pytest.mark.parametrize("options", [["--shard", "2/3"], PLAIN])
+def test_a_share_and_a_quiet_run_say_nothing_of_what_lacks(shares, tmp_path, options):
+    assert command("run", "rls2", "-n", "1e5", *options, "--out", united(shares, tmp_path, 1, 3)).stderr == ""
+
+
+def test_report_says_how_much_is_stored_and_what_is_missing(shares, tmp_path):
+    ended = command("report", "rls2", "-n", "1e5", "--out", united(shares, tmp_path, 1, 3), code=2)
+    assert f"rls2: 67,232 of 100,000 realisations are stored in {tmp_path}; missing: {MISSING}\n" in ended.stderr
+
+
+def test_check_says_what_is_stored_what_is_missing_and_how_long_it_takes(shares, tmp_path):
+    united(shares, tmp_path, 1, 3)
+    ask = ("check", "rls2", "-n", "1e5", "--out")
+    text = command(*ask, tmp_path).stdout
+    assert f"67,232 of 100,000 stored; missing: {MISSING}\n" in text
+    assert "1 case, 67,232 of 100,000 realisations stored, the rest under a second on " in text
+    (document,) = json.loads(command(*ask, tmp_path, "--json").stdout)
+    (case,) = document["cases"]
+    assert case["stock"] == {
+        **{"asked": 100_000, "stored": 67_232, "missing": [[32_768, 65_535]]},
+        **{"shares": [[2], 3], "loose": True},
+    }
+    whole = json.loads(command("check", "rls2", "-n", "1e5", "--json").stdout)[0]["cases"][0]
+    assert whole["stock"] is None
+    assert case["seconds"] == pytest.approx(0.32768 * whole["seconds"])
+    (share,) = json.loads(command(*ask, tmp_path, "--shard", "3/3", "--json").stdout)
+    assert share["share"] == [3, 3]
+    assert share["cases"][0]["realisations"] == share["cases"][0]["stock"]["stored"] == 100_000 - 65_536
+    assert share["cases"][0]["seconds"] == 0
+    assert "0 s\n" in command(*ask, tmp_path, "--shard", "3/3").stdout
+
+
+def test_check_of_a_share_says_how_long_that_takes():
+    ask = ("check", "rls2", "-n", "1e5")
+    whole, part = (json.loads(command(*ask, *of, "--json").stdout)[0]["cases"][0] for of in ((), ("--shard", "1/3")))
+    assert part["realisations"] == 32_768
+    assert part["seconds"] == pytest.approx(0.32768 * whole["seconds"])
+    text = command(*ask, "--shard", "1/3").stdout
+    assert "share    1 of 3\ntotal    1 case, 32,768 realisations, under a second on " in text
+
+
+def test_of_many_cases_the_first_that_lacks_a_share_is_named(tmp_path):
+    config = ("rls2_manoeuvre_variance", "-n", 13_000, "--out", tmp_path)
+    for number in (1, 3):
+        command("run", *config, "--shard", f"{number}/3", "--quiet")
+    cases = len(load("rls2_manoeuvre_variance").cases)
+    note = command("run", *config, "--no-figures").stderr.splitlines()[0]
+    assert (
+        f"{cases * 8_904:,} of {cases * 13_000:,} realisations are stored; missing: realisations 4,096 to 8,191" in note
+    )
+    assert f", the first of {cases} such cases); computed now, " in note
+
+
+def test_check_with_a_precision_counts_what_is_stored(tmp_path):
+    command("run", "rls2", "-n", 20_000, *PLAIN, "--out", tmp_path)
+    (document,) = json.loads(command("check", "rls2", "--precision", 1, "--out", tmp_path, "--json").stdout)
+    (case,) = document["cases"]
+    assert case["realisations"] == 32_000
+    assert case["stock"]["stored"] == 16_384  # the whole blocks
+    command("check", "rls2", "--precision", 1, "--shard", "1/2", code=2)
+
+
+def test_doctor_names_what_is_not_stored_before_what_is(shares, tmp_path):
+    command("run", "rls2", "-n", 3000, *PLAIN, "--out", united(shares, tmp_path, 1, 3))
+    text = command("doctor", tmp_path / "rls2").stdout
+    assert "realisations 32,768 to 65,535 are not stored, but later ones are" in text
+    assert "all whole" in text
+    before = command("doctor", united(shares, tmp_path / "new", 1, 3) / "rls2", code=2)
+    assert f"`radarsim check CONFIG --out {tmp_path / 'new'}` says what is stored there" in before.stderr
+    command("run", "rls2", "-n", "1e5", *PLAIN, "--out", tmp_path)
+    assert "not stored" not in command("doctor", tmp_path / "rls2").stdout
+
+
 def test_a_share_may_be_limited_in_time(tmp_path):
     limited = ("run", "rls2", "-n", "1e9", "--shard", "2/2", "--time-limit", 0.5, "--out", tmp_path)
     assert command(*limited, code=3).stderr == "rls2: time limit of 0.5 s\n"

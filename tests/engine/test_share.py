@@ -1,5 +1,6 @@
 """Shares of the blocks: together they are all of them, united by copying; alone they report nothing."""
 
+import random
 import shutil
 
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from radarsim.engine.blocks import Node, Total
 from radarsim.engine.collect import collect, share, stored
 from radarsim.engine.run import Share
+from radarsim.engine.stock import BY_CHANCE, Stock, as_shares, stock
 from radarsim.engine.store import Store
 from tests.engine.fake import WORK, Fake, N, same
 
@@ -86,3 +88,57 @@ def test_progress_is_that_of_the_share(tmp_path):
     seen = []
     share(WORK, 1_600, (1, 4), store=tmp_path, progress=lambda *given: seen.append(given))
     assert seen[-1] == (400, 400, 0)
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(1, 3_000), st.integers(2, 9), st.data())
+def test_what_is_missing_is_named_by_realisations_and_shares(tmp_path_factory, realisations, of, data):
+    """Of a store without some of its shares, by the names of its files: they lie as the shares that were not copied."""
+    numbers = range(1, of + 1)
+    absent = data.draw(st.sets(st.sampled_from(numbers)))
+    root = tmp_path_factory.mktemp("stock")
+    for number in set(numbers) - absent:
+        share(WORK, realisations, (number, of), store=root, threads=0)
+    found = stock(WORK, realisations, root)
+    parts = {number: stock(WORK, realisations, root, (number, of)) for number in numbers}
+    assert found.asked == realisations == sum(part.asked for part in parts.values())
+    assert found.stored == sum(part.stored for part in parts.values())
+    for number, part in parts.items():
+        assert part.stored == (0 if number in absent else part.asked)
+    missing = [i for first, last in found.missing for i in range(first, last + 1)]
+    assert missing == [i for part in parts.values() for first, last in part.missing for i in range(first, last + 1)]
+    assert found.loose is (found.stored > 0)
+    if found.shares is not None:  # 3 and 4 of 4 are 2 of 2
+        fewer, total = found.shares
+        assert total <= of
+        bounds = [min((realisations + 15) // 16 * number // total * 16, realisations) for number in range(total + 1)]
+        assert missing == [i for n in fewer for i in range(bounds[n - 1], bounds[n])]
+
+
+def test_a_share_that_lacks_is_named(tmp_path):
+    for absent, shares in (({2}, ((2,), 3)), ({1}, ((1,), 3)), ({3}, ((3,), 3)), ({1, 3}, ((1, 3), 3))):
+        root = tmp_path / "".join(map(str, absent))
+        for number in {1, 2, 3} - absent:
+            share(WORK, N, (number, 3), store=root, threads=0)
+        found = stock(WORK, N, root)
+        assert (found.shares, found.loose) == (shares, True)
+        assert collect(WORK, N, store=root, threads=0).computed == N - found.stored
+        assert stock(WORK, N, root) == Stock(N, N, (), None, loose=False)
+
+
+def test_of_a_run_that_ended_nothing_is_loose(tmp_path):
+    collect(WORK, 1000, store=tmp_path, threads=0)
+    larger = stock(WORK, N, tmp_path)
+    assert (larger.stored, larger.missing, larger.loose) == (992, ((992, N - 1),), False)
+    assert stock(WORK, N, None) == Stock(N, 0, ((0, N - 1),), None, loose=False)
+    assert stock(WORK, N, tmp_path / "nowhere") == stock(WORK, N, None)
+    assert stock(WORK, 1000, tmp_path).missing == ()
+
+
+def test_ends_that_lie_by_chance_are_no_shares():
+    """Of 3000 runs of missing blocks wherever, as a killed run leaves them, few are taken for shares."""
+    draw, blocks, n = random.Random(1), 300, 3000
+    taken = sum(as_shares([sorted(draw.sample(range(1, blocks), 2))], blocks) is not None for _ in range(n))
+    assert 0 < taken < BY_CHANCE * n
+    taken = sum(as_shares([(draw.randrange(1, blocks), blocks)], blocks) is not None for _ in range(n))
+    assert 0 < taken < BY_CHANCE * n

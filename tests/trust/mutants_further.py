@@ -126,12 +126,15 @@ LAWS_EXACT = (
 )
 RUNS = (
     *mutants(
-        "radarsim/engine/run.py",
+        "radarsim/engine/blocks.py",
         (
-            "blocks * bound // of, self.full)",
-            "self.full * bound // of + 1, self.full)",
+            "share_bound(full + (rest > 0), bound, part[1]), full)",
+            "share_bound(full, bound, part[1]) + 1, full)",
             "engine/test_share.py::test_shares_tile_the_blocks_and_the_last_has_the_cut_one",
         ),
+    ),
+    *mutants(
+        "radarsim/engine/run.py",
         (
             "sums.count == self.full * self.work.block:",
             "sums.count >= 0:",
