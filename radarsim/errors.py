@@ -43,7 +43,12 @@ class StoreError(RadarsimError):
 
 
 class DisagreementError(StoreError):
-    """An exact value and its simulation differ by more than chance allows: one of the two is computed wrongly."""
+    """An exact value and its simulation differ by more than chance allows: one of the two is computed wrongly.
+
+    `result` holds the tables with both, where `radarsim.run` raised it.
+    """
+
+    result: object = None
 
 
 class NonFiniteError(RadarsimError):

@@ -145,23 +145,41 @@ class Result:
         """Write tables, figures, claims, run.json and report.html into out/<stem>/, and out/index.html again.
 
         figures may name the formats of their files: svg, png, pdf; width_mm is their width in place of their own. What
-        was written comes back. Raises DisagreementError, with all written, where an exact value of a claim and its
-        simulation differ beyond chance, or values with and without controls.
+        was written comes back. Raises DisagreementError, with all written, where there are `faults`.
         """
         from radarsim.app import arguments, output
-        from radarsim.report import claims, controlled, index, provenance
+        from radarsim.report import index, provenance
 
         folder = Path(out) / self.experiment.stem
         self._tables["claims"] = output.over_readings(self._tables["claims"], self.experiment.study, Path(out))
         formats = arguments.formats(figures)
         self.facts["warnings"] = [*self.facts["warnings"], *provenance.replaced(folder, self.experiment)]
         facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
+        facts["warnings"] = [*self.faults, *facts["warnings"]]
         write = partial(output.write, draw=bool(formats), formats=formats, width_mm=width_mm)
         self.written = write(self.experiment, self.cases, folder, facts, made=self.tables)
         index.write(Path(out))
-        if errors := [*claims.errors(self._tables["claims"]), *controlled.faults(self._tables)]:
-            raise DisagreementError(*errors)
+        self.check()
         return self.written
+
+    @cached_property
+    def faults(self) -> tuple[str, ...]:
+        """What no chance makes, a line each: exact and measured values apart, or values with and without controls."""
+        from radarsim.report import agreement, claims, controlled
+
+        own, made = study(self.experiment.study), dict(self._tables)
+        judged = made.pop("claims")
+        nearly = [case.name for case in self.experiment.cases if own.exact_but_for(case)]
+        bounds = () if own.exact_errors else ("curves", "gains")
+        exact = {name: table for name, table in made.items() if name not in bounds}
+        return (*agreement.faults(exact, nearly), *claims.errors(judged), *controlled.faults(made))
+
+    def check(self) -> None:
+        """Raises DisagreementError where there are `faults`."""
+        if self.faults:
+            error = DisagreementError(*self.faults)
+            error.result = self
+            raise error
 
     def verdicts(self, column: str = "class") -> dict[str, list[str]]:
         """The claims of a class over all readings that their papers allow, or `as_shipped`; empty where there are none.
@@ -203,7 +221,7 @@ class Result:
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader of the numbers must know: damaged or mixed blocks, too few realisations."""
+        """What a reader of the numbers must know: faults, damaged or mixed blocks, too few realisations."""
         from radarsim.report import provenance
 
-        return [*self.facts["warnings"], *provenance.of_intervals(self.cases, self._tables)]
+        return [*self.faults, *self.facts["warnings"], *provenance.of_intervals(self.cases, self._tables)]

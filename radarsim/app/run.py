@@ -105,7 +105,8 @@ def run(
 
     Raises ConfigError for a wrong config, StoreError for a bad disk, NonFiniteError for a filter that diverged,
     TargetUnmet where the time did not suffice for a single block, and Interrupted, with all that was done stored, if
-    `stop` saw a signal.
+    `stop` saw a signal. Raises DisagreementError, after all is written, where measured and exact values differ by more
+    than chance makes: one of them is computed wrongly. Its `result` is what would have been returned.
 
     >>> result = run("rls2", realisations=2000)
     >>> len(result.curves) > 50
@@ -150,7 +151,9 @@ def run(
         facts |= {"unmet": [*facts["unmet"], *left], "stop": "; ".join((*facts["unmet"], *left)) or "done"}
     ended_by = None if simulated.stopped or precision is None else (precision, of)
     result = result_of(experiment, simulated, facts, repeated(experiment, simulated.done, overrides, ended_by))
-    if out is not None:
+    if out is None:
+        result.check()
+    else:
         result.write(out, figures, width_mm)
     return result
 

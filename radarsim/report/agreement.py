@@ -1,16 +1,171 @@
-"""Exact values against Monte-Carlo: how often the intervals hold them, and how far apart the two come."""
+"""Exact values against measured ones, in every table and every run.
 
-from typing import TYPE_CHECKING
+A column `exact_NAME` of a table holds the exact value of its column NAME, or gain_NAME; `exact` alone that of the
+column whose ends are `lo` and `hi`. The two columns after the measured one are the ends of its 95 %
+interval; of a mean the one after it, `…_se`, is its standard error. So a study that names its columns like this is held
+against its own exact values without a word more. Each of them is to lie within `statistics.ERROR_OF_PROGRAM` standard
+errors, within more where there are so many that chance would take one further.
+
+Whose standard errors: the sample's own, with one exception. Where errors have a heavy tail, the few large ones that
+make σ may be missing in a sample, and in its standard error with them. Such a row, of κ over `TAIL`, is only held
+against being too large, which no sample is for what it lacks. Where κ is less but another scan shows a tail, as much
+may be missing as `UNSEEN` of its errors make of n.
+"""
+
+from collections.abc import Collection, Iterator, Mapping
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from radarsim.language import tr
 from radarsim.report import tables as common
+from radarsim.report.statistics import ERROR_OF_PROGRAM, FEW, Z95, Estimate, furthest, standard_errors
 
 if TYPE_CHECKING:
     import pandas as pd
 
 COLUMNS = ("case", "filter", "component", "unit", "scans", "inside_percent", "largest_difference_percent", "at_k")
-MOST_ROWS = 300
+ALMOST = 2e-4  # of a value that `Study.exact_but_for` says something of
+ROUNDING = 1e-9  # of a value
+TAIL = 5.0  # κ; 3 of Gaussian errors
+UNSEEN = 18.0  # realisations of n that are all missing in one sample of 6·10⁷
+POWERS = {"sigma": 2, "nees": 1, "nis": 1}  # of these columns that power is a mean of squares
+SAME = ["case", "filter", "component", "k"]
+
+
+class Beside(NamedTuple):
+    """A measured column, its ends, and its exact value; lo and hi are one column where it is the standard error."""
+
+    value: str
+    lo: str
+    hi: str
+    exact: str
+
+
+def beside(table: "pd.DataFrame") -> Iterator[Beside]:
+    """The measured columns of a table that have an exact one."""
+    columns = [str(name) for name in table.columns]
+    for exact in (name for name in columns if name == "exact" or name.startswith("exact_")):
+        own = exact.removeprefix("exact").removeprefix("_")
+        for value, lo, hi in zip(columns, columns[1:], columns[2:], strict=False):
+            named = value in (own, f"gain_{own}") if own else (lo, hi) == ("lo", "hi")
+            if named and lo == f"{value}_se":
+                yield Beside(value, lo, lo, exact)
+            elif named and lo.endswith("lo") and hi.endswith("hi"):
+                yield Beside(value, lo, hi, exact)
+
+
+def measured(table: "pd.DataFrame", of: Beside) -> Estimate:
+    """The measured values (rows,) of a column with their 95 % intervals."""
+    value, lo, hi = (table[name].to_numpy(dtype=float) for name in of[:3])
+    return Estimate(value, value - Z95 * lo, value + Z95 * hi) if of.lo == of.hi else Estimate(value, lo, hi)
+
+
+def distances(made: "Mapping[str, pd.DataFrame]", name: str, of: Beside, nearly: Collection[str] = ()) -> np.ndarray:
+    """Standard errors (rows,) by which the measured values of a column lie off the exact ones.
+
+    made: all tables; nearly: the cases of which exact values are right to `ALMOST`. Less is said where the sample may
+    lack something, see above. Not-a-number where no exact value is known, or under `FEW` realisations measured it.
+    """
+    table = made[name]
+    value, lo, hi = estimate = measured(table, of)
+    exact, missing = table[of.exact].to_numpy(dtype=float), _missing(made, name, of)
+    percent = of.value.endswith("_percent")  # of a ratio of two σ
+    size = np.abs(100 - exact if percent else exact)
+    if of.value == "bias":
+        size = np.fmax(size, table["sigma"].to_numpy(dtype=float))
+    room = size * np.where(table["case"].isin(list(nearly)), ALMOST, ROUNDING)
+    lacking = np.where(percent | (np.abs(value) < np.abs(exact)), missing, 0.0)
+    off = exact - value
+    with np.errstate(invalid="ignore"):
+        nearest = np.where(np.abs(off) <= room + lacking, value, exact - np.sign(off) * (room + lacking))
+    enough = table["n"].to_numpy(dtype=float) >= FEW if "n" in table else True
+    return np.where(enough, standard_errors(Estimate(value, lo, hi), nearest), np.nan)
+
+
+def _missing(made: "Mapping[str, pd.DataFrame]", name: str, of: Beside) -> np.ndarray:
+    """How much of a measured value (rows,) a sample may lack, in the column's unit; infinite where it may be all."""
+    table = made[name]
+    shares = [np.zeros(len(table))]
+    if name != "curves" and set(SAME) <= set(table) and len(made.get("curves", ())):
+        of_curves = made["curves"][SAME].assign(share=_shares(made["curves"], "sigma"))
+        for who in {"filter", "baseline", "control"} & set(table):
+            keys = table[["case", who, "component", "k"]].set_axis(SAME, axis=1)
+            shares.append(keys.merge(of_curves, on=SAME, how="left")["share"].to_numpy(dtype=float))
+    with np.errstate(invalid="ignore"):
+        if of.value.endswith("_percent"):
+            return np.abs(100 - table[of.exact].to_numpy(dtype=float)) * np.nansum(shares, axis=0) / 2
+        if of.value == "bias":
+            missed = UNSEEN / table["n"].to_numpy(dtype=float)
+            return table["sigma"].to_numpy(dtype=float) * np.sqrt(_shares(table, "sigma") * missed)
+        if of.value in POWERS and "n" in table:
+            share = np.fmax(np.fmax.reduce(shares), _shares(table, of.value))
+            return table[of.value].to_numpy(dtype=float) * ((1 + share) ** (1 / POWERS[of.value]) - 1)
+    return shares[0]
+
+
+def _shares(table: "pd.DataFrame", name: str) -> np.ndarray:
+    """What share of a mean of squares (rows,) a sample may lack beside what it holds; infinite where tails are heavy.
+
+    From the interval, which tells κ, or from effective realisations where the table has them.
+    """
+    value, lo, hi, n = (table[column].to_numpy(dtype=float) for column in (name, f"{name}_lo", f"{name}_hi", "n"))
+    square = value ** POWERS[name]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        of_interval = n * (POWERS[name] * (hi - lo) / (2 * Z95 * value)) ** 2
+        kurtosis = 1 + (n / table["n_eff"].to_numpy(dtype=float) if "n_eff" in table else of_interval)
+        heavy = kurtosis > TAIL
+        groups = [table[column] for column in SAME[:3] if column in table]
+        size = common.frame({"size": np.where(heavy, kurtosis * square, 0.0)}).groupby([*groups], sort=False)
+        largest = size["size"].transform("max").to_numpy()
+        return np.where(heavy, np.inf, UNSEEN / n * largest / square)
+
+
+def compared(
+    made: "Mapping[str, pd.DataFrame]", nearly: Collection[str] = ()
+) -> "dict[tuple[str, Beside], np.ndarray]":
+    """The `distances` of every column that has an exact one beside it, by the name of its table."""
+    return {
+        (name, of): distances(made, name, of, nearly)
+        for name, table in made.items()
+        if "case" in table and len(table)
+        for of in beside(table)
+    }
+
+
+def faults(made: "Mapping[str, pd.DataFrame]", nearly: Collection[str] = ()) -> list[str]:
+    """A line for each column that lies further off its exact values than chance takes any: the furthest row of it.
+
+    made: the tables to be compared, all that hold exact values; nearly: as for `distances`.
+    """
+    found = compared(made, nearly)
+    many = sum(int((~np.isnan(apart)).sum()) for apart in found.values())
+    bound = max(ERROR_OF_PROGRAM, furthest(many))
+    said = []
+    for (name, of), apart in found.items():
+        if (apart > bound).any():
+            at = int(np.nanargmax(apart))
+            row = made[name].iloc[at]
+            scan = f"k = {row['k']:g}" + (f" ({row['t_s']:g} s)" if "t_s" in row else "") if "k" in row else ""
+            place = ", ".join(filter(None, (*(str(row[key]) for key in SAME[:3] if key in row), scan)))
+            said.append(
+                tr(
+                    "{table}.csv: {place}: {column} measured {measured:.6g}, exactly {exact:.6g}: {apart:.3g} standard "
+                    "errors apart; {count:,} of {rows:,} rows of this column are over {bound:.3g}, the most that "
+                    "chance makes of {many:,}: the simulation or the exact value is computed wrongly",
+                    table=name,
+                    place=place,
+                    column=of.value,
+                    measured=float(row[of.value]),
+                    exact=float(row[of.exact]),
+                    apart=float(apart[at]),
+                    bound=bound,
+                    many=many,
+                    count=int((apart > bound).sum()),
+                    rows=int((~np.isnan(apart)).sum()),
+                )
+            )
+    return said
 
 
 def agreement(curves: "pd.DataFrame") -> "pd.DataFrame | None":

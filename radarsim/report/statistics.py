@@ -193,6 +193,28 @@ def furthest(looks: Values) -> float:
     return NormalDist().inv_cdf(1 - TOGETHER / 2 / max(int(looks), 1))
 
 
+ERROR_OF_PROGRAM = 5.85  # standard errors between a measured and an exact value: by chance once in 2·10⁸
+
+
+def standard_errors(of: Estimate, exact: Values) -> Values:
+    """By how many of its standard errors a measured value lies off the exact one, from its 95 % interval; 0 or more.
+
+    Towards the wider side of the interval the variance is taken to grow in proportion to the distance, as it does where
+    the interval is Wilson's or that of a rate: what is left is then the score of the exact value. Towards the narrower
+    side it stays what it is at the value. A statistic so made strays no further than a Gaussian number: of rates
+    however rare, and of σ from 200 realisations on. Infinite where a value without width is off, not-a-number where
+    either is not known.
+    """
+    off = np.subtract(exact, of.value)
+    up, down = np.subtract(of.hi, of.value), np.subtract(of.value, of.lo)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        grown = np.where(off > 0, up - down, down - up)
+        unbounded = np.isinf(np.where(off > 0, of.hi, of.lo))
+        variance = up * down + np.maximum(grown, 0) * np.abs(off)
+        apart = np.where((off == 0) | unbounded, 0.0, Z95 * np.abs(off) / np.sqrt(variance))
+    return np.where(np.isnan(off) | np.isnan(up) | np.isnan(down), np.nan, apart)
+
+
 def unskewed(apart: Values, n: Values) -> Values:
     """Standard errors between two means of n values, less the most that skewness makes of them.
 

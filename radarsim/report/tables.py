@@ -80,12 +80,12 @@ def realisations(result: CaseResult) -> np.ndarray:
 
 CURVES = (
     *("case", "filter", "component", "unit", "k", "t_s", "n"),
-    *("sigma", "sigma_lo", "sigma_hi", "bias", "bias_se", "spread", "exact_sigma", "n_eff"),
+    *("sigma", "sigma_lo", "sigma_hi", "bias", "bias_se", "spread", "exact_sigma", "exact_bias", "n_eff"),
 )
 
 
 def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
-    """σ with its interval, bias, spread, exact σ and effective realisations, by case, filter, component and scan."""
+    """σ with its interval, bias, spread, both exactly, and effective realisations, by case, filter, component and scan."""
     return joined([_curves(result) for result in results], CURVES)
 
 
@@ -103,6 +103,7 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
         "bias_se": of.bias_se,
         "spread": of.spread,
         "exact_sigma": np.asarray(axes.exact_sigma, dtype=float)[at],
+        "exact_bias": np.asarray(axes.exact_bias, dtype=float)[at],
         "n_eff": statistics.effective(moments[..., 1], moments[..., 3], n),
     }
 

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from radarsim.cli import main
 from radarsim.cli.console import fitting
 
-CURVES = "case,filter,component,unit,k,t_s,n,sigma,sigma_lo,sigma_hi,bias,bias_se,spread,exact_sigma,n_eff"
+CURVES = "case,filter,component,unit,k,t_s,n,sigma,sigma_lo,sigma_hi,bias,bias_se,spread,exact_sigma,exact_bias,n_eff"
 GAINS = "case,filter,baseline,component,k,t_s,gain_percent,gain_lo,gain_hi,exact_percent"
 
 

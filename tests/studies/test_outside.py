@@ -197,3 +197,37 @@ def test_its_identity_is_that_of_its_own_sources(identities, i):
 def test_its_own_tests_pass(place, radarsim):
     done = radarsim("-q", "-p", "no:cacheprovider", cwd=place / "fifth", module="pytest")
     assert "6 passed" in done.stdout
+
+
+def test_a_wrong_number_in_kernel_or_exact_value_ends_the_run_in_exit_code_4(tmp_path):
+    """A walk 5 % longer than the filters are told, in a config without claims; then a bias that there is not."""
+    site = tmp_path / "site"
+    site.mkdir()
+    outside.command("new-study", "wrong", site=site, cwd=tmp_path)
+    outside.installed(tmp_path / "wrong", site)
+    run = ("run", "wrong", "-n", 100_000, "--set", "sensor.sigma_x_m=1.1", "--no-figures", "--out")
+
+    def edited(file, old, new):
+        path = tmp_path / "wrong/src/wrong" / file
+        assert old in (text := path.read_text(encoding="utf-8"))
+        path.write_text(text.replace(old, new), encoding="utf-8")
+
+    outside.command(*run, "right", site=site, cwd=tmp_path)
+    edited("study.py", "exact_bias=np.zeros(shape)", "exact_bias=np.full(shape, 0.02)")
+    said = outside.command(*run, "biased", site=site, cwd=tmp_path, code=4).stderr
+    assert said.startswith("curves.csv: wrong, ")
+    assert "bias measured " in said
+    assert "exactly 0.02: " in said
+    assert "sigma measured" not in said
+    edited("study.py", "exact_bias=np.full(shape, 0.02)", "exact_bias=np.zeros(shape)")
+    edited("kernels/walk.py", "x += step * w", "x += 1.05 * step * w")
+    said = outside.command(*run, "longer", site=site, cwd=tmp_path, code=4).stderr
+    assert "curves.csv: wrong, fixed, x, k = " in said
+    assert "sigma measured " in said
+    assert "claims" not in said
+    assert (tmp_path / "longer/wrong/curves.csv").exists()
+    record = json.loads((tmp_path / "longer/wrong/run.json").read_text(encoding="utf-8"))
+    assert "sigma measured " in record["warnings"][0]
+    assert "sigma measured " in (tmp_path / "longer/wrong/report.html").read_text(encoding="utf-8")
+    told = outside.command("report", "wrong", *run[4:], "longer", site=site, cwd=tmp_path, code=4).stderr
+    assert told == said

@@ -167,7 +167,7 @@ class Evidence:
         self.looked: set[tuple[str, str]] = set()  # tables, with or without a component, since it was last emptied
         self.tables: Mapping = _Watched(made, self.looked)
         self._places = places
-        self._exact, self._factor = False, 1.0
+        self._exact = False
         self._groups: dict[str, Mapping] = {}
 
     def exactly(self) -> "Evidence":
@@ -180,12 +180,6 @@ class Evidence:
         other = copy.copy(self)
         other._exact, other.tables = True, Hidden()
         other.results = [replace(result, sums=Hidden()) for result in self.results]
-        return other
-
-    def widened(self, factor: float) -> "Evidence":
-        """The same with the intervals of curves and gains so many times as wide."""
-        other = copy.copy(self)
-        other._factor = factor
         return other
 
     def _grouped(self, table: str) -> Mapping:
@@ -224,8 +218,6 @@ class Evidence:
             if np.isnan(exact).any():
                 raise Missing("not known exactly")
             value = lo = hi = exact
-        elif self._factor != 1.0:
-            lo, hi = value - self._factor * (value - lo), value + self._factor * (hi - value)
         return Series(rows["k"].to_numpy(), rows["t_s"].to_numpy(), value, lo, hi)
 
     def row(self, table: str, **equal: object) -> Mapping[str, Any]:

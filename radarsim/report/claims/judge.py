@@ -12,7 +12,7 @@ from radarsim.report.claims.declared import Claim, PaperClaims, Part
 from radarsim.report.claims.evidence import Certain, Evidence, Missing
 from radarsim.report.claims.paper import Described, Shipped, described, differences, own_members
 from radarsim.report.claims.rule import CONFIRMED, REFUTED, Judged, Outcome
-from radarsim.report.statistics import FEW, Estimate
+from radarsim.report.statistics import ERROR_OF_PROGRAM, FEW, Estimate, standard_errors
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -198,7 +198,7 @@ def _tried(part: Part, seen: Evidence | None, changed: str) -> _Tried:
     )
     names = ", ".join(dict.fromkeys(case.name for case in cases))
     old = verdict(measured, part.expected.strict)
-    return _Tried(part, names, of, old, disagreement(part, seen, of), looked)
+    return _Tried(part, names, of, old, disagreement(part, of), looked)
 
 
 def exact(part: Part, seen: Evidence, measured: Estimate) -> float:
@@ -211,30 +211,26 @@ def exact(part: Part, seen: Evidence, measured: Estimate) -> float:
         return float(measured.value) if isinstance(measured, Certain) else math.nan
 
 
-def disagreement(part: Part, seen: Evidence, of: Judged) -> str:
-    """What to say where exact value and Monte-Carlo lie further apart than chance puts them; else nothing.
+def disagreement(part: Part, of: Judged) -> str:
+    """What to say where a part has an exact value of its own, further off than chance puts it; else nothing.
 
-    The part is measured again with the curves' intervals at 5.85 standard errors, so that what jumps from scan to scan
-    is judged as what moves evenly is. Of few realisations nothing is said: their intervals are no multiple of 95 %.
+    All others follow from tables, which `agreement` holds against their exact columns.
     """
-    if not of.known or of.n < FEW or of.lo == of.hi == of.exact:
+    if part.exact is None or not of.known or of.n < FEW:
         return ""
-    factor = rule.ERROR_OF_PROGRAM / rule.Z95
-    wide = part.measure(seen.widened(factor))
-    lo, hi = rule.widened(of.lo, of.measured, of.hi, factor)
     slack = max(1e-9 * abs(of.exact), ROUNDING * of.margin)
-    low, high = min(lo, float(wide.lo)) - slack, max(hi, float(wide.hi)) + slack
-    if low <= of.exact <= high or math.isinf(of.exact) or not math.isfinite(of.measured):
+    apart = standard_errors(Estimate(of.measured, of.lo, of.hi), of.exact)
+    if abs(of.exact - of.measured) <= slack or not apart > ERROR_OF_PROGRAM:
         return ""
     return f"{ERROR}: exact {of.exact:.6g}, simulated {of.measured:.6g} [{of.lo:.6g}, {of.hi:.6g}]"
 
 
 ROUNDING = 1e-3  # of a margin, in values that have no width: identities hold to the last bits
-ERROR = f"exact value and simulation differ by more than {rule.ERROR_OF_PROGRAM} standard errors"
+ERROR = f"exact value and simulation differ by more than {ERROR_OF_PROGRAM} standard errors"
 
 
 def errors(rows: "pd.DataFrame") -> list[str]:
-    """A line for each part whose exact value and simulation disagree: errors of the program."""
+    """A line for each part whose own exact value and simulation disagree: errors of the program."""
     own = rows[rows["why"].astype(str).str.startswith(ERROR)]
     return [f"{row['claim']}: {row['what']} ({row['case']}): {row['why']}" for _, row in own.iterrows()]
 

@@ -27,7 +27,6 @@ INCLUSIVE = (PRINT, ABOUT, GRID, SAME)
 EQUIVALENT, UNSTATED, AGAINST = "E", "U", "N"  # kinds of readings; the last contradicts the print
 Z95 = NormalDist().inv_cdf(0.975)
 ROUNDING = 1e-12  # of a margin
-ERROR_OF_PROGRAM = 5.85  # standard errors between exact value and Monte-Carlo: by chance once in 2·10⁸
 
 
 @dataclass(frozen=True)
@@ -202,17 +201,6 @@ def _shrunk(part: Judged, parts: int, border: float) -> int | None:
     low, high = widened(part.lo, part.measured, part.hi, share)
     decided = verdict(replace(part, lo=low, hi=high), parts) != UNDECIDED
     return math.ceil(part.n / share**2) if decided else None
-
-
-def disagrees(part: Judged) -> bool:
-    """Whether exact value and Monte-Carlo lie further apart than chance ever puts them: an error of the program.
-
-    lo and hi are those of the measured value. Of values without a width, as times on a grid, nothing is said.
-    """
-    if not part.known or part.lo == part.hi or not (math.isfinite(part.exact) and math.isfinite(part.measured)):
-        return False
-    lo, hi = widened(part.lo, part.measured, part.hi, ERROR_OF_PROGRAM / Z95)
-    return part.exact < lo or part.exact > hi
 
 
 # ---- a claim ------------------------------------------------------------------------------------------------------

@@ -65,6 +65,7 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
         "bias_se": of.bias_se * bound,
         "spread": of.spread * bound,
         "exact_sigma": bound,
+        "exact_bias": np.full(f.size, np.nan),
         "n_eff": statistics.effective(moments[..., 1], moments[..., 3], n),
         "sigma_all": every.sigma.value * bound,
         "posterior_sigma": axes.posterior_sigma[at],

@@ -1,0 +1,153 @@
+"""Exact values beside measured ones: what is told, what is chance, and what a sample of heavy tails may lack."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import radarsim
+from radarsim.app.result import Result
+from radarsim.config import lookup
+from radarsim.errors import DisagreementError
+from radarsim.report import agreement, tables
+from radarsim.report.statistics import ERROR_OF_PROGRAM, Z95, Estimate, rate, root_mean_square, standard_errors
+
+
+def test_standard_errors_of_an_even_interval():
+    of = Estimate(2.0, 2.0 - Z95 * 0.5, 2.0 + Z95 * 0.5)
+    assert standard_errors(of, np.array([2.0, 3.0, 0.0])) == pytest.approx([0, 2, 4])
+    assert np.isnan(standard_errors(of, np.nan))
+    assert standard_errors(Estimate(1.0, 1.0, 1.0), 2.0) == np.inf
+    assert standard_errors(Estimate(1.0, 0.5, np.inf), 9.0) == 0
+
+
+def test_standard_errors_of_a_rate_are_its_score():
+    """Of 20 events in 10⁷, towards more: (μ − 20)/√μ; and no number of events is far from a rate of none of them."""
+    n = 1e7
+    for expected in (30.0, 60.0, 100.0):
+        assert standard_errors(rate(20.0, n), expected / n) == pytest.approx((expected - 20) / expected**0.5, rel=1e-3)
+    assert standard_errors(rate(0.0, n), 30 / n) == pytest.approx(30**0.5, rel=1e-3)
+    assert (standard_errors(rate(np.arange(1.0, 30), n), 1e-20) < ERROR_OF_PROGRAM).all()
+
+
+@pytest.mark.parametrize("n", [200, 1000])
+def test_standard_errors_of_sigma_stray_no_further_than_normal_ones(n):
+    """Of 20 000 samples of Gaussian errors: 0.27 % beyond three, within three binomial standard errors or fewer."""
+    squares = np.random.default_rng(5).standard_normal((20_000, n)) ** 2
+    of = root_mean_square(squares.sum(axis=1), (squares**2).sum(axis=1), np.full(20_000, float(n)))
+    apart = standard_errors(of, 1.0)
+    assert (apart > 3).sum() < 54 + 3 * 54**0.5
+    assert (apart > 2).sum() > 0.6 * 0.0455 * 20_000  # and it is no bound that holds always
+    assert apart.max() < ERROR_OF_PROGRAM
+
+
+def changed(result, **axes):
+    return replace(result, axes=replace(result.axes, **axes))
+
+
+def made(*results):
+    return {"curves": tables.curves(results), "gains": tables.gains(results)}
+
+
+def test_each_row_of_each_table_counts(expected_radar):
+    """Sums as they are expected agree; one σ of 85 that is 3 % off, one bias, one gain are told with their place."""
+    radar = expected_radar("rls2", count=100_000)
+    assert agreement.faults(made(radar)) == []
+    one = np.ones(radar.axes.exact_sigma.shape)
+    one[1, 7, 1] = 1.03
+    wrong = changed(radar, exact_sigma=radar.axes.exact_sigma * one)
+    (line,) = agreement.faults(made(wrong))
+    assert line.startswith("curves.csv: rls2, r+Vr, Vr, k = 8 (70 s): sigma measured ")
+    assert "1 of 85 rows of this column are over 5.85" in line
+    moved = changed(radar, exact_bias=radar.axes.exact_bias + 0.05 * radar.axes.exact_sigma * (one > 1))
+    (line,) = agreement.faults(made(moved))
+    assert line.startswith("curves.csv: rls2, r+Vr, Vr, k = 8 (70 s): bias measured ")
+    (line,) = agreement.faults(made(changed(radar, exact_gain=radar.axes.exact_gains + (one > 1))))
+    assert line.startswith("gains.csv: rls2, r+Vr, Vr, k = 8 (70 s): gain_percent measured ")
+
+
+def test_a_bias_taken_for_none_is_told(expected_radar):
+    """A target that jerks: the filters lag, and an exact bias of zero is as wrong as the σ that is right beside it."""
+    radar = expected_radar("rls2", target={"kind": "polynomial", "coefficients": [100e3, -250, 4, 0.3]})
+    assert agreement.faults(made(radar)) == []
+    (line,) = agreement.faults(made(changed(radar, exact_bias=0 * radar.axes.exact_bias)))
+    assert "bias measured" in line
+
+
+def test_few_realisations_say_nothing(expected_radar):
+    few = expected_radar("rls2", count=150)
+    assert agreement.faults(made(changed(few, exact_sigma=2 * few.axes.exact_sigma))) == []
+
+
+def test_what_is_nearly_exact_may_differ_by_as_much(expected_radar):
+    """At 10¹⁰ realisations a ten-thousandth is 14 standard errors."""
+    radar = expected_radar("rls2", count=10**10)
+    near = made(changed(radar, exact_sigma=radar.axes.exact_sigma * 1.0001))
+    assert len(agreement.faults(near)) == 1
+    assert agreement.faults(near, ["rls2"]) == []
+
+
+def curves(sigma, exact, n_eff, n=100_000):
+    """A filter at as many scans as there are values; the intervals are those of so many effective realisations."""
+    sigma, exact, n_eff = (np.asarray(part, dtype=float) for part in (sigma, exact, n_eff))
+    of = root_mean_square(n * sigma**2, n * sigma**4 * (1 + n / n_eff), float(n))
+    labels = {"case": "one", "filter": "f", "component": "r", "unit": "m"}
+    return pd.DataFrame(
+        labels
+        | {"k": np.arange(1, sigma.size + 1), "t_s": np.arange(sigma.size), "n": n}
+        | tables.interval("sigma", of)
+        | {"exact_sigma": exact, "n_eff": n_eff}
+    )
+
+
+def told(table):
+    return [line.split(":")[1] for line in agreement.faults({"curves": table})]
+
+
+def test_a_row_of_heavy_tails_is_held_against_being_too_large_alone():
+    """κ is 101 in the second row: what a sample lacks makes it smaller, its own standard error too."""
+    gaussian, heavy = 50_000, 1_000
+    assert told(curves([1, 1], [1, 1.2], [gaussian, heavy])) == []
+    assert told(curves([1, 1], [1, 0.8], [gaussian, heavy])) == [" one, f, r, k = 2 (1 s)"]
+    assert told(curves([1, 1], [1, 1.2], [gaussian, gaussian])) == [" one, f, r, k = 2 (1 s)"]
+
+
+def test_a_row_may_lack_the_tail_of_another_scan():
+    """Errors of 101 · 10² at the first scan, in 18 of 10⁵: up to 1.8 of a variance of 1 may be missing at the second."""
+    assert told(curves([10, 1], [10, 1.6], [1_000, 50_000])) == []
+    assert told(curves([10, 1], [10, 1.8], [1_000, 50_000])) == [" one, f, r, k = 2 (1 s)"]
+    assert told(curves([10, 1], [10, 0.9], [1_000, 50_000])) == [" one, f, r, k = 2 (1 s)"]
+
+
+def test_columns_by_their_names():
+    names = ["case", "rate", "rate_lo", "rate_hi", "bias", "bias_se", "exact_bias", "exact_rate", "exact_other"]
+    assert [one.value for one in agreement.beside(pd.DataFrame(columns=names))] == ["bias", "rate"]
+    (one,) = agreement.beside(pd.DataFrame(columns=["case", "error_probability", "lo", "hi", "exact"]))
+    assert one == ("error_probability", "lo", "hi", "exact")
+
+
+def test_python_raises_with_the_result(monkeypatch):
+    from radarsim.studies.range_doppler import study
+
+    def wrong(made, right=study.axes):
+        axes = right(made)
+        return replace(axes, exact_sigma=1.05 * axes.exact_sigma)
+
+    monkeypatch.setattr(study, "axes", wrong)
+    with pytest.raises(DisagreementError, match=r"curves\.csv: rls2, .* computed wrongly") as raised:
+        radarsim.run("rls2", realisations=100_000)
+    assert isinstance(raised.value.result, Result)
+    assert len(raised.value.result.curves) == 85
+    assert "computed wrongly" in raised.value.result.warnings[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stem", sorted(path.stem for path in (lookup.SHIPPED / "configs").glob("*.yaml")))
+def test_no_alarm_over_the_shipped_configs(stem):
+    """Six seeds of 300 realisations, two of 2000: no exact value is further off than chance puts it."""
+    for n, seed in (*((300, 1000 + i) for i in range(6)), (2000, 1), (2000, 2)):
+        result = radarsim.run(stem, realisations=n, seed=seed)
+        assert result.faults == ()
+        if not any(set(agreement.beside(table)) for table in result.tables.values()):
+            break
