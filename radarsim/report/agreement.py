@@ -6,10 +6,10 @@ interval; of a mean the one after it, `…_se`, is its standard error. So a stud
 against its own exact values without a word more. Each of them is to lie within `statistics.ERROR_OF_PROGRAM` standard
 errors, within more where there are so many that chance would take one further.
 
-Whose standard errors: the sample's own, with one exception. Where errors have a heavy tail, the few large ones that
-make σ may be missing in a sample, and in its standard error with them. Such a row, of κ over `TAIL`, is only held
-against being too large, which no sample is for what it lacks. Where κ is less but another scan shows a tail, as much
-may be missing as `UNSEEN` of its errors make of n.
+Whose standard errors: the sample's own, where a filter's errors are Gaussian at every scan, by their κ. Where they are
+not, as where plots are missed, something rare may make much of a mean of squares and be missing in a sample, and in its
+standard error with it. Such a σ is held against being too large alone, which no sample is for what it lacks; of a bias
+so much may be missing as `UNSEEN` of n realisations can make, σ √(UNSEEN/n) (Cauchy and Schwarz); a gain is not held.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 COLUMNS = ("case", "filter", "component", "unit", "scans", "inside_percent", "largest_difference_percent", "at_k")
 ALMOST = 2e-4  # of a value that `Study.exact_but_for` says something of
 ROUNDING = 1e-9  # of a value
-TAIL = 5.0  # κ; 3 of Gaussian errors
 UNSEEN = 18.0  # realisations of n that are all missing in one sample of 6·10⁷
-POWERS = {"sigma": 2, "nees": 1, "nis": 1}  # of these columns that power is a mean of squares
-SAME = ["case", "filter", "component", "k"]
+STRAYS = 5.0  # standard errors by which κ of Gaussian errors may lie off theirs
+PLACE = ("case", "filter", "component")
+SQUARES = ("sigma", "nees", "nis")  # measured columns of means of squares
 
 
 class Beside(NamedTuple):
@@ -64,61 +64,47 @@ def measured(table: "pd.DataFrame", of: Beside) -> Estimate:
 def distances(made: "Mapping[str, pd.DataFrame]", name: str, of: Beside, nearly: Collection[str] = ()) -> np.ndarray:
     """Standard errors (rows,) by which the measured values of a column lie off the exact ones.
 
-    made: all tables; nearly: the cases of which exact values are right to `ALMOST`. Less is said where the sample may
-    lack something, see above. Not-a-number where no exact value is known, or under `FEW` realisations measured it.
+    made: all tables; nearly: the cases of which exact values are right to `ALMOST`. 0 where the sample may lack as
+    much, see above. Not-a-number where no exact value is known, or under `FEW` realisations measured it.
     """
     table = made[name]
-    value, lo, hi = estimate = measured(table, of)
-    exact, missing = table[of.exact].to_numpy(dtype=float), _missing(made, name, of)
-    percent = of.value.endswith("_percent")  # of a ratio of two σ
-    size = np.abs(100 - exact if percent else exact)
+    (value, lo, hi), exact = measured(table, of), table[of.exact].to_numpy(dtype=float)
+    size, lacking, squares = np.abs(exact), np.zeros(len(table)), of.value in SQUARES
     if of.value == "bias":
         size = np.fmax(size, table["sigma"].to_numpy(dtype=float))
+        lacking = size * np.sqrt(UNSEEN / table["n"].to_numpy(dtype=float))
+    elif of.value.endswith("_percent"):  # of a ratio of two σ
+        size = np.abs(100 - exact)
+        lacking[:] = np.inf
+    elif squares:
+        lacking[value < exact] = np.inf
     room = size * np.where(table["case"].isin(list(nearly)), ALMOST, ROUNDING)
-    lacking = np.where(percent | (np.abs(value) < np.abs(exact)), missing, 0.0)
-    off = exact - value
-    with np.errstate(invalid="ignore"):
-        nearest = np.where(np.abs(off) <= room + lacking, value, exact - np.sign(off) * (room + lacking))
+    room = room + np.where(_gaussian(made, table), 0.0, lacking)
+    near = np.abs(exact - value) <= room
+    nearest = np.where(near, value, exact - np.sign(exact - value) * np.where(near, 0.0, room))
     enough = table["n"].to_numpy(dtype=float) >= FEW if "n" in table else True
-    return np.where(enough, standard_errors(Estimate(value, lo, hi), nearest), np.nan)
+    return np.where(enough & ~np.isnan(exact), standard_errors(Estimate(value, lo, hi), nearest), np.nan)
 
 
-def _missing(made: "Mapping[str, pd.DataFrame]", name: str, of: Beside) -> np.ndarray:
-    """How much of a measured value (rows,) a sample may lack, in the column's unit; infinite where it may be all."""
-    table = made[name]
-    shares = [np.zeros(len(table))]
-    if name != "curves" and set(SAME) <= set(table) and len(made.get("curves", ())):
-        of_curves = made["curves"][SAME].assign(share=_shares(made["curves"], "sigma"))
-        for who in {"filter", "baseline", "control"} & set(table):
-            keys = table[["case", who, "component", "k"]].set_axis(SAME, axis=1)
-            shares.append(keys.merge(of_curves, on=SAME, how="left")["share"].to_numpy(dtype=float))
-    with np.errstate(invalid="ignore"):
-        if of.value.endswith("_percent"):
-            return np.abs(100 - table[of.exact].to_numpy(dtype=float)) * np.nansum(shares, axis=0) / 2
-        if of.value == "bias":
-            missed = UNSEEN / table["n"].to_numpy(dtype=float)
-            return table["sigma"].to_numpy(dtype=float) * np.sqrt(_shares(table, "sigma") * missed)
-        if of.value in POWERS and "n" in table:
-            share = np.fmax(np.fmax.reduce(shares), _shares(table, of.value))
-            return table[of.value].to_numpy(dtype=float) * ((1 + share) ** (1 / POWERS[of.value]) - 1)
-    return shares[0]
-
-
-def _shares(table: "pd.DataFrame", name: str) -> np.ndarray:
-    """What share of a mean of squares (rows,) a sample may lack beside what it holds; infinite where tails are heavy.
-
-    From the interval, which tells κ, or from effective realisations where the table has them.
-    """
-    value, lo, hi, n = (table[column].to_numpy(dtype=float) for column in (name, f"{name}_lo", f"{name}_hi", "n"))
-    square = value ** POWERS[name]
+def _gaussian(made: "Mapping[str, pd.DataFrame]", table: "pd.DataFrame") -> np.ndarray:
+    """Whether errors are Gaussian, (rows,), of the filter of each row, and of that which it is compared with."""
+    curves = made.get("curves")
+    if curves is None or not len(curves):
+        return np.zeros(len(table), dtype=bool)
+    n, n_eff, square, bias, spread = (
+        curves[column].to_numpy(dtype=float) for column in ("n", "n_eff", "sigma", "bias", "spread")
+    )
+    square, variance = square**2, spread**2
     with np.errstate(divide="ignore", invalid="ignore"):
-        of_interval = n * (POWERS[name] * (hi - lo) / (2 * Z95 * value)) ** 2
-        kurtosis = 1 + (n / table["n_eff"].to_numpy(dtype=float) if "n_eff" in table else of_interval)
-        heavy = kurtosis > TAIL
-        groups = [table[column] for column in SAME[:3] if column in table]
-        size = common.frame({"size": np.where(heavy, kurtosis * square, 0.0)}).groupby([*groups], sort=False)
-        largest = size["size"].transform("max").to_numpy()
-        return np.where(heavy, np.inf, UNSEEN / n * largest / square)
+        kurtosis = 1 + n / n_eff
+        theirs = (bias**4 + 6 * bias**2 * variance + 3 * variance**2) / square**2
+        error = np.sqrt((96 * bias**2 * variance**3 + 24 * variance**4) / n) / square**2
+        strays = np.abs(kurtosis - theirs) > STRAYS * error + ROUNDING
+    others = set(zip(curves["case"][strays], curves["filter"][strays], strict=True))
+    pairs = [zip(table["case"], table[who], strict=True) for who in {"filter", "baseline", "control"} & set(table)]
+    return (
+        np.all([[pair not in others for pair in own] for own in pairs], axis=0) if pairs else np.ones(len(table), bool)
+    )
 
 
 def compared(
@@ -147,7 +133,7 @@ def faults(made: "Mapping[str, pd.DataFrame]", nearly: Collection[str] = ()) -> 
             at = int(np.nanargmax(apart))
             row = made[name].iloc[at]
             scan = f"k = {row['k']:g}" + (f" ({row['t_s']:g} s)" if "t_s" in row else "") if "k" in row else ""
-            place = ", ".join(filter(None, (*(str(row[key]) for key in SAME[:3] if key in row), scan)))
+            place = ", ".join(filter(None, (*(str(row[key]) for key in PLACE if key in row), scan)))
             said.append(
                 tr(
                     "{table}.csv: {place}: {column} measured {measured:.6g}, exactly {exact:.6g}: {apart:.3g} standard "

@@ -85,7 +85,7 @@ CURVES = (
 
 
 def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
-    """σ with its interval, bias, spread, both exactly, and effective realisations, by case, filter, component and scan."""
+    """σ with its interval, bias, spread, exact values, effective realisations, by case, filter, component and scan."""
     return joined([_curves(result) for result in results], CURVES)
 
 

@@ -88,36 +88,48 @@ def test_what_is_nearly_exact_may_differ_by_as_much(expected_radar):
     assert agreement.faults(near, ["rls2"]) == []
 
 
-def curves(sigma, exact, n_eff, n=100_000):
-    """A filter at as many scans as there are values; the intervals are those of so many effective realisations."""
-    sigma, exact, n_eff = (np.asarray(part, dtype=float) for part in (sigma, exact, n_eff))
-    of = root_mean_square(n * sigma**2, n * sigma**4 * (1 + n / n_eff), float(n))
-    labels = {"case": "one", "filter": "f", "component": "r", "unit": "m"}
-    return pd.DataFrame(
-        labels
-        | {"k": np.arange(1, sigma.size + 1), "t_s": np.arange(sigma.size), "n": n}
-        | tables.interval("sigma", of)
-        | {"exact_sigma": exact, "n_eff": n_eff}
-    )
+def curves(sigma, exact, kurtosis, bias=(0.0, 0.0), exact_bias=(0.0, 0.0), n=100_000):
+    """A filter at two scans, of 10⁵ realisations; κ is about the truth."""
+    sigma, kurtosis, bias = (np.asarray(part, dtype=float) for part in (sigma, kurtosis, bias))
+    of = root_mean_square(n * sigma**2, n * kurtosis * sigma**4, float(n))
+    spread = np.sqrt(sigma**2 - bias**2)
+    labels = {"case": "one", "filter": "f", "component": "r", "unit": "m", "k": [1, 2], "t_s": [0.0, 1.0], "n": n}
+    biased = {"bias": bias, "bias_se": spread / n**0.5, "spread": spread}
+    exactly = {"exact_sigma": np.array(exact, dtype=float), "exact_bias": np.array(exact_bias, dtype=float)}
+    return pd.DataFrame(labels | tables.interval("sigma", of) | biased | exactly | {"n_eff": n / (kurtosis - 1)})
 
 
 def told(table):
-    return [line.split(":")[1] for line in agreement.faults({"curves": table})]
+    return [line.partition(" measured")[0] for line in agreement.faults({"curves": table})]
 
 
-def test_a_row_of_heavy_tails_is_held_against_being_too_large_alone():
-    """κ is 101 in the second row: what a sample lacks makes it smaller, its own standard error too."""
-    gaussian, heavy = 50_000, 1_000
-    assert told(curves([1, 1], [1, 1.2], [gaussian, heavy])) == []
-    assert told(curves([1, 1], [1, 0.8], [gaussian, heavy])) == [" one, f, r, k = 2 (1 s)"]
-    assert told(curves([1, 1], [1, 1.2], [gaussian, gaussian])) == [" one, f, r, k = 2 (1 s)"]
+SECOND = "curves.csv: one, f, r, k = 2 (1 s): "
 
 
-def test_a_row_may_lack_the_tail_of_another_scan():
-    """Errors of 101 · 10² at the first scan, in 18 of 10⁵: up to 1.8 of a variance of 1 may be missing at the second."""
-    assert told(curves([10, 1], [10, 1.6], [1_000, 50_000])) == []
-    assert told(curves([10, 1], [10, 1.8], [1_000, 50_000])) == [" one, f, r, k = 2 (1 s)"]
-    assert told(curves([10, 1], [10, 0.9], [1_000, 50_000])) == [" one, f, r, k = 2 (1 s)"]
+def test_errors_that_are_not_gaussian_are_held_against_being_too_large_alone():
+    """What a sample lacks makes σ smaller, and its standard error too; any scan of a filter shows that it may."""
+    for kurtosis in ((3, 100), (4, 3)):
+        assert told(curves([1, 1], [1, 1.2], kurtosis)) == []
+        assert told(curves([1, 1], [1, 0.7], kurtosis)) == [SECOND + "sigma"]
+    assert told(curves([1, 1], [1, 1.05], (3.05, 2.95))) == [SECOND + "sigma"]
+    assert told(curves([1, 1], [1, 0.95], (3.05, 2.95))) == [SECOND + "sigma"]
+
+
+def test_a_bias_may_lack_what_eighteen_realisations_make():
+    """σ √(18/10⁵) is 0.0134 σ, beside 5.85 standard errors of 0.0032 σ each."""
+    assert told(curves([1, 1], [1, 1], (4, 4), exact_bias=(0, 0.031))) == []
+    assert told(curves([1, 1], [1, 1], (4, 4), exact_bias=(0, 0.033))) == [SECOND + "bias"]
+    assert told(curves([1, 1], [1, 1], (3, 3), exact_bias=(0, 0.018))) == []
+    assert told(curves([1, 1], [1, 1], (3, 3), exact_bias=(0, 0.019))) == [SECOND + "bias"]
+
+
+def test_a_bias_makes_errors_no_less_gaussian():
+    """κ of N(b, v) about zero."""
+    b, v = 0.8, 0.36
+    kurtosis = b**4 + 6 * b**2 * v + 3 * v**2
+    same = {"bias": (0, b), "exact_bias": (0, b)}
+    assert told(curves([1, 1], [1, 1.05], (3, kurtosis), **same)) == [SECOND + "sigma"]
+    assert told(curves([1, 1], [1, 1.05], (3, kurtosis + 0.2), **same)) == []
 
 
 def test_columns_by_their_names():

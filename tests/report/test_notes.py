@@ -134,6 +134,7 @@ def curves_of(errors):
         k=np.arange(1, scans + 1),
         t_s=np.arange(scans),
         exact_sigma=np.full((1, scans, 1), np.nan),
+        exact_bias=np.full((1, scans, 1), np.nan),
     )
     result = SimpleNamespace(name="a", count=n, sums={"error": sums}, axes=axes)
     return tables.curves([result]), [result]

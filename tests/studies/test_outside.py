@@ -209,7 +209,8 @@ def test_a_wrong_number_in_kernel_or_exact_value_ends_the_run_in_exit_code_4(tmp
 
     def edited(file, old, new):
         path = tmp_path / "wrong/src/wrong" / file
-        assert old in (text := path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        assert old in text
         path.write_text(text.replace(old, new), encoding="utf-8")
 
     outside.command(*run, "right", site=site, cwd=tmp_path)
