@@ -167,12 +167,10 @@ class Result:
         """What no chance makes, a line each: exact and measured values apart, or values with and without controls."""
         from radarsim.report import agreement, claims, controlled
 
-        own, made = study(self.experiment.study), dict(self._tables)
-        judged = made.pop("claims")
+        own, made = study(self.experiment.study), self._tables
         nearly = [case.name for case in self.experiment.cases if own.exact_but_for(case)]
-        bounds = () if own.exact_errors else ("curves", "gains")
-        exact = {name: table for name, table in made.items() if name not in bounds}
-        return (*agreement.faults(exact, nearly), *claims.errors(judged), *controlled.faults(made))
+        bounds = ("claims",) if own.exact_errors else ("claims", "curves", "gains")
+        return (*agreement.faults(made, nearly, bounds), *claims.errors(made["claims"]), *controlled.faults(made))
 
     def check(self) -> None:
         """Raises DisagreementError where there are `faults`."""

@@ -82,8 +82,9 @@ def distances(made: "Mapping[str, pd.DataFrame]", name: str, of: Beside, nearly:
     room = room + np.where(_gaussian(made, table), 0.0, lacking)
     near = np.abs(exact - value) <= room
     nearest = np.where(near, value, exact - np.sign(exact - value) * np.where(near, 0.0, room))
-    enough = table["n"].to_numpy(dtype=float) >= FEW if "n" in table else True
-    return np.where(enough & ~np.isnan(exact), standard_errors(Estimate(value, lo, hi), nearest), np.nan)
+    n = table["n"] if "n" in table else table["case"].map(made["curves"].groupby("case")["n"].min())
+    enough = (n.to_numpy(dtype=float) >= FEW) & ~np.isnan(exact)
+    return np.where(enough, standard_errors(Estimate(value, lo, hi), nearest), np.nan)
 
 
 def _gaussian(made: "Mapping[str, pd.DataFrame]", table: "pd.DataFrame") -> np.ndarray:
@@ -107,24 +108,19 @@ def _gaussian(made: "Mapping[str, pd.DataFrame]", table: "pd.DataFrame") -> np.n
     )
 
 
-def compared(
-    made: "Mapping[str, pd.DataFrame]", nearly: Collection[str] = ()
-) -> "dict[tuple[str, Beside], np.ndarray]":
-    """The `distances` of every column that has an exact one beside it, by the name of its table."""
-    return {
-        (name, of): distances(made, name, of, nearly)
-        for name, table in made.items()
-        if "case" in table and len(table)
-        for of in beside(table)
-    }
-
-
-def faults(made: "Mapping[str, pd.DataFrame]", nearly: Collection[str] = ()) -> list[str]:
+def faults(
+    made: "Mapping[str, pd.DataFrame]", nearly: Collection[str] = (), bounds: Collection[str] = ("claims",)
+) -> list[str]:
     """A line for each column that lies further off its exact values than chance takes any: the furthest row of it.
 
-    made: the tables to be compared, all that hold exact values; nearly: as for `distances`.
+    made, nearly: as for `distances`; bounds: tables that hold no exact values of what was measured, whatever they say.
     """
-    found = compared(made, nearly)
+    found = {
+        (name, of): distances(made, name, of, nearly)
+        for name, table in made.items()
+        if name not in bounds and "case" in table and len(table)
+        for of in beside(table)
+    }
     many = sum(int((~np.isnan(apart)).sum()) for apart in found.values())
     bound = max(ERROR_OF_PROGRAM, furthest(many))
     said = []
