@@ -129,7 +129,8 @@ def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
     assert "1 confirmed, 2 depend on what the paper leaves open" in forest.figure(rows).caption
 
 
-def test_a_radar_of_ones_own_has_no_class():
+def test_a_result_that_is_not_written_has_the_class_and_a_radar_of_ones_own_none():
+    assert radarsim.run("rls2", realisations=60).verdicts()[rule.DEPENDS] == ["P1.18", "P1.28"]
     result = radarsim.run("rls2", overrides=["radar.sigma_range_m=100"], realisations=60)
     assert set(result.tables["claims"]["class"]) <= {NOT_JUDGED}
 
