@@ -179,7 +179,7 @@ class _Import:
         for i, (track, radar, t) in enumerate(zip(batch.track, batch.radar, times, strict=True)):
             if len(self.seen) < MOST_LISTED:
                 self.seen.add(track)
-            if self.options.sites and radar not in self.options.sites:
+            if self.options.sites and batch.kind == PLOTS and radar not in self.options.sites:
                 self.left[f"rows of radar {radar or 'without a name'}, whose place --at does not say"] += 1
             elif wanted and track not in wanted:
                 self.left["rows of other tracks"] += 1
@@ -291,7 +291,7 @@ class _Import:
             there = sorted(self.seen)
             more = " …" if len(there) >= MOST_LISTED else ""
             return f"{path}: track: must be one of {', '.join(there)}{more}; got {', '.join(self.options.tracks)}"
-        passed = counted(self.reader.skipped)
+        passed = [*counted(self.reader.skipped), *counted(self.left)]
         why = f" ({'; '.join(passed)} passed over)" if passed else ""
         return f"{path}: has no plots; {self.reader.records} records were read{why}"
 

@@ -216,6 +216,9 @@ def test_the_tracks_of_two_radars_stay_apart(tmp_path):
     done, _, tracks = imported(tmp_path, block(48, *records), Options(sites={"25/13": places["25/13"]}))
     assert set(tracks) == {"25/13:1"}
     assert done.skipped == ["4 rows of radar 25/12, whose place --at does not say"]
+    (line,) = refused_again(tmp_path, block(48, *records), Options(sites={"25/99": SITE}))
+    assert line.endswith("(4 rows of radar 25/12, whose place --at does not say; 4 rows of radar 25/13, whose place "
+                         "--at does not say passed over)")  # fmt: skip
 
 
 def flights(*names, speed=250.0, count=30, step=4.0):
