@@ -1,7 +1,8 @@
 """`radarsim run --decide`: as many realisations as it takes until each claim of the config is decided.
 
-It looks at declared numbers of realisations only, 2000·2^m, as a precision does: were it to look after every block, it
-would stop at the first one at which chance decides.
+It looks at declared numbers of realisations only, 2000·2^m, as a precision does, and each verdict is one of all these
+looks (report.claims.rule.LOOKS): were each judged at 95 %, chance would refute up to a fifth of the claims that are
+true at a border.
 """
 
 import tempfile

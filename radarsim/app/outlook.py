@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from radarsim.app.simulation import NO_CONTROL, check_precision, result_of, table_of, unknown
+from radarsim.app.simulation import NO_CONTROL, check_precision, result_of, table_of, tailed, unknown
 from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Experiment
 from radarsim.engine.blocks import Total
@@ -185,7 +185,7 @@ def needed(
         result = precision.gaussian(result)
         axes = result.axes
         exact = bool(np.isfinite(axes.exact_sigma[axes.available]).all())
-    n = precision.needed(result, percent, table, of, work.case.realisations)
+    n = precision.needed(result, percent, table, of, work.case.realisations, tailed(work, of))
     cell = precision.worst(result, table, of)
     if cell is None and of != "sigma":
         raise ConfigError(unknown(work.case, of))

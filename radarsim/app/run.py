@@ -97,7 +97,8 @@ def run(
     config is a path, the name of a shipped config, a dict as YAML would give it, or an Experiment loaded with these
     overrides. overrides are texts `key=value` with dotted keys. With a precision, in per cent, a case ends at the first
     of 2000, 4000, 8000 …, N realisations at which the 95 % half-width of every σ is under it, or of every quantity of
-    another kind, `of`: gain, lock, lost, right, wrong, loss, false_tracks. decide: all cases end at the first of
+    another kind, `of`: gain, lock, lost, right, wrong, loss, false_tracks; where errors are not known to be Gaussian,
+    of σ and gains not before 64,000, or 512,000 where large ones have come. decide: all cases end at the first of
     these at which every claim of the config is decided. time_limit is in seconds, tables and figures counted in, or a
     condition that runs already. `result.unmet` says what of the two was not reached. workers are processes of this
     machine, scheduler the address of a Dask scheduler, executor one that is open already.

@@ -104,8 +104,8 @@ def simulated(
 ) -> SimulatedCases:
     """Collect every case in turn, cases of one identity once; progress(done, total, from_store) is over all of them.
 
-    precision is in per cent: a case ends at the first look at which every quantity `of` that kind (both
-    report.precision) is known so well. Raises ConfigError where a case has none of that kind.
+    precision is in per cent: a case ends at the first look at which every quantity `of` that kind is known so well, and
+    large errors would have been seen (all report.precision). Raises ConfigError where a case has none of that kind.
     """
     total = sum(case.realisations for case in experiment.cases)
     made: dict[tuple[str, int], tuple[CaseWork, Collected, Cell | None]] = {}
@@ -123,7 +123,9 @@ def simulated(
             key = (work.identity, case.realisations)
             if key not in made:
                 collector = _collector(work, options, over_all)
-                wanted = None if precision is None else Wanted(precision, of, table_of(experiment, of))
+                wanted = None
+                if precision is not None:
+                    wanted = Wanted(precision, of, table_of(experiment, of), tailed(work, of))
                 made[key] = work, *_collected(case, work, wanted, collector)
             work, collected, cell = made[key]
             if collected.count:
@@ -152,11 +154,19 @@ def _collector(work: CaseWork, options: RunOptions, progress: Progress) -> Calla
 
 
 class Wanted(NamedTuple):
-    """A precision in per cent, of which kind of quantity, and the table that holds it."""
+    """A precision in per cent, of which kind of quantity, the table that holds it, and that of curves if `tailed`."""
 
     percent: float
     of: str
     table: "Table"
+    curves: "Table | None"
+
+
+def tailed(work: CaseWork, of: str) -> "Table | None":
+    """The table of a case's curves where rare large errors may decide a kind of quantity; None where they do not."""
+    from radarsim.report.precision import OF
+
+    return study(work.case.study).curves if OF[of].squares and not work.plan.gaussian else None
 
 
 def table_of(experiment: Experiment, of: str, controls: bool = True) -> "Table":
@@ -187,11 +197,11 @@ def _collected(
     """The sums of a case, and the cell of its widest interval where a precision is asked for."""
     if wanted is None:
         return collector(case.realisations), None
-    from radarsim.report.precision import looks, worst
+    from radarsim.report.precision import FIRST, FLOOR, least, looks, worst
 
     looked: list[Collected] = []
     best, cell = None, None
-    for n in looks(case.realisations):
+    for n in looks(case.realisations, FLOOR if wanted.curves else FIRST):
         looked.append(collector(n))
         # Stopped on the way to a look, a run may hold less without a gap than at the look before.
         if best is None or looked[-1].count > best.count:
@@ -199,7 +209,9 @@ def _collected(
             cell = worst(result_of(case, work, best), wanted.table, wanted.of) if best.count else None
             if cell is None and best.count and wanted.of != "sigma":
                 raise ConfigError(unknown(case, wanted.of))
-        if looked[-1].stopped or cell is None or cell.percent < wanted.percent:
+        if looked[-1].stopped or cell is None:
+            break
+        if cell.percent < wanted.percent and n >= least(result_of(case, work, best), wanted.curves):
             break
     assert best is not None  # there is a look at every number of realisations that check_precision lets pass
     computed = sum(one.computed for one in looked)

@@ -265,7 +265,8 @@ precision_option = click.option(
     "--precision",
     type=Positive("PCT", most=100),
     metavar="PCT",
-    help="Run until the 95 % half-width of every σ is under PCT %, at most N; looks at 2000, 4000, 8000, …, N.",
+    help="Run until the 95 % half-width of every σ is under PCT %, at most N; looks at 2000, 4000, 8000, …, N, where "
+    "errors are not Gaussian from 64,000 on.",
 )
 OF = ("sigma", "gain", "lock", "lost", "right", "wrong", "loss", "false_tracks")
 of_option = click.option(

@@ -204,6 +204,7 @@ def _template(name: str) -> "Template":
         "kept": kept,
         "reason": reasons.said,
         "measured": _measured,
+        "bounds": _bounds,
     }
     environment.filters.update(own)
     environment.globals.update(tr=tr, plural=plural)
@@ -220,6 +221,12 @@ def _measured(part: Mapping[str, Any]) -> str:
     if math.isinf(part["measured"]) and "settling" in part["what"]:
         return tr(NOT_SETTLED)
     return number(part["measured"])
+
+
+def _bounds(part: Mapping[str, Any]) -> str:
+    """The interval of a part of a claim; a dash where chance has no part in it."""
+    lo, hi = claims_page.bounds(part)
+    return "–" if lo == hi else f"{number(lo)} … {number(hi)}"
 
 
 def _css(verdict: str) -> str:

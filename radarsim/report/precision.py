@@ -3,6 +3,10 @@
 `--precision` looks at declared numbers of realisations only, 2000·2^m below N and N itself. Were it to look after every
 block, it would stop at the first one at which chance made the intervals narrow, and where that is would depend on the
 machine.
+
+An interval of σ is narrow, too, where rare large errors have not come yet. A sample cannot tell what it lacks: to ask
+for narrower intervals, or for one more doubling, mends little. So where errors are not known to be Gaussian there is a
+number of realisations below which no run ends: FLOOR, and FLOOR_OF_TAILS where large errors have come.
 """
 
 import math
@@ -20,6 +24,9 @@ if TYPE_CHECKING:
 
 Table = Callable[[Sequence[CaseResult]], "pandas.DataFrame"]  # of a study: that which holds the quantity
 FIRST = 2000
+FLOOR = 64_000  # of errors of one in 10⁴, all but two samples in 1000 have one
+FLOOR_OF_TAILS = 512_000  # of these 51 are expected: the interval then covers 92 %
+TAILED = 3  # realisations an effective one, from which on large errors are seen: κ = 4; of Gaussian errors two
 EQUAL = 1e-9  # relative difference of widths that is rounding
 MOST = 10**12  # realisations, as in a config
 
@@ -28,7 +35,8 @@ class Of(NamedTuple):
     """A quantity that a precision may be asked of: the table that holds it, and the columns of value and interval.
 
     relative: its half-width counts in per cent of it, else it is one of per cent. last: only the last scan or window of
-    each filter counts. rest: what is left of one is meant, the losses of a lock rate.
+    each filter counts. rest: what is left of one is meant, the losses of a lock rate. squares: it is made of squared
+    errors, which rare large ones decide.
     """
 
     words: str
@@ -37,12 +45,13 @@ class Of(NamedTuple):
     relative: bool = True
     last: bool = False
     rest: bool = False
+    squares: bool = False
 
 
 LOCKS, FOLDS = ("lock_rate", "lock_lo", "lock_hi"), ("right", "right_lo", "right_hi")
 OF = {
-    "sigma": Of("sigma", "curves", ("sigma", "sigma_lo", "sigma_hi")),
-    "gain": Of("gain", "gains", ("gain_percent", "gain_lo", "gain_hi"), relative=False),
+    "sigma": Of("sigma", "curves", ("sigma", "sigma_lo", "sigma_hi"), squares=True),
+    "gain": Of("gain", "gains", ("gain_percent", "gain_lo", "gain_hi"), relative=False, squares=True),
     "lock": Of("lock rate", "locks", LOCKS, last=True),
     "lost": Of("rate of lost locks", "locks", LOCKS, last=True, rest=True),
     "right": Of("rate of right folds", "folds", FOLDS, last=True),
@@ -86,18 +95,30 @@ class Cell:
         return ", ".join(filter(None, (self.filter, self.component, f"k = {self.k}" if self.k else "")))
 
 
-def looks(most: int) -> Iterator[int]:
-    """The numbers of realisations, up to `most`, at which a precision is looked at: of 2000 and more it is the last.
+def looks(most: int, first: int = FIRST) -> Iterator[int]:
+    """The numbers of realisations, from `first` on, at which a precision is looked at: of 2000 and more `most` is last.
 
     >>> list(looks(10_000))
     [2000, 4000, 8000, 10000]
     """
     n = FIRST
     while n < most:
-        yield n
+        if n >= first:
+            yield n
         n *= 2
     if most >= FIRST:
         yield most
+
+
+def least(result: CaseResult, curves: Table | None) -> int:
+    """Realisations below which a precision ends no run, unless its N is less; curves None: no tails are to be feared.
+
+    Large errors are seen where the effective realisations of any σ are under a third of all.
+    """
+    if curves is None:
+        return FIRST
+    made = curves([result])
+    return FLOOR_OF_TAILS if (TAILED * made["n_eff"] < made["n"]).any() else FLOOR
 
 
 def worst(result: CaseResult, table: Table, of: str = "sigma") -> Cell | None:
@@ -134,10 +155,17 @@ def narrowed(plain: "pandas.DataFrame", controlled: "pandas.DataFrame", of: str 
     return narrower_rows(plain, beside, OF[of].columns)
 
 
-def needed(result: CaseResult, percent: float, table: Table, of: str = "sigma", most: int = MOST) -> int | None:
-    """At which look the precision is likely met, with one at `most`; None if beyond all bounds.
+def needed(
+    result: CaseResult,
+    percent: float,
+    table: Table,
+    of: str = "sigma",
+    most: int = MOST,
+    curves: Table | None = None,
+) -> int | None:
+    """At which look a run of at most `most` likely ends, or of how many more it would; None if beyond all bounds.
 
-    From the sums of a pilot, taken as those of more realisations, in proportion.
+    From the sums of a pilot, taken as those of more realisations, in proportion. curves as of `least`.
     """
     cell = worst(result, table, of)
     if cell is None:
@@ -148,8 +176,9 @@ def needed(result: CaseResult, percent: float, table: Table, of: str = "sigma", 
         # Half-widths go with 1/√n: what is far from enough need not be looked at.
         if cell.percent * math.sqrt(result.count / n) >= 2 * percent:
             continue
-        wide = worst(grown(result, n), table, of)
-        if wide is not None and wide.percent < percent:
+        whole = grown(result, n)
+        wide = worst(whole, table, of)
+        if wide is not None and wide.percent < percent and n >= min(least(whole, curves), most):
             return n
     return None
 

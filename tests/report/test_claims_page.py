@@ -8,7 +8,8 @@ from radarsim.report.claims.rule import CONFIRMED, DEPENDS, REFUTED, UNDECIDED
 
 
 def row(claim="P9.1", kind=REFUTED, **more):
-    numbers = {"measured": 3.0, "lo": 2.5, "hi": 3.5, "expected_lo": 5.0, "expected_hi": "", "margin": 1.0}
+    numbers = {"measured": 3.0, "lo": 2.5, "hi": 3.5, "judged_lo": 2.0, "judged_hi": 4.0}
+    numbers |= {"expected_lo": 5.0, "expected_hi": "", "margin": 1.0}
     words = {"paper": "Someone", "statement": "s", "place": "p", "original": "", "reading": "", "number": "", "why": ""}
     classes = {"class": kind, "overall": kind, "as_shipped": kind, "verdict": kind, "extension": False, "needed": ""}
     beside = {
@@ -59,7 +60,7 @@ def test_forest_stands_in_margins():
     figure = forest.figure([row(), row("P9.2", CONFIRMED, measured=6.0, lo=5.5, hi=6.5, exact=6.25)])
     marks = {mark.label: mark for mark in figure.panels[0].marks if mark.label in (CONFIRMED, REFUTED)}
     refuted, confirmed = marks[REFUTED], marks[CONFIRMED]
-    np.testing.assert_allclose((refuted.lo, refuted.y, refuted.hi), ([1.5], [2.0], [2.5]))
+    np.testing.assert_allclose((refuted.lo, refuted.y, refuted.hi), ([1.0], [2.0], [3.0]))
     np.testing.assert_allclose((confirmed.lo, confirmed.y, confirmed.exact), ([-1.5], [-1.0], [-1.25]))
     assert forest.figure([row(kind=NOT_RUN)]) is None
 

@@ -79,9 +79,9 @@ def test_exact_first():
 
 
 def test_level_is_of_all_parts():
-    assert rule.level(1) == pytest.approx(1)
-    assert rule.level(50) == pytest.approx(3.2905 / 1.95996, abs=1e-4)
-    one = at(BETTER, -2.0, half=0.8)
+    assert rule.level(1) == rule.level(0) == pytest.approx(3.1535 / 1.95996, abs=1e-4)
+    assert rule.level(50) == pytest.approx(4.1569 / 1.95996, abs=1e-4)
+    one = at(BETTER, -2.0, half=0.8 / rule.level(1))
     assert rule.verdict(one, 1) == REFUTED
     assert rule.verdict(one, 50) == UNDECIDED
     certain = Judged(7, 7, 7, 5, 5, 0.5)
@@ -112,20 +112,22 @@ def test_sentences_of_a_claim_are_judged_each():
 
 
 def test_undecided_only_where_it_may_yet_be_refuted():
-    open_ = at(BETTER, 0.5, half=1.2)  # −0.7 … 1.7: at worst immaterial
+    half = 1.2 / rule.level(2)
+    open_ = at(BETTER, 0.5, half=half)  # −0.7 … 1.7: at worst immaterial
     assert rule.verdict(open_) == UNDECIDED
     assert rule.claim([at(BETTER, 5), replace(open_, exact=math.nan)]).kind == CONFIRMED
     assert rule.claim([open_]).kind == UNDECIDED
-    assert rule.claim([at(BETTER, 5), at(BETTER, 0, half=1.2)]).kind == UNDECIDED
+    assert rule.claim([at(BETTER, 5), at(BETTER, 0, half=half)]).kind == UNDECIDED
 
 
 def test_realisations_that_would_decide():
     assert rule.needed(NUMBER) == 0
-    edge = at(NUMBER, 22.4, half=0.2, n=1000)  # border 22.5
+    wide = rule.level(1)
+    edge = at(NUMBER, 22.4, half=0.2 / wide, n=1000)  # border 22.5
     assert rule.needed(edge) == pytest.approx(4000, abs=1)
-    assert rule.verdict(at(NUMBER, 22.4, half=0.0999)) == REFUTED
-    assert rule.needed(at(NUMBER, 22.5, half=0.2, n=1000)) is None
-    two = at(BETTER, 0.5, half=1.2, n=1000)  # to 1 it has 0.5, to −1 more than it needs
+    assert rule.verdict(at(NUMBER, 22.4, half=0.0999 / wide)) == REFUTED
+    assert rule.needed(at(NUMBER, 22.5, half=0.2 / wide, n=1000)) is None
+    two = at(BETTER, 0.5, half=1.2 / wide, n=1000)  # to 1 it has 0.5, to −1 more than it needs
     assert rule.needed(two) == pytest.approx(1000 * (1.2 / 0.5) ** 2, abs=1)
     assert rule.claim([edge]).needed == pytest.approx(4000, abs=1)
     assert rule.claim([NUMBER]).needed is None

@@ -35,6 +35,7 @@ def as_runs_would_store(out, own):
     for of, claim in PAPERS.values():
         row = judge.blank(claim, of.paper) | dict.fromkeys(judge.SAID, own)
         row |= {"measured": 3.0, "lo": 2.0, "hi": 4.0, "expected_lo": 5.0, "margin": 1.0, "miss": 2.0, "what": "x"}
+        row |= {"judged_lo": 2.0, "judged_hi": 4.0}
         stored.setdefault(claim.config, []).append(row)
     known = classes_of(OPEN, None)
     for config, rows in stored.items():

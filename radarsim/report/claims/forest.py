@@ -40,9 +40,9 @@ def figure(rows: Sequence[Mapping]) -> Figure | None:
         title=tr("Claims, in margins of what their papers say"),
         caption=plural("Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged), counted=counted)
         + tr(
-            "Of each claim the part that lies furthest from the paper's words: measured, with its 95 % interval, and "
-            "exactly, in margins of that part, cut at ± {furthest:g}. Under 0 it is as the words say, up to "
-            "1 within their margin. The mark is the class of the claim, over all readings that its paper allows.",
+            "Of each claim the part that lies furthest from the paper's words: measured, with the interval that is "
+            "judged, and exactly, in margins of that part, cut at ± {furthest:g}. Under 0 it is as the words say, "
+            "up to 1 within their margin. The mark is the class of the claim, over all readings that its paper allows.",
             furthest=FURTHEST,
         ),
         panels=tuple(panels),
@@ -76,7 +76,7 @@ def _panel(paper: str, found: Sequence[tuple[Sequence[Mapping], Mapping]]) -> Pa
 def _line(kind: str, style: Style, of: Sequence[tuple[int, Mapping]]) -> Line:
     """The marks of one class: where a value is known exactly, this is what the mark stands at."""
     rows = [row for _, row in of]
-    ends = np.array([sorted((depth(float(row["lo"]), row), depth(float(row["hi"]), row))) for row in rows])
+    ends = np.array([sorted(depth(end, row) for end in page.bounds(row)) for row in rows])
     value = np.array([depth(float(row["measured"]), row) for row in rows])
     exact = [page.number(row["exact"]) for row in rows]
     crosses = np.array([math.nan if one is None else depth(one, row) for one, row in zip(exact, rows, strict=True)])

@@ -47,12 +47,13 @@ CLAIMED = (
     *("expected_lo", "expected_hi", "what", "unit", "place", "reading", "overall"),
     *("exact", "margin", "miss", "class", "holds", "of", "depends_on", "old_verdict", "original"),
     *("margin_kind", "ceiling", "n", "worst_miss", "needed", "extension", "number", "why", "as_shipped"),
+    *("judged_lo", "judged_hi"),
 )
 SAID = ("verdict", "overall", "class", "as_shipped")  # of these columns
 # Of these columns; empty where there is none.
 NUMBERS = (
     *("measured", "lo", "hi", "expected_lo", "expected_hi", "exact", "margin", "miss", "holds", "of"),
-    *("ceiling", "n", "worst_miss", "needed"),
+    *("ceiling", "n", "worst_miss", "needed", "judged_lo", "judged_hi"),
 )
 
 
@@ -268,6 +269,7 @@ def _row(claim: Claim, paper: str, one: _Tried, outcome: Outcome | None, many: i
         "old_verdict": one.old,
         "ceiling": of.ceiling,
         "n": of.n,
+        **dict(zip(("judged_lo", "judged_hi"), rule.ends(of, many), strict=True)),
     }
 
 

@@ -26,7 +26,7 @@ HEAD = """# The papers' claims
 
 Made from results by `make claims-page`, never by hand, by [one rule](verdicts.md) that was written down before anything
 was measured. Of each claim a line: what the paper says; the part of it that lies furthest from these words, measured
-with its 95 % interval or exactly, and what the words leave to it; how far the claim stands; and the config that shows
+with the interval that is judged or exactly, and what the words leave; how far the claim stands; the config that shows
 it (`radarsim run CONFIG`, then `radarsim claims CONFIG`). The class is over all readings that the paper allows, where
 it leaves anything open (`radarsim readings`): "refuted as shipped; depends on start" is false with the choices that
 the config takes, and true with another start. Below, to be opened: every claim in the original and how it was read,
@@ -263,7 +263,7 @@ def plain(value: float) -> str:
 
 def measured(row: Mapping) -> str:
     """Value and unit, with the interval where there is a sampling error, both to two figures of its half-width."""
-    value, lo, hi = (float(row[name]) for name in ("measured", "lo", "hi"))
+    value, (lo, hi) = float(row["measured"]), bounds(row)
     half = (hi - lo) / 2
     if not 0 < half < math.inf:
         text = numeral(f"{value:.4g}").replace("inf", "∞")
@@ -273,6 +273,12 @@ def measured(row: Mapping) -> str:
         middle, low, high = (numeral(f"{round(one, place) + 0.0:.{place}f}") for one in (value, lo, hi))
         text = f"{middle} {interval(low, high)}"
     return f"{text} {tr(str(row['unit']))}".rstrip().replace("-", "\N{MINUS SIGN}")
+
+
+def bounds(row: Mapping) -> tuple[float, float]:
+    """The interval of a part that is shown: that which is judged, or of one known exactly its own 95 %."""
+    names = ("judged_lo", "judged_hi") if number(row["exact"]) is None else ("lo", "hi")
+    return float(row[names[0]]), float(row[names[1]])
 
 
 def _cell(text: str) -> str:
