@@ -82,8 +82,10 @@ def test_the_classes_of_the_first_paper_are_those_that_are_shipped(first):
 def test_what_is_known_of_the_first_paper(first):
     _, done = first
     said = {over.claim.id: over.outcome for over in done.read[0].over}
-    assert said["P1.5"].kind == rule.REFUTED  # in every reading: robust
-    assert said["P1.5"].holds_in == 0
+    assert said["P1.5"].words == "depends on end_of, falls_to"
+    assert (said["P1.5"].holds_in, said["P1.5"].readings) == (6, 18)
+    assert said["P1.17"].kind == rule.REFUTED  # in every reading: robust
+    assert said["P1.17"].holds_in == 0
     assert said["P1.9"].kind == said["P1.25"].kind == rule.CONFIRMED
     assert said["P1.6"].depends_on == ("falls_to",)
     assert said["P1.7"].depends_on == ("start",)
@@ -116,6 +118,15 @@ def test_what_falls_may_rise_by_the_tolerance_of_the_reading(first):
     rows = [row for row in table(out) if row["claim"] == "P1.27" and row["kind"] in "EU"]
     assert {(row["settled_within"], float(row["margin"])) for row in rows} == {("5 %", 5), ("2 %", 2), ("10 %", 10)}
     assert "settled_within" in next(one for one in done.read[0].over if one.claim.id == "P1.27").outcome.depends_on
+
+
+def test_one_printed_end_of_two_curves_is_that_of_each_or_of_the_lower(first):
+    """18.29 and 19.52 % at the end, 19.74 and 21.73 % at 100 s: 18 ± 1 is that of the lower alone, and at the end."""
+    rows = {row["reading"]: row for row in table(first[0]) if row["claim"] == "P1.5" and row["part"] == "1"}
+    lower, early = rows["end_of: the lower one"], rows["falls_to: 100 s; end_of: the lower one"]
+    assert [float(one["exact"]) for one in (lower, early)] == pytest.approx([18.29, 19.74], abs=0.006)
+    assert [one["outcome"] for one in (lower, early)] == ["confirmed", "refuted"]
+    assert rows["as shipped"]["outcome"] == "refuted"
 
 
 def test_sentences_on_figures_2a_and_3a_speak_of_their_radar_or_of_each(first):

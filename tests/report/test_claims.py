@@ -161,7 +161,8 @@ FOUND = [
     ("P1.16", "rls2", "Doppler", 4, 1e-9),
     ("P1.16", "rls4", "Doppler", 20, 1e-9),
     ("P1.17", "rls1", "^largest range", 14.1, 0.06),
-    ("P1.17", "rls1", "scan", 3, 0),
+    ("P1.17", "rls1", "^scan of", 3, 0),
+    ("P1.17", "rls1", "any other", 11.97 - 13.40, 0.011),
     ("P1.18", "rls2", "end", 100 * 34.6 / 85, 0.3),
     ("P1.19", "rls4, rls5, rls1, rls2", "final range", 52.3 - 18.3, 0.11),
     ("P1.20", "rls2, rls3", "range only", 7.38 - 9.88, 0.011),
@@ -193,6 +194,14 @@ def test_measures_what_it_says(table, claim, case, what, value, slack):
     rows = rows[rows["what"].str.contains(what)]
     assert len(rows) == 1
     assert rows["measured"].iloc[0] == pytest.approx(value, abs=slack)
+
+
+def test_about_ten_per_cent_at_two_steps_only(table):
+    """A margin of a tenth, and the second step above the fourth: each refutes P1.17, which stands at its largest."""
+    own = table[table["claim"] == "P1.17"].set_index("what")
+    assert own["class"].eq(REFUTED).all()
+    assert own.loc["largest range gain", ["margin", "miss"]].tolist() == pytest.approx([1, 4.05], abs=0.01)
+    assert own["verdict"].tolist() == [REFUTED, CONFIRMED, REFUTED]
 
 
 def test_the_papers_radar_under_another_name(expected_radar):

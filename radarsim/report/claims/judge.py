@@ -253,7 +253,7 @@ def _row(claim: Claim, paper: str, one: _Tried, outcome: Outcome | None, many: i
         "worst_miss": _end(outcome.miss) if outcome else math.nan,
         "needed": outcome.needed if outcome and outcome.needed else math.nan,
         "verdict": NOT_JUDGED,
-        "why": one.why,
+        "why": one.why or claim.unstated,
         LOOKED: one.looked,
     }
     if of is None:

@@ -1,4 +1,4 @@
-"""P4.1 … P4.19: what Uss, Baryshev & Djavad (2010) say, read from their words alone.
+"""P4.1 … P4.20: what Uss, Baryshev & Djavad (2010) say, read from their words alone.
 
 Places are the article's sections (Aviacionno-kosmicheskaya tehnika i tehnologiya 2010, no. 6): 3 holds the method, 4
 the experiment. Its numbers are judged in both readings of its noise and threshold, see discriminator_measures.
@@ -168,7 +168,11 @@ CLAIMS = (
         "section 4, conclusion",
         "From the first window to the whole burst it takes 12 iterations",
         *WINDOWS,
-        original="Для достижения полного времени наблюдения T = 0,3 с … начиная с T_0 = 1,79 ms требуется 12 итераций.",
+        original="Для достижения полного времени наблюдения T = 0,3 с … начиная с T_0 = 1,79 ms требуется 12 итераций. "
+        "/ При точности прогноза более чем в 100 раз ниже потенциальной точности … потребовалась последовательность "
+        "из 12-ти оптимальных дискриминаторов …",
+        reading="twelve windows after the first; the conclusion's sequence of twelve discriminators counts the first "
+        "too, and is a reading",
     ),
     _claim(
         4,
@@ -340,7 +344,8 @@ CLAIMS = (
         ),
         original="Полагая P_Δ = 0,99 и учитывая (12) и (13), (11) запишем в виде tr(R_Δθ·H) + 3·√(2tr([H·R_Δθ]²)) ≤ 1.",
         reading="by the law of the quadratic form itself, a sum of weighted χ²; the last window is the whole burst, "
-        "whatever (16) says, and is left out",
+        "whatever (16) says, and is left out. One c for the design and for the lobe; that the design takes the 0.5 of "
+        "(11) and the lobe is that of (10), under 1, is a reading, in which it holds",
     ),
     _claim(
         13,
@@ -492,5 +497,40 @@ CLAIMS = (
         "сопровождаемым объектом маневра, когда точность прогноза резко падает.",
         reading="of the experiment's forecast, a hundred to two thousand times worse than the potential accuracy; the "
         "design allows each hand-over to fail once in a hundred, of K windows 1 − 0.99^K",
+    ),
+    _claim(
+        20,
+        "section 3, step 1",
+        "After the first window no search over the initial phase is needed",
+        *(
+            replace(part, statement="then")
+            for part in _both(
+                "largest probability at a hand-over that the start's phase is over a quarter of a turn off the best",
+                "",
+                lambda seen, key: seen.phase_lost(key)[1],
+                at_most(0.01),
+            )
+        ),
+        *(
+            replace(part, statement="first")
+            for part in _both(
+                "the same at the first window, by the forecast",
+                "",
+                lambda seen, key: seen.phase_lost(key)[0],
+                above(0.01),
+            )
+        ),
+        *_both(
+            "share of bursts locked that a search along the widest direction of the error adds",
+            "",
+            lambda seen, key: difference(seen.lock(key, "cured"), seen.lock(key, "sequence")),
+            same(0, 0.01),
+            asserted=False,
+        ),
+        original="Так как прогноз θ_пр не содержит оценки начальной фазы, то на первом этапе нужно дополнительно "
+        "выполнить поиск по начальной фазе. … В дальнейшем поиск по начальной фазе выполнять не требуется.",
+        reading="needed where, all else as the start has it, the best phase is over a quarter of a turn away, from "
+        "where scoring does not find it, with more than the 0.01 of a miss. A search over all five parameters, along "
+        "the direction in which the start is worst known, does keep locks: shown and not counted",
     ),
 )

@@ -15,7 +15,7 @@ import numpy as np
 
 from radarsim.bursts import fisher as exact
 from radarsim.bursts import schedule
-from radarsim.bursts.burst import LIGHT_MPS
+from radarsim.bursts.burst import LIGHT_MPS, balanced_inverse
 from radarsim.engine.results import CaseResult
 from radarsim.report import claims
 from radarsim.report.claims import Missing, certain
@@ -150,13 +150,36 @@ class Evidence(claims.Evidence):
 
     def worst_handover(self, key: str) -> Estimate:
         """The largest probability over the hand-overs that Z passes c: of the form's own law, not of a Gaussian."""
-        result, i = self.case(key), self.estimator(key, "sequence")
-        burst, threshold = study.burst_of(result.spec), READINGS[key][1]
-        fisher = partial(exact.fisher, burst, len(COMPONENTS))
-        designer = schedule.Designer(burst, result.axes.prior_sigma, fisher, schedule.Condition(threshold=threshold))
-        times = burst.pulse_period_s * np.array(result.axes.pulses[i])
+        designer, times = self._designer(key)
+        threshold = designer.condition.threshold
         forms = [designer.handover(before)(after) for before, after in pairwise(times[:-1])]  # the last is cut short
         return certain(max(schedule.tail_probability(form.values, threshold) for form in forms))
+
+    def _designer(self, key: str) -> tuple[schedule.Designer, np.ndarray]:
+        """What designed the sequence, and its windows in s."""
+        result, i = self.case(key), self.estimator(key, "sequence")
+        burst, condition = study.burst_of(result.spec), schedule.Condition(threshold=READINGS[key][1])
+        fisher = partial(exact.fisher, burst, len(COMPONENTS))
+        times = burst.pulse_period_s * np.array(result.axes.pulses[i])
+        return schedule.Designer(burst, result.axes.prior_sigma, fisher, condition), times
+
+    def phase_offsets(self, key: str) -> np.ndarray:
+        """How far the best phase lies from the start's, rad, one σ: from the forecast, then at each hand-over."""
+        designer, times = self._designer(key)
+        error, offsets = np.diag(designer.sigma**2), []
+        for information in (designer.posterior(duration)[0] for duration in times):
+            after, row = balanced_inverse(information), information[0] / information[0, 0]
+            offsets.append(math.sqrt(row @ (error - after) @ row))
+            error = after
+        return np.array(offsets)
+
+    def phase_lost(self, key: str) -> tuple[Estimate, Estimate]:
+        """Probability that the start's phase is over a quarter of a turn off the best: at first, largest afterwards.
+
+        Over the phase alone the likelihood is a cosine, so that from nearer scoring finds its maximum.
+        """
+        first, *later = (math.erfc(math.pi / 2 / sigma / math.sqrt(2)) for sigma in self.phase_offsets(key))
+        return certain(first), certain(max(later))
 
     def spare_window(self, key: Key, amplitude: float) -> Estimate:
         """First window less the shortest allowed at an amplitude, ms."""

@@ -27,10 +27,11 @@ from radarsim.studies.discriminator.versions import Burst, Version
 BURST = Burst(1e-5, (100.0, 150.0, 500.0, 1000.0, 2000.0))
 PRINTED_PRIOR = (6.1, 67.5, 6.1e3, 183.38e3, 2.426e6)  # rad, Hz, Hz/s, Hz/s², Hz/s³
 SHIPPED_NOISE = measures.READINGS[COMPUTED][0]
+OTHER_THRESHOLD = {0.5: 1.0, 1.0: 0.5}
 ITERATIONS = "12"  # the number of the part that counts windows
 LEAST_RATIO = 5.0  # μ_min
-EXACT = ("P4.1", "P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13")
-WINDOWS = ("P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13")
+EXACT = ("P4.1", "P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
+WINDOWS = ("P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
 RUN = ("P4.4", "P4.5", "P4.6", "P4.7", "P4.9", "P4.10", "P4.19")
 NO_ROOT = "(15) has no root: with the phase in it, its left side is over c at every length"
 
@@ -60,6 +61,19 @@ CHOICES = (
         ),
         (*WINDOWS, *RUN),
         contradicts=True,
+    ),
+    Choice(
+        "lobe",
+        "Whether the main lobe ends at the c for which the windows are designed",
+        "… условие попадания θ_н.п. в пределы главного лепестка ФП запишем в виде Δθᵀ·H(T)·Δθ < 1 (10); "
+        "P(Δθᵀ·H(T)·Δθ < 0.5) > P_Δ (11)",
+        "The condition that a start lies within the main lobe is written with 1 (10); the probability of it with 0.5 "
+        "(11).",
+        (
+            Alternative("one c", UNSTATED, "the lobe is that of the design, whichever number is taken"),
+            Alternative("two", UNSTATED, "the other printed number: a design by (11) for the lobe of (10), or reverse"),
+        ),
+        ("P4.12",),
     ),
     Choice(
         "forecast",
@@ -147,11 +161,13 @@ CHOICES = (
     Choice(
         "counted",
         "Which windows count as iterations",
-        "… начиная с T_0 = 1,79 ms требуется 12 итераций.",
-        "… beginning with T₀ = 1.79 ms it takes 12 iterations.",
+        "… начиная с T_0 = 1,79 ms требуется 12 итераций. […] потребовалась последовательность из 12-ти "
+        "оптимальных дискриминаторов …",
+        "… beginning with T₀ = 1.79 ms it takes 12 iterations. […] a sequence of 12 optimal discriminators was "
+        "needed …",
         (
-            Alternative("after the first", UNSTATED, "T₁ … T₁₂"),
-            Alternative("in all", UNSTATED, "T₀ … T₁₁"),
+            Alternative("after the first", UNSTATED, "T₁ … T₁₂: 12 iterations, beginning with T₀"),
+            Alternative("in all", UNSTATED, "T₀ … T₁₁: a sequence of 12 discriminators"),
         ),
         ("P4.3", "P4.11"),
     ),
@@ -300,6 +316,8 @@ class ExactEvidence(measures.Evidence):
     def __init__(self, reading: Reading):
         super().__init__((), {}, {})
         self._version = version(reading)
+        c = self._version.threshold
+        self._lobe = c if reading["lobe"] == "one c" else OTHER_THRESHOLD[c]
 
     def windows(self, key: Any, kind: str = "sequence") -> np.ndarray:
         """Window lengths in s; of a forecast with the scale that a key of a sweep names, the first alone."""
@@ -315,9 +333,11 @@ class ExactEvidence(measures.Evidence):
 
     def worst_handover(self, key: Any) -> Estimate:
         """The largest probability over the hand-overs that Z passes c, by its own law; the last one is cut short."""
-        own = self._version
-        weights = versions.handovers(BURST, own, windows(own)[:-1])
-        return certain(max(schedule.tail_probability(one, own.threshold) for one in weights))
+        weights = versions.handovers(BURST, self._version, windows(self._version)[:-1])
+        return certain(max(schedule.tail_probability(one, self._lobe) for one in weights))
+
+    def phase_offsets(self, key: Any) -> np.ndarray:
+        return versions.phase_offsets(BURST, self._version, windows(self._version))
 
     def shortest_window(self, key: Any, amplitude: float) -> Estimate:
         """T_min (17), ms: one sample a pulse."""

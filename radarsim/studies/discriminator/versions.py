@@ -99,6 +99,19 @@ def handovers(burst: Burst, version: Version, windows: Sequence[int]) -> list[np
     return list(np.maximum(np.linalg.eigvalsh(roots.transpose(0, 2, 1) @ error @ roots), 0.0))
 
 
+def phase_offsets(burst: Burst, version: Version, windows: Sequence[int]) -> np.ndarray:
+    """How far the best phase lies from the start's, rad, one σ (len(windows),): from the forecast, then at hand-overs.
+
+    Of all parameters but the phase the start's stay: what a search over the phase alone would find.
+    """
+    of = _Problem(burst, [version])
+    information, _ = of.posterior(np.zeros(len(windows), dtype=int), np.array(windows, dtype=float))
+    covariance = _inverse(information)
+    error = np.concatenate([np.diag(1 / of.prior[0])[None], covariance[:-1]]) - covariance
+    row = information[:, 0] / information[:, :1, 0]
+    return np.sqrt(np.einsum("wi,wij,wj->w", row, error, row))
+
+
 class _Problem:
     """Information matrices of B versions in units in which all are of one size: parameters over the whole burst."""
 
@@ -113,7 +126,7 @@ class _Problem:
         self._unit[:, 0] = 1.0
         given = np.array([one.sigma or (np.nan,) * self.size for one in versions])
         multiples = np.array(burst.multiples) * self.spreads()
-        self._prior = (np.where(np.isfinite(given), given, multiples) * self._unit) ** -2.0  # of R_pr⁻¹, its diagonal
+        self.prior = (np.where(np.isfinite(given), given, multiples) * self._unit) ** -2.0  # of R_pr⁻¹, its diagonal
         self._threshold = np.array([one.threshold for one in versions])
         self._factor = np.array([one.factor for one in versions])
         self._phase = np.array([one.phase for one in versions])
@@ -148,7 +161,7 @@ class _Problem:
     def posterior(self, of: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Φ + R_pr⁻¹ and H = (Φ + R_pr⁻¹)/2μ, of which Φ's first element is 2μ."""
         fisher = self._fisher(of, n)
-        information = fisher + self._prior[of, None, :] * np.eye(self.size)
+        information = fisher + self.prior[of, None, :] * np.eye(self.size)
         return information, information / fisher[:, :1, :1]
 
     def _excess(self, of: np.ndarray, R: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -160,7 +173,7 @@ class _Problem:
     def _first_excess(self, of: np.ndarray, n: np.ndarray) -> np.ndarray:
         """(15) of each version, with the phase as it says."""
         information, H = self.posterior(of, n)
-        prior = 1 / self._prior[of, None, :] * np.eye(self.size)
+        prior = 1 / self.prior[of, None, :] * np.eye(self.size)
         found = np.empty(len(of))
         for phase in np.unique(self._phase[of]):
             own = self._phase[of] == phase

@@ -5,7 +5,7 @@ variance are the paper's, whatever its name.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from typing import Any
 
@@ -349,6 +349,22 @@ def after_loss(seen: Evidence) -> Estimate:
     gain = seen.k_gain(2, "ar")
     lost = np.flatnonzero(gain.value < 0)
     return gain.where(slice(int(lost[0]) + 1 if lost.size else len(gain.k) - 1, None)).largest()
+
+
+def above_all_others(radar: int, component: str, scans: Collection[int]) -> Measure:
+    """The least gain of a radar at these scans less its largest at any other, points."""
+
+    def measure(seen: Evidence) -> Estimate:
+        gain = seen.k_gain(radar, component)
+        own = np.isin(gain.k, list(scans))
+        return difference(gain.where(own).least(), gain.where(~own).largest())
+
+    return measure
+
+
+def lowest_end(radars: Collection[int], component: str) -> Measure:
+    """The least of these radars' final gains, %."""
+    return lambda seen: min(seen.k_gain(radar, component).last() for radar in radars)
 
 
 def after_peak(radar: int) -> Measure:

@@ -15,7 +15,7 @@ from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED
 from radarsim.report.claims.search import Search
 from radarsim.report.statistics import Estimate
 from radarsim.studies.range_doppler import measures, recursion
-from radarsim.studies.range_doppler.claims import CLAIMS, first_steps
+from radarsim.studies.range_doppler.claims import CLAIMS, FALLEN, first_steps
 from radarsim.studies.range_doppler.measures import RADARS
 
 ALGEBRA = ("P1.16", "P1.31", "P1.34", "P1.36")  # of the table of radars, and of the equations
@@ -30,11 +30,12 @@ FAST = tuple(  # those that look at a radar of Δt = 5 s
     for keys in [{key[0] if isinstance(key, tuple) else key for part in parts for key in part.cases}]
     if keys & {3, 5}
 )
-FALLS = ("P1.5", "P1.6")
+ENDS = "P1.5"
+FALLS = (ENDS, "P1.6")
 FALLING = ("P1.26", "P1.27")  # as far as a settled curve may rise again
 SETTLES = ("P1.14", "P1.15", *FALLING)
 FIRST_STEPS = "P1.28"
-EACH, SHOWN = "each radar", "RLS 2"
+EACH, SHOWN, LOWER = "each radar", "RLS 2", "the lower one"
 SHIPPED = "0.001"  # D_M, (m/s³)²
 SWEPT = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # D_M of the config manoeuvre_variance
 FIFTEEN = 15  # points, as printed
@@ -88,6 +89,17 @@ CHOICES = (
             Alternative("100 s", UNSTATED, "the time to which the passage speaks"),
         ),
         FALLS,
+    ),
+    Choice(
+        "end_of",
+        "Whose end is meant where two curves fall to one number",
+        "… в 45 % при высоком темпе и в 35 % при малом темпе обзора достигается … с последующим спадом до 18 %.",
+        "… of 45 % at the fast and of 35 % at the slow rate … is reached, falling to 18 % afterwards.",
+        (
+            Alternative(EACH, UNSTATED, "both peaks are named, and one end: each falls to it"),
+            Alternative(LOWER, UNSTATED, "the lower end of the two curves"),
+        ),
+        (ENDS,),
     ),
     Choice(
         "extremum",
@@ -209,6 +221,8 @@ class Readings(PaperReadings):
         """Those of the radars that the reading means; what falls to a steady value may rise by its tolerance."""
         if claim.id == FIRST_STEPS and reading["first_steps_of"] == EACH:
             return [part for radar in RADARS for part in first_steps(radar)]
+        if claim.id == ENDS and reading["end_of"] == LOWER:
+            return [Part((2, 3), "the lower of the final range gains", "%", measures.lowest_end((2, 3), "r"), FALLEN)]
         if claim.id not in FALLING:
             return claim.parts
         wide = same(0, _tolerance(reading, 100))

@@ -59,11 +59,11 @@ def _over(claim: str, what: str, least: float) -> Printed:
 
 
 # The numbers in the order of `_numbers`. Strict: rounds to the print, "about" within 10 %. Granular: multiples of five
-# to ± 2.5, "about 10 %" to ± 5, times to the slower radar's period; 7 and 18, no multiples of five, as in strict.
+# to ± 2.5, "about 10 %" to ± 1, times to the slower radar's period; 7 and 18, no multiples of five, as in strict.
 FIVES = 2.5
 READ_AS = (
     'To the digit: what rounds to the print; of times and of "about 10 %", within 10 %. To the steps of the print: '
-    'multiples of five ± 2.5, limits by as much, "about 10 %" ± 5, times to one period of the slower radar; 7 and 18, '
+    'multiples of five ± 2.5, limits by as much, "about 10 %" ± 1, times to one period of the slower radar; 7 and 18, '
     "which are no multiples of five, as to the digit."
 )
 PRINTED = (
@@ -94,7 +94,7 @@ PRINTED = (
     _over("P1.10", "RLS 5, largest acceleration gain to k = 5", 80),
     _printed("P1.11", "time of the largest range gain, RLS 3 : RLS 2", "", "1", (0.9, 1.1), (0.5, 1.5)),
     _printed("P1.14", "RLS 2, settling of σ_r, range only", "Δt", "< 10", (0, 9.999)),
-    _printed("P1.17", "RLS 1, largest range gain", "%", "about 10", (9, 11), (5, 15)),
+    _printed("P1.17", "RLS 1, largest range gain", "%", "about 10", (9, 11)),
     _printed("P1.17", "RLS 1, scan of it", "k", "3–4", (3, 4)),
     _printed("P1.23", "RLS 2, scans with a loss in acceleration", "", "few", (1, 3)),
 )

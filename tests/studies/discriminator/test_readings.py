@@ -1,7 +1,7 @@
 """P4's readings: the shipped one is the config as printed; what is exact is what a prepared case has."""
 
 from functools import partial
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 import pytest
@@ -9,6 +9,9 @@ import pytest
 from radarsim.app.configs import load
 from radarsim.bursts import fisher as exact
 from radarsim.bursts import schedule
+from radarsim.engine.results import CaseResult
+from radarsim.report.claims import rule
+from radarsim.report.claims.over import under
 from radarsim.report.claims.readings import Unreadable
 from radarsim.studies import registry
 from radarsim.studies.discriminator import study
@@ -87,3 +90,49 @@ def test_what_is_exact_by_reading():
         ratio = say["9"].potential("any", component).value / say["2.25"].potential("any", component).value
         assert ratio == pytest.approx(2.0)
         assert say["2.25"].potential("any", component).value == pytest.approx(printed, rel=5e-3)
+
+
+def classes(claim):
+    """The outcomes of an exact claim by threshold and lobe, over noise and forecast."""
+    found = {}
+    varied = [choice for choice in OF.choices if choice.key in ("noise_variance", "threshold", "lobe", "forecast")]
+    for reading in OF.combined(varied):
+        seen = under(OF, CLAIMS[claim], reading, ExactEvidence(reading))
+        found.setdefault((reading["threshold"], reading["lobe"]), set()).add(seen.outcome.kind)
+    return found
+
+
+def test_a_design_by_11_for_the_lobe_of_10_keeps_its_promise():
+    """Two numbers are printed for c: the design may take one and the lobe the other, and only 0.5 for 1 holds."""
+    assert classes("P4.12") == {
+        ("0.5", "one c"): {rule.REFUTED},
+        ("1", "one c"): {rule.REFUTED},
+        ("0.5", "two"): {rule.CONFIRMED},
+        ("1", "two"): {rule.REFUTED},
+    }
+    worst = {name: ExactEvidence(OF.reading(lobe=name)).worst_handover("any").value for name in ("one c", "two")}
+    # By another program, with 400 000 draws of the form.
+    assert worst["one c"] == pytest.approx(0.0224, abs=5e-4)
+    assert worst["two"] == pytest.approx(0.00125, abs=1e-4)
+
+
+def test_the_phase_is_searched_for_once():
+    """The forecast's phase is anywhere; at the hand-overs it is as near as the form's rank-one error leaves it."""
+    assert set(chain(*classes("P4.20").values())) == {rule.CONFIRMED}
+    for noise, c in (("9", "0.5"), ("2.25", "1")):
+        offsets = ExactEvidence(OF.reading(noise_variance=noise, threshold=c)).phase_offsets("any")
+        assert offsets[0] > np.pi / 2
+        assert 0.1 < offsets[1:].max() < 0.5
+
+
+def test_offsets_of_the_phase_are_those_of_the_prepared_case(cases):
+    """Of many versions at once, in scaled units, and by the designer of a run."""
+    evidence = registry.study("discriminator").claims().evidence
+    for noise, taken in ((9.0, {}), (2.25, {"noise_variance": "2.25", "threshold": "1", "forecast": "multiples"})):
+        result = registry.study("discriminator").prepare(cases[noise])
+        case, own = cases[noise], {"estimators": set(range(len(result.axes.filters)))}
+        seen = evidence(
+            [CaseResult(case.name, "discriminator", case.spec, (), 0, {}, result.axes)], {}, {case.name: own}
+        )
+        wanted = seen.phase_offsets("printed" if noise == 9 else "computed")
+        np.testing.assert_allclose(ExactEvidence(OF.reading(**taken)).phase_offsets("any"), wanted, rtol=1e-5)

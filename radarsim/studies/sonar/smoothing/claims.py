@@ -1,4 +1,4 @@
-"""P3.1 … P3.7, P3.11 … P3.18: what Butyrskiy says of smoothing, from his words alone, before anything was measured.
+"""P3.1 … P3.7, P3.11 … P3.19: what Butyrskiy says of smoothing, from his words alone, before anything was measured.
 
 The paper has no experiment and prints few numbers, so most statements are formulas. A formula holds when what is
 measured is within 1 % of it in σ, within 2 % in a variance or covariance; an identity, to 10⁻⁹. Places are the
@@ -7,7 +7,7 @@ paper's sections.
 
 from radarsim.report.claims import Claim, Part, above, at_most, greater, less, same, within
 from radarsim.studies.sonar.smoothing import measures as measured
-from radarsim.studies.sonar.smoothing.measures import ASYNCHRONOUS, FLUCTUATING, GAP, TEXTBOOK, correlated
+from radarsim.studies.sonar.smoothing.measures import ASYNCHRONOUS, FLUCTUATING, GAP, TEXTBOOK, TURNING, correlated
 
 IN_SIGMA = same(1, 0.01)
 IN_VARIANCE = same(1, 0.02)
@@ -22,9 +22,9 @@ def _claim(
     original: str,
     reading: str = "",
     config: str = "sonar_smoothing",
-    internal: bool = False,
+    unstated: str = "",
 ) -> Claim:
-    return Claim(f"P3.{number}", place, statement, parts, reading, config, original, internal=internal)
+    return Claim(f"P3.{number}", place, statement, parts, reading, config, original, unstated=unstated)
 
 
 def _formula(what: str, n: int) -> Part:
@@ -251,10 +251,21 @@ CLAIMS = (
             less(),
             statement="cost",
         ),
+        Part(
+            (TEXTBOOK,),
+            "σ of the recursion over that of least squares, both after 20 plots",
+            "",
+            measured.over_formula("smoothed", 20),
+            less(),
+            exact=measured.exact_over_formula("smoothed", 20),
+            asserted=False,
+        ),
         original="Уменьшить требования к емкостным и вычислительным затратам специализированной ЭВМ вторичной "
         "обработки при одновременном повышении точности выходных данных можно путем применения принципа "
         "последовательного сглаживания координат и параметров.",
-        reading="against the 5–6 plots that the paper recommends; of a target that moves as the filter takes it to",
+        reading="against the 5–6 plots that the paper recommends: the accuracy is that of more plots at the same cost. "
+        "On the same plots both are one estimate (P3.4): shown, and neither better nor worse. Of a target that moves "
+        "as the filter takes it to",
     ),
     _claim(
         15,
@@ -262,16 +273,25 @@ CLAIMS = (
         "A Kalman-Bucy filter looks at two neighbouring moments only and demands less of the target's uniform motion",
         Part(
             (FLUCTUATING,),
-            "σ of the range at the end of the filter with manoeuvre variance over that of growing memory",
+            "σ of the range at the end of (11) over that of growing memory",
+            "",
+            measured.as_printed,
+            less(),
+        ),
+        Part(
+            (FLUCTUATING,),
+            "the same of (11) with process noise",
             "",
             measured.with_manoeuvres,
             less(),
+            asserted=False,
         ),
         original="В расчетах непосредственно используется информация только о двух соседних моментах времени, что "
         "позволяет оценивать изменяющийся во времени вектор неизвестных параметров и снижает жесткость требований к "
         "прямолинейному и равномерному движению цели в течение всего времени определения КПДЦ.",
-        reading="on the shipped course whose velocity walks at random: the Kalman-Bucy filter (11) with process noise "
-        "against the recursion without it",
+        reading="on the shipped course whose velocity walks at random. (11) is printed without process noise, Ψ_э = "
+        "ΦΨΦᵀ, and is then the recursion with growing memory: the same estimate, neither better nor worse. With "
+        "process noise, which the print lacks, it does demand less: shown and not counted",
         config="sonar_fluctuating",
     ),
     _claim(
@@ -290,8 +310,11 @@ CLAIMS = (
         ),
         original="Если экстраполяция производится на произвольный интервал времени Δt_э, формулы для h_n и g_n "
         "приобретают вид: … g_n = g_{n−1} + f_n(Δt_э/T_0).",
-        reading="an interval of T₀ is one of any length: (12) has f_{n−1} there, and step 5 the closed form",
-        internal=True,
+        reading="an interval of T₀ is one of any length: (12) has f_{n−1} there, and step 5 the closed form. A like "
+        "slip, if it is one, is B_n = 6/(n(n+1)) of (14), printed without restriction: it is that of equal intervals "
+        "and weights",
+        unstated="it stands on one subscript of a scan that a machine has read: f_n for f_{n−1} is as likely the "
+        "reader's slip as the print's",
     ),
     _claim(
         17,
@@ -330,5 +353,37 @@ CLAIMS = (
         "будущей отметки. … Для более точного решения задачи экстраполяции … осуществляется сглаживание измеренных "
         "координат отметок или параметров траекторий целей.",
         reading="a scan ahead; without smoothing: the straight line through the last two plots",
+    ),
+    _claim(
+        19,
+        "filtering of a linear trajectory, first sentence",
+        "The parameters of a linear trajectory can be filtered coordinate by coordinate: these are not tied together",
+        *(
+            Part(
+                (TEXTBOOK,),
+                f"σ of the {name} after 20 plots, filtered alone, over least squares on range and bearing at once",
+                "",
+                measured.over_jointly(component, 20),
+                IN_SIGMA,
+            )
+            for component, name in (("r", "range"), ("b", "bearing"))
+        ),
+        *(
+            Part(
+                (TURNING,),
+                f"σ of the {name} at the end of a straight course at constant speed over that of a linear trajectory",
+                "",
+                measured.on_a_straight_course(component),
+                IN_SIGMA,
+                asserted=False,
+            )
+            for component, name in (("r", "range"), ("b", "bearing"))
+        ),
+        original="Закон изменения координат линейной траектории записывается в виде: … Фильтрацию параметров линейной "
+        "траектории можно проводить отдельно по каждой координате, так как последние не связаны между собой.",
+        reading="linear as the law before the sentence has it: range and bearing each at a constant rate, with errors "
+        "independent of each other. Range and bearing of a vessel on a straight course are no polynomials, and are "
+        "tied together: what that costs in two minutes is shown and not counted",
+        config="sonar_fluctuating",
     ),
 )

@@ -34,6 +34,10 @@ def _is_fluctuating(result: CaseResult) -> bool:
     return walks and ("growing_memory", 1) in _kinds(result) and len(result.axes.k) >= 40
 
 
+def _turns(result: CaseResult) -> bool:
+    return result.spec.target.kind == "turning" and ("growing_memory", 1) in _kinds(result) and _even(result)
+
+
 def _has_gap(result: CaseResult) -> bool:
     sensor = result.spec.sensor
     return bool(sensor.missed_scans) and sensor.detection_probability == 1 and not sensor.further
@@ -58,6 +62,7 @@ def _first(matches: Callable[[CaseResult], bool]) -> Callable[[Sequence[CaseResu
 
 TEXTBOOK = CaseKey("equal intervals and weights, white errors, no miss", _first(_is_textbook))
 FLUCTUATING = CaseKey("a course whose velocity walks at random", _first(_is_fluctuating))
+TURNING = CaseKey("a vessel on a straight course at a constant speed, then in a turn", _first(_turns))
 GAP = CaseKey("scans that never give a plot, the others always", _first(_has_gap))
 ASYNCHRONOUS = CaseKey("several sonars", _first(_has_several_sonars))
 
@@ -146,14 +151,48 @@ def exact_bought(more: int, few: int, what: str = "smoothed") -> Number:
     return lambda seen: _least_squares(what, more) / _least_squares(what, few)
 
 
+def as_printed(seen: Evidence) -> Estimate:
+    """σ of the range at the end, of the Kalman filter without manoeuvre variance over that of growing memory."""
+    return _over_growing_memory(seen, seen.filter(FLUCTUATING, "kalman"))
+
+
 def with_manoeuvres(seen: Evidence) -> Estimate:
-    """σ of the range at the end, of the Kalman filter with manoeuvre variance over that of growing memory."""
+    """The same of the Kalman filter with manoeuvre variance."""
     case = seen.case(FLUCTUATING)
     own = next((f.name for _, f in seen.members(case) if f.kind == "kalman" and f.manoeuvre_variance), None)
     if own is None:
         raise Missing("no Kalman filter with manoeuvre variance")
+    return _over_growing_memory(seen, own)
+
+
+def _over_growing_memory(seen: Evidence, own: str) -> Estimate:
     other = seen.filter(FLUCTUATING, "growing_memory")
     return ratio(seen.curve(FLUCTUATING, own, "r").last(), seen.curve(FLUCTUATING, other, "r").last())
+
+
+def over_jointly(component: str, n: int) -> Measure:
+    """σ of range or bearing after n plots, each filtered alone, over least squares on both at once."""
+
+    def measure(seen: Evidence) -> Estimate:
+        sensor, c = seen.case(TEXTBOOK).spec.sensor, "rb".index(component)
+        sigma = np.repeat([sensor.sigma_range_m, sensor.sigma_bearing_rad], n)
+        lines = np.kron(np.eye(2), np.column_stack([np.ones(n), np.arange(1 - n, 1)])) / sigma[:, None]
+        joint = np.sqrt(np.linalg.inv(lines.T @ lines)[2 * c, 2 * c])
+        own = seen.curve(TEXTBOOK, seen.filter(TEXTBOOK, "growing_memory"), component).at(n)
+        return Estimate(*(float(part / joint) for part in own))
+
+    return measure
+
+
+def on_a_straight_course(component: str) -> Measure:
+    """σ of range or bearing of growing memory at the end of a straight leg over that on a linear trajectory."""
+
+    def measure(seen: Evidence) -> Estimate:
+        end = seen.case(TURNING).spec.target.turns[0].start_s
+        curves = [seen.curve(key, seen.filter(key, "growing_memory"), component) for key in (TURNING, TEXTBOOK)]
+        return ratio(*(curve.where(curve.t <= end).last() for curve in curves))
+
+    return measure
 
 
 def enough(seen: Evidence) -> Estimate:

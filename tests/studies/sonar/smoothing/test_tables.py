@@ -96,7 +96,37 @@ def test_claims_are_judged_where_their_cases_are(results):
     assert found["sonar_missed"] == {"P3.5"}
     rows = results["sonar_missed"].tables["claims"]
     assert set(rows["verdict"]) == {claims.CONFIRMED}
-    assert [claim.id for claim in STUDY.claims().claims] == [f"P3.{n}" for n in range(1, 19)]
+    assert [claim.id for claim in STUDY.claims().claims] == [f"P3.{n}" for n in range(1, 20)]
+
+
+@pytest.fixture(scope="module")
+def walking():
+    return radarsim.run("sonar_fluctuating", realisations=200, figures=False).tables["claims"].set_index("claim")
+
+
+def test_the_filter_as_printed_is_growing_memory(walking):
+    """(11) has no process noise: nothing is gained on it, and what a filter with such noise gains is not counted."""
+    own = walking.loc["P3.15"]
+    assert set(own["class"]) == {"no material difference"}
+    assert own["exact"].tolist() == pytest.approx([1, 15.017 / 30.2325], rel=1e-4)
+    assert own["extension"].tolist() == [False, True]
+    same = walking.loc["P3.14"].iloc[-1]
+    assert (same["exact"], same["verdict"], same["extension"]) == (pytest.approx(1), "no material difference", True)
+    assert set(walking.loc["P3.14", "class"]) == {claims.CONFIRMED}
+
+
+def test_a_subscript_of_a_scan_contradicts_no_print(walking):
+    assert set(walking.loc["P3.16", "class"]) == {"not judgeable as stated"}
+    assert walking.loc["P3.16", "why"].str.contains("one subscript of a scan").all()
+
+
+def test_coordinates_apart_are_those_at_once_on_a_linear_trajectory_alone(walking):
+    """Of independent errors and constant rates nothing is lost; of a straight course 4 % in two minutes."""
+    own = walking.loc["P3.19"]
+    assert set(own["class"]) == {claims.CONFIRMED}
+    assert own["exact"].tolist() == pytest.approx([1, 1, 1.0422, 1.0137], abs=1e-4)
+    assert own["verdict"].tolist() == [claims.CONFIRMED] * 2 + [claims.REFUTED] * 2
+    assert own["extension"].tolist() == [False, False, True, True]
 
 
 def test_what_is_known_exactly_is_judged_exactly(results):
