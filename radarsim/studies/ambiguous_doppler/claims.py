@@ -4,7 +4,7 @@
 scan to scan … filters of order zero as well as one and two … combined by the total errors at that step."
 """
 
-from radarsim.report.claims import Claim, Part, above, at_most, below, less
+from radarsim.report.claims import Claim, Part, above, at_most, less
 from radarsim.studies.ambiguous_doppler import measures
 
 CONCLUSION = "last sentences"
@@ -48,19 +48,23 @@ CLAIMS = (
     ),
     _claim(
         2,
-        "Without memory it fails: the folds are right in fewer than half of the realisations",
+        "Without memory folded velocity is worth nothing: it lowers no error of velocity",
         *(
             Part(
                 (_radar(n),),
-                f"all folds right at the last scan: {name}",
-                "",
-                measures.right_at_the_end(_radar(n), name),
-                below(0.5),
+                f"gain of velocity at {words}: {name}",
+                "%",
+                measures.gain(_radar(n), name, at),
+                at_most(0, 1),
+                statement=name,
             )
-            for n in RADARS
             for name in ("nearest fold", "no memory")
+            for n in RADARS
+            for at, words in ((measures.AT, f"scan {measures.AT}"), (None, "the last scan"))
         ),
-        reading="both ways to have no memory: the nearest fold, and hypotheses merged at each scan",
+        reading="against range alone, both ways to have no memory: the nearest fold, and hypotheses merged at each "
+        "scan. Either is right in fewer than half of the realisations, and merging pays all the same: little at first, "
+        "a sixth to a half of σ by 140 s",
         config="ambiguous",
         original=WISH,
     ),

@@ -16,10 +16,6 @@ AT = 8  # scan at which gains are compared: the folds of the paper's centimetre 
 class Evidence(claims.Evidence):
     """Finds the shipped experiments' cases by their names."""
 
-    def folds(self, key: str, name: str) -> Series:
-        """Share of realisations in which a filter has all folds right, by scan."""
-        return self._of(self.tables["folds"], key, name, ("right", "right_lo", "right_hi"))
-
     def above_oracle(self, key: str, name: str) -> Series:
         """By how much σ of the velocity is above that of unfolded velocity, %, by scan."""
         gains = self.tables["gains"]
@@ -34,14 +30,14 @@ class Evidence(claims.Evidence):
         return Series(k, t, value, lo, hi)
 
 
-def gain(key: str, name: str) -> Callable[[Evidence], Estimate]:
-    """Gain of a filter in σ of the velocity against range alone at scan 8, %."""
-    return lambda seen: seen.gain(key, name, "Vr").at(AT)
+def gain(key: str, name: str, scan: int | None = AT) -> Callable[[Evidence], Estimate]:
+    """Gain of a filter in σ of the velocity against range alone at a scan, %; None: at the last."""
 
+    def measure(seen: Evidence) -> Estimate:
+        found = seen.gain(key, name, "Vr")
+        return found.last() if scan is None else found.at(scan)
 
-def right_at_the_end(key: str, name: str) -> Callable[[Evidence], Estimate]:
-    """Share of realisations in which a filter has all folds right at the last scan."""
-    return lambda seen: seen.folds(key, name).last()
+    return measure
 
 
 def above_at_the_end(key: str, name: str) -> Callable[[Evidence], Estimate]:

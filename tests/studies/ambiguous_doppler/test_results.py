@@ -245,3 +245,18 @@ def test_the_fan_of_a_case_with_rare_folds_is_of_plots_as_they_fall():
     assert case.spec.rare is not None
     np.testing.assert_array_equal(shown.truth, fans.fan(plain, number, 3).truth)
     assert len(shown.lists) == 3
+
+
+def test_what_memory_is_worth_is_measured_by_the_error_and_not_by_right_folds():
+    """Folds merged at each scan are right next to never, and lower σ of the velocity all the same."""
+    result = radarsim.run("ambiguous", realisations=400, figures=False)
+    folds = result.tables["folds"]
+    assert folds[(folds["filter"] == "no memory") & (folds["k"] > 10)]["right"].max() < 0.05
+    rows = result.tables["claims"]
+    own = rows[rows["claim"] == "P1.E2"]
+    assert set(own["class"]) == {"refuted"}
+    nearest = own["what"].str.endswith("nearest fold")
+    assert set(own[nearest]["verdict"]) == {"confirmed"}
+    last = own[~nearest & own["what"].str.contains("last scan")]
+    assert len(last) == 4
+    assert set(last["verdict"]) == {"refuted"}
