@@ -40,7 +40,8 @@ class Part:
 class Claim:
     """A statement of a paper: where it stands, how it was read, the parts that judge it, the config that holds them.
 
-    original is the sentence in the paper's language. An extension is ours, and not counted. unstated says what the
+    original is the sentence in the paper's language. An extension is ours, and not counted. reported: the paper says
+    that others assert it, and does not itself: judged under every reading, and not counted. unstated says what the
     paper leaves out without which the statement cannot be judged; joint: one variant has to give every number;
     internal: both sides are printed, so that what does not agree is the print with itself.
     """
@@ -53,6 +54,7 @@ class Claim:
     config: str = ""
     original: str = ""
     extension: bool = False
+    reported: bool = False
     unstated: str = ""
     joint: bool = False
     internal: bool = False
@@ -61,6 +63,11 @@ class Claim:
     def paper(self) -> str:
         """The key of the paper, the part of the id before its first point."""
         return self.id.partition(".")[0]
+
+    @property
+    def counted(self) -> bool:
+        """Whether it is one of the paper's own claims."""
+        return not (self.extension or self.reported)
 
     @property
     def how(self) -> dict[str, bool]:

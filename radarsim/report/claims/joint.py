@@ -133,6 +133,7 @@ def joint(of: PaperReadings, over: Sequence[Over]) -> Joint:
     The readings are those that are declared for a claim, and all combinations of E and U under which every claim was
     judged: as under the reading that takes what bears on it.
     """
+    over = [one for one in over if one.claim.counted]
     claims = [{one.reading: _Own(one) for one in claim.under if one.outcome is not None} for claim in over]
     declared = dict.fromkeys(one.reading for claim in over for one in claim.under)
     varied = [choice for choice in of.choices if any(choice.bears_on(claim.claim.id) for claim in over)]

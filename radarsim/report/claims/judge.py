@@ -247,7 +247,7 @@ def _row(claim: Claim, paper: str, one: _Tried, outcome: Outcome | None, many: i
         "unit": part.unit,
         "margin_kind": part.expected.kind,
         "number": f"{part.statement}{part.number}" if part.number else "",
-        "extension": claim.extension or not part.asserted,
+        "extension": not (claim.counted and part.asserted),
         "overall": outcome.words if outcome else NOT_JUDGED,
         **dict.fromkeys(("class", "as_shipped"), outcome.kind if outcome else NOT_JUDGED),
         "worst_miss": _end(outcome.miss) if outcome else math.nan,
@@ -283,7 +283,7 @@ def blank(claim: Claim, paper: str) -> dict[str, Any]:
         "place": claim.place,
         "reading": claim.reading,
         "original": claim.original,
-        "extension": claim.extension,
+        "extension": not claim.counted,
         "why": claim.unstated,
     }
 

@@ -20,24 +20,37 @@ LIKELIHOOD, MERGE, MERGE_ONCE = 8, 208, -9
 MOST_SCANS, PASSES = 4096, 5  # of the measurement by the clock
 
 
-def operations(family: str, transition: np.ndarray, accelerates: Sequence[bool]) -> tuple[float, float, float]:
+def blocks(family: str, transition: np.ndarray, merged_first: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    """Extrapolations and updates (M,) of each model in a scan, by the changes that transition (M, M) allows.
+
+    merged_first: of family imm hypotheses are merged before a model extrapolates them, and not after.
+    """
+    sources, once = np.count_nonzero(transition, axis=1), np.ones(len(transition), dtype=int)
+    if family == "gpb2":
+        return sources, sources
+    return (sources if family == "imm" and not merged_first else once), once
+
+
+def operations(
+    family: str, transition: np.ndarray, accelerates: Sequence[bool], merged_first: bool = True
+) -> tuple[float, float, float]:
     """Arithmetic operations of one scan: fixed ones, and those of each merged hypothesis and of each merge.
 
     transition (M, M); accelerates (M,): whether each model has an acceleration. A merge of a single hypothesis is a
     copy and costs nothing.
     """
-    size = len(transition)
-    times = np.count_nonzero(transition, axis=1) if family == "gpb2" else np.ones(size, dtype=int)
-    advanced = sum(n * (PREDICT[bool(a)] + UPDATE[bool(a)]) for n, a in zip(times, accelerates, strict=True))
+    size, (extrapolated, updated) = len(transition), blocks(family, transition, merged_first)
+    every = zip(extrapolated, updated, accelerates, strict=True)
+    advanced = sum(m * PREDICT[bool(a)] + n * UPDATE[bool(a)] for m, n, a in every)
     predicted = size * (2 * size - 1) if size > 1 else 0
-    likelihoods = times.sum() * LIKELIHOOD if size > 1 else 0
+    likelihoods = updated.sum() * LIKELIHOOD if size > 1 else 0
     return float(advanced + likelihoods + predicted), MERGE, MERGE_ONCE
 
 
-def operations_of(options: Filter) -> tuple[float, float, float]:
+def operations_of(options: Filter, merged_first: bool = True) -> tuple[float, float, float]:
     """`operations` of a filter of a config."""
     accelerates = [filters.MOTIONS[model.motion][1] > 0 for model in options.models]
-    return operations(options.family, filters.transition_matrix(options.transition), accelerates)
+    return operations(options.family, filters.transition_matrix(options.transition), accelerates, merged_first)
 
 
 def seconds_per_update(plan: Plan) -> dict[str, float]:

@@ -1,16 +1,17 @@
 """Flights that the axes of P2's lost figures allow, beside the shipped one; chosen before any filter ran on them.
 
 What is left of figures 1 to 4: 0 to 200 km north, ±100 km east, under 2000 m/s, 186.2 s, a ballistic part and one of
-intense manoeuvre. What manoeuvre it is, in the vertical or to the side, how strong and for how long, is lost. All
-flights begin as the shipped one does, and all but the two last manoeuvre from 125 s to 170 s. Manoeuvres are those of
-the field's textbooks: a weave, reversals, one pull-up, a spiral; 40 to 250 m/s², which is 4 to 25 g.
+intense manoeuvre. What manoeuvre it is, in the vertical or to the side, how strong, from when on and for how long, is
+lost. All flights but one begin as the shipped one does; they manoeuvre from 125 s on, the early ones from 60 s, to
+170 s at the latest. Manoeuvres are those of the field's textbooks: a weave, reversals, one pull-up, a spiral; 40 to
+250 m/s², which is 4 to 25 g.
 """
 
 from typing import Any
 
 from radarsim.studies.multimodel.config import Flight
 
-BEGINS, ENDS = 125, 170  # s, of the manoeuvre
+BEGINS, ENDS, EARLY = 125, 170, 60  # s, of the manoeuvre; EARLY: another beginning
 BASE: dict[str, Any] = {
     "kind": "flight",
     "duration_s": 186.2,
@@ -24,7 +25,7 @@ BASE: dict[str, Any] = {
 def _flight(phases: list[dict[str, Any]], ends: float = ENDS, **other: Any) -> Flight:
     """Ballistic, then these phases, then trimmed; stages as those of the shipped flight."""
     stages = [
-        *({"name": "start", "end_s": 20}, {"name": "ballistic", "end_s": BEGINS}),
+        *({"name": "start", "end_s": 20}, {"name": "ballistic", "end_s": phases[0]["start_s"]}),
         *({"name": "manoeuvre", "end_s": ends}, {"name": "after"}),
     ]
     every = [{"start_s": 0}, *phases, {"start_s": ends, "trimmed": True}]
@@ -42,10 +43,10 @@ def _held(size: float, until_s: float, key: str = "normal_mps2", **also: float) 
     return {"phases": [{"start_s": BEGINS, key: size, **also}], "ends": until_s}
 
 
-def _reversals(key: str, size: float, held_s: float, **also: float) -> list[dict[str, Any]]:
+def _reversals(key: str, size: float, held_s: float, begins: float = BEGINS, **also: float) -> list[dict[str, Any]]:
     """Accelerations of one size, the sign changed after each has been held."""
-    count = int((ENDS - BEGINS) / held_s)
-    return [{"start_s": BEGINS + i * held_s, key: size * (-1) ** i, **also} for i in range(count)]
+    count = int((ENDS - begins) / held_s)
+    return [{"start_s": begins + i * held_s, key: size * (-1) ** i, **also} for i in range(count)]
 
 
 def _spiral(size: float, held_s: float, turns: int) -> list[dict[str, Any]]:
@@ -81,5 +82,9 @@ FLIGHTS: dict[str, Flight] = {
     "low, vertical weave 60": _flight(
         _weave(16, normal_mps2=60), position_m=[150e3, 42e3, 60e3], velocity_mps=[-700, 560, -500]
     ),
+    "early lateral reversals 150": _flight(
+        _reversals("lateral_mps2", 150, 9, EARLY, normal_mps2=20), ends=EARLY + 12 * 9
+    ),
+    "early vertical reversals 100": _flight(_reversals("normal_mps2", 100, 6, EARLY), ends=EARLY + 18 * 6),
     "dive 60": _flight(**_held(-60, 145)),
 }

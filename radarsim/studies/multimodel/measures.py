@@ -186,12 +186,44 @@ def _moments(weight: np.ndarray, x: np.ndarray, P: np.ndarray) -> tuple[np.ndarr
 def cost_of_merging_early(seen: Evidence, key: tuple, wanted: tuple) -> float:
     """Operations of a scan of a filter that extrapolates what is merged, over one that merges what is extrapolated."""
     options = seen.case(key).spec.filters[seen.filter(key, wanted)]
-    fixed, merge, once = cost.operations_of(options)
-    whole = fixed + merge * np.count_nonzero(filters.transition_matrix(options.transition)) + once
-    sources = np.count_nonzero(filters.transition_matrix(options.transition), axis=1)
-    accelerates = [filters.MOTIONS[model.motion][1] > 0 for model in options.models]
-    more = sum((n - 1) * cost.PREDICT[a] for n, a in zip(sources, accelerates, strict=True))
-    return float(whole / (whole + more))
+    merges = np.count_nonzero(filters.transition_matrix(options.transition))
+    early, late = (
+        fixed + merge * merges + once
+        for fixed, merge, once in (cost.operations_of(options, merged_first) for merged_first in (True, False))
+    )
+    return float(early / late)
+
+
+def blocks_over(key: tuple, wanted: tuple, family: str, which: int, power: int) -> Callable[[Evidence], Estimate]:
+    """Extrapolations (which = 0) or updates (1) of a family with a filter's bank of N models, over a power of N."""
+
+    def measure(seen: Evidence) -> Estimate:
+        options = seen.case(key).spec.filters[seen.filter(key, wanted)]
+        T = filters.transition_matrix(options.transition)
+        return certain(cost.blocks(family, T, merged_first=False)[which].sum() / len(T) ** power)
+
+    return measure
+
+
+def bend(range_m: float, sigma_range_m: np.ndarray, sigma_angle_rad: np.ndarray) -> np.ndarray:
+    """What linearisation leaves out of a plot's mean squared error along the line of sight, over what it has.
+
+    A plot converted to rectangular coordinates falls short by r(α² + β²)/2, whose mean square is 2r²σ⁴.
+    """
+    return 2 * (range_m * sigma_angle_rad**2 / sigma_range_m) ** 2
+
+
+SIGMA_RANGE_M, SIGMA_ANGLE_RAD = (1.0, 150.0), tuple(np.radians(np.array([2.0, 15.0]) / 60))  # as P2 prints them
+
+
+def share_linear(range_m: float, even_logarithms: bool = False, most: float = 0.1, steps: int = 1000) -> float:
+    """Share of the printed accuracies of radars of which `bend` is at most so much; each range is spread evenly."""
+    middles = (np.arange(steps) + 0.5) / steps
+    axes = [
+        low * (high / low) ** middles if even_logarithms else low + (high - low) * middles
+        for low, high in (SIGMA_RANGE_M, SIGMA_ANGLE_RAD)
+    ]
+    return float(np.mean(bend(range_m, *np.meshgrid(*axes)) <= most))
 
 
 def rival_parts(key: tuple, stages: tuple[str, ...], expected: Range) -> tuple[Part, ...]:

@@ -18,6 +18,12 @@ AERODYNAMIC = "P2.4"  # speaks of another target than the lost flight
 ESTIMATES = tuple(f"P2.{n}" for n in (1, 6, 7, 8, 9, 10, 12, 13))
 SHIPPED = "aeroballistic"
 
+
+def _begins(flight: str) -> float:
+    """When the manoeuvre of a flight begins, s."""
+    return FLIGHTS[flight].phases[1].start_s
+
+
 CHOICES = (
     Choice(
         "flight",
@@ -27,7 +33,10 @@ CHOICES = (
         "for their axes: 0 to 200 km north, ±100 km east, under 2000 m/s, 186.2 s.",
         (
             Alternative(SHIPPED, UNSTATED, "a pull-up, then a lateral weave of 60 m/s² and 16 s"),
-            *(Alternative(name, UNSTATED, "within the printed axes, ballistic to 125 s") for name in FLIGHTS),
+            *(
+                Alternative(name, UNSTATED, f"within the printed axes, ballistic to {_begins(name):g} s")
+                for name in FLIGHTS
+            ),
         ),
         OF_FLIGHT,
     ),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from radarsim.studies.multimodel import flight
-from radarsim.studies.multimodel.flights import BEGINS, FLIGHTS
+from radarsim.studies.multimodel.flights import FLIGHTS
 from radarsim.studies.multimodel.readings import CHOICES
 
 T = np.arange(0, 186.2, 0.5)
@@ -33,7 +33,8 @@ def test_a_flight_is_within_the_printed_axes(name):
     elevation = np.arcsin((up * np.cos(e) - north * np.sin(e)) / slant)
     azimuth = np.arcsin(east / slant)
     assert np.degrees(abs(elevation) + abs(azimuth)).max() < 85
-    ballistic = track[(T > 0) & (T < BEGINS)]
+    ballistic = track[(T > 0) & (FLIGHTS[name].phases[1].start_s > T)]
+    assert len(ballistic) > 100
     assert np.allclose(ballistic[:, [2, 8]], 0, atol=1.0)  # gravity and little drag: no force to the side
 
 
@@ -41,6 +42,12 @@ def test_a_flight_is_within_the_printed_axes(name):
 def test_one_that_cannot_be_flown_says_why(name):
     with pytest.raises(flight.Unflyable, match="hits the ground"):
         flown(FLIGHTS[name])
+
+
+def test_when_the_manoeuvre_begins_is_varied():
+    """A model that takes no part in the ballistic stage would take none either where that is half as long."""
+    begins = {of.phases[1].start_s for of in FLIGHTS.values()}
+    assert {60, 125} <= begins
 
 
 def test_there_are_enough_of_both_kinds():

@@ -189,8 +189,10 @@ def on_a_straight_course(component: str) -> Measure:
 
     def measure(seen: Evidence) -> Estimate:
         end = seen.case(TURNING).spec.target.turns[0].start_s
-        curves = [seen.curve(key, seen.filter(key, "growing_memory"), component) for key in (TURNING, TEXTBOOK)]
-        return ratio(*(curve.where(curve.t <= end).last() for curve in curves))
+        straight, linear = (
+            seen.curve(key, seen.filter(key, "growing_memory"), component) for key in (TURNING, TEXTBOOK)
+        )
+        return ratio(straight.where(straight.t <= end).last(), linear.where(linear.t <= end).last())
 
     return measure
 
