@@ -100,9 +100,9 @@ def handovers(burst: Burst, version: Version, windows: Sequence[int]) -> list[np
 
 
 def phase_offsets(burst: Burst, version: Version, windows: Sequence[int]) -> np.ndarray:
-    """How far the best phase lies from the start's, rad, one σ (len(windows),): from the forecast, then at hand-overs.
+    """How far the best phase lies from the start's, rad, one σ (K,): from the forecast, then at hand-overs.
 
-    Of all parameters but the phase the start's stay: what a search over the phase alone would find.
+    windows (K,) in pulses. Of all parameters but the phase the start's stay: what a search over it alone would find.
     """
     of = _Problem(burst, [version])
     information, _ = of.posterior(np.zeros(len(windows), dtype=int), np.array(windows, dtype=float))

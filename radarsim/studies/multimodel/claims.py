@@ -171,7 +171,7 @@ CLAIMS = (
         "прямолинейного равномерного движения с малыми возмущениями фактически не участвует в работе "
         "алгоритма.",
         reading="its mean probability over the whole flight is under a tenth; flights that manoeuvre from 60 s on are "
-        "among the readings, and change nothing: the weak model leads neither, and takes part in each stage",
+        "among the readings, and change nothing",
     ),
     _claim(
         "6",
