@@ -31,13 +31,14 @@ it (`radarsim run CONFIG`, then `radarsim claims CONFIG`). The class is over all
 it leaves anything open (`radarsim readings`): "refuted as shipped; depends on start" is false with the choices that
 the config takes, and true with another start. Below, to be opened: every claim in the original and how it was read,
 and every part: what was measured, the exact value where it is known, which then decides, the values that the words
-leave, and by how many margins it misses them. Extensions are ours and are not counted.
+leave, and by how many margins it misses them. Extensions are ours, or what a paper only reports of others, and are not
+counted.
 
 ![All claims, in margins of what their papers say](claims.svg)
 """
 MARKS = (CONFIRMED, REFUTED)  # in bold
 ORDER = (*CLASSES, NOT_JUDGED, NOT_RUN)
-NOT_COUNTED = term("extension, not counted")  # a claim, or a part of one, that is ours
+NOT_COUNTED = term("extension, not counted")  # a claim, or a part of one, that is not the paper's own
 WORDS = {  # of each class, for the headline
     CONFIRMED: "true as stated",
     REFUTED: "false by more than the margin of their words",
@@ -124,7 +125,7 @@ def grouped(rows: Sequence[Mapping]) -> list[list[Mapping]]:
 
 
 def extension(parts: Sequence[Mapping]) -> bool:
-    """Whether all of a claim is ours."""
+    """Whether nothing of a claim is the paper's own: ours, or reported of others."""
     return all(str(part["extension"]).lower() == "true" for part in parts)
 
 
