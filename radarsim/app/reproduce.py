@@ -187,13 +187,15 @@ def _follow(parent: int) -> None:
 
 
 def _run(task: Task, stop: Signals) -> Done:
+    from radarsim.report.claims import page
+
     started = time.perf_counter()
     faults: tuple[str, ...] = ()
     code = 0
     stages: dict[str, float] = {}
     try:
         result = experiment.run(task.stem, overrides=task.overrides, out=task.out, stop=stop, figures=task.figures)
-        verdicts = ", ".join(f"{len(names)} {verdict}" for verdict, names in result.verdicts().items())
+        verdicts = ", ".join(page.of_class(kind, len(names)) for kind, names in result.verdicts().items())
         drawn = sum(name.endswith(".svg") for name in result.written.files) if result.written else 0
         made = [plural(drawn, "figure")] if task.figures else []
         made += [f"claims: {verdicts}"] if verdicts else []

@@ -63,6 +63,9 @@ def test_forest_stands_in_margins():
     np.testing.assert_allclose((refuted.lo, refuted.y, refuted.hi), ([1.0], [2.0], [3.0]))
     np.testing.assert_allclose((confirmed.lo, confirmed.y, confirmed.exact), ([-1.5], [-1.0], [-1.25]))
     assert forest.figure([row(kind=NOT_RUN)]) is None
+    (wide,) = forest.figure([row(judged_lo="", judged_hi="")]).panels[0].marks[:1]  # few realisations have no interval
+    assert np.isnan(wide.lo).all()
+    assert page.measured(row(judged_lo="", judged_hi="")) == "3 m"
 
 
 def test_of_variants_of_a_number_the_nearest_is_drawn():

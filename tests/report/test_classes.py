@@ -58,7 +58,7 @@ def agree(out):
     rows = {parts[0]["claim"]: parts[0] for parts in page.grouped(every)}
     lines = {line.split()[0]: line for line in command("claims", "--out", out).splitlines() if line[:1] == "P"}
     made = command("claims", "--markdown", "--out", out)
-    marks = drawn(every)
+    marks = drawn(experiment.claims((), out))
     stands = dict(re.findall(r"^\| (P\d\.\w+) \| .* \| ([^|]*) \| `\w+` \|$", made, re.MULTILINE))
     assert rows.keys() == lines.keys() == stands.keys() == PAPERS.keys()
     for claim, row in rows.items():
@@ -109,7 +109,7 @@ def test_every_claim_has_one_class_wherever_it_is_said(tmp_path, own):
     shipped = {one.claim: one.kind for one in shipped_classes()}
     assert kinds == {claim: shipped.get(claim, own) for claim in PAPERS}
     assert len(shipped) > 50
-    assert len(drawn(json.loads(command("claims", "--json", "--out", tmp_path)))) == len(PAPERS)
+    assert len(drawn(experiment.claims((), tmp_path))) == len(PAPERS)
 
 
 def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
@@ -125,7 +125,7 @@ def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
     assert f"P1.18  {phrase}: RLS 2" in command("claims", "rls2", "--out", tmp_path)
     index.write(tmp_path)
     assert "1 confirmed, 2 depend on what the paper leaves open" in (tmp_path / "index.html").read_text()
-    rows = json.loads(command("claims", "rls2", "--json", "--out", tmp_path))
+    rows = experiment.claims(("rls2",), tmp_path)
     assert drawn(rows)["P1.18"] == rule.DEPENDS
     assert "1 confirmed, 2 depend on what the paper leaves open" in forest.figure(rows).caption
 

@@ -279,7 +279,8 @@ def measured(row: Mapping) -> str:
 def bounds(row: Mapping) -> tuple[float, float]:
     """The interval of a part that is shown: that which is judged, or of one known exactly its own 95 %."""
     names = ("judged_lo", "judged_hi") if number(row["exact"]) is None else ("lo", "hi")
-    return float(row[names[0]]), float(row[names[1]])
+    lo, hi = (math.nan if row[name] == "" else float(row[name]) for name in names)
+    return lo, hi
 
 
 def _cell(text: str) -> str:
