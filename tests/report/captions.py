@@ -12,6 +12,7 @@ import numpy as np
 from radarsim.language import tr
 from radarsim.report import panels, seen
 from radarsim.report.chart_text import spoken
+from radarsim.report.drawing import Line
 
 RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"
 POWER = re.compile(rf"(−?)(?:(\d+(?:[.,]\d+)?)·)?10([{RAISED}]+)")
@@ -25,6 +26,7 @@ ENDS = (
     "Of all panels lowest {low} ({lowest}), highest {high} ({highest}).",
 )
 EVERY = {1: "At the end lowest in every panel: {names}.", -1: "At the end highest in every panel: {names}."}
+SOME = {1: "At the end lowest: {told}.", -1: "At the end highest: {told}."}
 MOST = ("At most {most} ({name}), at the end.", "At most {most} ({name}, at {t_s:g} s); {last} at the end.")
 EXTREMES = (
     "{quantity}: highest {high} ({name}), lowest {low} ({other}).",
@@ -58,7 +60,7 @@ def table_of(figure, study):
     if study == "ambiguous_doppler" and figure in ("right", "lost"):
         column = {"right": "right", "lost": "beyond"}[figure]
         return "folds", (column, f"{column}_lo", f"{column}_hi"), None
-    return ("locks", ("lock_rate", "lock_lo", "lock_hi"), None) if figure == "locks" else None
+    return None
 
 
 def found(template, caption):
@@ -163,6 +165,13 @@ def judged(result, figure, caption):
                 _, first = at(rows, sign)
                 if not any(spoken(panels.literal(row.filter)) in claim["names"] for row in first):
                     faults.append(f"{figure}: {claim['names']} is {first[0].filter} in {first[0].case}")
+    for sign, template in SOME.items():
+        if claim := found(template, caption):
+            for rows in panels_of(study, cases or result.cases, every):
+                _, first = at(rows, sign)
+                named = any(spoken(panels.literal(row.filter)) in claim["told"] for row in first)
+                if not named and tr("others in {count}").partition(" ")[0] not in claim["told"]:
+                    faults.append(f"{figure}: {claim['told']} is {first[0].filter} in {first[0].case}")
     for template in MOST:
         if claim := found(template, caption):
             told += 1
@@ -191,25 +200,92 @@ def panels_of(study, cases, rows):
     return [rows for rows in by_panel if rows]
 
 
+def rates(result, figure, caption):
+    """Faults of a caption of shares of locks, or of wrong folds over a sweep: as shares, or as what is lost of them."""
+    spoke, of = spoken(caption), ("folds", "right") if figure == "right" else ("locks", "lock_rate")
+    table = result.tables[of[0]]
+    if figure.startswith("locks"):
+        shown = [one.name for one in result.cases if not one.swept and one.name in figure] or [
+            one.name for one in result.cases if not one.swept
+        ][:1]
+        groups = table[table["case"].isin(shown)].groupby("filter", sort=False)
+        some = {name: own[of[1]].to_numpy(float) for name, own in groups}
+        if result.experiment.study == "pulses_to_tracks":
+            ideal = {f.name for f in result.cases[0].spec.filters if f.estimator == "fisher_bound"}
+            lost = {name: ((1 - own[of[1]]) * own["n"]).sum() for name, own in groups}
+            some = {name: y for name, y in some.items() if name not in ideal and lost[name] >= 20}
+    else:
+        family = {one.name for one in result.cases if "_".join(["lock", *ends_of(one)]) == figure or figure == "right"}
+        last = table[table["case"].isin(family)].groupby(["case", "filter"], sort=False).tail(1)
+        some = {name: own[of[1]].to_numpy(float) for name, own in last.groupby("filter", sort=False)}
+    wrong = []
+    for turn in (lambda y: 1 - y, lambda y: y):
+        wrong.append([])
+        values = {name: turn(y) for name, y in some.items()}
+        if claim := next(filter(None, (found(one, spoke) for one in ENDS[:2])), None):
+            ends = {name: y[-1] for name, y in values.items()}
+            pairs = (("low", "lowest", min(ends.values())), ("high", "highest", max(ends.values())))
+            who = {true: [name for name in ends if ends[name] == true] for _, _, true in pairs}
+        elif claim := next(filter(None, (found(one, spoke) for one in EXTREMES)), None):
+            low, high = min(y.min() for y in values.values()), max(y.max() for y in values.values())
+            pairs = (("low", "other" if "other" in claim else "name", low), ("high", "name", high))
+            who = {low: [n for n in values if low in values[n]], high: [n for n in values if high in values[n]]}
+        else:
+            return [f"{figure}: nothing was judged of: {spoke[:200]}"]
+        for end, names, true in pairs:
+            if not close(value(claim[end]), true) or not any(spoken(one) in claim[names] for one in who[true]):
+                wrong[-1].append(f"{figure}: {claim[end]!r} of {claim[names]!r} is {true:.4g} of {who[true]}")
+    return [] if [] in wrong else wrong[0]
+
+
+def ends_of(result):
+    return [key.rpartition(".")[2] for key, _ in result.swept]
+
+
+def sweep(result, figure, caption):
+    """Faults of a caption of σ at the last scan over swept keys, quantity by quantity."""
+    spoke, faults, told = spoken(caption), [], 0
+    members = [one for one in result.cases if one.swept and figure.endswith("_".join(ends_of(one)))]
+    own_stem = [one for one in members if figure == "_".join(["sweep", panels.stem(one), *ends_of(one)])]
+    members = own_stem or [one for one in members if figure == "_".join(["sweep", *ends_of(one)])]
+    table = result.tables["curves"]
+    table = table[table["case"].isin([one.name for one in members])]
+    last = table.groupby(["case", "filter", "component"], sort=False).tail(1)
+    for component, own in last.groupby("component", sort=False):
+        factor = 180 / np.pi if own["unit"].iloc[0].startswith("rad") and len(members[0].swept) == 1 else 1.0
+        template = "$\\sigma$ of {symbol} at the end" if len(members[0].swept) == 1 else "$\\sigma$ of {symbol}"
+        words = spoken(tr(template, symbol=panels.letter(component)))
+        at = spoke.find(f"{words}: ")
+        claim = at >= 0 and next(filter(None, (found(one, spoke[at:]) for one in EXTREMES)), None)
+        if not claim or claim["quantity"] != words:
+            continue
+        told += 1
+        for end, true in (("high", own["sigma"].max()), ("low", own["sigma"].min())):
+            if not close(value(claim[end]), factor * true):
+                faults.append(f"{figure}: {component} {end} {claim[end]!r} is {factor * true:.4g}")
+    return faults, told
+
+
 def checked(result):
     """Faults of all captions of σ, gains and rates of a result in the language spoken, and how many were judged."""
     from radarsim.app import output
 
     faults, told = [], 0
     for name, figure in output.figures(result.cases, result.tables, result.experiment).items():
-        if table_of(name, result.experiment.study) is None or seen_elsewhere(result, name):
+        kind = name.partition("_")[0]
+        if kind in ("locks", "lock") or (name == "right" and "rare" in result.tables):
+            if len(figure.panels) == 1 and any(isinstance(mark, Line) for mark in figure.panels[0].marks):
+                faults += rates(result, name, figure.caption)
+                told += 1
             continue
-        wrong, own = judged(result, name, figure.caption)
+        if kind != "sweep" and table_of(name, result.experiment.study) is None:
+            continue
+        wrong, own = (sweep if kind == "sweep" else judged)(result, name, figure.caption)
         faults += wrong
         told += own
         if not own:
             faults.append(f"{name}: nothing was judged of: {figure.caption[:200]}")
     return faults, told
-
-
-def seen_elsewhere(result, figure):
-    """Figures whose sentence is of losses, or over a sweep."""
-    return figure == "locks" or (figure == "right" and "rare" in result.tables)
 
 
 assert ENDS[-1] == seen.OF_ALL  # the sentences are those that are told

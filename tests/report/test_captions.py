@@ -1,5 +1,7 @@
 """Every caption against its table, and every answer whole, in both languages: what is told is what the numbers say."""
 
+import re
+
 import pytest
 
 from radarsim import language
@@ -55,3 +57,12 @@ def test_a_wrong_caption_is_noticed(words, others):
     name, caption = next((name, one.caption) for name, one in drawn.items() if words in one.caption)
     assert captions.judged(result, name, caption)[0] == []
     assert captions.judged(result, name, caption.replace(words, others))[0]
+
+
+@pytest.mark.parametrize("code", language.known())
+def test_a_translation_tells_the_same_values_in_the_same_order(code):
+    """What is read back by a translation's own places would not tell lowest from highest exchanged in it."""
+    places = re.compile(r"\{(\w+)")
+    with language.speaking(code):
+        for one in (*captions.ENDS, *captions.MOST, *captions.EXTREMES):
+            assert places.findall(language.tr(one)) == places.findall(one)
