@@ -555,11 +555,9 @@ class Panel {
 
   // A place of the axis of x in words: a number, or what stands at the tick where that is a word.
   across(value) {
-    for (const one of this.svg.querySelectorAll(":scope > text[data-x]")) {
-      const text = one.textContent.trim();
-      if (Math.abs(Number(one.getAttribute("data-x")) - value) < 0.45 && !NUMERAL.test(text)) return text;
-    }
-    return words(value);
+    const near = (one) => Math.abs(Number(one.getAttribute("data-x")) - value) < 0.45 && !NUMERAL.test(one.textContent.trim());
+    const ticks = [...this.svg.querySelectorAll(":scope > text[data-x]")].filter(near);
+    return ticks.length ? ticks.map((one) => one.textContent.trim()).join(" ") : words(value); // a long one has two lines
   }
 
   mark(points) {
