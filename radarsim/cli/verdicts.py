@@ -78,7 +78,8 @@ def _print_claim(parts: Sequence[Mapping[str, Any]], detailed: bool) -> None:
     if not detailed:
         words = tr(first["statement"]).split()
         short = " ".join(words[:SHORT]) + (" …" if len(words) > SHORT else "")
-        say(f"{first['claim']:<6} {verdict}: {short}")
+        by = f" (radarsim run {first['config']})" if first["class"] == NOT_RUN else ""
+        say(f"{first['claim']:<6} {verdict}{by}: {short}")
         return
     place = f"{tr(first['paper'])}, {tr(first['place'])}"
     say(f"{first['claim']:<6} {verdict}: {tr(first['statement'])} [{place}; {first['config']}]")
