@@ -249,7 +249,7 @@ def test_the_fan_of_a_case_with_rare_folds_is_of_plots_as_they_fall():
 
 def test_what_memory_is_worth_is_measured_by_the_error_and_not_by_right_folds():
     """Folds merged at each scan are right next to never, and lower σ of the velocity all the same."""
-    result = radarsim.run("ambiguous", realisations=400, figures=False)
+    result = radarsim.run("ambiguous", realisations=2000, figures=False)
     folds = result.tables["folds"]
     assert folds[(folds["filter"] == "no memory") & (folds["k"] > 10)]["right"].max() < 0.05
     rows = result.tables["claims"]
