@@ -72,7 +72,7 @@ def distances(made: "Mapping[str, pd.DataFrame]", name: str, of: Beside, nearly:
     size, lacking, squares = np.abs(exact), np.zeros(len(table)), of.value in SQUARES
     if of.value == "bias":
         size = np.fmax(size, table["sigma"].to_numpy(dtype=float))
-        lacking = size * np.sqrt(UNSEEN / table["n"].to_numpy(dtype=float))
+        lacking = size * np.sqrt(UNSEEN / np.fmax(table["n"].to_numpy(dtype=float), 1.0))  # n = 0: no row is judged
     elif of.value.endswith("_percent"):  # of a ratio of two σ
         size = np.abs(100 - exact)
         lacking[:] = np.inf
