@@ -60,7 +60,17 @@ def report_fit(found: Fit) -> None:
     if found.outliers is not None:
         lines.append(tr("outliers: {share} % of the plots", share=significant_digits(100 * found.outliers, "#.2g")))
     settings = " ".join(f"--set {key}={value:g}" for key, value in fit.settings(found).items())
-    lines.append(labelled("", tr("the stated values are less likely by a factor of exp({gain:.1f})", gain=found.gain)))
+    if found.beside is not None:
+        lines.append(labelled("", tr("the intervals do not hold: {what}", what=words.what(*found.beside))))
+    lines.append(
+        labelled(
+            "",
+            tr(
+                "with these values the plots are {times} times as likely as with those stated",
+                times=words.times(found.gain),
+            ),
+        )
+    )
     if settings:
         lines.append(labelled("", tr("to use what the plots tell: {settings}", settings=settings)))
     for line in lines:

@@ -15,7 +15,8 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError
-from radarsim.recorded import plots
+from radarsim.recorded import doppler, plots
+from radarsim.recorded.along import IMPOSSIBLE, Counted, Progress, best, silent, units
 from radarsim.recorded.follow import by_track, one_case, recorded_of
 from radarsim.studies.interface import OUTLIERS, Likelihood
 
@@ -27,10 +28,8 @@ EVALUATIONS = 2000
 # To which a top and an end of an interval are found, in the logarithm of a key; the likelihood's own to a tenth. That
 # is far finer than what is printed: which way a search goes hangs on last digits, and these differ between processors.
 CLOSE = 1e-6
-IMPOSSIBLE = -1e300  # what counts as the logarithm of no likelihood: a search needs a number
 STEP = 1e-3  # over which a slope is taken, in the logarithm of a key
 LEAST_SHARE, MOST_SHARE = 1e-6, 0.5  # of outliers; less is none
-FAR_FROM_ZERO = 1e4  # times what counts as zero of a key
 FINER, LEAP = 1e-3, 0.01  # what counts as zero is this part of before where the likelihood leaps by more there
 
 
@@ -52,7 +51,8 @@ class Fitted:
 @dataclass(frozen=True)
 class Fit:
     """What was fitted: filter, tracks and plots used, the keys, the share of outliers where they were allowed for, and
-    by how much the logarithm of the likelihood is above that of the stated values."""
+    by how much the logarithm of the likelihood is above that of the stated values; and what else the plots have, of
+    EXPLANATIONS, with its value: then the intervals do not hold."""
 
     filter: str
     tracks: int
@@ -60,6 +60,7 @@ class Fit:
     keys: tuple[Fitted, ...]
     outliers: float | None
     gain: float
+    beside: tuple[str, float] | None = None
 
 
 def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name: str | None = None) -> Likelihood:
@@ -77,6 +78,9 @@ def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name
     if same := [name for name in long[0] if name != "t_s" and all(np.ptp(one[name]) == 0 for one in long)]:
         raise ConfigError(f"{source}: {same[0]}: must differ between plots, or no σ can be told; all are the same")
     found = of.likelihood(case, filter_name, long)
+    folding = doppler.folded(case, long)
+    if folding and found is not None and doppler.VELOCITY in found.by_number(np.asarray(found.stated)):
+        raise ConfigError(f"{source}: {doppler.said(folding, source, case)}")
     if found is None:
         asked = f"filter {filter_name}" if filter_name else f"no filter of {case.name}"
         raise ConfigError(
@@ -96,13 +100,6 @@ def _tracks(
             if own.name != "":
                 parts.setdefault(own.name, []).append(own.columns)
     return [{key: np.concatenate([part[key] for part in pieces]) for key in pieces[0]} for pieces in parts.values()]
-
-
-Progress = Callable[[int], None]
-
-
-def silent(evaluations: int) -> None:
-    """Progress that nobody sees."""
 
 
 def fit(
@@ -134,13 +131,25 @@ def fitted(likelihood: Likelihood, robust: bool = False, progress: Progress = si
                           "different values?); fit without it")  # fmt: skip
     keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
     stated = likelihood(np.array(likelihood.stated), 0.0)
-    return Fit(likelihood.filter, likelihood.tracks, likelihood.rows, keys, share, search.top - stated)
+    gain = search.top - stated
+    return Fit(likelihood.filter, likelihood.tracks, likelihood.rows, keys, share, gain, _beside(search, likelihood))
 
 
-def units(likelihood: Likelihood) -> np.ndarray:
-    """From where each key is searched: as the config states it; one that it states as zero, far from what counts so."""
-    near_zero = np.asarray(likelihood.stated) <= likelihood.least
-    return np.where(near_zero, FAR_FROM_ZERO * np.asarray(likelihood.least), likelihood.stated)
+def _beside(search: "_Search", likelihood: Likelihood) -> tuple[str, float] | None:
+    """What explains the plots beside the keys that fit them best, with its value: that which raises the top most, if by
+    more than chance does in one recording of twenty."""
+    from scipy.stats import chi2
+
+    counted = Counted(likelihood, search.progress, search.evaluations)
+    fitted = search.natural(search.best).tolist()
+    held = dict(zip((*likelihood.keys, OUTLIERS), fitted, strict=False))
+    asked = [what for what in likelihood.explains if what not in held]
+    found = [best(counted, [what], {}, held) for what in asked]
+    if not found:
+        return None
+    values, top = max(found, key=lambda one: one[1])
+    needed = 0.5 * float(chi2.ppf(0.95 ** (1 / len(found)), 1))
+    return next(iter(values.items())) if top > search.top + needed else None
 
 
 def polished(value: Callable[[np.ndarray], float], at: np.ndarray) -> np.ndarray:

@@ -28,7 +28,7 @@ def write(
     page = html.followed(
         experiment.stem,
         os.path.basename(os.fspath(source)),
-        _said(words.verdict(judged, advised)) or ["Too few plots to judge the filters by."],
+        _said(words.verdict(followed, judged, advised)) or ["Too few plots to judge the filters by."],
         _said(words.rows(followed)),
         list(made.values()),
         {"Errors against the truth": _errors(followed), "Innovations": _tests(judged), "Tracks": _tracks(followed)},

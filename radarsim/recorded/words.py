@@ -1,12 +1,14 @@
 """What is said of tracks over recorded plots: rows, gaps, errors, how well the stated accuracies fit, advice."""
 
+import math
 from collections.abc import Sequence
 
 from radarsim.language import numeral, plural, term, tr
-from radarsim.recorded import accuracy, advice
-from radarsim.recorded.advice import Advice, Finding
+from radarsim.recorded import accuracy, doppler
+from radarsim.recorded.advice import Advice, Asked, Finding
 from radarsim.recorded.follow import Followed
-from radarsim.report.text import labelled, significant_digits, unit
+from radarsim.report.text import labelled, number, power_of_ten, significant_digits, unit
+from radarsim.studies.interface import BIAS, CORRELATION, OUTLIERS
 
 CLEAR = 3.0  # of the logarithm of a likelihood, twenty times: from there on one filter is clearly the best
 
@@ -14,12 +16,12 @@ CLEAR = 3.0  # of the logarithm of a likelihood, twenty times: from there on one
 def sentences(followed: Followed, judged: Sequence[accuracy.Judged], advised: Advice | None) -> list[str]:
     """All that is said, a line each; advised: where a likelihood is known."""
     lines = [tested(one, advised is None) for one in judged if one.tests]
-    return [*rows(followed), *errors(followed), *lines, *verdict(judged, advised)]
+    return [*rows(followed), *errors(followed), *lines, *verdict(followed, judged, advised)]
 
 
-def verdict(judged: Sequence[accuracy.Judged], advised: Advice | None) -> list[str]:
+def verdict(followed: Followed, judged: Sequence[accuracy.Judged], advised: Advice | None) -> list[str]:
     """Which filter is best, and what is to be changed: by the likelihood where it is known."""
-    return nearest(judged) if advised is None else likely(advised)
+    return nearest(judged) if advised is None else likely(followed, advised)
 
 
 def rows(followed: Followed) -> list[str]:
@@ -77,8 +79,8 @@ def errors(followed: Followed) -> list[str]:
 
 FINDINGS = {
     accuracy.FITS: term("the stated σ fits"),
-    accuracy.SMALL: term("the stated σ is too small, or the target manoeuvres harder than the filter allows"),
-    accuracy.LARGE: term("the stated σ is too large, or the filter allows for harder manoeuvres than there are"),
+    accuracy.SMALL: term("the plots err more than stated, or the target manoeuvres harder than the filter allows"),
+    accuracy.LARGE: term("the plots err less than stated, or the filter allows for harder manoeuvres than there are"),
     accuracy.UNKNOWN: term("too few plots to decide"),
 }
 
@@ -115,37 +117,96 @@ def nearest(judged: Sequence[accuracy.Judged]) -> list[str]:
     return [labelled("", words)]
 
 
-def likely(advised: Advice) -> list[str]:
-    """Which filter predicts the plots best, and what is wrong with its numbers."""
+def likely(followed: Followed, advised: Advice) -> list[str]:
+    """Which filter predicts the plots best, and what is wrong with the numbers of the one that takes most of a plot."""
     compared, lines = advised.compared, []
-    if len(compared.behind) > 1:
+    if len(compared.behind) > 1 and advised.folding is None:
         behind = sorted((name, gap) for name, gap in compared.behind.items() if name != compared.best)
-        others = ", ".join(tr("exp({gap:.1f}) times under {name}", gap=-gap, name=name) for name, gap in behind)
+        others = ", ".join(tr("{times} times under {name}", times=times(gap), name=name) for name, gap in behind)
         best = compared.best
         if min(gap for _, gap in behind) <= CLEAR:
             best = tr("{name} (not clearly)", name=best)
         lines.append(
-            labelled("best", tr("{best}; elsewhere the plots are less likely: {others}", best=best, others=others))
+            labelled(
+                "best", tr("{best}; the plots are less likely under the others: {others}", best=best, others=others)
+            )
         )
-    if not advised.findings:
+    if advised.folding is not None:
+        lines.append(labelled("advice", doppler.said(advised.folding, followed.source, followed.case)))
+    elif not advised.findings:
         words = plural(
-            "nothing is wrong with the stated numbers, as far as {count} row tell",
-            "nothing is wrong with the stated numbers, as far as {count} rows tell",
-            advised.rows,
+            "nothing is wrong with the stated numbers of {filter}, as far as {count} row tell",
+            "nothing is wrong with the stated numbers of {filter}, as far as {count} rows tell",
+            advised.asked.rows,
+            filter=compared.fullest,
         )
         lines.append(labelled("advice", words))
-    for one in advised.findings:
-        words = tr("{what}; the plots are then more likely by exp({gain:.1f})", what=_explained(one), gain=one.gain)
-        lines.append(labelled("advice", words))
-    return lines
+    found = [explained(one, compared.fullest) for one in advised.findings]
+    return [*lines, *(labelled("advice", one) for one in found), *_partly(followed, advised.asked)]
 
 
-def _explained(one: Finding) -> str:
-    """What is wrong, in words."""
-    if one.what == advice.OUTLIERS:
-        share = significant_digits(100 * one.value, "#.2g")
+def _partly(followed: Followed, asked: Asked) -> list[str]:
+    """Of which rows best filter and advice are, where not of all."""
+    if asked.rows >= followed.rows:
+        return []
+    if asked.tracks is None:
+        words = tr("this is of the first {rows}, of {all}", rows=counted(asked.rows), all=followed.rows)
+    else:
+        words = tr(
+            "this is of {rows}, of {all}: the first {each} of each of {tracks} tracks, of {count}",
+            rows=counted(asked.rows),
+            all=followed.rows,
+            each=asked.each,
+            tracks=asked.tracks,
+            count=len(followed.tracks),
+        )
+    return [labelled("", words)]
+
+
+def times(gain: float) -> str:
+    """How many times as likely something is, from the difference of the logarithms: 12, 10¹⁶."""
+    power = round(gain / math.log(10))
+    return (
+        significant_digits(math.exp(gain), "#.2g" if gain < math.log(99) else ".0f")
+        if power < 4
+        else power_of_ten(power)
+    )
+
+
+def explained(one: Finding, filter_name: str) -> str:
+    """What is wrong, in words, and what it is worth."""
+    told = {"what": what(one.what, one.value), "times": times(one.gain)}
+    if not one.from_zero:
+        told["key"] = one.what
+        words = tr("{key}: the plots do not tell it from zero, which is no reason to lower it", **told)
+    else:
+        words = tr("{what}; the plots are then {times} times as likely", **told)
+    turn = one.turning
+    if turn is None:
+        return words
+    cost = tr(
+        "in a turn of {load:g} g the largest error of {filter} in {component} would be {changed}, not {stated} {unit}",
+        load=turn.acceleration_g,
+        filter=filter_name,
+        component=turn.component,
+        changed=number(turn.changed, 3),
+        stated=number(turn.stated, 3),
+        unit=tr(unit(turn.unit)),
+    )
+    if not one.from_zero:
+        cost = tr("at {value} {cost}", value=number(one.value, 2), cost=cost)
+    return f"{words}; {cost}"
+
+
+def what(name: str, value: float) -> str:
+    """What is wrong, in words: a key, or one of EXPLANATIONS, and its value."""
+    if name == OUTLIERS:
+        share = significant_digits(100 * value, "#.2g")
         return tr("outliers: {share} % of the plots err by ten times their σ", share=share)
-    if one.what == advice.BIAS:
-        size = significant_digits(one.value, "#.3g")
+    if name == BIAS:
+        size = significant_digits(value, "#.3g")
         return tr("the measured velocities are off by {size} of their σ, all alike", size=size)
-    return f"--set {one.what}={one.value:.3g}"
+    if name == CORRELATION:
+        size = significant_digits(value, "#.2g")
+        return tr("errors last from plot to plot: those of neighbours are correlated by {size}", size=size)
+    return f"--set {name}={value:.3g}"

@@ -74,7 +74,7 @@ def true_column(component: str, unit: str) -> str:
     return f"{TRUE}{component}_{IN_NAMES.get(unit, unit)}"
 
 
-OUTLIERS, BIAS = EXPLANATIONS = ("outliers", "bias")
+OUTLIERS, BIAS, CORRELATION = EXPLANATIONS = ("outliers", "bias", "correlation")
 
 
 class Likelihood(Protocol):
@@ -92,15 +92,28 @@ class Likelihood(Protocol):
     least: "np.ndarray"
     explains: tuple[str, ...]
 
-    def __call__(self, values: "np.ndarray", outliers: float = 0.0, bias: float = 0.0) -> float:
-        """The logarithm of the likelihood of values (n,) of the keys.
+    def __call__(
+        self, values: "np.ndarray", outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0
+    ) -> float:
+        """The logarithm of the likelihood of values (n,) of the keys. It is asked with what it explains plots by alone.
 
-        outliers: the share of plots with ten times their σ; bias: a constant error of what can show one, in its σ.
+        outliers: the share of plots with ten times their σ; bias: a constant error of what can show one, in its σ;
+        correlation: of the errors of neighbouring plots, at the recording's usual interval.
         """
 
     def by_number(self, values: "np.ndarray") -> Mapping[str, float]:
         """The same with the keys alone, summed for each number that a plot holds, by its column; not-a-number where it
         cannot be told."""
+
+
+class Turning(NamedTuple):
+    """The largest standard error of a component in a turn, as a config states it and with other values."""
+
+    component: str
+    unit: str
+    acceleration_g: float
+    stated: float
+    changed: float
 
 
 class RecordedPlots(ABC):
@@ -140,6 +153,19 @@ class RecordedPlots(ABC):
 
         Default: not known; `radarsim fit` refuses its configs.
         """
+        return None
+
+    def span_mps(self, spec: Any) -> float | None:
+        """What velocities of a config's radar are ambiguous by, m/s; None, the default, where it does not say."""
+        return None
+
+    def unfolding(self, span_mps: float) -> tuple[str, str] | None:
+        """A shipped config whose filters take velocities that are folded by so much (m/s), and the `KEY=VALUE` that
+        says so; None, the default, where velocities are taken as they are measured."""
+        return None
+
+    def in_a_turn(self, case: "Case", filter_name: str, values: Mapping[str, float]) -> "Turning | None":
+        """The largest error of a filter in a turn, as stated and with other values of its keys. Default: not known."""
         return None
 
 

@@ -55,7 +55,7 @@ def test_the_kernel_is_the_density_of_all_numbers_together():
     spread = (rows @ whole @ rows.T + np.diag(variance.ravel()))[np.ix_(chosen, chosen)]
     expected = normal.logpdf(z.ravel()[chosen], (rows @ np.concatenate(means))[chosen], spread)
     score = np.empty((n, 2))
-    log_likelihood(x.copy(), P.copy(), F, Q, H, z, variance, there, q, 0.0, score)
+    log_likelihood(x.copy(), P.copy(), F, Q, H, z, variance, there, q, 0.0, 1.0, score)
     assert score.sum() == pytest.approx(expected, rel=1e-12)
     assert np.all(score[~there] == 0)
 
@@ -80,7 +80,7 @@ def test_nothing_known_before_the_first_plot_costs_no_digits():
     there[0] = False
     rows = np.tile(np.eye(3)[:2], (n, 1, 1)), z, np.tile(variance, (n, 1)), there
     start = np.array([z[0, 0], 0.0, 0.0]), wide
-    log_likelihood(*start, np.tile(F, (n, 1, 1)), np.tile(Q, (n, 1, 1)), *rows, q, 0.0, score)
+    log_likelihood(*start, np.tile(F, (n, 1, 1)), np.tile(Q, (n, 1, 1)), *rows, q, 0.0, 1.0, score)
     assert score.sum() == pytest.approx(float(expected), abs=1e-9)
 
 
@@ -97,7 +97,7 @@ def test_an_outlier_leaves_the_moments_of_both_explanations():
     second = chances * np.exp(-0.5 * (z[1] - mean) ** 2 / spreads) / np.sqrt(2 * np.pi * spreads)
     one, score = np.ones((2, 1, 1)), np.empty((2, 1))
     there = np.ones((2, 1), dtype=bool)
-    log_likelihood(np.zeros(1), np.array([[P]]), one, 0 * one, one, z, np.ones((2, 1)), there, 0.0, share, score)
+    log_likelihood(np.zeros(1), np.array([[P]]), one, 0 * one, one, z, np.ones((2, 1)), there, 0.0, share, 1.0, score)
     np.testing.assert_allclose(score[:, 0], np.log([first.sum(), second.sum()]), rtol=1e-12)
 
 

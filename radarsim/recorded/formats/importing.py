@@ -17,12 +17,14 @@ from typing import Literal
 import numpy as np
 
 from radarsim.errors import ConfigError
+from radarsim.recorded import doppler
 from radarsim.recorded.formats import ais, asterix
 from radarsim.recorded.formats.ais import Ais
 from radarsim.recorded.formats.asterix import Asterix
 from radarsim.recorded.formats.records import DAY_S, PLOTS, POSITIONS, Batch, Reader, counted, utc_s
 from radarsim.recorded.formats.site import Antenna, Site, biconical, described
 from radarsim.recorded.formats.text import Table
+from radarsim.recorded.plots import grouped
 from radarsim.report.files import Writer
 
 Format = Literal["asterix", "opensky", "ais", "csv"]
@@ -34,6 +36,10 @@ FARTHEST_TRUTH_M = 5000.0  # of plots from their truth in range, by median: 20 s
 NOT_LATER = "rows not later than the one before of their track"
 SIGN_TESTS = 2000  # pairs of plots over which the sign of the Doppler speed is looked at
 LEAST_TESTS = 20
+FOLD_TESTS, FOLD_COLUMNS = (
+    3000,
+    ("t_s", "range_m", "velocity_mps"),
+)  # over which folds of the Doppler speed are looked for
 PLACED = ("range_m", "bearing_rad", "velocity_mps")
 LOCAL = ("x_m", "y_m", "z_m")
 SPEEDS = ("vx_mps", "vy_mps", "vz_mps")
@@ -132,7 +138,7 @@ def import_recording(
         raise ConfigError("truth: needs the place of one radar, --at LAT,LON,HEIGHT; import other radars by themselves")
     truth = _Truth(path, options) if options.site else None
     with opened(path, options) as (kind, reader):
-        work = _Import(kind, reader, options, truth)
+        work = _Import(kind, reader, options, truth, output)
         with Writer(output, {"the recording": path, "the truth": options.truth}) as file:
             first = True
             for rows in work.rows():
@@ -152,15 +158,17 @@ def import_recording(
 class _Import:
     """The recording on its way: batches in, rows out."""
 
-    def __init__(self, kind: Format, reader: Reader, options: Options, truth: "_Truth | None"):
-        self.reader, self.options, self.truth = reader, options, truth
+    def __init__(
+        self, kind: Format, reader: Reader, options: Options, truth: "_Truth | None", output: str | os.PathLike
+    ):
+        self.reader, self.options, self.truth, self.output = reader, options, truth, output
         self.done = Imported(kind)
         self.zero: float | None = None
         self.last: dict[str, float] = {}
         self.left = Counter[str]()
         self.radars = Counter[str]()
         self.behind = self.unplaced = 0
-        self.sign = _Sign()
+        self.sign, self.folds = _Sign(), _Folds()
         self.seen: set[str] = set()
 
     def rows(self) -> Iterator[Iterable[tuple[str, ...]]]:
@@ -205,6 +213,7 @@ class _Import:
         columns = {"t_s": t - self.zero} | self._placed(batch)
         if batch.kind == PLOTS:
             self.sign.take(batch)
+            self.folds.take(batch)
         if self.truth is not None:
             columns |= self.truth.columns(batch, columns["range_m"], self.reader.of_day)
         names = {"track": batch.track} | ({"radar": batch.radar} if isinstance(self.reader, Asterix) else {})
@@ -331,6 +340,8 @@ class _Import:
             done.notes.append(f"{unnamed} of {done.rows} plots belong to no track; `radarsim track` passes them over")
         if note := self.sign.note(self.options.towards):
             done.notes.append(note)
+        if (folded := doppler.folding(self.folds.tracks())) is not None:
+            done.notes.append(doppler.said(folded, self.output))
         return done
 
 
@@ -514,6 +525,30 @@ class _Sign:
             f"the Doppler speeds miss the change of the range by {as_is:.1f} m/s (median), with the other sign by "
             f"{turned:.1f} m/s: {cure} --doppler-towards"
         )
+
+
+class _Folds:
+    """Plots by which to see whether Doppler speeds are folded: of rows that do not say by what."""
+
+    def __init__(self) -> None:
+        self.rows: dict[str, list[np.ndarray]] = {}
+        self.count = 0
+
+    def take(self, batch: Batch) -> None:
+        """Keep the first FOLD_TESTS rows of tracks."""
+        if self.count >= FOLD_TESTS:
+            return
+        table = np.stack([batch.columns[name] for name in FOLD_COLUMNS], axis=1)
+        usable = np.isfinite(table).all(axis=1) & np.isnan(batch.columns["span_mps"])
+        self.count += int(usable.sum())
+        for name, rows in grouped(batch.track).items():
+            if name:
+                self.rows.setdefault(name, []).append(table[rows][usable[rows]])
+
+    def tracks(self) -> list[dict[str, np.ndarray]]:
+        """Their columns (n,) by track."""
+        whole = (np.concatenate(parts).T for parts in self.rows.values())
+        return [dict(zip(FOLD_COLUMNS, columns, strict=True)) for columns in whole]
 
 
 def zero_of(text: str) -> str | float:

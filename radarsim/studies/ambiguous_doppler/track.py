@@ -18,6 +18,7 @@ from radarsim.studies.interface import BIAS, RecordedPlots, true_column
 COLUMNS = ("t_s", "range_m", "velocity_mps")
 SPAN = "span_mps"  # a further column: what each velocity is ambiguous by, where the file says so
 MEASURED = (("range_m", "m"), ("velocity_mps", "m/s"))
+UNFOLDS, UNFOLDS_WAVELENGTH_M = "ambiguous_rls2", 0.15  # a shipped config for folded velocities of any radar
 LEAST_SIGMA, LEAST_MANOEUVRE = 1e-4, 1e-6  # of the stated values, which count as zero
 
 
@@ -138,7 +139,7 @@ class PlotLikelihood:
                 total += one.log_density
         return total
 
-    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0) -> float:
+    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
         """The logarithm of the likelihood; outliers are not allowed for; bias: of the velocity, in its σ."""
         return float(self._scores(values, bias).sum())
 
@@ -170,6 +171,9 @@ class Recorded(RecordedPlots):
 
     def tracker(self, case: Case) -> Tracker:
         return Tracker(case)
+
+    def unfolding(self, span_mps: float) -> tuple[str, str]:
+        return UNFOLDS, f"radar.repetition_rate_hz={2 * span_mps / UNFOLDS_WAVELENGTH_M:.6g}"
 
     def likelihood(
         self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]

@@ -242,8 +242,8 @@ class PlotLikelihood:
         models[self.hardest] = models[self.hardest].model_copy(update=hardest)
         return sensor, self.options.model_copy(update={"models": tuple(models)})
 
-    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0) -> float:
-        """The logarithm of the likelihood; a bias is not looked for."""
+    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
+        """The logarithm of the likelihood; neither a bias nor a correlation is looked for."""
         sensor, options = self._changed(values)
         spec = self.spec.model_copy(update={"sensor": sensor, "filters": (options,)})
         return sum(_score(spec, t, *local_plots(sensor, seen), outliers) for t, seen in self.recorded)

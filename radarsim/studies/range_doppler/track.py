@@ -1,6 +1,8 @@
 """Plots of the range_doppler study: those of one realisation, and the study's filters over recorded ones."""
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -8,10 +10,11 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.kernels import linear
-from radarsim.kernels.innovations import log_likelihood
+from radarsim.kernels.innovations import lasting, log_likelihood
+from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
 from radarsim.physics.motion import transition
-from radarsim.studies.interface import EXPLANATIONS, RecordedPlots, true_column
-from radarsim.studies.range_doppler.config import Filter, Keys
+from radarsim.studies.interface import EXPLANATIONS, RecordedPlots, Turning, true_column
+from radarsim.studies.range_doppler.config import Filter, Keys, Turn
 from radarsim.studies.range_doppler.design import designed
 from radarsim.studies.range_doppler.filters import noise_by_time, noise_over, observation
 from radarsim.studies.range_doppler.kernels import missed, rows
@@ -21,6 +24,9 @@ STARTING = 3  # ranges of a track from which its state is found, in the likeliho
 LEAST_MANOEUVRE = 1e-6  # of the stated manoeuvre variance, which counts as none
 WIDE_VELOCITY_MPS, WIDE_ACCELERATION_MPS2 = 3e4, 3e3  # standard deviations before the first plot: nothing is known
 LONGEST_START = 200  # plots in which a start is looked for; a file of velocities alone never has one
+TURN_G, TURN_SPEED_MPS, TURNED_DEG = 3.0, 250.0, 90.0  # a turn as an aircraft flies it
+SETTLED = 60  # scans before and after it
+FARTHER_M = 60e3  # than the flight is long, so that it does not meet the radar
 MEASURED = (("range_m", 1), ("velocity_mps", 1))
 SIGMAS: dict[str, tuple[str, ...]] = {
     "range_m": ("radar.sigma_range_m",),
@@ -151,6 +157,36 @@ class _One:
         self.held = []
 
 
+def in_a_turn(case: Case, filter_name: str, variance: float) -> Turning:
+    """The largest exact error of range (m) of a filter over a flight of TURN, as stated and with another manoeuvre
+    variance: straight flight until the filter has settled, the turn, and straight flight again, no plot missed."""
+    dt = case.spec.radar.scan_period_s
+    (options,) = (one for one in case.spec.filters if one.name == filter_name)
+    stated = variances_of(case)[case.spec.filters.index(options)]
+    variances = {"stated": stated, "changed": variance}
+    lasting_s = math.radians(TURNED_DEG) / (TURN_G * STANDARD_GRAVITY_MPS2 / TURN_SPEED_MPS)
+    start_s, scans = SETTLED * dt, 2 * SETTLED + math.ceil(lasting_s / dt)
+    target = Turn.model_validate(
+        {
+            "kind": "turn",
+            "range_m": TURN_SPEED_MPS * (scans * dt) + FARTHER_M,
+            "speed_mps": TURN_SPEED_MPS,
+            "aspect_rad": math.pi,
+            "acceleration_g": TURN_G,
+            "start_s": start_s,
+            "duration_s": lasting_s,
+        }
+    )
+    filters = tuple(
+        options.model_copy(update={"name": name, "manoeuvre_variance": one}) for name, one in variances.items()
+    )
+    radar = case.spec.radar.model_copy(update={"detection_probability": 1.0})
+    changed = {"radar": radar, "target": target, "filters": filters, "baseline": "stated", "scans": scans}
+    axes = prepare(replace(case, spec=case.spec.model_copy(update=changed))).axes
+    worst = axes.exact_sigma[:, SETTLED:, 0].max(axis=1)
+    return Turning(*COMPONENTS[0], TURN_G, *worst.tolist())
+
+
 class PlotLikelihood:
     """How likely tracks are under a filter's model: range and velocity of independent errors, acceleration that the
     filter's process noise changes. The state before the first plot is taken as unknown, whatever start the config
@@ -172,6 +208,8 @@ class PlotLikelihood:
         self.keys, self.stated = tuple(stated), np.array(list(stated.values()), dtype=float)
         self.least = self.stated * np.array([1e-4] * self.observes + [LEAST_MANOEUVRE])
         self.noise = noise_by_time(options.process_noise, 1.0, radar.scan_period_s)
+        usual = [float(np.median(np.diff(columns["t_s"]))) for columns in tracks if len(columns["t_s"]) > 1]
+        self.usual_s = float(np.median(usual)) if usual else radar.scan_period_s
         self.problems = [problem for columns in tracks if (problem := self._problem(columns)) is not None]
 
     def _problem(self, columns: Mapping[str, np.ndarray]) -> "_Problem | None":
@@ -188,10 +226,11 @@ class PlotLikelihood:
         F, Q = np.stack([transition(step) for step in dt]), np.stack([noise_over(self.noise, step) for step in dt])
         H = np.tile(observation(self.observes), (len(t), 1, 1))
         settled = int(np.searchsorted(np.cumsum(ranged[first:]), STARTING, side="right"))
-        return _Problem(F, Q, H, np.where(np.isfinite(z), z, 0.0), there, settled)
+        return _Problem(F, Q, H, np.where(np.isfinite(z), z, 0.0), there, settled, dt / self.usual_s)
 
-    def _scores(self, values: np.ndarray, outliers: float, bias: float) -> np.ndarray:
+    def _scores(self, values: np.ndarray, outliers: float, bias: float, correlation: float) -> np.ndarray:
         """Sums over all tracks for each number that counts; the first plots, which find the state, are left out."""
+        manoeuvre = float(values[self.observes])
         variances, total = np.square(values[: self.observes]), np.zeros(self.observes)
         offset = np.zeros(self.observes)
         offset[1:] = bias * values[1 : self.observes]
@@ -200,23 +239,30 @@ class PlotLikelihood:
             x[0] = one.z[0, 0]
             score, spread = np.empty(one.z.shape), np.tile(variances, (len(one.z), 1))
             z = one.z - offset if bias else one.z
-            log_likelihood(x, P, one.F, one.Q, one.H, z, spread, one.there, values[self.observes], outliers, score)
+            model, scale, white = (x, P, one.F, one.Q, one.H), manoeuvre, 1.0
+            if correlation:
+                first = np.zeros((3, self.observes))  # it is where the first plot is, and errs by its error
+                first[0, 0] = -math.sqrt(variances[0])
+                model = lasting(x, P, first, one.F, manoeuvre * one.Q, one.H, spread, correlation**one.intervals)
+                scale, white = 1.0, 0.0
+            log_likelihood(*model, z, spread, one.there, scale, outliers, white, score)
             total += score[one.settled :].sum(axis=0)
         return total
 
-    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0) -> float:
+    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
         """The logarithm of the likelihood; bias: of the velocity, in its σ."""
-        return float(self._scores(values, outliers, bias).sum())
+        return float(self._scores(values, outliers, bias, correlation).sum())
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The sums of range and velocity."""
-        total = self._scores(values, 0.0, 0.0)
+        total = self._scores(values, 0.0, 0.0, 0.0)
         return {name: float(part) for (name, _), part in zip(MEASURED[: self.observes], total, strict=False)}
 
 
 class _Problem(NamedTuple):
     """A track for the kernel: transitions and process noises of unit variance (n, 3, 3), the rows (n, m, 3) of its
-    numbers (n, m), which of these count, and the row from which the state is known."""
+    numbers (n, m), which of these count, the row from which the state is known, and the time (n,) since the row before
+    in usual intervals."""
 
     F: np.ndarray
     Q: np.ndarray
@@ -224,6 +270,7 @@ class _Problem(NamedTuple):
     z: np.ndarray
     there: np.ndarray
     settled: int
+    intervals: np.ndarray
 
 
 class Recorded(RecordedPlots):
@@ -249,3 +296,15 @@ class Recorded(RecordedPlots):
         self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]
     ) -> PlotLikelihood:
         return PlotLikelihood(case, filter_name, tracks)
+
+    def span_mps(self, spec: Keys) -> float | None:
+        radar = spec.radar
+        return (
+            radar.wavelength_m * radar.repetition_rate_hz / 2
+            if "repetition_rate_hz" in radar.model_fields_set
+            else None
+        )
+
+    def in_a_turn(self, case: Case, filter_name: str, values: Mapping[str, float]) -> Turning | None:
+        variance = values.get("manoeuvre_variance")
+        return None if variance is None else in_a_turn(case, filter_name, variance)

@@ -291,12 +291,12 @@ class PlotLikelihood:
             for i, rate in enumerate(one.rates, start=1):
                 P[np.arange(C) * size + i, np.arange(C) * size + i] = (wide * rate) ** 2
             score = np.empty(z.shape)
-            log_likelihood(x, P, one.F, one.Q, H, z, variance, one.there, manoeuvre, outliers, score)
+            log_likelihood(x, P, one.F, one.Q, H, z, variance, one.there, manoeuvre, outliers, 1.0, score)
             total += float(score[one.settled :].sum())
         return total
 
-    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0) -> float:
-        """The logarithm of the likelihood; a bias is not looked for."""
+    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
+        """The logarithm of the likelihood; neither a bias nor a correlation is looked for."""
         return self._score(values, outliers)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
