@@ -22,9 +22,12 @@ from pydantic import (
     GetJsonSchemaHandler,
     Strict,
     StringConstraints,
+    TypeAdapter,
+    ValidationError,
     WithJsonSchema,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 T = TypeVar("T")
@@ -166,6 +169,43 @@ class Model(BaseModel):
                 schema["required"].remove(name)
                 schema.setdefault("allOf", []).append({"oneOf": [{"required": [name]}, {"required": [twin]}]})
         return schema
+
+
+def unknown_to(spec: Model, home: str) -> list[str]:
+    """The keys of a config, dotted, that code of a package cannot know: those that a model derived elsewhere adds to
+    the package's, and values that it allows beyond."""
+    return list(_unknown(spec, home, ""))
+
+
+def _unknown(spec: Model, home: str, above: str) -> Iterator[str]:
+    lineage = type(spec).__mro__
+    own = next((one for one in lineage if issubclass(one, Model) and _known(one.__module__, home)), Model)
+    for name in type(spec).model_fields:
+        value, key = getattr(spec, name), f"{above}{name}"
+        info = own.model_fields.get(name)
+        if info is None or not (own is lineage[0] or _allowed(info, value)):
+            yield key
+            continue
+        members = enumerate(value) if isinstance(value, tuple) else [(None, value)]
+        for i, one in members:
+            if isinstance(one, Model):
+                yield from _unknown(one, home, f"{key}." if i is None else f"{key}.{i}.")
+
+
+def _known(module: str, home: str) -> bool:
+    """Whether a module is one of a package, or one that it stands on: radarsim, of a study of radarsim its keys."""
+    ours = "radarsim.config." if home.startswith("radarsim.") else "radarsim."
+    return f"{module}.".startswith((f"{home}.", ours))
+
+
+def _allowed(info: FieldInfo, value: Any) -> bool:
+    """Whether a field of a model takes a value that another model has taken."""
+    allowed: Any = Annotated[info.annotation, *info.metadata] if info.metadata else info.annotation
+    try:
+        TypeAdapter(allowed).validate_python(value)
+    except ValidationError:
+        return False
+    return True
 
 
 def in_degrees(key: str) -> str | None:

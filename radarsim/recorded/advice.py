@@ -18,7 +18,7 @@ from radarsim.config.experiment import Case
 from radarsim.recorded.along import Along, Counted, Progress, best, climbed, silent, value
 from radarsim.recorded.doppler import Folding, folded
 from radarsim.recorded.fit import HALF_CHI2_95, LEAST_ROWS, polished
-from radarsim.recorded.follow import Followed, recorded_of
+from radarsim.recorded.follow import Followed, borrowed, recorded_of
 from radarsim.studies.interface import Likelihood, Turning
 
 LEVEL = 0.05  # of finding something where nothing is wrong
@@ -77,7 +77,7 @@ def advised(followed: Followed, progress: Progress = silent) -> Advice | None:
     case, of = followed.case, recorded_of(followed.case)
     heads = [one.head for one in followed.tracks.values()] or [followed.head]
     long = [head for head in heads if len(head["t_s"]) >= LEAST_ROWS]
-    if not long:
+    if not long or borrowed(case, "likelihood"):
         return None
     chosen = some(long, of.rows_asked)
     known = {one.filter: one for member in case.spec.members if (one := of.likelihood(case, member.name, chosen))}

@@ -17,7 +17,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError
 from radarsim.recorded import doppler, plots
 from radarsim.recorded.along import IMPOSSIBLE, Counted, Progress, best, silent, units
-from radarsim.recorded.follow import by_track, one_case, recorded_of
+from radarsim.recorded.follow import by_track, one_case, recorded_of, refuse_borrowed
 from radarsim.studies.interface import OUTLIERS, Likelihood
 
 HALF_CHI2_95 = 1.9207294103470  # half the 95 % point of chi-square with one degree of freedom
@@ -67,6 +67,7 @@ def likelihood_of(experiment: Experiment, source: str | os.PathLike, filter_name
     """The likelihood of a filter of an experiment's one case over all tracks of a file; of the one that takes the most
     of a plot where none is named. Raises ConfigError."""
     case = one_case(experiment, "fit", f"radarsim fit {{}} {os.fspath(source)}")
+    refuse_borrowed(case, "likelihood")
     of = recorded_of(case)
     names = [member.name for member in case.spec.members]
     if filter_name is not None and filter_name not in names:

@@ -8,13 +8,14 @@ from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.linalg import LinAlgError
 
 from radarsim.config import lookup
 from radarsim.config.experiment import Case, Experiment, in_name
+from radarsim.config.fields import unknown_to
 from radarsim.config.schema import LARGEST_REALISATIONS
 from radarsim.engine.results import Track
 from radarsim.errors import ConfigError, PlotFault
@@ -40,6 +41,28 @@ def recorded_of(case: Case) -> RecordedPlots:
     found = study(case.study).recorded()
     assert found is not None
     return found
+
+
+Part = Literal["tracker", "simulated", "likelihood"]
+
+
+def borrowed(case: Case, part: Part) -> list[str]:
+    """The keys of a case, dotted, that a part of its study does not know: of another study, whose keys it extends."""
+    module = getattr(recorded_of(case), part).__module__
+    if module == RecordedPlots.__module__:  # nobody's: it does nothing
+        return []
+    packages = module.split(".")
+    return unknown_to(case.spec, ".".join(packages[:3] if packages[0] == "radarsim" else packages[:1]))
+
+
+def refuse_borrowed(case: Case, part: Part) -> None:
+    """Raise ConfigError where a part of a study would pass over keys that it does not know."""
+    if keys := borrowed(case, part):
+        of = getattr(recorded_of(case), part).__module__
+        raise ConfigError(
+            f"study {case.study}: its part `{part}` of recorded plots is that of {of}, which does not know "
+            f"{', '.join(keys)}: it must have one of its own"
+        )
 
 
 def one_case(experiment: Experiment, what: str, command: str) -> Case:
@@ -94,6 +117,7 @@ def simulated(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndar
     if not 0 <= realisation < LARGEST_REALISATIONS:
         raise ConfigError(f"realisation: must be from 0 to {LARGEST_REALISATIONS - 1}, got {realisation}")
     case = one_case(experiment, "simulate", "radarsim simulate {} -o PLOTS.csv")
+    refuse_borrowed(case, "simulated")
     return dict(recorded_of(case).simulated(case, realisation))
 
 
@@ -310,6 +334,7 @@ def follow(
     """
     plots_named = shlex.quote(os.fspath(source)).replace("{", "{{").replace("}", "}}")
     case = one_case(experiment, "track with", f"radarsim track {{}} {plots_named}")
+    refuse_borrowed(case, "tracker")
     of = recorded_of(case)
     tracker = of.tracker(case)
     size = tracker.most_rows or plots.CHUNK

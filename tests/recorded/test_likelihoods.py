@@ -6,7 +6,7 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal as normal
 
 from radarsim.app.run import load_all
-from radarsim.kernels.innovations import FACTOR, log_likelihood
+from radarsim.kernels.innovations import FACTOR, lasting, log_likelihood
 from radarsim.physics import frames
 from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.recorded import advice, fit, follow
@@ -82,6 +82,38 @@ def test_nothing_known_before_the_first_plot_costs_no_digits():
     start = np.array([z[0, 0], 0.0, 0.0]), wide
     log_likelihood(*start, np.tile(F, (n, 1, 1)), np.tile(Q, (n, 1, 1)), *rows, q, 0.0, 1.0, score)
     assert score.sum() == pytest.approx(float(expected), abs=1e-9)
+
+
+def test_errors_that_last_have_the_density_of_their_correlations():
+    """By the joint normal density, without a filter: of errors whose correlation falls as a power of the time, at
+    uneven times, some numbers missing; the state at the first row is known by a plot whose error it has."""
+    rng, n, d, m, rho, q = np.random.default_rng(3), 6, 2, 2, 0.6, 0.3
+    t = np.array([0.0, 1.0, 2.0, 4.5, 5.0, 6.0])
+    steps = np.diff(t, prepend=0.0)
+    F = np.stack([transition(step, d) for step in steps])
+    Q = np.stack([manoeuvre_covariance(1.0, step, d) for step in steps])
+    H, sigma = rng.normal(size=(n, m, d)), np.array([1.5, 0.7])
+    z, there = rng.normal(size=(n, m)), rng.random((n, m)) < 0.8
+    x, P, first = rng.normal(size=d), np.diag([2.0, 0.5]), np.array([[-1.0, 0.0], [0.0, 0.1]])
+    of_states, moved, own = np.zeros((n, d, n, d)), [np.eye(d)], [P]
+    for k in range(1, n):
+        moved.append(F[k] @ moved[-1])
+        own.append(F[k] @ own[-1] @ F[k].T + q * Q[k])
+    for i in range(n):
+        for j in range(i, n):
+            of_states[j, :, i] = moved[j] @ np.linalg.inv(moved[i]) @ own[i]
+            of_states[i, :, j] = of_states[j, :, i].T
+    errors = rho ** np.abs(t[:, None] - t)[:, None, :, None] * np.diag(sigma**2)[None, :, None]
+    crossed = np.einsum("iab,bc,j->iajc", np.stack(moved), first * sigma, rho**t)
+    whole = np.einsum("iad,idje,jbe->iajb", H, of_states, H) + errors
+    whole += (both := np.einsum("iad,idjb->iajb", H, crossed)) + both.transpose(2, 3, 0, 1)
+    chosen, size = there.ravel(), n * m
+    means = np.concatenate([H[k] @ moved[k] @ x for k in range(n)])[chosen]
+    expected = normal.logpdf(z.ravel()[chosen], means, whole.reshape(size, size)[np.ix_(chosen, chosen)])
+    variance, score = np.tile(sigma**2, (n, 1)), np.empty((n, m))
+    model = lasting(x, P, first, F, q * Q, H, variance, rho**steps)
+    log_likelihood(*model, z, variance, there, 1.0, 0.0, 0.0, score)
+    assert score.sum() == pytest.approx(expected, rel=1e-10)
 
 
 def test_an_outlier_leaves_the_moments_of_both_explanations():

@@ -1,0 +1,136 @@
+"""Velocities that are folded: noticed by `track`, `fit` and `import`, with the command that unfolds them."""
+
+import re
+import shlex
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from radarsim.app.run import load_all
+from radarsim.cli import main
+from radarsim.recorded import follow, plots
+from radarsim.recorded.doppler import folding
+
+SPAN = 60.0  # m/s: 0.1 m at 1.2 kHz
+RADAR = {"sigma_range_m": 60, "sigma_velocity_mps": 3, "scan_period_s": 4, "detection_probability": 0.9}
+KNOWING = ("radar.wavelength_m=0.1", "radar.repetition_rate_hz=1200")
+SCENARIOS = ("polynomial", "turn", "fly_by", "acceleration_start", "jerk_pulse")
+
+
+def loaded(*overrides, config="rls2", radar=RADAR):
+    (one,) = load_all([config], (*(f"radar.{key}={value}" for key, value in radar.items()), *overrides))
+    return one
+
+
+def measured(config, realisation=0):
+    columns = follow.simulated(config, realisation)
+    return {name: columns[name] for name in ("t_s", "range_m", "velocity_mps")}
+
+
+def folded(columns, span=SPAN):
+    """The velocities that a radar measures that is ambiguous by a span."""
+    v = columns["velocity_mps"]
+    return columns | {"velocity_mps": v - span * np.round(v / span)}
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """148 plots of an approach at 250 m/s, one in ten missed."""
+    return measured(loaded("scans=148", "target={kind: polynomial, coefficients: [200e3, -250]}"))
+
+
+def command(*arguments, code=0):
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert result.exit_code == code, result.output
+    return result
+
+
+def options(*overrides):
+    return [part for one in (*(f"radar.{key}={value}" for key, value in RADAR.items()), *overrides)
+            for part in ("--set", one)]  # fmt: skip
+
+
+@pytest.mark.parametrize("span", [SPAN, None, 20.0], ids=["known", "not known", "known wrongly"])
+def test_the_span_is_that_of_the_config_or_of_the_plots(flown, span):
+    found = folding([folded(flown)], span)
+    assert found.known == (span == SPAN)
+    assert found.velocity_mps <= SPAN / 2
+    assert 240 < found.rate_mps < 280
+    # 250 m/s is four spans off: a span of 240 m/s, or a whole part of it.
+    whole = found.span_mps / SPAN
+    assert whole == pytest.approx(round(whole), abs=0.02)
+
+
+def test_track_and_fit_notice_folded_velocities(flown, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    plots.write_columns(folded(flown), "folded.csv")
+    for config, span in ((options(*KNOWING), "the config's span is 60.0 m/s"), (options(), "by the plots the span is")):
+        text = command("track", "rls2", "folded.csv", "-o", "track.csv", *config).stdout
+        assert "the velocities are folded: none is beyond ±" in text
+        assert span in text
+        assert "advice   --set" not in text
+        told = command("fit", "rls2", "folded.csv", *config, code=2)
+        assert span in told.stderr
+        assert "to use what the plots tell" not in told.output
+    # A filter of ranges alone has no folds.
+    assert "to use what the plots tell" in command("fit", "rls2", "folded.csv", "--filter", "r", *options()).stdout
+
+
+def test_the_command_that_is_named_unfolds_them(flown, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    plots.write_columns({name: column[:40] for name, column in folded(flown).items()}, "folded.csv")
+    text = command("track", "rls2", "folded.csv", "-o", "track.csv", *options(*KNOWING)).stdout
+    (words,) = re.findall(r"radarsim (track .*)$", text, re.M)
+    assert "radar.sigma_velocity_mps=3" in words
+    command(*shlex.split(words), "-q")
+    rows = [line.split(",") for line in (tmp_path / "unfolded.csv").read_text().splitlines()]
+    *_, last = (float(row[4]) for row in rows if row[1:3] == ["memory", "Vr"])
+    assert last == pytest.approx(-250, abs=15)  # and not 10
+
+
+def test_import_notices_them_where_the_recording_does_not_say_by_what(flown, tmp_path):
+    rows = [",".join(["time,range_m,doppler_mps,track"])]
+    for t, r, v in zip(*folded(flown).values(), strict=True):
+        rows += [f"{t},{r},{v},a"] if np.isfinite(r) else []
+    (tmp_path / "log.csv").write_text("\n".join(rows))
+    said = command("import", tmp_path / "log.csv", "-o", tmp_path / "plots.csv").stderr
+    assert "the velocities are folded" in said
+    assert "radarsim track ambiguous_rls2" in said
+    spans = [f"{rows[0]},span", *(f"{row},{SPAN}" for row in rows[1:])]
+    (tmp_path / "spans.csv").write_text("\n".join(spans))
+    assert "are folded" not in command("import", tmp_path / "spans.csv", "-o", tmp_path / "two.csv").stderr
+
+
+def test_velocities_of_the_other_sign_are_not_taken_for_folded(flown):
+    assert folding([flown | {"velocity_mps": -flown["velocity_mps"]}]) is None
+
+
+def noticed(config, realisations, span, fold):
+    """Of how many realisations the velocities are said to be folded."""
+    seen = (measured(config, i) for i in range(realisations))
+    return sum(folding([folded(one, span) if fold else one], span) is not None for one in seen)
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_unfolded_velocities_are_not_noticed(scenario):
+    config = loaded(f"target={scenario}", radar={})
+    assert noticed(config, 5, 75.0, fold=False) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("radar", range(1, 6))
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_no_unfolded_recording_of_any_shipped_target_is_noticed(scenario, radar):
+    """Of 100 each, with the span of the config and without."""
+    config = loaded(f"target={scenario}", config=f"rls{radar}", radar={})
+    span = config.cases[0].spec.radar.wavelength_m * 500
+    for known in (span, None):
+        assert noticed(config, 100, known, fold=False) == 0
+
+
+@pytest.mark.slow
+def test_folded_velocities_are_noticed_in_99_of_100():
+    """60 scans of RLS 2 at 1 kHz, whose σ of velocity is a fifth of the span."""
+    config = loaded("scans=60", "target={kind: polynomial, coefficients: [200e3, 250]}", radar={})
+    assert noticed(config, 100, 75.0, fold=True) >= 99
