@@ -1,0 +1,77 @@
+"""A study of a package that offers a part of another study: what that part does not know is refused, not passed over."""
+
+import numpy as np
+import pytest
+
+from radarsim.app.run import load_all
+from radarsim.recorded import follow, plots
+from tests.studies import outside
+
+FILES = {
+    "__init__.py": """
+from radarsim.studies.folder import StudyFolder
+
+STUDY = StudyFolder(package=__name__, name="frozen", about="Frozen gains.", filters={}, offers=("recorded",))
+""",
+    "config.py": """
+from radarsim.studies.range_doppler import config
+
+
+class Filter(config.Filter):
+    frozen_from_k: int = 5
+
+
+class Keys(config.Keys):
+    filters: tuple[Filter, ...]
+""",
+    "track.py": "from radarsim.studies.range_doppler.track import Recorded\n",
+}
+OWN = """
+from radarsim.studies.range_doppler import track
+
+
+class Recorded(track.Recorded):
+    def tracker(self, case):
+        return track.Tracker(case)
+"""
+CONFIG = """
+study: frozen
+radar: {wavelength_m: 0.15, sigma_range_m: 250, sigma_velocity_mps: 15, scan_period_s: 10}
+target: polynomial
+filters:
+  - {name: r, observes: [range], manoeuvre_variance: 1e-3}
+scans: 15
+realisations: 1000
+seed: 1
+"""
+
+
+@pytest.fixture
+def place(tmp_path):
+    (tmp_path / "site/frozen").mkdir(parents=True)
+    for name, text in FILES.items():
+        (tmp_path / "site/frozen" / name).write_text(text)
+    outside.metadata(tmp_path / "site", "frozen", "1", {"frozen": "frozen:STUDY"})
+    (tmp_path / "mine.yaml").write_text(CONFIG)
+    columns = follow.simulated(load_all(["rls2"], ())[0])
+    plots.write_columns({name: np.asarray(column) for name, column in columns.items()}, tmp_path / "plots.csv")
+    return tmp_path
+
+
+def test_a_borrowed_part_refuses_keys_that_it_does_not_know(place):
+    for words in (("track", "mine.yaml", "plots.csv"), ("fit", "mine.yaml", "plots.csv"), ("simulate", "mine.yaml")):
+        told = outside.command(*words, *(("-o", "out.csv") if words[0] != "fit" else ()),
+                               site=place / "site", cwd=place, code=2).stderr  # fmt: skip
+        assert "does not know filters.0.frozen_from_k" in told
+        assert not (place / "out.csv").exists()
+    # Of its own it knows them; what it still borrows is not asked for advice.
+    (place / "site/frozen/track.py").write_text(OWN)
+    said = outside.command("track", "mine.yaml", "plots.csv", "-o", "out.csv", site=place / "site", cwd=place).stdout
+    assert "NIS" in said
+    assert "advice" not in said
+
+
+def test_no_shipped_study_refuses_itself():
+    for stem in ("rls2", "ambiguous_rls2", "multimodel", "sonar_smoothing", "sonar_clutter"):
+        case = load_all([stem], ())[0].cases[0]
+        assert not any(follow.borrowed(case, part) for part in ("tracker", "simulated", "likelihood"))
