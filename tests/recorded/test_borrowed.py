@@ -1,4 +1,4 @@
-"""A study of a package that offers a part of another study: what that part does not know is refused, not passed over."""
+"""A study of a package that offers a part of another study: what the part does not know is refused, not passed over."""
 
 import numpy as np
 import pytest
