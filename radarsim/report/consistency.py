@@ -68,10 +68,12 @@ def normalised(
 ) -> Mapping[str, np.ndarray]:
     """Columns of `nees` or `nis`, arrays of one shape: the mean with its interval, the bounds, and the verdict.
 
-    In 95 % of runs all means of a filter that is right about itself lie between their bounds.
+    In 95 % of runs all means of a filter that is right about itself lie between their bounds. Where the expectation is
+    known, it is judged by them in place of the mean.
     """
     known = () if exact is None else (exact,)
-    values = (*mean, *known, *bounds, verdict(mean.value, *bounds))
+    decides = mean.value if exact is None else np.where(np.isnan(exact), mean.value, exact)
+    values = (*mean, *known, *bounds, verdict(decides, *bounds))
     return dict(zip(columns(quantity, exact=exact is not None), values, strict=True))
 
 

@@ -72,6 +72,12 @@ def components(result: CaseResult, c: np.ndarray) -> dict[str, np.ndarray]:
     return {"component": names(labels, c), "unit": names(units, c)}
 
 
+def exact_first(rows: "pd.DataFrame", value: str, exact: str) -> np.ndarray:
+    """A column (rows,) with the exact value in place of the measured one wherever it is known: what decides."""
+    known = rows[exact].to_numpy(dtype=float)
+    return np.where(np.isnan(known), rows[value].to_numpy(dtype=float), known)
+
+
 def realisations(result: CaseResult) -> np.ndarray:
     """How many realisations stand behind each sum (F, K, C): all, or `estimates` where not all have an estimate."""
     counted = result.sums.get("estimates")

@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import json
+import math
 import re
 import weakref
 
@@ -302,13 +303,23 @@ def test_a_reading_as_shipped_measures_what_a_run_of_the_config_does(ran, tmp_pa
     import radarsim
 
     result = radarsim.run("range_doppler", realisations=2000, out=tmp_path, figures=False)
-    stored = result.tables["claims"].set_index(["claim", "what", "case"])["measured"]
+    stored = result.tables["claims"].set_index(["claim", "what", "case"])[["measured", "exact"]]
     done = app.readings([ran], out=tmp_path, figures=False)
     for part, judged in done.read[0].over[0].under[0].parts:
-        assert judged.measured == stored["P1.8", part.what, f"rls{part.cases[0]}"]
+        assert (judged.measured, judged.exact) == tuple(stored.loc["P1.8", part.what, f"rls{part.cases[0]}"])
 
 
-class Margins(Velocities):
+def test_exact_values_decide_under_a_reading_as_in_a_run(ran, tmp_path):
+    """Of 60 realisations: what a run knows exactly is undecided neither in the shipped reading nor in a changed one."""
+    wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, readings=Near()))
+    (over,) = app.readings([wanted], out=tmp_path, realisations=60, figures=False).read[0].over
+    assert all(judged.known and judged.n == 60 for one in over.under for _, judged in one.parts)
+    assert over.outcome.kind != rule.UNDECIDED
+    measured = {judged.exact for one in over.under for _, judged in one.parts}
+    assert len(measured) == sum(len(one.parts) for one in over.under)  # each case has its own
+
+
+class Near(Velocities):
     """Two velocities of which one leaves a gain near the limit of 50 %, so that few realisations leave it open."""
 
     realisations = 60
@@ -323,6 +334,17 @@ class Margins(Velocities):
         factor = {"shipped": 1.0, "worse": 1.1}[reading["sigma_velocity"]]
         radar = case.spec.radar.model_copy(update={"sigma_velocity_mps": factor * case.spec.radar.sigma_velocity_mps})
         return dataclasses.replace(case, spec=case.spec.model_copy(update={"radar": radar}))
+
+
+class Margins(Near):
+    """The same of a study that knows nothing exactly."""
+
+    def evidence(self, claim, reading, seen, of):
+        sampled = {
+            name: made.assign(**{key: math.nan for key in made if key.startswith("exact")})
+            for name, made in seen.tables.items()
+        }
+        return super().evidence(claim, reading, dataclasses.replace(seen, tables=sampled), of)
 
 
 def test_what_is_undecided_runs_on_until_it_is_decided(ran, tmp_path):

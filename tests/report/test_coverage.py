@@ -61,8 +61,6 @@ def test_coverage_over_two_thousand_repetitions(count, radar_config):
 
 CONFIGS = SHIPPED / "configs"
 SEEDS, N = 200, 1000  # the least N at which tables of no known n_eff bear no note
-# Times on a grid of scans: their intervals, of whole scans, hold too often.
-DISCRETE = {("steady", "settling_s")}
 # Beside a case of every study and part of the sonar: missed plots, models that differ by rare events, orders, plots.
 FURTHER = (
     *("rls2", "multimodel_1hz", "multimodel_families_1hz", "orders"),
@@ -87,10 +85,9 @@ def right(experiment, n, seeds):
     found = kept(experiment, n, seeds)
     assert ("curves", "sigma") in found
     for key, one in found.items():
-        high = 1.0 if key in DISCRETE else HIGH
-        assert not one.wrong(seeds, high).size, (key, one.held[one.wrong(seeds, high)])
+        assert not one.wrong(seeds, HIGH).size, (key, one.held[one.wrong(seeds, HIGH)])
         if one.unmarked.sum() >= len(one.held) * seeds / 20:  # what is left of a table that is marked is a choice of it
-            assert LOW - 2 * one.error <= one.share <= high + 2 * one.error, (key, one.share, one.error)
+            assert LOW - 2 * one.error <= one.share <= HIGH + 2 * one.error, (key, one.share, one.error)
 
 
 def test_unmarked_intervals_cover_in_the_first_study():

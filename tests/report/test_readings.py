@@ -54,6 +54,13 @@ class Sampled(Small):
         return False
 
 
+class Ends(Estimate):
+    """Evidence of one number, which is not known exactly."""
+
+    def exactly(self):
+        raise Missing("not known exactly")
+
+
 def claim(number, *values):
     parts = tuple(Part((), f"number {text}", "m", lambda seen: certain(seen), printed(text)) for text in values)
     return Claim(f"P9.{number}", "somewhere", f"It is {' and '.join(values)}", parts)
@@ -155,7 +162,7 @@ def test_a_number_comes_out_by_its_interval():
     one = Claim("P9.3", "somewhere", "about ten", (part, coarse))
     came = {}
     for name, seen in {"in": (10, 9.5, 10.5), "wide": (10, 8.7, 11), "beyond": (15, 14, 16)}.items():
-        found = under(Sampled(), one, Sampled().reading(), seen)
+        found = under(Sampled(), one, Sampled().reading(), Ends(*seen))
         own = joint(Sampled(), [Over(one, (found,))]).shipped
         came[name] = [(number.strict, number.granular, number.open) for number in own.outcomes.values()]
     assert came["in"] == [(True, True, False), (True, True, False)]
@@ -166,9 +173,10 @@ def test_a_number_comes_out_by_its_interval():
 def test_what_is_open_says_what_would_decide_it():
     """Two readings of three are open: the harder one says how many it takes; the one against the print is not asked."""
     of, one = Sampled(), claim(2, "1")
+    part = Part((), "number", "m", lambda seen: Estimate(*seen), printed("1.0"))
     ends = {"one": (1.0, 0.99, 1.01), "two": (1.04, 1.0, 1.08), "ten": (1.0, 0.0, 2.0)}
     every = [
-        under(of, dataclasses.replace(one, parts=(part(ends[reading["scale"]]),)), reading, None, 1000)
+        under(of, dataclasses.replace(one, parts=(part,)), reading, Ends(*ends[reading["scale"]]), 1000)
         for reading in of.of_claim(one.id)
     ]
     found = Over(one, tuple(every))
@@ -180,10 +188,6 @@ def test_what_is_open_says_what_would_decide_it():
     assert {row["needed"] for each in every[1:2] for row in rows(each, columns([of]))} == {needed}
     assert found.still_open() in page(of, "Nobody 1900", [found], joint(of, [found]))
     assert over(Small(), claim(2, "1")).still_open() == ""
-
-
-def part(seen):
-    return Part((), "number", "m", lambda _: Estimate(*seen), printed("1.0"))
 
 
 def test_of_variants_one_suffices_and_void_parts_count_for_nothing():

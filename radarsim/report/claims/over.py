@@ -10,7 +10,8 @@ from radarsim.language import tr
 from radarsim.report.claims import reasons, rule
 from radarsim.report.claims.declared import Claim, Part
 from radarsim.report.claims.evidence import Evidence, Missing
-from radarsim.report.claims.readings import PaperReadings, Reading
+from radarsim.report.claims.judge import exact as known
+from radarsim.report.claims.readings import DEFAULT, PaperReadings, Reading
 from radarsim.report.claims.rule import Judged, Outcome
 
 NOTHING = "there is nothing to measure it by"
@@ -51,15 +52,22 @@ def under(of: PaperReadings, claim: Claim, reading: Reading, evidence: Evidence,
     """Judge a claim by the evidence of a reading, which has n realisations; 0 where nothing was run."""
     name, kind = of.name(reading), of.kind(reading)
     try:
-        parts = tuple((part, _judged(part, evidence, of.exact(claim, reading), n)) for part in of.parts(claim, reading))
+        parts = tuple(
+            (part, _judged(part, evidence, of.exact(claim, reading), n, name == DEFAULT))
+            for part in of.parts(claim, reading)
+        )
     except Missing as missing:
         return Under(claim, reading, name, kind, why=missing.why or NOTHING)
     outcome = rule.claim([judged for _, judged in parts], **claim.how)
     return Under(claim, reading, name, kind, parts, outcome)
 
 
-def _judged(part: Part, seen: Evidence, exact: bool, n: int) -> Judged:
-    """A part with its numbers; which variant it is of, and whether that is against the print, the reading says."""
+def _judged(part: Part, seen: Evidence, exact: bool, n: int, shipped: bool) -> Judged:
+    """A part with its numbers; which variant it is of, and whether that is against the print, the reading says.
+
+    exact: whether all evidence is. Of other evidence the exact value is known where the run knows it; a part's own
+    formula is of the shipped reading.
+    """
     found, nothing = part.measure(seen), math.nan
     measured, lo, hi = (nothing,) * 3 if exact else (float(found.value), float(found.lo), float(found.hi))
     return Judged(
@@ -71,7 +79,7 @@ def _judged(part: Part, seen: Evidence, exact: bool, n: int) -> Judged:
         expected_hi=part.expected.hi,
         margin=part.expected.margin * (part.scale(seen) if part.scale else 1.0),
         kind=part.expected.kind,
-        exact=float(found.value) if exact else nothing,
+        exact=float(found.value) if exact else known(part if shipped else replace(part, exact=None), seen, found),
         ceiling=part.ceiling(seen) if part.ceiling else nothing,
         statement=part.statement,
         number=part.number,

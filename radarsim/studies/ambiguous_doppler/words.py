@@ -79,7 +79,8 @@ def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> list
     curves = curves[(curves["k"] > 1) & (curves["n"] > 0)]
     if not len(curves):
         return []
-    worst = curves.loc[curves.groupby("filter", sort=False)["sigma"].idxmax()]
+    curves = curves.assign(decides=common.exact_first(curves, "sigma", "exact_sigma"))
+    worst = curves.loc[curves.groupby("filter", sort=False)["decides"].idxmax()]
     said = [
         tr(
             "{filter} {sigma} at scan {k}",

@@ -102,7 +102,7 @@ def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure 
     if not drawn:
         return None
     caption = _best_settled(drawn) + tr(
-        "Exact steady σ of the range against the settling time of the measured σ (within 5 % of the "
+        "Steady σ of the range against its settling time, both exact (within 5 % of the "
         "steady value, for good); grey lines join equal manoeuvre variances D_M, named in (m/s³)². "
         "Dotted: ten scan periods, the paper's limit; star: the least steady error under it. What "
         "does not settle within the run is named and left out."

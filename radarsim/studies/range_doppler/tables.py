@@ -78,17 +78,16 @@ def _own_gains(result: Result) -> dict[str, np.ndarray]:
 
 STEADY = (
     *("case", "filter", "manoeuvre_variance", "component", "unit", "steady_sigma", "last_sigma", "last_lo", "last_hi"),
-    *("settling_periods", "settling_s", "settling_lo_s", "settling_hi_s", "under_10_periods", "best"),
+    *("settling_periods", "settling_s", "under_10_periods", "best"),
 )
 
 
 def steady(results: Sequence[Result]) -> "pd.DataFrame":
-    """Steady σ (exact) against settling, of every case, filter and component.
+    """Steady σ against settling, both exact, of every case, filter and component; and σ measured at the last scan.
 
-    Settled is the first scan from which σ(k) stays within 5 % of the exact steady value to the end of the run; the
-    interval takes σ at the kind and at the unkind end of its own; infinite where it does not settle within the run.
-    Cases whose target breaks the filters' model have no steady error and no rows; nor have those whose plots may be
-    missed or are biased.
+    Settled is the first scan from which the exact σ(k) stays within 5 % of its steady value to the end of the run;
+    infinite where it does not settle within the run. Cases whose target breaks the filters' model have no steady error
+    and no rows; nor have those whose plots may be missed or are biased.
     `best` marks, among the cases of one config that differ in D_M, the least steady σ of those that settle in under
     ten periods.
     """
@@ -116,14 +115,12 @@ def _steady(result: Result) -> list[tuple]:
             at = np.flatnonzero(axes.available[f, :, c])
             if not at.size:
                 continue
-            value, lo, hi = (part[f, at, c] for part in of)
-            last = np.sqrt(true[c, c])
-            when = settling(statistics.Estimate(value, lo, hi), t[at], last)
+            last, known = float(np.sqrt(true[c, c])), axes.exact_sigma[f, at, c]
+            when = settling(statistics.Estimate(known, known, known), t[at], last).value
             rows.append(
                 (
-                    *(result.name, name, variance, component, unit, float(last)),
-                    *(value[-1], lo[-1], hi[-1], when.value / period, when.value, when.lo, when.hi),
-                    bool(when.value < PERIODS * period * (1 - 1e-9)),
+                    *(result.name, name, variance, component, unit, last, *(end[f, at[-1], c] for end in of)),
+                    *(when / period, when, bool(when < PERIODS * period * (1 - 1e-9))),
                 )
             )
     return rows

@@ -93,10 +93,10 @@ def _gain_sentence(
     several = rows["filter"].nunique() > 1
     said: dict[str, Any] = {"quantity": _capital(quantity), "when": when, "base": _baseline(results)}
     if len(last) > 1:
-        low, high = (last.iloc[int(pick(last["gain_percent"].to_numpy()))] for pick in (np.argmin, np.argmax))
+        low, high = (last.iloc[int(pick(_decides(last)))] for pick in (np.argmin, np.argmax))
         said |= {"least": _gain(low), "low": _who(low, labels, several)}
         said |= {"most": _gain(high), "high": _who(high, labels, several)}
-        if last["gain_lo"].max() <= last["gain_hi"].min():
+        if _decides(last, "gain_lo").max() <= _decides(last, "gain_hi").min():
             words = tr(
                 "{quantity}: {when} σ is {least} ({low}) to {most} ({high}), which do not differ for certain, {base}",
                 **said,
@@ -105,13 +105,18 @@ def _gain_sentence(
             words = tr("{quantity}: {when} σ is {least} ({low}) to {most} ({high}) {base}", **said)
         return "; ".join([words, *_loss(every, low, labels)]) + "."
     row = last.iloc[0]
-    best = rows.iloc[int(rows["gain_percent"].to_numpy().argmax())]
+    best = rows.iloc[int(_decides(rows).argmax())]
     clauses = [
         tr("{quantity}: at {t_s:g} s, the last scan, σ is {gain} {base}", t_s=row["t_s"], gain=_gain(row), **said)
     ]
     if best["k"] != row["k"]:
         clauses.append(tr("at best {gain}, at {t_s:g} s", gain=_gain(best), t_s=best["t_s"]))
     return "; ".join([*clauses, *_loss(every, row, labels)]) + "."
+
+
+def _decides(gains: "pd.DataFrame", end: str = "gain_percent") -> np.ndarray:
+    """The gains (rows,), or an end of their intervals, by which one is called more than another: exact ones first."""
+    return common.exact_first(gains, end, "exact_percent")
 
 
 def _capital(word: str) -> str:
@@ -125,10 +130,10 @@ LOSS = 1.0  # per cent: a gain certainly below minus this, at any scan, is told
 
 def _loss(every: "pd.DataFrame", sentences: "pd.Series[Any]", labels: dict[str, str]) -> list[str]:
     """The greatest of the certain losses in words, unless there is none or it is the gain already told."""
-    sure = every[every["gain_hi"] < -LOSS]
+    sure = every[_decides(every, "gain_hi") < -LOSS]
     if not len(sure):
         return []
-    worst = sure.iloc[int(sure["gain_percent"].to_numpy().argmin())]
+    worst = sure.iloc[int(_decides(sure).argmin())]
     if worst.name == sentences.name:
         return []
     several = every["filter"].nunique() > 1
@@ -217,7 +222,7 @@ def _best_of_broken(results: Sequence[Result], made: Made) -> list[str]:
     """The D_M of those tried with which the worst error on a manoeuvring target is least, by radar and filter."""
     curves, sentences = made["curves"], []
     rows = curves[(curves["component"] == "r") & (curves["k"] >= FIRST)]
-    rows = rows.assign(error=rows["exact_sigma"].fillna(rows["sigma"]))
+    rows = rows.assign(error=common.exact_first(rows, "sigma", "exact_sigma"))
     for name, members in _tried_on(results).items():
         own = rows[rows["case"].isin([member.name for member in members])]
         words = [_least_worst(own[own["filter"] == one], members, one) for one in members[0].axes.filters]
@@ -345,8 +350,7 @@ def _ambiguity(results: Sequence[Result]) -> list[str]:
 
 def _worst(rows: "pd.DataFrame") -> str:
     worst, bias = (
-        rows.iloc[int(rows["sigma"].to_numpy().argmax())],
-        rows.iloc[int(np.abs(rows["bias"].to_numpy()).argmax())],
+        rows.iloc[int(np.abs(common.exact_first(rows, name, f"exact_{name}")).argmax())] for name in ("sigma", "bias")
     )
     return tr(
         "worst σ of the range {sigma} at {t_s:g} s, largest bias {bias:.4g} m at {bias_t_s:g} s",

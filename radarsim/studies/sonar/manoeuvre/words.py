@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from radarsim.engine.results import CaseResult
 from radarsim.language import term, tr
 from radarsim.report import panels, text
+from radarsim.report import tables as common
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
 from radarsim.studies.sonar.manoeuvre.config import Keys
 from radarsim.studies.sonar.manoeuvre.figures import USUAL, every_scan, last_of, usual
@@ -35,7 +36,8 @@ def _detected(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame") -> 
     """The detectors with the most and the fewest detections of a manoeuvre; empty where there are none."""
     rows = detections[detections["case"] == result.name]
     last = [last_of(usual(rows, name), "manoeuvre") for name in every_scan(result)]
-    ranked = sorted((one.iloc[0] for one in last if len(one)), key=lambda row: row["probability"])
+    found = [one.assign(decides=common.exact_first(one, "probability", "exact")).iloc[0] for one in last if len(one)]
+    ranked = sorted(found, key=lambda row: row["decides"])
     if not ranked:
         return ""
     ends = [
