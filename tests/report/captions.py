@@ -218,6 +218,10 @@ def rates(result, figure, caption):
         family = {one.name for one in result.cases if "_".join(["lock", *ends_of(one)]) == figure or figure == "right"}
         last = table[table["case"].isin(family)].groupby(["case", "filter"], sort=False).tail(1)
         some = {name: own[of[1]].to_numpy(float) for name, own in last.groupby("filter", sort=False)}
+    if tr(LEVEL) in spoke:
+        last = groups.tail(1)
+        alike = last["lock_lo"].max() <= last["lock_hi"].min()
+        return [] if alike else [f"{figure}: not within each other's intervals"]
     wrong = []
     for turn in (lambda y: 1 - y, lambda y: y):
         wrong.append([])

@@ -167,7 +167,7 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
     )
     caption = tr(
         "False tracks confirmed in an hour in the whole sector, every false plot beginning a "
-        "tentative track, of {realisations} such plots a case. Bands: 95 % intervals.",
+        "tentative track, of {realisations} a case. Bands: 95 % intervals.",
         realisations=panels.realisations(results),
     )
     x, y = axis_over(results[0], column, rows[column]), Axis(tr("false tracks per hour"), "log")
@@ -195,7 +195,7 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
         drawn.append(Panel(x, y, tuple(true), direct=False))
     caption = tr(
         "Error rates of calling a track true once its score (logarithm of the likelihood ratio) "
-        "reaches a threshold, of {realisations} tracks each. Left: of tracks that false plots began; "
+        "reaches a threshold, of {realisations} of each kind. Left: of tracks that false plots began; "
         "no more than exp(−threshold) of them can (bound). Right: of the target's first tracks. "
         "Bands: 95 % intervals.",
         realisations=panels.realisations(results),
