@@ -256,9 +256,12 @@ def sweep(result, figure, caption):
     table = table[table["case"].isin([one.name for one in members])]
     last = table.groupby(["case", "filter", "component"], sort=False).tail(1)
     for component, own in last.groupby("component", sort=False):
-        factor = 180 / np.pi if own["unit"].iloc[0].startswith("rad") and len(members[0].swept) == 1 else 1.0
-        template = "$\\sigma$ of {symbol} at the end" if len(members[0].swept) == 1 else "$\\sigma$ of {symbol}"
-        words = spoken(tr(template, symbol=panels.letter(component)))
+        templates = {"$\\sigma$ of {symbol} at the end": True, "$\\sigma$ of {symbol}": False}  # of lines, of maps
+        worded = {spoken(tr(one, symbol=panels.letter(component))): of_lines for one, of_lines in templates.items()}
+        words = next((one for one in worded if f"{one}: " in spoke), None)
+        if words is None:
+            continue
+        factor = 180 / np.pi if worded[words] and own["unit"].iloc[0].startswith("rad") else 1.0
         at = spoke.find(f"{words}: ")
         claim = at >= 0 and next(filter(None, (found(one, spoke[at:]) for one in EXTREMES)), None)
         if not claim or claim["quantity"] != words:
