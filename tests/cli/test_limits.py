@@ -391,6 +391,14 @@ def test_a_pilot_and_exact_values_say_about_the_same(tmp_path):
             assert 0.5 <= case["need"]["realisations"] / done[case["name"]]["done"] <= 2
 
 
+def test_a_pilot_that_saw_large_errors_foretells_where_a_run_ends(tmp_path):
+    """Tracks whose first plots were missed err by a hundred times σ²: no run ends before such are seen often enough."""
+    words = ("rls2", "-n", "1e6", "--precision", 20, "--set", "radar.detection_probability=0.9")
+    (check,) = json.loads(command("check", *words, "--json").stdout)
+    command("run", *words, *PLAIN, "--out", tmp_path)
+    assert check["cases"][0]["need"]["realisations"] == record(tmp_path / "rls2")["realisations_done"] == 512_000
+
+
 @pytest.mark.parametrize("chunk", [1, 8, 512])
 def test_a_pilot_knows_that_kernels_calculate_chunks(monkeypatch, chunk):
     """One realisation costs as much as a chunk of them, and stands for no more than its share."""

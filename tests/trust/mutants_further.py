@@ -9,6 +9,7 @@ AMONG = f"{CLUTTER}::test_estimates_are_the_twins"
 SCORE = "studies/discriminator/test_kernels.py::test_score_of_samples_is_the_likelihood_and_its_gradient"
 CLEAN = "studies/discriminator/test_kernels.py::test_the_coherent_sum_of_a_clean_burst_is_its_amplitude"
 POWERS = "trust/test_statistics_sums.py::test_sums_of_one_realisation_are_the_powers_of_its_error"
+LOOKS = "trust/test_looks.py"
 DETECTOR, INITIATION = "studies/sonar/manoeuvre/test_exact.py", "studies/sonar/clutter/test_exact.py"
 
 MANOEUVRES = (
@@ -177,6 +178,19 @@ RUNS = (
             "percent <= percent.min() * (1 + EQUAL)",
             "report/test_precision.py::test_the_worst_cell_is_the_widest_of_the_table",
         ),
+        ("TAILED = 3", "TAILED = 0", f"{LOOKS}::test_where_a_run_ends_is_foretold"),
+    ),
+    *mutants(
+        "radarsim/app/simulation.py",
+        (
+            "cell.percent < wanted.percent and n >= least",
+            "cell.percent < wanted.percent or n >= least",
+            f"{LOOKS}::test_sigma_with_rare_large_errors_is_covered_where_a_precision_ends",
+        ),
+    ),
+    *mutants(
+        "radarsim/report/claims/rule.py",
+        ("1 - 0.025 / LOOKS / max", "1 - 0.025 / max", f"{LOOKS}::test_a_rate_keeps_what_is_promised_too"),
     ),
 )
 CHAIN, BURSTS = "studies/pulses_to_tracks/test_kernels.py", "studies/pulses_to_tracks/test_study.py"
