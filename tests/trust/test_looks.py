@@ -150,7 +150,7 @@ def test_a_verdict_is_the_same_however_its_number_came_about(tmp_path):
 @pytest.mark.slow
 def test_a_real_claim_at_the_border_is_refuted_in_few_runs_that_decide(monkeypatch):
     """σ of rls2, of which only this test knows the exact value, said to be 3.5 % less, 3.5 % being the margin."""
-    study, runs = registry.study("range_doppler"), 250
+    study, runs = registry.study("range_doppler"), 150
     place = {"filter": "r", "component": "r", "k": 10}
 
     def row(tables):
