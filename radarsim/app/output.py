@@ -37,7 +37,7 @@ def tables(results: Sequence[CaseResult], control_variate: bool = False, stem: s
         made["controlled"] = controlled.controlled(results)
     verdicts = claims.judged(of.claims(), results, made, configs.shipped, stem)
     made["claims"] = over_readings(verdicts, results[0].study)
-    return notes.noted(made, results)
+    return notes.noted(made, results, of.exact_errors)
 
 
 def over_readings(verdicts: "pd.DataFrame", name: str, out: Path | None = None) -> "pd.DataFrame":
@@ -66,7 +66,7 @@ def figures(
     drawn = dict(own.figures(results, _banded(made), experiment))
     if (judged := forest.figure(made["claims"].to_dict("records"))) is not None:
         drawn["claims"] = judged
-    if any("note" in made[name] and made[name]["note"].isin(notes.HEAVY).any() for name in ("curves", "gains")):
+    if any(notes.heavy(made[name]).any() for name in ("curves", "gains")):
         drawn = {
             name: _said(figure) if name.startswith(("sigma", "gain")) else figure for name, figure in drawn.items()
         }
@@ -77,16 +77,16 @@ def figures(
 
 def _said(figure: Figure) -> Figure:
     """The figure whose caption says why a band is missing."""
-    said = tr("No band where it would rest on under {few} effective realisations.", few=notes.FEW_EFFECTIVE)
+    said = tr("No band where few large errors decide: see the column note.")
     return replace(figure, caption=f"{figure.caption} {said}")
 
 
 def _banded(made: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:
-    """The tables for figures: σ and gains without an interval where theirs rests on too few effective realisations."""
+    """The tables for figures: σ and gains without an interval where theirs is marked."""
     thinned = {}
     for name, ends in (("curves", ("sigma_lo", "sigma_hi")), ("gains", ("gain_lo", "gain_hi"))):
         table = made[name]
-        if "note" in table and (thin := table["note"].isin(notes.HEAVY)).any():
+        if (thin := notes.heavy(table)).any():
             thinned[name] = table.assign(**{end: table[end].mask(thin) for end in ends})
     return {**made, **thinned}
 
@@ -147,7 +147,7 @@ def write(
     own = study(experiment.study)
     answer = tuple(own.answer(results, made))
     described_by = machine.described()
-    record = provenance.record(experiment, results, run, contents, answer, described_by, made)
+    record = provenance.record(experiment, results, run, contents, answer, described_by, made, own.answered)
     page = html.page(
         experiment,
         made,

@@ -199,7 +199,7 @@ def noted(quantity: Quantity, result: CaseResult) -> str:
 
     study, name = registry.study(result.study), quantity.of.table
     made = {"curves": study.curves([result]), "gains": study.gains([result])} | study.tables([result])
-    table = notes.noted({key: made[key] for key in {"curves", name}}, [result])[name]
+    table = notes.noted({key: made[key] for key in {"curves", name}}, [result], study.exact_errors)[name]
     if "note" not in table:
         return ""
     rows = table[table["filter"] == quantity.filter]

@@ -226,7 +226,7 @@ class Curve:
     def noted(self, value: float) -> tuple[str, ...]:
         """What the tables note of the interval at a value, in words."""
         note = quantities.noted(self.quantity, self._result(self.cases.at(self.key, value), self.realisations))
-        return (f"the interval is too narrow: {note}; more realisations, -n, mend that",) if note else ()
+        return (f"the interval may be too narrow: {note}; more realisations, -n, mend that",) if note else ()
 
     def _kept(self, value: float | None, count: int, of: Callable[[Case], Estimate]) -> Estimate:
         place = (math.nan if value is None else value, count)

@@ -222,4 +222,6 @@ class Result:
         """What a reader of the numbers must know: faults, damaged or mixed blocks, too few realisations."""
         from radarsim.report import provenance
 
-        return [*self.faults, *self.facts["warnings"], *provenance.of_intervals(self.cases, self._tables)]
+        answered = study(self.experiment.study).answered
+        of_intervals = provenance.of_intervals(self.cases, self._tables, answered)
+        return [*self.faults, *self.facts["warnings"], *of_intervals]

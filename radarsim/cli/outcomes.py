@@ -108,17 +108,13 @@ def print_comparison(compared: "Compared") -> None:
 
 
 def too_narrow(row: Any, column: str) -> str:
-    """A mark behind an interval, of a row of `last_scan`, by the column that says where it rests on too little."""
+    """A mark behind an interval, of a row of `last_scan`, by the column that says why it is too narrow."""
     from radarsim.report import notes
 
     note = getattr(row, column, "")
-    if not isinstance(note, str):  # of a gain that a row does not have
+    if not isinstance(note, str) or not note:  # not a text: of a gain that a row does not have
         return ""
-    if note == notes.THIN and row.n_eff < notes.FEW_EFFECTIVE:  # of a gain the baseline may have fewer
-        return tr(" ({n_eff:.0f} effective)", n_eff=row.n_eff)
-    if note in notes.HEAVY:
-        return tr(" (heavy tails)")
-    return tr(" (marked)") if note else ""
+    return tr(" (heavy tails)") if note == notes.HEAVY else tr(" (marked)")
 
 
 def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:

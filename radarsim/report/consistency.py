@@ -18,18 +18,16 @@ from radarsim.report.statistics import Estimate, Values
 OPTIMISTIC, CONSISTENT, PESSIMISTIC = "optimistic", "consistent", "pessimistic"
 BELIEVED = (
     *("case", "filter", "component", "unit", "k", "t_s", "n"),
-    *("sigma", "believed_sigma", "ratio", "ratio_lo", "ratio_hi", "note"),
+    *("sigma", "believed_sigma", "ratio", "ratio_lo", "ratio_hi"),
 )
-# Where the believed σ depends on the plots (a filter that adapts, interacting models, what is computed at an estimate)
-# its mean has a chance of its own. Measured: such intervals cover as little as 2 %, most of them 70 … 90 %.
-VARIES = "interval of sigma alone: the believed one varies from one realisation to the next"
 
 
-def believed(result: CaseResult, sigma: np.ndarray, varies: np.ndarray) -> dict[str, np.ndarray]:
+def believed(result: CaseResult, sigma: np.ndarray) -> dict[str, np.ndarray]:
     """Columns BELIEVED of one case: the measured σ beside sigma (F, K, C), the σ that the filters believe.
 
-    Rows stand where a filter has an estimate, as in `tables.curves`; varies (F,): whether what a filter believes hangs
-    on its plots.
+    Rows stand where a filter has an estimate, as in `tables.curves`. The interval of the ratio is that of the measured
+    σ alone. Where the believed one hangs on the plots (missed ones, filters that adapt) its mean has a chance of its
+    own, which is small beside: rows of `sonar_manoeuvre` and of a radar that misses plots cover 94 … 95 %.
     """
     axes, at = result.axes, tables.shown(result)
     f, k, c = at
@@ -44,7 +42,6 @@ def believed(result: CaseResult, sigma: np.ndarray, varies: np.ndarray) -> dict[
         "t_s": np.asarray(axes.t_s, dtype=float)[k],
         "n": n.astype(np.int64),
         **ratio_columns(true, claimed),
-        "note": np.where(varies[f], VARIES, "").astype(object),
     }
 
 

@@ -331,7 +331,9 @@ def _table(name: str, table: "pd.DataFrame", most: int = ROWS) -> dict[str, Any]
     rows = table[order].head(most)
     columns = [{"name": column, "numeric": table[column].dtype.kind in "iuf"} for column in order]
     cells = [list(map(_cell, order, row)) for row in rows.astype(object).itertuples(index=False, name=None)]
-    return {"name": name, "columns": columns, "rows": cells, "count": len(table), "cut": len(table) > most}
+    said = dict(table["note"][table["note"] != ""].value_counts()) if "note" in table else {}
+    shown = {"name": name, "columns": columns, "rows": cells, "count": len(table), "cut": len(table) > most}
+    return shown | {"notes": said}
 
 
 def _figures(figures: Sequence[Figure]) -> list[dict[str, Any]]:

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import os
 import platform
 from collections.abc import Mapping, Sequence
@@ -10,11 +11,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, plural, tr
 from radarsim.report import files, notes, rare
-from radarsim.report.statistics import FEW, FEW_EFFECTIVE, FEW_HEAVY
+from radarsim.report.statistics import FEW
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,16 +34,18 @@ def record(
     answer: Sequence[str],
     machine: Mapping[str, object],
     made: "Mapping[str, pd.DataFrame]" = MappingProxyType({}),
+    answered: Sequence[str] = ("gains", "curves"),
 ) -> dict[str, Any]:
     """All of run.json but the report's own hash.
 
     run gives the facts of the run (stop reason, threads, times, warnings, identities …), kept as they are; contents
-    are the outputs, by path; machine describes the one they were made on; made are the tables.
+    are the outputs, by path; machine describes the one they were made on; made are the tables, answered those that the
+    answer speaks of.
     Realisations asked and done are sums over the cases, which may differ in both.
     """
     facts = dict(run)
     stop = facts.pop("stop", "done")
-    warnings = [*facts.pop("warnings", ()), *of_intervals(results, made)]
+    warnings = [*facts.pop("warnings", ()), *of_intervals(results, made, answered)]
     done = {result.name: result.count for result in results}
     return {
         "config": experiment.stem,
@@ -115,75 +120,72 @@ def _asked(resolved: Any) -> object:
     return json.loads(to_json(cases))
 
 
-def of_intervals(results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]") -> list[str]:
-    """Warnings on intervals that rest on too little: of whole cases, of curves, of other tables, of rare events."""
-    return [*few(results, made.get("curves")), *marked(results, made), *rare.warnings(made.get("rare"))]
+def of_intervals(
+    results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", answered: Sequence[str] = ("gains", "curves")
+) -> list[str]:
+    """What a reader of the answer must know of its intervals: a line at most, and those on rare events.
 
-
-def marked(results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]") -> list[str]:
-    """A line on the tables with marked rows, if any, but for what `few` and `rare.warnings` tell."""
-    told = [result.name for result in results if result.count < FEW]
-    counts = []
-    for name, table in made.items():
-        if name == "curves" or "note" not in table or "case" not in table:
-            continue
-        rows = table["note"].ne("") & ~table["case"].isin(told)
-        if name == "rare":
-            rows &= ~table["sought"].astype(bool)
-        if rows.any():
-            counts.append(tr("{marked:,} of {rows:,} in {name}.csv", marked=rows.sum(), rows=len(table), name=name))
-    if not counts:
-        return []
-    every = ", ".join(counts)
-    return [tr("intervals that rest on too little, marked by row in the column note: {counts}", counts=every)]
-
-
-def few(results: Sequence[CaseResult], curves: "pd.DataFrame | None" = None) -> list[str]:
-    """Warnings on cases whose intervals rest on too few realisations, a line for each degree of it.
-
-    Where the table of curves is given it says which: those of σ at single scans where a few large errors decide.
+    answered: the tables that the answer speaks of, see `Study.answered`. How many rows of which table are marked is
+    said where the tables are shown.
     """
-    counts = {result.name: result.count for result in results}
-    rough = [name for name, count in counts.items() if count < FEW]
-    heavy = [name for name, count in counts.items() if FEW <= count < FEW_HEAVY]
-    said = []
-    if rough:
-        said.append(
-            tr(
-                "{cases}: intervals of {counts} realisations are rough, use at least {least}",
-                cases=_named(rough),
-                counts=span([counts[n] for n in rough]),
-                least=FEW,
-            )
+    return [*(few(results) or rests(results, made, answered)), *rare.warnings(made.get("rare"))]
+
+
+def few(results: Sequence[CaseResult]) -> list[str]:
+    """A line on the cases whose intervals rest on too few realisations, if any."""
+    rough = {result.name: result.count for result in results if result.count < FEW}
+    if not rough:
+        return []
+    words = tr(
+        "{cases}: intervals of {counts} realisations are rough, use at least {least}",
+        cases=_named(list(rough)),
+        counts=span(list(rough.values())),
+        least=FEW,
+    )
+    return [words]
+
+
+def rests(
+    results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", answered: Sequence[str] = ("gains", "curves")
+) -> list[str]:
+    """A line on the answer's intervals that are too narrow, with the realisations that it takes, if any are."""
+    table = next((made[name] for name in answered if name in made and len(made[name])), None)
+    if table is None:
+        return []
+    rows = notes.told(table, results, made)
+    marked = rows[rows["marked"]]
+    if not len(marked):
+        return []
+    said = {
+        "rows": len(rows),
+        "filters": _named(list(dict.fromkeys(marked["filter"]))),
+        "needed": roughly(float(marked["needed"].max())) if np.isfinite(marked["needed"]).all() else 0,
+    }
+    if said["needed"]:
+        words = plural(
+            "{count:,} of the {rows:,} intervals behind the answer is too narrow, as few large errors decide it "
+            "({filters}): -n {needed} would do",
+            "{count:,} of the {rows:,} intervals behind the answer are too narrow, as few large errors decide them "
+            "({filters}): -n {needed} would do",
+            len(marked),
+            **said,
         )
-    if curves is None or not len(curves):
-        if heavy:
-            said.append(
-                tr(
-                    "{cases}: intervals of {counts} realisations are too narrow where errors have heavy tails, use at "
-                    "least {least} there",
-                    cases=_named(heavy),
-                    counts=span([counts[n] for n in heavy]),
-                    least=FEW_HEAVY,
-                )
-            )
-        return said
-    marked = curves[notes.heavy(curves) & ~curves["case"].isin(rough).to_numpy()]
-    if len(marked):
-        names = list(dict.fromkeys(marked["case"]))
-        least = marked["n_eff"].min()
-        said.append(
-            tr(
-                "{cases}: {thin:,} of {rows:,} rows of curves.csv rest, there or at a scan nearby, on under {few} "
-                "effective realisations, the least on {least:.0f}; these intervals are too narrow, and marked",
-                cases=_named(names),
-                thin=len(marked),
-                rows=len(curves),
-                few=FEW_EFFECTIVE,
-                least=least,
-            )
+    else:
+        words = plural(
+            "{count:,} of the {rows:,} intervals behind the answer is too narrow, as few large errors decide it, of "
+            "which most may be missing ({filters}): it takes more realisations, -n",
+            "{count:,} of the {rows:,} intervals behind the answer are too narrow, as few large errors decide them, of "
+            "which most may be missing ({filters}): it takes more realisations, -n",
+            len(marked),
+            **said,
         )
-    return said
+    return [words]
+
+
+def roughly(count: float) -> str:
+    """A number of realisations, rounded up to one digit, as `-n` takes it."""
+    power = 10 ** math.floor(math.log10(max(count, 1.0)))
+    return f"{math.ceil(count / power) * power:.0e}".replace("e+0", "e").replace("e+", "e")
 
 
 def _named(names: Sequence[str]) -> str:

@@ -70,38 +70,73 @@ class Kept(NamedTuple):
         return np.flatnonzero((n >= runs / 2) & (few | many) | (binom.sf(n - k - 1, runs, 1 - LOW) < RARE))
 
 
+class Seen(NamedTuple):
+    """Of one run and one column with an interval: the rows (n,) that it has, their marks, and which held the truth."""
+
+    run: int
+    table: str
+    column: str
+    rows: np.ndarray
+    note: np.ndarray
+    held: np.ndarray
+
+
 def kept(experiment: Experiment, n: int, runs: int) -> dict[tuple[str, str], Kept]:
     """Of so many runs of n realisations each, by table and column: which rows were unmarked and held the truth.
 
     The truth is what all runs give together; its own error widens what is seen of an interval's misses by a factor of
     √(1 + 1/runs) at most.
     """
-    works = [CaseWork(case) for case in experiment.cases]
-    sums = [[work.simulate(run * n, n) for work in works] for run in range(runs)]
-    whole = _tables(experiment, works, [sum(own) for own in zip(*sums, strict=True)], n * runs)
+    whole, every = seen(experiment, n, runs)
     found = {}
     for name, table in whole.items():
         for value, *_ in _intervals(name, table):
             zeros = np.zeros((2, len(table)), dtype=int)
             found[name, value] = Kept(zeros[0], zeros[1], np.zeros((runs, 2), dtype=int))
-    for run, own in enumerate(sums):
-        for name, table in _tables(experiment, works, own, n).items():
-            if not len(table) or not any(True for _ in _intervals(name, table)):
-                continue
-            place = _index(name, whole[name]).get_indexer(_index(name, table))
-            table, place = table[place >= 0], place[place >= 0]
-            unmarked = table["note"].eq("").to_numpy() if "note" in table else np.full(len(table), True)
-            for value, lo, hi in _intervals(name, table):
-                truth = whole[name][value].to_numpy(dtype=float)
-                if np.isnan(truth).all():
-                    continue
-                size = SAME * max(np.nanmedian(abs(truth)), np.finfo(float).tiny)
-                by_chance = unmarked & (hi > lo + size) & np.isfinite(truth[place])
-                found[name, value].unmarked[place] += by_chance
-                held = by_chance & (lo <= truth[place]) & (truth[place] <= hi)
-                found[name, value].held[place] += held
-                found[name, value].by_run[run] += (by_chance.sum(), held.sum())
+    for one in every:
+        free = one.note == ""
+        of = found[one.table, one.column]
+        of.unmarked[one.rows[free]] += 1
+        of.held[one.rows[free]] += one.held[free]
+        of.by_run[one.run] += (free.sum(), (free & one.held).sum())
     return {key: one for key, one in found.items() if one.unmarked.any()}
+
+
+def by_mark(experiment: Experiment, n: int, runs: int) -> pd.DataFrame:
+    """How many intervals there were of each table and column by what their note says, and how many held the truth."""
+    _, every = seen(experiment, n, runs)
+    parts = [
+        pd.DataFrame({"table": one.table, "column": one.column, "note": one.note, "held": one.held}) for one in every
+    ]
+    return pd.concat(parts).groupby(["table", "column", "note"])["held"].agg(["size", "sum"]).reset_index()
+
+
+def seen(experiment: Experiment, n: int, runs: int) -> tuple[dict[str, pd.DataFrame], Iterator[Seen]]:
+    """The tables of all runs together, and run by run the intervals that have a chance in them."""
+    works = [CaseWork(case) for case in experiment.cases]
+    sums = [[work.simulate(run * n, n) for work in works] for run in range(runs)]
+    whole = _tables(experiment, works, [sum(own) for own in zip(*sums, strict=True)], n * runs)
+    return whole, (
+        one for run, own in enumerate(sums) for one in _of_run(run, _tables(experiment, works, own, n), whole)
+    )
+
+
+def _of_run(run: int, made: dict[str, pd.DataFrame], whole: dict[str, pd.DataFrame]) -> Iterator[Seen]:
+    for name, table in made.items():
+        if not len(table) or not any(True for _ in _intervals(name, table)):
+            continue
+        place = _index(name, whole[name]).get_indexer(_index(name, table))
+        table, place = table[place >= 0], place[place >= 0]
+        note = table["note"].to_numpy(dtype=object) if "note" in table else np.full(len(table), "", dtype=object)
+        for value, lo, hi in _intervals(name, table):
+            truth = whole[name][value].to_numpy(dtype=float)
+            if np.isnan(truth).all():
+                continue
+            size = SAME * max(np.nanmedian(abs(truth)), np.finfo(float).tiny)
+            truth = truth[place]
+            by_chance = (hi > lo + size) & np.isfinite(truth)
+            held = (lo <= truth) & (truth <= hi)
+            yield Seen(run, name, value, place[by_chance], note[by_chance], held[by_chance])
 
 
 def with_intervals(experiment: Experiment, n: int, cases: int) -> set[tuple[str, str]]:
@@ -113,11 +148,12 @@ def with_intervals(experiment: Experiment, n: int, cases: int) -> set[tuple[str,
 
 
 def _tables(experiment: Experiment, works: list[CaseWork], sums: list[np.ndarray], n: int) -> dict[str, pd.DataFrame]:
+    """The tables, marked as if no exact value stood in them: it counts what the rule does where none is known."""
     results = [
         CaseResult(case.name, case.study, case.spec, case.swept, n, work.plan.layout.unpack(own), work.plan.axes)
         for case, work, own in zip(experiment.cases, works, sums, strict=True)
     ]
-    return notes.noted(output.measured(results), results)
+    return notes.noted(output.measured(results), results, exact=False)
 
 
 def _index(name: str, table: pd.DataFrame) -> pd.MultiIndex:

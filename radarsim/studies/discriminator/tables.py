@@ -9,7 +9,6 @@ from radarsim.bursts import fisher as exact
 from radarsim.engine.results import CaseResult
 from radarsim.report import rare, statistics
 from radarsim.report import tables as common
-from radarsim.studies.discriminator import notes
 from radarsim.studies.discriminator.kernels.sums import LOCKS as COUNTED
 from radarsim.studies.discriminator.kernels.sums import bin_edges
 
@@ -40,7 +39,7 @@ def plain(result: CaseResult) -> int:
     return int(result.sums["drawn"][0]) if "drawn" in result.sums else result.count
 
 
-CURVES = (*common.CURVES, "sigma_all", "posterior_sigma", "note")
+CURVES = (*common.CURVES, "sigma_all", "posterior_sigma")
 
 
 def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
@@ -69,7 +68,6 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
         "n_eff": statistics.effective(moments[..., 1], moments[..., 3], n),
         "sigma_all": every.sigma.value * bound,
         "posterior_sigma": axes.posterior_sigma[at],
-        "note": notes.of_curves(result, locked)[at],
     }
 
 

@@ -10,7 +10,7 @@ common noise is not in it.
 X is told from all stages in which the filter has such errors in this component, and the greatest counts, as the sample
 may lack them in the stage that is judged, or have fewer than its share:
 
-* T is the mean of `report.notes.tails` over the scans of that stage that have a tail;
+* T is the mean of `tails` over the scans of that stage that have a tail;
 * d is told by the serial correlation of the squares there: Var q = Σ_jk Cov(e_j², e_k²)/K² is d/K times the mean of
   Var(e_k²) where each scan goes with d others, so d = K Var q / mean Var(e_k²), between 1 and K;
 * b² is the mean over the scans of the stage that is judged.
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from radarsim.studies.multimodel.study import FlightAxes
 
 RARE = f"under {statistics.FEW_EVENTS} rare errors: heavy tails"
-OF_GAIN = "gain: "  # before what is to be said of the gain alone
+TAIL = 5.0  # κ
 SHOWN_BY = {"m/s": "m/s2"}  # unit of a component, and of the one that shows its rare errors as well
 
 
@@ -58,10 +58,10 @@ def of_stages(result: "CaseResult[FlightAxes]") -> np.ndarray:
         few = n**2 / effective / more**2 < statistics.FEW_EVENTS
         events_of_gain = n**2 * log_variance / np.fmax(more, more[b]) ** 2
     few_of_gain = _least_of_axes(events_of_gain, [unit for _, unit in result.axes.components]) < statistics.FEW_EVENTS
-    own = np.where(effective < statistics.FEW_EFFECTIVE, common.THIN, np.where(few, RARE, "")).astype(object)
+    own = np.where(effective < common.EFFECTIVE, common.HEAVY, np.where(few, RARE, "")).astype(object)
     of_gain = np.where(own[b] != "", own[b], np.where(few_of_gain, RARE, "")).astype(object)
     of_gain[b] = ""
-    return np.where((own == "") & (of_gain != ""), OF_GAIN + of_gain, own)
+    return np.where((own == "") & (of_gain != ""), common.OF_GAIN + of_gain, own)
 
 
 def _least_of_axes(events: np.ndarray, units: Sequence[str]) -> np.ndarray:
@@ -78,7 +78,7 @@ def rare(result: "CaseResult[FlightAxes]") -> np.ndarray:
     axes, scans = result.axes, np.maximum(np.asarray(result.axes.stage_scans, dtype=float), 1)[:, None]
     m1, m2, _, m4 = np.moveaxis(np.asarray(result.sums["error"], dtype=float) / result.count, -1, 0)
     square, fourth = np.moveaxis(np.asarray(result.sums["stage"])[:, :, : len(axes.components)] / result.count, -1, 0)
-    of_scan, tail = m4 - m2**2, common.tails(result)
+    of_scan, tail = m4 - m2**2, tails(result)
     bias, found = np.zeros(square.shape), np.zeros(square.shape)
     for s in np.unique(axes.stage):
         bias[:, s] = np.mean(m1[:, axes.stage == s] ** 2, axis=1)
@@ -90,3 +90,14 @@ def rare(result: "CaseResult[FlightAxes]") -> np.ndarray:
         lasts = np.clip(np.nan_to_num(lasts, nan=1.0), 1.0, scans[s])[:, None]
         found = np.maximum(found, (mean + 2 * np.sqrt(bias * mean)) * np.minimum(lasts, scans) / scans)
     return found
+
+
+def tails(result: "CaseResult[FlightAxes]") -> np.ndarray:
+    """Squared size (F, K, C) of the errors about their mean that make a tail, κ over 5, at each scan; 0 elsewhere."""
+    moments = np.asarray(result.sums["error"], dtype=float) / result.count
+    with np.errstate(invalid="ignore", divide="ignore"):
+        m1, m2, m3, m4 = np.moveaxis(moments, -1, 0)
+        variance = np.maximum(m2 - m1**2, 0.0)
+        fourth = np.maximum(m4 - 4 * m1 * m3 + 6 * m1**2 * m2 - 3 * m1**4, 0.0)
+        kurtosis = np.where(variance > common.ROUNDING * m2, fourth / variance**2, 0.0)
+    return np.where(result.axes.available & (kurtosis > TAIL), kurtosis * variance, 0.0)

@@ -8,7 +8,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels, statistics
 from radarsim.report import tables as common
-from radarsim.report.notes import THIN
+from radarsim.report.notes import EFFECTIVE, HEAVY
 from radarsim.studies.pulses_to_tracks.axes import PulsesAxes
 from radarsim.studies.pulses_to_tracks.kernels.records import (
     LISTED,
@@ -39,7 +39,7 @@ FOLDS = ("case", "filter", "k", "t_s", "n", "right", "right_lo", "right_hi", "li
 PASSES = ("case", "filter", "passes", "passes_lo", "passes_hi")
 
 
-OF_ALL = f"sigma_all: {THIN}"  # where the lost among all bursts, few of them, decide
+OF_ALL = f"sigma_all: {HEAVY}"  # where the lost among all bursts, few of them, decide
 # A lost burst is rare and decides σ: where it is missing in a sample, nothing else in that tells of it. As many more
 # are supposed as the sample leaves possible (95 %); what they would add is marked from half of the interval on.
 UNSEEN = "bursts lost more rarely than seen here may decide"
@@ -122,7 +122,7 @@ def _estimates(result: Result) -> dict[str, np.ndarray]:
     f, c, k = np.nonzero(np.moveaxis(np.isfinite(axes.bound), 1, 2))
     of, locked = np.asarray(result.sums["measured"])[f, k, c], np.asarray(result.sums["locks"])[f, k, LOCKED]
     n = np.full(f.size, float(result.count))
-    few = statistics.effective(of[:, 1, 0], of[:, 1, 1], n) < statistics.FEW_EFFECTIVE
+    few = statistics.effective(of[:, 1, 0], of[:, 1, 1], n) < EFFECTIVE
     return {
         **common.leading(result, f, k, **common.components(result, MEASURED + c)),
         "n": locked.astype(np.int64),

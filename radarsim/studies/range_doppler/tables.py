@@ -150,11 +150,11 @@ def believed(results: Sequence[Result]) -> "pd.DataFrame":
 
 
 def _believed(result: Result) -> dict[str, np.ndarray]:
-    variance, own = np.diagonal(result.axes.believed, axis1=2, axis2=3), own_gains(result)
-    if own:
+    variance = np.diagonal(result.axes.believed, axis1=2, axis2=3)
+    if own_gains(result):
         with np.errstate(invalid="ignore"):
             variance = np.asarray(result.sums["believed"]) / np.asarray(result.sums["estimates"])
-    return consistency.believed(result, np.sqrt(variance), np.full(len(result.axes.filters), own))
+    return consistency.believed(result, np.sqrt(variance))
 
 
 def normalised_errors(results: Sequence[Result]) -> "pd.DataFrame":

@@ -76,9 +76,8 @@ def _extrapolation(result: CaseResult[SonarAxes]) -> Columns:
 
 def _believed(result: CaseResult[SonarAxes]) -> Columns:
     """The measured σ beside the σ that the filter believes, the root of its mean variance."""
-    adapts = np.array([one.kind in ("adaptive", "imm") for one in result.spec.filters])
     with np.errstate(invalid="ignore", divide="ignore"):
-        return consistency.believed(result, np.sqrt(result.sums["believed"] / common.realisations(result)), adapts)
+        return consistency.believed(result, np.sqrt(result.sums["believed"] / common.realisations(result)))
 
 
 def _normalised_errors(result: CaseResult[SonarAxes]) -> Columns:
