@@ -77,7 +77,7 @@ def figures(
 
 def _said(figure: Figure) -> Figure:
     """The figure whose caption says why a band is missing."""
-    said = tr("No band where few large errors decide: see the column note.")
+    said = tr("No band where few large errors decide.")
     return replace(figure, caption=f"{figure.caption} {said}")
 
 

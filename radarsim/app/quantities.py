@@ -194,12 +194,12 @@ def sampled(quantity: Quantity, result: CaseResult) -> tuple[Estimate, float]:
 
 
 def noted(quantity: Quantity, result: CaseResult) -> str:
-    """What the tables note of the interval there: why it rests on too little; empty where it does not."""
+    """What the tables would note of the interval there, no exact value beside it: why it is too narrow, or nothing."""
     from radarsim.report import notes
 
     study, name = registry.study(result.study), quantity.of.table
     made = {"curves": study.curves([result]), "gains": study.gains([result])} | study.tables([result])
-    table = notes.noted({key: made[key] for key in {"curves", name}}, [result], study.exact_errors)[name]
+    table = notes.noted({key: made[key] for key in {"curves", name}}, [result], exact=False)[name]
     if "note" not in table:
         return ""
     rows = table[table["filter"] == quantity.filter]

@@ -6,6 +6,7 @@ import json
 import math
 import re
 import shlex
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
 from importlib import resources
@@ -331,7 +332,7 @@ def _table(name: str, table: "pd.DataFrame", most: int = ROWS) -> dict[str, Any]
     rows = table[order].head(most)
     columns = [{"name": column, "numeric": table[column].dtype.kind in "iuf"} for column in order]
     cells = [list(map(_cell, order, row)) for row in rows.astype(object).itertuples(index=False, name=None)]
-    said = dict(table["note"][table["note"] != ""].value_counts()) if "note" in table else {}
+    said = Counter(str(note) for note in table.get("note", ()) if note)
     shown = {"name": name, "columns": columns, "rows": cells, "count": len(table), "cut": len(table) > most}
     return shown | {"notes": said}
 

@@ -172,10 +172,10 @@ def rests(
         )
     else:
         words = plural(
-            "{count:,} of the {rows:,} intervals behind the answer is too narrow, as few large errors decide it, of "
-            "which most may be missing ({filters}): it takes more realisations, -n",
-            "{count:,} of the {rows:,} intervals behind the answer are too narrow, as few large errors decide them, of "
-            "which most may be missing ({filters}): it takes more realisations, -n",
+            "{count:,} of the {rows:,} intervals behind the answer may be too narrow: rare errors decide it, and few "
+            "or none were seen ({filters}); it takes more realisations, -n",
+            "{count:,} of the {rows:,} intervals behind the answer may be too narrow: rare errors decide them, and few "
+            "or none were seen ({filters}); it takes more realisations, -n",
             len(marked),
             **said,
         )

@@ -13,14 +13,12 @@ ALIKE = 1e-9  # of κ − 1: errors that differ by no more are the same but for 
 
 Values = Any  # a number or an array of numbers: NumPy computes with both alike, which its types cannot express
 Z95 = 1.959963984540054
-# Where less than this stands behind a 95 % interval, its coverage was measured to leave 93.6 … 96.4 %, and 92.5 % for
-# Student's t with five degrees of freedom (docs/trust.md): tables then say so.
-FEW = 200  # realisations, errors Gaussian: paired gains cover 93.6 % at 30, means of products 93.2 % at 100
-FEW_HEAVY = 1000  # realisations, errors with heavy tails: σ covers 92.6 % at 500, 90.7 % at 100, 89.5 % at 20
-# Effective realisations behind an interval of σ where a few large errors decide: n/(κ − 1). Measured in `multimodel` at
-# single scans: 10–50 cover 47 %, 50–100 76 %, 100–200 87 %, over 200 93–94 %.
+# Where less than this stands behind a 95 % interval, its coverage was measured to leave 93.6 … 96.4 %
+# (tests/trust/test_statistics.py).
+FEW = 200  # realisations of a run: of Gaussian errors paired gains cover 93.6 % at 30, means of products 93.2 at 100
+# Effective realisations, n/(κ − 1), that controls have to leave behind a mean square for it to count.
 FEW_EFFECTIVE = 200
-FEW_EVENTS = 20  # of either outcome of a rate: Wilson's interval covers 91.7 to 98.1 % where one is expected
+FEW_EVENTS = 20  # rare errors, or weighted events, behind an interval that they decide
 
 
 class Estimate(NamedTuple):

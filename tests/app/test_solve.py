@@ -490,7 +490,7 @@ def test_an_interval_that_rests_on_heavy_tails_says_so():
     """While filters begin, rare patterns of plots decide: where the run's row is marked, so is the answer."""
     given = {"overrides": [*MISSED, "scans=7"], "between": (2, 40), "sampled": True, "realisations": 1000}
     early = solve("rls2", "radar.sigma_velocity_mps", Quantity("gain", "r+Vr", "r", 50.0), 60, **given)
-    assert any(note.startswith("the interval is too narrow: under 200 effective") for note in early.notes)
+    assert any(note.startswith("the interval may be too narrow: under 100 effective") for note in early.notes)
     late = solve("rls2", "radar.sigma_velocity_mps", GAIN, 30, **given | {"overrides": [], "between": (4, 40)})
     assert late.notes == ()
 

@@ -139,13 +139,13 @@ def test_every_marked_interval_is_marked_on_the_terminal(capsys):
     row = {"case": "a", "component": "x", "t_s": 1.0, "unit": "m", "exact_sigma": float("nan"), "n_eff": 900.0}
     row |= {"sigma": 1.5, "sigma_lo": 1.0, "sigma_hi": 2.0, "gain_percent": 3.0, "gain_lo": 1.0, "gain_hi": 5.0}
     said = [
-        {"filter": "f", "note": notes.THIN, "n_eff": 20.0, "gain_note": notes.THIN},
-        {"filter": "g", "note": notes.UNSEEN, "gain_note": notes.ALIKE},
-        {"filter": "h", "note": "", "gain_note": notes.THIN},  # the baseline has few
+        {"filter": "f", "note": notes.HEAVY, "gain_note": notes.HEAVY},
+        {"filter": "g", "note": "rarer ones may decide", "gain_note": notes.ALIKE},
+        {"filter": "h", "note": "", "gain_note": notes.HEAVY},  # the baseline has few
         {"filter": "i", "note": "", "gain_note": ""},
         {"filter": "j", "note": "", "gain_note": float("nan"), "gain_lo": float("nan"), "gain_hi": float("nan")},
     ]
     outcomes.show_last_scan(pd.DataFrame([row | own for own in said]))
     lines = capsys.readouterr().out.splitlines()[1:]
     found = [re.findall(r"\((.*?)\)", line) for line in lines]
-    assert found == [["20 effective"] * 2, ["heavy tails", "marked"], ["heavy tails"], [], []]
+    assert found == [["heavy tails"] * 2, ["marked"] * 2, ["heavy tails"], [], []]

@@ -158,7 +158,7 @@ def test_rare_errors_that_last_are_marked_where_a_sample_lacks_them(reach, monke
         m2, m4 = (e**2).sum(axis=0), (e**4).sum(axis=0)
         of, effective = statistics.root_mean_square(m2, m4, N), statistics.effective(m2, m4, N)
         curves = pd.DataFrame({"case": "a", "filter": "f", "component": "x", "k": range(scans), "n_eff": effective})
-        free = ~notes.thin(curves)
+        free = notes.nearby(curves) >= notes.EFFECTIVE
         unmarked += free
         held += free & (of.lo <= truth) & (truth <= of.hi)
     share = held.sum() / max(unmarked.sum(), 1)

@@ -117,7 +117,7 @@ S_BAND = (
 def test_marks_of_a_radar_that_misses_plots_fall_on_the_rows_that_do_not_cover():
     """Its first scans and its last ones are all but Gaussian; those between have the tails of several plots missed.
 
-    Marked as if no exact value stood beside: they cover less than the others, and the last scans are hardly ever marked.
+    Marked as if no exact value stood beside: these cover less than the others, and the last scans are not marked.
     """
     experiment, parts = load("rls2", list(S_BAND)), []
     for result in sampled(experiment, 1000, 150):

@@ -323,21 +323,8 @@ MISSED_PLOTS = (
 )
 MARKS = "report/test_notes.py"
 STAGES = "studies/multimodel/test_notes.py"
-LOCKED = "studies/discriminator/test_notes.py"
+FEW_FOLDS = "studies/ambiguous_doppler/test_results.py::test_sigma_is_marked_where_few_false_velocities_were_seen"
 SAID = (
-    *mutants(
-        "radarsim/studies/discriminator/notes.py",
-        (
-            "length[f, max(k - 1, 0)]",
-            "length[f, k]",
-            f"{LOCKED}::test_windows_are_beside_each_other_by_their_length",
-        ),
-        (
-            "_tails(moments, n) * bound",
-            "_tails(moments, n)",
-            f"{LOCKED}::test_errors_are_compared_in_hertz_not_in_potential_sigma",
-        ),
-    ),
     *mutants(
         "radarsim/studies/pulses_to_tracks/tables.py",
         (
@@ -372,19 +359,27 @@ SAID = (
     *mutants(
         "radarsim/report/notes.py",
         (
-            "largest = _of_tail(result, variance, kurtosis).max(axis=1, keepdims=True)",
-            "largest = _of_tail(result, variance, kurtosis)",
-            f"{MARKS}::test_large_errors_at_one_scan_mark_those_whose_sample_may_lack_them",
+            "np.minimum(EFFECTIVE, n / TAIL)",
+            "EFFECTIVE",
+            f"{MARKS}::test_gaussian_errors_of_few_realisations_have_no_tails",
         ),
         (
-            "m4 - 4 * m1 * m3 + 6 * m1**2 * m2 - 3 * m1**4",
-            "m4",
-            f"{MARKS}::test_an_error_of_most_bias_is_marked_by_what_makes_its_spread",
+            "known(table) & exact",
+            "known(table) & False",
+            f"{MARKS}::test_no_note_stands_beside_an_exact_value",
         ),
         (
-            'FORETOLD = {"calibration"',
-            'FORETOLD = {"orders"',
-            f"{MARKS}::test_a_calibration_is_marked_by_what_is_foretold",
+            "fewest = np.fmin(fewest, other)",
+            "fewest = np.fmax(fewest, other)",
+            f"{MARKS}::test_a_gain_rests_on_the_fewer_of_its_two_filters",
+        ),
+    ),
+    *mutants(
+        "radarsim/studies/ambiguous_doppler/tables.py",
+        (
+            "few = unfolding(result)[:, None] & (beyond < statistics.FEW_EVENTS)",
+            "few = unfolding(result)[:, None] & (beyond < 0)",
+            FEW_FOLDS,
         ),
     ),
     *mutants(

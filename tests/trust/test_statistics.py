@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from radarsim.report import notes, statistics
+from radarsim.report import statistics
 
 REPETITIONS, MANY = 2000, 8000  # many: so that the bounds are five standard errors away
 GAUSSIAN, HEAVY = (0.936, 0.964), (0.925, 1.0)
+FEW_HEAVY = 1000  # realisations from which heavy tails cover so: σ 92.6 % at 500, 90.7 at 100
 
 
 def gaussian(rng, *shape):
@@ -88,7 +89,7 @@ def slack(repetitions):
 def test_coverage_at_the_least_sizes_without_a_note(kind):
     low, high = GAUSSIAN
     assert low - slack(500) / 2 <= coverage(kind, gaussian, statistics.FEW, 500) <= high + slack(500) / 2
-    assert coverage(kind, student5, statistics.FEW_HEAVY, 500) >= HEAVY[0] - slack(500) / 2
+    assert coverage(kind, student5, FEW_HEAVY, 500) >= HEAVY[0] - slack(500) / 2
 
 
 @pytest.mark.slow
@@ -105,7 +106,7 @@ def test_gaussian_coverage_over_two_thousand_repetitions(kind, n):
 def test_heavy_tailed_coverage_over_two_thousand_repetitions(kind, n):
     """A product of two errors needs twice as many; the one table of them, smoothing_gains, is of Gaussian errors."""
     low, high = HEAVY
-    n *= statistics.FEW_HEAVY * (2 if kind is product else 1)
+    n *= FEW_HEAVY * (2 if kind is product else 1)
     assert low <= coverage(kind, student5, n, MANY) <= high
 
 
@@ -114,7 +115,6 @@ def test_rates_cover_exactly(n):
     """No simulation: Wilson's coverage is a sum of binomial chances, at every rate whose expected count is no few."""
     count = np.arange(n + 1)
     of = statistics.rate(count, n)
-    assert not any(notes.notes_on(np.array([1000.0]), np.array([20.0])))
     for p in np.linspace(statistics.FEW_EVENTS / n, min(0.5, 200 / n), 300):
         near = slice(max(0, int(n * p) - 400), int(n * p) + 400)
         chance = binom.pmf(count[near], n, p)
@@ -122,26 +122,17 @@ def test_rates_cover_exactly(n):
         assert GAUSSIAN[0] - 5e-4 <= covered <= GAUSSIAN[1]
 
 
-def test_rates_that_only_a_lucky_sample_leaves_unmarked():
-    """What is marked by the events that came is a choice: with 12 to 19 to come the unmarked shares are too high.
-
-    So they cover 0 to 93 %, while all samples cover 95: from 20 events to come on either holds. At no rate is more than
-    6 % of the samples unmarked and wrong, at those few events 4 %. A share seen of `pulses_snr` is foretold by this.
-    """
+def test_rates_of_few_events_cover_too():
+    """So they bear no mark, which would depend on the events that came: the samples it leaves are then a choice."""
     n = 1000
     count = np.arange(n + 1)
     of = statistics.rate(count, n)
-    unmarked = np.minimum(count, n - count) >= statistics.FEW_EVENTS
-    for events in np.linspace(8, 60, 300):
-        chance = binom.pmf(count, n, events / n)
-        held = (of.lo <= events / n) & (events / n <= of.hi)
-        assert chance[unmarked & ~held].sum() <= (0.042 if events < statistics.FEW_EVENTS else 0.06)
-        assert chance[held].sum() > 0.92
-        share = chance[unmarked & held].sum() / chance[unmarked].sum()
-        if events <= 12:
-            assert share == 0
-        if events >= statistics.FEW_EVENTS:
-            assert 0.93 < share < 0.98
+    p = np.geomspace(0.01, statistics.FEW_EVENTS, 400) / n
+    share = np.array([binom.pmf(count, n, one)[(of.lo <= one) & (one <= of.hi)].sum() for one in p])
+    assert share.min() > 0.83  # Wilson's dip, where the one event that came is five times too many (Brown et al. 2001)
+    assert share[p * n > 0.3].min() > 0.89
+    assert share[p * n > 1].min() > 0.917
+    assert share.mean() > 0.94
 
 
 @pytest.mark.parametrize("shape", [(2, 5), (0.2, 0.2), (0.5, 5)])

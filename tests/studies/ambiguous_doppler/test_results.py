@@ -4,16 +4,19 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import radarsim
 from radarsim.app.configs import load
 from radarsim.errors import ConfigError, PlotFault
 from radarsim.recorded import fit, follow, plots
+from radarsim.report import notes, statistics
 from radarsim.studies import registry
 from radarsim.studies.ambiguous_doppler import followers, study, track
 from radarsim.studies.ambiguous_doppler import map as fans
 from radarsim.studies.ambiguous_doppler.kernels import records
+from radarsim.studies.ambiguous_doppler.tables import FEW_FOLDS
 
 
 @pytest.fixture(scope="module")
@@ -260,3 +263,19 @@ def test_what_memory_is_worth_is_measured_by_the_error_and_not_by_right_folds():
     last = own[~nearest & own["what"].str.contains("last scan")]
     assert len(last) == 4
     assert set(last["verdict"]) == {"refuted"}
+
+
+def test_sigma_is_marked_where_few_false_velocities_were_seen():
+    """Of filters that unfold, and of what is compared with them; one that needs not is left alone."""
+    made = radarsim.run("ambiguous_rls5", realisations=300, overrides=["scans=12", "baseline=memory"]).tables
+    folds = made["folds"].set_index(["filter", "k"])
+    few = (folds["n"] * folds["beyond"]).round() < statistics.FEW_EVENTS
+    assert few.any()
+    assert not few.all()
+    curves, gains = made["curves"], made["gains"]
+    own = pd.Series([bool(few.get((row.filter, row.k), False)) for row in curves.itertuples()])
+    assert (curves["note"] == FEW_FOLDS)[~own].sum() == 0
+    assert curves["note"][own].isin([FEW_FOLDS, notes.HEAVY]).all()
+    assert (curves["note"] == FEW_FOLDS).any()
+    late = gains[(gains["filter"] == "range only") & (gains["k"] == 12)]
+    assert late["note"].isin([FEW_FOLDS, notes.HEAVY]).all()  # its baseline unfolds
