@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarsim.report.notes import TAIL
+from radarsim.report.notes import OF_GAIN
 from radarsim.studies.multimodel import notes
 
 SHORT, LONG = 10, 400  # scans of the two stages
@@ -48,7 +48,7 @@ def test_what_rare_errors_add_is_as_a_twin_counts_it():
     case, means = case_of(errors)
     own = errors[1]
     tails = np.mean((own - own.mean(0)) ** 4, axis=0) / own.var(axis=0)
-    tailed = np.mean((own - own.mean(0)) ** 4, axis=0) / own.var(axis=0) ** 2 > TAIL
+    tailed = np.mean((own - own.mean(0)) ** 4, axis=0) / own.var(axis=0) ** 2 > notes.TAIL
     assert list(np.flatnonzero(tailed)) == [4, 5, 6]
     size = tails[tailed].mean()
     lasts = SHORT * means[1, 0].var() / (own[:, :SHORT] ** 2).var(axis=0).mean()
@@ -85,7 +85,7 @@ def test_a_gain_is_marked_for_the_errors_of_either_filter():
     errors = errors_of(np.random.default_rng(4))
     errors[0, :3, 300] += 15
     said = notes.of_stages(case_of(errors)[0])[..., 0]
-    assert said.tolist() == [[notes.RARE, ""], [notes.OF_GAIN + notes.RARE, ""]]
+    assert said.tolist() == [[notes.RARE, ""], [OF_GAIN + notes.RARE, ""]]
 
 
 def test_a_gain_may_be_narrower_than_what_its_filters_lack():
@@ -96,7 +96,7 @@ def test_a_gain_may_be_narrower_than_what_its_filters_lack():
     errors[1, ::250, 300] += 15
     said = notes.of_stages(case_of(errors)[0])[..., 0]
     assert said[0].tolist() == ["", ""]
-    assert said[1, 1] == notes.OF_GAIN + notes.RARE
+    assert said[1, 1] == OF_GAIN + notes.RARE
 
 
 def test_a_gain_is_marked_by_the_axis_that_shows_rare_errors_most():
@@ -106,7 +106,7 @@ def test_a_gain_is_marked_by_the_axis_that_shows_rare_errors_most():
     errors = np.stack([errors_of(rng) for _ in components], axis=-1)
     errors[1, :3, 4, 0] += 15
     said = notes.of_stages(parts_of(errors, components)[0])
-    assert said[1, 0].tolist() == [notes.RARE, "", "", notes.OF_GAIN + notes.RARE, "", ""]
+    assert said[1, 0].tolist() == [notes.RARE, "", "", OF_GAIN + notes.RARE, "", ""]
     assert said[0].tolist() == [[""] * 6] * 2
 
 
@@ -120,6 +120,6 @@ def test_a_gain_in_speed_is_marked_by_the_acceleration_of_its_stage(wrong, marke
     errors[1, :3, 4, names.index(wrong)] += 17
     said = notes.of_stages(parts_of(errors, components)[0])
     own = {wrong: notes.RARE}
-    assert said[1, 0].tolist() == [own.get(n, notes.OF_GAIN + notes.RARE if n in marked else "") for n in names]
+    assert said[1, 0].tolist() == [own.get(n, OF_GAIN + notes.RARE if n in marked else "") for n in names]
     assert said[1, 1].tolist() == [""] * 6
     assert said[0].tolist() == [[""] * 6] * 2
