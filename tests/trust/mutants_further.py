@@ -322,7 +322,6 @@ MISSED_PLOTS = (
     ),
 )
 MARKS = "report/test_notes.py"
-STAGES = "studies/multimodel/test_notes.py"
 FEW_FOLDS = "studies/ambiguous_doppler/test_results.py::test_sigma_is_marked_where_few_false_velocities_were_seen"
 SAID = (
     *mutants(
@@ -331,29 +330,6 @@ SAID = (
             "statistics.effective(of[:, 1, 0], of[:, 1, 1], n)",
             "statistics.effective(of[:, 0, 0], of[:, 0, 1], n)",
             "studies/pulses_to_tracks/test_tables.py::test_sigma_of_all_bursts_is_marked_where_few_lost_ones_decide",
-        ),
-    ),
-    *mutants(
-        "radarsim/studies/multimodel/notes.py",
-        (
-            "* np.minimum(lasts, scans) / scans)",
-            ")",
-            f"{STAGES}::test_what_rare_errors_add_is_as_a_twin_counts_it",
-        ),
-        (
-            "events_of_gain = n**2 * log_variance",
-            "events_of_gain = n**2 / effective",
-            f"{STAGES}::test_a_gain_may_be_narrower_than_what_its_filters_lack",
-        ),
-        (
-            "telling = np.isin(units, [unit, SHOWN_BY.get(unit, unit)])",
-            "telling = ~np.isin(units, [unit, SHOWN_BY.get(unit, unit)])",
-            f"{STAGES}::test_a_gain_is_marked_by_the_axis_that_shows_rare_errors_most",
-        ),
-        (
-            'SHOWN_BY = {"m/s": "m/s2"}',
-            'SHOWN_BY = {"m/s2": "m/s"}',
-            f"{STAGES}::test_a_gain_in_speed_is_marked_by_the_acceleration_of_its_stage",
         ),
     ),
     *mutants(

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import consistency, controlled, statistics
+from radarsim.report import consistency, controlled, notes, statistics
 from radarsim.report import tables as common
 from radarsim.studies.multimodel import cost as costs
-from radarsim.studies.multimodel import filters, notes
+from radarsim.studies.multimodel import filters
 from radarsim.studies.multimodel.kernels.records import MERGED, MERGES, NEES, NIS
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ STAGES = (
 def stages(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """σ over each stage of the flight, of all its scans, and the paired gain against the baseline filter.
 
-    `note` says where an interval rests on too little (`notes`).
+    `note` says where few realisations make the spread of their mean squares, of the filter or of the baseline.
     """
     rows = [row for result in results for row in _stages(result)]
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(STAGES)})
@@ -105,7 +105,9 @@ def stage_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> statist
 
 def _stages(result: CaseResult) -> list[tuple]:
     rows, axes, b = [], result.axes, result.axes.baseline
-    places, said = {name: s for s, name in enumerate(stage_names(result))}, notes.of_stages(result)
+    places = {name: s for s, name in enumerate(stage_names(result))}
+    square, fourth = np.moveaxis(np.asarray(result.sums["stage"]), -1, 0)
+    few = statistics.effective(square, fourth, result.count) < notes.EFFECTIVE
     for f, label in enumerate(axes.filters):
         for stage, begin, end in stage_bounds(result):
             for c, (component, unit) in enumerate(axes.components):
@@ -114,7 +116,8 @@ def _stages(result: CaseResult) -> list[tuple]:
                 nothing = statistics.Estimate(np.nan, np.nan, np.nan)
                 gain = stage_gain(result, f, b, s, c) if f != b else nothing
                 where = (result.name, label, stage, begin, end, component, unit, result.count)
-                rows.append((*where, *map(float, sigma), axes.filters[b], *map(float, gain), said[f, s, c]))
+                said = notes.HEAVY if few[f, s, c] else notes.OF_GAIN + notes.HEAVY if few[b, s, c] else ""
+                rows.append((*where, *map(float, sigma), axes.filters[b], *map(float, gain), said))
     return rows
 
 
