@@ -80,7 +80,7 @@ def _noted(
 
 def known(table: "pd.DataFrame") -> np.ndarray:
     """The rows (rows,) beside which exact values stand."""
-    columns = [column for column in table if str(column).startswith("exact_")]
+    columns = [column for column in table if str(column).startswith("exact_") and column != "exact_bias"]
     return table[columns].notna().all(axis=1).to_numpy() & bool(columns)
 
 
