@@ -52,7 +52,7 @@ GROUND = ("errors", "kernels", "physics", "bursts", *CASE)
 KEYS = ("errors", "config.faults", "config.fields", "config.radial", "config.rare", "physics")
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
-SHOWN = (*SUMS, "cost", "notes", "tables", "figures", "map")
+SHOWN = (*SUMS, "cost", "tables", "figures", "map")
 READ = (*SHOWN, "words", "claims", "measures", "readings", "search")
 ROLES = {
     "kernels": (("kernels", "bursts.kernels"), ("kernels",)),
@@ -63,7 +63,6 @@ ROLES = {
     ),  # world, filters, exact, and whatever else prepares numbers
     "study": ((*GROUND, *DATA, "studies.noise"), SUMS),
     "cost": ((*GROUND, *DATA), (*SUMS, "cost")),
-    "notes": ((*GROUND, *DATA, "report"), SUMS),  # where an interval rests on too little
     "tables": ((*GROUND, *DATA, "report"), SHOWN),
     "figures": ((*GROUND, *DATA, "report", "language"), SHOWN),
     "words": ((*GROUND, *DATA, "report", "language"), READ),
