@@ -55,3 +55,10 @@ def test_every_study_has_the_same_columns(config, quantities, exact, sigma):
         rows = made["believed"]
         assert tuple(rows.columns) == consistency.BELIEVED
         np.testing.assert_allclose(rows["ratio"], rows["sigma"] / rows["believed_sigma"])
+
+
+def test_a_known_expectation_is_judged_in_place_of_the_mean():
+    mean = statistics.Estimate(*(np.array([value] * 3) for value in (1.2, 1.15, 1.25)))
+    bounds = np.full(3, 0.9), np.full(3, 1.1)
+    made = consistency.normalised("nees", mean, bounds, np.array([1.0, 0.8, np.nan]))
+    assert made["nees_verdict"].tolist() == ["consistent", "pessimistic", "optimistic"]

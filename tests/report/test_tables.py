@@ -63,6 +63,11 @@ def test_fewer_estimates_than_realisations(paper):
     np.testing.assert_allclose(table["sigma"], np.sqrt(2) * table["exact_sigma"], rtol=1e-12)
 
 
+def test_exact_values_come_first():
+    rows = pd.DataFrame({"sigma": [3.0, 2.0, 1.0], "exact_sigma": [1.5, 2.5, np.nan]})
+    assert tables.exact_first(rows, "sigma", "exact_sigma").tolist() == [1.5, 2.5, 1.0]
+
+
 def test_csv_reads_back_the_same(paper):
     table = tables.curves(paper[:1])
     table.loc[3, "exact_sigma"] = np.nan

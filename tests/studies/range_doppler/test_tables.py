@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from radarsim.report import panels, statistics, tables
@@ -66,6 +67,16 @@ def test_steady_values_over_the_manoeuvre_variance(swept):
     best = rows[rows["best"]].set_index("filter")["manoeuvre_variance"]
     assert best["r"] == 1e-3
     assert best["r+Vr"] == 1e-3
+
+
+def test_the_worst_is_named_by_exact_values():
+    """A sample that errs puts the largest σ and bias at another scan; the sentence names the scan of the exact ones."""
+    rows = pd.DataFrame({"t_s": [10.0, 20.0], "sigma": [5.2, 5.0], "exact_sigma": [4.9, 5.1]})
+    rows = rows.assign(
+        sigma_lo=rows["sigma"] - 0.3, sigma_hi=rows["sigma"] + 0.3, bias=[-2.0, 1.9], exact_bias=[-1.8, 2.1]
+    )
+    said = range_doppler_words._worst(rows)
+    assert said.endswith("at 20 s, largest bias 1.9 m at 20 s")
 
 
 def test_no_best_where_nothing_is_compared(paper):
