@@ -93,10 +93,10 @@ def _gain_sentence(
     several = rows["filter"].nunique() > 1
     said: dict[str, Any] = {"quantity": _capital(quantity), "when": when, "base": _baseline(results)}
     if len(last) > 1:
-        low, high = (last.iloc[int(pick(_decides(last)))] for pick in (np.argmin, np.argmax))
+        low, high = (last.iloc[int(pick(last["gain_percent"].to_numpy()))] for pick in (np.argmin, np.argmax))
         said |= {"least": _gain(low), "low": _who(low, labels, several)}
         said |= {"most": _gain(high), "high": _who(high, labels, several)}
-        if _decides(last, "gain_lo").max() <= _decides(last, "gain_hi").min():
+        if last["gain_lo"].max() <= last["gain_hi"].min():
             words = tr(
                 "{quantity}: {when} σ is {least} ({low}) to {most} ({high}), which do not differ for certain, {base}",
                 **said,
