@@ -169,7 +169,7 @@ def _compute_each(
 ) -> None:
     """Compute experiments one by one, each after a look at it, and print what came of it.
 
-    Raises TargetUnmet at the end for what was not reached.
+    Raises DisagreementError at the end for what no chance makes, else TargetUnmet for what was not reached.
     """
     from radarsim.app import documents, simulation
     from radarsim.cli import console, outcomes
@@ -189,7 +189,8 @@ def _compute_each(
             unmet += error.lines
             continue
         except DisagreementError as error:  # all is written, and the other experiments stand by themselves
-            wrong += error.lines
+            wrong += [line if line.startswith(f"{one.stem}: ") else f"{one.stem}: {line}" for line in error.lines]
+            made.append(documents.result(error.result))
             continue
         unmet += [f"{one.stem}: {reason}" for reason in done.unmet]
         if isinstance(done, simulation.Shares):
@@ -291,20 +292,13 @@ def report(
       radarsim report rls2
       radarsim report rls2 --json --no-figures
     """
-    from radarsim.app import documents
     from radarsim.app import run as experiment
-    from radarsim.cli import outcomes
 
     overrides = experiment.merged(overrides, realisations, seed)
-    made = []
-    for one in experiment.load_all(configs, overrides):
-        figures = False if no_figures else formats or True
-        result = experiment.report(one, out=out, overrides=overrides, figures=figures, width_mm=width_mm)
-        made.append(documents.result(result))
-        if not as_json:
-            outcomes.print_result(result)
-    if as_json:
-        click.echo(documents.text(made))
+    figures = False if no_figures else formats or True
+    read = partial(experiment.report, out=out, overrides=overrides, figures=figures, width_mm=width_mm)
+    loaded = experiment.load_all(configs, overrides)
+    _compute_each(loaded, lambda one, progress: read(one), out, False, as_json, None)
 
 
 @main.command()

@@ -1,13 +1,16 @@
 """Exact values beside measured ones: what is told, what is chance, and what a sample of heavy tails may lack."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
+from click.testing import CliRunner
 
 import radarsim
 from radarsim.app.result import Result
+from radarsim.cli import main
 from radarsim.config import lookup
 from radarsim.errors import DisagreementError
 from radarsim.report import agreement, tables
@@ -153,6 +156,27 @@ def test_python_raises_with_the_result(monkeypatch):
     assert isinstance(raised.value.result, Result)
     assert len(raised.value.result.curves) == 85
     assert "computed wrongly" in raised.value.result.warnings[0]
+
+
+def test_one_config_that_disagrees_does_not_stop_the_others(tmp_path, monkeypatch):
+    """`run` and `report` of several: all are written, printed as JSON too, and each line names its config."""
+    from radarsim.studies.range_doppler import study
+
+    def wrong(made, right=study.axes):
+        axes = right(made)
+        return replace(axes, exact_sigma=(1.5 if made.spec.radar.name == "RLS 2" else 1.0) * axes.exact_sigma)
+
+    monkeypatch.setattr(study, "axes", wrong)
+    for command, *more in (("run", "-n", "2000"), ("report",)):
+        for folder in ("rls2", "rls3"):
+            (tmp_path / folder / "report.html").unlink(missing_ok=True)
+        words = (command, "rls2", "rls3", *more, "--out", str(tmp_path), "--no-figures", "--json")
+        ended = CliRunner().invoke(main, words)
+        assert ended.exit_code == 4, ended.output
+        assert [one["config"] for one in json.loads(ended.stdout)] == ["rls2", "rls3"]
+        assert ended.stderr.startswith("rls2: curves.csv: rls2, r")
+        assert "rls3" not in ended.stderr
+        assert all((tmp_path / folder / "report.html").exists() for folder in ("rls2", "rls3"))
 
 
 @pytest.mark.slow
