@@ -27,8 +27,8 @@ def check(experiment: Experiment) -> None:
     of = registry.study(experiment.study).claims()
     if of is None or all(claim.config != experiment.stem for claim in of.claims):
         configs = sorted({claim.config for claim in of.claims}) if of else []
-        hint = f"; of this study: {', '.join(configs)}" if configs else ""
-        raise ConfigError(f"{experiment.path or experiment.stem}: decide: no claim is judged by this config{hint}")
+        hint = f"; claims of its study name {', '.join(configs)}" if configs else ""
+        raise ConfigError(f"{experiment.path or experiment.stem}: decide: no claim names this config{hint}")
 
 
 def simulated(experiment: Experiment, options: RunOptions, progress: Progress | None = None) -> SimulatedCases:

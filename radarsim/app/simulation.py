@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from radarsim.report.precision import Cell, Table
 
 Progress = Callable[[int, int, int], None]
-NO_CONTROL = "control_variate: no filter beside a baseline whose sigma is known exactly: no controlled.csv"
+NO_CONTROL = (
+    "control_variate: no controlled.csv: it takes a baseline whose sigma is known exactly, beside it a filter that has "
+    "its estimates in the same realisations, and three of these"
+)
 
 
 @dataclass

@@ -7,13 +7,13 @@ filter takes it to; less: they are better.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from statistics import NormalDist
 
 import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.config.fields import Model
 from radarsim.recorded.follow import Followed, Tally, recorded_of
+from radarsim.report.statistics import normalised_bounds
 
 LEAST_TESTS = 10  # below which there is no verdict
 CLOSE = 0.005  # of one, to which the mean is brought
@@ -50,18 +50,11 @@ def judged(followed: Followed) -> list[Judged]:
 
 def _judge(tally: Tally) -> Judged:
     """The verdict at 95 %."""
-    lo, hi = right_mean(max(tally.count * tally.freedom, 1))
+    lo, hi = map(float, normalised_bounds(max(tally.count * tally.freedom, 1)))
     verdict = SMALL if tally.mean > hi else LARGE if tally.mean < lo else FITS
     if tally.count < LEAST_TESTS:
         verdict = UNKNOWN
     return Judged(tally.filter, tally.name, tally.count, tally.mean, lo, hi, verdict, {})
-
-
-def right_mean(freedom: int) -> tuple[float, float]:
-    """Between what the mean NIS of a right filter lies in 95 % of cases, of so many degrees of freedom altogether: so
-    many times the mean is chi-square (Wilson and Hilferty)."""
-    ninth, z = 2 / (9 * freedom), NormalDist().inv_cdf(0.975)
-    return (1 - ninth - z * ninth**0.5) ** 3, (1 - ninth + z * ninth**0.5) ** 3
 
 
 def _own(case: Case, one: Judged, improved: Mapping[str, float]) -> dict[str, float]:

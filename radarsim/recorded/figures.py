@@ -6,11 +6,10 @@ import numpy as np
 
 from radarsim.engine.results import Track
 from radarsim.language import tr
-from radarsim.recorded.accuracy import right_mean
 from radarsim.recorded.places import Path
 from radarsim.report import panels
 from radarsim.report.drawing import COLUMN_MM, GREY, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
-from radarsim.report.statistics import Z95
+from radarsim.report.statistics import Z95, normalised_bounds
 
 PLOT = Style(GREY, None, 0, size_pt=1.6)
 BOUND = Style(GREY, 1, width_pt=0.8)
@@ -220,7 +219,7 @@ def innovations(track: Track) -> Figure | None:
     made: list[Panel] = []
     for q, (name, freedom) in enumerate(track.tested):
         marks: list = [Reference(1.0)]
-        low, high = right_mean(WINDOW * freedom)
+        low, high = normalised_bounds(WINDOW * freedom)
         for f, filter_name in enumerate(track.filters[:MOST_FILTERS]):
             known = np.flatnonzero(np.isfinite(track.nis[f, :, q]))
             if len(known) < WINDOW:

@@ -203,9 +203,9 @@ def standard_errors(of: Estimate, exact: Values) -> Values:
     however rare, and of σ from 200 realisations on. Infinite where a value without width is off, not-a-number where
     either is not known.
     """
-    off = np.subtract(exact, of.value)
-    up, down = np.subtract(of.hi, of.value), np.subtract(of.value, of.lo)
     with np.errstate(divide="ignore", invalid="ignore"):
+        off = np.subtract(exact, of.value)
+        up, down = np.subtract(of.hi, of.value), np.subtract(of.value, of.lo)
         grown = np.where(off > 0, up - down, down - up)
         unbounded = np.isinf(np.where(off > 0, of.hi, of.lo))
         variance = up * down + np.maximum(grown, 0) * np.abs(off)
@@ -324,7 +324,8 @@ def _gain(mean_square: Values, base: Values, log_variance: Values, freedom: Valu
     ratio = np.sqrt(mean_square / base)
     # One realisation tells nothing of its spread: the interval is all there can be.
     step = np.where(np.asarray(freedom) > 0, 0.5 * student(freedom) * np.sqrt(log_variance), np.inf)
-    factor = np.exp(step)
+    with np.errstate(over="ignore"):  # of two realisations
+        factor = np.exp(step)
     return Estimate(100 * (1 - ratio), 100 * (1 - ratio * factor), 100 * (1 - ratio / factor))
 
 

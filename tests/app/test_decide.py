@@ -52,7 +52,7 @@ def test_undecided_at_the_most_is_exit_code_3(tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["rls2", "--decide"], "no claim is judged by this config; of this study: range_doppler"),
+        (["rls2", "--decide"], "no claim names this config; claims of its study name range_doppler"),
         (["range_doppler", "--decide", "--precision", "1"], "--decide goes with neither --shard nor --precision"),
         (["range_doppler", "--decide", "--shard", "1/2"], "--decide goes with neither --shard nor --precision"),
     ],
@@ -68,7 +68,7 @@ def test_an_exact_value_that_simulation_denies_is_exit_code_4_with_all_written(t
     monkeypatch.setattr(claims, "errors", lambda table: ["P1.1: exact 1, simulated 2"])
     done = CliRunner().invoke(main, ["run", "rls1", "rls2", "-n", "500", "--out", str(tmp_path), "--no-figures", "-q"])
     assert done.exit_code == 4
-    assert done.stderr == "P1.1: exact 1, simulated 2\n"
+    assert done.stderr == "".join(f"{stem}: P1.1: exact 1, simulated 2\n" for stem in ("rls1", "rls2"))
     for stem in ("rls1", "rls2"):
         assert (tmp_path / stem / "claims.csv").is_file()
         assert (tmp_path / stem / "report.html").is_file()

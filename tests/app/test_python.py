@@ -71,6 +71,17 @@ def test_realisation_i_is_the_same_in_any_run():
     np.testing.assert_allclose(parts, whole, rtol=1e-9, atol=1e-6 * np.abs(whole).max())
 
 
+@pytest.mark.parametrize(
+    ("config", "overrides", "n"),
+    [("rls2", ["control_variate=true"], 1), ("multimodel_1hz", ["control_variate=true", "report_every=40"], 2)],
+)
+def test_one_or_two_realisations_make_no_numeric_warning(config, overrides, n):
+    """Here any warning is an error: intervals are infinite, and no word of NumPy's reaches the user."""
+    result = radarsim.run(config, realisations=n, overrides=overrides)
+    assert f"intervals of {n} realisations are rough" in result.warnings[-1]
+    assert all("no filter" not in line for line in result.warnings)
+
+
 def test_load_gives_what_was_run_and_writes_nothing(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     ran = radarsim.run("rls2", realisations=3000, out="results", figures=False)

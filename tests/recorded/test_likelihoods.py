@@ -177,6 +177,13 @@ def test_the_sonar_likelihood_is_that_of_a_textbook_filter(frame, name):
     )
 
 
+@pytest.mark.parametrize("frame", ["polar", "cartesian"])
+def test_a_sonar_without_errors_of_range_has_a_likelihood(frame):
+    """A fit asks whether an error can be zero; the rates before the first plot are as unknown then."""
+    one = likelihood(loaded("sonar_smoothing", f"frame={frame}"), "kalman q", recording("sonar_smoothing"))
+    assert np.isfinite(one(np.array([0.0, *one.stated[1:]])))
+
+
 @pytest.mark.parametrize(
     ("key", "true"), [("sensor.sigma_range_m", 75.0), ("sensor.sigma_bearing_rad", 0.04), (None, None)]
 )

@@ -217,8 +217,9 @@ def likeness(radar: int, one: str, other: str) -> Measure:
         a.last()
         value = float(np.corrcoef(a.value, b.value)[0, 1])
         steps = np.diag((a.hi - a.lo) / 2), np.diag((b.hi - b.lo) / 2)
-        moved = [np.corrcoef(a.value + step, b.value)[0, 1] for step in steps[0]]
-        moved += [np.corrcoef(a.value, b.value + step)[0, 1] for step in steps[1]]
+        with np.errstate(invalid="ignore"):  # of one realisation they are infinite
+            moved = [np.corrcoef(a.value + step, b.value)[0, 1] for step in steps[0]]
+            moved += [np.corrcoef(a.value, b.value + step)[0, 1] for step in steps[1]]
         half = float(np.sqrt(np.sum((np.array(moved) - value) ** 2)))
         return Estimate(value, value - half, value + half)
 

@@ -254,7 +254,10 @@ class PlotLikelihood:
         rates = WIDE * usual ** -np.arange(1.0, size)
         there[0] = False  # it starts the track
         following = int(whole[first + 1 :].argmax()) + 1 if whole[first + 1 :].any() else 0
-        return _Problem(F, Q, np.where(np.isfinite(z), z, 0.0), there, t - t[0], rates, following, settled)
+        one = _Problem(F, Q, np.where(np.isfinite(z), z, 0.0), there, t - t[0], rates, following, settled)
+        _, along, variance = self._numbers(one, self.stated[:C])  # the stated errors, whatever is tried
+        wide = np.sqrt(np.diag(along[0].T @ np.diag(variance[0]) @ along[0]))
+        return one._replace(rates=np.outer(rates, wide))
 
     def _numbers(self, one: "_Problem", sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What is measured along independent directions: positions (n, C) in the frame of the filters, the directions
@@ -275,7 +278,6 @@ class PlotLikelihood:
     def _score(self, values: np.ndarray, outliers: float) -> float:
         sigma, C, size = values[: self.coordinates], self.coordinates, self.size
         manoeuvre, total = float(values[C]) if len(values) > C else 0.0, 0.0
-        stated = self.stated[:C]
         for one in self.problems:
             place, along, variance = self._numbers(one, sigma)
             H = np.zeros((*along.shape[:2], C * size))
@@ -287,9 +289,8 @@ class PlotLikelihood:
                 x[1::size] = (place[one.following] - place[0]) / one.t[one.following]
             start = along[0].T @ np.diag(variance[0]) @ along[0]
             P[::size, ::size] = start
-            wide = np.sqrt(np.diag(start) * (stated / sigma) ** 2)  # of the stated errors, whatever is tried
             for i, rate in enumerate(one.rates, start=1):
-                P[np.arange(C) * size + i, np.arange(C) * size + i] = (wide * rate) ** 2
+                P[np.arange(C) * size + i, np.arange(C) * size + i] = rate**2
             score = np.empty(z.shape)
             log_likelihood(x, P, one.F, one.Q, H, z, variance, one.there, manoeuvre, outliers, 1.0, score)
             total += float(score[one.settled :].sum())
@@ -306,8 +307,8 @@ class PlotLikelihood:
 
 class _Problem(NamedTuple):
     """A track for the kernel: transitions and process noises of unit variance (n, d, d), values (C, n) as measured,
-    which of them count (n, C), times (n,) from the first, the widths of the rates in standard deviations of a plot, the
-    row of the second whole plot (0: none), the row from which the state is known."""
+    which of them count (n, C), times (n,) from the first, standard deviations of the rates of each order (size − 1, C)
+    before the first plot, the row of the second whole plot (0: none), the row from which the state is known."""
 
     F: np.ndarray
     Q: np.ndarray
