@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
@@ -190,7 +190,7 @@ def _compute_each(
             continue
         except DisagreementError as error:  # all is written, and the other experiments stand by themselves
             wrong += [line if line.startswith(f"{one.stem}: ") else f"{one.stem}: {line}" for line in error.lines]
-            made.append(documents.result(error.result))
+            made.append(documents.result(cast("Result", error.result)))
             continue
         unmet += [f"{one.stem}: {reason}" for reason in done.unmet]
         if isinstance(done, simulation.Shares):
