@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -146,8 +147,9 @@ def write(
     drawn = time.perf_counter()
     own = study(experiment.study)
     answer = tuple(own.answer(results, made))
-    described_by = machine.described()
-    record = provenance.record(experiment, results, run, contents, answer, described_by, made, own.answered)
+    of_intervals = provenance.of_intervals(results, made, partial(own.answer, results))
+    run = {**run, "warnings": [*run.get("warnings", ()), *of_intervals]}
+    record = provenance.record(experiment, results, run, contents, answer, machine.described())
     page = html.page(
         experiment,
         made,

@@ -220,8 +220,12 @@ class Result:
     @property
     def warnings(self) -> list[str]:
         """What a reader of the numbers must know: faults, damaged or mixed blocks, too few realisations."""
+        return [*self.faults, *self.facts["warnings"], *self._of_intervals]
+
+    @cached_property
+    def _of_intervals(self) -> list[str]:
         from radarsim.report import provenance
 
-        answered = study(self.experiment.study).answered
-        of_intervals = provenance.of_intervals(self.cases, self._tables, answered)
-        return [*self.faults, *self.facts["warnings"], *of_intervals]
+        return provenance.of_intervals(
+            self.cases, self._tables, partial(study(self.experiment.study).answer, self.cases)
+        )

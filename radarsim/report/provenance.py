@@ -5,10 +5,9 @@ import json
 import math
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,19 +32,15 @@ def record(
     contents: Mapping[str, bytes],
     answer: Sequence[str],
     machine: Mapping[str, object],
-    made: "Mapping[str, pd.DataFrame]" = MappingProxyType({}),
-    answered: Sequence[str] = ("gains", "curves"),
 ) -> dict[str, Any]:
     """All of run.json but the report's own hash.
 
     run gives the facts of the run (stop reason, threads, times, warnings, identities …), kept as they are; contents
-    are the outputs, by path; machine describes the one they were made on; made are the tables, answered those that the
-    answer speaks of.
+    are the outputs, by path; machine describes the one they were made on.
     Realisations asked and done are sums over the cases, which may differ in both.
     """
     facts = dict(run)
     stop = facts.pop("stop", "done")
-    warnings = [*facts.pop("warnings", ()), *of_intervals(results, made, answered)]
     done = {result.name: result.count for result in results}
     return {
         "config": experiment.stem,
@@ -63,7 +58,6 @@ def record(
         "resolved": experiment.resolved,
         "resolved_sha256": asked(experiment),
         **facts,
-        "warnings": warnings,
         "versions": versions(),
         "machine": dict(machine),
         "outputs": {path: hashlib.sha256(data).hexdigest() for path, data in sorted(contents.items())},
@@ -121,14 +115,15 @@ def _asked(resolved: Any) -> object:
 
 
 def of_intervals(
-    results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", answered: Sequence[str] = ("gains", "curves")
+    results: Sequence[CaseResult],
+    made: "Mapping[str, pd.DataFrame]",
+    answer: "Callable[[Mapping[str, pd.DataFrame]], Sequence[str]]",
 ) -> list[str]:
-    """What a reader of the answer must know of its intervals: a line at most, and those on rare events.
+    """What a reader of the answer must know of its intervals, a line at most; and whether weights are wrong.
 
-    answered: the tables that the answer speaks of, see `Study.answered`. How many rows of which table are marked is
-    said where the tables are shown.
+    answer makes its sentences from the tables. How many rows of which table are marked is said where these are shown.
     """
-    return [*(few(results) or rests(results, made, answered)), *rare.warnings(made.get("rare"))]
+    return [*(few(results) or rests(results, made, answer)), *rare.warnings(made.get("rare"))]
 
 
 def few(results: Sequence[CaseResult]) -> list[str]:
@@ -146,38 +141,34 @@ def few(results: Sequence[CaseResult]) -> list[str]:
 
 
 def rests(
-    results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", answered: Sequence[str] = ("gains", "curves")
+    results: Sequence[CaseResult],
+    made: "Mapping[str, pd.DataFrame]",
+    answer: "Callable[[Mapping[str, pd.DataFrame]], Sequence[str]]",
 ) -> list[str]:
     """A line on the answer's intervals that are too narrow, with the realisations that it takes, if any are."""
-    table = next((made[name] for name in answered if name in made and len(made[name])), None)
-    if table is None:
+    found = notes.concerned(made, answer).values()
+    if not found:
         return []
-    rows = notes.told(table, results, made)
-    marked = rows[rows["marked"]]
-    if not len(marked):
-        return []
-    said = {
-        "rows": len(rows),
-        "filters": _named(list(dict.fromkeys(marked["filter"]))),
-        "needed": roughly(float(marked["needed"].max())) if np.isfinite(marked["needed"]).all() else 0,
-    }
-    if said["needed"]:
+    count, names = sum(map(len, found)), _named(list(dict.fromkeys(name for rows in found for name in rows["filter"])))
+    needed = np.max(np.concatenate([notes.needed(rows, made, results) for rows in found]))  # not-a-number if one is
+    if np.isfinite(needed):
         words = plural(
-            "{count:,} of the {rows:,} intervals behind the answer is too narrow, as few large errors decide it "
-            "({filters}): -n {needed} would do",
-            "{count:,} of the {rows:,} intervals behind the answer are too narrow, as few large errors decide them "
-            "({filters}): -n {needed} would do",
-            len(marked),
-            **said,
+            "{count} interval of the answer is too narrow, as few realisations decide it ({filters}): -n {needed} "
+            "would do",
+            "{count} intervals of the answer are too narrow, as few realisations decide them ({filters}): -n {needed} "
+            "would do",
+            count,
+            filters=names,
+            needed=roughly(float(needed)),
         )
     else:
         words = plural(
-            "{count:,} of the {rows:,} intervals behind the answer may be too narrow: rare errors decide it, and few "
-            "or none were seen ({filters}); it takes more realisations, -n",
-            "{count:,} of the {rows:,} intervals behind the answer may be too narrow: rare errors decide them, and few "
-            "or none were seen ({filters}); it takes more realisations, -n",
-            len(marked),
-            **said,
+            "{count} interval of the answer may be too narrow: rare realisations decide it, and few or none were seen "
+            "({filters}); it takes more of them, -n",
+            "{count} intervals of the answer may be too narrow: rare realisations decide them, and few or none were "
+            "seen ({filters}); it takes more of them, -n",
+            count,
+            filters=names,
         )
     return [words]
 

@@ -69,7 +69,6 @@ class StudyFolder(Study):
     exact_errors: bool = True
     own_controls: bool = False
     draws_sweeps: bool = False
-    answered: tuple[str, ...] = Study.answered
     rate_tables: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:

@@ -193,7 +193,6 @@ class Study(ABC):
     exact_errors: bool = True  # False: exact_sigma is a bound, which a filter may reach or not
     own_controls: bool = False  # True: it simulates controls of its own where a case asks for a control variate
     draws_sweeps: bool = False  # True: `figures` draws sweeps too, in place of the common figures
-    answered: tuple[str, ...] = ("gains", "curves")  # tables of the answer's intervals: the first with rows counts
 
     # ---- what is asked -------------------------------------------------------------------------------------------
     @abstractmethod

@@ -147,8 +147,7 @@ def shipped(config: str, overrides: Sequence[str] = ()) -> pd.DataFrame | None:
 
 def table(found: pd.DataFrame) -> str:
     """Coverage of marked and of unmarked intervals as Markdown: by study, then by what the note says."""
-    informs = found["note"].str.startswith("interval of sigma alone")
-    found = found.assign(marked=found["note"].ne("") & ~informs)
+    found = found.assign(marked=~found["note"].isin(("", notes.VARIES)))
     lines = ["| | intervals | marked | of these hold | of the others hold |", "|---|---|---|---|---|"]
     for study, own in [*found.groupby("study"), ("all", found)]:
         count, held = own.groupby("marked")["intervals"].sum(), own.groupby("marked")["held"].sum()

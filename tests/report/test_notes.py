@@ -11,6 +11,7 @@ import radarsim
 from radarsim.app import output
 from radarsim.app.configs import load
 from radarsim.app.work import CaseWork
+from radarsim.config.lookup import SHIPPED
 from radarsim.engine.results import CaseResult
 from radarsim.report import notes, provenance
 from radarsim.report.statistics import FEW
@@ -140,39 +141,78 @@ def test_the_answer_of_a_radar_that_misses_plots_stands_without_a_warning():
     assert "note" not in result.gains
 
 
-def test_what_is_said_above_an_answer_is_of_its_intervals_alone():
-    """Of the last scans, in one line, whatever other rows of whatever table are marked; none where none is there."""
+def given(*rows):
+    """An answer that gives the interval of σ of these rows of curves, to two digits."""
+    return lambda made: [f"{made['curves']['sigma_lo'][i]:.2g} {made['curves']['sigma_hi'][i]:.2g}" for i in rows]
+
+
+def test_what_is_said_above_an_answer_is_of_the_intervals_that_it_gives():
+    """In one line, whatever other rows of whatever table are marked; none where none of its own is."""
     results = [SimpleNamespace(name="a", count=5000)]
     of = [{"case": "a", "component": "x", "k": k, "n": 5000, "filter": f} for f in "fg" for k in range(60)]
     curves = pd.DataFrame(of).assign(sigma=1.0, sigma_lo=0.9, sigma_hi=1.1, n_eff=2500.0)
     curves.loc[20, "n_eff"] = 30.0
-    early = notes.noted({"curves": curves, "gains": pd.DataFrame()}, results)
-    assert notes.heavy(early["curves"]).sum() == 13
-    assert not provenance.of_intervals(results, early)
-    curves.loc[59, "n_eff"] = 30.0
-    (line,) = provenance.of_intervals(results, notes.noted({"curves": curves, "gains": pd.DataFrame()}, results))
-    assert line.startswith("1 of the 2 intervals behind the answer is too narrow")
+    made = notes.noted({"curves": curves, "gains": pd.DataFrame()}, results)
+    assert notes.heavy(made["curves"]).sum() == 13
+    assert not provenance.of_intervals(results, made, given(0, 59, 80))
+    (line,) = provenance.of_intervals(results, made, given(0, 14, 80))
+    assert line.startswith("1 interval of the answer is too narrow")
     assert "(f): -n 2e4 would do" in line  # 5000 × 100/30
-    (line,) = provenance.of_intervals([SimpleNamespace(name="a", count=FEW - 1)], early)
+    (line,) = provenance.of_intervals(results, made, given(14, 15, 26, 27))
+    assert line.startswith("3 intervals of the answer are too narrow")
+    (line,) = provenance.of_intervals([SimpleNamespace(name="a", count=FEW - 1)], made, given(14))
     assert f"{FEW - 1} realisations are rough" in line
 
 
-WARNED = ("multimodel_1hz", "sonar_missed", "orders", "ambiguous_rls5", "pulses_rls4", "discriminator_pair")
+def test_a_note_that_begins_with_the_name_of_an_interval_is_of_that_one_alone():
+    row = {"case": "a", "filter": "f", "n": 5000, "sigma_lo": 0.9, "sigma_hi": 1.1, "gain_lo": 1.0, "gain_hi": 3.0}
+    made = {"stages": pd.DataFrame([row | {"note": notes.OF_GAIN + notes.HEAVY}]), "curves": pd.DataFrame()}
+    results = [SimpleNamespace(name="a", count=5000)]
+    assert not provenance.of_intervals(results, made, lambda made: [str(made["stages"]["sigma_hi"][0])])
+    (line,) = provenance.of_intervals(results, made, lambda made: [str(made["stages"]["gain_hi"][0])])
+    assert "may be too narrow" in line
+    assert "(f)" in line
 
 
-@pytest.mark.parametrize("config", WARNED)
-def test_no_warning_names_a_number_that_it_does_not_count(config):
-    """A line at most about the answer; what it counts is marked, and what it asks for is more than there is."""
-    result = radarsim.run(config, realisations=400)
-    said = [line for line in result.warnings if "intervals behind the answer" in line]
+def check_notes_and_warning(config):
+    """Of a shipped config: no note beside an exact value; a sentence at most, true of the answer, or none needed."""
+    result = radarsim.run(config, realisations=FEW)
+    study, made = output.study(result.experiment.study), result.tables
+    for table in made.values():
+        exact = [name for name in table if name in ("exact_sigma", "exact_percent", "exact_right")]
+        if "note" in table and exact and study.exact_errors:
+            assert not table.loc[table[exact].notna().all(axis=1), "note"].any()
+    said = [line for line in result.warnings if "of the answer" in line]
     assert len(said) <= 1
-    table = next(t for name in output.study(result.experiment.study).answered if len(t := result.tables.get(name, [])))
+    assert not any("rare event" in line for line in result.warnings)
+
+    def answer(widened):
+        """With intervals twice as wide in some rows of each table."""
+        wide = {name: notes._wider(table, at) for name, table in made.items() if len(at := widened(name, table))}
+        return list(study.answer(result.cases, {**made, **wide}))
+
+    found = notes.concerned(made, lambda tables: study.answer(result.cases, tables))
+    every = answer(lambda _, table: np.flatnonzero(notes.heavy(table) & (table.get("note", "") != notes.VARIES)))
+    own = answer(lambda name, table: table.index.get_indexer(found[name].index) if name in found else ())
+    assert own == every  # no other row's interval is in the answer
+    assert bool(said) == (every != list(result.answer)) == bool(found)
     for line in said:
-        marked, rows = (int(text.replace(",", "")) for text in re.match(r"([\d,]+) of the ([\d,]+) ", line).groups())
-        assert 0 < marked <= rows
-        assert marked <= (table["note"] != "").sum()
-        needed = re.search(r"-n (\S+) would", line)
-        assert needed is None or float(needed[1]) > 400
+        assert int(re.match(r"[\d,]+", line)[0].replace(",", "")) == sum(map(len, found.values()))
+        names = list(dict.fromkeys(name for rows in found.values() for name in rows["filter"]))
+        assert all(name in line for name in names[:3])
+        asked = re.search(r"-n (\S+) would", line)
+        assert asked is None or float(asked[1]) > FEW
+
+
+@pytest.mark.parametrize("config", ["ambiguous_missed", "pulses_rls4", "sonar_missed", "rls2"])
+def test_a_warning_is_true_of_the_answer(config):
+    check_notes_and_warning(config)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("config", sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml")))
+def test_of_every_shipped_config_the_warning_is_true_of_the_answer(config):
+    check_notes_and_warning(config)
 
 
 def test_notes_say_what_their_rows_have():

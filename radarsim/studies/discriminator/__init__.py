@@ -25,6 +25,5 @@ STUDY = StudyFolder(
     offers=("curves", "readings"),
     exact_errors=False,  # exact_sigma is the bound, which an estimator reaches or does not
     draws_sweeps=True,  # lock is what is swept for, and has figures of its own
-    answered=("locks",),
     rate_tables=("locks",),
 )

@@ -100,7 +100,9 @@ def _locks(result: CaseResult) -> dict[str, np.ndarray]:
     if "losses" in result.sums:
         every = {name: losses(result, (f, k, np.full(f.size, i))) for i, name in enumerate(COUNTED)}
         rates = {name: rare.complement(rare.rate(lost, drawn(result))) for name, lost in every.items()}
-        note = rare.note(drawn(result), every["lock"], every["always_three"], every["always_posterior_three"])
+        note = rare.note(drawn(result), every["lock"])
+        so_far = rare.note(drawn(result), every["always_three"], every["always_posterior_three"])
+        note = np.where((note == "") & (so_far != ""), "always: " + so_far, note)
     lock, always, always_posterior = rates["lock"], rates["always_three"], rates["always_posterior_three"]
     return {
         **_labels(result, f, k),

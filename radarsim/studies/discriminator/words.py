@@ -101,7 +101,8 @@ def _over(results: Sequence[CaseResult], made: Mapping, name: str) -> str:
 
 def _last(made: Mapping, result: CaseResult, name: str) -> "pd.Series":
     """An estimator's row of locks at its last window."""
-    return common.groups(made["locks"], "case", "filter")[(result.name, name)].iloc[-1]
+    locks = made["locks"]
+    return locks[(locks["case"] == result.name) & (locks["filter"] == name)].iloc[-1]
 
 
 def _lock(row: "pd.Series") -> str:

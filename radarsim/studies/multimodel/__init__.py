@@ -21,6 +21,5 @@ STUDY = StudyFolder(
     ),
     own_controls=True,
     offers=("cost", "readings", "seconds_per_update", "recorded"),
-    answered=("stages",),
     rate_tables=(),
 )

@@ -16,6 +16,5 @@ STUDY = StudyFolder(
     },
     paper=Paper("Uss, Baryshev & Djavad 2010, into Gorshkov & Zavizhenets 2017", page="pulses_to_tracks"),
     offers=("inputs", "warnings"),
-    answered=("idealisations",),
     rate_tables=("locks", "folds"),
 )

@@ -30,7 +30,6 @@ class Sonar(Study):
 
     name = "sonar"
     about = "P3 (Butyrskiy): smoothing and extrapolation of sonar plots, missed plots, correlated errors."
-    answered = ("tracking", "detections", "curves")
     filters = {  # noqa: RUF012
         "kind: growing_memory": "least squares on all plots so far, the recursion (12)-(14)",
         "kind: window": "least squares on the last `plots` plots",

@@ -374,7 +374,6 @@ def test_tables_are_equal_bytes_for_threads_shards_and_a_run_that_goes_on(tmp_pa
 
 def test_a_rate_that_rests_on_few_events_is_told():
     result = result_of(24)
-    assert any("the rate of a rare event rests on" in line for line in result.warnings)
     assert result.tables["rare"]["note"].str.contains("effective events").all()
 
 
@@ -394,7 +393,8 @@ def test_wrong_folds_of_full_lists_are_told():
         assert full["events"] <= whole["events"]
         squares = [row["rate"] ** 2 / max(row["n_eff"], 1) for row in (full, whole)]
         assert (squares[0] > 0.1 * squares[1]) == told
-        assert any("to which no shift leads" in line for line in result.warnings) == told
+        assert (whole["note"] == report.ASTRAY) == told
+        assert any("may be too narrow" in line for line in result.warnings) or not told
 
 
 def test_calibration_and_curves_are_marked_by_their_own_realisations():

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import consistency, statistics
+from radarsim.report import consistency, notes, statistics
 from radarsim.report import tables as common
 from radarsim.report.tables import interval, leading
 from radarsim.studies.sonar.exact import sigma_acceleration
@@ -22,8 +22,6 @@ PHASES = np.array(["steady", "manoeuvre", "after"], dtype=object)
 EVENTS = np.array(["false alarm", "alarm", "all clear"], dtype=object)  # the first of a phase
 JOINT = "joint"
 NEAR = "fails: near zero"
-# What is computed at an estimate has a spread of its own: ratios of `sonar_manoeuvre` cover 93 %, one in twenty 31.
-VARIES = "interval of sigma alone: the believed one varies from one realisation to the next"
 NEAR_ZERO = 3.0  # in σ: speeds and distances, which cannot be negative, are not of first order nearer to zero
 
 
@@ -235,7 +233,7 @@ def _uses(result: CaseResult[ManoeuvreAxes]) -> Columns:
         **compared,
         "distance_in_sigma": distance,
         "first_order": verdict.astype(object),
-        "note": np.full(f.size, VARIES, dtype=object),
+        "note": np.full(f.size, notes.VARIES, dtype=object),
     }
 
 
