@@ -288,6 +288,8 @@ class _Search:
         least = float(self.lowest[i])
         near, step = self.best, 0.1
         home = inside = max(float(self.best[i]), least)
+        if direction > 0 and i in self.raised:  # from zero the end may be farther than REACH: up to there it is not
+            home = inside = max(inside, self.raised[i] - 1.0)
         while abs(inside - home) < math.log(REACH):
             outside = inside + direction * step
             top, found = self._profile(i, outside, near)

@@ -185,7 +185,8 @@ def explained(one: Finding, filter_name: str) -> str:
     if turn is None:
         return words
     cost = tr(
-        "in a turn of {load:g} g the largest error of {filter} in {component} would be {changed}, not {stated} {unit}",
+        "in a turn of {load:g} g without missed plots the largest error of {filter} in {component} would be {changed}, "
+        "not {stated} {unit}",
         load=turn.acceleration_g,
         filter=filter_name,
         component=turn.component,

@@ -178,9 +178,9 @@ def extremes(figure: Figure) -> str:
 def _extremes(quantity: str, unit: str, lines: Sequence[Seen], several: bool) -> str:
     high, low = max(line.y.max() for line in lines), min(line.y.min() for line in lines)
     told = {"quantity": quantity, "high": _valued(high, unit), "low": _valued(low, unit)}
-    if told["high"] == told["low"]:
-        return tr("{quantity}: {high} everywhere.", **told)
     top = _names([line for line in lines if _valued(line.y.max(), unit) == told["high"]], several)
+    if told["high"] == told["low"]:  # of all points that are drawn, which may be few
+        return tr("{quantity}: {high} ({name}).", name=top, **told)
     bottom = _names([line for line in lines if _valued(line.y.min(), unit) == told["low"]], several)
     if top == bottom:
         return tr("{quantity}: from {low} to {high} ({name}).", name=top, **told)

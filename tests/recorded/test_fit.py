@@ -279,9 +279,22 @@ def test_a_quiet_recording_is_no_reason_to_lower_the_manoeuvre_variance(tmp_path
     text = "\n".join(words.likely(followed, found))
     assert "--set" not in text
     assert "the plots do not tell it from zero" in text
-    assert "in a turn of 3 g the largest error of r+Vr in r would be" in text
+    assert "in a turn of 3 g without missed plots the largest error of r+Vr in r would be" in text
     # As `fit` has it, whose interval has no lower end.
     assert fit.fitted(likelihood(columns, config=config)).keys[2].lo == 0
+
+
+@pytest.mark.parametrize("seed", [5, 2017])
+def test_what_is_not_told_from_zero_has_an_upper_end(seed):
+    """However far below it the search has come to rest: straight flight, on which a large D_M is very unlikely."""
+    radar = (f"radar.{key}" for key in ("sigma_range_m=60", "sigma_velocity_mps=3", "scan_period_s=4"))
+    config = loaded("scans=120", "target={kind: polynomial, coefficients: [160e3, -250]}", f"seed={seed}", *radar)
+    told = likelihood(follow.simulated(config), config=config)
+    *sigmas, key = fit.fitted(told).keys
+    assert key.lo == 0
+    assert key.hi < key.stated  # ten times which is not held to be possible
+    at = [told(np.array([*(one.value for one in sigmas), value])) for value in (key.hi, 10 * key.hi)]
+    assert at[0] > at[1] + 1.9
 
 
 def test_what_a_turn_costs_is_the_exact_error_in_it():

@@ -113,7 +113,9 @@ def test_extremes_and_readings_at_a_place():
     assert seen.reading_at(2.0)(beyond) == "Y at 2: highest 6 (b), lowest 5 (a). 1 of 3 lines does not reach it."
     assert seen.extremes(figure(())) == ""
     level = [Line(T, np.full(5, 1.0), name) for name in "ab"]
-    assert seen.extremes(figure(level)) == "Y: 1 everywhere."
+    assert seen.extremes(figure(level)) == "Y: 1 (a and b)."
+    alone = (Line(T, np.where(T == 2, 5.0, np.nan), "a"), Line(T, np.full(5, np.nan), "b"))
+    assert seen.extremes(figure(alone)) == "Y: 5 (a)."  # a point is no more than that
     both = (line("a", 1.0), Line(T, np.full(5, 9.0), "b"))
     assert seen.extremes(figure(both)) == "Y: highest 9 (a and b), lowest 1 (a)."
 

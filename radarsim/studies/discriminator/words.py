@@ -57,9 +57,25 @@ def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
             **said,
         )
     ]
+    rare_event = result.spec.rare is not None
     if row["lock_rate"]:
         bound = result.axes.posterior_sigma[0, k - 1] / result.axes.exact_sigma[0, k - 1]
         ratio = np.sqrt(result.sums["error"][0, k - 1, :, 1] / n) / bound
+        said |= {"least": ratio.min(), "most": ratio.max()}
+    if row["lock_rate"] and rare_event:  # the lock is told by its losses: of these bursts some are shifted
+        words = [
+            before
+            + plural(
+                "{estimator}: {count} window; σ of the locked over the bound (forecast included) {least:.3f} to "
+                "{most:.3f}, of {plain:,} bursts drawn as they are.",
+                "{estimator}: {count} windows; σ of the locked over the bound (forecast included) {least:.3f} to "
+                "{most:.3f}, of {plain:,} bursts drawn as they are.",
+                k,
+                plain=int(n),
+                **said,
+            )
+        ]
+    elif row["lock_rate"]:
         words = [
             before
             + plural(
@@ -68,12 +84,10 @@ def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
                 "{estimator}: {count} windows, locked in {lock} of {bursts:,} bursts; σ of the locked over the bound "
                 "(forecast included) {least:.3f} to {most:.3f}.",
                 k,
-                least=ratio.min(),
-                most=ratio.max(),
                 **said,
             )
         ]
-    if result.spec.rare is not None:
+    if rare_event:
         words.append(before + _rare(common.groups(made["rare"], "case")[(result.name,)]))
     if others:
         locks = ", ".join(f"{name} {_lock(_last(made, result, name))}" for name in others)
