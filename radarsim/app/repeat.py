@@ -36,20 +36,29 @@ def repeated(asked: Experiment, done: Mapping[str, int], overrides: Sequence[str
 
 
 def command(
-    experiment: Experiment, overrides: Sequence[str], out: str | os.PathLike, precision: Precision | None = None
+    experiment: Experiment,
+    overrides: Sequence[str],
+    out: str | os.PathLike,
+    precision: Precision | None = None,
+    verb: str = "run",
 ) -> str:
-    """The command that runs an experiment; a shipped config by its stem."""
+    """The command that runs an experiment, or reads what it came to; a shipped config by its stem."""
     # In a checkout the shipped folder is a link to configs/.
     folders = {(folder / "configs").resolve() for folder in (lookup.SHIPPED, *lookup.further_folders())}
-    shipped = experiment.path and Path(experiment.path).resolve().parent in folders
-    words = ["radarsim", "run", experiment.stem if shipped else as_text(experiment.path or "")]
+    shipped = not experiment.path or Path(experiment.path).resolve().parent in folders
+    words = ["radarsim", verb, experiment.stem if shipped else as_text(experiment.path or "")]
     for override in overrides:
         key, _, value = override.partition("=")
         words += [SHORT[key], value] if key in SHORT else ["--set", override]
     if precision is not None:
         percent, of = precision
         words += ["--precision", f"{percent:.17g}", *(["--of", of] if of != "sigma" else [])]
-    return shlex.join(words + (["--out", str(out)] if str(out) != RESULTS else []))
+    return shlex.join(words) + into(out)
+
+
+def into(out: str | os.PathLike) -> str:
+    """The end of a command that reads or writes a directory of results."""
+    return f" {shlex.join(['--out', as_text(os.fspath(out))])}" if str(out) != RESULTS else ""
 
 
 def as_text(path: str) -> str:

@@ -251,7 +251,10 @@ def from_store(experiment: Experiment, out: str | os.PathLike[str], overrides: S
         else:
             held.cases.append((case, work, collected))
     if missing:
-        raise ConfigError(*missing, f"`{command(experiment, overrides, out)}` computes them")
+        counts = {case.realisations for case in experiment.cases}
+        if experiment is not asked and counts != {case.realisations for case in asked.cases} and len(counts) == 1:
+            overrides = merged(overrides, counts.pop(), None)
+        raise ConfigError(*missing, f"`{command(asked, overrides, out)}` computes them")
     return result_of(experiment, held, facts_of(held, 0, 0.0), repeated(asked, held.done, overrides, None))
 
 

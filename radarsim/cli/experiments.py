@@ -340,4 +340,4 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
 
         click.echo(page.page(rows, {of.paper: of.page for of in experiment.papers()}), nl=False)
     else:
-        verdicts.print_claims(rows, {row["claim"] for row in rows if parts or row["claim"] in names})
+        verdicts.print_claims(rows, {row["claim"] for row in rows if parts or row["claim"] in names}, out, names)

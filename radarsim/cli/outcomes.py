@@ -152,7 +152,8 @@ def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
     stored, seconds = sum(case.stock.stored for case in outlook.cases if case.stock), _about(outlook.seconds)
     if stored:
         told["realisations"] = tr("{stored:,} of {realisations} stored", stored=stored, **told)
-        seconds = tr("the rest {seconds}", seconds=seconds)
+        whole = stored == sum(case.realisations for case in outlook.cases)
+        seconds = tr("nothing left to compute") if whole else tr("the rest {seconds}", seconds=seconds)
     words = tr(
         "{cases}, {realisations}, {seconds} on {threads}, {memory:.0f} MB; figures and tables take some seconds more",
         **told,

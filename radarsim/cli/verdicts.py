@@ -1,8 +1,10 @@
 """What the terminal shows of claims and readings: each with its class, what was measured and what was expected."""
 
+import shlex
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from radarsim.app import repeat
 from radarsim.cli.console import field, say
 from radarsim.language import listed, plural, term, tr
 
@@ -34,12 +36,16 @@ def print_verdicts(result: "Result") -> None:
             "as shipped alone: {names}; `radarsim readings {paper}` judges under all that the paper allows", **told
         )
         field("", words)
-    if verdicts:
-        field("", tr("`radarsim claims {stem}` says what each of them is", stem=result.experiment.stem))
+    if verdicts and result.written is not None:
+        told = {"command": repeat.command(result.experiment, (), result.written.folder.parent, verb="claims")}
+        field("", tr("`{command}` says what each of them is", **told))
 
 
-def print_claims(rows: Sequence[dict[str, Any]], detailed: Collection[str] = ()) -> None:
+def print_claims(
+    rows: Sequence[dict[str, Any]], detailed: Collection[str] = (), out: str = repeat.RESULTS, names: Sequence[str] = ()
+) -> None:
     """A line a claim: its number, how far it stands, what it says; of those that are detailed what was measured too.
+    The commands that it names are those for the directory `out`, and for the names that were asked for.
 
     Of experiments that are not the paper's a line for each reason, with the claims that cannot be judged for it.
     """
@@ -53,7 +59,7 @@ def print_claims(rows: Sequence[dict[str, Any]], detailed: Collection[str] = ())
         else:
             stated.append(row)
     for own in page.grouped(stated):
-        _print_claim(own, detailed=own[0]["claim"] in detailed)
+        _print_claim(own, own[0]["claim"] in detailed, repeat.into(out))
     for (stem, why), names in foreign.items():
         told = {"stem": stem, "names": page.in_a_row(names), "reason": reasons.said(why)}
         say(tr("{stem}: not judged: {names}: {reason}", **told))
@@ -61,7 +67,12 @@ def print_claims(rows: Sequence[dict[str, Any]], detailed: Collection[str] = ())
     if stated and all(row["class"] == NOT_RUN for row in stated):
         say(tr(NOTHING_RUN))
     elif any(row["class"] != NOT_RUN and row["claim"] not in detailed for row in stated):
-        say(tr("`radarsim claims {claim}` says what was measured; --parts of all of them", claim=stated[0]["claim"]))
+        if names:
+            command = f"radarsim claims {shlex.join(names)} --parts{repeat.into(out)}"
+            say(tr("`{command}` says what was measured", command=command))
+        else:
+            command = f"radarsim claims {stated[0]['claim']}{repeat.into(out)}"
+            say(tr("`{command}` says what was measured; --parts of all of them", command=command))
 
 
 def _named(row: Mapping[str, Any]) -> str:
@@ -69,7 +80,7 @@ def _named(row: Mapping[str, Any]) -> str:
     return ": ".join(filter(None, (str(row["case"]), tr(str(row["what"])))))
 
 
-def _print_claim(parts: Sequence[Mapping[str, Any]], detailed: bool) -> None:
+def _print_claim(parts: Sequence[Mapping[str, Any]], detailed: bool, into: str) -> None:
     """A claim in a line; detailed, its place, config, original sentence and a line a part."""
     from radarsim.report.claims import NOT_JUDGED, NOT_RUN, page, reasons
 
@@ -78,7 +89,7 @@ def _print_claim(parts: Sequence[Mapping[str, Any]], detailed: bool) -> None:
     if not detailed:
         words = tr(first["statement"]).split()
         short = " ".join(words[:SHORT]) + (" …" if len(words) > SHORT else "")
-        by = f" (radarsim run {first['config']})" if first["class"] == NOT_RUN else ""
+        by = f" (radarsim run {first['config']}{into})" if first["class"] == NOT_RUN else ""
         say(f"{first['claim']:<6} {verdict}{by}: {short}")
         return
     place = f"{tr(first['paper'])}, {tr(first['place'])}"
@@ -86,7 +97,7 @@ def _print_claim(parts: Sequence[Mapping[str, Any]], detailed: bool) -> None:
     if first["original"]:
         say(f"       «{first['original']}»")
     if first["class"] == NOT_RUN:
-        say(f"       radarsim run {first['config']}")
+        say(f"       radarsim run {first['config']}{into}")
         return
     for row in parts:
         said = [_named(row)]

@@ -4,6 +4,8 @@ import hashlib
 import json
 import os
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -91,6 +93,35 @@ def test_same_bytes_when_extended(tmp_path):
     assert csv_bytes(tmp_path / "grown" / "rls1") == csv_bytes(tmp_path / "at once" / "rls1")
     record = json.loads((tmp_path / "grown" / "rls1" / "run.json").read_text())
     assert record["realisations_from_store"] >= 8192
+
+
+def test_the_command_that_a_run_names_shows_the_claims_of_that_run(tmp_path):
+    """Of any directory of results and a config of one's own, as of the shipped ones."""
+    from radarsim.config import lookup
+
+    mine, out = tmp_path / "mine.yaml", tmp_path / "my results"
+    mine.write_text((lookup.SHIPPED / "configs/rls2.yaml").read_text())
+    for config in ("rls2", mine):
+        said = radarsim("run", config, "-n", 300, "--out", out, "--no-figures").output
+        for _ in range(2):  # the command that it names, and that which this one names
+            *_, named = re.findall(r"`radarsim ([^`]+)`", "".join(said))
+            said = radarsim(*shlex.split(named)).output
+            assert "confirmed" in said
+            assert "not run" not in said
+    assert shlex.quote(str(out)) in radarsim("claims", "P1.1", "--out", out).output
+
+
+def test_the_command_that_report_names_makes_what_it_lacks(tmp_path):
+    """As many realisations as the last run had, whose blocks are gone."""
+    radarsim("run", "rls2", "-n", 300, "--out", tmp_path, "--no-figures")
+    shutil.rmtree(tmp_path / ".blocks")
+    said = radarsim("report", "rls2", "--out", tmp_path, code=2).stderr
+    *_, named = re.findall(r"`radarsim ([^`]+)` computes", said)
+    assert "-n 300" in named
+    radarsim(*shlex.split(named), "--no-figures")
+    held = radarsim("check", *shlex.split(named)[1:]).output
+    assert "300 of 300 realisations stored, nothing left to compute" in held
+    radarsim("report", "rls2", "--out", tmp_path, "--no-figures")
 
 
 def test_a_smaller_run_after_a_larger_one_reports_exactly_what_was_asked(tmp_path):

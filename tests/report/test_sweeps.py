@@ -90,8 +90,7 @@ def test_the_page_of_claims():
         "claim": "P1.2",
         "what": "operations",
         "measured": 7.0,
-        "lo": 7.0,
-        "hi": 7.0,
+        **dict.fromkeys(("lo", "hi", "judged_lo", "judged_hi"), 7.0),
         "unit": "",
         "exact": "",
     }
@@ -126,7 +125,7 @@ def test_the_page_of_claims():
 
 def test_measured_values_are_written_to_two_figures_of_their_half_width():
     def said(value, lo, hi, unit="%"):
-        return page.measured({"measured": value, "lo": lo, "hi": hi, "unit": unit})
+        return page.measured({"measured": value, "judged_lo": lo, "judged_hi": hi, "unit": unit, "exact": ""})
 
     assert said(82.7032, 82.33, 83.07) == "82.70 [82.33, 83.07] %"
     assert said(-6.5e-5, -1.3e-4, 4e-7) == "−0.000065 [−0.000130, 0.000000] %"
