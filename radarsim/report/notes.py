@@ -121,16 +121,26 @@ def _least(rows: np.ndarray, matter: Callable[[np.ndarray], bool]) -> list[int]:
 
 
 def _wider(table: "pd.DataFrame", rows: np.ndarray) -> "pd.DataFrame":
-    """The table with intervals twice as wide in these rows: those that a note begins with the name of, else all."""
+    """The table with intervals twice as wide in these rows, of the columns that their notes are of."""
     wider, said = table.copy(), table["note"].to_numpy(dtype=object)[rows]
     lows = [str(column) for column in table if str(column).endswith(("_lo", "_lo_s"))]
     for note in set(said):
         at = table.index[rows[said == note]]
-        for low in [one for one in lows if one.startswith(note.partition(": ")[0])] or lows:
+        for low in (one for one in lows if is_of(note, one, lows)):
             ends = [low, low.replace("_lo", "_hi")]
             half = (table.loc[at, ends[1]] - table.loc[at, ends[0]]) / 2
             wider.loc[at, ends] = np.stack([table.loc[at, ends[0]] - half, table.loc[at, ends[1]] + half], axis=1)
     return wider
+
+
+def is_of(note: str, column: str, columns: Sequence[str]) -> bool:
+    """Whether a note is of a column among those with intervals: of those that it begins with the name of, else of all.
+
+    >>> [is_of("gain: heavy tails", one, ["sigma", "gain_percent"]) for one in ("sigma", "gain_percent")]
+    [False, True]
+    """
+    name = note.partition(": ")[0]
+    return column.startswith(name) or not any(one.startswith(name) for one in columns)
 
 
 def needed(rows: "pd.DataFrame", made: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]) -> np.ndarray:
