@@ -15,7 +15,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, plural, tr
-from radarsim.report import files, notes, rare
+from radarsim.report import files, notes, rare, seen
 from radarsim.report.statistics import FEW
 
 if TYPE_CHECKING:
@@ -180,10 +180,8 @@ def roughly(count: float) -> str:
 
 
 def _named(names: Sequence[str]) -> str:
-    """A few names, and how many more."""
-    more = len(names) - MOST_NAMES
-    first = ", ".join(names[:MOST_NAMES])
-    return plural("{first} and {count} more", "{first} and {count} more", more, first=first) if more > 0 else first
+    """A few names, and how many more; those that hold a comma are quoted."""
+    return seen.named(names, MOST_NAMES)
 
 
 def extent(record: Mapping) -> str:

@@ -221,3 +221,8 @@ def test_notes_say_what_their_rows_have():
     fewest = notes.nearby(made)
     np.testing.assert_array_equal(notes.heavy(made), fewest < notes.EFFECTIVE)
     assert set(made["note"]) == {"", notes.HEAVY}
+
+
+def test_filters_whose_names_hold_a_comma_are_told_apart():
+    results = [SimpleNamespace(name=name, count=FEW - 1) for name in ("PDA", "PDA, 4 of 6")]
+    assert provenance.few(results)[0].startswith("PDA and “PDA, 4 of 6”: ")

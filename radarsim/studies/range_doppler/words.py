@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from radarsim.config.experiment import Experiment
-from radarsim.language import listed, plural, term, tr
+from radarsim.language import listed, numeral, plural, term, tr
 from radarsim.report import panels, text
 from radarsim.report import tables as common
 from radarsim.studies.range_doppler import tuning
@@ -362,14 +362,19 @@ def _worst(rows: "pd.DataFrame") -> str:
 
 
 SIGMA = ("sigma", "sigma_lo", "sigma_hi")
+TOLD = 0.05  # per cent: what is not nil to one decimal
 MANIFOLD = 100.0  # per cent of loss from which it is told as a factor
 
 
 def _gain(row: "pd.Series[Any]") -> str:
-    """A gain in words: lower, higher, or neither for certain."""
+    """A gain in words: lower, higher, or neither for certain; where the sample cannot tell, by the exact one."""
     value, lo, hi = (round(float(row[name]), 1) + 0.0 for name in ("gain_percent", "gain_lo", "gain_hi"))
     if value == lo == hi == 0:
         return tr("no lower nor higher by 0.1 %")
+    exact = float(row.get("exact_percent", np.nan))
+    if row["gain_lo"] <= 0 <= row["gain_hi"] and abs(exact) >= TOLD:
+        words = term("exactly {percent} lower") if exact > 0 else term("exactly {percent} higher")
+        return tr(words, percent=f"{numeral(f'{abs(exact):.1f}')} %")
     if row["gain_lo"] <= 0 <= row["gain_hi"]:
         return tr("neither lower nor higher for certain (gain {gain})", gain=_percent(value, lo, hi))
     if value < -MANIFOLD:

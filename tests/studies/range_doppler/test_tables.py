@@ -275,12 +275,16 @@ def test_answer_is_silent_of_a_loss_that_is_none(paper):
         ((0.03, 0.01, 0.04), "no lower nor higher by 0.1 %"),
         ((-0.01, -0.04, 0.02), "no lower nor higher by 0.1 %"),
         ((-0.04, -0.2, 0.1), "neither lower nor higher for certain (gain 0.0 % [−0.2, 0.1])"),
+        ((1.6, -1.0, 4.1, -1.26), "exactly 1.3 % higher"),
+        ((1.9, -0.7, 4.4, 1.41), "exactly 1.4 % lower"),
+        ((1.9, -0.7, 4.4, 0.04), "neither lower nor higher for certain (gain 1.9 % [−0.7, 4.4])"),
+        ((1.9, -0.7, 4.4, np.nan), "neither lower nor higher for certain (gain 1.9 % [−0.7, 4.4])"),
         ((-0.4, -0.8, -0.01), "0.4 % [0.0, 0.8] higher"),
         ((33.04, 32.7, 33.4), "33.0 % [32.7, 33.4] lower"),
     ],
 )
 def test_a_gain_in_words(gain, words):
-    row = dict(zip(("gain_percent", "gain_lo", "gain_hi"), gain, strict=True))
+    row = dict(zip(("gain_percent", "gain_lo", "gain_hi", "exact_percent"), gain, strict=False))
     assert range_doppler_words._gain(row) == words
 
 
