@@ -145,7 +145,11 @@ def listed(names: Sequence[str]) -> str:
 
 
 def few(names: Sequence[str], most: int = 4) -> str:
-    """Names in a sentence, of more than so many the first ones and how many there are besides."""
+    """Names in a sentence, of more than so many the first ones and how many there are besides.
+
+    Of several those that hold a comma themselves are quoted.
+    """
+    names = [tr("“{name}”", name=one) if ", " in one and len(names) > 1 else one for one in names]
     if len(names) <= most + 1:
         return listed(names)
     first = ", ".join(names[:most])

@@ -278,11 +278,8 @@ def _names(lines: Sequence[Seen], several: bool = False) -> str:
 
 
 def named(names: Iterable[str], most: int = MOST_NAMES) -> str:
-    """Names in a sentence, of many the first; of several those that hold a comma themselves are quoted."""
-    told = list(dict.fromkeys(names))
-    if len(told) > 1:
-        told = [tr("“{name}”", name=one) if ", " in one else one for one in told]
-    return few(told, most)
+    """Names in a sentence, each once, of many the first."""
+    return few(list(dict.fromkeys(names)), most)
 
 
 def _name(line: Line) -> str:

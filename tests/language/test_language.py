@@ -2,6 +2,7 @@
 
 import re
 from string import Formatter
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
@@ -144,3 +145,15 @@ def forms(message):
         return [spec for _, name, spec, _ in Formatter().parse(message) if name and spec.isalpha() and len(spec) > 1]
     except ValueError:
         return []
+
+
+def test_names_with_commas_stay_one_name_in_a_row():
+    """`cured, gated` is one filter, not two: in questions, captions and warnings."""
+    from radarsim.report import provenance, seen
+
+    names = ["sequence", "cured", "cured, gated", "dense"]
+    assert language.few(names) == seen.named(names) == "sequence, cured, “cured, gated” and dense"
+    assert provenance.few([SimpleNamespace(name=one, count=9) for one in names]) == [
+        "sequence, cured, “cured, gated” and dense: intervals of 9 realisations are rough, use at least 200"
+    ]
+    assert language.few(["cured, gated"]) == "cured, gated"
