@@ -216,7 +216,7 @@ def test_a_wrong_number_in_kernel_or_exact_value_ends_the_run_in_exit_code_4(tmp
     outside.command(*run, "right", site=site, cwd=tmp_path)
     edited("study.py", "exact_bias=np.zeros(shape)", "exact_bias=np.full(shape, 0.02)")
     said = outside.command(*run, "biased", site=site, cwd=tmp_path, code=4).stderr
-    assert said.startswith("curves.csv: wrong, ")
+    assert said.startswith("wrong: curves.csv: wrong, ")
     assert "bias measured " in said
     assert "exactly 0.02: " in said
     assert "sigma measured" not in said
