@@ -36,10 +36,8 @@ FARTHEST_TRUTH_M = 5000.0  # of plots from their truth in range, by median: 20 s
 NOT_LATER = "rows not later than the one before of their track"
 SIGN_TESTS = 2000  # pairs of plots over which the sign of the Doppler speed is looked at
 LEAST_TESTS = 20
-FOLD_TESTS, FOLD_COLUMNS = (
-    3000,
-    ("t_s", "range_m", "velocity_mps"),
-)  # over which folds of the Doppler speed are looked for
+FOLD_TESTS = 3000  # rows over which folds of the Doppler speed are looked for
+FOLD_COLUMNS = ("t_s", "range_m", "velocity_mps")
 PLACED = ("range_m", "bearing_rad", "velocity_mps")
 LOCAL = ("x_m", "y_m", "z_m")
 SPEEDS = ("vx_mps", "vy_mps", "vz_mps")
@@ -247,7 +245,7 @@ class _Import:
         if site is None and not self.options.sites:
             return columns
         local = np.full((len(batch.radar), 3), np.nan)
-        for name, own in by_name(batch.radar).items():
+        for name, own in grouped(batch.radar).items():
             place = self.options.sites.get(name) or site
             assert place is not None  # rows of other radars are left out
             local[own] = place.local(*(given[key][own] for key in ("range_m", "bearing_rad", "altitude_m")))
@@ -393,7 +391,7 @@ class _Truth:
                 continue
             seen = site.seen(batch.columns)
             table = np.stack([batch.columns["t_s"], *(seen[name] for name in LOCAL)], axis=-1)
-            for name, rows in by_name(batch.address).items():
+            for name, rows in grouped(batch.address).items():
                 if name:
                     self.tables.setdefault(name, []).append(table[rows])
                 else:
@@ -406,7 +404,7 @@ class _Truth:
         t, states = batch.columns["t_s"], np.full((len(batch.track), 6), np.nan)
         if of_day != self.of_day:
             t = t % DAY_S
-        named = by_name(batch.address if any(batch.address) else batch.track)
+        named = grouped(batch.address if any(batch.address) else batch.track)
         for name, rows in named.items():
             path = self._path(name, of_day)
             if path is not None:
@@ -459,14 +457,6 @@ class _Truth:
         misses = np.concatenate([one for own in self.misses.values() for one in own])
         return [f"truth: of {len(misses)} of {self.rows} plots, which lie {np.median(misses):.3g} m from it in range "
                 "(median)"]  # fmt: skip
-
-
-def by_name(names: Sequence[str]) -> dict[str, np.ndarray]:
-    """The rows of each name."""
-    found: dict[str, list[int]] = {}
-    for i, name in enumerate(names):
-        found.setdefault(name, []).append(i)
-    return {name: np.array(rows) for name, rows in found.items()}
 
 
 def interpolated(table: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
