@@ -103,83 +103,52 @@ def demodulate(physics, edges, samples, x, first, last, sums):
             else:
                 demodulate_real(samples, place, count, time, physics.step, x, sums, i)
                 if physics.image:
-                    reference_image(count, time, physics.step, x, sums, i)
+                    reference_image(samples, place, count, time, physics.step, x, sums, i)
 
 
-@summing
-def demodulate_real(samples, place, count, time, step, x, sums, i):
-    """Adds the samples from column `place`, the first at `time`, to Z₀, Z₁, Z₂ of block i."""
-    x0, x1, x2, x3, x4, x5 = x[0], x[1], x[2], x[3], x[4], x[5]
-    row = samples[0, place : place + count]  # an index that may be negative is not vectorised
-    centre, a, b, p, q, v, w = sums[CENTRE, i], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for m in range(count):
-        t = time + number(m) * step
-        s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))
-        u, t = row[m], t - centre
-        c, s = u * c, u * s
-        a += c
-        b += s
-        c, s = c * t, s * t
-        p += c
-        q += s
-        v += c * t
-        w += s * t
-    sums[Z0, i] += a
-    sums[Z0 + 1, i] -= b
-    sums[Z1, i] += p
-    sums[Z1 + 1, i] -= q
-    sums[Z2, i] += v
-    sums[Z2 + 1, i] -= w
+def _demodulated(source):
+    """The loop that adds samples times e^{-jψ_ref} sⁱ, i = 0, 1, 2, to block i; source: real, complex, or the image's.
+
+    The image's samples are all one, at twice the phase, and go to W₀, W₁, W₂ in place of Z₀, Z₁, Z₂.
+    """
+    turns, first = (2.0, W0) if source == "image" else (1.0, Z0)
+    real, image = source == "real", source == "image"
+    sign = 1.0 if source == "complex" else -1.0
+
+    @summing
+    def demodulate(samples, place, count, time, step, x, sums, i):
+        x0, x1, x2, x3, x4, x5 = turns * x[0], turns * x[1], turns * x[2], turns * x[3], turns * x[4], turns * x[5]
+        row = samples[0, place : place + count]  # an index that may be negative is not vectorised
+        imaginary = row if real or image else samples[1, place : place + count]
+        centre, a, b, p, q, v, w = sums[CENTRE, i], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for m in range(count):
+            t = time + number(m) * step
+            s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))
+            t = t - centre
+            if real:
+                c, s = row[m] * c, row[m] * s
+            elif not image:
+                re, im = row[m], imaginary[m]
+                c, s = re * c + im * s, im * c - re * s
+            a += c
+            b += s
+            c, s = c * t, s * t
+            p += c
+            q += s
+            v += c * t
+            w += s * t
+        sums[first, i] += a
+        sums[first + 1, i] += sign * b
+        sums[first + 2, i] += p
+        sums[first + 3, i] += sign * q
+        sums[first + 4, i] += v
+        sums[first + 5, i] += sign * w
+
+    return demodulate
 
 
-@summing
-def demodulate_complex(samples, place, count, time, step, x, sums, i):
-    """As `demodulate_real` for complex samples."""
-    x0, x1, x2, x3, x4, x5 = x[0], x[1], x[2], x[3], x[4], x[5]
-    real, imaginary = samples[0, place : place + count], samples[1, place : place + count]
-    centre, a, b, p, q, v, w = sums[CENTRE, i], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for m in range(count):
-        t = time + number(m) * step
-        s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))
-        re, im, t = real[m], imaginary[m], t - centre
-        c, s = re * c + im * s, im * c - re * s
-        a += c
-        b += s
-        c, s = c * t, s * t
-        p += c
-        q += s
-        v += c * t
-        w += s * t
-    sums[Z0, i] += a
-    sums[Z0 + 1, i] += b
-    sums[Z1, i] += p
-    sums[Z1 + 1, i] += q
-    sums[Z2, i] += v
-    sums[Z2 + 1, i] += w
-
-
-@summing
-def reference_image(count, time, step, x, sums, i):
-    """Adds Σ e^{-2jψ_ref} sⁱ to W₀, W₁, W₂ of block i."""
-    x0, x1, x2, x3, x4, x5 = 2.0 * x[0], 2.0 * x[1], 2.0 * x[2], 2.0 * x[3], 2.0 * x[4], 2.0 * x[5]
-    centre, a, b, p, q, v, w = sums[CENTRE, i], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for m in range(count):
-        t = time + number(m) * step
-        s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))
-        a += c
-        b += s
-        t -= centre
-        p += c * t
-        q += s * t
-        t *= t
-        v += c * t
-        w += s * t
-    sums[W0, i] += a
-    sums[W0 + 1, i] -= b
-    sums[W1, i] += p
-    sums[W1 + 1, i] -= q
-    sums[W2, i] += v
-    sums[W2 + 1, i] -= w
+# (samples, place, count, time, step, x, sums, i): of the samples from column `place`, the first at `time`.
+demodulate_real, demodulate_complex, reference_image = map(_demodulated, ("real", "complex", "image"))
 
 
 def block_table(

@@ -87,158 +87,105 @@ def second_derivative(b2, b3, b4, b5, t):
     return ((20.0 * b5 * t + 12.0 * b4) * t + 6.0 * b3) * t + 2.0 * b2
 
 
-@summing
-def score_samples(samples, first, pulses, step, offset, amplitude, state):
-    """Real samples first … first + pulses − 1 at τ = offset, offset + step, …, at the phase state.b.
+def _over_samples(complex_samples):
+    """The loop over samples, compiled for real and for complex ones apart."""
 
-    Adds to state.out (8,): L, the coherent sum that is A/2 a sample at the truth, and the sums of ∂L/∂ψ τ^j, j = 0 … 5.
-    """
-    b0, b1, b2, b3, b4, b5 = state.b[0], state.b[1], state.b[2], state.b[3], state.b[4], state.b[5]
-    u = samples[0, first : first + pulses]  # an index that may be negative is not vectorised
-    uc = cc = g0 = g1 = g2 = g3 = g4 = g5 = 0.0
-    for m in range(pulses):
-        t = number(m) * step + offset
-        s, c = sincos_turns(polynomial(b0, b1, b2, b3, b4, b5, t))
-        y = u[m]
-        uc += y * c
-        cc += c * c
-        e = s * (amplitude * c - y)
-        g0 += e
-        e *= t
-        g1 += e
-        e *= t
-        g2 += e
-        e *= t
-        g3 += e
-        e *= t
-        g4 += e
-        e *= t
-        g5 += e
-    image = amplitude * (cc - 0.5 * pulses)
-    state.out[0] += uc - 0.5 * image
-    state.out[1] += uc - image
-    state.out[2] += g0
-    state.out[3] += g1
-    state.out[4] += g2
-    state.out[5] += g3
-    state.out[6] += g4
-    state.out[7] += g5
+    @summing
+    def score(samples, first, pulses, step, offset, amplitude, state):
+        b0, b1, b2, b3, b4, b5 = state.b[0], state.b[1], state.b[2], state.b[3], state.b[4], state.b[5]
+        u = samples[0, first : first + pulses]  # an index that may be negative is not vectorised
+        v = samples[1, first : first + pulses] if complex_samples else u
+        uc = cc = g0 = g1 = g2 = g3 = g4 = g5 = 0.0
+        for m in range(pulses):
+            t = number(m) * step + offset
+            s, c = sincos_turns(polynomial(b0, b1, b2, b3, b4, b5, t))
+            if complex_samples:
+                x, y = u[m], v[m]
+                uc += x * c + y * s
+                e = y * c - x * s
+            else:
+                y = u[m]
+                uc += y * c
+                cc += c * c
+                e = s * (amplitude * c - y)
+            g0 += e
+            e *= t
+            g1 += e
+            e *= t
+            g2 += e
+            e *= t
+            g3 += e
+            e *= t
+            g4 += e
+            e *= t
+            g5 += e
+        image = amplitude * (cc - 0.5 * pulses)
+        add(state.out, uc - 0.5 * image, uc - image, (g0, g1, g2, g3, g4, g5))
 
-
-@summing
-def score_complex_samples(samples, first, pulses, step, offset, state):
-    """As `score_samples` for complex samples, the imaginary parts in row 1."""
-    b0, b1, b2, b3, b4, b5 = state.b[0], state.b[1], state.b[2], state.b[3], state.b[4], state.b[5]
-    u, v = samples[0, first : first + pulses], samples[1, first : first + pulses]
-    uc = g0 = g1 = g2 = g3 = g4 = g5 = 0.0
-    for m in range(pulses):
-        t = number(m) * step + offset
-        s, c = sincos_turns(polynomial(b0, b1, b2, b3, b4, b5, t))
-        x, y = u[m], v[m]
-        uc += x * c + y * s
-        e = y * c - x * s
-        g0 += e
-        e *= t
-        g1 += e
-        e *= t
-        g2 += e
-        e *= t
-        g3 += e
-        e *= t
-        g4 += e
-        e *= t
-        g5 += e
-    state.out[0] += uc
-    state.out[1] += uc
-    state.out[2] += g0
-    state.out[3] += g1
-    state.out[4] += g2
-    state.out[5] += g3
-    state.out[6] += g4
-    state.out[7] += g5
+    return score
 
 
-@summing
-def score_blocks(sums, blocks, per_window, state):
-    """As `score_samples` over the first blocks of sums (ROWS, blocks padded), without image; state.out is overwritten.
-
-    per_window is bursts a window.
-    """
-    b0, b1, b2, b3, b4, b5 = state.b[0], state.b[1], state.b[2], state.b[3], state.b[4], state.b[5]
-    total = g0 = g1 = g2 = g3 = g4 = g5 = 0.0
-    for i in range((blocks + 7) >> 3 << 3):
-        t = sums[CENTRE, i] * per_window
-        half = sums[HALF, i] * per_window**2
-        mean = polynomial(b0, b1, b2, b3, b4, b5, t) + half * second_derivative(b2, b3, b4, b5, t)
-        s, c = sincos_turns(mean - sums[REF, i])
-        D = TURN * (derivative(b1, b2, b3, b4, b5, t) * per_window - sums[SLOPE, i])
-        D = min(max(D, -sums[LIMIT, i]), sums[LIMIT, i])
-        z1r, z1i, z2r, z2i = sums[Z1, i], sums[Z1 + 1, i], sums[Z2, i], sums[Z2 + 1, i]
-        zr = sums[Z0, i] + D * (z1i - 0.5 * D * z2r)
-        zi = sums[Z0 + 1, i] - D * (z1r + 0.5 * D * z2i)
-        re, e = c * zr + s * zi, c * zi - s * zr
-        h = ((c * z1i - s * z1r) - D * (c * z2r + s * z2i)) * per_window
-        inside = i < blocks
-        re, e, h = (re if inside else 0.0), (e if inside else 0.0), (h if inside else 0.0)
-        total += re
-        # The mean of τ^j over the block is τ^j + j(j − 1) τ^{j−2} half; its slope takes h.
-        bend = half * e
-        g0 += e
-        g1 += e * t + h
-        e, h = e * t, h * t
-        g2 += e * t + 2.0 * h + 2.0 * bend
-        e, h, bend = e * t, h * t, bend * t
-        g3 += e * t + 3.0 * h + 6.0 * bend
-        e, h, bend = e * t, h * t, bend * t
-        g4 += e * t + 4.0 * h + 12.0 * bend
-        e, h, bend = e * t, h * t, bend * t
-        g5 += e * t + 5.0 * h + 20.0 * bend
-    state.out[0], state.out[1], state.out[2], state.out[3] = total, total, g0, g1
-    state.out[4], state.out[5], state.out[6], state.out[7] = g2, g3, g4, g5
+@inline
+def add(out, level, coherent, gradient):
+    """Add to out (8,): L, the coherent sum that is A/2 a sample at the truth, and the sums of ∂L/∂ψ τ^j, j = 0 … 5."""
+    out[0] += level
+    out[1] += coherent
+    for j in range(6):
+        out[2 + j] += gradient[j]
 
 
-@summing
-def score_image(sums, blocks, per_window, amplitude, state):
-    """Adds the image's part −(A/4) Re Σ e^{-2jψ} to what `score_blocks` wrote.
+# (samples, first, pulses, step, offset, amplitude, state): samples first … first + pulses − 1 at τ = offset,
+# offset + step, …, at the phase state.b; adds to state.out. Complex samples have their
+# imaginary parts in row 1 and no image: their amplitude is zero.
+score_samples, score_complex_samples = _over_samples(False), _over_samples(True)
 
-    The loop is that of `score_blocks` at twice the phase. One function for both, with a factor on the phase, was up to
-    6 % slower when measured; three times slower as an inline one, which may not reassociate.
-    """
-    b0, b1, b2, b3, b4, b5 = state.b[0], state.b[1], state.b[2], state.b[3], state.b[4], state.b[5]
-    total = g0 = g1 = g2 = g3 = g4 = g5 = 0.0
-    for i in range((blocks + 7) >> 3 << 3):
-        t = sums[CENTRE, i] * per_window
-        half = sums[HALF, i] * per_window**2
-        mean = polynomial(b0, b1, b2, b3, b4, b5, t) + half * second_derivative(b2, b3, b4, b5, t)
-        s, c = sincos_turns(2.0 * (mean - sums[REF, i]))
-        D = 2.0 * TURN * (derivative(b1, b2, b3, b4, b5, t) * per_window - sums[SLOPE, i])
-        D = min(max(D, -sums[LIMIT, i]), sums[LIMIT, i])
-        w1r, w1i, w2r, w2i = sums[W1, i], sums[W1 + 1, i], sums[W2, i], sums[W2 + 1, i]
-        wr = sums[W0, i] + D * (w1i - 0.5 * D * w2r)
-        wi = sums[W0 + 1, i] - D * (w1r + 0.5 * D * w2i)
-        re, e = c * wr + s * wi, c * wi - s * wr
-        h = ((c * w1i - s * w1r) - D * (c * w2r + s * w2i)) * per_window
-        inside = i < blocks
-        re, e, h = (re if inside else 0.0), (e if inside else 0.0), (h if inside else 0.0)
-        total += re
-        # The mean of τ^j over the block is τ^j + j(j − 1) τ^{j−2} half; its slope takes h.
-        bend = half * e
-        g0 += e
-        g1 += e * t + h
-        e, h = e * t, h * t
-        g2 += e * t + 2.0 * h + 2.0 * bend
-        e, h, bend = e * t, h * t, bend * t
-        g3 += e * t + 3.0 * h + 6.0 * bend
-        e, h, bend = e * t, h * t, bend * t
-        g4 += e * t + 4.0 * h + 12.0 * bend
-        e, h, bend = e * t, h * t, bend * t
-        g5 += e * t + 5.0 * h + 20.0 * bend
-    level = 0.5 * amplitude
-    state.out[0] -= 0.5 * level * total
-    state.out[1] -= level * total
-    state.out[2] -= level * g0
-    state.out[3] -= level * g1
-    state.out[4] -= level * g2
-    state.out[5] -= level * g3
-    state.out[6] -= level * g4
-    state.out[7] -= level * g5
+
+def _over_blocks(image):
+    """The loop over sums of blocks; of the image at twice the phase, apart: a factor given at run time costs 6 %."""
+    turns, first = (2.0, W0) if image else (1.0, Z0)
+
+    @summing
+    def score(sums, blocks, per_window, amplitude, state):
+        b0, b1, b2, b3, b4, b5 = state.b[0], state.b[1], state.b[2], state.b[3], state.b[4], state.b[5]
+        total = g0 = g1 = g2 = g3 = g4 = g5 = 0.0
+        for i in range((blocks + 7) >> 3 << 3):
+            t = sums[CENTRE, i] * per_window
+            half = sums[HALF, i] * per_window**2
+            mean = polynomial(b0, b1, b2, b3, b4, b5, t) + half * second_derivative(b2, b3, b4, b5, t)
+            s, c = sincos_turns(turns * (mean - sums[REF, i]))
+            D = turns * TURN * (derivative(b1, b2, b3, b4, b5, t) * per_window - sums[SLOPE, i])
+            D = min(max(D, -sums[LIMIT, i]), sums[LIMIT, i])
+            z1r, z1i, z2r, z2i = sums[first + 2, i], sums[first + 3, i], sums[first + 4, i], sums[first + 5, i]
+            zr = sums[first, i] + D * (z1i - 0.5 * D * z2r)
+            zi = sums[first + 1, i] - D * (z1r + 0.5 * D * z2i)
+            re, e = c * zr + s * zi, c * zi - s * zr
+            h = ((c * z1i - s * z1r) - D * (c * z2r + s * z2i)) * per_window
+            inside = i < blocks
+            re, e, h = (re if inside else 0.0), (e if inside else 0.0), (h if inside else 0.0)
+            total += re
+            # The mean of τ^j over the block is τ^j + j(j − 1) τ^{j−2} half; its slope takes h.
+            bend = half * e
+            g0 += e
+            g1 += e * t + h
+            e, h = e * t, h * t
+            g2 += e * t + 2.0 * h + 2.0 * bend
+            e, h, bend = e * t, h * t, bend * t
+            g3 += e * t + 3.0 * h + 6.0 * bend
+            e, h, bend = e * t, h * t, bend * t
+            g4 += e * t + 4.0 * h + 12.0 * bend
+            e, h, bend = e * t, h * t, bend * t
+            g5 += e * t + 5.0 * h + 20.0 * bend
+        if image:
+            w = -0.5 * amplitude
+            add(state.out, 0.5 * w * total, w * total, (w * g0, w * g1, w * g2, w * g3, w * g4, w * g5))
+        else:
+            state.out[:] = 0.0
+            add(state.out, total, total, (g0, g1, g2, g3, g4, g5))
+
+    return score
+
+
+# (sums, blocks, per_window, amplitude, state): as `score_samples` over the first blocks of sums (ROWS, blocks padded),
+# per_window bursts a window. score_blocks overwrites state.out and needs no amplitude; score_image adds the image's
+# part −(A/4) Re Σ e^{-2jψ} to it.
+score_blocks, score_image = _over_blocks(False), _over_blocks(True)

@@ -69,7 +69,7 @@ def evaluate(physics, samples, sums, window, state):
         state.b[j] = state.x[j] * window.powers[j]
     share = window.powers[1]
     if physics.mode != SAMPLES:
-        score_blocks(sums, window.blocks, 1.0 / share, state)
+        score_blocks(sums, window.blocks, 1.0 / share, 0.0, state)
         if physics.image:
             score_image(sums, window.blocks, 1.0 / share, state.amplitude, state)
         return
@@ -79,7 +79,7 @@ def evaluate(physics, samples, sums, window, state):
     for j in range(physics.samples_per_pulse):
         first, offset = j * physics.pulses, j * physics.offset / share
         if physics.complex_samples:
-            score_complex_samples(samples, first, window.pulses, step, offset, state)
+            score_complex_samples(samples, first, window.pulses, step, offset, 0.0, state)
         else:
             score_samples(samples, first, window.pulses, step, offset, state.amplitude, state)
 
