@@ -10,7 +10,7 @@ from radarsim.config.fields import in_degrees
 from radarsim.config.json_schema import schema
 from radarsim.studies import registry
 
-COMMON = ("include", "sweep", "realisations", "seed", "figures", "control_variate")
+COMMON = ("include", "sweep", "realisations", "seed", "figures")
 PAGE = Path(__file__).parents[1] / "reference" / "yaml.md"
 MARK = re.compile(r"(?<=^<!-- keys -->\n).*?(?=^<!-- end -->$)", re.MULTILINE | re.DOTALL)
 BOUNDS = {"minimum": "≥ {}", "exclusiveMinimum": "> {}", "maximum": "≤ {}", "exclusiveMaximum": "< {}"}

@@ -8,13 +8,12 @@ from functools import partial
 
 import numpy as np
 
-from radarsim.app.simulation import NO_CONTROL, check_precision, result_of, table_of, tailed, unknown
+from radarsim.app.simulation import check_precision, result_of, table_of, tailed, unknown
 from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Experiment
 from radarsim.engine.blocks import Total
 from radarsim.engine.collect import collect
 from radarsim.engine.machine import available_cores
-from radarsim.engine.results import Axes
 from radarsim.engine.stock import Stock, stock
 from radarsim.engine.store import Store
 from radarsim.errors import ConfigError
@@ -45,8 +44,7 @@ class CaseOutlook:
 
     stock is what a results directory has of these realisations; where one is given, seconds are of those it lacks.
     timed: whether a few realisations were; else it takes at most so many seconds, which is short.
-    need is what a precision takes by the plain intervals, controlled by those with control variates, where the config
-    asks for these; beside each the seconds of one thread until then. The run ends at the earlier.
+    need is what a precision takes.
     """
 
     name: str
@@ -56,9 +54,6 @@ class CaseOutlook:
     seconds: float
     timed: bool = True
     need: Need | None = None
-    controlled: Need | None = None
-    seconds_plain: float | None = None
-    seconds_controlled: float | None = None
     stock: Stock | None = None
 
 
@@ -95,15 +90,13 @@ def outlook(
     if precision is not None:
         check_precision([experiment], precision, of)
     cases: list[CaseOutlook] = []
-    largest, preparing, control = 0, 0.0, False
+    largest, preparing = 0, 0.0
     study = registry.study(experiment.study)
     study.prepare(experiment.cases[0])  # what it loads is not to be timed
     for done, case in enumerate(experiment.cases, 1):
         work, started = CaseWork(case), time.perf_counter()
         axes = work.plan.axes
         preparing += time.perf_counter() - started
-        has_controls = experiment.control_variate and (study.own_controls or (study.exact_errors and controls(axes)))
-        control |= has_controls
         labels = case.name, ", ".join(axes.filters), len(axes.k)
         stocked = partial(stock, work, store=out, part=share or (1, 1))
         short = None if precision is not None else surely_short(work, SURELY_SHORT_S / len(experiment.cases))
@@ -112,8 +105,7 @@ def outlook(
             short *= (held.asked - held.stored) / case.realisations
             cases.append(CaseOutlook(*labels, held.asked, short, timed=False, stock=None if out is None else held))
         else:
-            ways = precision, of, has_controls and (of == "sigma" or (of == "gain" and study.own_controls))
-            one = measured(experiment, work, labels, PILOT_S / len(experiment.cases), stocked, *ways)
+            one = measured(experiment, work, labels, PILOT_S / len(experiment.cases), stocked, precision, of)
             cases.append(one if out is not None else replace(one, stock=None))
             largest = max(largest, work.size)
         if progress is not None:
@@ -121,10 +113,7 @@ def outlook(
     # Vectors of sums in flight: two a thread, one a level of the tree; beside them the interpreter and its libraries.
     memory = 200 + 8e-6 * largest * (2 * threads + 32)
     seconds = preparing + sum(c.seconds for c in cases) / threads
-    warnings = [*study.warnings(experiment)]
-    if experiment.control_variate and not control:
-        warnings.append(NO_CONTROL)
-    return Outlook(tuple(cases), threads, seconds, memory, precision, of, tuple(warnings), share)
+    return Outlook(tuple(cases), threads, seconds, memory, precision, of, tuple(study.warnings(experiment)), share)
 
 
 def surely_short(work: CaseWork, most_s: float) -> float | None:
@@ -144,41 +133,25 @@ def measured(
     stocked: Callable[[int], Stock],
     precision: float | None,
     of: str,
-    controlled: bool,
 ) -> CaseOutlook:
     """The outlook of a case of which a few realisations are timed; stocked gives what is stored of so many."""
     case = work.case
     work.simulate(0, 1)
     each = seconds_each(work, case.realisations, pilot_s)
-    need = by_controls = None
-    if precision is not None:
-        need = needed(experiment, work, precision, each, of)
-        by_controls = needed(experiment, work, precision, each, of, controls=True) if controlled else None
-    ends = [None if one is None else ending(one, case.realisations) for one in (need, by_controls)]
-    count = min((end for end in ends if end is not None), default=case.realisations)
-    held, (plain, by) = stocked(count), (None if end is None else stocked(end) for end in ends)
-    plain_s, controlled_s = (None if one is None else each * (one.asked - one.stored) for one in (plain, by))
-    left_s = each * (held.asked - held.stored)
-    return CaseOutlook(*labels, held.asked, left_s, True, need, by_controls, plain_s, controlled_s, held)
+    need = None if precision is None else needed(experiment, work, precision, each, of)
+    held = stocked(case.realisations if need is None else ending(need, case.realisations))
+    return CaseOutlook(*labels, held.asked, each * (held.asked - held.stored), True, need, held)
 
 
-def controls(axes: Axes) -> bool:
-    """Whether the baseline's σ is known exactly somewhere where another filter has one too."""
-    known = axes.available[axes.baseline] & np.isfinite(np.asarray(axes.exact_sigma, dtype=float)[axes.baseline])
-    return bool((np.delete(axes.available, axes.baseline, axis=0) & known).any())
-
-
-def needed(
-    experiment: Experiment, work: CaseWork, percent: float, seconds_each: float, of: str, controls: bool = False
-) -> Need:
-    """How many realisations a precision takes, by plain intervals or by those with control variates.
+def needed(experiment: Experiment, work: CaseWork, percent: float, seconds_each: float, of: str) -> Need:
+    """How many realisations a precision takes.
 
     From exact values for σ, where errors are Gaussian with these, else from a pilot. Raises ConfigError where the case
     has no such quantity.
     """
     from radarsim.report import precision
 
-    exact, table = work.plan.gaussian and of == "sigma" and not controls, table_of(experiment, of, controls)
+    exact, table = work.plan.gaussian and of == "sigma", table_of(experiment, of)
     count = LEAST if exact else min(max(LEAST, int(PILOT_OF_PRECISION_S / seconds_each)), MOST)
     result = result_of(work.case, work, collect(work, count))
     if exact:

@@ -13,7 +13,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine import machine
 from radarsim.engine.results import CaseResult
 from radarsim.language import tr
-from radarsim.report import agreement, claims, controlled, files, notes, provenance, seen, sweeps
+from radarsim.report import agreement, claims, files, notes, provenance, seen, sweeps
 from radarsim.report import tables as common
 from radarsim.report.chart_text import spoken
 from radarsim.report.claims import forest
@@ -25,17 +25,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def tables(results: Sequence[CaseResult], control_variate: bool = False, stem: str = "") -> dict:
-    """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims; if asked for,
-    `controlled`.
+def tables(results: Sequence[CaseResult], stem: str = "") -> dict:
+    """All tables of an experiment by the stem of their file: curves, gains, the study's own, claims.
 
     A study whose errors are not of all realisations at common scans makes its own curves and gains. stem is the
     config's: all claims of it are in the table of claims, also those that it cannot judge any more.
     """
     of = study(results[0].study)
     made = measured(results)
-    if control_variate and of.exact_errors and not of.own_controls:
-        made["controlled"] = controlled.controlled(results)
     verdicts = claims.judged(of.claims(), results, made, configs.shipped, stem)
     made["claims"] = over_readings(verdicts, results[0].study)
     return notes.noted(made, results, of.exact_errors)

@@ -82,7 +82,7 @@ class Result:
     def _tables(self) -> dict:
         from radarsim.app import output
 
-        return output.tables(self.cases, self.experiment.control_variate, self.experiment.stem)
+        return output.tables(self.cases, self.experiment.stem)
 
     @property
     def curves(self) -> "pd.DataFrame":
@@ -164,13 +164,13 @@ class Result:
 
     @cached_property
     def faults(self) -> tuple[str, ...]:
-        """What no chance makes, a line each: exact and measured values apart, or values with and without controls."""
-        from radarsim.report import agreement, claims, controlled
+        """What no chance makes, a line each: exact and measured values apart."""
+        from radarsim.report import agreement, claims
 
         own, made = study(self.experiment.study), self._tables
         nearly = [case.name for case in self.experiment.cases if own.exact_but_for(case)]
         bounds = ("claims",) if own.exact_errors else ("claims", "curves", "gains")
-        return (*agreement.faults(made, nearly, bounds), *claims.errors(made["claims"]), *controlled.faults(made))
+        return (*agreement.faults(made, nearly, bounds), *claims.errors(made["claims"]))
 
     def check(self) -> None:
         """Raises DisagreementError where there are `faults`."""

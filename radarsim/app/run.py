@@ -270,10 +270,7 @@ def lack(name: str, held: Stock, out: str | os.PathLike[str]) -> str:
 def result_of(experiment: Experiment, simulated: SimulatedCases, facts: dict[str, Any], again: str) -> Result:
     """The result, `again` the command that repeats it; with what is to be warned of in the config."""
     facts["warnings"] += registry.study(experiment.study).warnings(experiment)
-    result = Result(experiment, finished(simulated), facts | {"command": again})
-    if experiment.control_variate and not len(result.tables.get("controlled", ())):
-        facts["warnings"].append(simulation.NO_CONTROL)
-    return result
+    return Result(experiment, finished(simulated), facts | {"command": again})
 
 
 def as_last_run(experiment: Experiment, out: Path) -> Experiment:

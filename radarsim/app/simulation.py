@@ -22,10 +22,6 @@ if TYPE_CHECKING:
     from radarsim.report.precision import Cell, Table
 
 Progress = Callable[[int, int, int], None]
-NO_CONTROL = (
-    "control_variate: no controlled.csv: it takes a baseline whose sigma is known exactly, beside it a filter that has "
-    "its estimates in the same realisations, and three of these"
-)
 
 
 @dataclass
@@ -172,26 +168,15 @@ def tailed(work: CaseWork, of: str) -> "Table | None":
     return study(work.case.study).curves if OF[of].squares and not work.plan.gaussian else None
 
 
-def table_of(experiment: Experiment, of: str, controls: bool = True) -> "Table":
-    """The table of a study that holds a kind of quantity, from results; with control variates where a run has them.
-
-    Empty where the study makes no such table.
-    """
-    from radarsim.report import controlled, tables
-    from radarsim.report.precision import OF, narrowed
+def table_of(experiment: Experiment, of: str) -> "Table":
+    """The table of a study that holds a kind of quantity, from results; empty where the study makes none."""
+    from radarsim.report import tables
+    from radarsim.report.precision import OF
 
     own = study(experiment.study)
     if of not in ("sigma", "gain"):
         return lambda results: own.tables(results).get(OF[of].table, tables.frame({}))
-    plain = own.gains if of == "gain" else own.curves
-    if not (controls and experiment.control_variate):
-        return plain
-    if own.own_controls:
-        beside = "controlled_gains" if of == "gain" else "controlled"
-        return lambda results: narrowed(plain(results), own.tables(results)[beside], of)
-    if of == "gain" or not own.exact_errors:
-        return plain
-    return lambda results: narrowed(plain(results), controlled.controlled(results), of)
+    return own.gains if of == "gain" else own.curves
 
 
 def _collected(

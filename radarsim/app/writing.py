@@ -21,7 +21,7 @@ def seconds(experiment: Experiment, figures: bool | str | Sequence[str], width_m
     result = result_of(case, work, collect(work, REALISATIONS))
     output.tables([result])  # what it loads is not to be counted for every case
     started = time.perf_counter()
-    made = output.tables([result], experiment.control_variate, experiment.stem)
+    made = output.tables([result], experiment.stem)
     tables = (time.perf_counter() - started) * len(experiment.cases)
     formats = arguments.formats(figures)
     described = output.figures([result], made, experiment) if formats else {}

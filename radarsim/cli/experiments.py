@@ -236,7 +236,7 @@ def check(
     what the results directory lacks.
 
     With a precision, also how many realisations it takes, and how long: from exact values where the filters are linear,
-    else from a pilot of a second or two; where the config asks for a control variate, by these intervals too.
+    else from a pilot of a second or two.
 
     \b
     Examples

@@ -204,19 +204,17 @@ def print_lacking(experiment: "Experiment", lacking: "Lacking", whole: bool) -> 
 def print_needs(experiment: "Experiment", outlook: "Outlook") -> None:
     """How many realisations a precision takes, and whether the run may do so many."""
     asked = {case.name: case.realisations for case in experiment.cases}
-    needs = {case.name: need for case in outlook.cases if (need := case.controlled or case.need) is not None}
-    ways = [("", case.need, case.seconds_plain, case.name) for case in outlook.cases]
-    ways += [(tr(", control variate"), case.controlled, case.seconds_controlled, case.name) for case in outlook.cases]
+    needs = {case.name: need for case in outlook.cases if (need := case.need) is not None}
     rows = [
         (
-            f"{name}{way}",
+            case.name,
             numeral(f"{need.realisations:,}") if need.realisations is not None else _unreached(need),
-            tr("{t_s:.3g} s", t_s=float(seconds or 0)),
+            tr("{t_s:.3g} s", t_s=float(case.seconds)),
             need.known_by,
             need.last,
         )
-        for way, need, seconds, name in ways
-        if need is not None
+        for case in outlook.cases
+        if (need := case.need) is not None
     ]
     unit = tr("points") if outlook.of == "gain" else "%"
     wanted = tr("for ± {percent:g} {unit}", percent=outlook.precision, unit=unit)

@@ -67,11 +67,10 @@ class Expander:
             stem=stem,
             study=cases[0].study,
             path=str(document.file) if document.file else None,
-            cases=tuple(replace(case, control_variate=common.control_variate) for case in cases),
+            cases=tuple(cases),
             realisations=common.realisations or max(case.realisations for case in cases),
             seed=cases[0].seed if common.seed is None else common.seed,
             figures=dict(common.figures),
-            control_variate=common.control_variate,
         )
 
     def _expand(self, document: Document, chain: tuple[FilePath, ...]) -> tuple[Common, list[Draft]]:

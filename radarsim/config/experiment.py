@@ -16,7 +16,7 @@ class Case:
 
     name is the stem of its config with ` key=value` for each swept key. spec holds the study's own keys, an object of
     its subclass of `radarsim.config.fields.Study`. noise_of, where given, are the keys of another case, whose noise
-    this one shares although its world is another: common random numbers. control_variate: as of the experiment.
+    this one shares although its world is another: common random numbers.
     asked_from_k: exact σ and gains are asked for from this scan on, counted from 1; 0: every exact value. roughly: what
     is long to compute may be off by a thousandth, as where a search only looks about.
     """
@@ -29,24 +29,18 @@ class Case:
     realisations: int
     seed: int
     noise_of: Any = None
-    control_variate: bool = False
     asked_from_k: int = 0
     roughly: bool = False
 
     def resolved(self) -> dict[str, Any]:
         """The case as plain JSON-able data, names included."""
         common = {"case": self.name, "swept": dict(self.swept), "realisations": self.realisations, "seed": self.seed}
-        asked = {"control_variate": True} if self.control_variate else {}
-        return common | asked | complete(self.spec)
+        return common | complete(self.spec)
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """What a config asks for.
-
-    figures holds, for a figure, names or patterns of the cases that it shows; control_variate asks for the table
-    `controlled`.
-    """
+    """What a config asks for; figures holds, for a figure, names or patterns of the cases that it shows."""
 
     stem: str
     study: str
@@ -55,7 +49,6 @@ class Experiment:
     realisations: int
     seed: int
     figures: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    control_variate: bool = False
 
     @cached_property
     def resolved(self) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from typing import Annotated, Protocol
 
 from pydantic import Field
 
-from radarsim.config.fields import Anything, Flag, Model, Name, Stem, Study, Whole
+from radarsim.config.fields import Anything, Model, Name, Stem, Study, Whole
 
 LARGEST_REALISATIONS = 10**12
 LARGEST_SEED = 2**64 - 1
@@ -34,11 +34,6 @@ class Common(Model):
     )
     figures: dict[Name, Annotated[tuple[Name, ...], Field(min_length=1)]] = Field(
         {}, title="cases in figures", description="for a figure the cases it shows: names, or patterns with * and ?"
-    )
-    control_variate: Flag = Field(
-        False,
-        title="table with a control variate",
-        description="a further table, controlled.csv: σ with controls known exactly: the baseline, or filters beside",
     )
 
 

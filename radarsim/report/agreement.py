@@ -102,7 +102,7 @@ def _gaussian(made: "Mapping[str, pd.DataFrame]", table: "pd.DataFrame") -> np.n
         error = np.sqrt((96 * bias**2 * variance**3 + 24 * variance**4) / n) / square**2
         strays = np.abs(kurtosis - theirs) > STRAYS * error + ROUNDING
     others = set(zip(curves["case"][strays], curves["filter"][strays], strict=True))
-    pairs = [zip(table["case"], table[who], strict=True) for who in {"filter", "baseline", "control"} & set(table)]
+    pairs = [zip(table["case"], table[who], strict=True) for who in {"filter", "baseline"} & set(table)]
     return (
         np.all([[pair not in others for pair in own] for own in pairs], axis=0) if pairs else np.ones(len(table), bool)
     )

@@ -41,7 +41,6 @@ INDEPENDENT = 0.1
 VARIES = "interval of sigma alone: the believed one varies from one realisation to the next"
 ROUNDING = 1e-9  # of a σ: filters that differ by no more are the same
 PAIRED = {"gain": -1, "above_oracle": 1}  # columns NAME_percent, and the sign with which it adds to the baseline's σ
-GAINS = {"gains": "curves", "controlled_gains": "controlled"}  # tables of gains, and those of their σ
 # Tables that bring all their notes, and one whose mean squares are of several components and bounded: unmarked or
 # marked by these rules, rows of NEES and NIS cover 95 … 97 %.
 OWN = ("rare", "consistency")
@@ -74,8 +73,8 @@ def _noted(
     notes = brought
     if name not in OWN:
         notes = notes_on(*behind(table, made, results))
-        if name in GAINS:
-            notes = np.where((notes == "") & _alike(table, made[GAINS[name]]), ALIKE, notes)
+        if name == "gains":
+            notes = np.where((notes == "") & _alike(table, made["curves"]), ALIKE, notes)
         notes = np.where(notes == "", brought, notes)
         notes = np.where(known(table) & exact, "", notes)
     return table.assign(note=notes) if any(notes) else table

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report.controlled import narrower_rows
 
 if TYPE_CHECKING:
     import pandas
@@ -146,13 +145,6 @@ def worst(result: CaseResult, table: Table, of: str = "sigma") -> Cell | None:
     component, k = str(row.get("component", "")), int(row.get("k", 0))
     below = float(hi[first]) if value[first] == 0 and math.isinf(percent[first]) else None
     return Cell(float(percent.max()), str(row["case"]), str(row["filter"]), component, k, result.count, of, below)
-
-
-def narrowed(plain: "pandas.DataFrame", controlled: "pandas.DataFrame", of: str = "sigma") -> "pandas.DataFrame":
-    """Curves or gains with value and interval from a table with control variates, as `narrower_rows` chooses."""
-    keys = ["case", "filter", "component", "k"]
-    beside = plain[keys].merge(controlled, on=keys, how="left")
-    return narrower_rows(plain, beside, OF[of].columns)
 
 
 def needed(

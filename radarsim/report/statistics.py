@@ -16,8 +16,6 @@ Z95 = 1.959963984540054
 # Where less than this stands behind a 95 % interval, its coverage was measured to leave 93.6 … 96.4 %
 # (tests/trust/test_statistics.py).
 FEW = 200  # realisations of a run: of Gaussian errors paired gains cover 93.6 % at 30, means of products 93.2 at 100
-# Effective realisations, n/(κ − 1), that controls have to leave behind a mean square for it to count.
-FEW_EFFECTIVE = 200
 FEW_EVENTS = 20  # rare errors, or weighted events, behind an interval that they decide
 
 
@@ -103,84 +101,7 @@ def effective(square: Values, fourth: Values, n: Values) -> Values:
         return np.where(excess > ALIKE, n / np.abs(excess), np.where(np.isnan(excess), np.nan, np.inf))
 
 
-def controlled(
-    square: Values,
-    fourth: Values,
-    control_square: Values,
-    control_fourth: Values,
-    cross: Values,
-    exact_square: Values,
-    n: Values,
-) -> tuple[Estimate, np.ndarray]:
-    """rms of e with another error c as control variate, and the factor by which that lowers the variance of the mean.
-
-    From Σe², Σe⁴, Σc², Σc⁴, Σe²c² over n realisations and E c² = exact_square: mean e² − β (mean c² − E c²), β the
-    slope of e² on c². The factor is 1/(1 − ρ²), ρ their correlation; the mean is unchanged to order 1/n. (Glasserman,
-    Monte Carlo Methods in Financial Engineering, 2003, 4.1.)
-    """
-    n = np.asarray(n, dtype=float)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        a, b = _per_one(square, n), _per_one(control_square, n)
-        own, other = _per_one(fourth, n) - a**2, _per_one(control_fourth, n) - b**2
-        joint = _per_one(cross, n) - a * b
-        left = np.maximum(1 - joint**2 / (own * other), 0)  # 1 − ρ²
-        mean = np.maximum(a - joint / other * (b - exact_square), 0)
-        relative = own * left / mean**2 * _freed(n) * n / np.maximum(n - 2, 1)
-        return _root(mean, relative, n), 1 / left
-
-
-class Controlled(NamedTuple):
-    """What controls leave of a mean square: its rms with the interval, and what tells how far that may be trusted.
-
-    factor: how many times more realisations the plain one would take; apart: by how many standard errors of their
-    difference both differ; effective: as of `effective`, n/2 where what is left has the tails of a Gaussian's square.
-    """
-
-    estimate: Estimate
-    factor: Values
-    apart: Values
-    effective: Values
-
-
-GAUSSIAN_SQUARE = 14.0  # κ − 1 of the square of a Gaussian number
-APART = 3.0  # standard errors between a value with and without controls, beyond which the plain one counts
 TOGETHER = 0.0027  # chance of a number beyond three standard errors
-
-
-def residual_mean(sums: Values, n: Values) -> tuple[Values, Values]:
-    """Mean and variance of what controls leave of squares, from sums (…, 5) over n realisations.
-
-    These are Σ level, Σ ρ, Σ ρ², Σ ρ⁴ and Σ explained², ρ what is left less a level that is known beforehand.
-    """
-    shift = _per_one(sums[..., 1], n)
-    return _per_one(sums[..., 0], n) + shift, np.maximum(_per_one(sums[..., 2], n) - shift**2, 0)
-
-
-def residual(sums: Values, square: Values, fourth: Values, n: Values) -> Controlled:
-    """rms of e from the residuals of e² of controls, and Σe², Σe⁴ of the same realisations; sums as `residual_mean`."""
-    n = np.asarray(n, dtype=float)
-    mean, variance = residual_mean(sums, n)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        plain = _per_one(square, n)
-        before = _per_one(fourth, n) - np.square(plain)
-        taken = np.maximum(_per_one(sums[..., 4], n) - np.square(plain - mean), 0)
-        alike = before <= ALIKE * np.square(plain)  # an error without noise: all else is rounding
-        apart = np.where(alike | (taken <= 0), 0.0, (plain - mean) * np.sqrt(n / taken))
-        tails = _per_one(sums[..., 3], n) / np.square(variance) - 1
-        effective = np.where(alike | (tails <= ALIKE), np.inf, n * GAUSSIAN_SQUARE / 2 / tails)
-        relative = variance / np.square(mean) / np.maximum(n - 1, 0)
-        factor = np.where(alike, np.nan, before / variance)
-        return Controlled(_root(np.maximum(mean, 0), relative, n), factor, apart, effective)
-
-
-def residual_gain(own: Values, base: Values, pairs: Values, n: Values) -> tuple[Estimate, Values]:
-    """Paired gain, %, as `gain`, from residuals of both and Σ ρ ρ₀; and the variance of the logarithm of the ratio."""
-    n = np.asarray(n, dtype=float)
-    (a, of_a), (b, of_b) = residual_mean(own, n), residual_mean(base, n)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        joint = _per_one(pairs, n) - _per_one(own[..., 1], n) * _per_one(base[..., 1], n)
-        variance = np.maximum(of_a / a**2 + of_b / b**2 - 2 * joint / (a * b), 0) / np.maximum(n - 1, 0)
-        return _gain(np.maximum(a, 0), b, variance, n - 1), variance
 
 
 def furthest(looks: Values) -> float:
@@ -211,28 +132,6 @@ def standard_errors(of: Estimate, exact: Values) -> Values:
         variance = up * down + np.maximum(grown, 0) * np.abs(off)
         apart = np.where((off == 0) | unbounded, 0.0, Z95 * np.abs(off) / np.sqrt(variance))
     return np.where(np.isnan(off) | np.isnan(up) | np.isnan(down), np.nan, apart)
-
-
-def unskewed(apart: Values, n: Values) -> Values:
-    """Standard errors between two means of n values, less the most that skewness makes of them.
-
-    A Student's t of skewed values strays further on one side: the few large ones that are not among them are missing in
-    the spread too. Hall's transformation (J. R. Statist. Soc. B 54, 1992, 221) makes it a Gaussian's again; the
-    skewness is that of a Gaussian's square, the largest of quadratic forms in Gaussian numbers, of either sign.
-    """
-    skewness = np.sqrt(8 / np.asarray(n, dtype=float))
-    return (1 - np.maximum(1 - skewness * np.abs(apart) / 3, 0) ** 3) / skewness
-
-
-def trusted(apart: Values, effective: Values) -> Values:
-    """Where values with and without controls agree within three standard errors and enough realisations count."""
-    return (np.abs(apart) <= APART) & (np.asarray(effective) >= FEW_EFFECTIVE)
-
-
-def narrower(plain: Estimate, controlled: Estimate, trust: Values) -> Estimate:
-    """The narrower of two estimates of the same, where the one with controls is trusted; else the plain one."""
-    better = trust & (np.subtract(controlled.hi, controlled.lo) < np.subtract(plain.hi, plain.lo))
-    return Estimate(*(np.where(better, ours, theirs)[()] for ours, theirs in zip(controlled, plain, strict=True)))
 
 
 def errors(moments: Values, n: Values) -> ErrorStatistics:
@@ -300,30 +199,12 @@ def gain(
     n = np.asarray(n, dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
         a, b = _per_one(square, n), _per_one(base_square, n)
-        return _gain(a, b, log_variance(square, fourth, base_square, base_fourth, cross, n), n - 1)
-
-
-def log_variance(
-    square: Values, fourth: Values, base_square: Values, base_fourth: Values, cross: Values, n: Values
-) -> Values:
-    """The variance of the logarithm of the ratio of two mean squares, from the sums that `gain` takes."""
-    n = np.asarray(n, dtype=float)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        a, b = _per_one(square, n), _per_one(base_square, n)
         variance = _per_one(fourth, n) / a**2 + _per_one(base_fourth, n) / b**2 - 2 * _per_one(cross, n) / (a * b)
-        return np.maximum(variance, 0) * _freed(n)
-
-
-def _freed(n: Values) -> Values:
-    """(n + 2) / (n − 1) / n: what makes m₄/m₂² − 1 of a Gaussian sample the variance of its mean square over m₂²."""
-    n = np.asarray(n, dtype=float)
-    return (n + 2) / np.maximum(n - 1, 0) / n
-
-
-def _gain(mean_square: Values, base: Values, log_variance: Values, freedom: Values) -> Estimate:
-    ratio = np.sqrt(mean_square / base)
-    # One realisation tells nothing of its spread: the interval is all there can be.
-    step = np.where(np.asarray(freedom) > 0, 0.5 * student(freedom) * np.sqrt(log_variance), np.inf)
+        # (n + 2)/(n − 1)/n makes m₄/m₂² − 1 of a Gaussian sample the variance of its mean square over m₂².
+        variance = np.maximum(variance, 0) * ((n + 2) / np.maximum(n - 1, 0) / n)
+        ratio = np.sqrt(a / b)
+        # One realisation tells nothing of its spread: the interval is all there can be.
+        step = np.where(n > 1, 0.5 * student(n - 1) * np.sqrt(variance), np.inf)
     with np.errstate(over="ignore"):  # of two realisations
         factor = np.exp(step)
     return Estimate(100 * (1 - ratio), 100 * (1 - ratio * factor), 100 * (1 - ratio / factor))

@@ -67,7 +67,6 @@ class StudyFolder(Study):
     paper: Paper | None = None
     offers: tuple[OptionalPart, ...] = ()
     exact_errors: bool = True
-    own_controls: bool = False
     draws_sweeps: bool = False
     rate_tables: tuple[str, ...] | None = None
 

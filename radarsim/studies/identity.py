@@ -44,8 +44,6 @@ def identity(case: Case) -> str:
     from radarsim.kernels import random  # the compiler, which takes half a second, is not loaded for `radarsim list`
 
     shared: dict[str, object] = {} if case.noise_of is None else {"noise_of": world(case.noise_of)}
-    if case.control_variate and study(case.study).own_controls:
-        shared["control_variate"] = True
     return digest(
         shared
         | {

@@ -191,7 +191,6 @@ class Study(ABC):
     about: str
     filters: Mapping[str, str]  # what `radarsim list` says of its filters: keys, and what they make
     exact_errors: bool = True  # False: exact_sigma is a bound, which a filter may reach or not
-    own_controls: bool = False  # True: it simulates controls of its own where a case asks for a control variate
     draws_sweeps: bool = False  # True: `figures` draws sweeps too, in place of the common figures
 
     # ---- what is asked -------------------------------------------------------------------------------------------

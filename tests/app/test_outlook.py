@@ -5,7 +5,7 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from radarsim.app import outlook, simulation
+from radarsim.app import outlook
 from radarsim.cli import main
 
 
@@ -54,20 +54,3 @@ def test_what_may_be_long_or_large_or_is_not_counted_is_timed(words):
     (document,) = json.loads(check(*words, "--json").stdout)
     assert all(case["timed"] for case in document["cases"])
     assert "under 0" not in check(*words).output.replace("under a second", "")
-
-
-@pytest.mark.parametrize(
-    ("words", "warned"),
-    [
-        (["rls2", "--set", "control_variate=true"], False),
-        (["rls2"], False),
-        (["multimodel_1hz", "--set", "control_variate=true"], False),
-        (["discriminator_pair", "--set", "control_variate=true"], True),
-        (["discriminator_pair"], False),
-    ],
-)
-def test_a_control_variate_without_effect_is_told_as_by_a_run(words, warned):
-    ended = check(*words, "-n", 100)
-    assert (f"warning: {simulation.NO_CONTROL}" in ended.stderr) == warned
-    (document,) = json.loads(check(*words, "-n", 100, "--json").stdout)
-    assert document["warnings"] == [simulation.NO_CONTROL] * warned

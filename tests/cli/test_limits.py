@@ -110,16 +110,6 @@ def test_a_precision_of_rates_is_relative_and_of_the_last_window(tmp_path):
     assert refused.stderr == "rls2: of: must be what the case has, got lock: no lock rate in locks.csv\n"
 
 
-def test_controlled_intervals_count_and_check_foretells_both_ways():
-    words = ("ambiguous_rls3", "-n", "1e6", "--precision", 1, "--set", "control_variate=true")
-    (case,) = json.loads(command("check", *words, "--json").stdout)[0]["cases"]
-    assert case["controlled"]["realisations"] <= case["need"]["realisations"]
-    assert case["realisations"] == case["controlled"]["realisations"]
-    assert case["seconds_controlled"] > 0
-    assert case["seconds_plain"] > 0
-    assert "control variate" in command("check", *words).stdout
-
-
 def test_all_cases_count_for_a_precision(tmp_path):
     result = command("run", "range_doppler", "-n", 2_000, "--precision", 3.28, *PLAIN, "--out", tmp_path, code=3)
     assert " of 30 cases; worst: rls" in result.stderr
@@ -406,15 +396,6 @@ def test_a_pilot_knows_that_kernels_calculate_chunks(monkeypatch, chunk):
     for pilot_s in (0.3, 0.06):
         seconds = overview.seconds_each(SimpleNamespace(block=4096), 100_000, pilot_s)
         assert seconds == pytest.approx(0.02 / chunk, rel=1e-9)
-
-
-def test_a_control_variate_that_is_none_is_told(tmp_path):
-    """Where no baseline's σ is known exactly there is no table, and a warning says so."""
-    for config, there in (("sonar_clutter", False), ("discriminator_pair", False), ("rls2", True)):
-        result = command("run", config, "-n", 50, "--set", "control_variate=true", "--no-figures", "--out", tmp_path)
-        assert (tmp_path / config / "controlled.csv").exists() is there
-        assert ("control_variate: no" in result.output) is not there
-        assert any("control_variate: no" in line for line in record(tmp_path / config)["warnings"]) is not there
 
 
 def test_what_no_number_of_realisations_reaches_is_told():

@@ -70,21 +70,6 @@ def test_gaussian_errors_need_as_many_as_their_chi_square_says(results):
     assert widths == pytest.approx(100 * 1.959964 / np.sqrt(2e6), rel=1e-4)
 
 
-def test_controlled_rows_take_the_place_of_wider_ones(results):
-    from radarsim.report.controlled import controlled
-
-    (case,) = results["range_doppler"]
-    plain, other = curves([case]), controlled([case])
-    both = precision.narrowed(plain, other)
-    keys = ["filter", "component", "k"]
-    beside = both.merge(plain, on=keys, suffixes=("", "_plain")).merge(other, on=keys, suffixes=("", "_other"))
-    width = beside["sigma_hi"] - beside["sigma_lo"]
-    for name in ("_plain", "_other"):
-        assert (width <= beside[f"sigma_hi{name}"] - beside[f"sigma_lo{name}"]).all()
-    assert (beside["sigma"] == beside["sigma_other"]).any()
-    assert len(both) == len(plain)
-
-
 def test_losses_are_what_locks_leave(results):
     import pandas as pd
 

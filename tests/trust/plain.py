@@ -153,8 +153,6 @@ RIVAL["burst"] = COMPLEX["burst"] | {"pulse_length_s": 1e-6, "pulses": 1024}
 # Angles as rough as ranges: the plots' covariance is of a condition near 50 and not 3·10⁶, which multiplies rounding.
 EVEN = ["sensor.sigma_range_m=2500", "sensor.sigma_elevation_deg=2", "sensor.sigma_azimuth_deg=2"]
 SHORT = ["scans=9", "report_every=3", *EVEN]
-ONE = "filters=[{name: a, family: kalman, models: [{motion: accelerated, sigma_acceleration_mps2: 20}]}]"
-CONTROLLED = ["control_variate=true", "scans=8", *EVEN, ONE]
 SWEPT = [word if "elevation" not in word else "sweep.sensor.sigma_elevation_deg=[2]" for word in SHORT]
 NEAR = "target={kind: polynomial, frame: polar, range_m: [900, -4], bearing_deg: [2, 0.01]}"
 DETECTORS = "{name: a, plots: 4, false_alarm_probability: [0.1]}, {name: b, plots: 4, test_every: 4, threshold_k: [2]}"
@@ -198,7 +196,6 @@ RUNS = {
     "sonar rare ends": ("sonar_clutter_ends", ["scans=14", "sweep.sensor.false_plots_per_km2=[0.1]"], 20),
     "multimodel families": ("multimodel_families", SHORT, 8),
     "multimodel irregular": ("multimodel_irregular", SHORT, 8),
-    "multimodel controls": ("multimodel_irregular", CONTROLLED, 8),
     "multimodel at prediction": ("multimodel_covariance", SWEPT, 8),
     "discriminator on block sums": (DISCRIMINATOR | {"engine": "block_sums", "blocks_per_window": 8}, [], 8),
     "discriminator shifted": (DISCRIMINATOR | SHIFTED | {"engine": "block_sums", "blocks_per_window": 8}, [], 8),
@@ -240,17 +237,16 @@ class Work:
 
 
 def work(config, overrides):
-    """The last case of a config; a pilot of it takes few realisations, a search for rare losses few turns."""
+    """The last case of a config; a search for rare losses few turns."""
     from radarsim.app.configs import load
     from radarsim.studies.discriminator import nearest
-    from radarsim.studies.multimodel import controls
 
-    usual = controls.PILOT, nearest.MOST_TURNS
-    controls.PILOT, nearest.MOST_TURNS = 40, 1
+    usual = nearest.MOST_TURNS
+    nearest.MOST_TURNS = 1
     try:
         return Work(load(config, overrides).cases[-1])
     finally:
-        controls.PILOT, nearest.MOST_TURNS = usual
+        nearest.MOST_TURNS = usual
 
 
 def sums(config, overrides, count):

@@ -15,8 +15,7 @@ AGREED = 1e-12
 # weights of hypotheses are exponentials of up to −50, which multiplies a relative error by 50. A likelihood begins
 # with variances of 10⁹ beside plots of 1 … 10⁴.
 MISSING = "linear with misses", "linear, drawn flight"
-# Slopes of controls are solved from the products of forty realisations, which multiplies rounding.
-SOLVED = (*MISSING, "multimodel controls", "folds", "folds missed", "orders", "folds and orders", "tracks", "patterns")
+SOLVED = (*MISSING, "folds", "folds missed", "orders", "folds and orders", "tracks", "patterns")
 OWN = dict.fromkeys(SOLVED, 1e-10)
 ROOT = Path(__file__).parents[2]
 MOMENTS = ("error", "error_all", "ahead")  # Σe, Σe², Σe³, Σe⁴ in the last axis

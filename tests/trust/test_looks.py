@@ -236,7 +236,7 @@ class Synthetic:
         monkeypatch.setattr(simulation, "CaseWork", lambda case: self)
         monkeypatch.setattr(simulation, "collect", collect)
         monkeypatch.setattr(simulation, "study", lambda name: study)
-        experiment = SimpleNamespace(cases=(self.case,), study="synthetic", control_variate=False)
+        experiment = SimpleNamespace(cases=(self.case,), study="synthetic")
         found = simulation.simulated(experiment, RunOptions(out="nowhere"), precision=percent, of=of)
         ((_, _, done),) = found.cases
         sigma = statistics.root_mean_square(done.values[1], done.values[3], done.count)

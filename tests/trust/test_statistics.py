@@ -172,3 +172,19 @@ def test_bounds_of_dependent_looks_keep_more():
     shared = rng.chisquare(freedom // 2, size=(REPETITIONS, 1))
     means = (shared + rng.chisquare(freedom // 2, size=(REPETITIONS, looks))) / freedom
     assert np.mean(((low <= means) & (means <= high)).all(axis=1)) > 0.95 - slack(REPETITIONS)
+
+
+def test_antithetic_pairs_double_the_variance():
+    """Why they are not offered: a linear filter errs on mirrored noise by the same, mirrored: one square for two."""
+    from radarsim.app.configs import load
+    from radarsim.kernels import linear
+    from radarsim.studies.range_doppler import study
+
+    problem = study.prepare(load("rls2", ["scans=8"]).cases[0]).problem
+    truth, plots = problem.truth, linear.simulate_plots(problem, 0, 20_000)
+    error, mirrored = (linear.estimate(problem, p)[:, :, -1] - truth[-1] for p in (plots, 2 * truth[:, :2] - plots))
+    scale = error.std(axis=0)
+    assert np.abs((error**2 - mirrored**2) / scale**2).max() < 1e-6
+    plain = np.square(error).reshape(200, 100, 2, 3).mean(axis=1).var(axis=0)
+    paired = ((error**2 + mirrored**2) / 2).reshape(400, 50, 2, 3).mean(axis=1).var(axis=0)
+    np.testing.assert_allclose(paired / plain, 2, rtol=8 / math.sqrt(200))

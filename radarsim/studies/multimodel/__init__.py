@@ -19,7 +19,6 @@ STUDY = StudyFolder(
         may_grow=("filters",),
         held_too={"multimodel_families": ("P2.8", "P2.9")},
     ),
-    own_controls=True,
     offers=("cost", "readings", "seconds_per_update", "recorded"),
     rate_tables=(),
 )

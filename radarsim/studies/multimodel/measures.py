@@ -98,9 +98,9 @@ class Evidence(claims.Evidence):
         return names.index(name)
 
     def stage_gain(self, key: tuple, wanted: tuple, base: tuple, stage: str, component: str) -> Estimate:
-        """Paired gain of a filter against another over a stage, %; with controls where these tell more."""
+        """Paired gain of a filter against another over a stage, %."""
         of, s = self.case(key), self.stage(key, stage)
-        return tables.best_gain(of, self.filter(key, wanted), self.filter(key, base), s, COMPONENTS[component])
+        return tables.stage_gain(of, self.filter(key, wanted), self.filter(key, base), s, COMPONENTS[component])
 
     def probability(self, key: tuple, wanted: tuple, stage: str, model: int) -> Estimate:
         """Mean probability of a model (from 0) over the reported scans of a stage; ends of intervals are averaged."""

@@ -8,7 +8,7 @@ from radarsim.config.experiment import Case
 from radarsim.engine.moments import Layout
 from radarsim.engine.results import Axes
 from radarsim.kernels.lanes import WIDTH, rows
-from radarsim.studies.multimodel import controls, filters
+from radarsim.studies.multimodel import filters
 from radarsim.studies.multimodel.config import Keys
 from radarsim.studies.multimodel.kernels import plots, records, sums
 from radarsim.studies.multimodel.world import intervals, plot_truth, sensor_frame, truth
@@ -43,13 +43,12 @@ class FlightAxes(Axes):
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a block needs; see `kernels.records` for the arrays. The controls are made for the first block."""
+    """All that a block needs; see `kernels.records` for the arrays."""
 
     layout: Layout
     axes: FlightAxes
     world: records.World
     banks: records.Banks
-    controls: controls.Once
     block: int = BLOCK
     gaussian = False
 
@@ -103,14 +102,8 @@ def prepare(case: Case) -> Plan:
         lengths=lengths,
         weights=filters.start_weights(t[: records.START], spec.start_acceleration_mps2),
     )
-    sizes = len(spec.filters), int(reported.sum()), len(lengths)
-    shapes, members = records.shapes(*sizes), banks(spec, times)
-    beside = controls.Once(lambda: controls.none(len(spec.filters)))
-    if case.control_variate:
-        shapes |= records.controlled_shapes(*sizes)
-        other = world._replace(keys=np.stack([noise_key(case, "pilot plots"), noise_key(case, "pilot detections")]))
-        beside = controls.Once(lambda: controls.piloted(spec, other, members))
-    return Plan(Layout(**shapes), axes(spec, t, world, lengths), world, members, beside)
+    shapes = records.shapes(len(spec.filters), int(reported.sum()), len(lengths))
+    return Plan(Layout(**shapes), axes(spec, t, world, lengths), world, banks(spec, times))
 
 
 def axes(spec: Keys, t: np.ndarray, world: records.World, lengths: np.ndarray) -> FlightAxes:
@@ -140,8 +133,7 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     arrays = plan.layout.unpack(values)
     plain = records.Sums(*(arrays[name] for name in records.Sums._fields))
     memory = sums.memory(len(plan.banks.numbers), len(plan.world.lengths))
-    beside = controls.beside(plan.controls(), arrays)
-    sums.simulate_block(plan.world, plan.banks, memory, plain, plan.axes.baseline, first, count, beside)
+    sums.simulate_block(plan.world, plan.banks, memory, plain, plan.axes.baseline, first, count)
     return values
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import consistency, controlled, notes, statistics
+from radarsim.report import consistency, notes, statistics
 from radarsim.report import tables as common
 from radarsim.studies.multimodel import cost as costs
 from radarsim.studies.multimodel import filters
@@ -21,20 +21,13 @@ FREEDOM = 3  # degrees of freedom of a position's or a plot's normalised error s
 
 
 def tables(results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
-    """The tables beyond curves and gains: probabilities, stages, consistency, operations; with controls theirs."""
-    made = {
+    """The tables beyond curves and gains: probabilities, stages, consistency, operations."""
+    return {
         "probabilities": probabilities(results),
         "stages": stages(results),
         "consistency": normalised_errors(results),
         "operations": operations(results),
     }
-    if all("controlled" in result.sums for result in results):
-        made |= {
-            "controlled": controlled.residuals(results, control_names),
-            "controlled_gains": controlled.residual_gains(results),
-            "controlled_stages": controls(results),
-        }
-    return made
 
 
 PROBABILITIES = (
@@ -118,75 +111,6 @@ def _stages(result: CaseResult) -> list[tuple]:
                 where = (result.name, label, stage, begin, end, component, unit, result.count)
                 said = notes.HEAVY if few[f, s, c] else notes.OF_GAIN + notes.HEAVY if few[b, s, c] else ""
                 rows.append((*where, *map(float, sigma), axes.filters[b], *map(float, gain), said))
-    return rows
-
-
-CONTROLS = (
-    *("case", "filter", "control", "stage", "begin_s", "end_s", "component", "unit", "n"),
-    *("sigma", "sigma_lo", "sigma_hi", "variance_factor", "n_eff", "apart"),
-    *("baseline", "gain_percent", "gain_lo", "gain_hi", "gain_factor"),
-)
-
-
-def control_names(result: CaseResult) -> list[str]:
-    """What each filter's controls are: the models of its bank."""
-    return [" + ".join(filters.labels(options.models)) for options in result.spec.filters]
-
-
-def controls(results: Sequence[CaseResult]) -> "pd.DataFrame":
-    """As `stages`, with the controls of each filter: how much they narrow σ and gain, and whether both ways agree."""
-    rows = [row for result in results for row in _controls(result)]
-    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(CONTROLS)})
-
-
-def controlled_sigma(result: CaseResult, f: int, s: int, c: int) -> statistics.Controlled:
-    """σ of component c of filter f over stage s with controls."""
-    square, fourth = np.asarray(result.sums["stage"])[f, s, c]
-    return statistics.residual(np.asarray(result.sums["controlled_stage"])[f, s, c], square, fourth, result.count)
-
-
-def controlled_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> tuple[statistics.Estimate, float]:
-    """Paired gain over a stage with controls, %, and how many times the variance of the plain one it has less."""
-    own, other = (np.asarray(result.sums["controlled_stage"])[i, s, c] for i in (f, base))
-    pairs = np.asarray(result.sums["controlled_stage_pairs"])[f, base, s, c]
-    gain, spread = statistics.residual_gain(own, other, pairs, result.count)
-    (a, aa), (b, bb) = (np.asarray(result.sums["stage"])[i, s, c] for i in (f, base))
-    before = statistics.log_variance(a, aa, b, bb, np.asarray(result.sums["pairs"])[f, base, s, c], result.count)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return gain, float(np.divide(before, spread))
-
-
-def best_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> statistics.Estimate:
-    """Paired gain over a stage, %: with controls where the case has some, both ways agree and these are narrower."""
-    plain = stage_gain(result, f, base, s, c)
-    if "controlled_stage" not in result.sums:
-        return plain
-    both = (controlled_sigma(result, i, s, c) for i in (f, base))
-    trust = all(statistics.trusted(of.apart, of.effective) for of in both)
-    return statistics.narrower(plain, controlled_gain(result, f, base, s, c)[0], trust)
-
-
-def best_stages(made: "Mapping[str, pd.DataFrame]") -> "pd.DataFrame":
-    """The rows of `stages`, σ and its interval with controls where there are some, as `best_gain` has it."""
-    rows = made["stages"]
-    if "controlled_stages" not in made:
-        return rows
-    return controlled.narrower_rows(rows, made["controlled_stages"], ("sigma", "sigma_lo", "sigma_hi"))
-
-
-def _controls(result: CaseResult) -> list[tuple]:
-    rows, axes, b, names = [], result.axes, result.axes.baseline, control_names(result)
-    places = {name: s for s, name in enumerate(stage_names(result))}
-    nothing = statistics.Estimate(np.nan, np.nan, np.nan), np.nan
-    for f, label in enumerate(axes.filters):
-        for stage, begin, end in stage_bounds(result):
-            for c, (component, unit) in enumerate(axes.components):
-                s = places[stage]
-                of = controlled_sigma(result, f, s, c)
-                gain, factor = controlled_gain(result, f, b, s, c) if f != b else nothing
-                where = (result.name, label, names[f], stage, begin, end, component, unit, result.count)
-                told = map(float, (*of.estimate, of.factor, of.effective, of.apart))
-                rows.append((*where, *told, axes.filters[b], *map(float, gain), factor))
     return rows
 
 

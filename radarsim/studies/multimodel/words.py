@@ -7,7 +7,6 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, numeral, plural, term, tr
 from radarsim.report import panels, text
-from radarsim.studies.multimodel import tables
 
 
 def question(experiment: Experiment) -> str:
@@ -30,13 +29,12 @@ def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
     shown, others = panels.reported(results, 4)
     height = [f"{panels.plain_label(result)}: {_least(result, made, 'y', term('the height'))}" for result in shown]
     climb = [f"{panels.plain_label(results[0])}: {_least(results[0], made, 'vy', term('the rate of climb'))}"]
-    controls = [tr("Intervals are those with controls where both ways agree and these are narrower.")]
-    return [*height, *(climb if len(results) == 1 else []), *others, *(controls if "controlled_stages" in made else [])]
+    return [*height, *(climb if len(results) == 1 else []), *others]
 
 
 def _least(result: CaseResult, made: Mapping, component: str, quantity: str) -> str:
     """The filter of the least σ in each stage, with the interval."""
-    rows: Any = tables.best_stages(made)
+    rows: Any = made["stages"]
     rows = rows[(rows["case"] == result.name) & (rows["component"] == component)]
     parts = []
     for stage, own in rows.groupby("stage", sort=False):

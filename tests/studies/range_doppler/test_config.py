@@ -187,10 +187,7 @@ RADAR = (
     "detection_probability, bias_range_m, bias_velocity_mps, sigma_bias_range_m, sigma_bias_velocity_mps"
 )
 FILTER = "name, observes, manoeuvre_variance, initial_scans, process_noise"
-TOP = (
-    "radar, target, filters, baseline, scans, duration_s, study, include, sweep, realisations, seed, figures, "
-    "control_variate"
-)
+TOP = "radar, target, filters, baseline, scans, duration_s, study, include, sweep, realisations, seed, figures"
 UNKNOWN = [
     ("radar.sigma_rnge_m", f"unknown key; did you mean sigma_range_m? allowed: {RADAR}"),
     ("filters.0.manoeuver_variance", f"unknown key; did you mean manoeuvre_variance? allowed: {FILTER}"),

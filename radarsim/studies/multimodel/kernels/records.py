@@ -70,11 +70,6 @@ MEANS = 13  # so many means of a stage are summed over realisations
 PLOTS = 13  # number of detected plots
 STAGE = 14
 
-# ---- the controls ----
-PARTS = 4  # of a stage, over each of which the controls of its means are summed apart
-COLLECTED = 2  # rows a part and state: Σ d² and Σ d times the control's mean error, over the part's scans
-MOMENTS = 5  # of a residual ρ and of what the controls explain: Σ level, Σ ρ, Σ ρ², Σ ρ⁴, Σ explained²
-
 # ---- plain numbers (not rows) ----
 # of a sensor (FRAME,)
 ROTATION, SIGMA, HEIGHT, FORM, UNBIASED, DETECTION = 0, 9, 12, 13, 14, 15
@@ -88,12 +83,6 @@ FAMILY, MERGE, OUTPUT_RULE, AT_PREDICTION, SIZE = range(5)
 KALMAN, GPB1, IMM, GPB2 = range(4)  # values of FAMILY
 MOMENT, BEST, COMBINED, MODIFIED = range(4)  # values of MERGE and OUTPUT_RULE
 MODEL_NUMBERS = 3  # of a model: moves, accelerates (0 or 1), sigma of the acceleration
-# of a control over some scans: its gain (9 x 3, row by row), the mean error of the predicted position (3) and of the
-# estimate (9)
-EXPECTED, MEAN_ERROR = 27, 30
-CONTROL = 40
-CONTROL_STEP = 5  # of a control over an interval: F of one axis
-NO_CONTROLS, PILOT, CONTROLLED = range(3)  # values of Controls.mode
 
 
 class Rules(NamedTuple):
@@ -147,59 +136,6 @@ class Banks(NamedTuple):
     probabilities: np.ndarray
 
 
-class Controls(NamedTuple):
-    """The controls of a case, C Kalman filters of shared gains, and how the filters' squared errors depend on them.
-
-    mode (1,)                     NO_CONTROLS, PILOT (products are summed) or CONTROLLED (residuals are)
-    gains (C, G, CONTROL)         the numbers of each control, held over some scans
-    steps (C, U, CONTROL_STEP)    F of each control over each interval
-    row, part (K,)                the number of a scan's gain, and of the part of a stage that it belongs to
-    noise (K, 9)                  G, row by row: the plot's error in the local frame is G n, n three standard normals
-    own (F, 8)                    the control of each model of a filter
-    variances (K', C, 9)          E d² at a reported scan
-    sums (C, S PARTS, 9)          Σ E d² over the scans of a part
-    scans (K', F, 9, 1 + 2 M)     level and slopes of the squared error at a scan: on d and d² - E d² of each model
-    stages (S, F, 9, 1 + 2 PARTS M)   the same of the mean over a stage: on both sums over each part, of each model
-    """
-
-    mode: np.ndarray
-    gains: np.ndarray
-    steps: np.ndarray
-    row: np.ndarray
-    part: np.ndarray
-    noise: np.ndarray
-    own: np.ndarray
-    variances: np.ndarray
-    sums: np.ndarray
-    scans: np.ndarray
-    stages: np.ndarray
-
-
-class ControlSums(NamedTuple):
-    """Sums over realisations of what the controls leave of squared errors, as a block of results holds them.
-
-    controlled (F, K', 9, MOMENTS)         of e² at a scan
-    controlled_pairs (F, K', 9)            Σ ρ ρ₀, with the residual of the baseline filter
-    controlled_stage (F, S, 9, MOMENTS)    of the mean of e² over a stage
-    controlled_stage_pairs (F, F, S, 9)    Σ ρ ρ' of two filters
-    """
-
-    controlled: np.ndarray
-    controlled_pairs: np.ndarray
-    controlled_stage: np.ndarray
-    controlled_stage_pairs: np.ndarray
-
-
-class Products(NamedTuple):
-    """Sums over a pilot's realisations, from which the slopes are regressed: of the regressand y and its regressors.
-
-    scans (K', F, 9, …), stages (S, F, 9, …)    Σ of each, then Σ of the products of any two, as `products` counts
-    """
-
-    scans: np.ndarray
-    stages: np.ndarray
-
-
 class Sums(NamedTuple):
     """Sums over realisations, as a block of results holds them.
 
@@ -228,20 +164,4 @@ def shapes(filters: int, reported: int, stages: int) -> dict[str, tuple[int, ...
         believed=(filters, reported, 2),
         stage=(filters, stages, MEANS, 2),
         pairs=(filters, filters, stages, STATES),
-    )._asdict()
-
-
-def products(regressors: int) -> int:
-    """How many sums a regression on so many regressors takes: of it and each of them, and of all pairs."""
-    size = 1 + regressors
-    return size + size * (size + 1) // 2
-
-
-def controlled_shapes(filters: int, reported: int, stages: int) -> dict[str, tuple[int, ...]]:
-    """The shape of each array of `ControlSums`, by name."""
-    return ControlSums(
-        controlled=(filters, reported, STATES, MOMENTS),
-        controlled_pairs=(filters, reported, STATES),
-        controlled_stage=(filters, stages, STATES, MOMENTS),
-        controlled_stage_pairs=(filters, filters, stages, STATES),
     )._asdict()

@@ -19,7 +19,6 @@ from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, rows, total, where_greater
 from radarsim.kernels.symmetric import dot, factored, scaled, whitened
 from radarsim.studies.multimodel.kernels import strip
-from radarsim.studies.multimodel.kernels.controls import Span, follow_controls
 from radarsim.studies.multimodel.kernels.plots import RANDOM, STRIP, draw_strip, make_plots
 from radarsim.studies.multimodel.kernels.records import (
     DETECTED,
@@ -31,7 +30,6 @@ from radarsim.studies.multimodel.kernels.records import (
     MOST,
     NEES,
     NIS,
-    NO_CONTROLS,
     OUTPUT,
     PLOT,
     PLOTS,
@@ -43,7 +41,6 @@ from radarsim.studies.multimodel.kernels.records import (
     VARIANCE,
     WORK,
 )
-from radarsim.studies.multimodel.kernels.residuals import add_controlled_scan, close_controls
 from radarsim.studies.multimodel.kernels.strip import Filter, Scans, rules_of, run_strip, start
 
 
@@ -184,18 +181,14 @@ def clear(first, count):
 
 
 @kernel
-def simulate_block(world, banks, memory, sums, baseline, first, count, beside):
-    """Add the realisations first … first + count - 1 to the sums; gains are against the filter `baseline`.
-
-    beside: the controls, `controls.Beside`.
-    """
+def simulate_block(world, banks, memory, sums, baseline, first, count):
+    """Add the realisations first … first + count - 1 to the sums; gains are against the filter `baseline`."""
     filters, scans, stages = banks.numbers.shape[0], world.truth.shape[0], world.lengths.shape[0]
     padded = banks.transitions.shape[1] // WIDTH
     for group in range(0, count, WIDTH):
         for n in range(WIDTH):
             memory.counted[n] = 1.0 if group + n < count else 0.0
         clear(address(memory.stages), filters * stages * STAGE)
-        clear(address(beside.memory.parts), beside.memory.parts.size // WIDTH)
         for k in range(0, scans, STRIP):
             length, begin = min(STRIP, scans - k), START if k == 0 else 0
             draw_strip(world.keys, first + group, k // STRIP, memory.random)
@@ -215,14 +208,10 @@ def simulate_block(world, banks, memory, sums, baseline, first, count, beside):
                 own = strip.Memory(work, numbers, address(memory.listed))
                 run_strip(own, design, span, plots, frame, row(address(memory.out), f * STRIP * OUTPUT))
             add_strip(world, banks, memory, sums, baseline, k, begin, length)
-            if beside.controls.mode[0] != NO_CONTROLS:
-                add_controls(world, banks, memory, beside, baseline, Span(k, begin, length))
         lengths, counted = address(world.lengths), get(address(memory.counted), 0)
         close_stages(
             address(memory.stages), filters, stages, lengths, counted, address(sums.stage), address(sums.pairs)
         )
-        if beside.controls.mode[0] != NO_CONTROLS:
-            close_controls(banks, beside, address(memory.stages), address(memory.counted), stages)
 
 
 @inline
@@ -246,13 +235,3 @@ def add_strip(world, banks, memory, sums, baseline, k, begin, length):
                     address(sums.believed[f, place]),
                 )
                 add_scan(out, row(base, n * OUTPUT), truth, counted, banks.numbers[f, SIZE], places)
-
-
-@inline
-def add_controls(world, banks, memory, beside, baseline, span):
-    """Run the controls over a strip, and add what they leave of the squared errors at its reported scans."""
-    follow_controls(world, address(memory.random), beside, span)
-    for n in range(span.begin, span.length):
-        if world.reported[span.k + n] == 1:
-            outputs, counted = address(memory.out), address(memory.counted)
-            add_controlled_scan(world, banks, beside, outputs, counted, baseline, span.k + n, n)
