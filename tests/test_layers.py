@@ -74,7 +74,7 @@ ROLES = {
     "track": ((*GROUND, *DATA, "studies.noise", "studies.interface"), (*SUMS, "track")),
     "map": ((*GROUND, *DATA), (*SUMS, "track")),  # one realisation followed as recorded plots are, for a figure
     "part": (
-        (*GROUND, *DATA, "report", "studies.interface"),
+        (*GROUND, *DATA, "report", "studies.interface", "studies.folder"),
         (*READ, "track"),
     ),  # of several: their type
     "__init__": (

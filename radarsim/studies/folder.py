@@ -38,18 +38,36 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, get_args
 
-from radarsim.studies.interface import OptionalPart, Paper, Plan, RecordedPlots, Study
+from radarsim.studies.interface import OptionalPart, Paper, Study
 
 if TYPE_CHECKING:
-    import numpy as np
-    import pandas as pd
-
-    from radarsim.config.experiment import Case, Experiment
     from radarsim.config.fields import Study as Keys
-    from radarsim.engine.results import CaseResult
     from radarsim.report.claims import PaperClaims
-    from radarsim.report.claims.readings import PaperReadings
-    from radarsim.report.drawing import Chart, Figure
+
+
+class _Part:
+    """A method of a folder's class that is the function, or class, of its name in a file; see `part`."""
+
+    def __init__(self, file: str, name: str):
+        self.path, self.name = file, name
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.owner, self.method, self.name = owner, name, self.name or name
+
+    def __get__(self, folder: Any, owner: type) -> Any:
+        if folder is None:
+            return self
+        if self.method in get_args(OptionalPart) and self.method not in folder.offers:
+            return getattr(super(self.owner, folder), self.method)
+        return getattr(folder.file(self.path), self.name)
+
+
+def part(file: str, name: str = "") -> Any:
+    """A method that a file of the folder has, under its own name or another one; the default where it is not offered.
+
+    It is what `radarsim.studies.interface` says of the method, without self.
+    """
+    return _Part(file, name)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,93 +97,34 @@ class StudyFolder(Study):
         """A module of the folder."""
         return import_module(f"{self.package}.{name}")
 
-    # ---- what is asked, and numbers ------------------------------------------------------------------------------
     def keys(self) -> "type[Keys]":
         return self.file("config").Keys
 
     def computes_in(self, spec: Any) -> tuple[str, ...]:
         return f"{self.package}.study", f"{self.package}.config"
 
-    def prepare(self, case: "Case") -> Plan:
-        return self.file("study").prepare(case)
-
-    def simulate(self, plan: Any, first: int, count: int) -> "np.ndarray":
-        return self.file("study").simulate(plan, first, count)
-
-    def shortened(self, case: "Case", at_s: float | None, at_k: int | None) -> "Case":
-        offered = "shortened" in self.offers
-        return self.file("study").shortened(case, at_s, at_k) if offered else super().shortened(case, at_s, at_k)
-
-    def exact_but_for(self, case: "Case") -> str:
-        offered = "exact_but_for" in self.offers
-        return self.file("study").exact_but_for(case) if offered else super().exact_but_for(case)
-
-    def costly(self, case: "Case") -> bool:
-        return self.file("study").costly(case) if "costly" in self.offers else super().costly(case)
-
     def rates(self, spec: Any) -> tuple[str, ...] | None:
         return self.rate_tables
 
-    def seconds_per_update(self, plan: Any) -> Mapping[str, float]:
-        offered = "seconds_per_update" in self.offers
-        return self.file("cost").seconds_per_update(plan) if offered else super().seconds_per_update(plan)
-
-    def seconds_at_most(self, plan: Any) -> float | None:
-        offered = "seconds_at_most" in self.offers
-        return self.file("cost").seconds_at_most(plan) if offered else super().seconds_at_most(plan)
-
-    # ---- what is shown -------------------------------------------------------------------------------------------
-    def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
-        return self.file("tables").tables(results)
-
-    def curves(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
-        return self.file("tables").curves(results) if "curves" in self.offers else super().curves(results)
-
-    def gains(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
-        return self.file("tables").gains(results) if "gains" in self.offers else super().gains(results)
-
-    def inputs(self, results: "Sequence[CaseResult]") -> "pd.DataFrame | None":
-        return self.file("tables").inputs(results) if "inputs" in self.offers else super().inputs(results)
-
-    def cost(self, made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
-        return self.file("tables").cost(made, run) if "cost" in self.offers else super().cost(made, run)
-
-    def figures(
-        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
-    ) -> "dict[str, Figure]":
-        return self.file("figures").figures(results, made, experiment)
+    prepare, simulate = part("study"), part("study")
+    shortened, exact_but_for, costly = part("study"), part("study"), part("study")
+    seconds_per_update, seconds_at_most = part("cost"), part("cost")
+    tables, curves, gains = part("tables"), part("tables"), part("tables")
+    inputs, cost = part("tables"), part("tables")
+    figures, chart = part("figures"), part("chart")
+    question, answer, warnings = part("words"), part("words"), part("words")
+    readings, recorded = part("readings", "Readings"), part("track", "Recorded")
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
         return getattr(self.file("figures"), "DRAWN_FROM", {})
 
-    def question(self, experiment: "Experiment") -> str:
-        return self.file("words").question(experiment)
-
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> Sequence[str]:
-        return self.file("words").answer(results, made)
-
-    def warnings(self, experiment: "Experiment") -> Sequence[str]:
-        return self.file("words").warnings(experiment) if "warnings" in self.offers else super().warnings(experiment)
-
     def claims(self) -> "PaperClaims | None":
         if self.paper is None:
-            return super().claims()
+            return None
         from radarsim.report.claims import PaperClaims
 
         return PaperClaims(self.file("claims").CLAIMS, self.file("measures").Evidence, *self.paper)
 
-    def readings(self) -> "PaperReadings | None":
-        return self.file("readings").Readings() if "readings" in self.offers else super().readings()
-
-    # ---- beside --------------------------------------------------------------------------------------------------
-    def recorded(self) -> RecordedPlots | None:
-        return self.file("track").Recorded() if "recorded" in self.offers else super().recorded()
-
-    def chart(self, cases: "Sequence[Case]", references: "Sequence[Case]") -> "Chart | None":
-        return (
-            self.file("chart").chart(cases, references) if "chart" in self.offers else super().chart(cases, references)
-        )
-
     def shipped(self) -> Path | None:
         (folder,) = import_module(self.package).__path__
-        return Path(folder) / "shipped" if "shipped" in self.offers else super().shipped()
+        return Path(folder) / "shipped" if "shipped" in self.offers else None

@@ -201,7 +201,6 @@ def test_sentences_move_nothing(folder, moved):
         ("recorded/follow.py", NONE),
         ("studies/registry.py", NONE),
         ("studies/interface.py", NONE),
-        ("studies/folder.py", NONE),
         ("studies/identity.py", NONE),
     ],
 )
@@ -228,9 +227,6 @@ def test_the_shared_rooms(path, expected, moved):
         # The declared study: what it is called and shows, and how it computes.
         ("studies/range_doppler/__init__.py", 'about="', 'about="Indeed: ', NONE),
         ("studies/range_doppler/__init__.py", '"inputs",', "", NONE),
-        ("studies/folder.py", ".tables(results)", ".tables(results[:1])", NONE),
-        ("studies/folder.py", ".prepare(case)", ".prepare(case, 1)", ALL - SONAR),
-        ("studies/folder.py", ".simulate(plan, first, count)", ".simulate(plan, first + 1, count)", ALL - SONAR),
         ("studies/sonar/__init__.py", ".simulate(first, count)", ".simulate(first + 1, count)", SONAR),
     ],
 )  # fmt: skip

@@ -156,6 +156,7 @@ class Recorded(RecordedPlots):
 
     rows_asked = 100
     from_any_origin = True
+    simulated, tracker = staticmethod(simulated), staticmethod(Tracker)
 
     def columns(self, spec: Any) -> Sequence[Sequence[str]]:
         return ((*COLUMNS, SPAN), COLUMNS)
@@ -165,12 +166,6 @@ class Recorded(RecordedPlots):
 
     def scan_period_s(self, spec: Any) -> float:
         return spec.radar.scan_period_s
-
-    def simulated(self, case: Case, realisation: int) -> Mapping[str, np.ndarray]:
-        return simulated(case, realisation)
-
-    def tracker(self, case: Case) -> Tracker:
-        return Tracker(case)
 
     def unfolding(self, span_mps: float) -> tuple[str, str]:
         return UNFOLDS, f"radar.repetition_rate_hz={2 * span_mps / UNFOLDS_WAVELENGTH_M:.6g}"

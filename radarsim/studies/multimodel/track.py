@@ -44,7 +44,7 @@ TESTED = (("plot", 3),)
 LEAST = 1e-4  # of a key's stated value, which counts as zero
 
 
-def plot_columns(spec: Keys) -> tuple[tuple[str, ...], ...]:
+def columns(spec: Keys) -> tuple[tuple[str, ...], ...]:
     """The columns that `track` reads of a file of recorded plots."""
     if spec.sensor.sigma_range_m is None:
         return (("t_s", "x_m", "y_m", "z_m"),)
@@ -68,12 +68,12 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     else:
         exact = np.stack([truth[:, RANGE], *np.arcsin(truth[:, [ELEVATION, AZIMUTH]]).T], axis=1)
     detected = measured(plan, realisation)[2][:, 0] > 0
-    t, *names = plot_columns(case.spec)[0]
+    t, *names = columns(case.spec)[0]
     found = np.where(detected[:, None], exact + noise, np.nan)
-    columns = {t: scan_times(case)[0]} | dict(zip(names, found.T, strict=True))
+    made = {t: scan_times(case)[0]} | dict(zip(names, found.T, strict=True))
     if case.spec.sensor.sigma_range_m is not None:
-        columns |= {f"true_{name}": exact[:, i] for i, name in enumerate(names)}
-    return columns | {true_column(*component): plan.world.truth[:, i] for i, component in enumerate(COMPONENTS)}
+        made |= {f"true_{name}": exact[:, i] for i, name in enumerate(names)}
+    return made | {true_column(*component): plan.world.truth[:, i] for i, component in enumerate(COMPONENTS)}
 
 
 def normals(key: np.ndarray, realisation: int, count: int) -> np.ndarray:
@@ -279,20 +279,11 @@ class Recorded(RecordedPlots):
 
     rows_asked = 600
 
-    def columns(self, spec: Keys) -> tuple[tuple[str, ...], ...]:
-        return plot_columns(spec)
-
-    def sigmas(self, spec: Keys) -> dict[str, tuple[str, ...]]:
-        return sigmas(spec)
+    columns, sigmas = staticmethod(columns), staticmethod(sigmas)
+    simulated, tracker = staticmethod(simulated), staticmethod(Tracker)
 
     def scan_period_s(self, spec: Keys) -> float:
         return spec.sensor.scan_period_s
-
-    def simulated(self, case: Case, realisation: int) -> dict[str, np.ndarray]:
-        return simulated(case, realisation)
-
-    def tracker(self, case: Case) -> Tracker:
-        return Tracker(case)
 
     def likelihood(
         self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]

@@ -34,16 +34,6 @@ SIGMAS: dict[str, tuple[str, ...]] = {
 }
 
 
-def plot_columns(spec: Keys) -> tuple[tuple[str, ...], ...]:
-    """The columns that `track` reads of a file of recorded plots."""
-    return (("t_s", "range_m", "velocity_mps"),)
-
-
-def sigmas(spec: Keys) -> dict[str, tuple[str, ...]]:
-    """Which of the sensor's standard deviations stand behind each number that is measured."""
-    return SIGMAS
-
-
 def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     """The plots of one realisation of the study and the truth, columns (K,)."""
     plan = prepare(case)
@@ -276,26 +266,17 @@ class _Problem(NamedTuple):
 class Recorded(RecordedPlots):
     """The study's part in `radarsim track` and `radarsim simulate`."""
 
+    simulated, tracker = staticmethod(simulated), staticmethod(Tracker)
+    likelihood = staticmethod(PlotLikelihood)
+
     def columns(self, spec: Keys) -> Sequence[Sequence[str]]:
-        """As `RecordedPlots`, and so below."""
-        return plot_columns(spec)
+        return (("t_s", "range_m", "velocity_mps"),)
 
     def sigmas(self, spec: Keys) -> Mapping[str, Sequence[str]]:
-        return sigmas(spec)
+        return SIGMAS
 
     def scan_period_s(self, spec: Keys) -> float:
         return spec.radar.scan_period_s
-
-    def simulated(self, case: Case, realisation: int) -> Mapping[str, np.ndarray]:
-        return simulated(case, realisation)
-
-    def tracker(self, case: Case) -> Tracker:
-        return Tracker(case)
-
-    def likelihood(
-        self, case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]
-    ) -> PlotLikelihood:
-        return PlotLikelihood(case, filter_name, tracks)
 
     def span_mps(self, spec: Keys) -> float | None:
         radar = spec.radar

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
-from radarsim.studies.interface import Plan, RecordedPlots, Study, Tracker
+from radarsim.studies.interface import Plan, RecordedPlots, Study
 from radarsim.studies.sonar.part import SonarPart
 
 if TYPE_CHECKING:
@@ -16,11 +16,9 @@ if TYPE_CHECKING:
     from radarsim.report.claims.readings import PaperReadings
     from radarsim.report.drawing import Figure
     from radarsim.studies.sonar.clutter.study import Plan as ClutterPlan
-    from radarsim.studies.sonar.config import Keys
     from radarsim.studies.sonar.schema import Sonar as AllKeys
     from radarsim.studies.sonar.smoothing.study import SharedPlan
     from radarsim.studies.sonar.study import RealisationPlan
-    from radarsim.studies.sonar.track import PlotLikelihood
 
 CaseOrResult = TypeVar("CaseOrResult", "Case", "CaseResult")
 
@@ -120,40 +118,10 @@ class Sonar(Study):
 
         return Readings()
 
-    def recorded(self) -> "Recorded":
-        return Recorded()
+    def recorded(self) -> RecordedPlots:
+        from radarsim.studies.sonar.track import Recorded
 
-
-class Recorded(RecordedPlots):
-    """Recorded plots of all parts, for `radarsim track` and `radarsim simulate`."""
-
-    rows_asked = 1000
-
-    def columns(self, spec: "Keys") -> tuple[tuple[str, ...], ...]:
-        from radarsim.studies.sonar import track
-
-        return track.plot_columns(spec)
-
-    def sigmas(self, spec: "Keys") -> Mapping[str, Sequence[str]]:
-        from radarsim.studies.sonar import track
-
-        return track.sigmas(spec)
-
-    def scan_period_s(self, spec: "Keys") -> float:
-        return spec.sensor.scan_period_s
-
-    def simulated(self, case: "Case", realisation: int) -> "Mapping[str, np.ndarray]":
-        return part_of(case.spec).simulated(case, realisation)
-
-    def tracker(self, case: "Case") -> Tracker:
-        return part_of(case.spec).tracker(case)
-
-    def likelihood(
-        self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
-    ) -> "PlotLikelihood | None":
-        from radarsim.studies.sonar import track
-
-        return track.likelihood(case, filter_name, tracks)
+        return Recorded(part_of)
 
 
 # ---- which part -----------------------------------------------------------------------------------------------------

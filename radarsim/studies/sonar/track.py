@@ -1,7 +1,7 @@
 """Sonar plots of one realisation, and filters over recorded plots that are known to be the target's; how likely these
 are under a filter."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +10,8 @@ from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.kernels.innovations import log_likelihood
 from radarsim.physics.motion import manoeuvre_covariance, transition
-from radarsim.studies.interface import OUTLIERS, true_column
+from radarsim.studies import interface
+from radarsim.studies.interface import OUTLIERS, RecordedPlots, true_column
 from radarsim.studies.sonar import banks, filters, world
 from radarsim.studies.sonar import study as base
 from radarsim.studies.sonar.config import Keys
@@ -30,7 +31,7 @@ LEAST_SIGMA, LEAST_MANOEUVRE = 1e-4, 1e-8  # what counts as zero: of a stated σ
 LEAST_FREEDOM = 1e-6  # of a plot's variance; with less the estimate passes through the plot
 
 
-def plot_columns(spec: Keys) -> tuple[tuple[str, ...], ...]:
+def columns(spec: Keys) -> tuple[tuple[str, ...], ...]:
     """The columns that `track` reads from a file of recorded plots."""
     third, _ = third_coordinate(spec.sensor)
     return (("t_s", "range_m", "bearing_rad", *([THIRD[third][0]] if third else [])),)
@@ -66,11 +67,11 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     else:
         values, exact = scene.polar[..., 0] + drawn[..., 1], scene.polar[..., 0]
     measured_there = there[:, None] & np.isfinite(scene.sigma)
-    t, *names = plot_columns(spec)[0]
-    columns = {t: scene.t} | dict(zip(names, np.where(measured_there, values, np.nan).T, strict=True))
-    columns |= {f"true_{name}": exact[:, c] for c, name in enumerate(names)}
+    t, *names = columns(spec)[0]
+    made = {t: scene.t} | dict(zip(names, np.where(measured_there, values, np.nan).T, strict=True))
+    made |= {f"true_{name}": exact[:, c] for c, name in enumerate(names)}
     components = zip(base.labels(spec, 3), truth.reshape(K, -1).T, strict=True)
-    return columns | {true_column(name, unit): state for (name, unit), state in components}
+    return made | {true_column(name, unit): state for (name, unit), state in components}
 
 
 class Derived(NamedTuple):
@@ -333,3 +334,22 @@ def likelihood(
     else:
         known = [i for i in known if members[i].name == filter_name]
     return PlotLikelihood(case, known[0], tracks) if known else None
+
+
+class Recorded(RecordedPlots):
+    """Recorded plots of all parts, for `radarsim track` and `radarsim simulate`; part_of: the part of a case's keys."""
+
+    rows_asked = 1000
+    columns, sigmas, likelihood = staticmethod(columns), staticmethod(sigmas), staticmethod(likelihood)
+
+    def __init__(self, part_of: Callable[[Any], Any]):
+        self.part_of = part_of
+
+    def scan_period_s(self, spec: Keys) -> float:
+        return spec.sensor.scan_period_s
+
+    def simulated(self, case: Case, realisation: int) -> Mapping[str, np.ndarray]:
+        return self.part_of(case.spec).simulated(case, realisation)
+
+    def tracker(self, case: Case) -> interface.Tracker:
+        return self.part_of(case.spec).tracker(case)

@@ -289,7 +289,7 @@ def test_track_over_recorded_plots_equals_the_experiment():
     R = frames.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
     biconical = to_biconical(frames.to_antenna(z[:, :, 0], R, sensor.antenna_height_m))
     t = np.concatenate([plan.axes.t_s[:1] - 1.5, plan.axes.t_s[:1] - 1.0, plan.axes.t_s[:1] - 0.5, plan.axes.t_s])
-    columns = multimodel_plots.plot_columns(case.case.spec)[0]
+    columns = multimodel_plots.columns(case.case.spec)[0]
     track = multimodel_plots.track(case.case, dict(zip(columns, [t + 100, *biconical.T], strict=True)))
     sums = plan.layout.unpack(case.simulate(0, 1))
     assert np.isnan(track.estimate[:, :2]).all()
@@ -300,7 +300,7 @@ def test_track_over_recorded_plots_equals_the_experiment():
 
 def test_track_waits_over_gaps_and_plots_beyond_the_edge():
     case = work()
-    columns = multimodel_plots.plot_columns(case.case.spec)[0]
+    columns = multimodel_plots.columns(case.case.spec)[0]
     t = np.cumsum(np.random.default_rng(3).uniform(0.02, 3, 9000))
     plots = np.stack([np.full(9000, 5e4), np.full(9000, 0.1), np.full(9000, -0.1)])
     plots[0, 40:60] = np.nan
@@ -314,7 +314,7 @@ def test_track_waits_over_gaps_and_plots_beyond_the_edge():
 
 def test_a_track_of_two_plots_has_no_estimate():
     case = work()
-    columns = multimodel_plots.plot_columns(case.case.spec)[0]
+    columns = multimodel_plots.columns(case.case.spec)[0]
     track = multimodel_plots.track(case.case, dict(zip(columns, [np.arange(2.0), *np.full((3, 2), 0.1)], strict=True)))
     assert np.isnan(track.estimate).all()
 
