@@ -43,7 +43,7 @@ TOLERANCES = {
     # rounding of it, once in 10⁹ of them; the cases hold some 10⁴. Likelihoods multiply: κε of a few hundred roundings.
     "sonar_manoeuvre": Tolerance(sampled=1e-10),
     "sonar_clutter": Tolerance(sampled=1e-10),
-    # Innovation covariances of bearings have κ of up to 3·10⁶ (kernels.symmetric.factored), so κε = 7·10⁻¹⁰.
+    # Innovation covariances of bearings have κ of up to 3·10⁶ (kernels.algebra.factored), so κε = 7·10⁻¹⁰.
     "multimodel": Tolerance(sampled=1e-9),
     # Balanced information of five parameters, κ = 2.1·10⁵: its inverse is known to κε/2 = 2.3·10⁻¹¹. Estimates are
     # found by scoring steps that use the inverse, each a fraction of σ long and ended by a threshold.

@@ -6,9 +6,10 @@ Cascade Lake: sums over samples 1.7 times faster, normals 1.3 times. Numba's CPU
 whole process, but only where no other user of Numba came first, and the order of sums would depend on who did.
 
 Numba optimises every function together with all that it calls and makes machine code of it, so that what is called at
-the fifth level is translated five times. Functions without an entry from Python (`inline`, `part`) are therefore kept
-untranslated until the kernel that calls them is compiled: the nine-state filters take two thirds of the time, and run
-at the same speed. A kernel that another calls is compiled for it apart, without an entry and without machine code.
+the fifth level is translated five times. What kernels call (`inline`, `part`) has no compiled entry from Python and is
+kept untranslated until the kernel is compiled: the nine-state filters take two thirds of the time, and run at the same
+speed. A kernel that another calls is compiled for it apart, without an entry and without machine code. Python calls an
+`inline` function as the plain function that it is, see `radarsim.kernels.formula`; a `part` it cannot call.
 """
 
 import ctypes
@@ -25,9 +26,11 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
+from numba.extending import typeof_impl
 from numba.np.arrayobj import make_array
 
 from radarsim.kernels import cache
+from radarsim.kernels.formula import Formula
 from radarsim.kernels.resolving import resolving
 
 # No `reassoc` (part of fastmath=True): it folds rounding tricks such as (x + M) - M and changes the order of sums.
@@ -184,12 +187,23 @@ def compiler(**options) -> Callable:
 
 # Nobody takes a kernel's C address; its wrapper is a tenth of the time to compile.
 COMMON = {"error_model": "numpy", "pipeline_class": WideCompiler, "no_cfunc_wrapper": True}
-# What only kernels call: copied into its caller, or a function of its own in each kernel.
-inline = njit(fastmath=set(FLAGS), forceinline=True, no_cpython_wrapper=True, **COMMON)
+# What kernels call: copied into its caller, or a function of its own in each kernel.
+inline = Formula
 part = njit(fastmath=set(FLAGS), no_cpython_wrapper=True, **COMMON)
 kernel = compiler(fastmath=set(FLAGS), nogil=True)
 # Reassociation is allowed only where it lets independent sums run in vector registers; the code fixes their order.
 summing = compiler(fastmath=set(FLAGS | {"reassoc"}), nogil=True)
+
+
+@typeof_impl.register(Formula)
+def _type_of_formula(formula: Formula, context) -> types.Type:
+    return types.Dispatcher(twin(formula))
+
+
+@functools.cache
+def twin(formula: Formula):
+    """The compiled twin of a formula, as kernels call it."""
+    return njit(fastmath=set(FLAGS), forceinline=True, no_cpython_wrapper=True, **COMMON)(formula.function)
 
 
 def aligned_zeros(*shape: int) -> np.ndarray:

@@ -41,7 +41,7 @@ def house(tmp_path):
     """A package with copies of compile.py and what it needs, a helper file, a kernel that uses it, and a cache."""
     kernels = tmp_path / "copied" / "kernels"
     kernels.mkdir(parents=True)
-    for name in ("compile.py", "resolving.py", "cache.py", "sources.py", "trees.py"):
+    for name in ("compile.py", "formula.py", "resolving.py", "cache.py", "sources.py", "trees.py"):
         (kernels / name).write_text((SOURCES / name).read_text().replace("radarsim.kernels", "copied.kernels"))
     begin = "from copied.kernels"
     (kernels / "helper.py").write_text(f"{begin}.compile import inline\n@inline\ndef grown(x):\n    return x + 1.0\n")
@@ -189,7 +189,7 @@ def test_plain_python_gives_the_same_numbers():
 
 
 def test_functions_without_an_entry_refuse_python():
-    """They stay untranslated until a kernel needs them; Python gets an error, no crash."""
+    """They stay untranslated until a kernel needs them; Python gets an error, no crash; a formula it calls as it is."""
 
     @compiling.part
     def halved(x):
@@ -199,10 +199,20 @@ def test_functions_without_an_entry_refuse_python():
     def grown(x):
         return halved(x) + 1
 
+    @compiling.inline
+    def doubled(x):
+        return 2 * x
+
+    @compiling.inline
+    def squared(x):
+        return doubled(x) * x / 2
+
     for function in (halved, grown):
         with pytest.raises(TypeError, match="not callable"):
             function(4.0)
     assert compiling.kernel(lambda x: grown(x))(4.0) == 3.0
+    assert compiling.kernel(lambda x: squared(x))(4.0) == squared(4.0) == 16.0
+    assert (squared(np.array([1.0, 2.0])) == [1.0, 4.0]).all()
 
 
 def test_a_kernel_that_another_calls_is_compiled_for_it_apart(monkeypatch):

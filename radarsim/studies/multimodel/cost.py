@@ -12,7 +12,7 @@ from radarsim.studies.multimodel.kernels.records import MODEL_NUMBERS, OUTPUT, P
 from radarsim.studies.multimodel.study import Plan
 
 # Additions, subtractions, multiplications, divisions, roots and exponentials of one step, all three axes, counted on
-# the formulas of `radarsim.kernels.symmetric` and `kernels.hypothesis` (a test counts them again); PREDICT, UPDATE by
+# the formulas of `radarsim.kernels.algebra` and `kernels.hypothesis` (a test counts them again); PREDICT, UPDATE by
 # whether the model accelerates: the zeros of one that does not are left out.
 PREDICT, UPDATE = {True: 282, False: 99}, {True: 456, False: 267}
 LIKELIHOOD, MERGE, MERGE_ONCE = 8, 208, -9

@@ -1,13 +1,10 @@
 """Banks, transition powers, stationary probabilities, the track start, the count of operations."""
 
-import ast
-import inspect
-
 import numpy as np
 import pytest
 from scipy.linalg import fractional_matrix_power
 
-from radarsim.kernels import symmetric as blocks
+from radarsim.kernels import algebra
 from radarsim.studies.multimodel import cost, filters
 
 PRINTED = np.array([[0.996, 0, 0.002], [0, 0.996, 0.002], [0.004, 0.004, 0.996]])
@@ -89,37 +86,28 @@ class Counted:
     __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _operate
 
 
-def plain(module):
-    """The functions of a kernel module as plain Python."""
-    tree = ast.parse(inspect.getsource(module))
-    names = {"inline": lambda f: f}
-    body = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
-    exec(compile(ast.Module(body, []), "plain", "exec"), names)  # our own source, read from disk
-    return names
-
-
 @pytest.mark.parametrize("accelerates", [True, False])
 def test_operations_are_those_of_the_formulas(accelerates):
-    of, x = plain(blocks), Counted()
+    x = Counted()
     zero = x if accelerates else ExactZero()
     F, Q = (x, zero, x, zero, zero), (x, x, zero, x, zero, zero)
     Counted.count = 0
     for _ in range(3):
-        mean = of["predicted_axis"]((x,) * 3, F)
-        own = of["predicted_own"]((x,) * 6, F, Q)
-        cross = of["predicted_cross"]((x,) * 9, F)
+        mean = algebra.predicted((x,) * 3, F)
+        own = algebra.predicted_covariance((x,) * 6, F, Q)
+        cross = algebra.predicted_cross((x,) * 9, F)
     assert Counted.count == cost.PREDICT[accelerates]
     Counted.count = 6 + 3  # S = H P H' + R; the innovation
-    of["factored"]((x,) * 6)
-    v = of["whitened"]((x,) * 3, (x,) * 3)
-    of["dot"](of["scaled"](v, (x,) * 3), v)
+    algebra.factored((x,) * 6)
+    v = algebra.whitened((x,) * 3, (x,) * 3)
+    algebra.dot(algebra.scaled(v, (x,) * 3), v)
     for _ in range(3):
         # Rows of P H': the first columns of the axis's own block and of the blocks with the other two.
-        rows = [of["whitened"]((own[i], cross[3 * i], cross[3 * i]), (x,) * 3) for i in range(3)]
-        scaled = [of["scaled"](row, (x,) * 3) for row in rows]
-        _ = [at + of["dot"](row, v) for at, row in zip(mean, scaled, strict=True)]
-        of["shrunk_own"](own, scaled, rows)
-        of["shrunk_cross"](cross, scaled, rows)
+        rows = [algebra.whitened((own[i], cross[3 * i], cross[3 * i]), (x,) * 3) for i in range(3)]
+        scaled = [algebra.scaled(row, (x,) * 3) for row in rows]
+        _ = [at + algebra.dot(row, v) for at, row in zip(mean, scaled, strict=True)]
+        algebra.shrunk_own(own, scaled, rows)
+        algebra.shrunk_cross(cross, scaled, rows)
     assert Counted.count == cost.UPDATE[accelerates]
 
 

@@ -9,10 +9,10 @@ leaves possible, and drops what is too far below the best or beyond the number t
     c            1/(2S) of it
 """
 
+from radarsim.kernels.algebra import predicted
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.hypotheses import FALL, INNOVATION, NEAR, NOTHING, branched, column, greatest
 from radarsim.kernels.lanes import WIDTH, exponential, full, get, nearest, put, row, total, where_greater
-from radarsim.kernels.symmetric import predicted_axis
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     BEST,
     COUNT,
@@ -43,7 +43,7 @@ def moved_and_weighed(lists, which, count, F, z, scan):
     weight = scan[WEIGHT * WIDTH]
     g0, g1, g2 = scan[RANGE_GAIN * WIDTH], scan[(RANGE_GAIN + 1) * WIDTH], scan[(RANGE_GAIN + 2) * WIDTH]
     for i in range((count + WIDTH - 1) // WIDTH):
-        x = predicted_axis((get(r, i), get(v, i), get(a, i)), F)
+        x = predicted((get(r, i), get(v, i), get(a, i)), F)
         e = z - x[0]
         put(r, i, x[0] + g0 * e)
         put(v, i, x[1] + g1 * e)

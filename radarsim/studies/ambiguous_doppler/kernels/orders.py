@@ -9,9 +9,9 @@ as in `kernels.steps`, of each order j
 
 from typing import Any, NamedTuple
 
+from radarsim.kernels.algebra import predicted, predicted_covariance
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import exponential, full, get, nearest, put, root, row, where_greater
-from radarsim.kernels.symmetric import predicted_axis, predicted_own
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     DESIGN,
     DETECTED,
@@ -129,7 +129,7 @@ def taken(own, design, sigma, plot, D, unfolding, moves):
     x, P = three(own, STATE), six(own, COVARIANCE)
     detected, first = get(plot, DETECTED), get(plot, FIRST)
     if moves:
-        x, P = predicted_axis(x, F), predicted_own(P, F, Q)
+        x, P = predicted(x, F), predicted_covariance(P, F, Q)
     P, weight, g = range_taken(P, first, detected - first, sigma[0] * sigma[0])
     z = get(plot, RANGE)
     e = z - x[0]

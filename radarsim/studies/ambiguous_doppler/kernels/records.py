@@ -24,7 +24,7 @@ WEIGHT, RANGE_GAIN, VARIANCE, VELOCITY_GAIN, GAINS = 0, 1, 4, 5, 8
 # whether any listed has, how many there are, and the probability of the best; of several orders the weight of each (3).
 MEAN, BEST, RIGHT, LISTED, COUNT, PROBABILITY, WEIGHTS, OUTPUT = 0, 3, 6, 7, 8, 9, 10, 13
 
-# Numbers of a design: F above its diagonal of ones and zeros (5) and Q (6) as `kernels.symmetric` has them, the prior
+# Numbers of a design: F above its diagonal of ones and zeros (5) and Q (6) as `kernels.algebra` has them, the prior
 # variances of velocity and acceleration, 1 where it takes the velocity, 2 where it takes that of two scans.
 MOTION, NOISE, PRIOR, TAKES_VELOCITY, DESIGN = 0, 5, 11, 13, 16
 

@@ -3,7 +3,7 @@
 A plot is taken range first, velocity after, which needs no inverse and gives the fold a prediction that knows the
 range. Letters, each of eight lanes:
 
-    x (3), P (6)   state (range, radial velocity, acceleration) and covariance, packed as in `kernels.symmetric`
+    x (3), P (6)   state (range, radial velocity, acceleration) and covariance, packed as in `kernels.algebra`
     F (5), Q (6)   motion over a scan
     S, g (3)       variance of an innovation, and its gains
     D              span of velocity
@@ -11,10 +11,10 @@ range. Letters, each of eight lanes:
 `design`, `plots`, `gains`, `out` are addresses.
 """
 
+from radarsim.kernels.algebra import predicted, predicted_covariance
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.hypotheses import FARTHEST
 from radarsim.kernels.lanes import any_greater, exponential, full, get, nearest, put, root, row, where_greater
-from radarsim.kernels.symmetric import predicted_axis, predicted_own
 from radarsim.studies.ambiguous_doppler.kernels.records import (
     BEST,
     COUNT,
@@ -135,7 +135,7 @@ def fill_gains(design, sigma, scans, plots, gains):
         plot, to = row(plots, k * PLOT), row(gains, k * GAINS)
         detected, first = get(plot, DETECTED), get(plot, FIRST)
         if k > 0:
-            P = predicted_own(P, F, Q)
+            P = predicted_covariance(P, F, Q)
         P, weight, g = range_taken(P, first, detected - first, sigma[0] * sigma[0])
         put(to, WEIGHT, weight)
         put_three(to, RANGE_GAIN, g)
@@ -183,7 +183,7 @@ def run_single(kind, design, spans, plots, gains, out):
     x, right = (zero, zero, zero), full(1.0)
     for k in range(spans.size):
         plot, scan, D = row(plots, k * PLOT), row(gains, k * GAINS), spans[k]
-        x = with_range(predicted_axis(x, F), plot, scan)
+        x = with_range(predicted(x, F), plot, scan)
         if kind != NONE:
             u = get(plot, UNFOLDED)
             if kind == REMAINDER:
@@ -225,9 +225,9 @@ def run_merged(design, sigma, spans, plots, out):
     for k in range(spans.size):
         plot, D = row(plots, k * PLOT), spans[k]
         detected, first = get(plot, DETECTED), get(plot, FIRST)
-        x = predicted_axis(x, F)
+        x = predicted(x, F)
         if k > 0:
-            P = predicted_own(P, F, Q)
+            P = predicted_covariance(P, F, Q)
         P, _, g = range_taken(P, first, detected - first, sigma[0] * sigma[0])
         z = get(plot, RANGE)
         x = moved(x, g, z - x[0])

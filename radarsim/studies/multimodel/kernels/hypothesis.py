@@ -5,7 +5,7 @@ A hypothesis (P2 eq. 1) is HYPOTHESIS rows of the work array, see `records`. Let
     mu           share of a hypothesis in a merge, eq. (4)
     x, y, z      mean of an axis (3)
     P            a block of the covariance: an axis's own (6) or one between two axes (9), packed as
-                 `radarsim.kernels.symmetric` says; xx, yy, zz, xy, xz, yz: which block it is
+                 `radarsim.kernels.algebra` says; xx, yy, zz, xy, xz, yz: which block it is
     d, e         mean of a hypothesis less the merged mean, of one axis (3) and of another
     F, Q         a model over the interval, the same for each axis (5 and 6 elements)
     R            covariance of the plot (6)
@@ -20,19 +20,19 @@ hypotheses that are merged, their shares stand in the rows SHARE …
 
 import numpy as np
 
-from radarsim.kernels.compile import inline, part
-from radarsim.kernels.lanes import any_greater, full, get, put, row, rows, where_greater
-from radarsim.kernels.symmetric import (
+from radarsim.kernels.algebra import (
     dot,
     factored,
-    predicted_axis,
+    predicted,
+    predicted_covariance,
     predicted_cross,
-    predicted_own,
     scaled,
     shrunk_cross,
     shrunk_own,
     whitened,
 )
+from radarsim.kernels.compile import inline, part
+from radarsim.kernels.lanes import any_greater, full, get, put, row, rows, where_greater
 from radarsim.studies.multimodel.kernels.records import (
     CROSS,
     CURRENT,
@@ -218,8 +218,12 @@ def advance(work, listed, count, target, model, result, plot, noise):
 def predict_and_update(work, mixture, F, Q, target, result, plot, noise):
     """Predict a mixture (means, own blocks, blocks between axes), update it with a plot, write it: see `advance`."""
     means, own, cross = mixture
-    x, y, z = predicted_axis(means[0], F), predicted_axis(means[1], F), predicted_axis(means[2], F)
-    xx, yy, zz = predicted_own(own[0], F, Q), predicted_own(own[1], F, Q), predicted_own(own[2], F, Q)
+    x, y, z = predicted(means[0], F), predicted(means[1], F), predicted(means[2], F)
+    xx, yy, zz = (
+        predicted_covariance(own[0], F, Q),
+        predicted_covariance(own[1], F, Q),
+        predicted_covariance(own[2], F, Q),
+    )
     xy, xz, yz = predicted_cross(cross[0], F), predicted_cross(cross[1], F), predicted_cross(cross[2], F)
 
     R = get6(noise, 0)

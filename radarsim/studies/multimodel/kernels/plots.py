@@ -18,10 +18,10 @@ Letters, each of eight lanes:
 
 import numpy as np
 
+from radarsim.kernels.algebra import dot
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, root, row, where_greater
 from radarsim.kernels.random import U, normal_pair, sine_cosine_polynomial, threefry, uniform
-from radarsim.kernels.symmetric import dot
 from radarsim.studies.multimodel.kernels.records import (
     AZIMUTH,
     CARTESIAN,

@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.algebra import dot, factored, scaled, whitened
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, rows, total, where_greater
-from radarsim.kernels.symmetric import dot, factored, scaled, whitened
 from radarsim.studies.multimodel.kernels import strip
 from radarsim.studies.multimodel.kernels.plots import RANDOM, STRIP, draw_strip, make_plots
 from radarsim.studies.multimodel.kernels.records import (

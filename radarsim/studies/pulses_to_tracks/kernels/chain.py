@@ -25,12 +25,12 @@ from radarsim.studies.pulses_to_tracks.kernels.records import (
     hypotheses,
 )
 from radarsim.studies.pulses_to_tracks.kernels.steps import (
+    a_scan_later,
     acceleration_taken,
     begun,
     folded,
     lock_weight,
     mixed,
-    predicted,
     put_state,
     range_taken,
     scored,
@@ -49,7 +49,7 @@ def take_ranges(world, own, k, first, tracks):
             x, P = begun(world, first + i, noise)
         else:
             x, P = state_of(tracks, i)
-            x, P = predicted(world, own, k, x, P)
+            x, P = a_scan_later(world, own, k, x, P)
             x, P = range_taken(x, P, noise, variance)
         put_state(tracks, i, x, P)
 

@@ -14,10 +14,10 @@ from radarsim.kernels.lanes import WIDTH, address, row
 from radarsim.kernels.random import normals
 from radarsim.studies.pulses_to_tracks.kernels.records import LISTED, MIXTURE, NUMBER, RIGHT, TAKEN, WRONG_FOLD
 from radarsim.studies.pulses_to_tracks.kernels.steps import (
+    a_scan_later,
     acceleration_taken,
     begun,
     folded,
-    predicted,
     put_state,
     range_taken,
     scored,
@@ -51,7 +51,7 @@ def ranges_to_hypotheses(world, own, k, first, work):
         else:
             for h in range(held.count[i]):
                 x, P = state_of(states, h)
-                x, P = predicted(world, own, k, x, P)
+                x, P = a_scan_later(world, own, k, x, P)
                 e, S = noise - x[0], P[0] + variance
                 weights[h] -= 0.5 * (e * e / S + math.log(S))
                 x, P = range_taken(x, P, noise, variance)

@@ -48,7 +48,7 @@ class World(NamedTuple):
 
     keys     (4, 2)           of the streams of ranges, bursts, the designation, fixed forecasts
     missed   (K, 3)           see `world.defects`
-    motion   (5,)             F, as `kernels.symmetric` has it
+    motion   (5,)             F, as `kernels.algebra` has it
     sigma_r                   of a range, m
     prior    (2,)             standard deviations of the designation
     span                      of velocity, m/s

@@ -1,6 +1,6 @@
 """A Kalman filter of range, velocity and acceleration, one realisation at a time; plain numbers.
 
-x (3) is the state, P (6) its covariance, packed as in `kernels.symmetric`. Numbers are taken one after the other: for
+x (3) is the state, P (6) its covariance, packed as in `kernels.algebra`. Numbers are taken one after the other: for
 independent errors that is the same as all at once, and needs no inverse. The row of what is taken is scaled and not
 subtracted from itself, of which rounding would leave a negative number where the prior is wide.
 """
@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 
+from radarsim.kernels.algebra import predicted, predicted_covariance
 from radarsim.kernels.compile import inline
 from radarsim.kernels.random import normals
-from radarsim.kernels.symmetric import predicted_axis, predicted_own
 from radarsim.studies.pulses_to_tracks.kernels.records import AGES, LOCKED, LOCKED_3
 
 
@@ -44,13 +44,13 @@ def begun(world, realisation, noise):
 
 
 @inline
-def predicted(world, own, k, x, P):
+def a_scan_later(world, own, k, x, P):
     """State and covariance a scan later, at scan k."""
     missed, Q = world.missed[k], own.noise
-    x = predicted_axis(x, world.motion)
+    x = predicted(x, world.motion)
     x = x[0] + missed[0], x[1] + missed[1], x[2] + missed[2]
     q = (Q[0], Q[1], Q[2], Q[3], Q[4], Q[5]) if k >= own.start else (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return x, predicted_own(P, world.motion, q)
+    return x, predicted_covariance(P, world.motion, q)
 
 
 @inline

@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.algebra import predicted, predicted_covariance
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import address, exponential, full, get, put, root, total, where_greater
 from radarsim.kernels.linear import extrapolated
-from radarsim.kernels.symmetric import predicted_axis, predicted_own
 from radarsim.studies.sonar.kernels.steps import (
     GROUPS,
     eight,
@@ -93,8 +93,8 @@ def manoeuvre_covariance(q, tau, size):
 def filtered(x, P, tau, Q, z, w):
     """Predict and update with a plot z of weight w, zero where missed: x, P, nis and S = 1 + w H P Hᵀ."""
     F = (tau, 0.5 * tau * tau, 1.0, tau, 1.0)
-    r, v, a = predicted_axis(x, F)
-    P = predicted_own(P, F, Q)
+    r, v, a = predicted(x, F)
+    P = predicted_covariance(P, F, Q)
     S = w * P[0] + 1.0
     per, e = w / S, z - r
     k0, k1, k2 = per * P[0], per * P[1], per * P[2]
