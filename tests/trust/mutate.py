@@ -25,7 +25,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[2]
 TREE = ("radarsim", "tests", "configs", "scenarios", "docs", "pyproject.toml", "Makefile", "README.md", "CHANGELOG.md")
 ROOMS = ("kernels", "exact", "filters", "fisher", "statistics")  # folders and modules that hold formulas
-MACHINERY = ("cache", "compile", "resolving", "sources", "trees")  # what lies with the kernels and calculates nothing
+MACHINERY = ("cache", "compile", "formula", "resolving", "sources", "trees")  # with the kernels: calculates nothing
 OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
 COMPARISONS = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt}
 SYMMETRIC = {"min", "max", "minimum", "maximum", "hypot", "logaddexp"}  # their arguments may be swapped
