@@ -2,26 +2,8 @@
 
 import numpy as np
 
-from radarsim.bursts.kernels.scoring import (
-    CENTRE,
-    HALF,
-    LIMIT,
-    REF,
-    ROWS,
-    SLOPE,
-    TURN,
-    W0,
-    W1,
-    W2,
-    Z0,
-    Z1,
-    Z2,
-    derivative,
-    number,
-    polynomial,
-    second_derivative,
-    sincos_turns,
-)
+from radarsim.bursts.kernels import scoring as at
+from radarsim.bursts.kernels.scoring import derivative, number, polynomial, second_derivative, sincos_turns
 from radarsim.kernels.compile import kernel, summing
 from radarsim.kernels.random import U, normal_pair, threefry
 
@@ -89,12 +71,12 @@ def demodulate(physics, edges, samples, x, first, last, sums):
     edges (blocks + 1,) are the pulses where blocks begin and end.
     """
     for i in range(first, last):
-        centre = sums[CENTRE, i]
-        for row in range(Z0, ROWS):
+        centre = sums[at.CENTRE, i]
+        for row in range(at.Z0, at.ROWS):
             sums[row, i] = 0.0
-        bend = sums[HALF, i] * second_derivative(x[2], x[3], x[4], x[5], centre)
-        sums[REF, i] = polynomial(x[0], x[1], x[2], x[3], x[4], x[5], centre) + bend
-        sums[SLOPE, i] = derivative(x[1], x[2], x[3], x[4], x[5], centre)
+        bend = sums[at.HALF, i] * second_derivative(x[2], x[3], x[4], x[5], centre)
+        sums[at.REF, i] = polynomial(x[0], x[1], x[2], x[3], x[4], x[5], centre) + bend
+        sums[at.SLOPE, i] = derivative(x[1], x[2], x[3], x[4], x[5], centre)
         for j in range(physics.samples_per_pulse):
             place, count = j * physics.pulses + edges[i], edges[i + 1] - edges[i]
             time = edges[i] * physics.step + j * physics.offset
@@ -111,7 +93,7 @@ def _demodulated(source):
 
     The image's samples are all one, at twice the phase, and go to W₀, W₁, W₂ in place of Z₀, Z₁, Z₂.
     """
-    turns, first = (2.0, W0) if source == "image" else (1.0, Z0)
+    turns, first = (2.0, at.W0) if source == "image" else (1.0, at.Z0)
     real, image = source == "real", source == "image"
     sign = 1.0 if source == "complex" else -1.0
 
@@ -120,7 +102,7 @@ def _demodulated(source):
         x0, x1, x2, x3, x4, x5 = turns * x[0], turns * x[1], turns * x[2], turns * x[3], turns * x[4], turns * x[5]
         row = samples[0, place : place + count]  # an index that may be negative is not vectorised
         imaginary = row if real or image else samples[1, place : place + count]
-        centre, a, b, p, q, v, w = sums[CENTRE, i], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        centre, a, b, p, q, v, w = sums[at.CENTRE, i], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for m in range(count):
             t = time + number(m) * step
             s, c = sincos_turns(polynomial(x0, x1, x2, x3, x4, x5, t))
@@ -162,18 +144,18 @@ def block_table(
     """
     blocks = len(edges) - 1
     padded = -(-blocks // 8) * 8  # so that loops over blocks have no remainder
-    mean, factor = np.zeros((ROWS, padded)), np.zeros((blocks, 10))
+    mean, factor = np.zeros((at.ROWS, padded)), np.zeros((blocks, 10))
     t = np.arange(physics["pulses"]) * physics["step"]
     t = t + np.arange(physics["samples_per_pulse"])[:, None] * physics["offset"]
-    turn = np.exp(-1j * TURN * (reference - np.rint(reference)))
+    turn = np.exp(-1j * at.TURN * (reference - np.rint(reference)))
     for i in range(blocks):
         part = slice(edges[i], edges[i + 1])
-        mean[CENTRE, i] = t[:, part].mean()
-        s, e = (t[:, part] - mean[CENTRE, i]).ravel(), turn[:, part].ravel()
-        mean[HALF, i] = 0.5 * np.mean(s**2)
-        mean[LIMIT, i] = 1.0 / max(np.sqrt(np.mean(s**2)), 1e-9)
+        mean[at.CENTRE, i] = t[:, part].mean()
+        s, e = (t[:, part] - mean[at.CENTRE, i]).ravel(), turn[:, part].ravel()
+        mean[at.HALF, i] = 0.5 * np.mean(s**2)
+        mean[at.LIMIT, i] = 1.0 / max(np.sqrt(np.mean(s**2)), 1e-9)
         received = clean[:, part].ravel() * e
-        for n, (z, w) in enumerate(((Z0, W0), (Z1, W1), (Z2, W2))):
+        for n, (z, w) in enumerate(((at.Z0, at.W0), (at.Z1, at.W1), (at.Z2, at.W2))):
             mean[z, i], mean[z + 1, i] = np.sum(received * s**n).real, np.sum(received * s**n).imag
             if not physics["complex_samples"]:
                 mean[w, i], mean[w + 1, i] = np.sum(e**2 * s**n).real, np.sum(e**2 * s**n).imag

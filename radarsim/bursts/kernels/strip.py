@@ -8,28 +8,8 @@ import math
 
 import numpy as np
 
-from radarsim.bursts.kernels.lanes import (
-    BEGUN,
-    BEST,
-    CHOSEN,
-    COHERENT,
-    KEPT,
-    LIVE,
-    PASSES,
-    PRIOR,
-    ROWS,
-    SLOPES,
-    SQUARED,
-    B,
-    X,
-    copy,
-    fraction,
-    lane,
-    log_posterior,
-    merge,
-    score,
-    step,
-)
+from radarsim.bursts.kernels import lanes as at
+from radarsim.bursts.kernels.lanes import copy, fraction, lane, log_posterior, merge, score, step
 from radarsim.bursts.kernels.scoring import SIZE, TURN
 from radarsim.bursts.kernels.sequence import LEAST_COHERENCE
 from radarsim.kernels.compile import kernel, part
@@ -41,7 +21,7 @@ from radarsim.kernels.random import fill_normal_strip
 def evaluate(physics, work, sums, table, window):
     """L, the coherent sum and the gradient of a window at the estimate."""
     for j in range(SIZE):
-        put(work, B + j, window.powers[j] * get(work, X + j))
+        put(work, at.B + j, window.powers[j] * get(work, at.X + j))
     score(work, sums, table, window.table, window.blocks, physics.image, physics.amplitude)
 
 
@@ -49,23 +29,23 @@ def evaluate(physics, work, sums, table, window):
 def search(physics, work, sums, table, window, options, needed):
     """Moves the lanes that need it to the best of the points along the direction in which hand-overs err."""
     weight, half, points = physics.amplitude / physics.sigma**2, full(0.5), options.search
-    copy(work, X, BEGUN)
-    put(work, BEST, log_posterior(work, window, weight))
-    put(work, CHOSEN, full(0.0))
+    copy(work, at.X, at.BEGUN)
+    put(work, at.BEST, log_posterior(work, window, weight))
+    put(work, at.CHOSEN, full(0.0))
     for point in range(-points, points + 2):
         last = point > points
-        away = options.spacing * get(work, CHOSEN) if last else full(options.spacing * point)
+        away = options.spacing * get(work, at.CHOSEN) if last else full(options.spacing * point)
         for j in range(SIZE):
-            put(work, X + j, get(work, BEGUN + j) + window.direction[j] * away)
+            put(work, at.X + j, get(work, at.BEGUN + j) + window.direction[j] * away)
         if point == 0:
             continue
         evaluate(physics, work, sums, table, window)
         if not last:
-            found, best = log_posterior(work, window, weight), get(work, BEST)
+            found, best = log_posterior(work, window, weight), get(work, at.BEST)
             better = where_greater(found, best, needed, full(0.0))
-            put(work, BEST, where_greater(better, half, found, best))
-            put(work, CHOSEN, where_greater(better, half, full(float(point)), get(work, CHOSEN)))
-    put(work, PASSES, get(work, PASSES) + (2.0 * points + 1.0) * needed)
+            put(work, at.BEST, where_greater(better, half, found, best))
+            put(work, at.CHOSEN, where_greater(better, half, full(float(point)), get(work, at.CHOSEN)))
+    put(work, at.PASSES, get(work, at.PASSES) + (2.0 * points + 1.0) * needed)
 
 
 @part
@@ -76,23 +56,23 @@ def scored(physics, work, sums, table, window, options, searching):
     level, weight = share * numbers * physics.amplitude, physics.amplitude / physics.sigma**2
     error = physics.sigma * math.sqrt(share * numbers) / level
     zero, one = full(0.0), full(1.0)
-    put(work, LIVE, one)
+    put(work, at.LIVE, one)
     for number in range(options.steps):
         evaluate(physics, work, sums, table, window)
-        put(work, PASSES, get(work, PASSES) + get(work, LIVE))
+        put(work, at.PASSES, get(work, at.PASSES) + get(work, at.LIVE))
         if number == 0 and searching:
             enough = full(1.0 - options.margin * error)
-            needed = where_greater(enough, (1.0 / level) * get(work, COHERENT), one, zero)
+            needed = where_greater(enough, (1.0 / level) * get(work, at.COHERENT), one, zero)
             if any_greater(needed, zero):
                 search(physics, work, sums, table, window, options, needed)
         coherence = one
         if options.coherent:
-            coherence = (1.0 / level) * get(work, COHERENT) + 3.0 * error  # with a margin for noise
+            coherence = (1.0 / level) * get(work, at.COHERENT) + 3.0 * error  # with a margin for noise
             coherence = where_greater(one, coherence, coherence, one)
             coherence = where_greater(coherence, full(LEAST_COHERENCE), coherence, full(LEAST_COHERENCE))
         step(work, window, weight, options.coherent, coherence)
-        live = where_greater(get(work, SQUARED), full(options.tolerance**2), get(work, LIVE), zero)
-        put(work, LIVE, live)
+        live = where_greater(get(work, at.SQUARED), full(options.tolerance**2), get(work, at.LIVE), zero)
+        put(work, at.LIVE, live)
         if not any_greater(live, zero):
             break
 
@@ -102,27 +82,31 @@ def first_phase(physics, work, sums, table, window):
     """Puts the phase, the rest as forecast, at the argument of Σ u e^{-jψ}, where the likelihood is largest."""
     evaluate(physics, work, sums, table, window)
     for n in range(WIDTH):
-        work[lane(X, n)] += math.atan2(work[lane(SLOPES, n)], work[lane(COHERENT, n)]) / TURN
-    put(work, PASSES, get(work, PASSES) + 1.0)
+        work[lane(at.X, n)] += math.atan2(work[lane(at.SLOPES, n)], work[lane(at.COHERENT, n)]) / TURN
+    put(work, at.PASSES, get(work, at.PASSES) + 1.0)
 
 
 @part
 def best_of_phases(physics, work, sums, table, window, options):
     """The first window scored from equally spaced phases; the end with the largest posterior is kept."""
     weight = physics.amplitude / physics.sigma**2
-    copy(work, X, BEGUN)
-    put(work, BEST, full(-math.inf))
+    copy(work, at.X, at.BEGUN)
+    put(work, at.BEST, full(-math.inf))
     for phase in range(options.phases):
-        copy(work, BEGUN, X)
-        put(work, X, get(work, X) + phase / options.phases)
+        copy(work, at.BEGUN, at.X)
+        put(work, at.X, get(work, at.X) + phase / options.phases)
         scored(physics, work, sums, table, window, options, False)
         evaluate(physics, work, sums, table, window)
-        put(work, PASSES, get(work, PASSES) + 1.0)
-        found, best = log_posterior(work, window, weight), get(work, BEST)
+        put(work, at.PASSES, get(work, at.PASSES) + 1.0)
+        found, best = log_posterior(work, window, weight), get(work, at.BEST)
         for j in range(SIZE):
-            put(work, KEPT + j, where_greater(found, best, get(work, X + j), get(work, KEPT + j)))
-        put(work, BEST, where_greater(found, best, found, best))
-    copy(work, KEPT, X)
+            put(
+                work,
+                at.KEPT + j,
+                where_greater(found, best, get(work, at.X + j), get(work, at.KEPT + j)),
+            )
+        put(work, at.BEST, where_greater(found, best, found, best))
+    copy(work, at.KEPT, at.X)
 
 
 @part
@@ -151,16 +135,16 @@ def run_strip(physics, drawn, tables, windows, options, work, sums, errors):
     table, weights = address(tables[0]), address(tables[1])
     work, sums, drawn = address(work), address(sums), address(drawn)
     for j in range(SIZE):
-        put(work, X + j, full(0.0) if options.from_truth else get(work, PRIOR + j))
-    put(work, PASSES, full(0.0))
+        put(work, at.X + j, full(0.0) if options.from_truth else get(work, at.PRIOR + j))
+    put(work, at.PASSES, full(0.0))
     for k in range(options.windows):
         take_window(physics, drawn, (table, weights), windows[k], options, k == 0, work, sums)
         for j in range(SIZE):
-            error = get(work, X + j)
-            put(work, BEGUN + j, fraction(error) if j == 0 else error)
+            error = get(work, at.X + j)
+            put(work, at.BEGUN + j, fraction(error) if j == 0 else error)
         for n in range(errors.shape[0]):
             for j in range(SIZE):
-                errors[n, k, j] = work[lane(BEGUN + j, n)]
+                errors[n, k, j] = work[lane(at.BEGUN + j, n)]
 
 
 @kernel
@@ -170,8 +154,8 @@ def draw_forecasts(key, first, sigma, work):
     fill_normal_strip(key, first, 0, a, b)
     work, a, b = address(work), address(a), address(b)
     for pair in range(SIZE // 2):
-        put(work, PRIOR + 2 * pair, sigma[2 * pair] * get(a, pair))
-        put(work, PRIOR + 2 * pair + 1, sigma[2 * pair + 1] * get(b, pair))
+        put(work, at.PRIOR + 2 * pair, sigma[2 * pair] * get(a, pair))
+        put(work, at.PRIOR + 2 * pair + 1, sigma[2 * pair + 1] * get(b, pair))
 
 
 @kernel
@@ -205,12 +189,12 @@ def run_strips(physics, mean, factor, tables, windows, options, keys, first, sig
         for e in range(options.size):
             run_strip(physics, drawn, tables, windows[e], options[e], work, sums, errors[start:stop, e])
             for n in range(stop - start):
-                passes[start + n, e] = int(work[lane(PASSES, n)])
+                passes[start + n, e] = int(work[lane(at.PASSES, n)])
 
 
 def room_for(blocks: int) -> tuple[np.ndarray, ...]:
     """Work arrays for eight bursts of so many blocks: estimates, sums of a window, sums drawn, normals."""
-    return rows(ROWS), rows(4 * blocks), rows(4 * blocks), rows(2 * blocks), rows(2 * blocks)
+    return rows(at.ROWS), rows(4 * blocks), rows(4 * blocks), rows(2 * blocks), rows(2 * blocks)
 
 
 def estimate_strips(physics, law, tables, windows, options, noise, first, out) -> None:

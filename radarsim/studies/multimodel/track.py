@@ -14,27 +14,10 @@ from radarsim.studies.interface import OUTLIERS, RecordedPlots, true_column
 from radarsim.studies.multimodel import filters
 from radarsim.studies.multimodel.config import Filter, Keys, Sensor
 from radarsim.studies.multimodel.kernels import likelihood as kernel
+from radarsim.studies.multimodel.kernels import records as rec
 from radarsim.studies.multimodel.kernels import strip as strips
 from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
 from radarsim.studies.multimodel.kernels.plots import NORMALS, STRIP
-from radarsim.studies.multimodel.kernels.records import (
-    AZIMUTH,
-    COORDINATES,
-    COVARIANCE,
-    DETECTED,
-    ELEVATION,
-    INNOVATION,
-    MODEL_NUMBERS,
-    MODELS,
-    OUTPUT,
-    PREPARED,
-    RANGE,
-    SIGMA,
-    SIZE,
-    START,
-    STATES,
-    VARIANCE,
-)
 from radarsim.studies.multimodel.study import COMPONENTS, banks, measured, prepare
 from radarsim.studies.multimodel.world import intervals, local_plots, sensor_frame
 from radarsim.studies.multimodel.world import truth as scan_times
@@ -62,11 +45,11 @@ def simulated(case: Case, realisation: int) -> dict[str, np.ndarray]:
     """The plots of one realisation of the study and the truth, columns (K,); not-a-number where a plot is missed."""
     plan = prepare(case)
     truth, frame, count = plan.world.plot_truth, plan.world.frame, len(plan.world.truth)
-    noise = normals(plan.world.keys[0], realisation, count) * frame[SIGMA : SIGMA + 3]
+    noise = normals(plan.world.keys[0], realisation, count) * frame[rec.SIGMA : rec.SIGMA + 3]
     if case.spec.sensor.sigma_range_m is None:
-        exact = truth[:, COORDINATES:]
+        exact = truth[:, rec.COORDINATES :]
     else:
-        exact = np.stack([truth[:, RANGE], *np.arcsin(truth[:, [ELEVATION, AZIMUTH]]).T], axis=1)
+        exact = np.stack([truth[:, rec.RANGE], *np.arcsin(truth[:, [rec.ELEVATION, rec.AZIMUTH]]).T], axis=1)
     detected = measured(plan, realisation)[2][:, 0] > 0
     t, *names = columns(case.spec)[0]
     found = np.where(detected[:, None], exact + noise, np.nan)
@@ -117,18 +100,18 @@ class Tracker:
         t = recorded["t_s"]
         z, R, whole = local_plots(self.spec.sensor, np.stack(list(recorded.values())[1:], axis=1))
         shape = (len(self.names), len(t))
-        estimate, sigma = np.full((2, *shape, STATES), np.nan)
+        estimate, sigma = np.full((2, *shape, rec.STATES), np.nan)
         probability, nis = np.full((*shape, self.most), np.nan), np.full((*shape, 1), np.nan)
         plots = np.concatenate([z, R, whole[:, None]], axis=1)
         first = self._first(t, plots)
         for f, state in enumerate(self.states) if first < len(t) else ():
             out, tested = self._tracked(state, t, plots, first)
             size = len(state.options.models)
-            estimate[f, first:] = out[:, :STATES]
-            sigma[f, first:] = np.sqrt(np.maximum(out[:, VARIANCE : VARIANCE + STATES], 0.0))
-            probability[f, first:, :size] = out[:, MODELS : MODELS + size]
-            nis[f, first:, 0] = np.where(tested, out[:, INNOVATION], np.nan)
-        self.begun, self.last = len(self.held) == START, t[-1]
+            estimate[f, first:] = out[:, : rec.STATES]
+            sigma[f, first:] = np.sqrt(np.maximum(out[:, rec.VARIANCE : rec.VARIANCE + rec.STATES], 0.0))
+            probability[f, first:, :size] = out[:, rec.MODELS : rec.MODELS + size]
+            nis[f, first:, 0] = np.where(tested, out[:, rec.INNOVATION], np.nan)
+        self.begun, self.last = len(self.held) == rec.START, t[-1]
         residual = np.where(whole[:, None], z, np.nan)[None] - estimate[..., 0::3]
         spread = R[None][..., [0, 3, 5]] - sigma[..., 0::3] ** 2  # of residuals after the update
         believed = np.where(np.isfinite(residual), np.sqrt(np.maximum(spread, 0.0)), np.nan)
@@ -142,9 +125,9 @@ class Tracker:
         """The first row with an estimate: that of the third whole plot, or all once the track has begun."""
         if self.begun:
             return 0
-        for k in np.flatnonzero(plots[:, DETECTED]):
+        for k in np.flatnonzero(plots[:, rec.DETECTED]):
             self.held.append((t[k], plots[k]))
-            if len(self.held) == START:
+            if len(self.held) == rec.START:
                 return int(k)
         return len(t)
 
@@ -158,7 +141,7 @@ class Tracker:
             stop = min(start + CHUNK, len(t))
             before = t[start - 1] if start else self.last
             found.append(_filtered(self.spec, state, np.append(before, t[start:stop]), plots[start:stop], frame))
-        tested = plots[first:, DETECTED] > 0
+        tested = plots[first:, rec.DETECTED] > 0
         if not self.begun:
             tested[0] = False
         return np.concatenate(found), tested
@@ -169,9 +152,9 @@ class Tracker:
         weights = filters.start_weights(times, self.spec.start_acceleration_mps2)
         chances = filters.stationary(filters.transition_matrix(state.options.transition))
         strips.start_strip(state.work, state.numbers, _lanes(began), weights, chances)
-        out = np.zeros((1, OUTPUT))
-        out[0, :STATES], out[0, VARIANCE : VARIANCE + STATES] = _at_start(began, weights)
-        out[0, MODELS : MODELS + len(chances)] = chances
+        out = np.zeros((1, rec.OUTPUT))
+        out[0, : rec.STATES], out[0, rec.VARIANCE : rec.VARIANCE + rec.STATES] = _at_start(began, weights)
+        out[0, rec.MODELS : rec.MODELS + len(chances)] = chances
         return out
 
 
@@ -184,16 +167,16 @@ def _filtered(spec: Keys, state: _State, t: np.ndarray, plots: np.ndarray, frame
     """Outputs (n, OUTPUT) over the next n plots of one filter; t (n + 1,) with the time of the row before."""
     index, times = intervals(t)
     own = banks(spec.model_copy(update={"filters": (state.options,)}), times)
-    size, count = own.numbers[0, SIZE], len(plots)
-    state.numbers[PREPARED] = -1  # the intervals of this chunk are numbered from 0
-    out, reported = rows(count * OUTPUT), np.ones(count, dtype=np.int64)
+    size, count = own.numbers[0, rec.SIZE], len(plots)
+    state.numbers[rec.PREPARED] = -1  # the intervals of this chunk are numbered from 0
+    out, reported = rows(count * rec.OUTPUT), np.ones(count, dtype=np.int64)
     scans = index[1:].copy(), times
-    design = own.models[0, : MODEL_NUMBERS * size], own.transitions[0]
+    design = own.models[0, : rec.MODEL_NUMBERS * size], own.transitions[0]
     strips.filter_strip(
         *(state.work, state.numbers, _lanes(plots), 0, count),
         *(*design, *scans, own.numbers[0], frame, reported, out),
     )
-    return out.reshape(count, OUTPUT, WIDTH)[:, :, 0].copy()
+    return out.reshape(count, rec.OUTPUT, WIDTH)[:, :, 0].copy()
 
 
 def _at_start(began: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -201,7 +184,7 @@ def _at_start(began: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.nd
     a, b, g = weights.reshape(3, 3)
     mean, variance = np.zeros(9), np.tile(g**2, 3)
     mean[0::3], mean[1::3] = a @ began[:, :3], b @ began[:, :3]
-    own = began[:, [COVARIANCE, COVARIANCE + 3, COVARIANCE + 5]]  # xx, yy, zz
+    own = began[:, [rec.COVARIANCE, rec.COVARIANCE + 3, rec.COVARIANCE + 5]]  # xx, yy, zz
     variance[0::3] += a**2 @ own
     variance[1::3] += b**2 @ own
     return mean, variance
@@ -255,8 +238,8 @@ class PlotLikelihood:
 
 def _score(spec: Keys, t: np.ndarray, z: np.ndarray, R: np.ndarray, whole: np.ndarray, outliers: float) -> float:
     """The logarithm of the likelihood of one track under the one filter of a config; 0 where it never starts."""
-    began = np.flatnonzero(whole)[:START]
-    if len(began) < START or began[-1] + 1 == len(t):
+    began = np.flatnonzero(whole)[: rec.START]
+    if len(began) < rec.START or began[-1] + 1 == len(t):
         return 0.0
     first, (options,) = int(began[-1]), spec.filters
     plots = np.concatenate([z, R, whole[:, None]], axis=1)
@@ -266,8 +249,8 @@ def _score(spec: Keys, t: np.ndarray, z: np.ndarray, R: np.ndarray, whole: np.nd
     strips.start_strip(work, numbers, _lanes(plots[began]), weights, chances)
     index, times = intervals(t[first:])
     own = banks(spec, times)
-    size, score = own.numbers[0, SIZE], np.empty(len(t) - first - 1)
-    design = own.models[0, : MODEL_NUMBERS * size], own.transitions[0], index[1:].copy(), times, own.numbers[0]
+    size, score = own.numbers[0, rec.SIZE], np.empty(len(t) - first - 1)
+    design = own.models[0, : rec.MODEL_NUMBERS * size], own.transitions[0], index[1:].copy(), times, own.numbers[0]
     kernel.log_likelihood(
         work, numbers, _lanes(plots[first + 1 :]), *design, sensor_frame(spec.sensor), outliers, score
     )

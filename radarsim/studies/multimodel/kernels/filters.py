@@ -19,27 +19,8 @@ the banks before and after the plot.
 
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import any_greater, exponential, full, get, put, root, row, where_greater
+from radarsim.studies.multimodel.kernels import records as rec
 from radarsim.studies.multimodel.kernels.hypothesis import advance, merge
-from radarsim.studies.multimodel.kernels.records import (
-    BEST,
-    COMBINED,
-    COUNTED,
-    GPB1,
-    GPB2,
-    HYPOTHESIS,
-    MODEL,
-    MODEL_ROWS,
-    MOMENT,
-    MOST,
-    PROBABILITY,
-    RESULT,
-    RESULT_GROUP,
-    SHARE,
-    SPARE,
-    SURPRISE,
-    TRANSITION,
-    WEIGHT,
-)
 
 CREDIBLE = 1e-100  # probability above which a hypothesis scales the likelihoods
 
@@ -63,21 +44,21 @@ def shares_by_rule(work, listed, first, size, c, main, rule):
     if any_greater(least, c):
         for j in range(size):
             alone = is_number(main, float(j))
-            put(work, WEIGHT + j, where_greater(least, c, alone, get(work, WEIGHT + j)))
+            put(work, rec.WEIGHT + j, where_greater(least, c, alone, get(work, rec.WEIGHT + j)))
         c = where_greater(least, c, one, c)
-    if rule != MOMENT:
+    if rule != rec.MOMENT:
         c = keep_by_rule(work, size, main, rule)
     scale, count, inside = 1.0 / c, 0, zero
     for j in range(size):
-        w = get(work, WEIGHT + j)
+        w = get(work, rec.WEIGHT + j)
         if any_greater(w, zero):
-            put(work, SHARE + count, w * scale)
-            listed[count] = first + j * HYPOTHESIS
+            put(work, rec.SHARE + count, w * scale)
+            listed[count] = first + j * rec.HYPOTHESIS
             count += 1
             inside = inside + where_greater(w, zero, one, zero)
     if count > 1:
-        put(work, COUNTED, get(work, COUNTED) + where_greater(inside, one, inside, zero))
-        put(work, COUNTED + 1, get(work, COUNTED + 1) + where_greater(inside, one, one, zero))
+        put(work, rec.COUNTED, get(work, rec.COUNTED) + where_greater(inside, one, inside, zero))
+        put(work, rec.COUNTED + 1, get(work, rec.COUNTED + 1) + where_greater(inside, one, one, zero))
     return count
 
 
@@ -89,24 +70,24 @@ def keep_by_rule(work, size, main, rule):
     modified: the main one where it does, else the main one and the best. Ties go to the lower number.
     """
     zero = full(0.0)
-    top, best, of_main, others = get(work, WEIGHT), zero, zero, zero
+    top, best, of_main, others = get(work, rec.WEIGHT), zero, zero, zero
     for j in range(size):
-        w, is_main = get(work, WEIGHT + j), is_number(main, float(j))
+        w, is_main = get(work, rec.WEIGHT + j), is_number(main, float(j))
         best, top = where_greater(w, top, full(float(j)), best), where_greater(w, top, w, top)
         of_main = where_greater(is_main, zero, w, of_main)
         other = where_greater(is_main, zero, zero, w)
         others = where_greater(other, others, other, others)
     c = zero
     for j in range(size):
-        w, is_main, is_best = get(work, WEIGHT + j), is_number(main, float(j)), is_number(best, float(j))
-        if rule == BEST:
+        w, is_main, is_best = get(work, rec.WEIGHT + j), is_number(main, float(j)), is_number(best, float(j))
+        if rule == rec.BEST:
             kept = is_best
-        elif rule == COMBINED:
+        elif rule == rec.COMBINED:
             kept = where_greater(of_main, others, is_main, full(1.0))
         else:
             kept = where_greater(of_main, others, is_main, where_greater(is_main, zero, is_main, is_best))
         w = where_greater(kept, zero, w, zero)
-        put(work, WEIGHT + j, w)
+        put(work, rec.WEIGHT + j, w)
         c = c + w
     return c
 
@@ -117,8 +98,8 @@ def predict_weights(work, bank, size, i):
     """Put T[i, j] p[j] into the rows WEIGHT … and return their sum c (eq. 7)."""
     c = full(0.0)
     for j in range(size):
-        w = get(work, TRANSITION + i * MOST + j) * get(work, bank + j * HYPOTHESIS + PROBABILITY)
-        put(work, WEIGHT + j, w)
+        w = get(work, rec.TRANSITION + i * rec.MOST + j) * get(work, bank + j * rec.HYPOTHESIS + rec.PROBABILITY)
+        put(work, rec.WEIGHT + j, w)
         c = c + w
     return c
 
@@ -151,18 +132,18 @@ def step(work, listed, old, new, rules, plot, noise):
     """
     size, family, rule = rules.size, rules.family, rules.merge
     zero, overall, top, surprise = full(0.0), full(1e300), full(-1.0), full(0.0)
-    source = SPARE if family == GPB2 else old
+    source = rec.SPARE if family == rec.GPB2 else old
     for i in range(size):
-        model, main = MODEL + MODEL_ROWS * i, full(float(i))
+        model, main = rec.MODEL + rec.MODEL_ROWS * i, full(float(i))
         c, least = predict_weights(work, old, size, i), full(1e300)
-        for j in range(size if family == GPB2 else 1):
-            w, count, to, result = c, 1, new + i * HYPOTHESIS, RESULT_GROUP + 2 * i
-            if family == GPB2:
-                w, to, result = get(work, WEIGHT + j), SPARE + j * HYPOTHESIS, RESULT + 2 * j
+        for j in range(size if family == rec.GPB2 else 1):
+            w, count, to, result = c, 1, new + i * rec.HYPOTHESIS, rec.RESULT_GROUP + 2 * i
+            if family == rec.GPB2:
+                w, to, result = get(work, rec.WEIGHT + j), rec.SPARE + j * rec.HYPOTHESIS, rec.RESULT + 2 * j
                 if not any_greater(w, zero):
                     continue
-                listed[0] = old + j * HYPOTHESIS
-            elif family == GPB1:
+                listed[0] = old + j * rec.HYPOTHESIS
+            elif family == rec.GPB1:
                 listed[0] = old
             else:
                 count = shares_by_rule(work, listed, source, size, c, main, rule)
@@ -170,15 +151,15 @@ def step(work, listed, old, new, rules, plot, noise):
             q = get(work, result)
             surprise, top = where_greater(w, top, q, surprise), where_greater(w, top, w, top)
             least = where_greater(w, full(CREDIBLE), minimum(least, q), least)
-        if family == GPB2:
+        if family == rec.GPB2:
             c = weigh_pairs(work, size, least)
-            put(work, RESULT_GROUP + 2 * i, least)
-            put(work, RESULT_GROUP + 2 * i + 1, full(1.0))
+            put(work, rec.RESULT_GROUP + 2 * i, least)
+            put(work, rec.RESULT_GROUP + 2 * i + 1, full(1.0))
             count = shares_by_rule(work, listed, source, size, c, main, rule)
-            merge(work, listed, count, row(work, new + i * HYPOTHESIS))
-        put(work, new + i * HYPOTHESIS + PROBABILITY, c)
+            merge(work, listed, count, row(work, new + i * rec.HYPOTHESIS))
+        put(work, new + i * rec.HYPOTHESIS + rec.PROBABILITY, c)
         overall = minimum(overall, least)
-    put(work, SURPRISE, surprise)
+    put(work, rec.SURPRISE, surprise)
     update_probabilities(work, new, size, overall)
 
 
@@ -187,10 +168,10 @@ def weigh_pairs(work, size, least):
     """Multiply the weights by the likelihoods of their updates, relative to exp(-least / 2); return their sum c."""
     c = full(0.0)
     for j in range(size):
-        w = get(work, WEIGHT + j)
+        w = get(work, rec.WEIGHT + j)
         if any_greater(w, full(0.0)):
-            w = w * likelihood(work, least, RESULT + 2 * j)
-            put(work, WEIGHT + j, w)
+            w = w * likelihood(work, least, rec.RESULT + 2 * j)
+            put(work, rec.WEIGHT + j, w)
             c = c + w
     return c
 
@@ -200,13 +181,13 @@ def update_probabilities(work, bank, size, least):
     """Posterior probabilities of a bank, from the predicted ones and the likelihoods (eq. 9)."""
     c = full(0.0)
     for i in range(size):
-        at = bank + i * HYPOTHESIS + PROBABILITY
-        p = get(work, at) * likelihood(work, least, RESULT_GROUP + 2 * i)
+        at = bank + i * rec.HYPOTHESIS + rec.PROBABILITY
+        p = get(work, at) * likelihood(work, least, rec.RESULT_GROUP + 2 * i)
         put(work, at, p)
         c = c + p
     scale = 1.0 / c
     for i in range(size):
-        at = bank + i * HYPOTHESIS + PROBABILITY
+        at = bank + i * rec.HYPOTHESIS + rec.PROBABILITY
         put(work, at, get(work, at) * scale)
 
 
@@ -216,8 +197,8 @@ def merge_gpb1(work, listed, old, new, size, rule):
     the plot."""
     top, main = full(-1.0), full(0.0)
     for j in range(size):
-        p = get(work, old + j * HYPOTHESIS + PROBABILITY)
+        p = get(work, old + j * rec.HYPOTHESIS + rec.PROBABILITY)
         main, top = where_greater(p, top, full(float(j)), main), where_greater(p, top, p, top)
-        put(work, WEIGHT + j, get(work, new + j * HYPOTHESIS + PROBABILITY))
+        put(work, rec.WEIGHT + j, get(work, new + j * rec.HYPOTHESIS + rec.PROBABILITY))
     count = shares_by_rule(work, listed, new, size, full(1.0), main, rule)
     merge(work, listed, count, row(work, new))

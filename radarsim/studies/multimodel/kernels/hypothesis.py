@@ -33,26 +33,14 @@ from radarsim.kernels.algebra import (
 )
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import any_greater, full, get, put, row, rows, where_greater
-from radarsim.studies.multimodel.kernels.records import (
-    CROSS,
-    CURRENT,
-    DETECTED,
-    MEAN,
-    MODEL_Q,
-    OWN,
-    POSITION,
-    PREPARED,
-    SETTLED,
-    SHARE,
-    WORK,
-)
+from radarsim.studies.multimodel.kernels import records as rec
 
 
 def work_arrays() -> tuple[np.ndarray, np.ndarray]:
     """Memory of one filter for eight realisations: rows (WORK), and whole numbers CURRENT, PREPARED, SETTLED."""
     numbers = np.zeros(4, dtype=np.int64)
-    numbers[CURRENT], numbers[PREPARED], numbers[SETTLED] = 0, -1, 1
-    return rows(WORK), numbers
+    numbers[rec.CURRENT], numbers[rec.PREPARED], numbers[rec.SETTLED] = 0, -1, 1
+    return rows(rec.WORK), numbers
 
 
 @inline
@@ -155,7 +143,12 @@ def mixed_cross(listed, count, shares, block, means, mean, others, other):
 @inline
 def mixed(work, listed, count):
     """Means of the three axes, own blocks, blocks between axes: of the listed hypotheses, by the shares."""
-    shares, of_x, of_y, of_z = row(work, SHARE), row(work, MEAN), row(work, MEAN + 3), row(work, MEAN + 6)
+    shares, of_x, of_y, of_z = (
+        row(work, rec.SHARE),
+        row(work, rec.MEAN),
+        row(work, rec.MEAN + 3),
+        row(work, rec.MEAN + 6),
+    )
     x, y, z = (
         mixed_mean(listed, count, shares, of_x),
         mixed_mean(listed, count, shares, of_y),
@@ -164,14 +157,14 @@ def mixed(work, listed, count):
     return (
         (x, y, z),
         (
-            mixed_own(listed, count, shares, row(work, OWN), of_x, x),
-            mixed_own(listed, count, shares, row(work, OWN + 6), of_y, y),
-            mixed_own(listed, count, shares, row(work, OWN + 12), of_z, z),
+            mixed_own(listed, count, shares, row(work, rec.OWN), of_x, x),
+            mixed_own(listed, count, shares, row(work, rec.OWN + 6), of_y, y),
+            mixed_own(listed, count, shares, row(work, rec.OWN + 12), of_z, z),
         ),
         (
-            mixed_cross(listed, count, shares, row(work, CROSS), of_x, x, of_y, y),
-            mixed_cross(listed, count, shares, row(work, CROSS + 9), of_x, x, of_z, z),
-            mixed_cross(listed, count, shares, row(work, CROSS + 18), of_y, y, of_z, z),
+            mixed_cross(listed, count, shares, row(work, rec.CROSS), of_x, x, of_y, y),
+            mixed_cross(listed, count, shares, row(work, rec.CROSS + 9), of_x, x, of_z, z),
+            mixed_cross(listed, count, shares, row(work, rec.CROSS + 18), of_y, y, of_z, z),
         ),
     )
 
@@ -179,13 +172,13 @@ def mixed(work, listed, count):
 @inline
 def put_hypothesis(target, means, own, cross):
     """Write means and packed covariances of the three axes into a hypothesis."""
-    put9(target, MEAN, means[0] + means[1] + means[2])
-    put6(target, OWN, own[0])
-    put6(target, OWN + 6, own[1])
-    put6(target, OWN + 12, own[2])
-    put9(target, CROSS, cross[0])
-    put9(target, CROSS + 9, cross[1])
-    put9(target, CROSS + 18, cross[2])
+    put9(target, rec.MEAN, means[0] + means[1] + means[2])
+    put6(target, rec.OWN, own[0])
+    put6(target, rec.OWN + 6, own[1])
+    put6(target, rec.OWN + 12, own[2])
+    put9(target, rec.CROSS, cross[0])
+    put9(target, rec.CROSS + 9, cross[1])
+    put9(target, rec.CROSS + 18, cross[2])
 
 
 @part
@@ -205,7 +198,7 @@ def advance(work, listed, count, target, model, result, plot, noise):
     missed).
     """
     F = get(work, model), get(work, model + 1), get(work, model + 2), get(work, model + 3), get(work, model + 4)
-    Q, mixture, zero = get6(work, model + MODEL_Q), mixed(work, listed, count), full(0.0)
+    Q, mixture, zero = get6(work, model + rec.MODEL_Q), mixed(work, listed, count), full(0.0)
     if any_greater(F[4], zero):
         predict_and_update(work, mixture, F, Q, target, result, plot, noise)
     else:
@@ -229,9 +222,11 @@ def predict_and_update(work, mixture, F, Q, target, result, plot, noise):
     R = get6(noise, 0)
     S = xx[0] + R[0], xy[0] + R[1], xz[0] + R[2], yy[0] + R[3], yz[0] + R[4], zz[0] + R[5]
     L, i, determinant = factored(S)  # i: the diagonal of D⁻¹
-    detected = get(plot, DETECTED)
+    detected = get(plot, rec.DETECTED)
     i = i[0] * detected, i[1] * detected, i[2] * detected
-    v = whitened((get(plot, POSITION) - x[0], get(plot, POSITION + 1) - y[0], get(plot, POSITION + 2) - z[0]), L)
+    v = whitened(
+        (get(plot, rec.POSITION) - x[0], get(plot, rec.POSITION + 1) - y[0], get(plot, rec.POSITION + 2) - z[0]), L
+    )
     put(work, result, dot(scaled(v, i), v))
     put(work, result + 1, where_greater(detected, full(0.5), determinant, full(1.0)))
 

@@ -10,26 +10,7 @@ import numpy as np
 from radarsim.kernels.compile import inline, kernel
 from radarsim.kernels.innovations import FACTOR
 from radarsim.kernels.lanes import WIDTH, address
-from radarsim.studies.multimodel.kernels.records import (
-    BANK,
-    COVARIANCE,
-    CROSS,
-    CURRENT,
-    DETECTED,
-    GPB1,
-    GPB2,
-    HYPOTHESIS,
-    MODEL_NUMBERS,
-    MOST,
-    OUTPUT,
-    OWN,
-    PLOT,
-    PROBABILITY,
-    RESULT,
-    RESULT_GROUP,
-    STATES,
-    TRANSITION,
-)
+from radarsim.studies.multimodel.kernels import records as rec
 from radarsim.studies.multimodel.kernels.strip import Filter, Memory, Scans, rules_of, run_strip
 
 
@@ -41,21 +22,21 @@ def log_likelihood(work, numbers, plots, models, transitions, intervals, times, 
     transitions, intervals (n,), times, rules, frame as in `strip.filter_strip`; share of outliers. Out: score (n,), the
     logarithm of each plot's density given those before it, zero where there is none.
     """
-    n, own = score.size, rules_of(rules, models.size // MODEL_NUMBERS)
-    out, reported = np.empty(n * OUTPUT * WIDTH), np.zeros(n, dtype=np.int64)
+    n, own = score.size, rules_of(rules, models.size // rec.MODEL_NUMBERS)
+    out, reported = np.empty(n * rec.OUTPUT * WIDTH), np.zeros(n, dtype=np.int64)
     for k in range(n):
         for row in range(6):
-            plots[(k * PLOT + COVARIANCE + row) * WIDTH + 1] *= FACTOR * FACTOR
-    listed = np.zeros(MOST, dtype=np.int64)
+            plots[(k * rec.PLOT + rec.COVARIANCE + row) * WIDTH + 1] *= FACTOR * FACTOR
+    listed = np.zeros(rec.MOST, dtype=np.int64)
     memory = Memory(address(work), address(numbers), address(listed))
     design = Filter(own, address(models), address(transitions))
     for k in range(n):
         scans = Scans(k, k + 1, address(intervals), address(times), address(reported))
         run_strip(memory, design, scans, address(plots), address(frame), address(out))
         score[k] = 0.0
-        if plots[(k * PLOT + DETECTED) * WIDTH] > 0.5:
-            new = numbers[CURRENT] * BANK
-            plain, wild = density(work, BANK - new, new, own, 0), density(work, BANK - new, new, own, 1)
+        if plots[(k * rec.PLOT + rec.DETECTED) * WIDTH] > 0.5:
+            new = numbers[rec.CURRENT] * rec.BANK
+            plain, wild = density(work, rec.BANK - new, new, own, 0), density(work, rec.BANK - new, new, own, 1)
             score[k] = plain
             if share > 0.0:
                 plain, wild = plain + np.log(1.0 - share), wild + np.log(share)
@@ -72,7 +53,7 @@ def density(work, old, new, rules, lane):
     one: their sum is its part of the whole, of which its new probability is the share.
     """
     size, total, least = rules.size, 0.0, 1e300
-    last, at = size - 1, RESULT if rules.family == GPB2 else RESULT_GROUP
+    last, at = size - 1, rec.RESULT if rules.family == rec.GPB2 else rec.RESULT_GROUP
     for i in range(size):
         if predicted_probability(work, old, rules, lane, i) > 0.0:
             least = min(least, work[(at + 2 * i) * WIDTH + lane])
@@ -81,7 +62,7 @@ def density(work, old, new, rules, lane):
         if c > 0.0:
             q, determinant = work[(at + 2 * i) * WIDTH + lane], work[(at + 2 * i + 1) * WIDTH + lane]
             total += c * np.exp(0.5 * (least - q)) / np.sqrt(determinant)
-    part = work[(new + last * HYPOTHESIS + PROBABILITY) * WIDTH + lane] if rules.family == GPB2 else 1.0
+    part = work[(new + last * rec.HYPOTHESIS + rec.PROBABILITY) * WIDTH + lane] if rules.family == rec.GPB2 else 1.0
     if not (total > 0.0 and part > 0.0):
         return np.nan
     return np.log(total) - np.log(part) - 0.5 * least - 1.5 * np.log(2.0 * np.pi)
@@ -90,45 +71,45 @@ def density(work, old, new, rules, lane):
 @inline
 def predicted_probability(work, old, rules, lane, i):
     """The predicted probability of model i; of GPB2, that of the pair that leads from model i to the last one."""
-    if rules.family == GPB2:
+    if rules.family == rec.GPB2:
         last = rules.size - 1
-        return work[(TRANSITION + last * MOST + i) * WIDTH + lane] * probability(work, old, lane, i)
+        return work[(rec.TRANSITION + last * rec.MOST + i) * WIDTH + lane] * probability(work, old, lane, i)
     c = 0.0
     for j in range(rules.size):
-        c += work[(TRANSITION + i * MOST + j) * WIDTH + lane] * probability(work, old, lane, j)
+        c += work[(rec.TRANSITION + i * rec.MOST + j) * WIDTH + lane] * probability(work, old, lane, j)
     return c
 
 
 @inline
 def probability(work, bank, lane, i):
     """The probability of model i of a bank."""
-    return work[(bank + i * HYPOTHESIS + PROBABILITY) * WIDTH + lane]
+    return work[(bank + i * rec.HYPOTHESIS + rec.PROBABILITY) * WIDTH + lane]
 
 
 @kernel
 def merge_lanes(work, bank, rules, plain, wild):
     """Merge each model's hypotheses of lanes 0 and 1, of chances plain and wild, into both."""
     for i in range(rules.size):
-        first = (bank + i * HYPOTHESIS) * WIDTH
+        first = (bank + i * rec.HYPOTHESIS) * WIDTH
         p, q = plain * probability(work, bank, 0, i), wild * probability(work, bank, 1, i)
         # GPB1 has one hypothesis, the first, whatever the models' probabilities are.
-        a, b = (plain, wild) if rules.family == GPB1 else (p, q)
+        a, b = (plain, wild) if rules.family == rec.GPB1 else (p, q)
         whole = a + b
         if whole > 0.0:
             merge_states(work, first, a / whole, b / whole)
-        work[first + PROBABILITY * WIDTH] = work[first + PROBABILITY * WIDTH + 1] = p + q
+        work[first + rec.PROBABILITY * WIDTH] = work[first + rec.PROBABILITY * WIDTH + 1] = p + q
 
 
 @kernel
 def merge_states(work, first, a, b):
     """Merge mean and covariance of lanes 0 and 1 of a hypothesis, of weights a and b, into both."""
-    d = np.empty(STATES)
-    for s in range(STATES):
+    d = np.empty(rec.STATES)
+    for s in range(rec.STATES):
         at = first + s * WIDTH
         d[s] = work[at + 1] - work[at]
         work[at] = work[at + 1] = work[at] + b * d[s]
     for axis in range(3):
-        at = OWN + 6 * axis
+        at = rec.OWN + 6 * axis
         for i in range(3):
             for j in range(i, 3):
                 both(work, first + at * WIDTH, a, b, d[3 * axis + i] * d[3 * axis + j])
@@ -137,7 +118,7 @@ def merge_states(work, first, a, b):
         one, other = (0, 1 + pair) if pair < 2 else (1, 2)
         for i in range(3):
             for j in range(3):
-                at = CROSS + 9 * pair + 3 * i + j
+                at = rec.CROSS + 9 * pair + 3 * i + j
                 both(work, first + at * WIDTH, a, b, d[3 * one + i] * d[3 * other + j])
 
 

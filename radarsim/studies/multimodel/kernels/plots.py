@@ -22,23 +22,7 @@ from radarsim.kernels.algebra import dot
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, root, row, where_greater
 from radarsim.kernels.random import U, normal_pair, sine_cosine_polynomial, threefry, uniform
-from radarsim.studies.multimodel.kernels.records import (
-    AZIMUTH,
-    CARTESIAN,
-    COORDINATES,
-    COVARIANCE,
-    DETECTED,
-    DETECTION,
-    ELEVATION,
-    FORM,
-    HEIGHT,
-    PLOT,
-    PLOT_TRUTH,
-    POSITION,
-    RANGE,
-    SIGMA,
-    UNBIASED,
-)
+from radarsim.studies.multimodel.kernels import records as rec
 
 STRIP = 16  # scans
 NORMALS, UNIFORMS = 3 * STRIP, STRIP
@@ -88,10 +72,10 @@ def rotated(frame, x):
 def covariance(frame, r, sine_e, cosine_e, sine_a, cosine_a, u):
     """R J diag(sigma²) J' R' of eq. (10); a, b, c: the columns of R J diag(sigma)."""
     zero, s = full(0.0), 1.0 / u
-    a = rotated(frame, (u * frame[SIGMA], sine_e * frame[SIGMA], sine_a * frame[SIGMA]))
-    t = r * cosine_e * frame[SIGMA + 1]
+    a = rotated(frame, (u * frame[rec.SIGMA], sine_e * frame[rec.SIGMA], sine_a * frame[rec.SIGMA]))
+    t = r * cosine_e * frame[rec.SIGMA + 1]
     b = rotated(frame, ((0.0 - t) * sine_e * s, t, zero))
-    t = r * cosine_a * frame[SIGMA + 2]
+    t = r * cosine_a * frame[rec.SIGMA + 2]
     c = rotated(frame, ((0.0 - t) * sine_a * s, zero, t))
     x, y, z = (a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2])
     return dot(x, x), dot(x, y), dot(x, z), dot(y, y), dot(y, z), dot(z, z)
@@ -101,10 +85,10 @@ def covariance(frame, r, sine_e, cosine_e, sine_a, cosine_a, u):
 def put_plot(plots, x, p, detected):
     """Write a plot's rows: position, covariance, detection."""
     for i in range(3):
-        put(plots, POSITION + i, x[i])
+        put(plots, rec.POSITION + i, x[i])
     for i in range(6):
-        put(plots, COVARIANCE + i, p[i])
-    put(plots, DETECTED, detected)
+        put(plots, rec.COVARIANCE + i, p[i])
+    put(plots, rec.DETECTED, detected)
 
 
 @inline
@@ -116,15 +100,15 @@ def biconical_plot(plots, frame, r, sine_e, cosine_e, sine_a, cosine_a, detected
     u2 = where_greater(u2, least, u2, least)
     u = root(u2)
     x = (r * u, r * sine_e, r * sine_a)
-    if frame[UNBIASED] == 1.0:
+    if frame[rec.UNBIASED] == 1.0:
         # E[sin] shrinks by exp(-variance / 2); the second-order term of the Taylor series of u is subtracted.
-        ve, va = frame[SIGMA + 1] * frame[SIGMA + 1], frame[SIGMA + 2] * frame[SIGMA + 2]
+        ve, va = frame[rec.SIGMA + 1] * frame[rec.SIGMA + 1], frame[rec.SIGMA + 2] * frame[rec.SIGMA + 2]
         ce2, ca2, s = 1.0 - e2, 1.0 - a2, 1.0 / u
         bend = ve * (e2 - ce2 - e2 * ce2 * s * s) + va * (a2 - ca2 - a2 * ca2 * s * s)
         x = (r * (u - 0.5 * s * bend), r * sine_e * (1.0 + 0.5 * ve), r * sine_a * (1.0 + 0.5 * va))
     x = rotated(frame, x)
     p = covariance(frame, r, sine_e, cosine_e, sine_a, cosine_a, u)
-    put_plot(plots, (x[0], x[1] + frame[HEIGHT], x[2]), p, detected)
+    put_plot(plots, (x[0], x[1] + frame[rec.HEIGHT], x[2]), p, detected)
 
 
 @inline
@@ -143,20 +127,22 @@ def make_plots(random, frame, truth, scan, scans, certain, plots):
     """
     one, zero = full(1.0), full(0.0)
     for n in range(scans):
-        t, at, normal = PLOT_TRUTH * (scan + n), PLOT_TRUTH * (scan + n) + COORDINATES, 3 * n
+        t, at, normal = rec.PLOT_TRUTH * (scan + n), rec.PLOT_TRUTH * (scan + n) + rec.COORDINATES, 3 * n
         a, b, c = get(random, normal), get(random, normal + 1), get(random, normal + 2)
-        detected = where_greater(full(frame[DETECTION]), get(random, NORMALS + n), one, zero)
+        detected = where_greater(full(frame[rec.DETECTION]), get(random, NORMALS + n), one, zero)
         if scan + n < certain:
             detected = one
-        s0, s1, s2 = frame[SIGMA], frame[SIGMA + 1], frame[SIGMA + 2]
-        if frame[FORM] == CARTESIAN:
+        s0, s1, s2 = frame[rec.SIGMA], frame[rec.SIGMA + 1], frame[rec.SIGMA + 2]
+        if frame[rec.FORM] == rec.CARTESIAN:
             x = truth[at] + s0 * a, truth[at + 1] + s1 * b, truth[at + 2] + s2 * c
-            put_plot(row(plots, n * PLOT), x, (full(s0 * s0), zero, zero, full(s1 * s1), zero, full(s2 * s2)), detected)
+            put_plot(
+                row(plots, n * rec.PLOT), x, (full(s0 * s0), zero, zero, full(s1 * s1), zero, full(s2 * s2)), detected
+            )
         else:
-            sine_e, cosine_e = turned(truth[t + ELEVATION], truth[t + ELEVATION + 1], s1 * b)
-            sine_a, cosine_a = turned(truth[t + AZIMUTH], truth[t + AZIMUTH + 1], s2 * c)
-            r = truth[t + RANGE] + s0 * a
-            biconical_plot(row(plots, n * PLOT), frame, r, sine_e, cosine_e, sine_a, cosine_a, detected)
+            sine_e, cosine_e = turned(truth[t + rec.ELEVATION], truth[t + rec.ELEVATION + 1], s1 * b)
+            sine_a, cosine_a = turned(truth[t + rec.AZIMUTH], truth[t + rec.AZIMUTH + 1], s2 * c)
+            r = truth[t + rec.RANGE] + s0 * a
+            biconical_plot(row(plots, n * rec.PLOT), frame, r, sine_e, cosine_e, sine_a, cosine_a, detected)
 
 
 @part
@@ -168,7 +154,7 @@ def noise_at_prediction(frame, mean, wait, at_plot, noise):
     """
     half = 0.5 * wait * wait
     a = get(mean, 0) + wait * get(mean, 1) + half * get(mean, 2)
-    b = get(mean, 3) + wait * get(mean, 4) + half * get(mean, 5) - frame[HEIGHT]
+    b = get(mean, 3) + wait * get(mean, 4) + half * get(mean, 5) - frame[rec.HEIGHT]
     c = get(mean, 6) + wait * get(mean, 7) + half * get(mean, 8)
     x = frame[0] * a + frame[3] * b + frame[6] * c
     y = frame[1] * a + frame[4] * b + frame[7] * c
@@ -190,5 +176,5 @@ def fill_plots(keys, frame, truth, certain, first, random, plots):
     scans = truth.shape[0]
     for k in range(0, scans, STRIP):
         draw_strip(keys, first, k // STRIP, random)
-        to = row(address(plots), k * PLOT)
+        to = row(address(plots), k * rec.PLOT)
         make_plots(address(random), address(frame), address(truth), k, min(STRIP, scans - k), certain, to)

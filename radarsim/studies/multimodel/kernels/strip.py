@@ -17,52 +17,11 @@ import numpy as np
 
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import address, any_greater, full, get, put, row, where_greater
+from radarsim.studies.multimodel.kernels import records as rec
 from radarsim.studies.multimodel.kernels.filters import merge_gpb1, shares_by_rule, step
 from radarsim.studies.multimodel.kernels.hypothesis import get3, merge, mixed_mean, put3
 from radarsim.studies.multimodel.kernels.plots import noise_at_prediction
-from radarsim.studies.multimodel.kernels.records import (
-    AT_PREDICTION,
-    BANK,
-    COUNTED,
-    COVARIANCE,
-    CROSS,
-    CURRENT,
-    DETECTED,
-    ESTIMATE,
-    ESTIMATED,
-    FAMILY,
-    GPB1,
-    HYPOTHESIS,
-    INNOVATION,
-    MEAN,
-    MERGE,
-    MERGING,
-    MODEL,
-    MODEL_NUMBERS,
-    MODEL_Q,
-    MODEL_ROWS,
-    MODELS,
-    MOST,
-    NOISE,
-    OUTPUT,
-    OUTPUT_RULE,
-    OWN,
-    PLOT,
-    POSITION_COVARIANCE,
-    PREPARED,
-    PROBABILITY,
-    SETTLED,
-    SHARE,
-    SPARE,
-    START,
-    STATES,
-    SURPRISE,
-    TRANSITION,
-    VARIANCE,
-    WAIT,
-    WEIGHT,
-    Rules,
-)
+from radarsim.studies.multimodel.kernels.records import Rules
 
 
 class Filter(NamedTuple):
@@ -112,7 +71,7 @@ def prepare_model(work, at, moves, accelerates, sigma, dt):
     put3(work, at, (g1, accelerates * half, full(moves)))
     put(work, at + 3, accelerates * dt)
     put(work, at + 4, full(accelerates))
-    at += MODEL_Q
+    at += rec.MODEL_Q
     put3(work, at, (variance * (g0 * g0), variance * (g0 * g1), (variance * accelerates) * g0))
     put3(work, at + 3, (variance * (g1 * g1), (variance * accelerates) * g1, full(variance * accelerates)))
 
@@ -128,21 +87,21 @@ def prepare_step(work, design, interval, dt, settled):
     first = interval * size * size
     wait = full(dt)
     if not settled:
-        wait = wait + get(work, WAIT)
-    put(work, WAIT, wait)
+        wait = wait + get(work, rec.WAIT)
+    put(work, rec.WAIT, wait)
     for i in range(size):
-        m = MODEL_NUMBERS * i
-        prepare_model(work, MODEL + MODEL_ROWS * i, models[m], models[m + 1], models[m + 2], wait)
+        m = rec.MODEL_NUMBERS * i
+        prepare_model(work, rec.MODEL + rec.MODEL_ROWS * i, models[m], models[m + 1], models[m + 2], wait)
     for j in range(size):
         for i in range(size):
             c = full(design.transitions[first + i * size + j])
             if not settled:
                 c = full(0.0)
                 for n in range(size):
-                    c = c + design.transitions[first + i * size + n] * get(work, TRANSITION + n * MOST + j)
-            put(work, WEIGHT + i, c)
+                    c = c + design.transitions[first + i * size + n] * get(work, rec.TRANSITION + n * rec.MOST + j)
+            put(work, rec.WEIGHT + i, c)
         for i in range(size):
-            put(work, TRANSITION + i * MOST + j, get(work, WEIGHT + i))
+            put(work, rec.TRANSITION + i * rec.MOST + j, get(work, rec.WEIGHT + i))
 
 
 @part
@@ -151,12 +110,12 @@ def keep_missed(work, old, new, size, detected):
     again."""
     half = full(0.5)
     for i in range(size):
-        for at in range(i * HYPOTHESIS, i * HYPOTHESIS + PROBABILITY + 1):
+        for at in range(i * rec.HYPOTHESIS, i * rec.HYPOTHESIS + rec.PROBABILITY + 1):
             put(work, new + at, where_greater(detected, half, get(work, new + at), get(work, old + at)))
         for j in range(size):
-            at = TRANSITION + i * MOST + j
+            at = rec.TRANSITION + i * rec.MOST + j
             put(work, at, where_greater(detected, half, full(1.0 if i == j else 0.0), get(work, at)))
-    put(work, WAIT, where_greater(detected, half, full(0.0), get(work, WAIT)))
+    put(work, rec.WAIT, where_greater(detected, half, full(0.0), get(work, rec.WAIT)))
 
 
 @part
@@ -168,21 +127,21 @@ def output(work, listed, bank, rules, reported, out):
     """
     size = rules.size
     for j in range(size):
-        put(work, WEIGHT + j, get(work, bank + j * HYPOTHESIS + PROBABILITY))
+        put(work, rec.WEIGHT + j, get(work, bank + j * rec.HYPOTHESIS + rec.PROBABILITY))
     count = shares_by_rule(work, listed, bank, size, full(1.0), full(0.0), rules.output)
-    put(out, INNOVATION, get(work, SURPRISE))
+    put(out, rec.INNOVATION, get(work, rec.SURPRISE))
     if not reported:
         for axis in range(3):
-            put3(out, 3 * axis, mixed_mean(listed, count, row(work, SHARE), row(work, MEAN + 3 * axis)))
+            put3(out, 3 * axis, mixed_mean(listed, count, row(work, rec.SHARE), row(work, rec.MEAN + 3 * axis)))
         return
-    merge(work, listed, count, row(work, SPARE))
+    merge(work, listed, count, row(work, rec.SPARE))
     for axis in range(3):
-        own = SPARE + OWN + 6 * axis
-        put3(out, 3 * axis, get3(work, SPARE + MEAN + 3 * axis))
-        put3(out, VARIANCE + 3 * axis, (get(work, own), get(work, own + 3), get(work, own + 5)))
-        put(out, POSITION_COVARIANCE + axis, get(work, SPARE + CROSS + 9 * axis))
+        own = rec.SPARE + rec.OWN + 6 * axis
+        put3(out, 3 * axis, get3(work, rec.SPARE + rec.MEAN + 3 * axis))
+        put3(out, rec.VARIANCE + 3 * axis, (get(work, own), get(work, own + 3), get(work, own + 5)))
+        put(out, rec.POSITION_COVARIANCE + axis, get(work, rec.SPARE + rec.CROSS + 9 * axis))
     for j in range(size):
-        put(out, MODELS + j, get(work, bank + j * HYPOTHESIS + PROBABILITY))
+        put(out, rec.MODELS + j, get(work, bank + j * rec.HYPOTHESIS + rec.PROBABILITY))
 
 
 @part
@@ -197,17 +156,17 @@ def start(work, numbers, size, plots, weights, probabilities):
         start_block(work, e, plots, weights)
     for axis in range(3):
         x, v = full(0.0), full(0.0)
-        for k in range(START):
-            z = get(plots, k * PLOT + axis)
+        for k in range(rec.START):
+            z = get(plots, k * rec.PLOT + axis)
             x, v = x + weights[k] * z, v + weights[3 + k] * z
-        put3(work, MEAN + 3 * axis, (x, v, full(0.0)))
+        put3(work, rec.MEAN + 3 * axis, (x, v, full(0.0)))
     for i in range(size):
-        put(work, i * HYPOTHESIS + PROBABILITY, full(probabilities[i]))
-        for at in range(PROBABILITY):
-            put(work, i * HYPOTHESIS + at, get(work, at))
-    for at in range(STATES):
-        put(work, ESTIMATE + at, get(work, MEAN + at))
-    numbers[CURRENT], numbers[PREPARED], numbers[SETTLED] = 0, -1, 1
+        put(work, i * rec.HYPOTHESIS + rec.PROBABILITY, full(probabilities[i]))
+        for at in range(rec.PROBABILITY):
+            put(work, i * rec.HYPOTHESIS + at, get(work, at))
+    for at in range(rec.STATES):
+        put(work, rec.ESTIMATE + at, get(work, rec.MEAN + at))
+    numbers[rec.CURRENT], numbers[rec.PREPARED], numbers[rec.SETTLED] = 0, -1, 1
 
 
 @inline
@@ -215,17 +174,17 @@ def start_block(work, e, plots, weights):
     """The block of the first covariance for element e of R (xx, xy, xz, yy, yz, zz): Σ (a, b)' (a, b) R, and g g' on
     the diagonal."""
     aa, ab, bb = full(0.0), full(0.0), full(0.0)
-    for k in range(START):
-        R = get(plots, k * PLOT + COVARIANCE + e)
+    for k in range(rec.START):
+        R = get(plots, k * rec.PLOT + rec.COVARIANCE + e)
         aa = aa + (weights[k] * weights[k]) * R
         ab = ab + (weights[k] * weights[3 + k]) * R
         bb = bb + (weights[3 + k] * weights[3 + k]) * R
     if e == 0 or e == 3 or e == 5:
-        at, g0, g1, g2 = OWN + (0 if e == 0 else (6 if e == 3 else 12)), weights[6], weights[7], weights[8]
+        at, g0, g1, g2 = rec.OWN + (0 if e == 0 else (6 if e == 3 else 12)), weights[6], weights[7], weights[8]
         put3(work, at, (aa + g0 * g0, ab + g0 * g1, full(g0 * g2)))
         put3(work, at + 3, (bb + g1 * g1, full(g1 * g2), full(g2 * g2)))
     else:
-        at, zero = CROSS + 9 * (e - 1 if e < 3 else 2), full(0.0)
+        at, zero = rec.CROSS + 9 * (e - 1 if e < 3 else 2), full(0.0)
         put3(work, at, (aa, ab, zero))
         put3(work, at + 3, (ab, bb, zero))
         put3(work, at + 6, (zero, zero, zero))
@@ -240,46 +199,46 @@ def run_strip(memory, design, scans, plots, frame, out):
     work, numbers, listed = memory.work, memory.numbers, memory.listed
     rules = design.rules
     for k in range(scans.first, scans.stop):
-        plot, interval, to = row(plots, k * PLOT), scans.intervals[k], row(out, k * OUTPUT)
-        noise, detected = row(plot, COVARIANCE), get(plot, DETECTED)
-        if numbers[PREPARED] != interval or numbers[SETTLED] == 0:
-            prepare_step(work, design, interval, scans.times[interval], numbers[SETTLED] == 1)
-            numbers[PREPARED] = interval
+        plot, interval, to = row(plots, k * rec.PLOT), scans.intervals[k], row(out, k * rec.OUTPUT)
+        noise, detected = row(plot, rec.COVARIANCE), get(plot, rec.DETECTED)
+        if numbers[rec.PREPARED] != interval or numbers[rec.SETTLED] == 0:
+            prepare_step(work, design, interval, scans.times[interval], numbers[rec.SETTLED] == 1)
+            numbers[rec.PREPARED] = interval
         if rules.at_prediction == 1:
-            noise = row(work, NOISE)
-            noise_at_prediction(frame, row(work, ESTIMATE), get(work, WAIT), row(plot, COVARIANCE), noise)
-        put(work, COUNTED, full(0.0))
-        put(work, COUNTED + 1, full(0.0))
-        old, new = numbers[CURRENT] * BANK, (1 - numbers[CURRENT]) * BANK
+            noise = row(work, rec.NOISE)
+            noise_at_prediction(frame, row(work, rec.ESTIMATE), get(work, rec.WAIT), row(plot, rec.COVARIANCE), noise)
+        put(work, rec.COUNTED, full(0.0))
+        put(work, rec.COUNTED + 1, full(0.0))
+        old, new = numbers[rec.CURRENT] * rec.BANK, (1 - numbers[rec.CURRENT]) * rec.BANK
         step(work, listed, old, new, rules, plot, noise)
         output(work, listed, new, rules, scans.reported[k] == 1, to)
-        if rules.family == GPB1:
+        if rules.family == rec.GPB1:
             merge_gpb1(work, listed, old, new, rules.size, rules.merge)
-        put(to, MERGING, get(work, COUNTED))
-        put(to, MERGING + 1, get(work, COUNTED + 1))
+        put(to, rec.MERGING, get(work, rec.COUNTED))
+        put(to, rec.MERGING + 1, get(work, rec.COUNTED + 1))
         if rules.at_prediction == 1:
-            for i in range(STATES):
-                x = get(to, ESTIMATED + i)
-                put(work, ESTIMATE + i, where_greater(detected, full(0.5), x, get(work, ESTIMATE + i)))
+            for i in range(rec.STATES):
+                x = get(to, rec.ESTIMATED + i)
+                put(work, rec.ESTIMATE + i, where_greater(detected, full(0.5), x, get(work, rec.ESTIMATE + i)))
         if any_greater(full(0.5), detected):
             keep_missed(work, old, new, rules.size, detected)
-            numbers[SETTLED] = 0
-        elif numbers[SETTLED] == 0:
-            numbers[PREPARED], numbers[SETTLED] = -1, 1
-        numbers[CURRENT] = 1 - numbers[CURRENT]
+            numbers[rec.SETTLED] = 0
+        elif numbers[rec.SETTLED] == 0:
+            numbers[rec.PREPARED], numbers[rec.SETTLED] = -1, 1
+        numbers[rec.CURRENT] = 1 - numbers[rec.CURRENT]
 
 
 @inline
 def rules_of(numbers, size):
     """The rules of a filter from its numbers (FAMILY, MERGE, OUTPUT_RULE, AT_PREDICTION)."""
-    return Rules(numbers[FAMILY], numbers[MERGE], numbers[OUTPUT_RULE], numbers[AT_PREDICTION], size)
+    return Rules(numbers[rec.FAMILY], numbers[rec.MERGE], numbers[rec.OUTPUT_RULE], numbers[rec.AT_PREDICTION], size)
 
 
 @kernel
 def filter_strip(work, numbers, plots, first, stop, models, transitions, intervals, times, rules, frame, reported, out):
     """`run_strip` of arrays."""
-    memory = Memory(address(work), address(numbers), address(np.zeros(MOST, dtype=np.int64)))
-    design = Filter(rules_of(rules, models.size // MODEL_NUMBERS), address(models), address(transitions))
+    memory = Memory(address(work), address(numbers), address(np.zeros(rec.MOST, dtype=np.int64)))
+    design = Filter(rules_of(rules, models.size // rec.MODEL_NUMBERS), address(models), address(transitions))
     scans = Scans(first, stop, address(intervals), address(times), address(reported))
     run_strip(memory, design, scans, address(plots), address(frame), address(out))
 

@@ -18,29 +18,9 @@ import numpy as np
 from radarsim.kernels.algebra import dot, factored, scaled, whitened
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, rows, total, where_greater
+from radarsim.studies.multimodel.kernels import records as rec
 from radarsim.studies.multimodel.kernels import strip
 from radarsim.studies.multimodel.kernels.plots import RANDOM, STRIP, draw_strip, make_plots
-from radarsim.studies.multimodel.kernels.records import (
-    DETECTED,
-    INNOVATION,
-    MEANS,
-    MERGED,
-    MERGING,
-    MODELS,
-    MOST,
-    NEES,
-    NIS,
-    OUTPUT,
-    PLOT,
-    PLOTS,
-    POSITION_COVARIANCE,
-    SIZE,
-    STAGE,
-    START,
-    STATES,
-    VARIANCE,
-    WORK,
-)
 from radarsim.studies.multimodel.kernels.strip import Filter, Scans, rules_of, run_strip, start
 
 
@@ -75,14 +55,14 @@ class ScanSums(NamedTuple):
 def memory(filters: int, stages: int) -> Memory:
     """Memory for a number of filters and of stages."""
     return Memory(
-        works=rows(filters * WORK),
+        works=rows(filters * rec.WORK),
         random=rows(RANDOM),
-        plots=rows(STRIP * PLOT),
-        out=rows(filters * STRIP * OUTPUT),
-        stages=rows(filters * stages * STAGE),
+        plots=rows(STRIP * rec.PLOT),
+        out=rows(filters * STRIP * rec.OUTPUT),
+        stages=rows(filters * stages * rec.STAGE),
         counted=rows(1),
         numbers=np.zeros((filters, 8), dtype=np.int64),
-        listed=np.zeros(MOST, dtype=np.int64),
+        listed=np.zeros(rec.MOST, dtype=np.int64),
     )
 
 
@@ -96,12 +76,12 @@ def position_error(out, truth):
 def believed_error(out, e):
     """q = e' P⁻¹ e of the position (3), with the covariance that the filter believes."""
     P = (
-        get(out, VARIANCE),
-        get(out, POSITION_COVARIANCE),
-        get(out, POSITION_COVARIANCE + 1),
-        get(out, VARIANCE + 3),
-        get(out, POSITION_COVARIANCE + 2),
-        get(out, VARIANCE + 6),
+        get(out, rec.VARIANCE),
+        get(out, rec.POSITION_COVARIANCE),
+        get(out, rec.POSITION_COVARIANCE + 1),
+        get(out, rec.VARIANCE + 3),
+        get(out, rec.POSITION_COVARIANCE + 2),
+        get(out, rec.VARIANCE + 6),
     )
     L, i, _ = factored(P)  # P = L D L', i: the diagonal of D⁻¹
     e = whitened(e, L)
@@ -114,7 +94,7 @@ def add_scan(out, base, truth, counted, size, sums):
 
     out, base: outputs of the filter and of the baseline; truth (9,); size: number of models.
     """
-    for c in range(STATES):
+    for c in range(rec.STATES):
         e, e0 = counted * (get(out, c) - truth[c]), get(base, c) - truth[c]
         e2 = e * e
         sums.error[4 * c] += total(e)
@@ -123,7 +103,7 @@ def add_scan(out, base, truth, counted, size, sums):
         sums.error[4 * c + 3] += total(e2 * e2)
         sums.paired[c] += total(e2 * (e0 * e0))
     for i in range(size):
-        p = counted * get(out, MODELS + i)
+        p = counted * get(out, rec.MODELS + i)
         sums.probability[2 * i] += total(p)
         sums.probability[2 * i + 1] += total(p * p)
     q = counted * believed_error(out, position_error(out, truth))
@@ -134,16 +114,16 @@ def add_scan(out, base, truth, counted, size, sums):
 @part
 def add_to_stage(out, plot, truth, reported, stage):
     """Add a scan to the rows of its stage: squared errors, NIS and merges; NEES where `reported`."""
-    for c in range(STATES):
+    for c in range(rec.STATES):
         e = get(out, c) - truth[c]
         put(stage, c, get(stage, c) + e * e)
-    detected = get(plot, DETECTED)
-    put(stage, NIS, get(stage, NIS) + detected * get(out, INNOVATION))
-    put(stage, PLOTS, get(stage, PLOTS) + detected)
+    detected = get(plot, rec.DETECTED)
+    put(stage, rec.NIS, get(stage, rec.NIS) + detected * get(out, rec.INNOVATION))
+    put(stage, rec.PLOTS, get(stage, rec.PLOTS) + detected)
     for i in range(2):
-        put(stage, MERGED + i, get(stage, MERGED + i) + get(out, MERGING + i))
+        put(stage, rec.MERGED + i, get(stage, rec.MERGED + i) + get(out, rec.MERGING + i))
     if reported:
-        put(stage, NEES, get(stage, NEES) + believed_error(out, position_error(out, truth)))
+        put(stage, rec.NEES, get(stage, rec.NEES) + believed_error(out, position_error(out, truth)))
 
 
 @part
@@ -155,22 +135,22 @@ def close_stages(stages, filters, count, lengths, counted, sums, pairs):
     """
     for s in range(count):
         for f in range(filters):
-            own = row(stages, (f * count + s) * STAGE)
-            for c in range(MEANS):
-                length = full(max(lengths[2 * s + (1 if c == NEES else 0)], 1.0))
-                if c == NIS:
-                    length = where_greater(get(own, PLOTS), full(0.5), get(own, PLOTS), full(1.0))
+            own = row(stages, (f * count + s) * rec.STAGE)
+            for c in range(rec.MEANS):
+                length = full(max(lengths[2 * s + (1 if c == rec.NEES else 0)], 1.0))
+                if c == rec.NIS:
+                    length = where_greater(get(own, rec.PLOTS), full(0.5), get(own, rec.PLOTS), full(1.0))
                 put(own, c, get(own, c) / length)
         for f in range(filters):
-            own, at = row(stages, (f * count + s) * STAGE), f * count + s
-            for c in range(MEANS):
+            own, at = row(stages, (f * count + s) * rec.STAGE), f * count + s
+            for c in range(rec.MEANS):
                 x = counted * get(own, c)
-                sums[(at * MEANS + c) * 2] += total(x)
-                sums[(at * MEANS + c) * 2 + 1] += total(x * x)
+                sums[(at * rec.MEANS + c) * 2] += total(x)
+                sums[(at * rec.MEANS + c) * 2 + 1] += total(x * x)
             for g in range(filters):
-                other, at = row(stages, (g * count + s) * STAGE), (f * filters + g) * count + s
-                for c in range(STATES):
-                    pairs[at * STATES + c] += total(counted * get(own, c) * get(other, c))
+                other, at = row(stages, (g * count + s) * rec.STAGE), (f * filters + g) * count + s
+                for c in range(rec.STATES):
+                    pairs[at * rec.STATES + c] += total(counted * get(own, c) * get(other, c))
 
 
 @inline
@@ -188,17 +168,17 @@ def simulate_block(world, banks, memory, sums, baseline, first, count):
     for group in range(0, count, WIDTH):
         for n in range(WIDTH):
             memory.counted[n] = 1.0 if group + n < count else 0.0
-        clear(address(memory.stages), filters * stages * STAGE)
+        clear(address(memory.stages), filters * stages * rec.STAGE)
         for k in range(0, scans, STRIP):
-            length, begin = min(STRIP, scans - k), START if k == 0 else 0
+            length, begin = min(STRIP, scans - k), rec.START if k == 0 else 0
             draw_strip(world.keys, first + group, k // STRIP, memory.random)
             plots, frame = address(memory.plots), address(world.frame)
-            make_plots(address(memory.random), frame, address(world.plot_truth), k, length, START, plots)
+            make_plots(address(memory.random), frame, address(world.plot_truth), k, length, rec.START, plots)
             # This loop is written out: as a function of its own it makes LLVM fuse the products in GPB2's merges in
             # another order, and the last bits of the results change.
             for f in range(filters):
-                work, numbers = row(address(memory.works), f * WORK), row(address(memory.numbers), f)
-                size = banks.numbers[f, SIZE]
+                work, numbers = row(address(memory.works), f * rec.WORK), row(address(memory.numbers), f)
+                size = banks.numbers[f, rec.SIZE]
                 if k == 0:
                     start(work, numbers, size, plots, address(world.weights), row(address(banks.probabilities), f))
                 rules = rules_of(row(address(banks.numbers), f), size)
@@ -206,7 +186,7 @@ def simulate_block(world, banks, memory, sums, baseline, first, count):
                 intervals, reported = address(world.intervals[k:]), address(world.reported[k:])
                 span = Scans(begin, length, intervals, address(world.times), reported)
                 own = strip.Memory(work, numbers, address(memory.listed))
-                run_strip(own, design, span, plots, frame, row(address(memory.out), f * STRIP * OUTPUT))
+                run_strip(own, design, span, plots, frame, row(address(memory.out), f * STRIP * rec.OUTPUT))
             add_strip(world, banks, memory, sums, baseline, k, begin, length)
         lengths, counted = address(world.lengths), get(address(memory.counted), 0)
         close_stages(
@@ -218,14 +198,14 @@ def simulate_block(world, banks, memory, sums, baseline, first, count):
 def add_strip(world, banks, memory, sums, baseline, k, begin, length):
     """Add the outputs of all filters over a strip that starts at scan k."""
     stages = world.lengths.shape[0]
-    base = row(address(memory.out), baseline * STRIP * OUTPUT)
+    base = row(address(memory.out), baseline * STRIP * rec.OUTPUT)
     counted = get(address(memory.counted), 0)
     for f in range(banks.numbers.shape[0]):
         for n in range(begin, length):
-            out, truth = row(address(memory.out), (f * STRIP + n) * OUTPUT), address(world.truth[k + n])
-            stage = row(address(memory.stages), (f * stages + world.stage[k + n]) * STAGE)
+            out, truth = row(address(memory.out), (f * STRIP + n) * rec.OUTPUT), address(world.truth[k + n])
+            stage = row(address(memory.stages), (f * stages + world.stage[k + n]) * rec.STAGE)
             reported = world.reported[k + n] == 1
-            add_to_stage(out, row(address(memory.plots), n * PLOT), truth, reported, stage)
+            add_to_stage(out, row(address(memory.plots), n * rec.PLOT), truth, reported, stage)
             if reported:
                 place = world.place[k + n]
                 places = ScanSums(
@@ -234,4 +214,4 @@ def add_strip(world, banks, memory, sums, baseline, k, begin, length):
                     address(sums.probability[f, place]),
                     address(sums.believed[f, place]),
                 )
-                add_scan(out, row(base, n * OUTPUT), truth, counted, banks.numbers[f, SIZE], places)
+                add_scan(out, row(base, n * rec.OUTPUT), truth, counted, banks.numbers[f, rec.SIZE], places)

@@ -9,20 +9,11 @@ confirmed. Letters as in `tracker`.
 import numpy as np
 
 from radarsim.kernels.compile import kernel, part
+from radarsim.studies.sonar.clutter.kernels import rules as rule
 from radarsim.studies.sonar.clutter.kernels.counts import COUNTS, ENDS_PER_SCAN, WRONG_PER_PLOT
 from radarsim.studies.sonar.clutter.kernels.field import even_places
 from radarsim.studies.sonar.clutter.kernels.gate import KNOWN
-from radarsim.studies.sonar.clutter.kernels.rules import (
-    BEST,
-    ENDS,
-    FIRST,
-    HELD,
-    TAKEN,
-    WRONG,
-    judge,
-    judge_false,
-    judge_known,
-)
+from radarsim.studies.sonar.clutter.kernels.rules import judge, judge_false, judge_known
 from radarsim.studies.sonar.clutter.kernels.sums import add_ahead, add_errors, add_ratio, add_scores
 from radarsim.studies.sonar.clutter.kernels.tracker import Scan, Target, reset, step, tracks_of
 from radarsim.studies.sonar.kernels.patterns import detect
@@ -74,9 +65,9 @@ def simulate_block(world, detections, field, trackers, work, first, total, sums)
                     sums.counts[f, k, j] += counts[j]
                 add_errors(trackers, tracks, f, k, course, counted, out, sums.errors)
         for f in range(F):
-            add_ratio(status[f, ENDS], status[f, HELD], n, sums.ratios[f, ENDS_PER_SCAN])
-            add_ratio(status[f, WRONG], status[f, TAKEN], n, sums.ratios[f, WRONG_PER_PLOT])
-            add_scores(trackers.thresholds, n, status[f, FIRST], status[f, BEST], sums.scores[0, f])
+            add_ratio(status[f, rule.ENDS], status[f, rule.HELD], n, sums.ratios[f, ENDS_PER_SCAN])
+            add_ratio(status[f, rule.WRONG], status[f, rule.TAKEN], n, sums.ratios[f, WRONG_PER_PLOT])
+            add_scores(trackers.thresholds, n, status[f, rule.FIRST], status[f, rule.BEST], sums.scores[0, f])
 
 
 @kernel
@@ -99,4 +90,4 @@ def simulate_false(key, field, trackers, work, dt, first, total, sums):
                 step(trackers, f, field, Scan(first + done, n, k, dt[k]), tracks, target, work, counts)
                 if not judge_false(trackers, f, n, tracks, status, sums.begun[f, k]):
                     break
-            add_scores(trackers.thresholds, n, status[FIRST], status[BEST], sums.scores[1, f])
+            add_scores(trackers.thresholds, n, status[rule.FIRST], status[rule.BEST], sums.scores[1, f])

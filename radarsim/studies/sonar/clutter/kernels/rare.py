@@ -23,22 +23,11 @@ import numpy as np
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import address
 from radarsim.kernels.random import uniform, uniforms
+from radarsim.studies.sonar.clutter.kernels import rules as life
 from radarsim.studies.sonar.clutter.kernels.counts import COUNTS
 from radarsim.studies.sonar.clutter.kernels.field import TURN, cell_words, draws_of, even_places, place_in
 from radarsim.studies.sonar.clutter.kernels.gate import KNOWN, PDA, associated, empty_gate, inverse_two, with_plot
-from radarsim.studies.sonar.clutter.kernels.rules import (
-    AGE,
-    BEST,
-    CONFIRMED,
-    FIRST,
-    HITS,
-    MISSES,
-    NONE,
-    SINCE,
-    STATE,
-    TENTATIVE,
-    judge_false,
-)
+from radarsim.studies.sonar.clutter.kernels.rules import judge_false
 from radarsim.studies.sonar.clutter.kernels.sums import add_drawn, add_scores, add_weight
 from radarsim.studies.sonar.clutter.kernels.tracker import (
     Scan,
@@ -170,15 +159,19 @@ def associate_false(field, shift, trackers, f, scan, work, own, counts):
     lives, taken = address(status), address(out)
     keys, most, held_on = (shift.plots[0], shift.plots[1]), trackers.misses[f], shift.shares[2] > 0.0
     for i in range(scan.count):
-        if status[STATE, i] == NONE:
+        if status[life.STATE, i] == life.NONE:
             out[:, i] = 0.0
             continue
-        status[SINCE, i] += scan.dt
+        status[life.SINCE, i] += scan.dt
         place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
-        gate = gate_of(place, S, plots[i] > 1.5, rule.speed * status[SINCE, i])
-        box, tentative = box_of(draws.cells, gate, rule.gate), status[STATE, i] == TENTATIVE
+        gate = gate_of(place, S, plots[i] > 1.5, rule.speed * status[life.SINCE, i])
+        box, tentative = box_of(draws.cells, gate, rule.gate), status[life.STATE, i] == life.TENTATIVE
         if (tentative or held_on) and 0.0 < box.mean <= MOST_MEAN:
-            rest = (m - status[HITS, i]) / (n - status[AGE, i]) if tentative else 1.0 / (most - status[MISSES, i])
+            rest = (
+                (m - status[life.HITS, i]) / (n - status[life.AGE, i])
+                if tentative
+                else 1.0 / (most - status[life.MISSES, i])
+            )
             drawn = rest if own[LAW, i] > (0.0 if tentative else 1.0) else 0.0
             found, factor, _ = associate_drawn(keys, rule, (scan.first + i, scan.k), gate, NO_PLOT, box, rest, drawn)
             own[FOUND, i] = min(own[FOUND, i] * (factor if tentative else 1.0), LARGEST)
@@ -196,7 +189,7 @@ def begin_false(shift, first, n, status, own):
         own[LAW, i] = 0.0 if u < shift.shares[0] else 1.0 if u < shift.shares[0] + shift.shares[1] else 2.0
         own[FOUND, i], own[LONG, i], own[HELD, i] = 1.0, 1.0, 0.0
         if own[LAW, i] > 0.0:
-            status[FIRST, i] = -1.0
+            status[life.FIRST, i] = -1.0
 
 
 @inline
@@ -209,7 +202,7 @@ def weight_of(shares, own, i):
 def add_held(shares, own, state, n, held):
     """Count a scan of the n tracks that are confirmed, by their weights so far; state (CHUNK,)."""
     for i in range(n):
-        if state[i] == CONFIRMED:
+        if state[i] == life.CONFIRMED:
             add_weight(weight_of(shares, own, i), held, int(own[HELD, i]))
             own[HELD, i] += 1.0
 
@@ -245,9 +238,9 @@ def simulate_false(seeds, field, shift, trackers, work, dt, first, total, scores
             for k in range(1, dt.size):
                 scan = Scan(first + done, n, k, dt[k])
                 left = scan_false(field, shift, trackers, f, scan, work, own, counts)
-                add_held(shift.shares, own, status[STATE], n, sums.held[f])
+                add_held(shift.shares, own, status[life.STATE], n, sums.held[f])
                 if not left:
                     break
             for i in range(n):
                 add_drawn(weight_of(shift.shares, own, i), own[LAW, i] == 0.0, sums.drawn[f])
-            add_scores(trackers.thresholds, n, status[FIRST], status[BEST], scores[f])
+            add_scores(trackers.thresholds, n, status[life.FIRST], status[life.BEST], scores[f])

@@ -13,6 +13,7 @@ import numpy as np
 from radarsim.kernels.compile import aligned_zeros, inline, part
 from radarsim.kernels.lanes import address
 from radarsim.studies.sonar.clutter.kernels import counts as at
+from radarsim.studies.sonar.clutter.kernels import rules as life
 from radarsim.studies.sonar.clutter.kernels.field import draws_of, with_false_plots
 from radarsim.studies.sonar.clutter.kernels.gate import (
     CLOSEST,
@@ -26,22 +27,6 @@ from radarsim.studies.sonar.clutter.kernels.gate import (
     empty_gate,
     inverse_two,
     with_plot,
-)
-from radarsim.studies.sonar.clutter.kernels.rules import (
-    AGE,
-    BEST,
-    CONFIRMED,
-    FIRST,
-    HITS,
-    MISSES,
-    NONE,
-    ROWS,
-    SCORE,
-    SINCE,
-    STATE,
-    TAKEN,
-    TENTATIVE,
-    WRONG,
 )
 from radarsim.studies.sonar.clutter.kernels.tracks import Tracks, clear, predict, update
 from radarsim.studies.sonar.kernels.steps import CHUNK
@@ -106,7 +91,7 @@ class Target(NamedTuple):
 
 def workspace(count: int) -> Workspace:
     """Work arrays of this many trackers."""
-    shapes = ((2, 4), (2, 8), (2, 6), (4,), (), (ROWS,))
+    shapes = ((2, 4), (2, 8), (2, 6), (4,), (), (life.ROWS,))
     own = [aligned_zeros(count, *shape, CHUNK) for shape in shapes]
     return Workspace(*own, aligned_zeros(5, CHUNK), aligned_zeros(6, CHUNK))
 
@@ -116,7 +101,7 @@ def reset(work):
     """Set the work arrays to a state without any tracks."""
     work.x[:], work.Y[:], work.P[:], work.C[:] = 0.0, 0.0, 0.0, 0.0
     work.plots[:], work.status[:], work.association[:] = 0.0, 0.0, 0.0
-    work.status[:, FIRST] = -1.0
+    work.status[:, life.FIRST] = -1.0
 
 
 @inline
@@ -167,8 +152,17 @@ def begin(tracks, status, i, z, association):
     clear(tracks, i)
     association[:, i] = 0.0
     association[0, i], association[1, i], association[2, i] = 1.0, z[0, i], z[1, i]
-    status[STATE, i], status[AGE, i], status[HITS, i], status[MISSES, i] = TENTATIVE, 1.0, 1.0, 0.0
-    status[SINCE, i], status[SCORE, i], status[FIRST, i] = 0.0, 0.0, 0.0 if status[FIRST, i] >= 0.0 else 1.0
+    status[life.STATE, i], status[life.AGE, i], status[life.HITS, i], status[life.MISSES, i] = (
+        life.TENTATIVE,
+        1.0,
+        1.0,
+        0.0,
+    )
+    status[life.SINCE, i], status[life.SCORE, i], status[life.FIRST, i] = (
+        0.0,
+        0.0,
+        0.0 if status[life.FIRST, i] >= 0.0 else 1.0,
+    )
 
 
 @inline
@@ -189,20 +183,20 @@ def settle(status, i, found, out):
     rows = (found.taken, found.nu_r, found.nu_b, found.rr, found.rb, found.bb)
     for j in range(6):
         out[j * CHUNK + i] = rows[j]
-    if status[STATE * CHUNK + i] == CONFIRMED:
-        status[WRONG * CHUNK + i] += found.false_share
-        status[TAKEN * CHUNK + i] += found.taken
-    status[AGE * CHUNK + i] += 1.0
-    score = status[SCORE * CHUNK + i] + found.score
-    status[SCORE * CHUNK + i] = score
-    if status[FIRST * CHUNK + i] > 0.0:
-        status[BEST * CHUNK + i] = max(status[BEST * CHUNK + i], score)
+    if status[life.STATE * CHUNK + i] == life.CONFIRMED:
+        status[life.WRONG * CHUNK + i] += found.false_share
+        status[life.TAKEN * CHUNK + i] += found.taken
+    status[life.AGE * CHUNK + i] += 1.0
+    score = status[life.SCORE * CHUNK + i] + found.score
+    status[life.SCORE * CHUNK + i] = score
+    if status[life.FIRST * CHUNK + i] > 0.0:
+        status[life.BEST * CHUNK + i] = max(status[life.BEST * CHUNK + i], score)
     if found.taken > 0.0:
-        status[HITS * CHUNK + i] += 1.0
-        status[MISSES * CHUNK + i] = 0.0
-        status[SINCE * CHUNK + i] = 0.0
+        status[life.HITS * CHUNK + i] += 1.0
+        status[life.MISSES * CHUNK + i] = 0.0
+        status[life.SINCE * CHUNK + i] = 0.0
     else:
-        status[MISSES * CHUNK + i] += 1.0
+        status[life.MISSES * CHUNK + i] += 1.0
 
 
 @part
@@ -216,14 +210,14 @@ def associate(field, rule, scan, tracks, status, target, work, counts):
     draws, out, tally, plots = draws_of(field), work.association, address(counts), tracks.plots
     detected, z, predicted, lives, taken = target.detected, target.z, work.predicted, address(status), address(out)
     for i in range(scan.count):
-        if status[STATE, i] == NONE:
+        if status[life.STATE, i] == life.NONE:
             out[:, i] = 0.0
             if target.begins and detected[i] > 0.0:
                 begin(tracks, status, i, z, out)
             continue
-        status[SINCE, i] += scan.dt
+        status[life.SINCE, i] += scan.dt
         place, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
-        gate = gate_of(place, S, plots[i] > 1.5, rule.speed * status[SINCE, i])
+        gate = gate_of(place, S, plots[i] > 1.5, rule.speed * status[life.SINCE, i])
         plot = (detected[i], z[0, i], z[1, i])
         found = associate_track(draws, rule, scan.first + i, scan.k, plot, gate, tally)
         settle(lives, i, found, taken)
