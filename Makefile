@@ -34,7 +34,9 @@ slow: $(VENV)/tested
 machines: $(VENV)/tested
 	$(BIN)/python -m pytest -n $(JOBS) --maxprocesses 8 -m machines $(call marked,machines)
 
+# Faults of meaning, then a sample of wrong formulas, another each day; nightly, as it takes an hour and more.
 mutants: $(VENV)/tested
+	nice $(BIN)/python -m tests.trust.faults
 	nice $(BIN)/python -m tests.trust.mutate
 
 lint: $(VENV)/tested

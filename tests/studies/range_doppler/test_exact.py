@@ -105,6 +105,8 @@ def test_a_quadratic_truth_leaves_no_bias_and_a_cubic_one_does():
     quadratic, _, _ = sigmas("rls2", 1, scans=40)
     assert np.abs(quadratic).max() < 1e-6
     cubic, _, made = sigmas("rls2", 1, scans=400, coefficients=(1e5, -250.0, 4.0, 0.01))
+    # A parabola through three points of a cubic: its rate lags by j dt²/3, its bend by j dt.
+    np.testing.assert_allclose(cubic[2], [0.0, -0.01 * dt**2 / 3, -0.01 * dt], rtol=1e-9, atol=1e-9)
     # Steady bias of a constant jerk: b = (I - KH)(B b - j (dt³/6, dt²/2, dt)).
     kept = np.eye(3) - made.gains[-1, :, :1] @ observation(1)
     defect = 0.01 * np.array([dt**3 / 6, dt**2 / 2, dt])
