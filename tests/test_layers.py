@@ -21,7 +21,7 @@ TEMPLATE = PACKAGE / "app/template/src"  # a study of a package of its own, to w
 STUDIES = sorted(path.name for path in (PACKAGE / "studies").iterdir() if (path / "__init__.py").is_file())
 TEMPLATES = sorted(path.name for path in TEMPLATE.iterdir())
 DATA = ("engine.moments", "engine.results")  # the engine's plain data, which studies fill
-CASE = ("config.experiment", "config.fields", "config.identity")
+CASE = ("config.experiment", "config.fields", "config.identity", "config.rare")
 ROOMS = {
     "errors": (),
     "language": ("errors",),

@@ -135,12 +135,12 @@ class Designer:
         root = brentq(criterion, shortest_s, self.burst.duration_s, xtol=1e-4 * self.burst.pulse_period_s)
         return self.burst.pulses_in(root)
 
-    def windows(self, least_s: float = 0.0) -> list[int]:
-        """Window lengths in pulses from T₀ (15), at least `least_s` long, over (16) to the whole burst.
+    def windows(self) -> list[int]:
+        """Window lengths in pulses from T₀ (15) over (16) to the whole burst.
 
         None is shorter than there are parameters. Raises NoSchedule where over 200 are needed.
         """
-        period, fewest = self.burst.pulse_period_s, max(len(self.sigma), self.burst.pulses_in(least_s))
+        period, fewest = self.burst.pulse_period_s, len(self.sigma)
         sequence = [max(self.longest(self.first_excess, fewest * period), fewest)]
         while sequence[-1] < self.burst.pulses:
             if len(sequence) == MOST_WINDOWS:

@@ -47,7 +47,7 @@ STEP = {"kind": "acceleration_start", "coefficients": [1e5], "start_scan": 6, "a
             PULSE,
             {"jerk_mps2": 1},
             "target.jerk_mps2: unknown key; did you mean jerk_mps3? allowed: start_s, start_scan, "
-            "kind, coefficients, sigma_coefficients, jerk_mps3, duration_s",
+            "kind, coefficients, jerk_mps3, duration_s",
         ),
         (STEP, {"acceleration_mps2": -2000}, "target.acceleration_mps2: must be >= -1000, got -2000"),
         (STEP, {"start_scan": 0}, "target.start_scan: must be >= 1, got 0"),

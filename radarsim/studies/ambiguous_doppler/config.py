@@ -56,7 +56,6 @@ UNFOLDING = {"hypotheses": 300, "prune_below": 1e-6, "merge": "never", "estimate
 COMBINING = {  # keys of a combination: of which, and the default
     "stay_probability": ("likelihood", 0.95),
     "manoeuvres": ("expected_error", None),
-    "interval_sigmas": ("intersection", 2.0),
 }
 
 Order = Annotated[int, Whole(0, 2)]
@@ -238,12 +237,6 @@ class Filter(Model):
     )
     manoeuvres: Manoeuvres | None = Field(
         None, title="expected manoeuvres", description="expected_error: the manoeuvres that are expected"
-    )
-    interval_sigmas: Positive | None = Field(
-        None,
-        title="half width of an interval",
-        json_schema_extra={"unit": "σ"},
-        description="intersection: half width of an interval, in standard deviations (no unit); default: 2",
     )
 
     @property

@@ -13,6 +13,7 @@ from radarsim.studies.ambiguous_doppler import filters
 from radarsim.studies.ambiguous_doppler.filters import Member
 
 FARTHEST = 8.5  # standard deviations that an integral goes to: beyond lie 2e-17
+INTERVAL_SIGMAS = 2.0  # half width of the intervals that the smoothest order has to meet: 95 % of a Gaussian's errors
 NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(12)  # over one standard deviation: exact to rounding
 
 
@@ -110,8 +111,8 @@ def advanced(
     return moved, after + sigma[1] ** 2 * np.outer(of_velocity, of_velocity)
 
 
-def widths(bias: np.ndarray, noise: np.ndarray, of: Sequence[Member], prior: Any, sigmas: float) -> np.ndarray:
-    """Half widths (K, I, 3) of intervals of so many standard deviations; zero of what a filter does not estimate.
+def widths(bias: np.ndarray, noise: np.ndarray, of: Sequence[Member], prior: Any) -> np.ndarray:
+    """Half widths (K, I, 3) of intervals of INTERVAL_SIGMAS; zero of what a filter does not estimate.
 
     bias (2, I, K, 3) of a drawn velocity and acceleration of one, noise (K, I, 3, I, 3). What is drawn from the prior
     is no manoeuvre: a velocity, and an acceleration to a model that has one.
@@ -120,7 +121,7 @@ def widths(bias: np.ndarray, noise: np.ndarray, of: Sequence[Member], prior: Any
     known = np.array([one.components for one in of])
     variance = np.einsum("kixix->ikx", noise) + bias[0] ** 2 * prior.sigma_velocity_mps**2
     variance += bias[1] ** 2 * prior.sigma_acceleration_mps2**2 * models
-    return sigmas * np.sqrt(variance).swapaxes(0, 1) * known
+    return INTERVAL_SIGMAS * np.sqrt(variance).swapaxes(0, 1) * known
 
 
 def joint(bias: np.ndarray, noise: np.ndarray, weight: np.ndarray) -> np.ndarray:

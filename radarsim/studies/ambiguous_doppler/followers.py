@@ -362,10 +362,10 @@ class Combined:
         bias, noise = self.bias[:, :, None], self.noise.reshape(1, many, 3, many, 3)
         estimates = np.where(self.known, estimates, 0.0)
         if self.options.combine == "intersection":
-            width = exact.widths(bias, noise, self.members, self.spec.prior, self.options.interval_sigmas)[0]
+            width = exact.widths(bias, noise, self.members, self.spec.prior)[0]
             chosen = [_smoothest(estimates[:, c], width[:, c]) for c in range(3)]
             mean = np.array([estimates[i, c] for c, i in enumerate(chosen)])
-            sigma = np.array([width[i, c] for c, i in enumerate(chosen)]) / self.options.interval_sigmas
+            sigma = np.array([width[i, c] for c, i in enumerate(chosen)]) / exact.INTERVAL_SIGMAS
         else:
             weight = np.full(len(bias) - 1, 1 / self.spec.scans)
             weight[0] = self.spec.prior.sigma_velocity_mps**2

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from radarsim.config.rare import PLAIN_SHARE
 from radarsim.studies.ambiguous_doppler import exact, filters, lattice
 from radarsim.studies.ambiguous_doppler.kernels import rare as kernels
 from radarsim.studies.ambiguous_doppler.kernels import records
@@ -188,7 +189,7 @@ def mixture(world: records.World, spec: Any, key: np.ndarray) -> kernels.Mixture
     """
     one = next(one for one in spec.filters if one.name == spec.rare.filter)
     found = half_spaces(linear(world, spec, one), one)
-    plain, shares = spec.rare.plain_share, chances(found)
+    plain, shares = PLAIN_SHARE, chances(found)
     cumulative = np.cumsum([plain, *((1.0 - plain) * shares / shares.sum())])
     cumulative[-1] = 1.0
     return kernels.Mixture(key, cumulative, np.maximum(found.distance, 0.0), np.ascontiguousarray(found.units))

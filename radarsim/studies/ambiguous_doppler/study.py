@@ -67,7 +67,7 @@ def shares(spec: Any, one: Any, observed: records.World) -> np.ndarray:
     made = np.zeros((spec.scans, records.MEMBERS, 3))
     if one.combine == "intersection":
         bias, noise = exact.errors(of, drawn, observed.sigma)
-        made[:, : len(members)] = exact.widths(bias, noise, members, spec.prior, one.interval_sigmas)
+        made[:, : len(members)] = exact.widths(bias, noise, members, spec.prior)
     elif one.combine == "expected_error":
         manoeuvres = exact.expected_motions(one.manoeuvres, observed.t)
         motions = np.concatenate([drawn[:1], manoeuvres])

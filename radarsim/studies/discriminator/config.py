@@ -189,12 +189,6 @@ class Estimator(Model):
         title="law of the quadratic form",
         description="law of the quadratic form: the paper's Gaussian, or the weighted sum of χ² itself",
     )
-    minimum_energy_ratio: NonNegative = Field(
-        0.0,
-        title="minimum energy ratio",
-        json_schema_extra={"symbol": "μ_min"},
-        description="energy ratio μ_min of (17), below which no window begins; 0: none",
-    )
     density: Annotated[int, Whole(1, 10)] = Field(
         1,
         title="windows for each designed one",
@@ -227,14 +221,6 @@ class Estimator(Model):
         0,
         title="points of the search on each side",
         description="cure at a hand-over: points on each side along the leading direction of R_Δ; 0: none",
-    )
-    search_spacing_rad: Positive = Field(
-        0.8, title="spacing of the search points", description="distance of these points, rms over the window, rad"
-    )
-    search_margin: Number = Field(
-        2.0,
-        title="margin of the search",
-        description="standard errors by which the coherence must be short of 1 for a search",
     )
     amplitude: Literal["known", "estimated", "as_printed"] = Field(
         "known",
@@ -279,12 +265,6 @@ class Keys(Study):
         title="way of simulation",
         description="block_sums: exact sums over short blocks are drawn; samples: every step over every sample; "
         "demodulated: samples drawn and demodulated once; auto: block_sums where it is valid, else samples",
-    )
-    blocks_per_window: Annotated[int | None, Whole(4, 1000), Design()] = Field(
-        None,
-        title="blocks per window",
-        description="a block is a window over this; default: 20, or 24 where the Doppler frequency is near zero; "
-        "32 for demodulated",
     )
     rare: Annotated[Rare | None, Design(), Added()] = Field(
         None,

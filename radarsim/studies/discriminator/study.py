@@ -15,6 +15,7 @@ from radarsim.bursts.kernels import strip as strips
 from radarsim.bursts.kernels.data import BLOCK_SUMS, DEMODULATED, SAMPLES
 from radarsim.bursts.kernels.scoring import SIZE
 from radarsim.config.experiment import Case
+from radarsim.config.rare import PLAIN_SHARE
 from radarsim.engine.moments import Layout
 from radarsim.engine.results import Axes
 from radarsim.errors import ConfigError
@@ -32,6 +33,10 @@ MODES = {"block_sums": BLOCK_SUMS, "samples": SAMPLES, "demodulated": DEMODULATE
 # change sides, with 24 of them 0.5 %.
 BLOCKS_PER_WINDOW = {BLOCK_SUMS: 20, SAMPLES: 20, DEMODULATED: 32}
 IMAGE_BLOCKS_PER_WINDOW = {BLOCK_SUMS: 24, SAMPLES: 24, DEMODULATED: 32}
+# Of the cure at a hand-over: points closer than the main lobe reaches, 1 rad rms by (10), so that it is between no two;
+# and by how many standard errors the coherence is short of 1 for a search: about one lock in 44 is then searched for.
+SEARCH_SPACING_RAD = 0.8
+SEARCH_MARGIN = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,11 +136,9 @@ def designer_of(burst: model.Burst, sigma: np.ndarray, condition: schedules.Cond
 
 
 @lru_cache(maxsize=64)
-def designed_windows(
-    burst: model.Burst, sigma: tuple[float, ...], condition: schedules.Condition, least_s: float
-) -> tuple[int, ...]:
+def designed_windows(burst: model.Burst, sigma: tuple[float, ...], condition: schedules.Condition) -> tuple[int, ...]:
     """Windows in pulses of one condition, designed once: of many cases that differ elsewhere they are the same."""
-    return tuple(designer_of(burst, np.array(sigma), condition).windows(least_s))
+    return tuple(designer_of(burst, np.array(sigma), condition).windows())
 
 
 def windows_of(spec: Keys, burst: model.Burst, sigma: np.ndarray) -> list[list[int]]:
@@ -145,10 +148,9 @@ def windows_of(spec: Keys, burst: model.Burst, sigma: np.ndarray) -> list[list[i
         if e.method == "ridge":
             found.append([burst.pulses])
             continue
-        least = exact.shortest_window(burst, e.minimum_energy_ratio) if e.minimum_energy_ratio else 0.0
         if e.schedule == "designed":
             condition = schedules.Condition(e.lock_probability, e.main_lobe_threshold, e.tail)
-            windows = list(designed_windows(burst, tuple(sigma.tolist()), condition, least))
+            windows = list(designed_windows(burst, tuple(sigma.tolist()), condition))
         else:
             windows = sorted({burst.pulses_in(duration) for duration in e.schedule})
         found.append(schedules.denser(windows, e.density)[: e.first_windows])
@@ -182,7 +184,7 @@ def prepared(case: Case) -> Plan:
     windows = windows_of(spec, burst, sigma)
     every = sorted({w for own in windows for w in own})
     image = plans.has_image(burst, sigma, every, phase.turns)
-    per_window = spec.blocks_per_window or (IMAGE_BLOCKS_PER_WINDOW if image else BLOCKS_PER_WINDOW)[mode]
+    per_window = (IMAGE_BLOCKS_PER_WINDOW if image else BLOCKS_PER_WINDOW)[mode]
     edges = cuts.block_edges(every, per_window, 8 if mode == DEMODULATED else 1)
     world = plans.world(burst, mode, edges, image, phase.turns, phase.reference)
     tables = cuts.Tables(edges, world.mean, per_window)
@@ -222,7 +224,7 @@ def prepared(case: Case) -> Plan:
     sought = [e.name for e in spec.estimators].index(spec.rare.estimator)
     keys = np.concatenate([plan.keys, [noise_key(case, "rare")]])
     try:
-        return replace(plan, keys=keys, mixture=rare_losses.mixture(plan, sought, spec.rare.plain_share))
+        return replace(plan, keys=keys, mixture=rare_losses.mixture(plan, sought, PLAIN_SHARE))
     except rare_losses.NoLoss as error:
         raise ConfigError(f"{case.name}: rare: {spec.rare.estimator} {error}") from None
 
@@ -242,8 +244,8 @@ def design_of(estimator: Estimator, windows: list[int]) -> plans.Design:
         tolerance=estimator.tolerance,
         coherent=estimator.coherence_step,
         search=estimator.search_points,
-        spacing=estimator.search_spacing_rad,
-        margin=estimator.search_margin,
+        spacing=SEARCH_SPACING_RAD,
+        margin=SEARCH_MARGIN,
         from_truth=estimator.start == "truth",
         amplitude=("known", "estimated", "as_printed").index(estimator.amplitude),
         forecast=estimator.method == "sequence",

@@ -50,7 +50,6 @@ def own_gains(case: Case, made: Designed, baseline: int) -> missed.Problem:
         sigma=made.plots.sigma,
         bias=made.plots.bias,
         sigma_bias=made.plots.sigma_bias,
-        sigma_state=world.sigma_state(made.spec.target),
         sigma_flight=world.sigma_flight(made.spec.target),
         flight=world.flight(made.spec.target, made.t),
         detection=made.plots.detection,

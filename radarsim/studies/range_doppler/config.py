@@ -31,7 +31,9 @@ from radarsim.config.radial import (
     COEFFICIENTS,
     HARDEST_MPS2,
     MOST_SCANS,
+    AccelerationStart,
     Coefficients,
+    Polynomial,
     Starting,
     length_faults,
     number_of_scans,
@@ -81,28 +83,11 @@ class Radar(radial.Radar):
         return self.detection_probability == 1 and not any(errors)
 
 
-Spread = Annotated[tuple[NonNegative, ...], Field(max_length=3), Added()]
-DRAWN = "standard deviations with which the first three coefficients are drawn for each realisation"
-
-
-class Polynomial(radial.Polynomial):
-    """A range that is a polynomial of time; up to the second degree it fits the filters' model exactly."""
-
-    sigma_coefficients: Spread = Field((), title="σ of these derivatives", description=DRAWN)
-
-
-class AccelerationStart(radial.AccelerationStart):
-    """A polynomial that begins to accelerate (or brake) at a moment."""
-
-    sigma_coefficients: Spread = Field((), title="σ of these derivatives", description=DRAWN)
-
-
 class JerkPulse(Starting):
     """A polynomial with a jerk for a while; the acceleration it has built up stays."""
 
     kind: Literal["jerk_pulse"] = Field(title="kind", description="a constant jerk for a while")
     coefficients: Coefficients = Field(title="derivatives of the range at the first plot", description=COEFFICIENTS)
-    sigma_coefficients: Spread = Field((), title="σ of these derivatives", description=DRAWN)
     jerk_mps3: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = Field(
         title="jerk", description="radial jerk added during the pulse, m/s³"
     )

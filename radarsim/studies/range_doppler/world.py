@@ -28,12 +28,6 @@ def scan_times(spec: Keys) -> np.ndarray:
     return np.arange(spec.plots) * spec.radar.scan_period_s
 
 
-def sigma_state(target: Target) -> np.ndarray:
-    """Standard deviations (3,) with which range, velocity and acceleration at the first plot are drawn."""
-    drawn: tuple[float, ...] = getattr(target, "sigma_coefficients", ())
-    return np.array([*drawn, 0.0, 0.0, 0.0])[:3]
-
-
 def sigma_flight(target: Target) -> np.ndarray:
     """Standard deviations (6,) with which x, y, z (m) and vx, vy, vz (m/s) at the first plot are drawn.
 
@@ -47,7 +41,7 @@ def sigma_flight(target: Target) -> np.ndarray:
 
 def is_drawn(target: Target) -> bool:
     """Whether realisations have targets of their own."""
-    return bool(sigma_state(target).any() or sigma_flight(target).any())
+    return bool(sigma_flight(target).any())
 
 
 def flight(target: Target, t: np.ndarray) -> np.ndarray:

@@ -417,7 +417,6 @@ def test_without_the_key_a_case_is_the_one_it_was():
     ("keys", "words"),
     [
         ({"rare": {"filter": "oracle"}}, "rare.filter: must be the name of a filter of one order that lists its folds"),
-        ({"rare": {"filter": "memory", "plain_share": 1.0}}, "rare.plain_share: must be <= 0.9, got 1"),
         ({"rare": {"filter": "memory", "shift": 3}}, "rare.shift: unknown key"),
         ({"rare": {"filter": "memory"}, "scans": 65}, "rare: needs at most 64 scans, got 65"),
         ({"rare": {}}, "rare.filter: "),

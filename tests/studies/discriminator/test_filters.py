@@ -111,10 +111,6 @@ def test_a_perfect_forecast_needs_one():
     assert designer(sigma=designer().sigma * 1e-6).windows() == [30000]
 
 
-def test_least_window():
-    assert designer().windows(least_s=0.05)[0] == 5000
-
-
 def test_density_puts_windows_at_geometric_means():
     assert filters.denser([100, 400, 30000], 2) == [100, 200, 400, 3464, 30000]
     assert filters.denser([100, 800], 3) == [100, 200, 400, 800]

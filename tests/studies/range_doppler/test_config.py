@@ -191,7 +191,7 @@ TOP = "radar, target, filters, baseline, scans, duration_s, study, include, swee
 UNKNOWN = [
     ("radar.sigma_rnge_m", f"unknown key; did you mean sigma_range_m? allowed: {RADAR}"),
     ("filters.0.manoeuver_variance", f"unknown key; did you mean manoeuvre_variance? allowed: {FILTER}"),
-    ("target.coeficients", "unknown key; did you mean coefficients? allowed: kind, coefficients, sigma_coefficients"),
+    ("target.coeficients", "unknown key; did you mean coefficients? allowed: kind, coefficients"),
     ("scan", f"unknown key; did you mean scans? allowed: {TOP}"),
     ("realizations", f"unknown key; did you mean realisations? allowed: {TOP}"),
     ("radar.\n\x1b[2J", f"unknown key; allowed: {RADAR}"),
@@ -339,7 +339,6 @@ BEYOND = [
     ({"target": FLY_BY | {"start_range_m": 1e4}}, "target.start_range_m: must be >= distance_m, 15000, got 10000"),
     ({"target": FLY_BY | {"speed_mps": 2e4}}, "target.speed_mps: must be <= 12000, got 20000"),
     ({"target": {"kind": "recorded", "file": "none.csv"}}, "target.file: no such file: 'none.csv'"),
-    ({"target.sigma_coefficients": [1, 1, 1, 1]}, "target.sigma_coefficients: must hold at most 3, got [1, 1, 1, 1]"),
     ({"filters.0.process_noise": "jerk"}, "must be one of random_jerk, white_jerk, white_acceleration, got 'jerk'"),
     ({"filters.0.manoeuvre_variance": BEST | {"over": "most"}}, "over: must be one of worst, mean, last, got 'most'"),
     ({"filters.0.manoeuvre_variance": BEST | {"from_k": 16}}, "from_k: must be <= the number of scans, 15, got 16"),

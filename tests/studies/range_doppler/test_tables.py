@@ -376,7 +376,6 @@ def test_new_keys_are_outside_the_papers_experiment(expected_radar):
     changes = (
         {"radar": {"bias_velocity_mps": 1}},
         {"radar": {"sigma_bias_range_m": 1}},
-        {"target": {"kind": "polynomial", "coefficients": [100e3, -250, 4], "sigma_coefficients": [1]}},
     )
     filters = [
         {"name": "r", "observes": ["range"], "manoeuvre_variance": 1e-3, "process_noise": "white_jerk"},

@@ -95,7 +95,6 @@ def textbook(plots, observes, start, Q, dt=DT, sigma=SIGMA):
         {"radar": {"detection_probability": 0.7}},
         {"radar": {"detection_probability": 0.6}, "every_filter": {"initial_scans": 4, "process_noise": "white_jerk"}},
         {"radar": {"bias_range_m": 100, "sigma_bias_velocity_mps": 3, "sigma_bias_range_m": 50}},
-        {"target": {"kind": "polynomial", "coefficients": [5e4, -200], "sigma_coefficients": [1000, 50, 3]}},
         {"radar": {"detection_probability": 0.5, "scan_period_s": 0.01}, "scans": 30},
         {"target": TURN | DRAWN, "radar": {"detection_probability": 0.7}},
         {"target": FLY_BY | DRAWN},
@@ -142,7 +141,6 @@ def test_with_every_plot_both_kernels_agree():
         sigma=SIGMA,
         bias=np.zeros(2),
         sigma_bias=np.zeros(2),
-        sigma_state=np.zeros(3),
         sigma_flight=np.zeros(6),
         flight=np.zeros((0, 9)),
         detection=1.0,
@@ -327,7 +325,6 @@ def test_a_biased_range_moves_the_range_alone():
 WORLDS = {
     "biases": {"radar": {"bias_range_m": 40, "bias_velocity_mps": -2}},
     "drawn biases": {"radar": {"sigma_bias_range_m": 50, "sigma_bias_velocity_mps": 3, "bias_velocity_mps": 1}},
-    "drawn start": {"target": {"kind": "polynomial", "coefficients": [9e4], "sigma_coefficients": [1e3, 200, 5]}},
     "fly-by": {"target": FLY_BY, "scans": 25},
     "white jerk": {"every_filter": {"process_noise": "white_jerk"}},
     "white acceleration": {"every_filter": {"process_noise": "white_acceleration"}},
@@ -343,11 +340,6 @@ def test_sums_agree_with_the_exact_errors(name):
     assert np.abs(sigma / plan.axes.exact_sigma[there] - 1).max() < SIGMAS / np.sqrt(2 * count)
     bias = (sums["error"][..., 0] / count)[there]
     assert (np.abs(bias - plan.axes.exact_bias[there]) < SIGMAS * sigma / np.sqrt(count)).all()
-
-
-def test_a_drawn_start_changes_no_error():
-    drawn, fixed = prepared(**WORLDS["drawn start"]), prepared(target={"kind": "polynomial", "coefficients": [9e4]})
-    np.testing.assert_array_equal(drawn.axes.exact_sigma, fixed.axes.exact_sigma)
 
 
 def test_a_recorded_flight_is_seen_from_the_origin(tmp_path, monkeypatch):
@@ -565,7 +557,7 @@ def test_the_papers_noise_keeps_its_key():
     """Keys at their defaults change neither noise nor identity: an older config draws what it drew."""
     from radarsim.config.identity import canonical, world
 
-    given = load("rls2", ["radar.detection_probability=1", "radar.bias_range_m=0", "target.sigma_coefficients=[]"])
+    given = load("rls2", ["radar.detection_probability=1", "radar.bias_range_m=0"])
     plain = load("rls2").cases[0].spec
     assert world(given.cases[0].spec) == world(plain)
     assert canonical(given.cases[0].spec) == canonical(plain)

@@ -3,10 +3,9 @@
 import math
 
 from radarsim.kernels.compile import part
-from radarsim.kernels.lanes import address, full, get, put, where_greater
-from radarsim.kernels.linear import extrapolated
+from radarsim.kernels.lanes import full, get, put, where_greater
 from radarsim.kernels.random import fill_normal_pairs
-from radarsim.studies.range_doppler.kernels.chunk import CHUNK, EIGHTS, get3, put3
+from radarsim.studies.range_doppler.kernels.chunk import CHUNK, EIGHTS
 
 
 @part
@@ -33,29 +32,17 @@ def count_plots(at, k, detection, n):
 
 
 @part
-def draw_once(keys, first, made, bias, sigma_bias, sigma_state, sigma_flight):
-    """Biases, the start's difference and the flight's displacement of realisations first, first + 1, …"""
+def draw_once(keys, first, made, bias, sigma_bias, sigma_flight):
+    """Biases and the flight's displacement of realisations first, first + 1, …"""
     fill_normal_pairs(keys[2], first, 0, made.offset[0], made.offset[1])
-    fill_normal_pairs(keys[2], first, 1, made.state[0], made.state[1])
-    fill_normal_pairs(keys[2], first, 2, made.state[2], made.other)
     for m in range(2):
         for i in range(made.other.size):
             made.offset[m, i] = bias[m] + sigma_bias[m] * made.offset[m, i]
-    for c in range(3):
-        for i in range(made.other.size):
-            made.state[c, i] = sigma_state[c] * made.state[c, i]
     for c in range(3):
         fill_normal_pairs(keys[2], first, 3 + c, made.shift[2 * c], made.shift[2 * c + 1])
     for c in range(6):
         for i in range(made.other.size):
             made.shift[c, i] = sigma_flight[c] * made.shift[c, i]
-
-
-@part
-def advance_state(state, dt):
-    """The drawn difference of the truth one scan later, in place: a square of the time; by its address."""
-    for i in range(EIGHTS):
-        put3(state, i, extrapolated(*get3(state, i), dt))
 
 
 @part
@@ -72,15 +59,6 @@ def displace(made, flight, truth, t):
         pull = x * flight[2] + y * flight[5] + z * flight[8]
         state[0, i], state[1, i] = r - truth[0], v - truth[1]
         state[2, i] = (vx * vx + vy * vy + vz * vz + pull - v * v) / r - truth[2]
-
-
-@part
-def move_truth(made, k, dt, flight, truth):
-    """What is drawn of the truth (K, 3), in state, brought to scan k."""
-    if flight.shape[0] > 0:
-        displace(made, flight[k], truth[k], k * dt)
-    elif k > 0:
-        advance_state(address(made.state), dt)
 
 
 @part

@@ -14,7 +14,7 @@ from radarsim.kernels.lanes import WIDTH, address, row
 from radarsim.kernels.linear import CROSSED, fill_plots, plain
 from radarsim.kernels.random import fill_uniform_pairs
 from radarsim.studies.range_doppler.kernels.chunk import CHUNK, places, work
-from radarsim.studies.range_doppler.kernels.draws import count_plots, displace_plots, draw_once, move_truth
+from radarsim.studies.range_doppler.kernels.draws import count_plots, displace, displace_plots, draw_once
 from radarsim.studies.range_doppler.kernels.scores import OWN, PAIRED, pair, score
 from radarsim.studies.range_doppler.kernels.steps import advance, make_starts
 
@@ -29,8 +29,6 @@ class Problem(NamedTuple):
     sigma        (2,)          standard deviations of the plots' range and velocity
     bias         (2,)          their mean errors
     sigma_bias   (2,)          standard deviations of the errors that are drawn once a realisation
-    sigma_state  (3,)          standard deviations of the differences from the truth's first range, velocity and
-                               acceleration, drawn once a realisation
     sigma_flight (6,)          standard deviations of x, y, z and of vx, vy, vz at the first scan of a flight in space,
                                drawn once a realisation
     flight       (K or 0, 9)   that flight, (x, vx, ax, y, …), of which truth is the motion in range; none: not drawn
@@ -47,7 +45,6 @@ class Problem(NamedTuple):
     sigma: np.ndarray
     bias: np.ndarray
     sigma_bias: np.ndarray
-    sigma_state: np.ndarray
     sigma_flight: np.ndarray
     flight: np.ndarray
     detection: float
@@ -66,7 +63,6 @@ class Problem(NamedTuple):
             plain(self.sigma, 2),
             plain(self.bias, 2),
             plain(self.sigma_bias, 2),
-            plain(self.sigma_state, 3),
             plain(self.sigma_flight, 6),
             plain(self.flight, len(self.flight), 9),
             float(self.detection),
@@ -114,9 +110,9 @@ def shapes(filters: int, scans: int) -> dict[str, tuple[int, ...]]:
 
 
 @part
-def begin_chunk(keys, first, made, bias, sigma_bias, sigma_state, sigma_flight):
+def begin_chunk(keys, first, made, bias, sigma_bias, sigma_flight):
     """A new chunk: nothing has come yet, and what is drawn once a realisation is drawn; whether anything is."""
-    drawn = np.any(sigma_bias > 0.0) or np.any(sigma_state > 0.0) or np.any(sigma_flight > 0.0)
+    drawn = np.any(sigma_bias > 0.0) or np.any(sigma_flight > 0.0)
     made.count[:] = 0.0
     made.first[:] = 0.0
     made.x[:] = 0.0
@@ -126,15 +122,15 @@ def begin_chunk(keys, first, made, bias, sigma_bias, sigma_state, sigma_flight):
     for m in range(2):
         made.offset[m, :] = bias[m]
     if drawn:
-        draw_once(keys, first, made, bias, sigma_bias, sigma_state, sigma_flight)
+        draw_once(keys, first, made, bias, sigma_bias, sigma_flight)
     return drawn
 
 
 @kernel
 def add_block(made, first, count, problem, found):
     """`simulate_block` for a plain problem, with the work arrays of one chunk, into found (F, K, OWN + PAIRED)."""
-    keys, truth, sigma, bias, sigma_bias, sigma_state, sigma_flight, flight, detection, dt = problem[:10]
-    observes, start, Q, baseline = problem[10:]
+    keys, truth, sigma, bias, sigma_bias, sigma_flight, flight, detection, dt = problem[:9]
+    observes, start, Q, baseline = problem[9:]
     filters, scans, R, at, sums = observes.size, truth.shape[0], sigma * sigma, places(made), address(found)
     z, w, detected, other = made.plots[0], made.plots[1], made.detected, made.other
     running = np.zeros(filters, dtype=np.bool_)  # filters that have started in every realisation of the chunk
@@ -142,12 +138,12 @@ def add_block(made, first, count, problem, found):
         # A partial chunk is computed whole, with no plots beyond its end, so each realisation goes through the same
         # instructions.
         n = min(CHUNK, count - done)
-        drawn = begin_chunk(keys, first + done, made, bias, sigma_bias, sigma_state, sigma_flight)
+        drawn = begin_chunk(keys, first + done, made, bias, sigma_bias, sigma_flight)
         displaced = drawn or np.any(bias != 0.0)
         running[:] = False
         for k in range(scans):
-            if drawn:
-                move_truth(made, k, dt, flight, truth)
+            if drawn and flight.shape[0] > 0:
+                displace(made, flight[k], truth[k], k * dt)
             fill_plots(keys[0], first + done, k, truth[k], sigma, z, w)
             if displaced:
                 displace_plots(at)
@@ -169,11 +165,11 @@ def add_block(made, first, count, problem, found):
 @kernel
 def fill_simulated(made, first, problem, plots, detected, truth):
     """Realisation `first`: plots (K, 2), detected (K,) 1 where there is one, truth (K, 3); made: work arrays."""
-    spread = problem.sigma_bias, problem.sigma_state, problem.sigma_flight
+    spread = problem.sigma_bias, problem.sigma_flight
     drawn, at = begin_chunk(problem.keys, first, made, problem.bias, *spread), places(made)
     for k in range(plots.shape[0]):
-        if drawn:
-            move_truth(made, k, problem.dt, problem.flight, problem.truth)
+        if drawn and problem.flight.shape[0] > 0:
+            displace(made, problem.flight[k], problem.truth[k], k * problem.dt)
         fill_plots(problem.keys[0], first, k, problem.truth[k], problem.sigma, made.plots[0], made.plots[1])
         displace_plots(at)
         if problem.detection < 1.0 and k % 2 == 0:

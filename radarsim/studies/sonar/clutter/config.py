@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import Field, Strict
+from pydantic import Field
 
 from radarsim.config.fields import (
     Added,
@@ -19,6 +19,7 @@ from radarsim.config.fields import (
     at,
     cross_check,
 )
+from radarsim.config.rare import PLAIN_SHARE
 from radarsim.studies.sonar import config
 
 FIGURES = ("track_map", "confirmation", "track_life", "false_tracks", "track_classes")
@@ -152,20 +153,13 @@ class RareTracks(Model):
         "gates until they are confirmed; long_false_tracks: until they end; ended_tracks: further realisations of the "
         "target's track are drawn where it ends, with more misses, and worse or false plots while it is young",
     )
-    plain_share: Annotated[float, Strict(), Field(ge=0.01, le=0.9)] = Field(
-        0.1,
-        title="share of plain realisations",
-        json_schema_extra={"symbol": "α_0"},
-        description="share of the realisations that are drawn as they are, no unit; no weight is over one divided by "
-        "it",
-    )
 
     def shares(self) -> tuple[float, float, float]:
         """Shares of the laws that false tracks are drawn from: as they are, so that they are confirmed, and held on."""
         laws = ("false_tracks", "long_false_tracks")
-        each = (1.0 - self.plain_share) / max(sum(event in self.events for event in laws), 1)
+        each = (1.0 - PLAIN_SHARE) / max(sum(event in self.events for event in laws), 1)
         found, long = (each if event in self.events else 0.0 for event in laws)
-        return self.plain_share, found, long
+        return PLAIN_SHARE, found, long
 
     @property
     def seeks_false_tracks(self) -> bool:

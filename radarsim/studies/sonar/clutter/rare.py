@@ -19,6 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from radarsim.config.experiment import Case
+from radarsim.config.rare import PLAIN_SHARE
 from radarsim.studies.noise import noise_key
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.filters import Conditions, TrackerSpec, gate_threshold
@@ -112,7 +113,7 @@ def ends(case: Case, specs: Sequence[TrackerSpec], given: Conditions, labels: Cl
         direction[f, :, : len(at)] = directions(t[at], one.m)
         radius[f] = np.linalg.norm(direction[f], axis=1)
         far = np.flatnonzero(radius[f] > 0.0) if one.gate_probability < 1.0 else np.empty(0, dtype=np.int64)
-        own = family_shares(case.spec.rare.plain_share, (len(run), len(far), FALSE * (given.density > 0.0)))
+        own = family_shares(PLAIN_SHARE, (len(run), len(far), FALSE * (given.density > 0.0)))
         laws = [0, *range(1, 1 + len(run)), *(1 + most + far), *(range(-FALSE, 0) if given.density > 0.0 else [])]
         shares[f, laws] = own
         for j, each in enumerate(run):

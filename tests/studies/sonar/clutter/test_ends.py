@@ -33,10 +33,10 @@ SECTOR = ((7e3, 11e3), (math.radians(5), math.radians(40)))
 N = 20_000
 
 
-def keys_of(filters, density, detection, scans, sought=True, share=0.1, **more):
+def keys_of(filters, density, detection, scans, sought=True, **more):
     """The keys of a case whose ends of the target's track are sought, or are not."""
     keys = config(filters, density, detection, scans) | more
-    return keys | ({"rare": RARE | {"plain_share": share}} if sought else {})
+    return keys | ({"rare": RARE} if sought else {})
 
 
 def plan_of(*of, **more):
@@ -107,13 +107,13 @@ def test_runs_of_misses_end_tracks_as_their_exact_law_says(detection, m, n, miss
 
 
 def test_the_mean_weight_is_one_and_none_is_over_one_by_the_plain_share():
-    plan = plan_of([tracker("a"), tracker("b", "pda", 4, 6)], 0.1, 0.9, 15, share=0.2)
+    plan = plan_of([tracker("a"), tracker("b", "pda", 4, 6)], 0.1, 0.9, 15)
     plain, weight, squared = np.moveaxis(simulated(plan, N)["ended_drawn"], 1, 0)
     error = np.sqrt((squared / N - (weight / N) ** 2) / N)
     assert (np.abs(weight / N - 1) < 4 * error).all()
-    assert (np.abs(plain - 0.2 * N) < 4 * math.sqrt(0.16 * N)).all()
+    assert (np.abs(plain - 0.1 * N) < 4 * math.sqrt(0.09 * N)).all()
     for i in range(50):
-        assert plan.layout.unpack(STUDY.simulate(plan, i, 1))["ended_drawn"][:, 1].max() <= 5.0
+        assert plan.layout.unpack(STUDY.simulate(plan, i, 1))["ended_drawn"][:, 1].max() <= 10.0
 
 
 # ---- a twin ---------------------------------------------------------------------------------------------------------

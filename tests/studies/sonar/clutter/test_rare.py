@@ -30,10 +30,10 @@ SECTOR = ((7e3, 11e3), (math.radians(5), math.radians(40)))
 FOUR_OF_SIX = tracker("four of six", m=4, n=6)
 
 
-def case_of(filters, density, sought=True, scans=10, share=0.1, rare=RARE, **sensor):
+def case_of(filters, density, sought=True, scans=10, rare=RARE, **sensor):
     """A case whose false tracks are sought, or are not."""
     keys = config(filters, density, 0.9, scans, **sensor)
-    return load(keys | ({"rare": rare | {"plain_share": share}} if sought else {})).cases[0]
+    return load(keys | ({"rare": rare} if sought else {})).cases[0]
 
 
 def plan_of(*of, **more):
@@ -126,14 +126,14 @@ def test_pairs_of_false_plots_are_confirmed_as_their_exact_law_says(sector):
 
 
 def test_the_mean_weight_is_one_and_none_is_over_one_by_the_plain_share():
-    plan = plan_of([tracker("a"), FOUR_OF_SIX], 0.1, share=0.2)
+    plan = plan_of([tracker("a"), FOUR_OF_SIX], 0.1)
     plain, weight, squared = np.moveaxis(simulated(plan, 20_000)["drawn"], 1, 0)
     error = np.sqrt((squared / 20_000 - (weight / 20_000) ** 2) / 20_000)
     assert (np.abs(weight / 20_000 - 1) < 4 * error).all()
-    assert (np.abs(plain - 4000) < 4 * math.sqrt(3200)).all()
+    assert (np.abs(plain - 2000) < 4 * math.sqrt(1800)).all()
     for i in range(50):
         assert STUDY.simulate(plan, i, 1).max() >= 0
-        assert plan.layout.unpack(STUDY.simulate(plan, i, 1))["drawn"][:, 1].max() <= 5.0
+        assert plan.layout.unpack(STUDY.simulate(plan, i, 1))["drawn"][:, 1].max() <= 10.0
 
 
 @pytest.mark.parametrize("density", [0.3, pytest.param(1.5, marks=pytest.mark.slow)])
@@ -307,8 +307,6 @@ def test_without_the_key_a_case_is_the_one_it_was():
         ({"rare": {"events": []}}, "rare.events"),
         ({"rare": {"events": ["false tracks"]}}, "rare.events.0"),
         ({"rare": {"events": ["false_tracks"] * 2}}, "rare.events: must differ: false_tracks is there twice"),
-        ({"rare": RARE | {"plain_share": 1.0}}, "rare.plain_share: must be <= 0.9, got 1"),
-        ({"rare": RARE | {"plain_share": 0}}, "rare.plain_share: must be >= 0.01"),
         ({"rare": RARE | {"shift": 3}}, "rare.shift: unknown key"),
         ({"rare": RARE, "filters": [tracker("a", "known")]}, "rare: needs a filter that has to find its plots"),
         ({"rare": RARE, "sensor.false_plots_per_km2": 0.0}, "rare: needs false plots"),
