@@ -53,7 +53,7 @@ KEYS = ("errors", "config.faults", "config.fields", "config.radial", "config.rar
 DESIGN = ("kernels", "config", "design")
 SUMS = (*DESIGN, "study")
 SHOWN = (*SUMS, "cost", "tables", "figures", "map")
-READ = (*SHOWN, "words", "claims", "measures", "readings", "search")
+READ = (*SHOWN, "words", "measures", "readings", "search")
 ROLES = {
     "kernels": (("kernels", "bursts.kernels"), ("kernels",)),
     "config": (KEYS, ("config",)),
@@ -66,7 +66,6 @@ ROLES = {
     "tables": ((*GROUND, *DATA, "report"), SHOWN),
     "figures": ((*GROUND, *DATA, "report", "language"), SHOWN),
     "words": ((*GROUND, *DATA, "report", "language"), READ),
-    "claims": ((*GROUND, *DATA, "report"), READ),
     "measures": ((*GROUND, *DATA, "report"), READ),
     "readings": ((*GROUND, *DATA, "report"), READ),  # what the paper leaves open
     "search": ((*GROUND, *DATA, "report"), READ),  # its printed numbers under many readings
@@ -265,7 +264,7 @@ PLANTED = [
     ("studies.range_doppler.study", "radarsim.studies.registry"),
     ("studies.range_doppler.tables", "radarsim.studies.range_doppler.words"),
     ("studies.sonar.filters", "radarsim.studies.sonar.clutter.filters"),
-    ("studies.range_doppler.figures", "radarsim.studies.range_doppler.claims"),
+    ("studies.range_doppler.figures", "radarsim.studies.range_doppler.measures"),
     ("studies.range_doppler.words", "radarsim.studies.range_doppler.track"),
     ("studies.range_doppler.measures", "radarsim.app.configs"),
     ("studies.range_doppler.track", "radarsim.report.panels"),

@@ -93,7 +93,7 @@ def in_claims() -> Iterator[tuple[str, str, str]]:
         yield text, "", "radarsim/report/claims/rule.py"
     for name in registry.SHIPPED:
         for paper in filter(None, [registry.study(name).claims()]):
-            place = f"radarsim/studies/{name}/claims.py"
+            place = f"radarsim/studies/{name}/claims.yaml"
             yield paper.paper, "", place
             for claim in paper.claims:
                 for text in (claim.statement, claim.place, claim.reading, claim.unstated):

@@ -20,7 +20,7 @@ A study that follows this declares an object and writes no class:
 | `drawn_from` | `figures.DRAWN_FROM`, where there is one |
 | `question`, `answer` | functions of `words` |
 | `warnings`, if offered | the function of `words` |
-| `claims`, if there is a paper | `claims.CLAIMS`, judged by `measures.Evidence` |
+| `claims`, if there is a paper | those of `claims.yaml`, or `claims.CLAIMS`, judged by `measures.Evidence` |
 | `seconds_per_update`, `seconds_at_most`, if offered | functions of `cost` |
 | `shortened`, `exact_but_for`, `costly`, if offered | functions of `study` |
 | `readings`, if offered | an object of the class `readings.Readings` |
@@ -122,8 +122,9 @@ class StudyFolder(Study):
         if self.paper is None:
             return None
         from radarsim.report.claims import PaperClaims
+        from radarsim.report.claims.written import claims_of
 
-        return PaperClaims(self.file("claims").CLAIMS, self.file("measures").Evidence, *self.paper)
+        return PaperClaims(claims_of(self.file), self.file("measures").Evidence, *self.paper)
 
     def shipped(self) -> Path | None:
         (folder,) = import_module(self.package).__path__

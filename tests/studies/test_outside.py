@@ -156,7 +156,7 @@ EDITS = [  # file, text in it, its replacement, whether numbers may change
     ("config.py", 'description="the sensor"', 'description="a sensor"', False),
     ("words.py", "How well", "How badly", False),
     ("tables.py", '"x", "m", gain', '"y", "m", gain', False),
-    ("claims.py", "above(10)", "above(11)", False),
+    ("claims.yaml", "above: 10", "above: 11", False),
     ("track.py", "self.R = ", "self.R = 2 * ", False),
     ("__init__.py", "Kalman 1960", "Kalman 1961", False),
 ]

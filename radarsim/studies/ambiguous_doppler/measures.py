@@ -1,7 +1,6 @@
 """What is measured for the claims on folded velocity, from the tables."""
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from radarsim.report import claims
 from radarsim.report.claims import Series, ratio
@@ -9,8 +8,6 @@ from radarsim.report.statistics import Estimate
 
 if TYPE_CHECKING:
     import pandas as pd
-
-AT = 8  # scan at which gains are compared: the folds of the paper's centimetre radars are long decided
 
 
 class Evidence(claims.Evidence):
@@ -30,21 +27,17 @@ class Evidence(claims.Evidence):
         return Series(k, t, value, lo, hi)
 
 
-def gain(key: str, name: str, scan: int | None = AT) -> Callable[[Evidence], Estimate]:
-    """Gain of a filter in σ of the velocity against range alone at a scan, %; None: at the last."""
-
-    def measure(seen: Evidence) -> Estimate:
-        found = seen.gain(key, name, "Vr")
-        return found.last() if scan is None else found.at(scan)
-
-    return measure
+def velocity_gain(seen: Evidence, key: str, name: str, scan: int | Literal["last"]) -> Estimate:
+    """Gain of a filter in σ of the velocity against range alone at a scan, %."""
+    found = seen.gain(key, name, "Vr")
+    return found.at(scan) if isinstance(scan, int) else found.last()
 
 
-def above_at_the_end(key: str, name: str) -> Callable[[Evidence], Estimate]:
+def above_at_the_end(seen: Evidence, key: str, name: str) -> Estimate:
     """σ of the velocity above that of unfolded velocity at the last scan, %."""
-    return lambda seen: seen.above_oracle(key, name).last()
+    return seen.above_oracle(key, name).last()
 
 
-def worst_to_worst(key: str, name: str, single: str) -> Callable[[Evidence], Estimate]:
+def worst_to_worst(seen: Evidence, key: str, name: str, single: str) -> Estimate:
     """The largest σ of range over the scans, of a combination over that of a single order."""
-    return lambda seen: ratio(seen.curve(key, name, "r").largest(), seen.curve(key, single, "r").largest())
+    return ratio(seen.curve(key, name, "r").largest(), seen.curve(key, single, "r").largest())

@@ -6,16 +6,15 @@ one it states, and then its threshold c is the 1 of (14); its first window follo
 """
 
 import math
-from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from radarsim.bursts import fisher as exact
 from radarsim.bursts import schedule
-from radarsim.bursts.burst import LIGHT_MPS, balanced_inverse
+from radarsim.bursts.burst import balanced_inverse
 from radarsim.engine.results import CaseResult
 from radarsim.report import claims
 from radarsim.report.claims import Missing, certain
@@ -25,7 +24,6 @@ from radarsim.studies.discriminator.kernels.sums import LOCKS
 
 COMPUTED, PRINTED = "computed", "printed"
 READINGS = {COMPUTED: (2.25, 1.0), PRINTED: (9.0, 0.5)}  # noise variance, threshold c
-WORDS = {COMPUTED: "σ² = 2.25, c = 1", PRINTED: "σ² = 9, c = 0.5"}
 DOPPLER = (10e3, 180e3, -750e3, 1000e3)
 COMPONENTS = ("phi0", "f0", "f1", "f2", "f3")
 Key = str | tuple[str, float]  # a reading, or a swept key and its value
@@ -113,8 +111,8 @@ class Evidence(claims.Evidence):
         found = exact.spreads(exact.fisher_sums(burst, len(COMPONENTS), [burst.pulses - 1])[0])
         return certain(found[COMPONENTS.index(component)])
 
-    def as_far(self, key: Key, value: float) -> float:
-        """Share of bursts whose (7), the square of the amplitude, lies as far from its mean as a value, either way.
+    def as_far(self, key: Key, amplitude: float, power: int = 1) -> float:
+        """Share of bursts whose (7), the square of the amplitude, lies as far from its mean as a printed one's power.
 
         The sum of so many squares is Gaussian: of N samples with noise σ² it has a variance N (2σ⁴ + 2σ²A²).
         """
@@ -122,7 +120,7 @@ class Evidence(claims.Evidence):
         samples, noise = burst.pulses * round(burst.pulse_length_s / burst.sampling_period_s), burst.noise_variance
         square = burst.amplitude**2
         spread = 2 * math.sqrt((2 * noise**2 + 2 * noise * square) / samples)
-        return math.erfc(abs(value - square) / spread / math.sqrt(2))
+        return math.erfc(abs(amplitude**power - square) / spread / math.sqrt(2))
 
     def span(self, key: Key) -> Estimate:
         """How far ln L of the signal falls from its maximum to the mean level of its side lobes, over 2μ.
@@ -173,13 +171,13 @@ class Evidence(claims.Evidence):
             error = after
         return np.array(offsets)
 
-    def phase_lost(self, key: str) -> tuple[Estimate, Estimate]:
-        """Probability that the start's phase is over a quarter of a turn off the best: at first, largest afterwards.
+    def phase_lost(self, key: str, at: Literal["first", "later"]) -> float:
+        """Probability that the start's phase is over a quarter of a turn off the best: at first, or largest afterwards.
 
         Over the phase alone the likelihood is a cosine, so that from nearer scoring finds its maximum.
         """
         first, *later = (math.erfc(math.pi / 2 / sigma / math.sqrt(2)) for sigma in self.phase_offsets(key))
-        return certain(first), certain(max(later))
+        return first if at == "first" else max(later)
 
     def spare_window(self, key: Key, amplitude: float) -> Estimate:
         """First window less the shortest allowed at an amplitude, ms."""
@@ -189,51 +187,54 @@ class Evidence(claims.Evidence):
         """T_min (17) in ms at an amplitude."""
         return certain(1e3 * self.case(key).axes.shortest_window_s / amplitude**2)
 
-    def lock_loss(self, key: Key, other: Key, kind: str) -> Estimate:
-        """Lock of one case less that of another."""
-        return difference(self.lock(key, kind), self.lock(other, kind))
+
+def first_window(seen: Evidence, key: Key) -> float:
+    """The first window of the sequence, ms."""
+    return float(1e3 * seen.windows(key)[0])
 
 
-Measure = Callable[[Evidence], Estimate]
-OfReading = Callable[[Evidence, str], Estimate]
+def windows_counted(seen: Evidence, key: Key, first: bool) -> float:
+    """How many windows the sequence has, with the first or after it."""
+    return len(seen.windows(key)) - (not first)
 
 
-def potential_of(component: str) -> OfReading:
-    """Potential spread of a component."""
-    return lambda seen, key: seen.potential(key, component)
+def window_growth(seen: Evidence, better: Key, worse: Key) -> float:
+    """The first window of one case over that of another."""
+    return float(seen.windows(better)[0] / seen.windows(worse)[0])
 
 
-def closed_over_sum(component: str) -> Measure:
+def closed_over_sum(seen: Evidence, key: Key, component: str) -> float:
     """Potential spread of a component by the closed form over that by the sum over the pulses."""
-    c = COMPONENTS.index(component)
-    return lambda seen: certain(
-        seen.case(PRINTED).axes.potential_closed_form[c] / seen.potential(PRINTED, component).value
-    )
+    closed = seen.case(key).axes.potential_closed_form[COMPONENTS.index(component)]
+    return float(closed / seen.potential(key, component).value)
 
 
-def accuracy_of(component: str) -> OfReading:
-    """σ of the locked bursts over the potential one, at the last window of the sequence."""
-    return lambda seen, key: seen.accuracy(key, "sequence", component)
+def lock_above(seen: Evidence, key: Key, kind: str, other: str) -> Estimate:
+    """Lock of one estimator less that of another."""
+    return difference(seen.lock(key, kind), seen.lock(key, other))
 
 
-def wide_over_whole(component: str) -> OfReading:
-    """σ of the wide discriminator alone over the potential one of the whole burst."""
-    return lambda seen, key: seen.over_whole(key, "wide", component)
+def lock_loss(seen: Evidence, key: Key, other: Key, kind: str) -> Estimate:
+    """Lock of one case less that of another."""
+    return difference(seen.lock(key, kind), seen.lock(other, kind))
 
 
-def efficient(seen: Evidence, key: str) -> float:
-    """What an efficient estimator would score, see `Evidence.efficient`."""
-    return seen.efficient(key)
+def forecast_spread(seen: Evidence, key: Key, component: str) -> float:
+    """Printed potential spread times the printed factor."""
+    return float(SPREADS[component][0]) * FACTORS[component]
 
 
-def growth_of_first_window(key: str, better: float, worse: float) -> Measure:
-    """The first window at one value of a swept key over that at another."""
-    return lambda seen: certain(seen.windows((key, better))[0] / seen.windows((key, worse))[0])
+def doppler_of_polynomial(seen: Evidence, key: Key, t_s: float) -> float:
+    """Doppler frequency of the printed derivatives at a time, kHz."""
+    f0, f1, f2, f3 = DOPPLER
+    return 1e-3 * (f0 + f1 * t_s + f2 * t_s**2 / 2 + f3 * t_s**3 / 6)
 
 
-def loss_of_lock(key: str, value: float, other: float) -> Measure:
-    """Lock of the sequence at one value of a swept key less that at another."""
-    return lambda seen: seen.lock_loss((key, value), (key, other), "sequence")
+SPREADS = {  # as printed
+    **{"phi0": ("0.061", "rad"), "f0": ("0.45", "Hz"), "f1": ("12.2", "Hz/s"), "f2": ("183.38", "Hz/s²")},
+    "f3": ("1213.04", "Hz/s³"),
+}
+FACTORS = {"phi0": 100, "f0": 150, "f1": 500, "f2": 1000, "f3": 2000}
 
 
 def kind_of(estimator: Any, threshold: float) -> str:
@@ -250,27 +251,3 @@ def kind_of(estimator: Any, threshold: float) -> str:
     if e.first_windows == 1:
         return "wide"
     return "other" if e.first_windows else "cured" if e.search_points else "sequence"
-
-
-CARRIER_HZ = 10e9
-SPEEDS = {0.0: 0.0, 0.1: 350.0, 0.2: 450.0, 0.3: 475.0}  # s: m/s, as the paper states the motion
-
-
-def doppler_of_speed(t: float) -> float:
-    """Doppler frequency of the stated radial speed at a time, kHz: 2v/λ."""
-    return 2e-3 * SPEEDS[t] * CARRIER_HZ / LIGHT_MPS
-
-
-def doppler_of_polynomial(t: float) -> Estimate:
-    """Doppler frequency of the printed derivatives at a time, kHz."""
-    f0, f1, f2, f3 = DOPPLER
-    return certain(1e-3 * (f0 + f1 * t + f2 * t**2 / 2 + f3 * t**3 / 6))
-
-
-SPREADS = {"phi0": 0.061, "f0": 0.45, "f1": 12.2, "f2": 183.38, "f3": 1213.04}  # as printed
-FACTORS = {"phi0": 100, "f0": 150, "f1": 500, "f2": 1000, "f3": 2000}
-
-
-def forecast_spread(component: str) -> Estimate:
-    """Printed potential spread times the printed factor."""
-    return certain(SPREADS[component] * FACTORS[component])

@@ -7,8 +7,7 @@ import numpy as np
 
 from radarsim.report.claims.search import Printed, Search
 from radarsim.studies.discriminator import versions
-from radarsim.studies.discriminator.claims import SPREADS
-from radarsim.studies.discriminator.measures import ESTIMATE
+from radarsim.studies.discriminator.measures import ESTIMATE, SPREADS
 from radarsim.studies.discriminator.readings import BURST, LEAST_RATIO, PRINTED_PRIOR
 from radarsim.studies.discriminator.versions import Version
 

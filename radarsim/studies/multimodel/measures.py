@@ -5,14 +5,13 @@ Cases are found by target, scan period and what their filters are, whatever thei
 and bank.
 """
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Literal
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import claims
-from radarsim.report.claims import Part, Range, certain
 from radarsim.report.statistics import Estimate
 from radarsim.studies.multimodel import cost, filters, tables
 
@@ -20,14 +19,7 @@ BANK_122 = ("uniform 0.05", "accelerated 0.05", "accelerated 30")
 BANK_11 = ("uniform 5", "uniform 30")
 MATRIX_122 = ((0.996, 0, 0.002), (0, 0.996, 0.002), (0.004, 0.004, 0.996))
 MATRIX_11 = ((0.995, 0.01), (0.005, 0.99))
-MMA2_122 = ("imm", "combined", BANK_122)
-MMA2_11 = ("imm", "combined", BANK_11)
-RIVALS = (
-    MMA2_11,
-    *(("kalman", "", (model,)) for model in ("uniform 20", "uniform 5", "accelerated 20", "accelerated 1")),
-)
 COMPONENTS = {"y": 3, "vy": 4}
-UNITS = {"y": "height", "vy": "rate of climb"}
 DURATION = 186.2  # s, of every shipped flight, as printed
 STAGES = {  # the shipped flights, as their stages tell them apart: names, and ends in s
     "aeroballistic": (("start", 20), ("ballistic", 125), ("manoeuvre", 170), ("after", None)),
@@ -36,7 +28,6 @@ STAGES = {  # the shipped flights, as their stages tell them apart: names, and e
     "airliner": (("start", 20), ("steady", None)),
     "weaving": (("start", 20), ("steady", 30), ("manoeuvre", 150), ("after", None)),
 }
-AEROBALLISTIC = ("start", "ballistic", "manoeuvre", "after")
 
 
 def is_flight(target: Any, flight: str) -> bool:
@@ -103,11 +94,11 @@ class Evidence(claims.Evidence):
         return tables.stage_gain(of, self.filter(key, wanted), self.filter(key, base), s, COMPONENTS[component])
 
     def probability(self, key: tuple, wanted: tuple, stage: str, model: int) -> Estimate:
-        """Mean probability of a model (from 0) over the reported scans of a stage; ends of intervals are averaged."""
+        """Mean probability of a model (from 1) over the reported scans of a stage; ends of intervals are averaged."""
         of, f = self.case(key), self.filter(key, wanted)
         rows = self.tables["probabilities"]
         t = self._bounds(of, stage)
-        own = rows[(rows["case"] == of.name) & (rows["filter"] == of.axes.filters[f]) & (rows["model"] == model + 1)]
+        own = rows[(rows["case"] == of.name) & (rows["filter"] == of.axes.filters[f]) & (rows["model"] == model)]
         own = own[(own["t_s"] >= t[0]) & (own["t_s"] < t[1])]
         return Estimate(*(float(own[name].mean()) for name in ("probability", "probability_lo", "probability_hi")))
 
@@ -194,15 +185,14 @@ def cost_of_merging_early(seen: Evidence, key: tuple, wanted: tuple) -> float:
     return float(early / late)
 
 
-def blocks_over(key: tuple, wanted: tuple, family: str, which: int, power: int) -> Callable[[Evidence], Estimate]:
-    """Extrapolations (which = 0) or updates (1) of a family with a filter's bank of N models, over a power of N."""
-
-    def measure(seen: Evidence) -> Estimate:
-        options = seen.case(key).spec.filters[seen.filter(key, wanted)]
-        T = filters.transition_matrix(options.transition)
-        return certain(cost.blocks(family, T, merged_first=False)[which].sum() / len(T) ** power)
-
-    return measure
+def blocks_over(
+    seen: Evidence, key: tuple, wanted: tuple, family: str, of: Literal["extrapolations", "updates"], power: int
+) -> float:
+    """Extrapolations or updates of a family with a filter's bank of N models, over a power of N."""
+    options = seen.case(key).spec.filters[seen.filter(key, wanted)]
+    T = filters.transition_matrix(options.transition)
+    counted = cost.blocks(family, T, merged_first=False)[of == "updates"]
+    return float(counted.sum() / len(T) ** power)
 
 
 def bend(range_m: float, sigma_range_m: np.ndarray, sigma_angle_rad: np.ndarray) -> np.ndarray:
@@ -216,8 +206,11 @@ def bend(range_m: float, sigma_range_m: np.ndarray, sigma_angle_rad: np.ndarray)
 SIGMA_RANGE_M, SIGMA_ANGLE_RAD = (1.0, 150.0), tuple(np.radians(np.array([2.0, 15.0]) / 60))  # as P2 prints them
 
 
-def share_linear(range_m: float, even_logarithms: bool = False, most: float = 0.1, steps: int = 1000) -> float:
+def share_linear(
+    seen: Evidence | None, key: tuple, range_m: float, even_logarithms: bool = False, most: float = 0.1
+) -> float:
     """Share of the printed accuracies of radars of which `bend` is at most so much; each range is spread evenly."""
+    steps = 1000
     middles = (np.arange(steps) + 0.5) / steps
     axes = [
         low * (high / low) ** middles if even_logarithms else low + (high - low) * middles
@@ -226,57 +219,21 @@ def share_linear(range_m: float, even_logarithms: bool = False, most: float = 0.
     return float(np.mean(bend(range_m, *np.meshgrid(*axes)) <= most))
 
 
-def rival_parts(key: tuple, stages: tuple[str, ...], expected: Range) -> tuple[Part, ...]:
-    """MMA2-122 against the best of the other five, by stage and component: the paired gain of MMA2-122 over it, %."""
-
-    def measure(stage: str, component: str) -> Callable[[Evidence], Estimate]:
-        def least(seen: Evidence) -> Estimate:
-            gains = [seen.stage_gain(key, MMA2_122, rival, stage, component) for rival in RIVALS]
-            return min(gains, key=lambda of: of.value)
-
-        return least
-
-    return tuple(
-        Part(
-            (key,),
-            f"gain over the best other one, {UNITS[c]}, {key[0]}, stage {stage}",
-            "%",
-            measure(stage, c),
-            expected,
-        )
-        for stage in stages
-        for c in COMPONENTS
-    )
+def gain_over_best(
+    seen: Evidence, key: tuple, wanted: tuple, rivals: Sequence[tuple], stage: str, component: str
+) -> Estimate:
+    """The paired gain of a filter over the best of its rivals over a stage, %."""
+    return min((seen.stage_gain(key, wanted, one, stage, component) for one in rivals), key=lambda of: of.value)
 
 
-def gain_part(key: tuple, wanted: tuple, base: tuple, stage: str, component: str, expected: Range, words: str) -> Part:
-    """Paired gain of one filter over another."""
-    what = f"gain of {words}, {UNITS[component]}, stage {stage}"
-    return Part((key,), what, "%", lambda seen: seen.stage_gain(key, wanted, base, stage, component), expected)
-
-
-def probability_part(key: tuple, wanted: tuple, stage: str, model: int, expected: Range) -> Part:
-    """Mean probability of a model over a stage."""
-    what = f"mean probability of model {model + 1}, {key[0]}, stage {stage}"
-    return Part((key,), what, "", lambda seen: seen.probability(key, wanted, stage, model), expected)
-
-
-def lead_part(key: tuple, wanted: tuple, stage: str, model: int, expected: Range) -> Part:
+def lead(seen: Evidence, key: tuple, wanted: tuple, stage: str, model: int) -> Estimate:
     """By how much a model's mean probability exceeds the largest of the others'."""
-
-    def measure(seen: Evidence) -> Estimate:
-        own = seen.probability(key, wanted, stage, model)
-        others = [seen.probability(key, wanted, stage, m) for m in range(len(wanted[2])) if m != model]
-        top = max(others, key=lambda of: of.value)
-        return Estimate(own.value - top.value, own.lo - top.hi, own.hi - top.lo)
-
-    return Part((key,), f"lead of model {model + 1} over the next, {key[0]}, stage {stage}", "", measure, expected)
+    every = range(1, len(wanted[2]) + 1)
+    own = seen.probability(key, wanted, stage, model)
+    top = max((seen.probability(key, wanted, stage, m) for m in every if m != model), key=lambda of: of.value)
+    return Estimate(own.value - top.value, own.lo - top.hi, own.hi - top.lo)
 
 
-def cost_part(key: tuple, wanted: tuple, base: tuple, expected: Range, words: str) -> Part:
+def cost_over(seen: Evidence, key: tuple, wanted: tuple, base: tuple) -> float:
     """Ratio of counted operations of two filters."""
-
-    def measure(seen: Evidence) -> Estimate:
-        return certain(seen.operations(key, wanted) / seen.operations(key, base))
-
-    return Part((key,), f"operations of {words}", "", measure, expected)
+    return seen.operations(key, wanted) / seen.operations(key, base)

@@ -1,7 +1,5 @@
 """What is measured for the claims on the chain, from the tables."""
 
-from collections.abc import Callable
-
 from radarsim.report import claims
 from radarsim.report.claims import ratio
 from radarsim.report.statistics import Estimate
@@ -17,11 +15,6 @@ class Evidence(claims.Evidence):
         return Estimate(*(float(row[column]) for column in ("over_ideal", "over_ideal_lo", "over_ideal_hi")))
 
 
-def over_ideal(key: str, name: str, component: str) -> Callable[[Evidence], Estimate]:
-    """σ at the last scan over the idealisation's."""
-    return lambda seen: seen.over_ideal(key, name, component)
-
-
-def last_to_last(key: str, name: str, other: str, component: str) -> Callable[[Evidence], Estimate]:
+def last_to_last(seen: Evidence, key: str, name: str, other: str, component: str) -> Estimate:
     """σ at the last scan, of a filter over that of another."""
-    return lambda seen: ratio(seen.curve(key, name, component).last(), seen.curve(key, other, component).last())
+    return ratio(seen.curve(key, name, component).last(), seen.curve(key, other, component).last())

@@ -5,16 +5,16 @@ variance are the paper's, whatever its name.
 """
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.report import claims
-from radarsim.report.claims import Part, Range, Series, certain, common_times, minus, ratio
+from radarsim.report.claims import Series, certain, common_times, minus, ratio
 from radarsim.report.statistics import Estimate, difference
 from radarsim.studies.range_doppler import exact, tables
 
@@ -107,31 +107,48 @@ class Evidence(claims.Evidence):
         return found
 
 
-Measure = Callable[[Evidence], Estimate]
-Comparison = Callable[[Evidence, int, int], Estimate]  # of a slow and a fast radar
-Number = Callable[[Evidence], float]
+Pick = Literal["largest", "least", "first", "last", "when_largest", "scan_of_largest"] | int  # or the scan itself
 
 
 def _as_long_as_the_papers(series: Series) -> Series:
     return series.where(series.t <= DURATION + 1e-6)
 
 
-def gain_part(radar: int, component: str, pick: str, what: str, expected: Range, first: int = 2) -> Part:
-    """A part on one radar's gain: largest, least, first or last of it from scan `first` on."""
-    return Part(
-        (radar,),
-        f"{what} {COMPONENTS[component]} gain",
-        "%",
-        lambda seen: getattr(seen.k_gain(radar, component).since(first), pick)(),
-        expected,
-    )
+def _picked(series: Series, pick: Pick) -> Estimate:
+    if pick == "scan_of_largest":
+        return series.when_largest("k")
+    found: Estimate = series.at(pick) if isinstance(pick, int) else getattr(series, pick)()
+    return found
 
 
-def faster_part(
-    slow: int, fast: int, what: str, unit: str, measure: Comparison, expected: Range, scale: Number | None = None
-) -> Part:
-    """A part that compares two radars differing only in their period: measure(evidence, slow, fast)."""
-    return Part((slow, fast), what, unit, lambda seen: measure(seen, slow, fast), expected, scale)
+# ---- gains --------------------------------------------------------------------------------------------------------
+def gain(seen: Evidence, radar: int, component: str, pick: Pick, since: int = 2, upto: int | None = None) -> Estimate:
+    """A point of a radar's gain over the scans from `since` to `upto`, %."""
+    found = seen.k_gain(radar, component).since(since)
+    return _picked(found if upto is None else found.upto(upto), pick)
+
+
+def extreme_gain(
+    seen: Evidence, *radars: int, which: Literal["least", "largest"], component: str, pick: Pick
+) -> Estimate:
+    """The least or the largest of these radars' gains, %."""
+    found = [gain(seen, radar, component, pick) for radar in radars]
+    return min(found) if which == "least" else max(found)
+
+
+def gain_above(
+    seen: Evidence, *radars: int, component: str, high: int, which: Literal["least", "largest"], pick: Pick
+) -> Estimate:
+    """Gain of the first `high` radars, the least or the largest of them, less the largest of the others, points."""
+    upper = extreme_gain(seen, *radars[:high], which=which, component=component, pick=pick)
+    return difference(upper, extreme_gain(seen, *radars[high:], which="largest", component=component, pick=pick))
+
+
+def above_all_others(seen: Evidence, radar: int, component: str, scans: Collection[int]) -> Estimate:
+    """The least gain of a radar at these scans less its largest at any other, points."""
+    found = seen.k_gain(radar, component)
+    own = np.isin(found.k, list(scans))
+    return difference(found.where(own).least(), found.where(~own).largest())
 
 
 def gain_raised(seen: Evidence, slow: int, fast: int) -> Estimate:
@@ -162,285 +179,176 @@ def apart_in_time(one: tuple[Estimate, Estimate], other: tuple[Estimate, Estimat
     return Estimate(float(gap), float(least), float(gap))
 
 
-def apart(component: str) -> Comparison:
+def apart(seen: Evidence, slow: int, fast: int, component: str) -> Estimate:
     """How far two radars' gains lie apart at most, in % of the larger curve's height, over common times."""
-
-    def measure(seen: Evidence, slow: int, fast: int) -> Estimate:
-        a, b = common_times(seen.k_gain(fast, component), seen.k_gain(slow, component))
-        gap = minus(a, b)
-        sign = np.sign(gap.value)
-        ends = np.where(sign < 0, -gap.hi, gap.lo), np.where(sign < 0, -gap.lo, gap.hi)
-        size = Series(gap.k, gap.t, abs(gap.value), *ends, short=gap.short)
-        height = max(a.largest().value, b.largest().value)
-        if height <= 0:
-            raise claims.Missing("there is no gain")
-        worst = size.largest()
-        return Estimate(*(100 * max(part, 0.0) / height for part in worst))
-
-    return measure
+    a, b = common_times(seen.k_gain(fast, component), seen.k_gain(slow, component))
+    gap = minus(a, b)
+    sign = np.sign(gap.value)
+    ends = np.where(sign < 0, -gap.hi, gap.lo), np.where(sign < 0, -gap.lo, gap.hi)
+    size = Series(gap.k, gap.t, abs(gap.value), *ends, short=gap.short)
+    height = max(a.largest().value, b.largest().value)
+    if height <= 0:
+        raise claims.Missing("there is no gain")
+    return Estimate(*(100 * max(part, 0.0) / height for part in size.largest()))
 
 
-def sigma_change(observes: tuple[str, ...], component: str, pick: str) -> Comparison:
-    """σ fast − σ slow of two radars, first or last of each."""
-
-    def measure(seen: Evidence, slow: int, fast: int) -> Estimate:
-        a, b = (getattr(seen.sigma(radar, observes, component), pick)() for radar in (fast, slow))
-        return difference(a, b)
-
-    return measure
-
-
-def sigma_of(radar: int, observes: tuple[str, ...], component: str, pick: str) -> Number:
-    """σ of a radar, first or last, as what a margin is a share of."""
-    return lambda seen: getattr(seen.sigma(radar, observes, component), pick)().value
-
-
-def largest_rise(radar: int, observes: tuple[str, ...], component: str, since: int) -> Measure:
-    """The largest rise of σ over an earlier scan's from scan `since` on, in % of that; 0 where it never rises."""
-
-    def measure(seen: Evidence) -> Estimate:
-        sigma = seen.sigma(radar, observes, component).since(since)
-        sigma.last()
-        rises = [ratio(sigma.point(j), sigma.where(slice(0, j)).least(), 100) for j in range(1, len(sigma.k))]
-        worst = max(rises)
-        return Estimate(*(max(part - 100, 0.0) for part in worst))
-
-    return measure
-
-
-def likeness(radar: int, one: str, other: str) -> Measure:
+def likeness(seen: Evidence, radar: int, one: str, other: str) -> Estimate:
     """Correlation over the scans of two components' gains of a radar; half-widths of all points add in squares."""
-
-    def measure(seen: Evidence) -> Estimate:
-        a, b = common_times(seen.k_gain(radar, one), seen.k_gain(radar, other))
-        a.last()
-        value = float(np.corrcoef(a.value, b.value)[0, 1])
-        steps = np.diag((a.hi - a.lo) / 2), np.diag((b.hi - b.lo) / 2)
-        with np.errstate(invalid="ignore"):  # of one realisation they are infinite
-            moved = [np.corrcoef(a.value + step, b.value)[0, 1] for step in steps[0]]
-            moved += [np.corrcoef(a.value, b.value + step)[0, 1] for step in steps[1]]
-        half = float(np.sqrt(np.sum((np.array(moved) - value) ** 2)))
-        return Estimate(value, value - half, value + half)
-
-    return measure
+    a, b = common_times(seen.k_gain(radar, one), seen.k_gain(radar, other))
+    a.last()
+    value = float(np.corrcoef(a.value, b.value)[0, 1])
+    steps = np.diag((a.hi - a.lo) / 2), np.diag((b.hi - b.lo) / 2)
+    with np.errstate(invalid="ignore"):  # of one realisation they are infinite
+        moved = [np.corrcoef(a.value + step, b.value)[0, 1] for step in steps[0]]
+        moved += [np.corrcoef(a.value, b.value + step)[0, 1] for step in steps[1]]
+    half = float(np.sqrt(np.sum((np.array(moved) - value) ** 2)))
+    return Estimate(value, value - half, value + half)
 
 
-def gain_by_variance(radar: int) -> Measure:
+def gain_by_variance(seen: Evidence, radar: int) -> Estimate:
     """Final range gain at the greatest D_M at hand less that at the least, points; without its sign."""
-
-    def measure(seen: Evidence) -> Estimate:
-        found = seen.variances(radar)
-        ends = [_as_long_as_the_papers(_gain_at(seen, (radar, v))).last() for v in (found[0], found[-1])]
-        of = difference(*ends)
-        return of if of.value >= 0 else Estimate(-of.value, -of.hi, -of.lo)
-
-    return measure
+    keys = [(radar, seen.variances(radar)[end]) for end in (0, -1)]
+    gains = [seen.marked(seen.gain(key, seen.filter(key, RV), "r"), key) for key in keys]
+    of = difference(*(_as_long_as_the_papers(one).last() for one in gains))
+    return of if of.value >= 0 else Estimate(-of.value, -of.hi, -of.lo)
 
 
-def _gain_at(seen: Evidence, key: tuple[int, float]) -> Series:
-    return seen.marked(seen.gain(key, seen.filter(key, RV), "r"), key)
-
-
-def ineffective_from(radar: int, asked_s: float) -> Measure:
+def ineffective_from(seen: Evidence, radar: int, asked_s: float) -> Estimate:
     """The first time at which the acceleration gain is gone (zero or a loss); missing where the run is over before
     the time that is asked about.
     """
-
-    def measure(seen: Evidence) -> Estimate:
-        gain = seen.k_gain(radar, "ar")
-        gain.last()
-        if gain.t[-1] < asked_s and gain.value.min() > 0:
-            raise claims.Missing(f"the run of RLS {radar} ends at {gain.t[-1]:g} s, before {asked_s:g} s")
-        times = []
-        for part in (gain.value, gain.lo, gain.hi):
-            gone = np.flatnonzero(part <= 0)
-            times.append(float(gain.t[gone[0]]) if gone.size else np.inf)
-        return Estimate(times[0], times[1], times[2])
-
-    return measure
+    found = seen.k_gain(radar, "ar")
+    found.last()
+    if found.t[-1] < asked_s and found.value.min() > 0:
+        raise claims.Missing(f"the run of RLS {radar} ends at {found.t[-1]:g} s, before {asked_s:g} s")
+    gone = [found.t[part <= 0] for part in (found.value, found.lo, found.hi)]
+    return Estimate(*(float(times[0]) if times.size else np.inf for times in gone))
 
 
-def least_minus_largest(
-    component: str, high: tuple[int, ...], low: tuple[int, ...], pick: str, strict: bool
-) -> Measure:
-    """Gain of radars `high` less the largest of radars `low`: the least of high (strict), or its largest."""
-
-    def measure(seen: Evidence) -> Estimate:
-        upper = [getattr(seen.k_gain(radar, component), pick)() for radar in high]
-        lower = [getattr(seen.k_gain(radar, component), pick)() for radar in low]
-        return difference((min if strict else max)(upper), max(lower))
-
-    return measure
+def loss_scans(seen: Evidence, radar: int) -> Estimate:
+    """Scans at which a radar loses in acceleration; the interval counts the sure ones, and the possible ones."""
+    found = seen.k_gain(radar, "ar")
+    found.last()
+    return Estimate(*(float(np.sum(part < 0)) for part in (found.value, found.hi, found.lo)))
 
 
-def final_share(seen: Evidence) -> Estimate:
-    """Δσ_r at the end in % of its largest value, RLS 2."""
-    apart = range_difference(seen)
+def after_loss(seen: Evidence, radar: int) -> Estimate:
+    """The largest acceleration gain of a radar after its first scan with a loss."""
+    found = seen.k_gain(radar, "ar")
+    lost = np.flatnonzero(found.value < 0)
+    return found.where(slice(int(lost[0]) + 1 if lost.size else len(found.k) - 1, None)).largest()
+
+
+def after_peak(seen: Evidence, radar: int) -> Estimate:
+    """The largest range gain less the last one."""
+    return difference(gain(seen, radar, "r", "largest"), gain(seen, radar, "r", "last"))
+
+
+def rise(seen: Evidence, radar: int) -> Estimate:
+    """The largest rise of the velocity gain over an earlier scan's."""
+    found = seen.k_gain(radar, "Vr")
+    found.last()
+    return max(difference(found.point(j), found.where(slice(0, j)).least()) for j in range(1, len(found.k)))
+
+
+def fall(seen: Evidence, radar: int) -> Estimate:
+    """The velocity gain at the end less that at its first scan."""
+    return difference(gain(seen, radar, "Vr", "last"), gain(seen, radar, "Vr", "first"))
+
+
+# ---- σ ------------------------------------------------------------------------------------------------------------
+def sigma_of(
+    seen: Evidence, radar: int, *others: int, observes: tuple[str, ...], component: str, pick: Pick
+) -> Estimate:
+    """A point of σ(k) of the first of these radars."""
+    return _picked(seen.sigma(radar, observes, component), pick)
+
+
+def sigma_change(
+    seen: Evidence, slow: int, fast: int, observes: tuple[str, ...], component: str, pick: Pick
+) -> Estimate:
+    """σ fast − σ slow of two radars, first or last of each."""
+    return difference(*(_picked(seen.sigma(radar, observes, component), pick) for radar in (fast, slow)))
+
+
+def largest_rise(seen: Evidence, radar: int, observes: tuple[str, ...], component: str, since: int) -> Estimate:
+    """The largest rise of σ over an earlier scan's from scan `since` on, in % of that; 0 where it never rises."""
+    sigma = seen.sigma(radar, observes, component).since(since)
+    sigma.last()
+    worst = max(ratio(sigma.point(j), sigma.where(slice(0, j)).least(), 100) for j in range(1, len(sigma.k)))
+    return Estimate(*(max(part - 100, 0.0) for part in worst))
+
+
+def final_share(seen: Evidence, radar: int) -> Estimate:
+    """Δσ_r at the end in % of its largest value."""
+    apart = range_difference(seen, radar)
     return ratio(apart.last(), apart.largest(), 100)
 
 
-def range_difference(seen: Evidence) -> Series:
-    """Δσ_r(k) = σ_r(r) − σ_r(r,V_r) of RLS 2, from k = 2.
+def range_difference(seen: Evidence, radar: int) -> Series:
+    """Δσ_r(k) = σ_r(r) − σ_r(r,V_r), from k = 2.
 
     Taken as independent: the common noise makes the two errors alike, so the interval is too wide, never too narrow.
     """
-    return minus(seen.sigma(2, R, "r").since(2), seen.sigma(2, RV, "r").since(2))
+    return minus(seen.sigma(radar, R, "r").since(2), seen.sigma(radar, RV, "r").since(2))
 
 
-def final_to_fourth(observes: tuple[str, ...]) -> Measure:
-    """σ of range of RLS 2 at the end in % of that at the 4th scan."""
-
-    def measure(seen: Evidence) -> Estimate:
-        sigma = seen.sigma(2, observes, "r")
-        return ratio(sigma.last(), sigma.at(4), scale=100)
-
-    return measure
+def final_to_fourth(seen: Evidence, radar: int, observes: tuple[str, ...]) -> Estimate:
+    """σ of range at the end in % of that at the 4th scan."""
+    sigma = seen.sigma(radar, observes, "r")
+    return ratio(sigma.last(), sigma.at(4), scale=100)
 
 
-def largest_early(radar: int) -> Measure:
-    """The largest acceleration gain up to the fifth scan."""
-    return lambda seen: seen.k_gain(radar, "ar").upto(5).largest()
+def by_variance(
+    seen: Evidence, radar: int, of: Literal["final_range", "settling"], observes: tuple[str, ...]
+) -> Estimate:
+    """Final σ of the range, or its settling in scan periods, at the least D_M at hand less that at the greatest."""
+    keys = [(radar, seen.variances(radar)[end]) for end in (0, -1)]
+    if of == "final_range":
+        return difference(*(seen.whole_sigma(key, observes, "r").last() for key in keys))
+    small, large = (seen.settling(key, observes) for key in keys)
+    if not np.isfinite(small.value):  # not settled within the run: later than its end
+        low = min(small.lo, float(seen.case(keys[0]).axes.k[-1] - 1))
+        return Estimate(np.inf, low - large.hi, np.inf)
+    return difference(small, large)
 
 
-def first_velocity(radar: int) -> Measure:
-    """σ of the velocity at the first scan, with velocity."""
-    return lambda seen: seen.sigma(radar, RV, "Vr").at(1)
-
-
-def settling(radar: int) -> Measure:
-    """The same of one radar, range only."""
-    return lambda seen: seen.settling(radar, R)
-
-
-def last_range(observes: tuple[str, ...]) -> Callable[[Evidence, Key], Estimate]:
-    """σ of the range of the filter that observes these at the end of the run."""
-    return lambda seen, key: seen.whole_sigma(key, observes, "r").last()
-
-
-def settling_of(observes: tuple[str, ...]) -> Callable[[Evidence, Key], Estimate]:
-    """Scan periods in which σ of the range of the filter that observes these settles."""
-    return lambda seen, key: seen.settling(key, observes)
-
-
-def by_variance(radar: int, measure: Callable[[Evidence, Key], Estimate]) -> Measure:
-    """measure(evidence, key) at the least D_M at hand less that at the greatest."""
-
-    def compared(seen: Evidence) -> Estimate:
-        found = seen.variances(radar)
-        small, large = (measure(seen, (radar, v)) for v in (found[0], found[-1]))
-        if not np.isfinite(small.value):  # not settled within the run: later than its end
-            end = float(seen.case((radar, found[0])).axes.k[-1] - 1)
-            low = min(small.lo, end)
-            return Estimate(np.inf, low - large.hi, np.inf)
-        return difference(small, large)
-
-    return compared
-
-
-def loss_scans(seen: Evidence) -> Estimate:
-    """Scans at which RLS 2 loses in acceleration; the interval counts the sure ones, and the possible ones."""
-    gain = seen.k_gain(2, "ar")
-    gain.last()
-    return Estimate(*(float(np.sum(part < 0)) for part in (gain.value, gain.hi, gain.lo)))
-
-
-def after_loss(seen: Evidence) -> Estimate:
-    """The largest acceleration gain of RLS 2 after its first scan with a loss."""
-    gain = seen.k_gain(2, "ar")
-    lost = np.flatnonzero(gain.value < 0)
-    return gain.where(slice(int(lost[0]) + 1 if lost.size else len(gain.k) - 1, None)).largest()
-
-
-def above_all_others(radar: int, component: str, scans: Collection[int]) -> Measure:
-    """The least gain of a radar at these scans less its largest at any other, points."""
-
-    def measure(seen: Evidence) -> Estimate:
-        gain = seen.k_gain(radar, component)
-        own = np.isin(gain.k, list(scans))
-        return difference(gain.where(own).least(), gain.where(~own).largest())
-
-    return measure
-
-
-def lowest_end(radars: Collection[int], component: str) -> Measure:
-    """The least of these radars' final gains, %."""
-    return lambda seen: min(seen.k_gain(radar, component).last() for radar in radars)
-
-
-def after_peak(radar: int) -> Measure:
-    """The largest range gain less the last one."""
-    return lambda seen: difference((gain := seen.k_gain(radar, "r")).largest(), gain.last())
-
-
-def rise(radar: int) -> Measure:
-    """The largest rise of the velocity gain over an earlier scan's."""
-
-    def measure(seen: Evidence) -> Estimate:
-        gain = seen.k_gain(radar, "Vr")
-        gain.last()
-        later = [difference(gain.point(j), gain.where(slice(0, j)).least()) for j in range(1, len(gain.k))]
-        return max(later)
-
-    return measure
-
-
-def fall(radar: int) -> Measure:
-    """The velocity gain at the end less that at its first scan."""
-
-    def measure(seen: Evidence) -> Estimate:
-        gain = seen.k_gain(radar, "Vr")
-        return difference(gain.last(), gain.first())
-
-    return measure
-
-
-def earlier(radar: int, unit: str) -> Measure:
+# ---- algebra ------------------------------------------------------------------------------------------------------
+def earlier(seen: Evidence, radar: int, unit: Literal["scans", "s"]) -> Estimate:
     """How much earlier the filter with velocity has a velocity: in scans, or in seconds."""
-
-    def measure(seen: Evidence) -> Estimate:
-        a, b = (seen.sigma(radar, observes, "Vr") for observes in (R, RV))
-        return certain(float(a.k[0] - b.k[0]) if unit == "scans" else float(a.t[0] - b.t[0]))
-
-    return measure
+    a, b = (seen.sigma(radar, observes, "Vr") for observes in (R, RV))
+    return certain(a.k[0] - b.k[0] if unit == "scans" else a.t[0] - b.t[0])
 
 
-def doppler(radar: int) -> Measure:
+def doppler(seen: Evidence, radar: int) -> Estimate:
     """Doppler frequency of the paper's 300 m/s in repetition rates."""
-
-    def measure(seen: Evidence) -> Estimate:
-        axes = seen.case(radar).axes
-        return certain(2 * SPEED_MPS / axes.wavelength_m / axes.repetition_rate_hz)
-
-    return measure
+    axes = seen.case(radar).axes
+    return certain(2 * SPEED_MPS / axes.wavelength_m / axes.repetition_rate_hz)
 
 
-def c_theta(radar: int) -> Measure:
+def c_theta(seen: Evidence, radar: int) -> Estimate:
     """C_θ (11) of a radar: algebra."""
-    return lambda seen: certain(seen.case(radar).axes.C_theta)
+    return certain(seen.case(radar).axes.C_theta)
 
 
-def closed_forms(radar: int) -> Measure:
+def closed_forms(seen: Evidence, radar: int) -> Estimate:
     """The largest relative difference of (8) and (12), as printed, from the matrices of (5) and (9).
 
     Of covariances R̄_k drawn at random; an element of (8) counts against the root of the two variances it is between.
     """
-
-    def measure(seen: Evidence) -> Estimate:
-        axes = seen.case(radar).axes
-        dt, theta = axes.scan_period_s, axes.C_theta
-        C_M = VARIANCE / RADARS[radar][0] ** 2
-        B, Q = transition(dt), manoeuvre_covariance(C_M, dt)
-        H, noise = np.eye(2, 3), np.diag([1.0, 1 / (dt**2 * theta)])
-        rng, faults = np.random.default_rng(1), []
-        for root in rng.normal(size=(50, 3, 3)) / np.array([1, dt, dt**2])[:, None]:
-            forecast = B @ (root @ root.T) @ B.T + Q
-            spreads = np.sqrt(np.diag(forecast))
-            faults.append(np.abs(_forecast(root @ root.T, dt, C_M) - forecast) / np.outer(spreads, spreads))
-            gains = forecast @ H.T @ np.linalg.inv(H @ forecast @ H.T + noise)
-            faults.append(np.abs(_gains(forecast, noise[1, 1]) / gains - 1))
-        return certain(max(float(fault.max()) for fault in faults))
-
-    return measure
+    axes = seen.case(radar).axes
+    dt, theta = axes.scan_period_s, axes.C_theta
+    C_M = VARIANCE / RADARS[radar][0] ** 2
+    B, Q = transition(dt), manoeuvre_covariance(C_M, dt)
+    H, noise = np.eye(2, 3), np.diag([1.0, 1 / (dt**2 * theta)])
+    rng, faults = np.random.default_rng(1), []
+    for root in rng.normal(size=(50, 3, 3)) / np.array([1, dt, dt**2])[:, None]:
+        forecast = B @ (root @ root.T) @ B.T + Q
+        spreads = np.sqrt(np.diag(forecast))
+        faults.append(np.abs(_forecast(root @ root.T, dt, C_M) - forecast) / np.outer(spreads, spreads))
+        gains = forecast @ H.T @ np.linalg.inv(H @ forecast @ H.T + noise)
+        faults.append(np.abs(_gains(forecast, noise[1, 1]) / gains - 1))
+    return certain(max(float(fault.max()) for fault in faults))
 
 
 def _forecast(R: np.ndarray, dt: float, C_M: float) -> np.ndarray:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -13,11 +14,12 @@ from radarsim.report.claims.declared import Claim, PaperClaims, Part
 from radarsim.report.claims.readings import Alternative, Choice, PaperReadings, Reading, Seen
 from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED
 from radarsim.report.claims.search import Search
+from radarsim.report.claims.written import claims_in, of_other_cases
 from radarsim.report.statistics import Estimate
 from radarsim.studies.range_doppler import measures, recursion
-from radarsim.studies.range_doppler.claims import CLAIMS, FALLEN, first_steps
 from radarsim.studies.range_doppler.measures import RADARS
 
+CLAIMS = claims_in(Path(__file__).with_name("claims.yaml"), measures)
 ALGEBRA = ("P1.16", "P1.31", "P1.34", "P1.36")  # of the table of radars, and of the equations
 NUMBERS = tuple(claim.id for claim in CLAIMS if claim.id not in ALGEBRA)
 FIGURE_1A = ("P1.14", "P1.18")  # sentences on figure 1a, which is drawn for several D_M
@@ -220,9 +222,11 @@ class Readings(PaperReadings):
     def parts(self, claim: Claim, reading: Reading) -> Sequence[Part]:
         """Those of the radars that the reading means; what falls to a steady value may rise by its tolerance."""
         if claim.id == FIRST_STEPS and reading["first_steps_of"] == EACH:
-            return [part for radar in RADARS for part in first_steps(radar)]
+            return [of_other_cases(part, radar) for radar in RADARS for part in claim.parts]
         if claim.id == ENDS and reading["end_of"] == LOWER:
-            return [Part((2, 3), "the lower of the final range gains", "%", measures.lowest_end((2, 3), "r"), FALLEN)]
+            return [
+                replace(claim.parts[0], cases=(2, 3), what="the lower of the final range gains", measure=_lower_end)
+            ]
         if claim.id not in FALLING:
             return claim.parts
         wide = same(0, _tolerance(reading, 100))
@@ -245,6 +249,11 @@ class Readings(PaperReadings):
             for variance in (float(one["manoeuvre_variance"]), *SWEPT):
                 found[form, variance, start] = None
         return list(found)
+
+
+def _lower_end(seen: measures.Evidence) -> Estimate:
+    """The least of the final range gains of RLS 2 and 3, %."""
+    return measures.extreme_gain(seen, 2, 3, which="least", component="r", pick="last")
 
 
 def _tolerance(reading: Reading, of: float) -> float:

@@ -55,9 +55,11 @@ class SonarPart:
         """The tables that its figures are drawn from, by how the figure's name begins."""
         return getattr(self.file("figures"), "DRAWN_FROM", {})
 
-    def claims(self) -> "tuple[Claim, ...]":
+    def claims(self) -> "Sequence[Claim]":
         """The paper's claims about it."""
-        return self.file("claims").CLAIMS if self.claimed else ()
+        from radarsim.report.claims.written import claims_of
+
+        return claims_of(self.file) if self.claimed else ()
 
     def simulated(self, case: "Case", realisation: int) -> "Mapping[str, np.ndarray]":
         """The plots of one realisation, and the truth."""

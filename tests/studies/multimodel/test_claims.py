@@ -41,8 +41,8 @@ def test_most_of_the_printed_accuracies_are_linear_enough(rows):
     assert rows.loc["P2.16", "exact"].tolist() == pytest.approx([0.9625, 0.801], abs=5e-4)
     assert rows.loc["P2.16", "class"].eq(CONFIRMED).all()
     assert rows.loc["P2.16", "extension"].tolist() == [False, True]
-    assert measures.share_linear(2e3) == 1
-    assert measures.share_linear(1e9) == 0
+    assert measures.share_linear(None, (), 2e3) == 1
+    assert measures.share_linear(None, (), 1e9) == 0
 
 
 def test_blocks_of_the_families(rows):

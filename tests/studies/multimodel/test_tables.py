@@ -8,8 +8,9 @@ import pytest
 import radarsim
 from radarsim.report import claims, html
 from radarsim.studies.multimodel import STUDY, words
-from radarsim.studies.multimodel.claims import CLAIMS
-from radarsim.studies.multimodel.measures import MMA2_122, RIVALS, Evidence
+from radarsim.studies.multimodel.measures import Evidence
+
+CLAIMS = STUDY.claims().claims
 
 
 @pytest.fixture(scope="module")
@@ -56,8 +57,8 @@ def test_operations_and_consistency(result):
 def test_gains_between_any_two_filters_are_paired(result):
     (case,) = result.cases
     seen = Evidence(result.cases, result.tables, {case.name: {"filters": set(range(len(case.axes.filters)))}})
-    key = ("aeroballistic", 0.05, (MMA2_122, *RIVALS))
-    gain = seen.stage_gain(key, MMA2_122, RIVALS[2], "ballistic", "y")
+    (key,) = CLAIMS[0].parts[0].cases
+    gain = seen.stage_gain(key, key[2][0], key[2][3], "ballistic", "y")
     s = np.array(case.sums["stage"])[[0, 3], 1, 3, 0] / case.count
     assert np.isclose(gain.value, 100 * (1 - np.sqrt(s[0] / s[1])))
     assert gain.lo < gain.value < gain.hi

@@ -1,19 +1,18 @@
 """How P3's claims on manoeuvres are measured: the cases they mean, and the numbers taken from tables."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report.claims import Missing, Series, certain, ratio
+from radarsim.report.claims import Missing, Series, ratio
 from radarsim.report.statistics import Z95, Estimate
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
 from radarsim.studies.sonar.manoeuvre.config import Filter
-from radarsim.studies.sonar.measures import CaseKey, Evidence, Measure
+from radarsim.studies.sonar.measures import FOUND, Evidence, Key
 
 USUAL = 0.01  # false alarms a test
-ENOUGH = (4, 5)  # plots, over which n is not worth while
 AT_ONE = 0.31731050786291415  # false alarms a test at k = 1: a Gaussian outside one σ
 
 
@@ -41,8 +40,8 @@ def _of_one_sigma(results: Sequence[CaseResult]) -> CaseResult[ManoeuvreAxes] | 
     return next((r for r in _by_strength(results) if abs(_shift_of_five(r) - 1) < 0.01), None)
 
 
-WEAK, STRONG = CaseKey("weakest manoeuvre", _weakest), CaseKey("strongest manoeuvre", _strongest)
-EQUAL = CaseKey("manoeuvre of one σ_a", _of_one_sigma)
+WEAK, STRONG, EQUAL = "weakest manoeuvre", "strongest manoeuvre", "manoeuvre of one σ_a"
+FOUND.update({WEAK: _weakest, STRONG: _strongest, EQUAL: _of_one_sigma})
 
 
 # ---- the numbers --------------------------------------------------------------------------------------------------
@@ -69,21 +68,17 @@ def _last(result: CaseResult[ManoeuvreAxes]) -> int:
     return int(np.flatnonzero(result.axes.phase == 1)[-1])
 
 
-def thresholds_ratio(more: int, few: int) -> Measure:
+def thresholds_ratio(seen: Evidence, key: Key, more: int, few: int) -> float:
     """Accelerations at the thresholds of two detectors of the same false alarms: algebra."""
-
-    def measure(seen: Evidence) -> Estimate:
-        result, found = seen.case(STRONG), []
-        for plots in (more, few):
-            d, _ = _detector(result, plots, "false_alarm_probability", USUAL)
-            name = result.spec.detectors[d].name
-            rows = seen.tables["thresholds"]
-            rows = rows[(rows["case"] == result.name) & (rows["filter"] == name) & (rows["component"] == "r")]
-            near = (rows["false_alarm_probability"] - USUAL).abs().idxmin()
-            found.append(rows.loc[near, "threshold_acceleration"])
-        return certain(found[0] / found[1])
-
-    return measure
+    result, found = seen.case(key), []
+    for plots in (more, few):
+        d, _ = _detector(result, plots, "false_alarm_probability", USUAL)
+        name = result.spec.detectors[d].name
+        rows = seen.tables["thresholds"]
+        rows = rows[(rows["case"] == result.name) & (rows["filter"] == name) & (rows["component"] == "r")]
+        near = (rows["false_alarm_probability"] - USUAL).abs().idxmin()
+        found.append(rows.loc[near, "threshold_acceleration"])
+    return float(found[0] / found[1])
 
 
 def mean_delay(result: CaseResult[ManoeuvreAxes], plots: int, rate: float = USUAL) -> Estimate:
@@ -114,83 +109,71 @@ def _mean_time(result: CaseResult[ManoeuvreAxes], plots: int, rate: float, phase
     return Estimate(float(mean), float(mean - half), float(mean + half))
 
 
-Delay = Callable[[CaseResult[ManoeuvreAxes], int, float], Estimate]
+Until = Literal["beginning", "beginning and end"]
+DELAYS = {"beginning": mean_delay, "beginning and end": both_ends}
 
 
-def delays_ratio(key: CaseKey, more: int, few: int, delay: Delay, rate: float) -> Measure:
+def delays_ratio(seen: Evidence, key: Key, more: int, few: int, until: Until, rate: float) -> Estimate:
     """Mean delays of two detectors, taken as independent."""
-    return lambda seen: ratio(delay(seen.case(key), more, rate), delay(seen.case(key), few, rate))
+    result, delay = seen.case(key), DELAYS[until]
+    return ratio(delay(result, more, rate), delay(result, few, rate))
 
 
-def further(key: CaseKey, enough: Sequence[int], delay: Delay, rate: float) -> Measure:
+def further(seen: Evidence, key: Key, enough: Sequence[int], until: Until, rate: float) -> Estimate:
     """Least mean delay of detectors of more plots than `enough`, over the least of these, less 1, in %; as independent.
 
     Negative where more plots see it sooner.
     """
-
-    def measure(seen: Evidence) -> Estimate:
-        result = seen.case(key)
-        of = {n: delay(result, n, rate) for n in _plots_at(result, rate)}
-        more = [one for n, one in of.items() if n > max(enough)]
-        few = [one for n, one in of.items() if n in enough]
-        least = [min(ones, key=lambda one: one.value) for ones in (more, few)]
-        return Estimate(*(part - 100 for part in ratio(least[0], least[1], 100)))
-
-    return measure
+    of = _delays(seen, key, until, rate)
+    more = [one for n, one in of.items() if n > max(enough)]
+    few = [one for n, one in of.items() if n in enough]
+    least = [min(ones, key=lambda one: one.value) for ones in (more, few)]
+    return Estimate(*(part - 100 for part in ratio(least[0], least[1], 100)))
 
 
-def _plots_at(result: CaseResult[ManoeuvreAxes], rate: float) -> list[int]:
-    """Plots of the detectors that test at every scan at a rate of false alarms."""
-    tested = (one for one in result.spec.detectors if one.test_every == 1)
-    return [one.plots for one in tested if rate in (one.false_alarm_probability or ())]
-
-
-def fastest(key: CaseKey, delay: Delay, rate: float) -> Measure:
+def fastest(seen: Evidence, key: Key, until: Until, rate: float) -> Estimate:
     """Plots of the detector with the least mean delay; the interval spans all that cannot be distinguished from it."""
-
-    def measure(seen: Evidence) -> Estimate:
-        result = seen.case(key)
-        every = _plots_at(result, rate)
-        of = {plots: delay(result, plots, rate) for plots in every}
-        best = min(of, key=lambda plots: of[plots].value)
-        near = [plots for plots in every if of[plots].lo <= of[best].hi]
-        return Estimate(float(best), float(min(near)), float(max(near)))
-
-    return measure
+    of = _delays(seen, key, until, rate)
+    best = min(of, key=lambda plots: of[plots].value)
+    near = [plots for plots in of if of[plots].lo <= of[best].hi]
+    return Estimate(float(best), float(min(near)), float(max(near)))
 
 
-def exactly_detected_at_one(seen: Evidence) -> float:
+def _delays(seen: Evidence, key: Key, until: Until, rate: float) -> dict[int, Estimate]:
+    """Mean delays by plots, of the detectors that test at every scan at a rate of false alarms."""
+    result = seen.case(key)
+    tested = (one for one in result.spec.detectors if one.test_every == 1)
+    every = [one.plots for one in tested if rate in (one.false_alarm_probability or ())]
+    return {plots: DELAYS[until](result, plots, rate) for plots in every}
+
+
+def exact_detected_at_one(seen: Evidence, key: Key) -> float:
     """`detected_at_one` of the exact law."""
-    return float(_at_one(seen)["exact"])
+    return float(_at_one(seen, key)["exact"])
 
 
-def detected_at_one(seen: Evidence) -> Estimate:
+def detected_at_one(seen: Evidence, key: Key) -> Estimate:
     """Share of alarms of five plots at k = 1 at the last scan of the manoeuvre of one σ_a."""
-    row = _at_one(seen)
+    row = _at_one(seen, key)
     return Estimate(*(float(row[part]) for part in ("probability", "lo", "hi")))
 
 
-def _at_one(seen: Evidence) -> Mapping[str, Any]:
-    result = seen.case(EQUAL)
+def _at_one(seen: Evidence, key: Key) -> Mapping[str, Any]:
+    result = seen.case(key)
     d, _ = _detector(result, 5, "threshold_k", 1.0)
     name, k = result.spec.detectors[d].name, int(result.axes.k[_last(result)])
     return seen.row("detections", case=result.name, filter=name, component="r", threshold_k=1.0, k=k)
 
 
-def degrees_ratio(key: CaseKey, degree: int) -> Measure:
+def degrees_ratio(seen: Evidence, key: Key, degree: int) -> Estimate:
     """σ over the run of growing memory of a held degree, over that of the degree switched by five plots."""
-
-    def measure(seen: Evidence) -> Estimate:
-        result = seen.case(key)
-        filters = [f for _, f in seen.members(result)]
-        held = next((f.name for f in filters if (f.kind, f.degree) == ("growing_memory", degree)), None)
-        switched = next((f.name for f in filters if _by_five(f)), None)
-        if held is None or switched is None:
-            raise Missing(key)
-        over_run = [_over_run(seen.curve(key, name, "r").since(5)) for name in (held, switched)]
-        return ratio(over_run[0], over_run[1])
-
-    return measure
+    filters = [f for _, f in seen.members(seen.case(key))]
+    held = next((f.name for f in filters if (f.kind, f.degree) == ("growing_memory", degree)), None)
+    switched = next((f.name for f in filters if _by_five(f)), None)
+    if held is None or switched is None:
+        raise Missing((key,))
+    over_run = [_over_run(seen.curve(key, name, "r").since(5)) for name in (held, switched)]
+    return ratio(over_run[0], over_run[1])
 
 
 def _by_five(one: Filter) -> bool:

@@ -15,6 +15,7 @@ from radarsim.report.claims import Evidence, certain
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
 from radarsim.report.claims.readings import Alternative, Choice, PaperReadings, Reading, Seen
 from radarsim.report.claims.rule import UNSTATED
+from radarsim.report.claims.written import with_arguments
 from radarsim.report.statistics import Estimate
 from radarsim.studies.sonar.manoeuvre import exact, measures
 from radarsim.studies.sonar.manoeuvre.switched import switched_window
@@ -215,15 +216,14 @@ def _with_rate(one: Any, reading: Reading) -> Any:
 def _delay(part: Part, reading: Reading) -> Part:
     """A part on times to see a manoeuvre, at the reading's rate and of what it wants to be seen."""
     rate, both = RATES[reading["false_alarms"]], reading["seen"] == "beginning and end"
-    delay = measures.both_ends if both else measures.mean_delay
+    until: measures.Until = "beginning and end" if both else "beginning"
     at = "k = 1" if rate == measures.AT_ONE else f"{rate:g} false alarms a test"
     seen = f"mean time to see {reading['seen'] if both else 'the beginning'} of the {part.cases[0]} at {at}"
     if part.statement == "time":
-        what, measure = f"{seen}, 8 plots over 5", measures.delays_ratio(part.cases[0], 8, 5, delay, rate)
-        return replace(part, what=what, measure=measure)
+        return with_arguments(replace(part, what=f"{seen}, 8 plots over 5"), until=until, rate=rate)
     if part.statement == "not worth while":
         what = f"{seen}, over 5 plots against the best of 4–5"
-        return replace(part, what=what, measure=measures.further(part.cases[0], measures.ENOUGH, delay, rate))
+        return with_arguments(replace(part, what=what), until=until, rate=rate)
     return part
 
 

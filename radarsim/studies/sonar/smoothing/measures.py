@@ -2,21 +2,22 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.physics.motion import transition
 from radarsim.report import statistics
-from radarsim.report.claims import Missing, certain, ratio
-from radarsim.report.claims.declared import Number
+from radarsim.report.claims import Missing, ratio
 from radarsim.report.statistics import Estimate
 from radarsim.studies.sonar import exact
-from radarsim.studies.sonar.measures import CaseKey, Evidence, Measure
+from radarsim.studies.sonar.measures import FOUND, Evidence, Key
 from radarsim.studies.sonar.smoothing.tables import textbook
 
 MOST_PLOTS = 100
+What = Literal["smoothed", "extrapolated", "acceleration"]
+Letter = Literal["A", "B"]
 
 
 # ---- the cases ----------------------------------------------------------------------------------------------------
@@ -60,21 +61,24 @@ def _first(matches: Callable[[CaseResult], bool]) -> Callable[[Sequence[CaseResu
     return lambda results: next((one for one in results if one.spec.frame == "polar" and matches(one)), None)
 
 
-TEXTBOOK = CaseKey("equal intervals and weights, white errors, no miss", _first(_is_textbook))
-FLUCTUATING = CaseKey("a course whose velocity walks at random", _first(_is_fluctuating))
-TURNING = CaseKey("a vessel on a straight course at a constant speed, then in a turn", _first(_turns))
-GAP = CaseKey("scans that never give a plot, the others always", _first(_has_gap))
-ASYNCHRONOUS = CaseKey("several sonars", _first(_has_several_sonars))
-
-
-def correlated(rho: float) -> CaseKey:
+def _correlated(results: Sequence[CaseResult], rho: float) -> CaseResult | None:
     """The case whose plots' errors are correlated to ρ, with both filters that know of it."""
     kinds = {("kalman_augmented", 1), ("kalman_differenced", 1)}
 
     def matches(result: CaseResult) -> bool:
         return kinds <= _kinds(result) and result.spec.sensor.error_correlation == rho and _even(result)
 
-    return CaseKey(f"errors of neighbouring plots correlated to {rho:g}", _first(matches))
+    return _first(matches)(results)
+
+
+FOUND.update(
+    textbook=_first(_is_textbook),  # equal intervals and weights, white errors, no miss
+    fluctuating=_first(_is_fluctuating),  # a course whose velocity walks at random
+    turning=_first(_turns),  # a vessel on a straight course at a constant speed, then in a turn
+    gap=_first(_has_gap),  # scans that never give a plot, the others always
+    asynchronous=_first(_has_several_sonars),
+    correlated=_correlated,
+)
 
 
 # ---- exact values: least squares on n plots of one scan apart and of one σ, in units of these ------------------------
@@ -92,251 +96,190 @@ def _least_squares(what: str, n: int) -> float:
     return float(np.sqrt((F @ _covariance(n) @ F.T)[0, 0]))
 
 
-def exact_over_formula(what: str, n: int) -> Number:
+def exact_over_formula(seen: Evidence, key: Key, what: str, n: int) -> float:
     """What `over_formula` measures."""
     formula = {
         "smoothed": exact.sigma_smoothed(n),
         "extrapolated": exact.sigma_extrapolated(n) if n > 1 else np.inf,
         "acceleration": exact.sigma_acceleration(n, 1.0) if n > 2 else np.inf,
     }
-    return lambda seen: float(_least_squares(what, n) / formula[what])
+    return float(_least_squares(what, n) / formula[what])
 
 
-def exact_gain(letter: str, n: int) -> float:
+def _exact_gain(letter: str, n: int) -> float:
     """A_n or B_n."""
     return float(_covariance(n)[0, "AB".index(letter)])
 
 
-def exact_gain_over_formula(letter: str, n: int) -> Number:
+def exact_gain_over_formula(seen: Evidence, key: Key, letter: str, n: int) -> float:
     """What `gain_over_formula` measures."""
-    closed = exact.gains_closed(np.array([n]))["AB".index(letter)][0]
-    return lambda seen: float(exact_gain(letter, n) / closed)
+    return float(_exact_gain(letter, n) / exact.gains_closed(np.array([n]))["AB".index(letter)][0])
 
 
-def exact_enough(seen: Evidence) -> float:
+def exact_gain_falls(seen: Evidence, key: Key, letter: str, early: int, late: int) -> float:
+    """What `gain_falls` measures."""
+    return _exact_gain(letter, late) / _exact_gain(letter, early)
+
+
+def exact_enough(seen: Evidence, key: Key) -> float:
     """What `enough` measures."""
     return float(next(n for n in range(2, MOST_PLOTS) if _least_squares("extrapolated", n) <= 1))
 
 
+def exact_bought(seen: Evidence, key: Key, more: int, few: int, what: What = "smoothed") -> float:
+    """What `bought` measures."""
+    return _least_squares(what, more) / _least_squares(what, few)
+
+
+def exact_bounded(seen: Evidence, key: Key) -> float:
+    """What `bounded` measures, by the exact σ of both."""
+    return seen.exactly().gain(key, seen.filter(key, "window", 1, 10), "r").last().value
+
+
 # ---- the numbers --------------------------------------------------------------------------------------------------
-def over_formula(what: str, n: int) -> Measure:
+def _read(row: Mapping[str, Any], name: str, over: float = 1.0) -> Estimate:
+    """A number of a table with its interval, over another."""
+    return Estimate(*(row[key] / over for key in (name, f"{name}_lo", f"{name}_hi")))
+
+
+def _last(seen: Evidence, key: Key, kind: str, component: str = "r") -> Estimate:
+    """σ of the filter of a kind at the last scan."""
+    return seen.curve(key, seen.filter(key, kind), component).last()
+
+
+def over_formula(seen: Evidence, key: Key, what: What, n: int) -> Estimate:
     """σ of growing memory after n plots over the paper's formula, of the range."""
-
-    def measure(seen: Evidence) -> Estimate:
-        degree = 2 if what == "acceleration" else 1
-        row = seen.row("plots", case=seen.case(TEXTBOOK).name, component="r", what=what, plots=n, degree=degree)
-        return Estimate(*(row[key] / row["formula"] for key in ("ratio", "ratio_lo", "ratio_hi")))
-
-    return measure
+    degree = 2 if what == "acceleration" else 1
+    row = seen.row("plots", case=seen.case(key).name, component="r", what=what, plots=n, degree=degree)
+    return _read(row, "ratio", row["formula"])
 
 
-def bought(more: int, few: int, what: str = "smoothed") -> Measure:
+def bought(seen: Evidence, key: Key, more: int, few: int, what: What = "smoothed") -> Estimate:
     """Smoothed or extrapolated σ of growing memory after more plots over that after few; of the same realisations,
     taken as independent.
     """
-
-    def measure(seen: Evidence) -> Estimate:
-        name = seen.case(TEXTBOOK).name
-        found = []
-        for n in (more, few):
-            row = seen.row("plots", case=name, component="r", what=what, plots=n, degree=1)
-            found.append(Estimate(*(row[key] for key in ("ratio", "ratio_lo", "ratio_hi"))))
-        return ratio(found[0], found[1])
-
-    return measure
+    name = seen.case(key).name
+    rows = [seen.row("plots", case=name, component="r", what=what, plots=n, degree=1) for n in (more, few)]
+    return ratio(_read(rows[0], "ratio"), _read(rows[1], "ratio"))
 
 
-def exact_bought(more: int, few: int, what: str = "smoothed") -> Number:
-    """What `bought` measures."""
-    return lambda seen: _least_squares(what, more) / _least_squares(what, few)
-
-
-def as_printed(seen: Evidence) -> Estimate:
+def as_printed(seen: Evidence, key: Key) -> Estimate:
     """σ of the range at the end, of the Kalman filter without manoeuvre variance over that of growing memory."""
-    return _over_growing_memory(seen, seen.filter(FLUCTUATING, "kalman"))
+    return ratio(_last(seen, key, "kalman"), _last(seen, key, "growing_memory"))
 
 
-def with_manoeuvres(seen: Evidence) -> Estimate:
+def with_manoeuvres(seen: Evidence, key: Key) -> Estimate:
     """The same of the Kalman filter with manoeuvre variance."""
-    case = seen.case(FLUCTUATING)
-    own = next((f.name for _, f in seen.members(case) if f.kind == "kalman" and f.manoeuvre_variance), None)
+    members = seen.members(seen.case(key))
+    own = next((f.name for _, f in members if f.kind == "kalman" and f.manoeuvre_variance), None)
     if own is None:
         raise Missing("no Kalman filter with manoeuvre variance")
-    return _over_growing_memory(seen, own)
+    return ratio(seen.curve(key, own, "r").last(), _last(seen, key, "growing_memory"))
 
 
-def _over_growing_memory(seen: Evidence, own: str) -> Estimate:
-    other = seen.filter(FLUCTUATING, "growing_memory")
-    return ratio(seen.curve(FLUCTUATING, own, "r").last(), seen.curve(FLUCTUATING, other, "r").last())
+def ignored(seen: Evidence, key: Key) -> Estimate:
+    """σ of the range at the end, of the Kalman filter that takes errors as independent over the augmented one's."""
+    return ratio(_last(seen, key, "kalman"), _last(seen, key, "kalman_augmented"))
 
 
-def over_jointly(component: str, n: int) -> Measure:
+def over_jointly(seen: Evidence, key: Key, component: str, n: int) -> Estimate:
     """σ of range or bearing after n plots, each filtered alone, over least squares on both at once."""
-
-    def measure(seen: Evidence) -> Estimate:
-        sensor, c = seen.case(TEXTBOOK).spec.sensor, "rb".index(component)
-        sigma = np.repeat([sensor.sigma_range_m, sensor.sigma_bearing_rad], n)
-        lines = np.kron(np.eye(2), np.column_stack([np.ones(n), np.arange(1 - n, 1)])) / sigma[:, None]
-        joint = np.sqrt(np.linalg.inv(lines.T @ lines)[2 * c, 2 * c])
-        own = seen.curve(TEXTBOOK, seen.filter(TEXTBOOK, "growing_memory"), component).at(n)
-        return Estimate(*(float(part / joint) for part in own))
-
-    return measure
+    sensor, c = seen.case(key).spec.sensor, "rb".index(component)
+    sigma = np.repeat([sensor.sigma_range_m, sensor.sigma_bearing_rad], n)
+    lines = np.kron(np.eye(2), np.column_stack([np.ones(n), np.arange(1 - n, 1)])) / sigma[:, None]
+    joint = np.sqrt(np.linalg.inv(lines.T @ lines)[2 * c, 2 * c])
+    own = seen.curve(key, seen.filter(key, "growing_memory"), component).at(n)
+    return Estimate(*(float(part / joint) for part in own))
 
 
-def on_a_straight_course(component: str) -> Measure:
+def on_a_straight_course(seen: Evidence, key: Key, component: str) -> Estimate:
     """σ of range or bearing of growing memory at the end of a straight leg over that on a linear trajectory."""
-
-    def measure(seen: Evidence) -> Estimate:
-        end = seen.case(TURNING).spec.target.turns[0].start_s
-        straight, linear = (
-            seen.curve(key, seen.filter(key, "growing_memory"), component) for key in (TURNING, TEXTBOOK)
-        )
-        return ratio(straight.where(straight.t <= end).last(), linear.where(linear.t <= end).last())
-
-    return measure
+    end = seen.case(key).spec.target.turns[0].start_s
+    curves = [seen.curve(one, seen.filter(one, "growing_memory"), component) for one in (key, "textbook")]
+    straight, linear = (one.where(one.t <= end).last() for one in curves)
+    return ratio(straight, linear)
 
 
-def enough(seen: Evidence) -> Estimate:
+def enough(seen: Evidence, key: Key) -> Estimate:
     """Fewest plots from which the extrapolated σ is no more than a plot's; the ends take σ at those of its interval."""
-    name = seen.case(TEXTBOOK).name
+    name = seen.case(key).name
     rows = seen.tables["plots"]
     rows = rows[(rows["case"] == name) & (rows["component"] == "r") & (rows["degree"] == 1)]
     rows = rows[rows["what"] == "extrapolated"].sort_values("plots")
-    found = [rows.loc[rows[key] <= 1, "plots"] for key in ("ratio", "ratio_lo", "ratio_hi")]
+    found = [rows.loc[rows[one] <= 1, "plots"] for one in ("ratio", "ratio_lo", "ratio_hi")]
     return Estimate(*(float(f.iloc[0]) if len(f) else np.inf for f in found))
 
 
-def gain_over_formula(letter: str, n: int) -> Measure:
+def gain_over_formula(seen: Evidence, key: Key, letter: Letter, n: int) -> Estimate:
     """A_n or B_n as measured, over its closed form."""
-
-    def measure(seen: Evidence) -> Estimate:
-        row = _gain_row(seen, n)
-        return Estimate(*(row[key] / row[f"{letter}_formula"] for key in (letter, f"{letter}_lo", f"{letter}_hi")))
-
-    return measure
+    row = _gain_row(seen, key, n)
+    return _read(row, letter, row[f"{letter}_formula"])
 
 
-def gain_falls(letter: str, early: int, late: int) -> Measure:
+def gain_falls(seen: Evidence, key: Key, letter: Letter, early: int, late: int) -> Estimate:
     """A gain at one number of plots over that at another."""
-
-    def measure(seen: Evidence) -> Estimate:
-        a, b = (
-            Estimate(*(row[key] for key in (letter, f"{letter}_lo", f"{letter}_hi")))
-            for row in (_gain_row(seen, late), _gain_row(seen, early))
-        )
-        return ratio(a, b)
-
-    return measure
+    return ratio(_read(_gain_row(seen, key, late), letter), _read(_gain_row(seen, key, early), letter))
 
 
-def exact_gain_falls(letter: str, early: int, late: int) -> Number:
-    """What `gain_falls` measures."""
-    return lambda seen: exact_gain(letter, late) / exact_gain(letter, early)
+def _gain_row(seen: Evidence, key: Key, n: int) -> Mapping[str, Any]:
+    name = seen.filter(key, "growing_memory")
+    return seen.row("smoothing_gains", case=seen.case(key).name, filter=name, component="r", plots=n)
 
 
-def _gain_row(seen: Evidence, n: int) -> Mapping[str, Any]:
-    name = seen.filter(TEXTBOOK, "growing_memory")
-    return seen.row("smoothing_gains", case=seen.case(TEXTBOOK).name, filter=name, component="r", plots=n)
-
-
-def alike(seen: Evidence) -> Estimate:
-    """Largest relative difference in σ of growing memory and Kalman filter, range and radial velocity."""
-    return _difference(seen, TEXTBOOK, "growing_memory", "kalman")
-
-
-def two_ways(rho: float) -> Measure:
-    """Largest relative difference in σ of the augmented and the differenced filter."""
-    return lambda seen: _difference(seen, correlated(rho), "kalman_augmented", "kalman_differenced")
-
-
-def _difference(seen: Evidence, key: CaseKey, one: str, other: str) -> Estimate:
+def sigma_apart(seen: Evidence, key: Key, one: str, other: str) -> float:
+    """Largest relative difference in σ of the filters of two kinds, range and radial velocity."""
     largest = 0.0
     for component in ("r", "vr"):
         a, b = (seen.curve(key, seen.filter(key, kind), component).value for kind in (one, other))
         largest = max(largest, float(np.max(np.abs(a / b - 1))))
-    return certain(largest)
+    return largest
 
 
-def ignored(rho: float) -> Measure:
-    """σ of the range at the end, of the Kalman filter that takes errors as independent over the augmented one's."""
-
-    def measure(seen: Evidence) -> Estimate:
-        key = correlated(rho)
-        naive, own = (seen.curve(key, seen.filter(key, kind), "r").last() for kind in ("kalman", "kalman_augmented"))
-        return ratio(naive, own)
-
-    return measure
-
-
-def printed_sum(n: int) -> Measure:
+def printed_sum(seen: Evidence, key: Key, n: int) -> float:
     """g after n plots of equal weight and interval by the print's formula for any interval, over its closed form."""
-    g = 0.0
-    for f in range(2, n + 1):  # f is the number of plots, the new one with them
-        g += f
-    return lambda seen: certain(g / (n * (n - 1) / 2))
+    return sum(range(2, n + 1)) / (n * (n - 1) / 2)  # f is the number of plots, the new one with them
 
 
-def at_a_miss(kind: str) -> Measure:
+def at_a_miss(seen: Evidence, key: Key, kind: str) -> float:
     """σ of the range at the first missed scan over σ extrapolated to it from the scan before: of the same
     realisations.
     """
-
-    def measure(seen: Evidence) -> Estimate:
-        case, f = seen.case(GAP), seen.index(GAP, seen.filter(GAP, kind))
-        k = case.spec.sensor.missed_scans[0] - 1
-        here, before = case.sums["error"][f, k, 0, 1], case.sums["ahead"][f, k - 1, 0, 1]
-        return certain(np.sqrt(here / before))
-
-    return measure
+    case, f = seen.case(key), seen.index(key, seen.filter(key, kind))
+    k = case.spec.sensor.missed_scans[0] - 1
+    here, before = case.sums["error"][f, k, 0, 1], case.sums["ahead"][f, k - 1, 0, 1]
+    return float(np.sqrt(here / before))
 
 
-def over_optimal(key: CaseKey, kind: str, component: str) -> Measure:
+def over_optimal(seen: Evidence, key: Key, kind: str, component: str) -> Estimate:
     """σ of the last scan over that of generalised least squares on the same plots."""
-
-    def measure(seen: Evidence) -> Estimate:
-        case = seen.case(key)
-        axes, c = case.axes, [name for name, _ in case.axes.coordinates].index(component)
-        best = exact.optimal_sigma(axes.t_s, axes.sigma_of_plots[:, c], float(axes.rho[c]), axes.scan_period_s, 2)
-        last = seen.curve(key, seen.filter(key, kind), component).last()
-        return Estimate(*(float(part / best[0]) for part in last))
-
-    return measure
+    axes = seen.case(key).axes
+    c = [name for name, _ in axes.coordinates].index(component)
+    best = exact.optimal_sigma(axes.t_s, axes.sigma_of_plots[:, c], float(axes.rho[c]), axes.scan_period_s, 2)
+    return Estimate(*(float(part / best[0]) for part in _last(seen, key, kind, component)))
 
 
-def rises(seen: Evidence) -> Estimate:
-    """σ of the range of growing memory at the end over its least, on the fluctuating course; taken as independent."""
-    curve = seen.curve(FLUCTUATING, seen.filter(FLUCTUATING, "growing_memory"), "r")
+def rises(seen: Evidence, key: Key) -> Estimate:
+    """σ of the range of growing memory at the end over its least; taken as independent."""
+    curve = seen.curve(key, seen.filter(key, "growing_memory"), "r")
     return ratio(curve.last(), curve.least())
 
 
-def bounded(seen: Evidence) -> Estimate:
+def bounded(seen: Evidence, key: Key) -> Estimate:
     """Paired gain in σ of the range of a window of ten plots against growing memory, at the end."""
-    case = seen.case(FLUCTUATING)
-    f, base = (
-        seen.index(FLUCTUATING, seen.filter(FLUCTUATING, *of)) for of in (("window", 1, 10), ("growing_memory",))
-    )
+    case = seen.case(key)
+    f, base = (seen.index(key, seen.filter(key, *of)) for of in (("window", 1, 10), ("growing_memory",)))
     if base != case.axes.baseline:
         raise Missing("gains against growing memory")
     own, other = case.sums["error"][f, -1, 0], case.sums["error"][base, -1, 0]
     return statistics.gain(own[1], own[3], other[1], other[3], case.sums["paired"][f, -1, 0], case.count)
 
 
-def exact_bounded(seen: Evidence) -> float:
-    """What `bounded` measures, by the exact σ of both."""
-    return seen.exactly().gain(FLUCTUATING, seen.filter(FLUCTUATING, "window", 1, 10), "r").last().value
-
-
-def kept(algorithm: str) -> Measure:
+def kept(seen: Evidence, key: Key, algorithm: str) -> float:
     """Numbers that an algorithm keeps from plot to plot."""
-    return lambda seen: certain(seen.row("operations", algorithm=algorithm)["numbers_kept"])
+    return float(seen.row("operations", algorithm=algorithm)["numbers_kept"])
 
 
-def cost(algorithm: str, other: str) -> Measure:
+def cost(seen: Evidence, key: Key, algorithm: str, other: str) -> float:
     """Operations of one algorithm over those of another."""
-
-    def measure(seen: Evidence) -> Estimate:
-        one, two = (seen.row("operations", algorithm=name)["operations"] for name in (algorithm, other))
-        return certain(one / two)
-
-    return measure
+    one, two = (seen.row("operations", algorithm=name)["operations"] for name in (algorithm, other))
+    return float(one / two)

@@ -1,0 +1,140 @@
+"""Claims in YAML: what they become, and what is said of a mistake in one."""
+
+import subprocess
+import sys
+from types import ModuleType
+
+import pytest
+
+from radarsim.app.run import papers
+from radarsim.errors import ConfigError
+from radarsim.report.claims import above, evidence, printed
+from radarsim.report.claims.written import claims_in, of_other_cases, with_arguments
+from radarsim.report.statistics import Estimate
+from radarsim.studies.sonar.measures import FOUND
+
+HEAD = "paper: P9\nconfig: walk\nnames: {PAIRS: [[2, 3], [4, 5]], R: [range]}\nclaims:\n"
+CLAIM = "- id: 1\n  place: section 1\n  statement: It gains\n  parts:\n"
+PART = "  - {of: [1], what: gain, measure: {gain: {pick: first}}, expected: {above: 0}}\n"
+
+
+class Evidence(evidence.Evidence):
+    """One that knows a number of a case."""
+
+    def known(self, key: int, times: float = 1.0) -> float:
+        return 7.0 * key * times
+
+
+def gain(seen: Evidence, key: int, pick: str, scan: int = 1) -> Estimate:
+    return Estimate(key, scan, len(pick))
+
+
+def exact_gain(seen: Evidence, key: int, pick: str, scan: int = 1) -> float:
+    return 10.0 * key
+
+
+@pytest.fixture
+def claims(tmp_path):
+    """A function that reads claims of this text."""
+    module = ModuleType("measures")
+    vars(module).update(Evidence=Evidence, gain=gain, exact_gain=exact_gain)
+
+    def read(text):
+        file = tmp_path / "claims.yaml"
+        file.write_text(text, encoding="utf-8")
+        claims_in.cache_clear()
+        return claims_in(file, module)
+
+    return read
+
+
+def test_a_claim_is_what_is_written(claims):
+    (claim,) = claims(HEAD + CLAIM + PART)
+    (part,) = claim.parts
+    assert (claim.id, claim.place, claim.statement, claim.config) == ("P9.1", "section 1", "It gains", "walk")
+    assert (part.cases, part.what, part.unit, part.expected, part.asserted) == ((1,), "gain", "", above(0), True)
+    seen = Evidence((), {}, {})
+    assert part.measure(seen) == Estimate(1, 1, 5)
+    assert part.exact(seen) == 10
+    assert of_other_cases(part, 4).measure(seen) == Estimate(4, 1, 5)
+    assert with_arguments(part, scan=3).measure(seen) == Estimate(1, 3, 5)
+
+
+def test_each_makes_a_part_of_every_combination_in_order(claims):
+    part = """  - {of: [$n], each: {n: [1, 2], "times, text": [[3, "1.5"], [4, "2.50"]]}, unit: $text,
+     what: "$n of ${text}s", measure: {known: {times: $times}}, expected: {printed: $text}}\n"""
+    (claim,) = claims(HEAD + CLAIM + part)
+    assert [one.what for one in claim.parts] == ["1 of 1.5s", "1 of 2.50s", "2 of 1.5s", "2 of 2.50s"]
+    assert [one.cases for one in claim.parts] == [(1,), (1,), (2,), (2,)]
+    assert claim.parts[1].expected == printed("2.50")
+    seen = Evidence((), {}, {})
+    assert [one.measure(seen).value for one in claim.parts] == [21, 28, 42, 56]
+    assert isinstance(claim.parts[0].measure(seen), evidence.Certain)
+
+
+def test_a_method_is_that_of_the_evidence_at_hand(claims):
+    class Other(Evidence):
+        def known(self, key, times=1.0):
+            return -1.0
+
+    (claim,) = claims(HEAD + CLAIM + PART.replace("{gain: {pick: first}}", "known"))
+    assert claim.parts[0].measure(Other((), {}, {})).value == -1
+
+
+def test_the_parts_of_claims_before_it(claims):
+    first, second = claims(HEAD + CLAIM + PART + CLAIM.replace("id: 1", "id: 2").replace("parts:", "parts_of: [P9.1]"))
+    assert first.parts == second.parts
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "what: gain",
+            "what: $more",
+            "claims.yaml:9:21: claims.0.parts.0.what: $more is not given under names or each",
+        ),
+        ("{gain: {pick", "{gian: {pick", "parts.0.measure: must be one of them; did you mean gain? allowed: "),
+        ("pick: first", "pik: first", "measure.gain: gain(key, pick, scan): missing a required argument: 'pick', got "),
+        ("pick: first", "pick: first, scan: 1.5", "measure.gain.scan: must be a whole number, got 1.5"),
+        ("pick: first", "pick: true", "measure.gain.pick: must be text, got true"),
+        ("{pick: first}", "first", "measure.gain: must have its arguments by name, got 'first'"),
+        ("above: 0", "above: high", "expected.above.value: must be a number, got 'high'"),
+        ("above: 0", "printed: 5", "expected.printed.text: must be text, got 5"),
+        ("above: 0", "more: 0", "parts.0.expected: must be one of them; allowed: printed, between"),
+        ("of: [1]", "of: 1", "parts.0.of: must be a list of cases, got 1"),
+        ("of: [1]", "of: [1], each: {n: 1}", "parts.0.each.n: must be a list, got 1"),
+        ("of: [1]", 'of: [1], each: {"n, m": [[1]]}', "each.n, m: must be a list of lists of 2, got [[1]]"),
+        ("of: [1]", "of: [1], unti: m", "parts.0.unti: unknown key; did you mean unit? allowed: what, of"),
+        ("what: gain, ", "", "parts.0.what: required key is missing"),
+        ("what: gain", "what: costs $ 5", "what: must name a value after each $, got 'costs $ 5'"),
+    ],
+)
+def test_a_mistake_is_named_with_its_line_and_what_is_allowed(claims, old, new, said):
+    assert old in PART
+    with pytest.raises(ConfigError) as raised:
+        claims(HEAD + CLAIM + PART.replace(old, new))
+    assert said in str(raised.value)
+    assert "claims.yaml:9:" in str(raised.value)
+
+
+def test_parts_of_a_claim_that_is_not_there(claims):
+    with pytest.raises(ConfigError, match=r"claims.0.parts_of: must be of the claims before it; allowed: , got 'P9.7'"):
+        claims(HEAD + CLAIM.replace("parts:", "parts_of: [P9.7]"))
+
+
+def test_every_case_that_p3_names_is_one_that_is_looked_for():
+    keys = {
+        key for of in papers() for claim in of.claims if claim.paper == "P3" for p in claim.parts for key in p.cases
+    }
+    assert {key if isinstance(key, str) else key[0] for key in keys} == set(FOUND)
+
+
+def test_a_list_reads_no_claims():
+    program = (
+        "import sys; from radarsim.cli import entry\n"
+        "try: entry()\n"
+        "finally: assert 'radarsim.report.claims.written' not in sys.modules"
+    )
+    for argument in ("list", "--help"):
+        subprocess.run([sys.executable, "-c", program, argument], check=True, capture_output=True)
