@@ -287,6 +287,17 @@ def whole(least: int, most: int) -> Any:
     return Annotated[int, Whole(least, most)]
 
 
+def key(
+    title: str, about: str, default: Any = ..., *, symbol: str | None = None, unit: str | None = None, **limits: Any
+) -> Any:
+    """A key: what people call it, what it means with its unit, its default (none: it must be given), and its letter.
+
+    unit: of the value, where the key does not end in it. limits: what `pydantic.Field` takes beside.
+    """
+    extra: Any = {name: text for name, text in (("symbol", symbol), ("unit", unit)) if text is not None}
+    return Field(default, title=title, description=about, json_schema_extra=extra or None, **limits)
+
+
 class Study(Model):
     """A study's own top-level keys, beside the common ones.
 

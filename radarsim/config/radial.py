@@ -20,6 +20,7 @@ from radarsim.config.fields import (
     Whole,
     at,
     cross_check,
+    key,
 )
 from radarsim.physics.bands import Band, outside_band
 from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
@@ -38,30 +39,16 @@ COEFFICIENTS = "derivatives of range at the first plot: m, m/s, m/s², … (the 
 class Radar(Model):
     """A surveillance radar: accuracies of one plot, and the period of its scans."""
 
-    name: Annotated[Name | None, Display()] = Field(None, title="name", description="display name")
-    band: Annotated[Band | None, Display()] = Field(
-        None,
-        title="wave band",
-        description="wave band, for display: by its wavelength, or by its letter (IEEE Std 521)",
+    name: Annotated[Name | None, Display()] = key("name", "display name", None)
+    band: Annotated[Band | None, Display()] = key(
+        "wave band", "wave band, for display: by its wavelength, or by its letter (IEEE Std 521)", None
     )
-    wavelength_m: Positive = Field(
-        title="wavelength",
-        json_schema_extra={"symbol": "λ"},
-        description="wavelength, m: gives the Doppler frequency of a velocity",
+    wavelength_m: Positive = key("wavelength", "wavelength, m: gives the Doppler frequency of a velocity", symbol="λ")
+    sigma_range_m: Positive = key("σ of the measured range", "standard deviation of a measured range, m", symbol="σ_r")
+    sigma_velocity_mps: Positive = key(
+        "σ of the measured radial velocity", "standard deviation of a measured radial velocity, m/s", symbol="σ_V"
     )
-    sigma_range_m: Positive = Field(
-        title="σ of the measured range",
-        json_schema_extra={"symbol": "σ_r"},
-        description="standard deviation of a measured range, m",
-    )
-    sigma_velocity_mps: Positive = Field(
-        title="σ of the measured radial velocity",
-        json_schema_extra={"symbol": "σ_V"},
-        description="standard deviation of a measured radial velocity, m/s",
-    )
-    scan_period_s: Positive = Field(
-        title="scan period", json_schema_extra={"symbol": "Δt"}, description="time between two plots, s"
-    )
+    scan_period_s: Positive = key("scan period", "time between two plots, s", symbol="Δt")
 
     @cross_check
     def _in_its_band(self) -> Iterator[At]:
@@ -123,8 +110,8 @@ def with_either_length(schema: dict[str, Any]) -> dict[str, Any]:
 class Polynomial(Model):
     """A range that is a polynomial of time; up to the second degree it fits the filters' model exactly."""
 
-    kind: Literal["polynomial"] = Field(title="kind", description="a polynomial of any degree up to 11")
-    coefficients: Coefficients = Field(title="derivatives of the range at the first plot", description=COEFFICIENTS)
+    kind: Literal["polynomial"] = key("kind", "a polynomial of any degree up to 11")
+    coefficients: Coefficients = key("derivatives of the range at the first plot", COEFFICIENTS)
 
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
@@ -139,11 +126,9 @@ def polynomial_reach_m(coefficients: tuple[float, ...], t: float) -> float:
 class Starting(Model):
     """What targets that break the model share: a moment, in seconds or as a scan, at which they do."""
 
-    start_s: NonNegative | None = Field(
-        None, title="start time", description="time from the first plot at which it begins, s"
-    )
-    start_scan: Annotated[int, Whole(1, MOST_SCANS)] | None = Field(
-        None, title="scan of the start", description="scan, counted from 1, at which it begins; in place of start_s"
+    start_s: NonNegative | None = key("start time", "time from the first plot at which it begins, s", None)
+    start_scan: Annotated[int, Whole(1, MOST_SCANS)] | None = key(
+        "scan of the start", "scan, counted from 1, at which it begins; in place of start_s", None
     )
 
     @cross_check
@@ -161,14 +146,10 @@ class Starting(Model):
 class AccelerationStart(Starting):
     """A polynomial that begins to accelerate (or brake) at a moment."""
 
-    kind: Literal["acceleration_start"] = Field(
-        title="kind", description="a constant acceleration that sets in at a moment"
-    )
-    coefficients: Coefficients = Field(title="derivatives of the range at the first plot", description=COEFFICIENTS)
-    acceleration_mps2: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = Field(
-        title="acceleration",
-        json_schema_extra={"symbol": "a"},
-        description="radial acceleration added from then on, m/s²",
+    kind: Literal["acceleration_start"] = key("kind", "a constant acceleration that sets in at a moment")
+    coefficients: Coefficients = key("derivatives of the range at the first plot", COEFFICIENTS)
+    acceleration_mps2: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = key(
+        "acceleration", "radial acceleration added from then on, m/s²", symbol="a"
     )
 
     def reach_m(self, t: float) -> float:
@@ -179,18 +160,19 @@ class AccelerationStart(Starting):
 class Turn(Starting):
     """Straight flight in a plane through the radar, a turn of constant load, straight flight again."""
 
-    kind: Literal["turn"] = Field(title="kind", description="a turn of given g between two straight legs")
-    range_m: Positive = Field(title="range", description="range at the first plot, m")
-    speed_mps: Annotated[Positive, Field(le=FASTEST_MPS)] = Field(title="speed", description="speed, constant, m/s")
-    aspect_rad: Number = Field(
-        title="aspect angle", description="direction of flight from the line of sight outwards, rad (pi: straight in)"
+    kind: Literal["turn"] = key("kind", "a turn of given g between two straight legs")
+    range_m: Positive = key("range", "range at the first plot, m")
+    speed_mps: Annotated[Positive, Field(le=FASTEST_MPS)] = key("speed", "speed, constant, m/s")
+    aspect_rad: Number = key(
+        "aspect angle", "direction of flight from the line of sight outwards, rad (pi: straight in)"
     )
-    acceleration_g: Annotated[Number, Field(ge=-100, le=100)] = Field(
-        title="acceleration",
-        json_schema_extra={"symbol": "a", "unit": "g"},
-        description="lateral acceleration of the turn, standard gravities; positive: to the left",
+    acceleration_g: Annotated[Number, Field(ge=-100, le=100)] = key(
+        "acceleration",
+        "lateral acceleration of the turn, standard gravities; positive: to the left",
+        symbol="a",
+        unit="g",
     )
-    duration_s: Positive = Field(title="duration", description="length of the turn, s")
+    duration_s: Positive = key("duration", "length of the turn, s")
 
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
@@ -226,14 +208,12 @@ def straight_leg(x: float, y: float, heading: float, length: float) -> tuple[flo
 class FlyBy(Model):
     """Straight flight at a constant speed past the radar, at a distance."""
 
-    kind: Literal["fly_by"] = Field(title="kind", description="straight flight past the radar")
-    distance_m: Annotated[Positive, Field(ge=NEAREST_M)] = Field(
-        title="distance of closest approach", description="distance of closest approach, m"
+    kind: Literal["fly_by"] = key("kind", "straight flight past the radar")
+    distance_m: Annotated[Positive, Field(ge=NEAREST_M)] = key(
+        "distance of closest approach", "distance of closest approach, m"
     )
-    speed_mps: Annotated[Positive, Field(le=FASTEST_MPS)] = Field(title="speed", description="speed, constant, m/s")
-    start_range_m: Positive = Field(
-        title="range at the first plot", description="range at the first plot, before closest approach, m"
-    )
+    speed_mps: Annotated[Positive, Field(le=FASTEST_MPS)] = key("speed", "speed, constant, m/s")
+    start_range_m: Positive = key("range at the first plot", "range at the first plot, before closest approach, m")
 
     @cross_check
     def _begins_outside(self) -> Iterator[At]:
@@ -248,10 +228,10 @@ class FlyBy(Model):
 class Recorded(Model):
     """A flight recorded in a file, smoothed by a spline whose derivatives are the true velocity and acceleration."""
 
-    kind: Literal["recorded"] = Field(
-        title="kind", description="a flight from a CSV file with columns t_s, x_m, y_m, z_m, the radar at the origin"
+    kind: Literal["recorded"] = key(
+        "kind", "a flight from a CSV file with columns t_s, x_m, y_m, z_m, the radar at the origin"
     )
-    file: Annotated[str, DataFile()] = Field(title="file", description="the file, from the folder of this one")
+    file: Annotated[str, DataFile()] = key("file", "the file, from the folder of this one")
 
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s): of what is in the file none is known here."""

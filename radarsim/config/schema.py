@@ -4,7 +4,7 @@ from typing import Annotated, Protocol
 
 from pydantic import Field
 
-from radarsim.config.fields import Anything, Model, Name, Stem, Study, Whole
+from radarsim.config.fields import Anything, Model, Name, Stem, Study, Whole, key
 
 LARGEST_REALISATIONS = 10**12
 LARGEST_SEED = 2**64 - 1
@@ -13,27 +13,19 @@ LARGEST_SEED = 2**64 - 1
 class Common(Model):
     """Keys that every config may have, whatever its study."""
 
-    study: Stem | None = Field(None, title="study", description="the study, which decides the other keys")
-    include: Annotated[tuple[Stem, ...], Field(min_length=1)] | None = Field(
-        None,
-        title="included configs",
-        description="stems of other configs, to be run together in place of an experiment of one's own",
+    study: Stem | None = key("study", "the study, which decides the other keys", None)
+    include: Annotated[tuple[Stem, ...], Field(min_length=1)] | None = key(
+        "included configs", "stems of other configs, to be run together in place of an experiment of one's own", None
     )
-    sweep: Annotated[dict[str, Annotated[tuple[Anything, ...], Field(min_length=1)]], Field(min_length=1)] | None = (
-        Field(
-            None,
-            title="swept keys",
-            description="a case for each combination of values: key or dotted path, and its list of values",
-        )
+    sweep: Annotated[dict[str, Annotated[tuple[Anything, ...], Field(min_length=1)]], Field(min_length=1)] | None = key(
+        "swept keys", "a case for each combination of values: key or dotted path, and its list of values", None
     )
-    realisations: Annotated[int, Whole(1, LARGEST_REALISATIONS)] | None = Field(
-        None, title="realisations", description="how often the experiment is repeated"
+    realisations: Annotated[int, Whole(1, LARGEST_REALISATIONS)] | None = key(
+        "realisations", "how often the experiment is repeated", None
     )
-    seed: Annotated[int, Whole(0, LARGEST_SEED)] | None = Field(
-        None, title="seed", description="seed of the noise; default 1"
-    )
-    figures: dict[Name, Annotated[tuple[Name, ...], Field(min_length=1)]] = Field(
-        {}, title="cases in figures", description="for a figure the cases it shows: names, or patterns with * and ?"
+    seed: Annotated[int, Whole(0, LARGEST_SEED)] | None = key("seed", "seed of the noise; default 1", None)
+    figures: dict[Name, Annotated[tuple[Name, ...], Field(min_length=1)]] = key(
+        "cases in figures", "for a figure the cases it shows: names, or patterns with * and ?", {}
     )
 
 

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 COMPUTED = "?"  # stands among imports for a module whose name is computed
-WORDS = {"description", "title", "json_schema_extra"}  # of a configuration key: they only tell what it is
-KEYS = ("Field",)  # the calls whose words are meant
+# Of a configuration key, what only tells what it is: keywords, and texts before them; by the call that declares it.
+WORDS = {"Field": ({"description", "title", "json_schema_extra"}, 0), "key": ({"symbol", "unit"}, 2)}
 IMPORTERS = ("import_module", "__import__")
 FILE_NAME = re.compile(r"[\w ./-]*[\w-]\.[A-Za-z]\w{0,9}")
 OPAQUE = sys.stdlib_module_names | {"numpy", "scipy", "numba"}  # attributes of these are no modules of ours
@@ -165,8 +165,12 @@ def _tokens(node: object) -> Iterable[bytes]:
         yield f"({type(node).__name__}".encode()
         for name in node._fields:
             value = getattr(node, name, None)
-            if name == "keywords" and _is_key(node):
-                value = [one for one in value if one.arg not in WORDS]
+            if isinstance(node, ast.Call) and _called(node) in WORDS:
+                words, first = WORDS[_called(node)]
+                if name == "keywords":
+                    value = [one for one in value if one.arg not in words]
+                elif name == "args":
+                    value = [one for i, one in enumerate(value) if i >= first or not isinstance(one, ast.Constant)]
             elif name in ("kind", "type_comment", "ctx", "type_params"):
                 continue
             if value is not None and value != []:
@@ -181,9 +185,9 @@ def _tokens(node: object) -> Iterable[bytes]:
         yield repr(node).encode()
 
 
-def _is_key(node: ast.AST) -> bool:
-    """Whether a node declares a configuration key."""
-    return isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) in KEYS
+def _called(node: ast.Call) -> str:
+    """The name of what is called; empty where it has none."""
+    return getattr(node.func, "attr", getattr(node.func, "id", ""))
 
 
 def _is_text(statement: object) -> bool:

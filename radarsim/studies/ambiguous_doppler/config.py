@@ -25,6 +25,7 @@ from radarsim.config.fields import (
     Whole,
     at,
     cross_check,
+    key,
     of_each,
     unique_names,
 )
@@ -64,17 +65,14 @@ Order = Annotated[int, Whole(0, 2)]
 class Radar(radial.Radar):
     """A coherent surveillance radar: accuracies of one plot, period of its scans, pulse repetition rates."""
 
-    repetition_rate_hz: Positive | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_RATES)] = Field(
-        title="pulse repetition rate",
-        json_schema_extra={"symbol": "F_r"},
-        description="pulse repetition rate, Hz; velocity folds into half the wavelength times it; a list is used in "
-        "turn, scan by scan (stagger)",
+    repetition_rate_hz: Positive | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_RATES)] = key(
+        "pulse repetition rate",
+        "pulse repetition rate, Hz; velocity folds into half the wavelength times it; a list is used in turn, scan "
+        "by scan (stagger)",
+        symbol="F_r",
     )
-    detection_probability: Annotated[Probability, Field(gt=0)] = Field(
-        1.0,
-        title="detection probability",
-        json_schema_extra={"symbol": "P_D"},
-        description="probability that a scan gives a plot",
+    detection_probability: Annotated[Probability, Field(gt=0)] = key(
+        "detection probability", "probability that a scan gives a plot", 1.0, symbol="P_D"
     )
 
     @property
@@ -113,17 +111,11 @@ def joint_span(one: float, other: float) -> float:
 class Prior(Model):
     """What the filters know before the first plot: mean zero, and these standard deviations. The range is not known."""
 
-    sigma_velocity_mps: Positive = Field(
-        300.0,
-        title="prior σ of the radial velocity",
-        json_schema_extra={"symbol": "σ_V0"},
-        description="of the radial velocity, m/s",
+    sigma_velocity_mps: Positive = key(
+        "prior σ of the radial velocity", "of the radial velocity, m/s", 300.0, symbol="σ_V0"
     )
-    sigma_acceleration_mps2: Positive = Field(
-        10.0,
-        title="prior σ of the radial acceleration",
-        json_schema_extra={"symbol": "σ_a0"},
-        description="of the radial acceleration, m/s²",
+    sigma_acceleration_mps2: Positive = key(
+        "prior σ of the radial acceleration", "of the radial acceleration, m/s²", 10.0, symbol="σ_a0"
     )
 
 
@@ -133,34 +125,30 @@ class RandomPolynomial(Model):
     Both are normal with mean zero. Range counts from any origin, so that it may become negative.
     """
 
-    kind: Literal["random_polynomial"] = Field(
-        title="kind", description="a polynomial of the second degree, drawn each realisation"
-    )
-    range_m: Positive = Field(100e3, title="range", description="range at the first scan, m")
-    sigma_velocity_mps: Annotated[NonNegative, Field(le=FASTEST_MPS)] | None = Field(
+    kind: Literal["random_polynomial"] = key("kind", "a polynomial of the second degree, drawn each realisation")
+    range_m: Positive = key("range", "range at the first scan, m", 100e3)
+    sigma_velocity_mps: Annotated[NonNegative, Field(le=FASTEST_MPS)] | None = key(
+        "σ of the target's radial velocity",
+        "standard deviation of the radial velocity, m/s; default: that of `prior`",
         None,
-        title="σ of the target's radial velocity",
-        description="standard deviation of the radial velocity, m/s; default: that of `prior`",
     )
-    sigma_acceleration_mps2: Annotated[NonNegative, Field(le=HARDEST_MPS2)] | None = Field(
+    sigma_acceleration_mps2: Annotated[NonNegative, Field(le=HARDEST_MPS2)] | None = key(
+        "σ of the target's radial acceleration",
+        "standard deviation of the radial acceleration, m/s²; default: that of `prior`",
         None,
-        title="σ of the target's radial acceleration",
-        description="standard deviation of the radial acceleration, m/s²; default: that of `prior`",
     )
 
 
 class AccelerationPulse(Model):
     """A polynomial with a constant acceleration for a while; the velocity it has built up stays."""
 
-    kind: Literal["acceleration_pulse"] = Field(title="kind", description="a constant acceleration for a while")
-    coefficients: Coefficients = Field(title="derivatives of the range at the first plot", description=COEFFICIENTS)
-    acceleration_g: Annotated[Number, Field(ge=-100, le=100)] = Field(
-        title="acceleration",
-        json_schema_extra={"symbol": "a", "unit": "g"},
-        description="radial acceleration added, standard gravities",
+    kind: Literal["acceleration_pulse"] = key("kind", "a constant acceleration for a while")
+    coefficients: Coefficients = key("derivatives of the range at the first plot", COEFFICIENTS)
+    acceleration_g: Annotated[Number, Field(ge=-100, le=100)] = key(
+        "acceleration", "radial acceleration added, standard gravities", symbol="a", unit="g"
     )
-    start_s: NonNegative = Field(title="start time", description="time from the first scan at which it begins, s")
-    duration_s: Positive = Field(title="duration", description="how long it lasts, s")
+    start_s: NonNegative = key("start time", "time from the first scan at which it begins, s")
+    duration_s: Positive = key("duration", "how long it lasts, s")
 
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
@@ -177,67 +165,59 @@ Target = Annotated[
 class Manoeuvres(Model):
     """A class of manoeuvres: a constant radial acceleration for a while, that begins at any scan, each as likely."""
 
-    acceleration_mps2: Positive = Field(
-        title="acceleration", json_schema_extra={"symbol": "a"}, description="size of the acceleration, m/s²"
-    )
-    duration_s: Positive = Field(title="duration", description="how long it lasts, s")
+    acceleration_mps2: Positive = key("acceleration", "size of the acceleration, m/s²", symbol="a")
+    duration_s: Positive = key("duration", "how long it lasts, s")
 
 
 class Filter(Model):
     """A Kalman filter of range, or several of different order, with the velocity or without."""
 
-    name: Annotated[Name, Display()] = Field(title="name", description="label; every filter has its own")
-    doppler: Literal["none", "unfolded", "folded", "remainder"] = Field(
-        title="use of Doppler",
-        description="none: range alone; unfolded: the velocity with its true fold, a bound; folded: as measured, by "
-        "hypotheses; remainder: as measured, by the Chinese remainder of two scans of different repetition rates",
+    name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
+    doppler: Literal["none", "unfolded", "folded", "remainder"] = key(
+        "use of Doppler",
+        "none: range alone; unfolded: the velocity with its true fold, a bound; folded: as measured, by hypotheses; "
+        "remainder: as measured, by the Chinese remainder of two scans of different repetition rates",
     )
-    orders: Annotated[tuple[Order, ...], Field(min_length=1, max_length=3)] = Field(
+    orders: Annotated[tuple[Order, ...], Field(min_length=1, max_length=3)] = key(
+        "orders of the models",
+        "orders of its models: 2 has an acceleration, 1 a velocity, 0 a range that moves at random",
         (2,),
-        title="orders of the models",
-        description="orders of its models: 2 has an acceleration, 1 a velocity, 0 a range that moves at random",
     )
-    manoeuvre_variance: NonNegative | tuple[NonNegative, ...] = Field(
-        title="manoeuvre variance",
-        json_schema_extra={"symbol": "D_M", "unit": ""},
-        description="variance of the random derivative that a model allows for: jerk (m/s³)² of order 2, acceleration "
-        "(m/s²)² of order 1, velocity (m/s)² of order 0; a list for several orders, in their order",
+    manoeuvre_variance: NonNegative | tuple[NonNegative, ...] = key(
+        "manoeuvre variance",
+        "variance of the random derivative that a model allows for: jerk (m/s³)² of order 2, acceleration (m/s²)² of"
+        " order 1, velocity (m/s)² of order 0; a list for several orders, in their order",
+        symbol="D_M",
+        unit="",
     )
-    hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = Field(
+    hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = key(
+        "hypotheses kept", "folded: most sequences of folds that it keeps; 1: the nearest fold; default: 300", None
+    )
+    prune_below: Annotated[Probability, Field(lt=1)] | None = key(
+        "ratio under which a hypothesis is dropped",
+        "folded: ratio to the probability of the best, under which a hypothesis is dropped; 0: none is; default: 1e-6",
         None,
-        title="hypotheses kept",
-        description="folded: most sequences of folds that it keeps; 1: the nearest fold; default: 300",
     )
-    prune_below: Annotated[Probability, Field(lt=1)] | None = Field(
+    merge: Literal["never", "each_scan"] | None = key(
+        "merging of hypotheses",
+        "folded: keep hypotheses over scans, or merge them into one at each scan; default: never",
         None,
-        title="ratio under which a hypothesis is dropped",
-        description="folded: ratio to the probability of the best, under which a hypothesis is dropped; 0: none is; "
-        "default: 1e-6",
     )
-    merge: Literal["never", "each_scan"] | None = Field(
+    estimate: Literal["best", "mean"] | None = key(
+        "estimate", "folded: the best hypothesis, or the mean of all by their probabilities; default: mean", None
+    )
+    combine: Literal["likelihood", "expected_error", "intersection"] | None = key(
+        "combination of orders",
+        "several orders: likelihood (IMM, with transitions between orders), expected_error (the linear combination "
+        "of least error over `manoeuvres`), intersection (the smoothest whose interval meets all rougher)",
         None,
-        title="merging of hypotheses",
-        description="folded: keep hypotheses over scans, or merge them into one at each scan; default: never",
     )
-    estimate: Literal["best", "mean"] | None = Field(
+    stay_probability: Annotated[Probability, Field(gt=0, lt=1)] | None = key(
+        "probability that an order lasts",
+        "likelihood: probability that an order lasts from scan to scan; default: 0.95",
         None,
-        title="estimate",
-        description="folded: the best hypothesis, or the mean of all by their probabilities; default: mean",
     )
-    combine: Literal["likelihood", "expected_error", "intersection"] | None = Field(
-        None,
-        title="combination of orders",
-        description="several orders: likelihood (IMM, with transitions between orders), expected_error (the linear "
-        "combination of least error over `manoeuvres`), intersection (the smoothest whose interval meets all rougher)",
-    )
-    stay_probability: Annotated[Probability, Field(gt=0, lt=1)] | None = Field(
-        None,
-        title="probability that an order lasts",
-        description="likelihood: probability that an order lasts from scan to scan; default: 0.95",
-    )
-    manoeuvres: Manoeuvres | None = Field(
-        None, title="expected manoeuvres", description="expected_error: the manoeuvres that are expected"
-    )
+    manoeuvres: Manoeuvres | None = key("expected manoeuvres", "expected_error: the manoeuvres that are expected", None)
 
     @property
     def variances(self) -> tuple[float, ...]:
@@ -273,34 +253,34 @@ class Filter(Model):
             yield at("combine", "has no doppler: remainder, which unfolds for one order")
         elif self.combine == "expected_error" and self.manoeuvres is None:
             yield at("manoeuvres", "is needed by combine: expected_error")
-        for key, (of, _) in COMBINING.items():
-            if getattr(self, key) is not None and self.combine != of:
-                yield at(key, f"has no effect without combine: {of}; leave it out")
+        for name, (of, _) in COMBINING.items():
+            if getattr(self, name) is not None and self.combine != of:
+                yield at(name, f"has no effect without combine: {of}; leave it out")
 
     @cross_check
     def _unfolding(self) -> Iterator[At]:
-        for key in UNFOLDING:
-            if getattr(self, key) is None:
+        for name in UNFOLDING:
+            if getattr(self, name) is None:
                 continue
             if self.doppler != "folded":
-                yield at(key, f"has no effect with doppler: {self.doppler}; leave it out")
-            elif self.merge == "each_scan" and key != "merge":
-                yield at(key, "has no effect with merge: each_scan, which leaves one hypothesis; leave it out")
+                yield at(name, f"has no effect with doppler: {self.doppler}; leave it out")
+            elif self.merge == "each_scan" and name != "merge":
+                yield at(name, "has no effect with merge: each_scan, which leaves one hypothesis; leave it out")
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
         """The same with the defaults of what has an effect written out."""
-        defaults: dict[str, Any] = {key: value for key, (of, value) in COMBINING.items() if of == self.combine}
+        defaults: dict[str, Any] = {name: value for name, (of, value) in COMBINING.items() if of == self.combine}
         if self.doppler == "folded":
             defaults |= {"merge": "each_scan"} if self.merge == "each_scan" else UNFOLDING
-        missing = {key: value for key, value in defaults.items() if getattr(self, key) is None}
+        missing = {name: value for name, value in defaults.items() if getattr(self, name) is None}
         return self.model_copy(update=missing) if missing else self
 
 
 class RareFolds(rare.RareEvent):
     """Wrong folds that are rare: realisations shifted towards them, and weights that make up for it."""
 
-    filter: Name = Field(title="filter", description="the filter whose wrong folds at the last scan are sought")
+    filter: Name = key("filter", "the filter whose wrong folds at the last scan are sought")
 
     @property
     def aimed_at(self) -> str:
@@ -318,26 +298,22 @@ class Keys(Study):
         "orders",
     )
 
-    radar: Radar = Field(title="radar", description="the radar")
-    target: Annotated[Target, Scenario()] = Field(
-        title="target", description="the target: a scenario's stem, or inline"
-    )
-    prior: Annotated[Prior, Design()] = Field(
-        Prior.model_validate({}), title="prior", description="what the filters know before the first plot"
+    radar: Radar = key("radar", "the radar")
+    target: Annotated[Target, Scenario()] = key("target", "the target: a scenario's stem, or inline")
+    prior: Annotated[Prior, Design()] = key(
+        "prior", "what the filters know before the first plot", Prior.model_validate({})
     )
     filters: Annotated[
         tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = Field(title="filters", description="the filters; all see the same plots")
-    baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
-        None, title="baseline filter", description="name of the filter that gains are against; default: the first"
+    ] = key("filters", "the filters; all see the same plots")
+    baseline: Annotated[Name | None, Design(), NameIn("filters")] = key(
+        "baseline filter", "name of the filter that gains are against; default: the first", None
     )
-    scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = Field(
-        title="number of scans", description="number of scans"
-    )
-    rare: Annotated[RareFolds | None, Design(), Added()] = Field(
+    scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = key("number of scans", "number of scans")
+    rare: Annotated[RareFolds | None, Design(), Added()] = key(
+        "rare wrong folds",
+        "importance sampling of wrong folds, for filters that are almost always right: rare.csv",
         None,
-        title="rare wrong folds",
-        description="importance sampling of wrong folds, for filters that are almost always right: rare.csv",
     )
 
     @model_validator(mode="after")
@@ -348,9 +324,9 @@ class Keys(Study):
         if not isinstance(self.target, RandomPolynomial):
             return self
         own = {
-            key: getattr(self.prior, key)
-            for key in ("sigma_velocity_mps", "sigma_acceleration_mps2")
-            if getattr(self.target, key) is None
+            name: getattr(self.prior, name)
+            for name in ("sigma_velocity_mps", "sigma_acceleration_mps2")
+            if getattr(self.target, name) is None
         }
         return self.model_copy(update={"target": self.target.model_copy(update=own)}) if own else self
 

@@ -23,6 +23,7 @@ from radarsim.config.fields import (
     Whole,
     at,
     cross_check,
+    key,
     of_each,
     unique_names,
 )
@@ -37,25 +38,17 @@ Share = Annotated[float, Field(gt=0.5, lt=1)]
 class Burst(Model):
     """A coherent burst, sampled inside its pulses."""
 
-    carrier_hz: Positive = Field(
-        title="carrier frequency", json_schema_extra={"symbol": "f_0"}, description="carrier frequency, Hz"
+    carrier_hz: Positive = key("carrier frequency", "carrier frequency, Hz", symbol="f_0")
+    pulse_period_s: Positive = key("pulse repetition period", "time from pulse to pulse, s")
+    pulse_length_s: Positive = key("pulse length", "length of a pulse, s")
+    sampling_period_s: Positive = key("sampling period", "time from sample to sample inside a pulse, s")
+    pulses: Annotated[int, Whole(FEWEST_PULSES, MOST_SAMPLES)] = key("number of pulses", "number of pulses")
+    amplitude: Positive = key("amplitude of the echo", "amplitude of the echo, in the samples' unit")
+    noise_variance: Positive = key(
+        "noise variance of a sample",
+        "variance of the white noise in each real number sampled, in the samples' unit squared",
     )
-    pulse_period_s: Positive = Field(title="pulse repetition period", description="time from pulse to pulse, s")
-    pulse_length_s: Positive = Field(title="pulse length", description="length of a pulse, s")
-    sampling_period_s: Positive = Field(
-        title="sampling period", description="time from sample to sample inside a pulse, s"
-    )
-    pulses: Annotated[int, Whole(FEWEST_PULSES, MOST_SAMPLES)] = Field(
-        title="number of pulses", description="number of pulses"
-    )
-    amplitude: Positive = Field(
-        title="amplitude of the echo", description="amplitude of the echo, in the samples' unit"
-    )
-    noise_variance: Positive = Field(
-        title="noise variance of a sample",
-        description="variance of the white noise in each real number sampled, in the samples' unit squared",
-    )
-    samples: Literal["real", "complex"] = Field("real", title="samples", description="what the receiver gives")
+    samples: Literal["real", "complex"] = key("samples", "what the receiver gives", "real")
 
     @cross_check
     def _pulses_fit(self) -> Iterator[At]:
@@ -76,33 +69,26 @@ class Burst(Model):
 class Truth(Model):
     """The echo's phase: from its derivatives, or from a radial velocity that is straight between given instants."""
 
-    phase_rad: Number = Field(
-        0.0,
-        title="initial phase",
-        json_schema_extra={"symbol": "φ_0"},
-        description="phase at the start of the burst, rad",
-    )
+    phase_rad: Number = key("initial phase", "phase at the start of the burst, rad", 0.0, symbol="φ_0")
     doppler_derivatives: Annotated[tuple[Number, ...], Field(min_length=1, max_length=MOST_DERIVATIVES + 1)] | None = (
-        Field(
+        key(
+            "Doppler frequency and its derivatives",
+            "Doppler frequency and its derivatives at the start: Hz, Hz/s, Hz/s², …",
             None,
-            title="Doppler frequency and its derivatives",
-            description="Doppler frequency and its derivatives at the start: Hz, Hz/s, Hz/s², …",
         )
     )
-    times_s: Annotated[tuple[NonNegative, ...], Field(min_length=2, max_length=100)] | None = Field(
+    times_s: Annotated[tuple[NonNegative, ...], Field(min_length=2, max_length=100)] | None = key(
+        "times of the velocity profile",
+        "instants of the velocity profile from the start of the burst, s; the first is 0",
         None,
-        title="times of the velocity profile",
-        description="instants of the velocity profile from the start of the burst, s; the first is 0",
     )
-    velocities_mps: Annotated[tuple[Number, ...], Field(min_length=2, max_length=100)] | None = Field(
-        None,
-        title="radial velocities of the profile",
-        description="radial velocity at these instants, towards the radar positive, m/s",
+    velocities_mps: Annotated[tuple[Number, ...], Field(min_length=2, max_length=100)] | None = key(
+        "radial velocities of the profile", "radial velocity at these instants, towards the radar positive, m/s", None
     )
-    derivatives: Annotated[int, Whole(0, MOST_DERIVATIVES)] = Field(
+    derivatives: Annotated[int, Whole(0, MOST_DERIVATIVES)] = key(
+        "estimated derivatives of the Doppler frequency",
+        "with a velocity profile: derivatives of the Doppler frequency that are estimated",
         3,
-        title="estimated derivatives of the Doppler frequency",
-        description="with a velocity profile: derivatives of the Doppler frequency that are estimated",
     )
 
     @cross_check
@@ -130,19 +116,17 @@ Spreads = Annotated[tuple[Positive, ...], Field(min_length=2, max_length=MOST_DE
 class Prior(Model):
     """The forecast: independent Gaussian errors about the truth."""
 
-    spread_over_potential: Spreads | None = Field(
+    spread_over_potential: Spreads | None = key(
+        "prior σ over the potential σ",
+        "standard deviations over the potential ones of the whole burst: phase, frequency, …",
         None,
-        title="prior σ over the potential σ",
-        description="standard deviations over the potential ones of the whole burst: phase, frequency, …",
     )
-    sigma: Spreads | None = Field(
-        None, title="prior σ", description="standard deviations: rad, Hz, Hz/s, …; in place of the former"
-    )
-    scale: Positive = Field(1.0, title="scale of the prior σ", description="factor on all standard deviations")
-    error_scale: Positive = Field(
+    sigma: Spreads | None = key("prior σ", "standard deviations: rad, Hz, Hz/s, …; in place of the former", None)
+    scale: Positive = key("scale of the prior σ", "factor on all standard deviations", 1.0)
+    error_scale: Positive = key(
+        "true prior errors over the assumed ones",
+        "factor between the forecast's true errors and those that the estimators believe in",
         1.0,
-        title="true prior errors over the assumed ones",
-        description="factor between the forecast's true errors and those that the estimators believe in",
     )
 
     @cross_check
@@ -159,73 +143,52 @@ class Prior(Model):
 class Estimator(Model):
     """A sequence of windows that grow to the whole burst, Fisher scoring in each; or the classical rival."""
 
-    name: Annotated[Name, Display()] = Field(title="name", description="label; every estimator has its own")
-    method: Literal["sequence", "ridge"] = Field(
-        "sequence",
-        title="method",
-        description="sequence of discriminators, or short-time spectrum, robust fit, unwrapping, scoring",
+    name: Annotated[Name, Display()] = key("name", "label; every estimator has its own")
+    method: Literal["sequence", "ridge"] = key(
+        "method", "sequence of discriminators, or short-time spectrum, robust fit, unwrapping, scoring", "sequence"
     )
-    schedule: Literal["designed"] | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_WINDOWS)] = (
-        Field(
-            "designed",
-            title="window lengths",
-            description="designed by (14)–(16), or a list of rising window lengths, s",
-        )
+    schedule: Literal["designed"] | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_WINDOWS)] = key(
+        "window lengths", "designed by (14)–(16), or a list of rising window lengths, s", "designed"
     )
-    lock_probability: Share = Field(
-        0.99,
-        title="probability of a hand-over",
-        json_schema_extra={"symbol": "P_Δ"},
-        description="probability P_Δ of a hand-over",
+    lock_probability: Share = key("probability of a hand-over", "probability P_Δ of a hand-over", 0.99, symbol="P_Δ")
+    main_lobe_threshold: Positive = key(
+        "main-lobe threshold", "c, no unit: 1 as in (10) and (14), 0.5 as in (11)", 1.0, symbol="c"
     )
-    main_lobe_threshold: Positive = Field(
-        1.0,
-        title="main-lobe threshold",
-        json_schema_extra={"symbol": "c"},
-        description="c, no unit: 1 as in (10) and (14), 0.5 as in (11)",
-    )
-    tail: Literal["gaussian", "exact"] = Field(
+    tail: Literal["gaussian", "exact"] = key(
+        "law of the quadratic form",
+        "law of the quadratic form: the paper's Gaussian, or the weighted sum of χ² itself",
         "gaussian",
-        title="law of the quadratic form",
-        description="law of the quadratic form: the paper's Gaussian, or the weighted sum of χ² itself",
     )
-    density: Annotated[int, Whole(1, 10)] = Field(
-        1,
-        title="windows for each designed one",
-        description="windows for each designed one; 2: one at each geometric mean between",
+    density: Annotated[int, Whole(1, 10)] = key(
+        "windows for each designed one", "windows for each designed one; 2: one at each geometric mean between", 1
     )
-    first_windows: Annotated[int, Whole(1, MOST_WINDOWS)] | None = Field(
-        None, title="windows used", description="stop after so many windows; default: all"
+    first_windows: Annotated[int, Whole(1, MOST_WINDOWS)] | None = key(
+        "windows used", "stop after so many windows; default: all", None
     )
-    start: Literal["prior", "truth"] = Field("prior", title="first window", description="where the first window starts")
-    phases: Annotated[int, Whole(0, 64)] = Field(
-        0,
-        title="phases tried in the first window",
-        description="phases tried in the first window; 0: the phase in closed form",
+    start: Literal["prior", "truth"] = key("first window", "where the first window starts", "prior")
+    phases: Annotated[int, Whole(0, 64)] = key(
+        "phases tried in the first window", "phases tried in the first window; 0: the phase in closed form", 0
     )
-    steps: Annotated[int, Whole(1, 1000)] = Field(
-        40, title="scoring steps per window", description="scoring steps in a window, at most"
-    )
-    tolerance: Positive = Field(
+    steps: Annotated[int, Whole(1, 1000)] = key("scoring steps per window", "scoring steps in a window, at most", 40)
+    tolerance: Positive = key(
+        "step that ends a window",
+        "ε: step, in standard deviations, that ends a window",
         1e-3,
-        title="step that ends a window",
-        json_schema_extra={"symbol": "ε", "unit": "standard deviations"},
-        description="ε: step, in standard deviations, that ends a window",
+        symbol="ε",
+        unit="standard deviations",
     )
-    coherence_step: Flag = Field(
+    coherence_step: Flag = key(
+        "steps that account for the coherence",
+        "let steps account for the coherence: far from the maximum the curvature is less than Fisher's",
         False,
-        title="steps that account for the coherence",
-        description="let steps account for the coherence: far from the maximum the curvature is less than Fisher's",
     )
-    search_points: Annotated[int, Whole(0, 10)] = Field(
+    search_points: Annotated[int, Whole(0, 10)] = key(
+        "points of the search on each side",
+        "cure at a hand-over: points on each side along the leading direction of R_Δ; 0: none",
         0,
-        title="points of the search on each side",
-        description="cure at a hand-over: points on each side along the leading direction of R_Δ; 0: none",
     )
-    amplitude: Literal["known", "estimated", "as_printed"] = Field(
-        "known",
-        title="amplitude",
-        description="given, or estimated from the energy by (7) corrected, or as printed (its square)",
+    amplitude: Literal["known", "estimated", "as_printed"] = key(
+        "amplitude", "given, or estimated from the energy by (7) corrected, or as printed (its square)", "known"
     )
 
     @cross_check
@@ -237,9 +200,7 @@ class Estimator(Model):
 class Rare(rare.RareEvent):
     """Losses of lock that are rare: bursts shifted towards them, and weights that make up for it."""
 
-    estimator: Name = Field(
-        title="estimator", description="the estimator whose losses of lock at its last window are sought"
-    )
+    estimator: Name = key("estimator", "the estimator whose losses of lock at its last window are sought")
 
     @property
     def aimed_at(self) -> str:
@@ -252,32 +213,30 @@ class Keys(Study):
     bare_keys = "estimators"
     figure_names = ("residuals", "locks", "accuracy", "lock_*")  # the last: of what a sweep varies
 
-    burst: Burst = Field(title="burst", description="the burst")
-    truth: Annotated[Truth, Scenario()] = Field(
-        title="true phase", description="the echo's phase: a scenario's stem, or inline"
-    )
-    prior: Prior = Field(title="prior", description="the forecast")
+    burst: Burst = key("burst", "the burst")
+    truth: Annotated[Truth, Scenario()] = key("true phase", "the echo's phase: a scenario's stem, or inline")
+    prior: Prior = key("prior", "the forecast")
     estimators: Annotated[
         tuple[Estimator, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = Field(title="estimators", description="the estimators; all see the same bursts")
-    engine: Annotated[Literal["auto", "block_sums", "samples", "demodulated"], Design()] = Field(
+    ] = key("estimators", "the estimators; all see the same bursts")
+    engine: Annotated[Literal["auto", "block_sums", "samples", "demodulated"], Design()] = key(
+        "way of simulation",
+        "block_sums: exact sums over short blocks are drawn; samples: every step over every sample; demodulated: "
+        "samples drawn and demodulated once; auto: block_sums where it is valid, else samples",
         "auto",
-        title="way of simulation",
-        description="block_sums: exact sums over short blocks are drawn; samples: every step over every sample; "
-        "demodulated: samples drawn and demodulated once; auto: block_sums where it is valid, else samples",
     )
-    rare: Annotated[Rare | None, Design(), Added()] = Field(
+    rare: Annotated[Rare | None, Design(), Added()] = key(
+        "rare losses of lock",
+        "importance sampling of losses of lock, for sequences that lock almost always: rare.csv",
         None,
-        title="rare losses of lock",
-        description="importance sampling of losses of lock, for sequences that lock almost always: rare.csv",
     )
 
     @cross_check
     def _prior_fits(self) -> Iterator[At]:
         size = self.truth.parameters
         if len(self.prior.given) != size:
-            key = "spread_over_potential" if self.prior.sigma is None else "sigma"
-            yield at(f"prior.{key}", f"must have {size} values: phase, Doppler frequency and {size - 2} derivatives")
+            name = "spread_over_potential" if self.prior.sigma is None else "sigma"
+            yield at(f"prior.{name}", f"must have {size} values: phase, Doppler frequency and {size - 2} derivatives")
 
     @cross_check
     def _profile_fits(self) -> Iterator[At]:

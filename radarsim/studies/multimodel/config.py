@@ -25,6 +25,7 @@ from radarsim.config.fields import (
     Whole,
     at,
     cross_check,
+    key,
     unique_names,
 )
 
@@ -43,71 +44,42 @@ Acceleration = Annotated[Number, Field(ge=-2000, le=2000)]
 class Sensor(Model):
     """A radar with a flat antenna: accuracies of a plot, its period, where the antenna looks."""
 
-    name: Annotated[Name | None, Display()] = Field(None, title="name", description="display name")
-    sigma_range_m: Positive | None = Field(
-        None,
-        title="σ of the measured range",
-        json_schema_extra={"symbol": "σ_r"},
-        description="standard deviation of a measured range, m",
+    name: Annotated[Name | None, Display()] = key("name", "display name", None)
+    sigma_range_m: Positive | None = key(
+        "σ of the measured range", "standard deviation of a measured range, m", None, symbol="σ_r"
     )
-    sigma_elevation_rad: Wide | None = Field(
-        None,
-        title="σ of the measured elevation",
-        json_schema_extra={"symbol": "σ_ε"},
-        description="of the biconical elevation asin(y_A / r), rad",
+    sigma_elevation_rad: Wide | None = key(
+        "σ of the measured elevation", "of the biconical elevation asin(y_A / r), rad", None, symbol="σ_ε"
     )
-    sigma_azimuth_rad: Wide | None = Field(
-        None,
-        title="σ of the measured azimuth",
-        json_schema_extra={"symbol": "σ_α"},
-        description="of the biconical azimuth asin(z_A / r), rad",
+    sigma_azimuth_rad: Wide | None = key(
+        "σ of the measured azimuth", "of the biconical azimuth asin(z_A / r), rad", None, symbol="σ_α"
     )
-    sigma_x_m: Positive | None = Field(
-        None,
-        title="σ of the measured x",
-        json_schema_extra={"symbol": "σ_x"},
-        description="of x (north), m: for plots measured in the local frame",
+    sigma_x_m: Positive | None = key(
+        "σ of the measured x", "of x (north), m: for plots measured in the local frame", None, symbol="σ_x"
     )
-    sigma_y_m: Positive | None = Field(
-        None, title="σ of the measured y", json_schema_extra={"symbol": "σ_y"}, description="of y (up), m"
+    sigma_y_m: Positive | None = key("σ of the measured y", "of y (up), m", None, symbol="σ_y")
+    sigma_z_m: Positive | None = key("σ of the measured z", "of z (east), m", None, symbol="σ_z")
+    scan_period_s: Annotated[Positive, Field(le=LONGEST_INTERVAL_S)] = key(
+        "scan period", "time between two plots, s", symbol="Δt"
     )
-    sigma_z_m: Positive | None = Field(
-        None, title="σ of the measured z", json_schema_extra={"symbol": "σ_z"}, description="of z (east), m"
+    jitter_s: NonNegative = key(
+        "jitter of the scans", "each scan comes earlier or later by up to this, drawn once, s", 0.0
     )
-    scan_period_s: Annotated[Positive, Field(le=LONGEST_INTERVAL_S)] = Field(
-        title="scan period", json_schema_extra={"symbol": "Δt"}, description="time between two plots, s"
+    antenna_azimuth_rad: Angle = key(
+        "antenna azimuth", "of the antenna's normal, from north to east, rad", 0.0, symbol="α_A"
     )
-    jitter_s: NonNegative = Field(
-        0.0, title="jitter of the scans", description="each scan comes earlier or later by up to this, drawn once, s"
+    antenna_elevation_rad: Angle = key(
+        "antenna elevation", "of the antenna's normal above the horizon, rad", 0.0, symbol="ε_A"
     )
-    antenna_azimuth_rad: Angle = Field(
-        0.0,
-        title="antenna azimuth",
-        json_schema_extra={"symbol": "α_A"},
-        description="of the antenna's normal, from north to east, rad",
-    )
-    antenna_elevation_rad: Angle = Field(
-        0.0,
-        title="antenna elevation",
-        json_schema_extra={"symbol": "ε_A"},
-        description="of the antenna's normal above the horizon, rad",
-    )
-    antenna_height_m: Number = Field(
-        0.0,
-        title="antenna height",
-        json_schema_extra={"symbol": "h"},
-        description="of the phase centre above the origin, m",
-    )
-    detection_probability: Annotated[Probability, Field(gt=0)] = Field(
+    antenna_height_m: Number = key("antenna height", "of the phase centre above the origin, m", 0.0, symbol="h")
+    detection_probability: Annotated[Probability, Field(gt=0)] = key(
+        "detection probability",
+        "probability that the plot of a scan comes; the three that start the track always do",
         1.0,
-        title="detection probability",
-        json_schema_extra={"symbol": "P_D"},
-        description="probability that the plot of a scan comes; the three that start the track always do",
+        symbol="P_D",
     )
-    conversion: Annotated[Literal["plain", "unbiased"], Design()] = Field(
-        "plain",
-        title="conversion of plots",
-        description="of plots to the local frame: as in the paper, or with its mean error taken off",
+    conversion: Annotated[Literal["plain", "unbiased"], Design()] = key(
+        "conversion of plots", "of plots to the local frame: as in the paper, or with its mean error taken off", "plain"
     )
 
     @cross_check
@@ -137,10 +109,8 @@ class Sensor(Model):
 class Stage(Model):
     """A named part of the flight, up to a time."""
 
-    name: Name = Field(title="stage", description="start, ballistic, steady, manoeuvre, after, …")
-    end_s: Positive | None = Field(
-        None, title="end time", description="when it ends, s from the first plot; only the last has no end"
-    )
+    name: Name = key("stage", "start, ballistic, steady, manoeuvre, after, …")
+    end_s: Positive | None = key("end time", "when it ends, s from the first plot; only the last has no end", None)
 
 
 Stages = Annotated[tuple[Stage, ...], Field(min_length=1, max_length=12), AfterValidator(unique_names)]
@@ -149,8 +119,8 @@ Stages = Annotated[tuple[Stage, ...], Field(min_length=1, max_length=12), AfterV
 class Target(Model):
     """What all targets share: the stages by which tables are made."""
 
-    stages: Annotated[Stages, Design()] = Field(
-        (Stage(name="all", end_s=None),), title="stages", description="stages in order, the last without an end"
+    stages: Annotated[Stages, Design()] = key(
+        "stages", "stages in order, the last without an end", (Stage(name="all", end_s=None),)
     )
 
     @property
@@ -170,41 +140,27 @@ class Target(Model):
 class Phase(Model):
     """Accelerations commanded from a moment on, m/s²."""
 
-    start_s: NonNegative = Field(title="start time", description="when it begins, s from the first plot")
-    lateral_mps2: Acceleration = Field(
-        0.0, title="lateral acceleration", description="to the right of the velocity, level, m/s²"
+    start_s: NonNegative = key("start time", "when it begins, s from the first plot")
+    lateral_mps2: Acceleration = key("lateral acceleration", "to the right of the velocity, level, m/s²", 0.0)
+    normal_mps2: Acceleration = key("normal acceleration", "upwards, normal to the velocity, m/s²", 0.0)
+    axial_mps2: Acceleration = key("axial acceleration", "along the velocity, m/s²", 0.0)
+    period_s: Positive | None = key(
+        "period of the weave", "the commands follow a sine of this period, s; none: constant", None
     )
-    normal_mps2: Acceleration = Field(
-        0.0, title="normal acceleration", description="upwards, normal to the velocity, m/s²"
-    )
-    axial_mps2: Acceleration = Field(0.0, title="axial acceleration", description="along the velocity, m/s²")
-    period_s: Positive | None = Field(
-        None, title="period of the weave", description="the commands follow a sine of this period, s; none: constant"
-    )
-    trimmed: Flag = Field(
-        False, title="gravity and drag balanced", description="lift and thrust balance gravity and drag as well"
-    )
+    trimmed: Flag = key("gravity and drag balanced", "lift and thrust balance gravity and drag as well", False)
 
 
 class Flight(Target):
     """A point mass with gravity, an exponential atmosphere, and accelerations commanded by phase."""
 
-    kind: Literal["flight"] = Field(title="kind", description="an integrated flight")
-    duration_s: Annotated[Positive, Field(le=MOST_DURATION_S)] = Field(
-        title="duration", description="time from first to last plot, s"
-    )
-    position_m: Point = Field(title="position at the first plot", description="north, up, east at the first plot, m")
-    velocity_mps: Point = Field(
-        title="velocity at the first plot", description="north, up, east at the first plot, m/s"
-    )
-    ballistic_coefficient_kgpm2: Positive = Field(
-        1e4, title="ballistic coefficient", description="mass / (drag coefficient · area), kg/m²"
-    )
-    lag_s: Positive = Field(
-        1.0, title="lag of the commands", description="time constant with which commands are followed, s"
-    )
-    phases: Annotated[tuple[Phase, ...], Field(min_length=1, max_length=64)] = Field(
-        title="phases tried in the first window", description="phases, in order"
+    kind: Literal["flight"] = key("kind", "an integrated flight")
+    duration_s: Annotated[Positive, Field(le=MOST_DURATION_S)] = key("duration", "time from first to last plot, s")
+    position_m: Point = key("position at the first plot", "north, up, east at the first plot, m")
+    velocity_mps: Point = key("velocity at the first plot", "north, up, east at the first plot, m/s")
+    ballistic_coefficient_kgpm2: Positive = key("ballistic coefficient", "mass / (drag coefficient · area), kg/m²", 1e4)
+    lag_s: Positive = key("lag of the commands", "time constant with which commands are followed, s", 1.0)
+    phases: Annotated[tuple[Phase, ...], Field(min_length=1, max_length=64)] = key(
+        "phases tried in the first window", "phases, in order"
     )
 
     @cross_check
@@ -224,10 +180,8 @@ class Flight(Target):
 class Recorded(Target):
     """A flight recorded in a file, smoothed by a spline whose derivatives are the true velocity and acceleration."""
 
-    kind: Literal["recorded"] = Field(
-        title="kind", description="a flight from a CSV file with columns t_s, x_m, y_m, z_m"
-    )
-    file: Annotated[str, DataFile()] = Field(title="file", description="the file, from the folder of this one")
+    kind: Literal["recorded"] = key("kind", "a flight from a CSV file with columns t_s, x_m, y_m, z_m")
+    file: Annotated[str, DataFile()] = key("file", "the file, from the folder of this one")
 
 
 AnyTarget = Annotated[Flight | Recorded, Field(discriminator="kind")]
@@ -236,13 +190,13 @@ AnyTarget = Annotated[Flight | Recorded, Field(discriminator="kind")]
 class MotionModel(Model):
     """A hypothesis of how the target moves."""
 
-    motion: Literal["uniform", "accelerated", "still"] = Field(
-        title="motion", description="straight at a constant velocity, with a constant acceleration, or at rest"
+    motion: Literal["uniform", "accelerated", "still"] = key(
+        "motion", "straight at a constant velocity, with a constant acceleration, or at rest"
     )
-    sigma_acceleration_mps2: NonNegative = Field(
-        title="σ of the random acceleration",
-        json_schema_extra={"symbol": "σ_A"},
-        description="standard deviation of the random acceleration of each step, m/s², whatever the step's length",
+    sigma_acceleration_mps2: NonNegative = key(
+        "σ of the random acceleration",
+        "standard deviation of the random acceleration of each step, m/s², whatever the step's length",
+        symbol="σ_A",
     )
 
 
@@ -252,33 +206,29 @@ Column = Annotated[tuple[Probability, ...], Field(min_length=1, max_length=MOST_
 class Filter(Model):
     """A Kalman filter, or several that share what they know."""
 
-    name: Annotated[Name, Display()] = Field(title="name", description="label; every filter has its own")
-    family: Literal["kalman", "gpb1", "imm", "gpb2"] = Field(
-        title="family of filters", description="one model; or MMA1 (GPB1), MMA2 (IMM), MMA3 (GPB2) of the paper"
+    name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
+    family: Literal["kalman", "gpb1", "imm", "gpb2"] = key(
+        "family of filters", "one model; or MMA1 (GPB1), MMA2 (IMM), MMA3 (GPB2) of the paper"
     )
-    models: Annotated[tuple[MotionModel, ...], Field(min_length=1, max_length=MOST_MODELS)] = Field(
-        title="motion models", description="the bank of motion models, one to five; kalman has one"
+    models: Annotated[tuple[MotionModel, ...], Field(min_length=1, max_length=MOST_MODELS)] = key(
+        "motion models", "the bank of motion models, one to five; kalman has one"
     )
-    transition: Annotated[tuple[Column, ...], Field(min_length=1, max_length=MOST_MODELS)] = Field(
+    transition: Annotated[tuple[Column, ...], Field(min_length=1, max_length=MOST_MODELS)] = key(
+        "transition probabilities",
+        "transition probabilities: row i, column j from model j to model i; columns sum to one",
         ((1.0,),),
-        title="transition probabilities",
-        description="transition probabilities: row i, column j from model j to model i; columns sum to one",
     )
-    transition_interval_s: Positive = Field(
-        0.05, title="interval of the transition matrix", description="time for which the matrix holds, s"
+    transition_interval_s: Positive = key(
+        "interval of the transition matrix", "time for which the matrix holds, s", 0.05
     )
-    merge: Literal["moment", "best", "combined", "modified_combined"] = Field(
-        "combined",
-        title="merging rule",
-        description="rule of the partial merges: eq. (4), eq. (5), or the paper's combinations of them",
+    merge: Literal["moment", "best", "combined", "modified_combined"] = key(
+        "merging rule", "rule of the partial merges: eq. (4), eq. (5), or the paper's combinations of them", "combined"
     )
-    output: Literal["moment", "best"] = Field(
-        "best", title="output rule", description="rule by which the estimate is made"
-    )
-    covariance_at: Literal["plot", "prediction"] = Field(
+    output: Literal["moment", "best"] = key("output rule", "rule by which the estimate is made", "best")
+    covariance_at: Literal["plot", "prediction"] = key(
+        "where the plot's covariance is computed",
+        "where the plot's covariance is computed: at the plot, as in the paper, or at its prediction",
         "plot",
-        title="where the plot's covariance is computed",
-        description="where the plot's covariance is computed: at the plot, as in the paper, or at its prediction",
     )
 
     @cross_check
@@ -305,26 +255,22 @@ class Keys(Study):
 
     figure_names = ("trajectory", "sigma_y", "sigma_vy", "probabilities", "families", "cost", "consistency")
 
-    sensor: Sensor = Field(title="sensor", description="the radar")
-    target: Annotated[AnyTarget, Scenario()] = Field(
-        title="target", description="the target: a scenario's stem, or inline"
-    )
+    sensor: Sensor = key("sensor", "the radar")
+    target: Annotated[AnyTarget, Scenario()] = key("target", "the target: a scenario's stem, or inline")
     filters: Annotated[
         tuple[Filter, ...], Field(min_length=1, max_length=32), AfterValidator(unique_names), Design()
-    ] = Field(title="filters", description="the filters; all see the same plots")
-    baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
-        None, title="baseline filter", description="name of the filter that gains are against; default: the first"
+    ] = key("filters", "the filters; all see the same plots")
+    baseline: Annotated[Name | None, Design(), NameIn("filters")] = key(
+        "baseline filter", "name of the filter that gains are against; default: the first", None
     )
-    start_acceleration_mps2: Annotated[NonNegative, Design()] = Field(
+    start_acceleration_mps2: Annotated[NonNegative, Design()] = key(
+        "σ of the acceleration at the start of a track",
+        "spread of the acceleration that the start of a track allows for, m/s²",
         30.0,
-        title="σ of the acceleration at the start of a track",
-        description="spread of the acceleration that the start of a track allows for, m/s²",
     )
-    scans: Annotated[int | None, Whole(4, MOST_SCANS), Design()] = Field(
-        None, title="number of scans", description="number of plots; default: to the end of the flight"
+    scans: Annotated[int | None, Whole(4, MOST_SCANS), Design()] = key(
+        "number of scans", "number of plots; default: to the end of the flight", None
     )
-    report_every: Annotated[int, Whole(1, MOST_SCANS), Design()] = Field(
-        1,
-        title="every n-th scan reported",
-        description="tables and figures keep every such scan and the last; stages are made of all",
+    report_every: Annotated[int, Whole(1, MOST_SCANS), Design()] = key(
+        "every n-th scan reported", "tables and figures keep every such scan and the last; stages are made of all", 1
     )

@@ -24,6 +24,7 @@ from radarsim.config.fields import (
     Whole,
     at,
     cross_check,
+    key,
     of_each,
     unique_names,
 )
@@ -56,19 +57,13 @@ Target = Annotated[Polynomial | AccelerationStart | Turn | FlyBy | Recorded, Fie
 class Radar(Model):
     """A surveillance radar: wavelength, accuracy of a range, period of its scans. Its velocity comes from the burst."""
 
-    name: Annotated[Name | None, Display()] = Field(None, title="name", description="display name")
-    band: Annotated[Band | None, Display()] = Field(
-        None, title="band", description="wave band, for display: by its wavelength, or by its letter (IEEE Std 521)"
+    name: Annotated[Name | None, Display()] = key("name", "display name", None)
+    band: Annotated[Band | None, Display()] = key(
+        "band", "wave band, for display: by its wavelength, or by its letter (IEEE Std 521)", None
     )
-    wavelength_m: Positive = Field(title="wavelength", json_schema_extra={"symbol": "λ"}, description="wavelength, m")
-    sigma_range_m: Positive = Field(
-        title="σ of the measured range",
-        json_schema_extra={"symbol": "σ_r"},
-        description="standard deviation of a measured range, m",
-    )
-    scan_period_s: Positive = Field(
-        title="scan period", json_schema_extra={"symbol": "Δt"}, description="time between two bursts, s"
-    )
+    wavelength_m: Positive = key("wavelength", "wavelength, m", symbol="λ")
+    sigma_range_m: Positive = key("σ of the measured range", "standard deviation of a measured range, m", symbol="σ_r")
+    scan_period_s: Positive = key("scan period", "time between two bursts, s", symbol="Δt")
 
     @cross_check
     def _in_its_band(self) -> Iterator[At]:
@@ -78,37 +73,33 @@ class Radar(Model):
 class Burst(Model):
     """The coherent burst of a scan, one complex sample a pulse behind the filter that is matched to it."""
 
-    repetition_rate_hz: Positive = Field(
-        title="pulse repetition rate",
-        json_schema_extra={"symbol": "F_r"},
-        description="pulse repetition rate, Hz; velocity folds into λ/2 times it",
+    repetition_rate_hz: Positive = key(
+        "pulse repetition rate", "pulse repetition rate, Hz; velocity folds into λ/2 times it", symbol="F_r"
     )
-    pulses: Annotated[int, Whole(FEWEST_PULSES, MOST_PULSES)] | None = Field(
+    pulses: Annotated[int, Whole(FEWEST_PULSES, MOST_PULSES)] | None = key(
+        "pulses of a burst", "number of pulses; or give pulses_per_second", None, symbol="N"
+    )
+    pulses_per_second: Positive | None = key(
+        "pulses a second",
+        "ratio of pulses to the scan period, 1/s, in place of pulses: a constant share of time",
         None,
-        title="pulses of a burst",
-        json_schema_extra={"symbol": "N"},
-        description="number of pulses; or give pulses_per_second",
+        unit="1/s",
     )
-    pulses_per_second: Positive | None = Field(
+    pulse_length_s: Positive = key(
+        "pulse length",
+        "length of a pulse, s: the matched filter loses sinc² of it times the Doppler frequency",
+        symbol="t_p",
+    )
+    snr_db: Annotated[Number, Field(ge=-60, le=100)] = key(
+        "signal-to-noise ratio of a pulse",
+        "ratio of the power of the echo to that of the noise in the sample of a pulse, dB",
+        unit="dB",
+        symbol="q",
+    )
+    snr_range_m: Positive | None = key(
+        "range of the signal-to-noise ratio",
+        "range at which snr_db holds, m: it then falls with the fourth power; default: everywhere",
         None,
-        title="pulses a second",
-        json_schema_extra={"unit": "1/s"},
-        description="ratio of pulses to the scan period, 1/s, in place of pulses: a constant share of time",
-    )
-    pulse_length_s: Positive = Field(
-        title="pulse length",
-        json_schema_extra={"symbol": "t_p"},
-        description="length of a pulse, s: the matched filter loses sinc² of it times the Doppler frequency",
-    )
-    snr_db: Annotated[Number, Field(ge=-60, le=100)] = Field(
-        title="signal-to-noise ratio of a pulse",
-        json_schema_extra={"unit": "dB", "symbol": "q"},
-        description="ratio of the power of the echo to that of the noise in the sample of a pulse, dB",
-    )
-    snr_range_m: Positive | None = Field(
-        None,
-        title="range of the signal-to-noise ratio",
-        description="range at which snr_db holds, m: it then falls with the fourth power; default: everywhere",
     )
 
     @cross_check
@@ -125,98 +116,87 @@ class Burst(Model):
 class Prior(Model):
     """What is known when the track begins: the errors of a designation about the truth, drawn, Gaussian."""
 
-    sigma_velocity_mps: Positive = Field(
-        title="σ of the designated velocity",
-        json_schema_extra={"symbol": "σ_V0"},
-        description="standard deviation of the radial velocity, m/s",
+    sigma_velocity_mps: Positive = key(
+        "σ of the designated velocity", "standard deviation of the radial velocity, m/s", symbol="σ_V0"
     )
-    sigma_acceleration_mps2: Positive = Field(
-        title="σ of the designated acceleration",
-        json_schema_extra={"symbol": "σ_a0"},
-        description="standard deviation of the radial acceleration, m/s²",
+    sigma_acceleration_mps2: Positive = key(
+        "σ of the designated acceleration", "standard deviation of the radial acceleration, m/s²", symbol="σ_a0"
     )
 
 
 class Forecast(Model):
     """A forecast that is the same at each scan: errors about the truth, drawn independently, Gaussian."""
 
-    sigma_velocity_mps: Positive = Field(
-        title="σ of the forecast velocity", description="standard deviation of the radial velocity, m/s"
-    )
-    sigma_acceleration_mps2: Positive = Field(
-        title="σ of the forecast acceleration", description="standard deviation of the radial acceleration, m/s²"
+    sigma_velocity_mps: Positive = key("σ of the forecast velocity", "standard deviation of the radial velocity, m/s")
+    sigma_acceleration_mps2: Positive = key(
+        "σ of the forecast acceleration", "standard deviation of the radial acceleration, m/s²"
     )
 
 
 class Filter(Model):
     """A Kalman filter of range, and of what an estimator finds in the burst."""
 
-    name: Annotated[Name, Display()] = Field(title="name", description="label; every filter has its own")
-    observes: tuple[Literal["range", "velocity", "acceleration"], ...] = Field(
-        title="observes", description="what it takes: [range], [range, velocity] or [range, velocity, acceleration]"
+    name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
+    observes: tuple[Literal["range", "velocity", "acceleration"], ...] = key(
+        "observes", "what it takes: [range], [range, velocity] or [range, velocity, acceleration]"
     )
-    manoeuvre_variance: NonNegative = Field(
-        title="manoeuvre variance",
-        json_schema_extra={"symbol": "D_M", "unit": "(m/s³)²"},
-        description="variance of the random jerk it allows for, (m/s³)²; as in P1 not over the scans of its start",
+    manoeuvre_variance: NonNegative = key(
+        "manoeuvre variance",
+        "variance of the random jerk it allows for, (m/s³)²; as in P1 not over the scans of its start",
+        symbol="D_M",
+        unit="(m/s³)²",
     )
-    process_noise: Literal["random_jerk", "white_jerk", "white_acceleration"] = Field(
+    process_noise: Literal["random_jerk", "white_jerk", "white_acceleration"] = key(
+        "process noise",
+        "how the allowed manoeuvre lies within a scan: a constant jerk (P1's), of which the velocity tells the "
+        "acceleration, white jerk, or a step of the acceleration",
         "random_jerk",
-        title="process noise",
-        description="how the allowed manoeuvre lies within a scan: a constant jerk (P1's), of which the velocity tells "
-        "the acceleration, white jerk, or a step of the acceleration",
     )
-    estimator: Literal["sequence", "dense", "cured", "spectrum", "fisher_bound"] | None = Field(
+    estimator: Literal["sequence", "dense", "cured", "spectrum", "fisher_bound"] | None = key(
+        "estimator",
+        "how the burst is estimated: P4's sequence of windows, with twice as many, with the search where coherence "
+        "is short; peak of the spectrum and scoring; or ideal Gaussian errors; default: cured",
         None,
-        title="estimator",
-        description="how the burst is estimated: P4's sequence of windows, with twice as many, with the search where "
-        "coherence is short; peak of the spectrum and scoring; or ideal Gaussian errors; default: cured",
     )
-    forecast: Literal["track"] | Forecast | None = Field(
+    forecast: Literal["track"] | Forecast | None = key(
+        "forecast",
+        "where a sequence starts and how wide its first window is: track (the filter's own prediction with its "
+        "covariance), or a forecast of fixed accuracy; default: track",
         None,
-        title="forecast",
-        description="where a sequence starts and how wide its first window is: track (the filter's own prediction "
-        "with its covariance), or a forecast of fixed accuracy; default: track",
     )
-    derivatives: Annotated[int, Whole(0, MOST_DERIVATIVES)] | None = Field(
+    derivatives: Annotated[int, Whole(0, MOST_DERIVATIVES)] | None = key(
+        "derivatives estimated",
+        "derivatives of the Doppler frequency that are estimated; default: 1 with the acceleration, else 0 (it is "
+        "then taken as forecast)",
         None,
-        title="derivatives estimated",
-        description="derivatives of the Doppler frequency that are estimated; default: 1 with the acceleration, else 0 "
-        "(it is then taken as forecast)",
     )
-    use: Literal["as_measured", "gated", "mixture"] | None = Field(
+    use: Literal["as_measured", "gated", "mixture"] | None = key(
+        "use of an estimate",
+        "as_measured: every estimate as if it had locked; gated: those near the prediction; mixture: weighed by the "
+        "probability that it locked; default: as_measured",
         None,
-        title="use of an estimate",
-        description="as_measured: every estimate as if it had locked; gated: those near the prediction; mixture: "
-        "weighed by the probability that it locked; default: as_measured",
     )
-    gate_probability: Annotated[float, Field(gt=0, lt=1)] | None = Field(
-        None,
-        title="gate probability",
-        description="gated: probability that an estimate that locked is within the gate; default: 0.999",
+    gate_probability: Annotated[float, Field(gt=0, lt=1)] | None = key(
+        "gate probability", "gated: probability that an estimate that locked is within the gate; default: 0.999", None
     )
-    lock_probability: Annotated[float, Field(gt=0, lt=1)] | None = Field(
-        None,
-        title="lock probability",
-        description="mixture: probability before it is seen that an estimate has locked; default: 0.95",
+    lock_probability: Annotated[float, Field(gt=0, lt=1)] | None = key(
+        "lock probability", "mixture: probability before it is seen that an estimate has locked; default: 0.95", None
     )
 
-    hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = Field(
+    hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = key(
+        "hypotheses kept",
+        "most hypotheses that it keeps of the folds of its velocities (and, as a mixture, of the bursts that "
+        "locked), as folded velocity does; default: 1, the fold nearest to the prediction",
         None,
-        title="hypotheses kept",
-        description="most hypotheses that it keeps of the folds of its velocities (and, as a mixture, of the bursts "
-        "that locked), as folded velocity does; default: 1, the fold nearest to the prediction",
     )
-    prune_below: Annotated[Probability, Field(lt=1)] | None = Field(
+    prune_below: Annotated[Probability, Field(lt=1)] | None = key(
+        "ratio under which a hypothesis is dropped",
+        "several hypotheses: ratio to the probability of the best, under which one is dropped; 0: none is; default: "
+        "1e-6",
         None,
-        title="ratio under which a hypothesis is dropped",
-        description="several hypotheses: ratio to the probability of the best, under which one is dropped; 0: none is; "
-        "default: 1e-6",
     )
-    estimate: Literal["best", "mean"] | None = Field(
-        None,
-        title="estimate",
-        description="several hypotheses: the best one, or the mean of all by their probabilities; default: mean",
+    estimate: Literal["best", "mean"] | None = key(
+        "estimate", "several hypotheses: the best one, or the mean of all by their probabilities; default: mean", None
     )
 
     @property
@@ -234,18 +214,18 @@ class Filter(Model):
     def _keys_have_an_effect(self) -> Iterator[At]:
         if self.observes == ("range",):
             own = ("estimator", "forecast", "derivatives", "use", "gate_probability", "lock_probability")
-            for key in (*own, "hypotheses", *UNFOLDING):
-                if getattr(self, key) is not None:
-                    yield at(key, "has no effect on range alone; leave it out")
+            for name in (*own, "hypotheses", *UNFOLDING):
+                if getattr(self, name) is not None:
+                    yield at(name, "has no effect on range alone; leave it out")
             return
         if self.estimator in ("spectrum", "fisher_bound") and self.forecast is not None:
             yield at("forecast", f"has no effect with estimator: {self.estimator}; leave it out")
         if self.estimator == "fisher_bound" and self.use not in (None, "as_measured"):
             yield at("use", "must be as_measured with estimator: fisher_bound, whose estimates always lock")
         for use, keys in USES.items():
-            for key in keys:
-                if getattr(self, key) is not None and self.use != use:
-                    yield at(key, f"has no effect without use: {use}; leave it out")
+            for name in keys:
+                if getattr(self, name) is not None and self.use != use:
+                    yield at(name, f"has no effect without use: {use}; leave it out")
 
     @cross_check
     def _folds_by_hypotheses(self) -> Iterator[At]:
@@ -256,9 +236,9 @@ class Filter(Model):
         several = (self.hypotheses or 1) > 1
         if several and self.use == "gated":
             yield at("use", "must be as_measured or mixture with several hypotheses, which weigh what a gate would cut")
-        for key in UNFOLDING:
-            if getattr(self, key) is not None and not several:
-                yield at(key, "has no effect without hypotheses: 2 or more; leave it out")
+        for name in UNFOLDING:
+            if getattr(self, name) is not None and not several:
+                yield at(name, "has no effect without hypotheses: 2 or more; leave it out")
 
     @cross_check
     def _acceleration_is_estimated(self) -> Iterator[At]:
@@ -276,7 +256,7 @@ class Filter(Model):
         defaults |= USES.get(self.use or "", {})
         if self.estimator != "fisher_bound":
             defaults |= {"hypotheses": 1} | (UNFOLDING if (self.hypotheses or 1) > 1 else {})
-        missing = {key: value for key, value in defaults.items() if getattr(self, key) is None}
+        missing = {name: value for name, value in defaults.items() if getattr(self, name) is None}
         return self.model_copy(update=missing) if missing else self
 
 
@@ -298,25 +278,21 @@ class Keys(Study):
         "burst.pulses_per_second": "burst.pulses",
     }
 
-    radar: Radar = Field(title="radar", description="the radar")
-    burst: Burst = Field(title="burst", description="the burst of each scan")
-    target: Annotated[Target, Scenario()] = Field(
-        title="target", description="the target: a scenario's stem, or inline"
-    )
-    prior: Prior = Field(title="designation", description="what is known when the track begins")
+    radar: Radar = key("radar", "the radar")
+    burst: Burst = key("burst", "the burst of each scan")
+    target: Annotated[Target, Scenario()] = key("target", "the target: a scenario's stem, or inline")
+    prior: Prior = key("designation", "what is known when the track begins")
     filters: Annotated[
         tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = Field(title="filters", description="the filters; all see the same ranges and bursts")
-    baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
-        None, title="baseline", description="name of the filter that gains are against; default: the first"
+    ] = key("filters", "the filters; all see the same ranges and bursts")
+    baseline: Annotated[Name | None, Design(), NameIn("filters")] = key(
+        "baseline", "name of the filter that gains are against; default: the first", None
     )
-    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = Field(
-        None, title="scans", description="number of scans; or give duration_s"
+    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
+        "scans", "number of scans; or give duration_s", None
     )
-    duration_s: Annotated[Positive | None, Design()] = Field(
-        None,
-        title="duration",
-        description="time from the first scan to the last, s, in place of scans: to the last scan within it",
+    duration_s: Annotated[Positive | None, Design()] = key(
+        "duration", "time from the first scan to the last, s, in place of scans: to the last scan within it", None
     )
 
     @classmethod
@@ -370,8 +346,8 @@ class Keys(Study):
     def _burst_fits_the_scan(self) -> Iterator[At]:
         if self.burst_s > self.radar.scan_period_s:
             words = f"the burst must be <= radar.scan_period_s, {short(self.radar.scan_period_s)} s"
-            key = "pulses" if self.burst.pulses is not None else "pulses_per_second"
-            yield at(f"burst.{key}", f"{words}, is {short(self.burst_s)} s")
+            name = "pulses" if self.burst.pulses is not None else "pulses_per_second"
+            yield at(f"burst.{name}", f"{words}, is {short(self.burst_s)} s")
 
     @cross_check
     def _rate_carries_the_derivatives(self) -> Iterator[At]:
@@ -396,7 +372,7 @@ class Keys(Study):
     @cross_check
     def _in_proportion(self) -> Iterator[At]:
         dt, sigma = self.radar.scan_period_s, self.radar.sigma_range_m
-        for key, value in (
+        for name, value in (
             ("sigma_velocity_mps", self.prior.sigma_velocity_mps * dt),
             ("sigma_acceleration_mps2", self.prior.sigma_acceleration_mps2 * dt**2),
         ):
@@ -404,7 +380,7 @@ class Keys(Study):
                 words = (
                     "out of proportion: what it moves a target in a scan over sigma_range_m must be from 1e-6 to 1e6"
                 )
-                yield at(f"prior.{key}", words)
+                yield at(f"prior.{name}", words)
 
     @cross_check
     def _target_in_reach(self) -> Iterator[At]:

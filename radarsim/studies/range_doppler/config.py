@@ -23,6 +23,7 @@ from radarsim.config.fields import (
     Whole,
     at,
     cross_check,
+    key,
     of_each,
     readable,
     unique_names,
@@ -47,33 +48,33 @@ PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and accelera
 class Radar(radial.Radar):
     """A surveillance radar: accuracies of one plot, the period of its scans, and what is wrong with its plots."""
 
-    repetition_rate_hz: Positive = Field(
+    repetition_rate_hz: Positive = key(
+        "pulse repetition rate",
+        "pulse repetition rate, Hz: gives the unambiguous velocity; nothing is folded by it",
         1000.0,
-        title="pulse repetition rate",
-        json_schema_extra={"symbol": "F_r"},
-        description="pulse repetition rate, Hz: gives the unambiguous velocity; nothing is folded by it",
+        symbol="F_r",
     )
-    detection_probability: Annotated[Probability, Field(gt=0), Added()] = Field(
+    detection_probability: Annotated[Probability, Field(gt=0), Added()] = key(
+        "detection probability",
+        "probability that a scan gives its plot, range and velocity together",
         1.0,
-        title="detection probability",
-        json_schema_extra={"symbol": "P_D"},
-        description="probability that a scan gives its plot, range and velocity together",
+        symbol="P_D",
     )
-    bias_range_m: Annotated[Number, Added()] = Field(
-        0.0, title="bias of the measured range", description="mean error of a measured range, m"
+    bias_range_m: Annotated[Number, Added()] = key(
+        "bias of the measured range", "mean error of a measured range, m", 0.0
     )
-    bias_velocity_mps: Annotated[Number, Added()] = Field(
-        0.0, title="bias of the measured radial velocity", description="mean error of a measured velocity, m/s"
+    bias_velocity_mps: Annotated[Number, Added()] = key(
+        "bias of the measured radial velocity", "mean error of a measured velocity, m/s", 0.0
     )
-    sigma_bias_range_m: Annotated[NonNegative, Added()] = Field(
+    sigma_bias_range_m: Annotated[NonNegative, Added()] = key(
+        "σ of the random bias in range",
+        "standard deviation of a further error of range, drawn once a realisation, m",
         0.0,
-        title="σ of the random bias in range",
-        description="standard deviation of a further error of range, drawn once a realisation, m",
     )
-    sigma_bias_velocity_mps: Annotated[NonNegative, Added()] = Field(
+    sigma_bias_velocity_mps: Annotated[NonNegative, Added()] = key(
+        "σ of the random bias in radial velocity",
+        "standard deviation of a further error of velocity, drawn once a realisation, m/s",
         0.0,
-        title="σ of the random bias in radial velocity",
-        description="standard deviation of a further error of velocity, drawn once a realisation, m/s",
     )
 
     @property
@@ -86,12 +87,12 @@ class Radar(radial.Radar):
 class JerkPulse(Starting):
     """A polynomial with a jerk for a while; the acceleration it has built up stays."""
 
-    kind: Literal["jerk_pulse"] = Field(title="kind", description="a constant jerk for a while")
-    coefficients: Coefficients = Field(title="derivatives of the range at the first plot", description=COEFFICIENTS)
-    jerk_mps3: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = Field(
-        title="jerk", description="radial jerk added during the pulse, m/s³"
+    kind: Literal["jerk_pulse"] = key("kind", "a constant jerk for a while")
+    coefficients: Coefficients = key("derivatives of the range at the first plot", COEFFICIENTS)
+    jerk_mps3: Annotated[Number, Field(ge=-HARDEST_MPS2, le=HARDEST_MPS2)] = key(
+        "jerk", "radial jerk added during the pulse, m/s³"
     )
-    duration_s: Positive = Field(title="duration", description="length of the pulse, s")
+    duration_s: Positive = key("duration", "length of the pulse, s")
 
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
@@ -104,15 +105,15 @@ Displaced = Annotated[NonNegative, Added()]
 class Flying(Model):
     """A flight in space of which the first state is drawn: it is displaced, and flies the same accelerations."""
 
-    sigma_position_m: Displaced = Field(
+    sigma_position_m: Displaced = key(
+        "σ of the first position",
+        "standard deviation of each coordinate of its first position, drawn for each realisation, m",
         0.0,
-        title="σ of the first position",
-        description="standard deviation of each coordinate of its first position, drawn for each realisation, m",
     )
-    sigma_velocity_mps: Displaced = Field(
+    sigma_velocity_mps: Displaced = key(
+        "σ of the first velocity",
+        "standard deviation of each coordinate of its first velocity, drawn for each realisation, m/s",
         0.0,
-        title="σ of the first velocity",
-        description="standard deviation of each coordinate of its first velocity, drawn for each realisation, m/s",
     )
 
 
@@ -135,40 +136,36 @@ Noise = Literal["random_jerk", "white_jerk", "white_acceleration"]
 class Best(Model):
     """A manoeuvre variance that is looked for: the one with which this filter's exact error on this target is least."""
 
-    minimise: Literal["sigma_r", "sigma_Vr", "sigma_ar"] = Field(
-        title="error to minimise", description="the error that is to be least"
+    minimise: Literal["sigma_r", "sigma_Vr", "sigma_ar"] = key("error to minimise", "the error that is to be least")
+    over: Literal["worst", "mean", "last"] = key(
+        "taken over scans as", "of its values from scan from_k on: the greatest, their mean, or the last"
     )
-    over: Literal["worst", "mean", "last"] = Field(
-        title="taken over scans as",
-        description="of its values from scan from_k on: the greatest, their mean, or the last",
-    )
-    from_k: Annotated[int, Whole(1, MOST_SCANS)] = Field(
-        3, title="first scan that counts", description="first scan that counts"
-    )
+    from_k: Annotated[int, Whole(1, MOST_SCANS)] = key("first scan that counts", "first scan that counts", 3)
 
 
 class Filter(Model):
     """A second-order Kalman filter started by least squares."""
 
-    name: Annotated[Name, Display()] = Field(title="name", description="label; every filter has its own")
-    observes: tuple[Literal["range", "velocity"], ...] = Field(
-        title="observed quantities", description="what it measures: [range] or [range, velocity]"
+    name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
+    observes: tuple[Literal["range", "velocity"], ...] = key(
+        "observed quantities", "what it measures: [range] or [range, velocity]"
     )
-    manoeuvre_variance: Positive | Best = Field(
-        title="manoeuvre variance",
-        json_schema_extra={"symbol": "D_M", "unit": "(m/s³)²"},
-        description="variance of the random jerk it allows for, (m/s³)²: D_M; or what it is to make least",
+    manoeuvre_variance: Positive | Best = key(
+        "manoeuvre variance",
+        "variance of the random jerk it allows for, (m/s³)²: D_M; or what it is to make least",
+        symbol="D_M",
+        unit="(m/s³)²",
     )
-    initial_scans: Annotated[int, Whole(2, MOST_SCANS)] | None = Field(
+    initial_scans: Annotated[int, Whole(2, MOST_SCANS)] | None = key(
+        "plots in the initialisation",
+        "plots in its least-squares start; default and least: 3 for range, 2 with velocity",
         None,
-        title="plots in the initialisation",
-        description="plots in its least-squares start; default and least: 3 for range, 2 with velocity",
     )
-    process_noise: Noise = Field(
+    process_noise: Noise = key(
+        "process noise",
+        "how the allowed manoeuvre lies within a scan: a constant jerk (the paper's), white jerk, or a step of the "
+        "acceleration; each lets its variance grow by D_M times the period squared a scan",
         "random_jerk",
-        title="process noise",
-        description="how the allowed manoeuvre lies within a scan: a constant jerk (the paper's), white jerk, or a "
-        "step of the acceleration; each lets its variance grow by D_M times the period squared a scan",
     )
 
     @cross_check
@@ -199,23 +196,19 @@ class Keys(Study):
     )
     in_place_of: ClassVar = {"scans": "duration_s", "duration_s": "scans"}
 
-    radar: Radar = Field(title="radar", description="the radar")
-    target: Annotated[Target, Scenario()] = Field(
-        title="target", description="the target: a scenario's stem, or inline"
-    )
+    radar: Radar = key("radar", "the radar")
+    target: Annotated[Target, Scenario()] = key("target", "the target: a scenario's stem, or inline")
     filters: Annotated[
         tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = Field(title="filters", description="the filters; all see the same plots")
-    baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
-        None, title="baseline filter", description="name of the filter that gains are against; default: the first"
+    ] = key("filters", "the filters; all see the same plots")
+    baseline: Annotated[Name | None, Design(), NameIn("filters")] = key(
+        "baseline filter", "name of the filter that gains are against; default: the first", None
     )
-    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = Field(
-        None, title="number of scans", description="number of scans; or give duration_s"
+    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
+        "number of scans", "number of scans; or give duration_s", None
     )
-    duration_s: Annotated[Positive | None, Design(), Added()] = Field(
-        None,
-        title="duration",
-        description="time from the first scan to the last, s, in place of scans: to the last scan within it",
+    duration_s: Annotated[Positive | None, Design(), Added()] = key(
+        "duration", "time from the first scan to the last, s, in place of scans: to the last scan within it", None
     )
 
     @classmethod
@@ -242,9 +235,9 @@ class Keys(Study):
         starts = readable(self.filters, lambda one: (one.plots_to_start, one.name))
         plots, slowest = max(starts, key=lambda start: start[0], default=(0, ""))
         if self.plots < plots:
-            key = "scans" if self.duration_s is None else "duration_s"
-            many = "" if key == "scans" else " scans of radar.scan_period_s"
-            yield at(key, f"must be >= {plots}{many} for the initialisation of filter {slowest}")
+            which = "scans" if self.duration_s is None else "duration_s"
+            many = "" if which == "scans" else " scans of radar.scan_period_s"
+            yield at(which, f"must be >= {plots}{many} for the initialisation of filter {slowest}")
         yield from of_each(self.filters, self._counts_from)
 
     def _counts_from(self, i: int, one: Filter) -> Iterator[At]:
@@ -273,13 +266,13 @@ class Keys(Study):
         if isinstance(one.manoeuvre_variance, Best):
             return
         radar, dt = self.radar, self.radar.scan_period_s
-        key = f"filters.{i}.manoeuvre_variance"
+        name = f"filters.{i}.manoeuvre_variance"
         if not 1e-28 <= one.manoeuvre_variance * dt**6 / radar.sigma_range_m**2 <= 1e12:
             ratio = "manoeuvre_variance scan_period_s⁶ / sigma_range_m²"
-            yield at(key, f"out of proportion: {ratio} must be from 1e-28 to 1e12")
+            yield at(name, f"out of proportion: {ratio} must be from 1e-28 to 1e12")
         elif "velocity" in one.observes and one.manoeuvre_variance * dt**4 / radar.sigma_velocity_mps**2 > 1e12:
             ratio = "manoeuvre_variance scan_period_s⁴ / sigma_velocity_mps²"
-            yield at(key, f"out of proportion: {ratio} must be <= 1e12")
+            yield at(name, f"out of proportion: {ratio} must be <= 1e12")
 
     @cross_check
     def _within_reach(self) -> Iterator[At]:

@@ -22,6 +22,7 @@ from radarsim.config.fields import (
     Whole,
     at,
     cross_check,
+    key,
     of_each,
     readable,
 )
@@ -35,16 +36,10 @@ Derivatives = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
 class Correlations(Model):
     """A correlation for each coordinate; zero where none is given."""
 
-    range: Correlation = Field(
-        0.0, title="correlation of errors in range", description="correlation of the errors in range"
-    )
-    bearing: Correlation = Field(
-        0.0, title="correlation of errors in bearing", description="correlation of the errors in bearing"
-    )
-    third: Correlation = Field(
-        0.0,
-        title="correlation of errors in depth or elevation",
-        description="correlation of the errors in depth or elevation",
+    range: Correlation = key("correlation of errors in range", "correlation of the errors in range", 0.0)
+    bearing: Correlation = key("correlation of errors in bearing", "correlation of the errors in bearing", 0.0)
+    third: Correlation = key(
+        "correlation of errors in depth or elevation", "correlation of the errors in depth or elevation", 0.0
     )
 
     def of(self, index: int) -> float:
@@ -60,76 +55,52 @@ def correlation_of(value: "float | Correlations", index: int) -> float:
 class FurtherSensor(Model):
     """A further sonar that observes the same target at its own times and may measure the bearing only."""
 
-    sigma_range_m: Positive | None = Field(
-        None,
-        title="σ of the measured range",
-        json_schema_extra={"symbol": "σ_r"},
-        description="standard deviation of a measured range, m; none: not measured",
+    sigma_range_m: Positive | None = key(
+        "σ of the measured range", "standard deviation of a measured range, m; none: not measured", None, symbol="σ_r"
     )
-    sigma_bearing_rad: AngleSigma | None = Field(
-        None,
-        title="σ of the measured bearing",
-        json_schema_extra={"symbol": "σ_β"},
-        description="standard deviation of a measured bearing, rad",
+    sigma_bearing_rad: AngleSigma | None = key(
+        "σ of the measured bearing", "standard deviation of a measured bearing, rad", None, symbol="σ_β"
     )
-    scan_period_s: Positive = Field(
-        title="scan period", json_schema_extra={"symbol": "Δt"}, description="time between two of its plots, s"
-    )
-    first_s: NonNegative = Field(
-        title="time of the first plot", description="time of its first plot, s after the first plot of the first sonar"
+    scan_period_s: Positive = key("scan period", "time between two of its plots, s", symbol="Δt")
+    first_s: NonNegative = key(
+        "time of the first plot", "time of its first plot, s after the first plot of the first sonar"
     )
 
 
 class Sensor(Model):
     """A sonar: accuracy of its plots, scan period, and how plots are missed."""
 
-    name: Annotated[Name | None, Display()] = Field(None, title="name", description="display name")
-    sigma_range_m: Positive = Field(
-        title="σ of the measured range",
-        json_schema_extra={"symbol": "σ_r"},
-        description="standard deviation of a measured range, m",
+    name: Annotated[Name | None, Display()] = key("name", "display name", None)
+    sigma_range_m: Positive = key("σ of the measured range", "standard deviation of a measured range, m", symbol="σ_r")
+    sigma_bearing_rad: AngleSigma = key(
+        "σ of the measured bearing", "standard deviation of a measured bearing, rad", symbol="σ_β"
     )
-    sigma_bearing_rad: AngleSigma = Field(
-        title="σ of the measured bearing",
-        json_schema_extra={"symbol": "σ_β"},
-        description="standard deviation of a measured bearing, rad",
+    sigma_depth_m: Positive | None = key(
+        "σ of the measured depth", "standard deviation of a measured depth, m; none: not measured", None, symbol="σ_h"
     )
-    sigma_depth_m: Positive | None = Field(
+    sigma_elevation_rad: AngleSigma | None = key(
+        "σ of the measured elevation",
+        "standard deviation of a measured elevation, rad; replaces the depth",
         None,
-        title="σ of the measured depth",
-        json_schema_extra={"symbol": "σ_h"},
-        description="standard deviation of a measured depth, m; none: not measured",
+        symbol="σ_ε",
     )
-    sigma_elevation_rad: AngleSigma | None = Field(
-        None,
-        title="σ of the measured elevation",
-        json_schema_extra={"symbol": "σ_ε"},
-        description="standard deviation of a measured elevation, rad; replaces the depth",
-    )
-    scan_period_s: Positive = Field(
-        title="scan period",
-        json_schema_extra={"symbol": "Δt"},
-        description="time between two plots, s: T0 of the paper",
-    )
-    error_correlation: Correlation | Correlations = Field(
+    scan_period_s: Positive = key("scan period", "time between two plots, s: T0 of the paper", symbol="Δt")
+    error_correlation: Correlation | Correlations = key(
+        "correlation of neighbouring errors",
+        "correlation ρ of the errors of neighbouring plots, eq. (15); one number, or by coordinate",
         0.0,
-        title="correlation of neighbouring errors",
-        json_schema_extra={"symbol": "ρ"},
-        description="correlation ρ of the errors of neighbouring plots, eq. (15); one number, or by coordinate",
+        symbol="ρ",
     )
-    detection_probability: Annotated[Probability, Field(gt=0)] = Field(
+    detection_probability: Annotated[Probability, Field(gt=0)] = key(
+        "detection probability",
+        "probability that a scan gives a plot; the first scan always does, except for filters with an association",
         1.0,
-        title="detection probability",
-        json_schema_extra={"symbol": "P_D"},
-        description="probability that a scan gives a plot; the first scan always does, except for filters with an "
-        "association",
+        symbol="P_D",
     )
-    missed_scans: tuple[Annotated[int, Whole(2, MOST_SCANS)], ...] = Field(
-        (), title="missed scans", description="scans, counted from 1, that never give a plot"
+    missed_scans: tuple[Annotated[int, Whole(2, MOST_SCANS)], ...] = key(
+        "missed scans", "scans, counted from 1, that never give a plot", ()
     )
-    further: tuple[FurtherSensor, ...] = Field(
-        (), max_length=4, title="further sonars", description="further sonars on the same target"
-    )
+    further: tuple[FurtherSensor, ...] = key("further sonars", "further sonars on the same target", (), max_length=4)
 
     @cross_check
     def _consistent(self) -> Iterator[At]:
@@ -150,47 +121,37 @@ class Sensor(Model):
 class Polynomial(Model):
     """A target whose polar or cartesian coordinates are polynomials of time (eq. 1)."""
 
-    kind: Literal["polynomial"] = Field(title="kind", description="each coordinate is a polynomial of time")
-    frame: Literal["polar", "cartesian"] = Field(
-        title="frame of coordinates", description="which coordinates are polynomials"
+    kind: Literal["polynomial"] = key("kind", "each coordinate is a polynomial of time")
+    frame: Literal["polar", "cartesian"] = key("frame of coordinates", "which coordinates are polynomials")
+    range_m: Derivatives | None = key(
+        "range and its derivatives", "range and its derivatives at the first plot: m, m/s, m/s², …", None
     )
-    range_m: Derivatives | None = Field(
-        None,
-        title="range and its derivatives",
-        description="range and its derivatives at the first plot: m, m/s, m/s², …",
+    bearing_rad: Derivatives | None = key(
+        "bearing and its derivatives", "bearing and its derivatives, from north to east: rad, …", None
     )
-    bearing_rad: Derivatives | None = Field(
-        None, title="bearing and its derivatives", description="bearing and its derivatives, from north to east: rad, …"
+    x_m: Derivatives | None = key("distance north", "distance north and its derivatives: m, m/s, m/s², …", None)
+    y_m: Derivatives | None = key("distance east", "distance east and its derivatives: m, m/s, m/s², …", None)
+    depth_m: Derivatives | None = key("depth and its derivatives", "depth and its derivatives: m, m/s, …", None)
+    elevation_rad: Derivatives | None = key(
+        "elevation and its derivatives", "elevation and its derivatives: rad, rad/s, …", None
     )
-    x_m: Derivatives | None = Field(
-        None, title="distance north", description="distance north and its derivatives: m, m/s, m/s², …"
-    )
-    y_m: Derivatives | None = Field(
-        None, title="distance east", description="distance east and its derivatives: m, m/s, m/s², …"
-    )
-    depth_m: Derivatives | None = Field(
-        None, title="depth and its derivatives", description="depth and its derivatives: m, m/s, …"
-    )
-    elevation_rad: Derivatives | None = Field(
-        None, title="elevation and its derivatives", description="elevation and its derivatives: rad, rad/s, …"
-    )
-    fluctuation_mps2: NonNegative = Field(
+    fluctuation_mps2: NonNegative = key(
+        "σ of the random acceleration of the target",
+        "standard deviation, m/s², of a random acceleration that is new at every scan, so that the velocity is a "
+        "random walk",
         0.0,
-        title="σ of the random acceleration of the target",
-        description="standard deviation, m/s², of a random acceleration that is new at every scan, so that the "
-        "velocity is a random walk",
     )
 
     @cross_check
     def _coordinates(self) -> Iterator[At]:
         wanted = ("range_m", "bearing_rad") if self.frame == "polar" else ("x_m", "y_m")
         other = ("x_m", "y_m") if self.frame == "polar" else ("range_m", "bearing_rad")
-        for key in wanted:
-            if getattr(self, key) is None:
-                yield at(key, f"is needed in the {self.frame} frame")
-        for key in other:
-            if getattr(self, key) is not None:
-                yield at(key, f"does not belong to the {self.frame} frame")
+        for name in wanted:
+            if getattr(self, name) is None:
+                yield at(name, f"is needed in the {self.frame} frame")
+        for name in other:
+            if getattr(self, name) is not None:
+                yield at(name, f"does not belong to the {self.frame} frame")
 
     @cross_check
     def _ahead(self) -> Iterator[At]:
@@ -218,11 +179,11 @@ def _from_origin(*coordinates: float) -> float:
 class Vessel(Model):
     """A vessel that starts at a given position, with a given speed and course."""
 
-    kind: Literal["accelerating", "turning"] = Field(title="kind", description="how the vessel manoeuvres")
-    x_m: Number = Field(title="distance north", description="distance north of the sonar at the first plot, m")
-    y_m: Number = Field(title="distance east", description="distance east of the sonar at the first plot, m")
-    speed_mps: NonNegative = Field(title="speed", description="initial speed, m/s")
-    course_rad: Number = Field(title="course", description="initial course, from north to east, rad")
+    kind: Literal["accelerating", "turning"] = key("kind", "how the vessel manoeuvres")
+    x_m: Number = key("distance north", "distance north of the sonar at the first plot, m")
+    y_m: Number = key("distance east", "distance east of the sonar at the first plot, m")
+    speed_mps: NonNegative = key("speed", "initial speed, m/s")
+    course_rad: Number = key("course", "initial course, from north to east, rad")
     fluctuation_mps2: ClassVar[float] = 0.0
 
     @property
@@ -234,18 +195,10 @@ class Vessel(Model):
 class Accelerating(Vessel):
     """A vessel on a straight course whose speed changes at a constant rate between two times."""
 
-    kind: Literal["accelerating"] = Field(
-        title="kind", description="straight course with a step of acceleration along it"
-    )
-    acceleration_mps2: Number = Field(
-        title="acceleration",
-        json_schema_extra={"symbol": "a"},
-        description="acceleration along the course, m/s²; 0: no manoeuvre",
-    )
-    start_s: NonNegative = Field(title="start time", description="start of the acceleration, s from the first plot")
-    end_s: Positive | None = Field(
-        None, title="end time", description="end of the acceleration, s; none: it never ends"
-    )
+    kind: Literal["accelerating"] = key("kind", "straight course with a step of acceleration along it")
+    acceleration_mps2: Number = key("acceleration", "acceleration along the course, m/s²; 0: no manoeuvre", symbol="a")
+    start_s: NonNegative = key("start time", "start of the acceleration, s from the first plot")
+    end_s: Positive | None = key("end time", "end of the acceleration, s; none: it never ends", None)
 
     @cross_check
     def _order(self) -> Iterator[At]:
@@ -256,9 +209,9 @@ class Accelerating(Vessel):
 class TimedTurn(Model):
     """A turn between two times."""
 
-    start_s: NonNegative = Field(title="start time", description="start of the turn, s from the first plot")
-    end_s: Positive = Field(title="end time", description="end of the turn, s")
-    rate_radps: Number = Field(title="turn rate", description="turn rate, rad/s, positive to starboard")
+    start_s: NonNegative = key("start time", "start of the turn, s from the first plot")
+    end_s: Positive = key("end time", "end of the turn, s")
+    rate_radps: Number = key("turn rate", "turn rate, rad/s, positive to starboard")
 
     @cross_check
     def _order(self) -> Iterator[At]:
@@ -269,10 +222,10 @@ class TimedTurn(Model):
 class Turning(Vessel):
     """A vessel at constant speed on straight legs and turns."""
 
-    kind: Literal["turning"] = Field(title="kind", description="straight legs and turns at constant speed")
-    speed_mps: Positive = Field(title="speed", description="speed, m/s")
-    turns: Annotated[tuple[TimedTurn, ...], Field(min_length=1, max_length=16)] = Field(
-        title="turns", description="the turns, in order of time"
+    kind: Literal["turning"] = key("kind", "straight legs and turns at constant speed")
+    speed_mps: Positive = key("speed", "speed, m/s")
+    turns: Annotated[tuple[TimedTurn, ...], Field(min_length=1, max_length=16)] = key(
+        "turns", "the turns, in order of time"
     )
 
     @cross_check
@@ -288,9 +241,7 @@ CORRELATED = ("kalman_augmented", "kalman_differenced")
 class Filter(Model):
     """A filter that processes each coordinate separately: the keys that all kinds share."""
 
-    name: Annotated[Name, Display()] = Field(
-        title="name", description="label; must differ from those of the other filters"
-    )
+    name: Annotated[Name, Display()] = key("name", "label; must differ from those of the other filters")
     kind: Literal[
         "growing_memory",
         "window",
@@ -300,31 +251,32 @@ class Filter(Model):
         "kalman_differenced",
         "adaptive",
         "imm",
-    ] = Field(
-        title="kind",
-        description="least squares on all plots or on the last few; Kalman; fixed gains; two that model correlated "
-        "errors; one that responds to a manoeuvre detector; or two interacting Kalman filters",
+    ] = key(
+        "kind",
+        "least squares on all plots or on the last few; Kalman; fixed gains; two that model correlated errors; one "
+        "that responds to a manoeuvre detector; or two interacting Kalman filters",
     )
-    degree: Literal[1, 2] = Field(
-        1, title="degree of the polynomial", description="degree of the polynomial: 1 a straight line, 2 a parabola"
+    degree: Literal[1, 2] = key(
+        "degree of the polynomial", "degree of the polynomial: 1 a straight line, 2 a parabola", 1
     )
-    plots: Annotated[int, Whole(2, 1000)] | None = Field(
+    plots: Annotated[int, Whole(2, 1000)] | None = key(
+        "number of plots",
+        "length of a window; or of the least-squares start of fixed_gain, by default degree + 1",
         None,
-        title="number of plots",
-        description="length of a window; or of the least-squares start of fixed_gain, by default degree + 1",
     )
-    manoeuvre_variance: NonNegative | None = Field(
+    manoeuvre_variance: NonNegative | None = key(
+        "manoeuvre variance",
+        "variance of a random acceleration, (m/s²)², for degree 2 of a random jerk, (m/s³)²; for angles it is "
+        "divided by the square of the initial range",
         None,
-        title="manoeuvre variance",
-        json_schema_extra={"symbol": "D_M", "unit": ""},
-        description="variance of a random acceleration, (m/s²)², for degree 2 of a random jerk, (m/s³)²; "
-        "for angles it is divided by the square of the initial range",
+        symbol="D_M",
+        unit="",
     )
-    error_correlation: Correlation | Correlations | None = Field(
+    error_correlation: Correlation | Correlations | None = key(
+        "correlation of neighbouring errors",
+        "correlation that the filter assumes; default: that of the sonar",
         None,
-        title="correlation of neighbouring errors",
-        json_schema_extra={"symbol": "ρ"},
-        description="correlation that the filter assumes; default: that of the sonar",
+        symbol="ρ",
     )
 
     @cross_check
@@ -352,26 +304,20 @@ class Filter(Model):
 class Keys(Study):
     """The keys that all cases have."""
 
-    sensor: Sensor = Field(title="sensor", description="the sonar")
-    target: Annotated[Target, Scenario()] = Field(
-        title="target", description="the target: the stem of a scenario, or inline"
-    )
-    frame: Annotated[Literal["polar", "cartesian", "cartesian_unbiased"], Design()] = Field(
+    sensor: Sensor = key("sensor", "the sonar")
+    target: Annotated[Target, Scenario()] = key("target", "the target: the stem of a scenario, or inline")
+    frame: Annotated[Literal["polar", "cartesian", "cartesian_unbiased"], Design()] = key(
+        "frame of coordinates",
+        "coordinates in which the filters work; plots are converted to x, y plainly, or without bias",
         "polar",
-        title="frame of coordinates",
-        description="coordinates in which the filters work; plots are converted to x, y plainly, or without bias",
     )
-    filters: Annotated[tuple[Filter, ...], Field(min_length=1, max_length=16), Design()] = Field(
-        title="filters", description="the filters; all of them process the same plots"
+    filters: Annotated[tuple[Filter, ...], Field(min_length=1, max_length=16), Design()] = key(
+        "filters", "the filters; all of them process the same plots"
     )
-    baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
-        None,
-        title="baseline filter",
-        description="name of the filter that gains are measured against; default: the first",
+    baseline: Annotated[Name | None, Design(), NameIn("filters")] = key(
+        "baseline filter", "name of the filter that gains are measured against; default: the first", None
     )
-    scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = Field(
-        title="number of scans", description="number of scans of the first sonar"
-    )
+    scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = key("number of scans", "number of scans of the first sonar")
 
     @cross_check
     def _long_enough(self) -> Iterator[At]:
@@ -386,10 +332,10 @@ class Keys(Study):
 
     @cross_check
     def _target_measured(self) -> Iterator[At]:
-        for key, unit in (("depth", "m"), ("elevation", "rad")):
-            measured = getattr(self.sensor, f"sigma_{key}_{unit}") is not None
-            if measured and getattr(self.target, f"{key}_{unit}", None) is None:
-                yield at("target", f"needs {key}_{unit}, which the sonar measures")
+        for name, unit in (("depth", "m"), ("elevation", "rad")):
+            measured = getattr(self.sensor, f"sigma_{name}_{unit}") is not None
+            if measured and getattr(self.target, f"{name}_{unit}", None) is None:
+                yield at("target", f"needs {name}_{unit}, which the sonar measures")
 
     @cross_check
     def _elevation_in_polar(self) -> Iterator[At]:

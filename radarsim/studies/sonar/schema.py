@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from radarsim.config.fields import At, Design, at, cross_check, unique_names
+from radarsim.config.fields import At, Design, at, cross_check, key, unique_names
 from radarsim.studies.sonar import config
 from radarsim.studies.sonar.clutter import config as clutter
 from radarsim.studies.sonar.manoeuvre import config as manoeuvre
@@ -29,7 +29,7 @@ class Sonar(clutter.Keys, manoeuvre.Keys):
 
     filters: Annotated[
         tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = Field(title="filters", description="the filters; all of them process the same plots")
+    ] = key("filters", "the filters; all of them process the same plots")
 
     @property
     def parts(self) -> tuple[Literal["smoothing", "manoeuvre", "clutter"], ...]:
@@ -45,5 +45,5 @@ class Sonar(clutter.Keys, manoeuvre.Keys):
     @cross_check
     def _manoeuvres_of_known_plots(self) -> Iterator[At]:
         if "clutter" in self.parts:
-            for key in self.about_manoeuvres():
-                yield at(key, "does not go with filters that have an association")
+            for name in self.about_manoeuvres():
+                yield at(name, "does not go with filters that have an association")

@@ -18,6 +18,7 @@ from radarsim.config.fields import (
     Whole,
     at,
     cross_check,
+    key,
 )
 from radarsim.config.rare import PLAIN_SHARE
 from radarsim.studies.sonar import config
@@ -35,10 +36,8 @@ DEFAULTS = {
 class Sector(Model):
     """The surveyed sector, which contains all false plots; a target outside it is not detected."""
 
-    range_m: tuple[NonNegative, Positive] = Field(title="limits of range", description="smallest and largest range, m")
-    bearing_rad: tuple[Number, Number] = Field(
-        title="limits of bearing", description="first and last bearing, from north to east, rad"
-    )
+    range_m: tuple[NonNegative, Positive] = key("limits of range", "smallest and largest range, m")
+    bearing_rad: tuple[Number, Number] = key("limits of bearing", "first and last bearing, from north to east, rad")
 
     @cross_check
     def _order(self) -> Iterator[At]:
@@ -55,28 +54,24 @@ class Sector(Model):
 class Sensor(config.Sensor):
     """A sonar among false plots: how many there are, and where."""
 
-    false_plots_per_km2: Annotated[NonNegative, Field(le=1e4), Design()] = Field(
+    false_plots_per_km2: Annotated[NonNegative, Field(le=1e4), Design()] = key(
+        "false plots per scan",
+        "mean number of false plots a scan, per km² of the surveyed sector",
         0.0,
-        title="false plots per scan",
-        json_schema_extra={"symbol": "λ", "unit": "km⁻²"},
-        description="mean number of false plots a scan, per km² of the surveyed sector",
+        symbol="λ",
+        unit="km⁻²",
     )
-    sector: Annotated[Sector | None, Design()] = Field(
-        None,
-        title="surveyed sector",
-        description="the surveyed sector of filters with an association; there are no plots outside it",
+    sector: Annotated[Sector | None, Design()] = key(
+        "surveyed sector", "the surveyed sector of filters with an association; there are no plots outside it", None
     )
 
 
 class Initiation(Model):
     """A track is confirmed once m of its first n scans gave it a plot; the scan of its first plot counts."""
 
-    m: Annotated[int, Whole(2, 20)] = Field(
-        title="plots that confirm a track", description="number of plots that confirms a track"
-    )
-    n: Annotated[int, Whole(2, 20)] = Field(
-        title="scans of the confirmation rule",
-        description="number of scans, from that of the first plot on, within which they must come",
+    m: Annotated[int, Whole(2, 20)] = key("plots that confirm a track", "number of plots that confirms a track")
+    n: Annotated[int, Whole(2, 20)] = key(
+        "scans of the confirmation rule", "number of scans, from that of the first plot on, within which they must come"
     )
 
     @cross_check
@@ -88,42 +83,40 @@ class Initiation(Model):
 class Filter(config.Filter):
     """A filter that may have to find its plots among false ones; without `association` it does not."""
 
-    association: Literal["nearest", "pda", "known"] | None = Field(
+    association: Literal["nearest", "pda", "known"] | None = key(
+        "association",
+        "how plots are chosen: the nearest in the gate, probabilistic data association, or the target's own plots, "
+        "as a reference",
         None,
-        title="association",
-        description="how plots are chosen: the nearest in the gate, probabilistic data association, or the target's "
-        "own plots, as a reference",
     )
-    gate_probability: Annotated[Probability, Field(gt=0)] | None = Field(
+    gate_probability: Annotated[Probability, Field(gt=0)] | None = key(
+        "gate probability",
+        "probability that the gate contains the target's plot; 1: an open gate; default 0.99",
         None,
-        title="gate probability",
-        json_schema_extra={"symbol": "P_G"},
-        description="probability that the gate contains the target's plot; 1: an open gate; default 0.99",
+        symbol="P_G",
     )
-    initiation: Initiation | None = Field(
-        None, title="rule of confirmation", description="the m of n rule of confirmation; default 3 of 4"
-    )
-    drop_after_misses: Annotated[int, Whole(1, 1000)] | None = Field(
+    initiation: Initiation | None = key("rule of confirmation", "the m of n rule of confirmation; default 3 of 4", None)
+    drop_after_misses: Annotated[int, Whole(1, 1000)] | None = key(
+        "misses that drop a track",
+        "scans in a row without a plot after which a confirmed track is dropped; default 3",
         None,
-        title="misses that drop a track",
-        description="scans in a row without a plot after which a confirmed track is dropped; default 3",
     )
-    speed_mps: Positive | None = Field(
+    speed_mps: Positive | None = key(
+        "σ of a target's speed",
+        "standard deviation of a target's speed in each direction, m/s, for the second gate; default 10",
         None,
-        title="σ of a target's speed",
-        description="standard deviation of a target's speed in each direction, m/s, for the second gate; default 10",
     )
-    lost_beyond_sigmas: Positive | None = Field(
+    lost_beyond_sigmas: Positive | None = key(
+        "error of a lost track",
+        "error, in standard deviations of a plot, beyond which a track has lost its target; default 10",
         None,
-        title="error of a lost track",
-        json_schema_extra={"unit": "σ of a plot"},
-        description="error, in standard deviations of a plot, beyond which a track has lost its target; default 10",
+        unit="σ of a plot",
     )
 
-    def tracker(self, key: str) -> float:
+    def tracker(self, name: str) -> float:
         """A number of the tracker, or its default where it is not given."""
-        given = getattr(self, key)
-        return DEFAULTS[key] if given is None else given
+        given = getattr(self, name)
+        return DEFAULTS[name] if given is None else given
 
     def m_of_n(self) -> tuple[int, int]:
         """The rule of confirmation."""
@@ -131,9 +124,9 @@ class Filter(config.Filter):
 
     @cross_check
     def _belongs_to_tracker(self) -> Iterator[At]:
-        for key in (*DEFAULTS, "initiation"):
-            if self.association is None and getattr(self, key) is not None:
-                yield at(key, "belongs to a filter with an association: nearest, pda or known")
+        for name in (*DEFAULTS, "initiation"):
+            if self.association is None and getattr(self, name) is not None:
+                yield at(name, "belongs to a filter with an association: nearest, pda or known")
 
     @cross_check
     def _kalman_line(self) -> Iterator[At]:
@@ -147,10 +140,10 @@ Event = Literal["false_tracks", "long_false_tracks", "ended_tracks"]
 class RareTracks(Model):
     """Events that are rare: realisations drawn where they are frequent, and weights that make up for it."""
 
-    events: Annotated[tuple[Event, ...], Field(min_length=1)] = Field(
-        title="events that are sought",
-        description="false_tracks: tracks that false plots begin, of all trackers, are drawn with more plots in their "
-        "gates until they are confirmed; long_false_tracks: until they end; ended_tracks: further realisations of the "
+    events: Annotated[tuple[Event, ...], Field(min_length=1)] = key(
+        "events that are sought",
+        "false_tracks: tracks that false plots begin, of all trackers, are drawn with more plots in their gates "
+        "until they are confirmed; long_false_tracks: until they end; ended_tracks: further realisations of the "
         "target's track are drawn where it ends, with more misses, and worse or false plots while it is young",
     )
 
@@ -180,13 +173,13 @@ class RareTracks(Model):
 class Keys(config.Keys):
     """The keys of a case whose filters may be trackers."""
 
-    sensor: Sensor = Field(title="sensor", description="the sonar")
+    sensor: Sensor = key("sensor", "the sonar")
     filters: tuple[Filter, ...]
-    rare: Annotated[RareTracks | None, Design(), Added()] = Field(
+    rare: Annotated[RareTracks | None, Design(), Added()] = key(
+        "rare events",
+        "importance sampling of false tracks, for trackers that hardly have any, and of the target's track, for "
+        "those that hardly lose it: rare.csv",
         None,
-        title="rare events",
-        description="importance sampling of false tracks, for trackers that hardly have any, and of the target's "
-        "track, for those that hardly lose it: rare.csv",
     )
 
     @cross_check
@@ -226,7 +219,7 @@ class Keys(config.Keys):
             yield at("sensor.error_correlation", "must be 0 for filters with an association")
         if sensor.further:
             yield at("sensor.further", "must be empty for filters with an association")
-        for key in ("sigma_depth_m", "sigma_elevation_rad"):
-            if getattr(sensor, key) is not None:
+        for name in ("sigma_depth_m", "sigma_elevation_rad"):
+            if getattr(sensor, name) is not None:
                 message = "must not be given for filters with an association: they track range and bearing"
-                yield at(f"sensor.{key}", message)
+                yield at(f"sensor.{name}", message)

@@ -18,6 +18,7 @@ from radarsim.config.fields import (
     Whole,
     at,
     cross_check,
+    key,
     of_each,
     readable,
     unique_names,
@@ -43,25 +44,25 @@ def either_threshold(detector: "OwnDetector | Detector") -> Iterator[At]:
 class OwnDetector(Model):
     """The detector of an adaptive filter: it tests the acceleration of a parabola through the last plots."""
 
-    plots: WindowPlots = Field(title="plots of the parabola", description="plots n of the parabola")
-    threshold_k: Positive | None = Field(
+    plots: WindowPlots = key("plots of the parabola", "plots n of the parabola")
+    threshold_k: Positive | None = key(
+        "threshold",
+        "threshold k: a manoeuvre is declared where the squared acceleration exceeds k σ_a²",
         None,
-        title="threshold",
-        json_schema_extra={"symbol": "k"},
-        description="threshold k: a manoeuvre is declared where the squared acceleration exceeds k σ_a²",
+        symbol="k",
     )
-    false_alarm_probability: Rate | None = Field(
+    false_alarm_probability: Rate | None = key(
+        "false-alarm probability",
+        "replaces threshold_k: probability of an alarm in a test without a manoeuvre",
         None,
-        title="false-alarm probability",
-        json_schema_extra={"symbol": "P_F"},
-        description="replaces threshold_k: probability of an alarm in a test without a manoeuvre",
+        symbol="P_F",
     )
-    coordinates: Literal["each", "joint"] = Field(
+    coordinates: Literal["each", "joint"] = key(
+        "tested coordinates",
+        "each: a test of each coordinate, as in the paper; joint: one test of the sum over all",
         "each",
-        title="tested coordinates",
-        description="each: a test of each coordinate, as in the paper; joint: one test of the sum over all",
     )
-    test_every: TestPeriod = Field(1, title="scans between tests", description="scans from one test to the next")
+    test_every: TestPeriod = key("scans between tests", "scans from one test to the next", 1)
 
     @cross_check
     def _either_threshold(self) -> Iterator[At]:
@@ -71,26 +72,24 @@ class OwnDetector(Model):
 class Detector(Model):
     """A manoeuvre detector that is measured at one or several thresholds."""
 
-    name: Annotated[Name, Display()] = Field(
-        title="name", description="label; must differ from those of the other detectors"
-    )
-    plots: WindowPlots = Field(title="plots of the parabola", description="plots n of the parabola")
-    threshold_k: Thresholds | None = Field(
+    name: Annotated[Name, Display()] = key("name", "label; must differ from those of the other detectors")
+    plots: WindowPlots = key("plots of the parabola", "plots n of the parabola")
+    threshold_k: Thresholds | None = key(
+        "threshold",
+        "thresholds k: a manoeuvre is declared where the squared acceleration exceeds k σ_a²",
         None,
-        title="threshold",
-        json_schema_extra={"symbol": "k"},
-        description="thresholds k: a manoeuvre is declared where the squared acceleration exceeds k σ_a²",
+        symbol="k",
     )
-    false_alarm_probability: Rates | None = Field(
+    false_alarm_probability: Rates | None = key(
+        "false-alarm probability",
+        "replaces threshold_k: probabilities of an alarm in a test without a manoeuvre",
         None,
-        title="false-alarm probability",
-        json_schema_extra={"symbol": "P_F"},
-        description="replaces threshold_k: probabilities of an alarm in a test without a manoeuvre",
+        symbol="P_F",
     )
-    test_every: TestPeriod = Field(
+    test_every: TestPeriod = key(
+        "scans between tests",
+        "scans from one test to the next; from `plots` on the tests are independent and the delay is exact",
         1,
-        title="scans between tests",
-        description="scans from one test to the next; from `plots` on the tests are independent and the delay is exact",
     )
 
     @cross_check
@@ -105,61 +104,55 @@ class Detector(Model):
 class OwnShip(Model):
     """The vessel that carries the sonar, or another to be kept clear of; its course and speed are constant."""
 
-    x_m: Number = Field(
-        default=0.0, title="distance north", description="distance north of the sonar's origin at the first plot, m"
-    )
-    y_m: Number = Field(
-        default=0.0, title="distance east", description="distance east of the sonar's origin at the first plot, m"
-    )
-    speed_mps: NonNegative = Field(default=0.0, title="speed", description="speed, m/s")
-    course_rad: Number = Field(default=0.0, title="course", description="course, from north to east, rad")
+    x_m: Number = key("distance north", "distance north of the sonar's origin at the first plot, m", 0.0)
+    y_m: Number = key("distance east", "distance east of the sonar's origin at the first plot, m", 0.0)
+    speed_mps: NonNegative = key("speed", "speed, m/s", 0.0)
+    course_rad: Number = key("course", "course, from north to east, rad", 0.0)
 
 
 class Uses(Model):
     """Quantities derived from a track: course, speed, predicted position, closest point of approach."""
 
-    horizon_s: Positive = Field(title="prediction horizon", description="how far ahead the position is predicted, s")
-    at_s: Annotated[tuple[NonNegative, ...], Field(min_length=1, max_length=16)] | None = Field(
-        None,
-        title="times",
-        description="times, s from the first plot: the scan then or the next one; default: the last scan",
+    horizon_s: Positive = key("prediction horizon", "how far ahead the position is predicted, s")
+    at_s: Annotated[tuple[NonNegative, ...], Field(min_length=1, max_length=16)] | None = key(
+        "times", "times, s from the first plot: the scan then or the next one; default: the last scan", None
     )
-    own_ship: OwnShip = Field(OwnShip(), title="own ship", description="the vessel that the closest approach refers to")
+    own_ship: OwnShip = key("own ship", "the vessel that the closest approach refers to", OwnShip())
 
 
 class Filter(config.Filter):
     """A filter that may respond to manoeuvres: kinds `adaptive` and `imm`."""
 
-    detector: OwnDetector | None = Field(None, title="detector", description="manoeuvre detector of an adaptive filter")
-    response: Literal["raise_degree", "shorten_memory"] | None = Field(
+    detector: OwnDetector | None = key("detector", "manoeuvre detector of an adaptive filter", None)
+    response: Literal["raise_degree", "shorten_memory"] | None = key(
+        "response to a manoeuvre",
+        "response of an adaptive filter to a manoeuvre: a parabola that starts with the detector's plots (default), "
+        "or a window of these plots while the manoeuvre lasts",
         None,
-        title="response to a manoeuvre",
-        description="response of an adaptive filter to a manoeuvre: a parabola that starts with the detector's plots "
-        "(default), or a window of these plots while the manoeuvre lasts",
     )
-    end_after: Annotated[int, Whole(1, 100)] | None = Field(
+    end_after: Annotated[int, Whole(1, 100)] | None = key(
+        "quiet tests that end a manoeuvre",
+        "number of successive tests without an alarm that ends a manoeuvre; default 1",
         None,
-        title="quiet tests that end a manoeuvre",
-        description="number of successive tests without an alarm that ends a manoeuvre; default 1",
     )
-    manoeuvre_variances: tuple[NonNegative, NonNegative] | None = Field(
+    manoeuvre_variances: tuple[NonNegative, NonNegative] | None = key(
+        "manoeuvre variances of the models",
+        "of the two models of an imm, steady and manoeuvring, (m/s²)², as manoeuvre_variance",
         None,
-        title="manoeuvre variances of the models",
-        description="of the two models of an imm, steady and manoeuvring, (m/s²)², as manoeuvre_variance",
     )
-    stay_probabilities: tuple[Rate, Rate] | None = Field(
+    stay_probabilities: tuple[Rate, Rate] | None = key(
+        "probabilities that a model lasts",
+        "of an imm: probabilities that the steady and the manoeuvring model last from scan to scan",
         None,
-        title="probabilities that a model lasts",
-        description="of an imm: probabilities that the steady and the manoeuvring model last from scan to scan",
     )
 
     @cross_check
     def _adaptive_complete(self) -> Iterator[At]:
         if self.kind == "adaptive" and self.detector is None:
             yield at("detector", "is needed by an adaptive filter")
-        for key in ("detector", "response", "end_after"):
-            if self.kind != "adaptive" and getattr(self, key) is not None:
-                yield at(key, "belongs to an adaptive filter")
+        for name in ("detector", "response", "end_after"):
+            if self.kind != "adaptive" and getattr(self, name) is not None:
+                yield at(name, "belongs to an adaptive filter")
 
     @cross_check
     def _parabola(self) -> Iterator[At]:
@@ -168,11 +161,11 @@ class Filter(config.Filter):
 
     @cross_check
     def _models_complete(self) -> Iterator[At]:
-        for key in ("manoeuvre_variances", "stay_probabilities"):
-            if self.kind == "imm" and getattr(self, key) is None:
-                yield at(key, "is needed by an imm")
-            if self.kind != "imm" and getattr(self, key) is not None:
-                yield at(key, "belongs to an imm")
+        for name in ("manoeuvre_variances", "stay_probabilities"):
+            if self.kind == "imm" and getattr(self, name) is None:
+                yield at(name, "is needed by an imm")
+            if self.kind != "imm" and getattr(self, name) is not None:
+                yield at(name, "belongs to an imm")
 
     @cross_check
     def _second_moves_more(self) -> Iterator[At]:
@@ -184,13 +177,13 @@ class Keys(config.Keys):
     """The keys of a case with detectors, filters that respond to manoeuvres, or uses of a track."""
 
     filters: tuple[Filter, ...]
-    detectors: Annotated[tuple[Detector, ...], Field(max_length=8), AfterValidator(unique_names), Design()] = Field(
-        (), title="detectors", description="manoeuvre detectors that are measured on the plots"
+    detectors: Annotated[tuple[Detector, ...], Field(max_length=8), AfterValidator(unique_names), Design()] = key(
+        "detectors", "manoeuvre detectors that are measured on the plots", ()
     )
-    uses: Annotated[Uses | None, Design()] = Field(
+    uses: Annotated[Uses | None, Design()] = key(
+        "uses of the track",
+        "course, speed, predicted position and closest approach, with their σ; none: left out",
         None,
-        title="uses of the track",
-        description="course, speed, predicted position and closest approach, with their σ; none: left out",
     )
 
     def about_manoeuvres(self) -> Iterator[str]:
@@ -232,5 +225,5 @@ class Keys(config.Keys):
     @cross_check
     def _manoeuvres_of_one_sonar(self) -> Iterator[At]:
         if self.sensor.further:
-            for key in self.about_manoeuvres():
-                yield at(key, "does not go with further sonars")
+            for name in self.about_manoeuvres():
+                yield at(name, "does not go with further sonars")

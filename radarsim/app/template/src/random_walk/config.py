@@ -17,6 +17,7 @@ from radarsim.config.fields import (
     Whole,
     at,
     cross_check,
+    key,
     unique_names,
 )
 
@@ -27,34 +28,26 @@ MOST_SCANS = 100_000
 class Sensor(Model):
     """A sensor that measures the position."""
 
-    name: Annotated[Name | None, Display()] = Field(None, title="name", description="display name")
-    sigma_x_m: Positive = Field(
-        title="σ of the measured x",
-        json_schema_extra={"symbol": "σ_x"},
-        description="standard deviation of a measured position, m",
-    )
-    scan_period_s: Positive = Field(
-        title="scan period", json_schema_extra={"symbol": "Δt"}, description="time between two plots, s"
-    )
+    name: Annotated[Name | None, Display()] = key("name", "display name", None)
+    sigma_x_m: Positive = key("σ of the measured x", "standard deviation of a measured position, m", symbol="σ_x")
+    scan_period_s: Positive = key("scan period", "time between two plots, s", symbol="Δt")
 
 
 # Yours: what is observed. `Scenario()` beside the field below would let it be named by a file in scenarios/.
 class Target(Model):
     """A target whose position is a random walk."""
 
-    sigma_step_m: NonNegative = Field(
-        title="σ of a step", description="standard deviation of its step from one scan to the next, m"
-    )
+    sigma_step_m: NonNegative = key("σ of a step", "standard deviation of its step from one scan to the next, m")
 
 
 # Yours: the filters that are compared, each key with a default or without.
 class Filter(Model):
     """A filter of the position."""
 
-    name: Annotated[Name, Display()] = Field(title="name", description="label; every filter has its own")
-    kind: Literal["kalman", "fixed_gain"] = Field(title="kind", description="how its gain is made")
-    gain: Annotated[Positive, Field(le=1)] | None = Field(
-        None, title="gain", description="fixed_gain: share of the innovation that is taken over, no unit"
+    name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
+    kind: Literal["kalman", "fixed_gain"] = key("kind", "how its gain is made")
+    gain: Annotated[Positive, Field(le=1)] | None = key(
+        "gain", "fixed_gain: share of the innovation that is taken over, no unit", None
     )
 
     @cross_check
@@ -72,15 +65,13 @@ class Keys(Study):
     # Yours: all figures that the study may draw, so that a misspelt name under `figures:` is refused.
     figure_names = ("sigma_x", "gain_x")
 
-    sensor: Sensor = Field(title="sensor", description="the sensor")
-    target: Target = Field(title="target", description="the target")
+    sensor: Sensor = key("sensor", "the sensor")
+    target: Target = key("target", "the target")
     # Design(): cases that differ in nothing else have the same noise, so that their comparison is paired.
     filters: Annotated[
         tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = Field(title="filters", description="the filters; all see the same plots")
-    baseline: Annotated[Name | None, Design(), NameIn("filters")] = Field(
-        None, title="baseline filter", description="name of the filter that gains are against; default: the first"
+    ] = key("filters", "the filters; all see the same plots")
+    baseline: Annotated[Name | None, Design(), NameIn("filters")] = key(
+        "baseline filter", "name of the filter that gains are against; default: the first", None
     )
-    scans: Annotated[int, Whole(1, MOST_SCANS), Design()] = Field(
-        title="number of scans", description="number of plots"
-    )
+    scans: Annotated[int, Whole(1, MOST_SCANS), Design()] = key("number of scans", "number of plots")
