@@ -43,3 +43,11 @@ CASES = {
     "ambiguous_doppler": known("ambiguous_doppler", 4_501, 60_001),
     "pulses_to_tracks": Small("pulses", ("scans=5",), 4_501, 60_001),
 }
+# Further kinds of run, of rare events and of plots that are missed.
+MORE = {
+    "missed_plots": Small("sonar_missed", ("scans=12",), 20_001, 90_001),
+    "rare_folds": Small("ambiguous_rare", ("sweep.radar.repetition_rate_hz=[900]", "scans=6"), 1_301, 60_001),
+    "rare_losses": Small("discriminator_rare", ("sweep.estimators.0.lock_probability=[0.999]",), 301, 50_001),
+    "rare_tracks": Small("sonar_clutter_rare", ("scans=8",), 9_001, 80_001),
+    "rare_ends": Small("sonar_clutter_ends", ("scans=8",), 9_001, 80_001),
+}

@@ -20,7 +20,7 @@ from radarsim.engine.cluster import Cluster
 from radarsim.report.tables import to_csv
 from tests.cli.test_run import csv_bytes
 from tests.engine.test_collect import Shuffled
-from tests.trust.cases import CASES
+from tests.trust.cases import CASES, MORE
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.filterwarnings("ignore")  # Dask's own
@@ -29,7 +29,7 @@ every_study = pytest.mark.parametrize("study", CASES)
 
 def tables(study, realisations=None, **means):
     """The bytes of all tables of a run in this process, by name."""
-    result = experiment.run(CASES[study].loaded(realisations), **means)
+    result = experiment.run((CASES | MORE)[study].loaded(realisations), **means)
     return {name: to_csv(table) for name, table in result.tables.items()}
 
 
@@ -51,7 +51,7 @@ def expected():
     return of
 
 
-@every_study
+@pytest.mark.parametrize("study", CASES | MORE)
 def test_threads_and_order(expected, study):
     assert tables(study, threads=3) == expected(study)
     assert tables(study, executor=Shuffled(1)) == expected(study)

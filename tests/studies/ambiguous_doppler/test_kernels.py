@@ -130,15 +130,3 @@ def test_without_bounds_it_is_the_sum_over_all_sequences_of_folds(scans, varianc
         mean, probability = naive.enumerated(one, case.spec.prior, sigma, 5.0, plots, spans, 6)
         assert np.abs((out[0, -1, :3] - mean) / [1000.0, 30.0, 2.0]).max() < 1e-12
         assert abs(out[0, -1, records.PROBABILITY] - probability) < 1e-12
-
-
-def test_partial_groups_and_blocks_add_up():
-    """Realisation i is itself whatever the block: sums over 21 realisations in one and in two parts."""
-    case = made("RLS 2", [RANGE_ONLY, ORACLE, NO_MEMORY, MEMORY], 4, detection_probability=0.8)
-    plan = study.prepare(case)
-    whole = study.simulate(plan, 0, 21)
-    parts = study.simulate(plan, 0, 8) + study.simulate(plan, 8, 13)
-    assert np.abs(whole - parts).max() <= 1e-9 * np.abs(whole).max()
-    counted = plan.layout.unpack(whole)["estimates"]
-    assert counted.max() <= 21
-    assert counted.min() > 0

@@ -9,7 +9,6 @@ import pytest
 from scipy.special import ndtr
 
 import radarsim
-from radarsim.app import run
 from radarsim.app.configs import load
 from radarsim.config.identity import canonical
 from radarsim.errors import ConfigError
@@ -352,24 +351,6 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
     assert result.curves["n"].max() <= row["plain"]
     assert "by importance sampling" in " ".join(result.answer)
     assert not any("rare event" in line for line in result.warnings)
-
-
-def test_tables_are_equal_bytes_for_threads_shards_and_a_run_that_goes_on(tmp_path):
-    only = ["sweep.radar.repetition_rate_hz=[900]", "scans=6"]
-
-    def written(out):
-        return {path.name: path.read_bytes() for path in (out / "ambiguous_rare").glob("*.csv")}
-
-    for out, keys in (("one", {"threads": 1}), ("two", {"threads": 2}), ("on", {"realisations": 700}), ("on", {})):
-        given = {"realisations": 1300} | keys
-        radarsim.run("ambiguous_rare", out=tmp_path / out, overrides=only, figures=False, **given)
-    experiment = load("ambiguous_rare", [*only, "realisations=1300"])
-    for part in (2, 1):
-        run.share(experiment, (part, 2), out=tmp_path / "shared")
-    run.report(experiment, out=tmp_path / "shared", figures=False)
-    assert "rare.csv" in written(tmp_path / "one")
-    for other in ("two", "on", "shared"):
-        assert written(tmp_path / other) == written(tmp_path / "one")
 
 
 def test_a_rate_that_rests_on_few_events_is_told():

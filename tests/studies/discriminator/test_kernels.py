@@ -269,17 +269,6 @@ def evaluate_merged(table, weights, first, begin, blocks, image, amplitude, work
     laned.score(work, sums, table, first, blocks, image, amplitude)
 
 
-def test_a_realisation_is_itself_in_any_block():
-    burst = burst_of(pulses=61)
-    physics, clean = physics_of(burst), np.zeros((1, 61))
-    a, b = np.empty((2, 1, 61))
-    data.draw_samples(physics, KEY, 5, clean, a)
-    data.draw_samples(physics, KEY, 6, clean, b)
-    data.draw_samples(physics, KEY, 5, clean, b)
-    assert np.array_equal(a, b)
-    assert np.all(a != 0)
-
-
 def test_noise_of_samples_is_white():
     burst = burst_of(pulses=20_001, complex_samples=True)
     samples = np.empty((2, 20_001))

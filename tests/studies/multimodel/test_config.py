@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from radarsim.app.configs import load
-from radarsim.config.lookup import stems
 from radarsim.errors import ConfigError
 
 SENSOR = {"sigma_range_m": 2.5, "sigma_elevation_deg": 0.1, "sigma_azimuth_deg": 0.1, "scan_period_s": 0.05}
@@ -87,10 +86,3 @@ def test_faults_are_told(changes, words):
     with pytest.raises(ConfigError) as caught:
         load(config(**changes))
     assert words in "\n".join(caught.value.lines)
-
-
-def test_all_shipped_configs_of_the_paper_load():
-    found = [stem for stem in stems("configs") if stem.startswith("multimodel")]
-    assert {"multimodel", "multimodel_1hz", "multimodel_families", "multimodel_trajectories"} <= set(found)
-    for stem in found:
-        assert all(case.study == "multimodel" for case in load(stem).cases)

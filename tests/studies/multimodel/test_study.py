@@ -1,6 +1,5 @@
 """The multimodel study: plots, sums against the textbook twin on the study's own plots, blocks, edges, faults."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,6 @@ from radarsim.physics import frames
 from radarsim.studies.multimodel import STUDY, tables
 from radarsim.studies.multimodel import study as multimodel
 from radarsim.studies.multimodel import track as multimodel_plots
-from radarsim.studies.multimodel.kernels import records
 from tests.physics.antenna import to_biconical
 from tests.studies.multimodel import naive
 
@@ -70,12 +68,6 @@ def test_plots_have_the_stated_errors_and_covariances():
     sigma = np.array([2.5, np.radians(0.1), np.radians(0.1)])
     exact = frames.plot_covariance(to_biconical(antenna), sigma, frames.rotation(0, np.radians(30)))
     assert np.allclose(mean.mean(axis=0), exact, rtol=1e-3, atol=1e-3 * np.abs(exact).max())
-
-
-def test_a_realisation_is_itself_in_any_group():
-    plan = work(scans=20).plan
-    one, other = multimodel.measured(plan, 0)[0], multimodel.measured(plan, 3)[0]
-    assert np.array_equal(one[:, :, 3:], other[:, :, :5])
 
 
 @pytest.mark.parametrize("sensor", [{}, {"detection_probability": 0.7, "jitter_s": 0.1}])
@@ -135,14 +127,6 @@ def test_covariance_at_the_prediction_is_computed_there():
         at = to_biconical(frames.to_antenna((F @ x)[0::3], turn, 12))
         x, P, *_ = naive.advance(x, P, F, Q, z[k], frames.plot_covariance(at, sigma, turn))
         assert np.allclose(sums["error"][0, k - 3, :, 0], x - plan.world.truth[k], rtol=1e-7, atol=1e-5)
-
-
-def test_sums_of_parts_are_the_sums_of_the_whole():
-    case = work()
-    whole = case.simulate(0, 19)
-    parts = case.simulate(0, 8) + case.simulate(8, 8) + case.simulate(16, 3)
-    assert np.allclose(whole, parts, rtol=1e-11, atol=1e-9 * np.abs(whole).max())
-    assert np.array_equal(case.simulate(0, 19), whole)
 
 
 def test_stage_sums_are_those_of_the_scans():
@@ -268,18 +252,6 @@ def test_axes_describe_the_reported_scans():
     assert np.array_equal(axes.truth, case.plan.world.truth[axes.k - 1])
     assert axes.stage_scans.sum() == spec.scans - 3
     assert len(axes.stage_scans) == len(spec.target.stages)
-
-
-def test_sums_have_the_shapes_of_their_layout():
-    plan = work(report_every=7).plan
-    assert plan.layout.shapes == records.shapes(3, len(plan.axes.k), len(plan.axes.stage_scans))
-    assert tuple(plan.layout.shapes) == records.Sums._fields
-
-
-def test_the_plan_is_made_of_plain_data():
-    plan = work().plan
-    assert replace(plan, block=8).block == 8
-    assert plan.layout.size < 200_000
 
 
 def test_track_over_recorded_plots_equals_the_experiment():

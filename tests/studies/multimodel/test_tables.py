@@ -97,16 +97,6 @@ def test_answer_names_the_best_filter_of_each_stage(result):
     assert "m/s [" in climb
 
 
-def test_bytes_are_the_same_for_any_number_of_threads(tmp_path):
-    found = []
-    for threads in (1, 2, 3):
-        radarsim.run("multimodel_1hz", realisations=300, threads=threads, out=tmp_path / str(threads), figures=False)
-        folder = tmp_path / str(threads) / "multimodel_1hz"
-        found.append({path.name: path.read_bytes() for path in folder.glob("*.csv")})
-    assert found[0] == found[1] == found[2]
-    assert {"curves.csv", "gains.csv", "probabilities.csv", "stages.csv"} <= set(found[0])
-
-
 def test_time_per_update_stands_in_the_record_and_the_report_alone(tmp_path):
     """Counted operations are a table; what a clock measured is none."""
     radarsim.run("multimodel_1hz", realisations=8, out=tmp_path, figures=False)

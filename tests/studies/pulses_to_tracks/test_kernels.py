@@ -229,12 +229,3 @@ def test_the_chain_is_the_textbooks(count):
         # Where a start lies between two maxima a rounding decides; of locked bursts none is off by a hundredth.
         assert (off < 1e-2).mean() > 0.97, USES[f]["name"]
         assert np.median(off) < 1e-4, USES[f]["name"]
-
-
-def test_a_realisation_is_the_same_in_any_block():
-    plan = study.prepare(made([RANGE, CURED, SPECTRUM], scans=4))
-    values = np.zeros(plan.layout.size)
-    sums = Sums(**plan.layout.unpack(values))
-    whole = chain.simulate_block(plan.world, plan.filters, sums, 0, 40)
-    part = chain.simulate_block(plan.world, plan.filters, sums, 16, 11)
-    np.testing.assert_array_equal(whole[:, :, 16:27], part)

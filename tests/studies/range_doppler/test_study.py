@@ -138,12 +138,3 @@ def test_non_finite_numbers_are_found_and_explained():
     lines = spoiled.explain(0, 3)
     assert lines[0] == "rls2: filter 'r+Vr', scan 8: 3 of 3 realisations not finite"
     assert len(lines) == 15 - 7
-
-
-def test_plan_is_small_when_sent_elsewhere():
-    import pickle
-
-    work = work_of("rls2")
-    copy = pickle.loads(pickle.dumps(work))
-    assert copy.identity == work.identity
-    np.testing.assert_array_equal(copy.simulate(5, 100), work.simulate(5, 100))

@@ -109,21 +109,6 @@ def test_correlation_by_coordinate():
     assert spec.sensor.error_correlation.of(1) == -0.2
 
 
-@pytest.mark.parametrize(
-    "stem",
-    [
-        "sonar_smoothing",
-        "sonar_fluctuating",
-        "sonar_missed",
-        "sonar_correlated",
-        "sonar_asynchronous",
-        "sonar_conversion",
-    ],
-)
-def test_shipped_configs_are_right(stem):
-    assert load(stem).cases
-
-
 def test_a_scan_beyond_the_last_cannot_be_missed():
     with pytest.raises(ConfigError) as caught:
         load("sonar_smoothing", ["scans=10", "sensor.missed_scans=[3, 11]"])

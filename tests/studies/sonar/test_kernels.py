@@ -165,11 +165,3 @@ def test_third_coordinate_and_walk_of_velocity_leave_the_first_two_alone():
     known = plan.axes.available
     assert sigma[known] == pytest.approx(plan.axes.exact_sigma[known], rel=5.5 / np.sqrt(2 * 4096))
     assert [name for name, _ in plan.axes.components] == ["r", "vr", "ar", "b", "vb", "ab", "d", "vd", "ad"]
-
-
-def test_blocks_add_up_whatever_their_bounds():
-    plan = STUDY.prepare(load(config(detection_probability=0.7)).cases[0])
-    whole = plan.layout.unpack(STUDY.simulate(plan, 0, 1500))
-    parts = [plan.layout.unpack(STUDY.simulate(plan, *part)) for part in ((0, 700), (700, 800))]
-    for name, values in whole.items():
-        assert parts[0][name] + parts[1][name] == pytest.approx(values, rel=1e-9, abs=1e-9)

@@ -5,7 +5,6 @@ import inspect
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import radarsim
@@ -128,9 +127,3 @@ def test_every_figure_of_the_study_has_its_name(tmp_path):
     known = STUDY.keys().figure_names
     assert drawn <= set(known)
     assert len(known) == len(set(known))
-
-
-def test_a_plan_makes_its_own_sums():
-    for made in (smoothing_config(scans=5), manoeuvre_config(), clutter_config([tracker("nearest")], scans=5)):
-        plan = STUDY.prepare(load(made).cases[0])
-        assert np.array_equal(STUDY.simulate(plan, 3, 4), plan.simulate(3, 4))

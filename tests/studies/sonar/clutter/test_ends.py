@@ -8,13 +8,11 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app import run as experiment
 from radarsim.app.configs import load
 from radarsim.config.identity import canonical
 from radarsim.errors import ConfigError
 from radarsim.kernels import random
 from radarsim.report import rare
-from radarsim.report.tables import to_csv
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter import filters as design
 from radarsim.studies.sonar.clutter import tables
@@ -23,7 +21,6 @@ from radarsim.studies.sonar.clutter.kernels import counts as places
 from radarsim.studies.sonar.clutter.kernels.ends import outside
 from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK
-from tests.engine.test_collect import Shuffled
 from tests.studies.sonar.clutter import naive_ends
 from tests.studies.sonar.clutter.test_rare import words_of
 from tests.studies.sonar.clutter.test_study import config, simulated, tracker
@@ -231,15 +228,6 @@ def test_the_target_and_false_tracks_are_left_alone():
         assert all((sums[name] == more[name]).all() for name in sums)
 
 
-def test_blocks_add_up():
-    plan = plan_of([tracker("a"), tracker("told", "known")], 0.3, 0.9, 10)
-    whole = plan.layout.unpack(STUDY.simulate(plan, 0, 700))
-    parts = [plan.layout.unpack(STUDY.simulate(plan, *part)) for part in ((0, 130), (130, 570))]
-    for name in ("ended", "ended_drawn"):
-        assert parts[0][name] + parts[1][name] == pytest.approx(whole[name], rel=1e-9, abs=1e-9)
-        assert not whole[name][1].any()
-
-
 def test_tables_tell_the_curve_and_how_tracks_end():
     filters = [tracker("a", gate=0.999, drop_after_misses=4), tracker("told", "known"), tracker("b", "pda", gate=1.0)]
     result = radarsim.run(keys_of(filters, 0.0, 0.95, 20), realisations=5000)
@@ -287,15 +275,6 @@ def test_few_events_in_one_way_of_ending_are_told():
     few = {"n": 100, "mean_weight": 0.3, "mean_weight_se": 0.01, "note": ""}
     assert rare.warnings(pd.DataFrame([row | few])) == []
     assert "the mean weight is 0.3" in rare.warnings(pd.DataFrame([row | few | {"n": 200}]))[0]
-
-
-def test_bytes_are_those_of_any_threads_and_order():
-    keys = keys_of([tracker("a"), tracker("b", "pda")], 0.1, 0.9, 6) | {"realisations": 9001}
-    one, three, shuffled = (
-        {name: to_csv(table) for name, table in experiment.run(load(keys), **means).tables.items()}
-        for means in ({"threads": 1}, {"threads": 3}, {"executor": Shuffled(1)})
-    )
-    assert one == three == shuffled
 
 
 def test_without_the_event_a_case_is_the_one_it_was():

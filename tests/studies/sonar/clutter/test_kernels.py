@@ -132,15 +132,6 @@ def test_a_full_circle_has_no_seam():
     assert np.abs(np.array(counts) - 1).max() < 3.9 / np.sqrt(expected)
 
 
-def test_blocks_add_up_and_realisations_are_themselves():
-    _, plan = prepared([tracker("nearest"), tracker("pda")], density=2.0, detection=0.8, scans=12)
-    whole = sums_of(plan, 0, 700)
-    parts = [sums_of(plan, *part) for part in ((0, 130), (130, 570))]
-    for name, values in whole.items():
-        assert parts[0][name] + parts[1][name] == pytest.approx(values, rel=1e-9, abs=1e-9)
-    assert whole["begun"][:, 0, 0].tolist() == [700, 700]
-
-
 def test_cells_have_draws_of_their_own():
     """No two cells or scans share a draw: the numbers of neighbouring draws differ in the first word."""
     words = set()

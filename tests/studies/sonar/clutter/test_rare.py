@@ -7,20 +7,17 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.app import run as experiment
 from radarsim.app.configs import load
 from radarsim.app.quantities import Quantity
 from radarsim.app.solve import solve
 from radarsim.config.identity import canonical
 from radarsim.errors import ConfigError
 from radarsim.kernels import random
-from radarsim.report.tables import to_csv
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter import filters as design
 from radarsim.studies.sonar.clutter import track as plots
 from radarsim.studies.sonar.clutter.kernels import counts as places
 from radarsim.studies.sonar.clutter.kernels.rare import Shift
-from tests.engine.test_collect import Shuffled
 from tests.studies.sonar.clutter.naive_false import FalseTrack
 from tests.studies.sonar.clutter.test_study import config, simulated, tracker
 
@@ -218,12 +215,9 @@ def test_gates_full_of_false_plots_are_left_as_they_are():
     assert (drawn["held"][:, :, 2].sum(axis=1) == begun[:, :, places.FALSE_KEPT].sum(axis=1)).all()
 
 
-def test_blocks_add_up_and_the_target_is_left_alone():
+def test_the_target_is_left_alone():
     weighted, plain = plan_of([tracker("a")], 0.3), plan_of([tracker("a")], 0.3, sought=False)
     whole = weighted.layout.unpack(STUDY.simulate(weighted, 0, 700))
-    parts = [weighted.layout.unpack(STUDY.simulate(weighted, *part)) for part in ((0, 130), (130, 570))]
-    for name, values in whole.items():
-        assert parts[0][name] + parts[1][name] == pytest.approx(values, rel=1e-9, abs=1e-9)
     alone = plain.layout.unpack(STUDY.simulate(plain, 0, 700))
     for name in ("error", "counts", "ratios"):
         assert (whole[name] == alone[name]).all()
@@ -274,23 +268,6 @@ def test_solve_takes_the_weighted_rate():
 def test_a_rate_that_rests_on_few_events_is_told():
     result = result_of(20, [FOUR_OF_SIX])
     assert result.tables["rare"]["note"].str.contains("effective events").all()
-
-
-def test_bytes_are_those_of_any_threads_and_order():
-    keys = config([tracker("a"), FOUR_OF_SIX], 0.1, 0.9, 6) | {"rare": RARE, "realisations": 9001}
-    one, three, shuffled = (
-        {name: to_csv(table) for name, table in experiment.run(load(keys), **means).tables.items()}
-        for means in ({"threads": 1}, {"threads": 3}, {"executor": Shuffled(1)})
-    )
-    assert one == three == shuffled
-
-
-def test_a_run_goes_on_where_it_was(tmp_path):
-    keys = config([tracker("a")], 0.1, 0.9, 6) | {"rare": RARE}
-    radarsim.run(keys, realisations=5000, out=tmp_path)
-    grown = radarsim.run(keys, realisations=9001, out=tmp_path)
-    whole = radarsim.run(keys, realisations=9001)
-    assert to_csv(grown.tables["rare"]) == to_csv(whole.tables["rare"])
 
 
 def test_without_the_key_a_case_is_the_one_it_was():

@@ -7,8 +7,6 @@ import pytest
 from scipy import stats
 
 from radarsim.app.configs import load
-from radarsim.app.work import CaseWork
-from radarsim.engine.collect import collect
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter.kernels import counts as places
 
@@ -179,12 +177,6 @@ def test_a_target_that_passes_close_by_the_sonar_leaves_numbers():
     given["target"] = {"kind": "accelerating", **course, "acceleration_mps2": 0, "start_s": 0}
     found = simulated(STUDY.prepare(load(given).cases[0]), 2048)
     assert all(np.isfinite(values).all() for values in found.values())
-
-
-def test_bytes_do_not_depend_on_threads():
-    case = load(config([tracker("a"), tracker("b", "pda")], density=2.0, detection=0.9)).cases[0]
-    sums = [collect(CaseWork(case), 10_000, threads=threads).values for threads in (0, 1, 2)]
-    assert sums[0].tobytes() == sums[1].tobytes() == sums[2].tobytes()
 
 
 def test_noise_of_the_target_is_that_of_plain_filters():

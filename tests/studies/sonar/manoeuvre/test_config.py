@@ -75,8 +75,3 @@ def test_what_is_taken():
 def test_a_threshold_can_be_swept():
     made = config(filters=[ADAPTIVE]) | {"sweep": {"filters.0.detector.plots": [4, 6]}}
     assert [case.spec.filters[0].detector.plots for case in load(made).cases] == [4, 6]
-
-
-@pytest.mark.parametrize("stem", ["sonar_manoeuvre", "sonar_manoeuvre_turning"])
-def test_shipped_configs_are_right(stem):
-    assert load(stem).cases

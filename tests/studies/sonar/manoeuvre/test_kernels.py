@@ -132,11 +132,3 @@ def test_alarms_and_first_events_are_the_twins(probability):
                 event = np.where(phase == 2, ~alarm & ~np.isnan(q[g]), alarm)
                 first = [event[k] and not event[:k][phase[:k] == phase[k]].any() for k in range(SCANS)]
                 assert (sums["first"][d, g, i] == first).all()
-
-
-def test_blocks_add_up_whatever_their_bounds():
-    plan = STUDY.prepare(load(config() | {"uses": {"horizon_s": 60.0}}).cases[0])
-    whole = plan.layout.unpack(STUDY.simulate(plan, 0, 1500))
-    parts = [plan.layout.unpack(STUDY.simulate(plan, *part)) for part in ((0, 700), (700, 800))]
-    for name, values in whole.items():
-        assert parts[0][name] + parts[1][name] == pytest.approx(values, rel=1e-9, abs=1e-9), name

@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-import radarsim
 from radarsim.app.configs import load
-from radarsim.report.tables import to_csv
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar import exact as least_squares
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre import study as manoeuvres
 from radarsim.studies.sonar.scene import build_scene
-from tests.studies.sonar.manoeuvre.test_kernels import DETECTORS, FILTERS, SCANS, SIGMA, TARGET, VESSEL, T, config, twin
+from tests.studies.sonar.manoeuvre.test_kernels import FILTERS, SCANS, SIGMA, TARGET, VESSEL, T, config, twin
 
 N = 16_384
 ALL = 5e-9  # two-sided, of thousands of looks: 5.85 standard errors
@@ -172,16 +170,6 @@ def test_an_imm_of_two_like_models_is_the_kalman_filter():
     assert sums["error"][1] == pytest.approx(sums["error"][0], rel=1e-7, abs=1e-9)
     # The plots then tell nothing of the model: it stays at its long-run probability.
     assert sums["modes"][1, :, :, 0] / 600 == pytest.approx(0.25, abs=1e-6)
-
-
-# ---- the same bytes -----------------------------------------------------------------------------------------------
-def test_tables_are_the_same_bytes_for_any_number_of_threads():
-    made = config(filters=FILTERS, detectors=DETECTORS, sensor={"detection_probability": 0.9})
-    made |= {"uses": {"horizon_s": 60, "at_s": [50, 145]}, "realisations": 9000}
-    one, other = (radarsim.run(made, threads=threads).tables for threads in (1, 2))
-    assert {"detections", "delays", "classes", "modes", "uses"} <= set(one)
-    for name, table in one.items():
-        assert to_csv(table) == to_csv(other[name]), name
 
 
 # ---- uses ---------------------------------------------------------------------------------------------------------

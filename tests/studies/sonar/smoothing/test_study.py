@@ -7,7 +7,6 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.app.work import CaseWork
-from radarsim.engine.collect import collect
 from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.smoothing.study import SharedPlan
 from radarsim.studies.sonar.study import RealisationPlan
@@ -155,12 +154,6 @@ def test_planted_faults_show(fault):
     plan = STUDY.prepare(load(config(error_correlation=0.6)).cases[0])
     off, _ = deviations(plan, simulated(dataclasses.replace(plan, **FAULTS[fault](plan))))
     assert np.nanmax(np.abs(off)) > BOUND
-
-
-def test_bytes_do_not_depend_on_threads():
-    work = CaseWork(load(config(scans=8, detection_probability=0.8)).cases[0])
-    sums = [collect(work, 20_000, threads=threads).values.tobytes() for threads in (1, 2, 3)]
-    assert sums[0] == sums[1] == sums[2]
 
 
 def test_cases_that_differ_in_filters_share_their_plots():
