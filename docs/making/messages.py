@@ -109,7 +109,7 @@ def in_readings() -> Iterator[tuple[str, str, str]]:
         of = registry.study(name).readings()
         if of is None:
             continue
-        place = f"radarsim/studies/{name}/readings.py"
+        place = f"radarsim/studies/{name}/readings.yaml"
         for choice in of.choices:
             for text in (choice.asks, *(one.reason for one in choice.alternatives)):
                 yield text, "", place

@@ -9,8 +9,9 @@ import pytest
 from radarsim.app.run import papers
 from radarsim.errors import ConfigError
 from radarsim.report.claims import above, evidence, printed
-from radarsim.report.claims.written import claims_in, of_other_cases, with_arguments
+from radarsim.report.claims.written import choices_in, claims_in, of_other_cases, with_arguments
 from radarsim.report.statistics import Estimate
+from radarsim.studies import registry
 from radarsim.studies.sonar.measures import FOUND
 
 HEAD = "paper: P9\nconfig: walk\nnames: {PAIRS: [[2, 3], [4, 5]], R: [range]}\nclaims:\n"
@@ -138,3 +139,36 @@ def test_a_list_reads_no_claims():
     )
     for argument in ("list", "--help"):
         subprocess.run([sys.executable, "-c", program, argument], check=True, capture_output=True)
+
+
+def test_what_a_paper_leaves_open_is_what_is_written(tmp_path):
+    file = tmp_path / "readings.yaml"
+    file.write_text(
+        "paper: P9\nnames: {FAST: [1, 3]}\nchoices:\n- key: start\n  asks: how it starts\n  original: nothing\n"
+        "  claims: [$FAST, 5t]\n  alternatives:\n  - {name: slow, kind: U, reason: none, sets: {rate: 2}}\n"
+    )
+    (choice,) = choices_in(file)
+    assert (choice.key, choice.original, choice.english) == ("start", "nothing", "nothing")
+    assert choice.claims == ("P9.1", "P9.3", "P9.5t")
+    assert (choice.default, choice["slow"].sets, choice.contradicts) == ("slow", {"rate": 2}, False)
+    file.write_text(file.read_text().replace("kind: U", "kind: X").replace("$FAST", "$SLOW"))
+    with pytest.raises(ConfigError, match=r"readings.yaml:9:24: .*kind: must be one of E, U, N, got 'X'"):
+        choices_in(file)
+
+
+def test_a_choice_bears_on_claims_that_there_are():
+    for name in registry.SHIPPED:
+        readings = registry.study(name).readings()
+        known = {claim.id for claim in registry.study(name).claims().claims} if readings else set()
+        assert readings is None or {one for choice in readings.choices for one in choice.claims} <= known
+
+
+def test_how_long_fast_radars_are_watched_bears_on_all_claims_that_look_at_one():
+    study = registry.study("range_doppler")
+    points = next(one for one in study.readings().choices if one.key == "points")
+    looked = {}
+    for claim in study.claims().claims:
+        cases = [case for part in claim.parts if part.asserted for case in part.cases]
+        looked[claim.id] = {case[0] if isinstance(case, tuple) else case for case in cases}
+    algebra, level = {"P1.16", "P1.31", "P1.34", "P1.36"}, {"P1.20"}  # what a curve converges to
+    assert set(points.claims) == {one for one, radars in looked.items() if radars & {3, 5}} - algebra - level

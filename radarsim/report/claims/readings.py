@@ -8,7 +8,7 @@ in all E and U readings; N shows what would have to be changed.
 import itertools
 from abc import ABC
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -31,11 +31,12 @@ class Unreadable(Exception):
 
 @dataclass(frozen=True)
 class Alternative:
-    """One way to take a choice: its name in tables, its kind (E, U or N), and why it is one."""
+    """One way to take a choice: its name in tables, its kind (E, U or N), why it is one, and what it sets."""
 
     name: str
     kind: str
     reason: str
+    sets: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
 
 @dataclass(frozen=True)
@@ -139,6 +140,10 @@ class PaperReadings(ABC):
         """What a reading takes otherwise than the shipped configs."""
         words = [f"{choice.key}: {reading[choice.key]}" for choice in self._other(reading)]
         return "; ".join(words) or DEFAULT
+
+    def sets(self, reading: Reading) -> dict[str, Any]:
+        """The values that the alternatives of a reading set."""
+        return {key: value for one in self.choices for key, value in one[reading[one.key]].sets.items()}
 
     def _other(self, reading: Reading) -> list[Choice]:
         return [choice for choice in self.choices if reading[choice.key] != choice.default]

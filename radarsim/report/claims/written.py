@@ -17,12 +17,13 @@ once. An argument that is none of the function's is a fault with file and line, 
 import inspect
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from string import Template
 from types import ModuleType, UnionType
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from radarsim.config.check import check
 from radarsim.config.document import Document
@@ -34,12 +35,15 @@ from radarsim.config.lookup import did_you_mean
 from radarsim.report.claims import ranges
 from radarsim.report.claims.declared import Claim, Part
 from radarsim.report.claims.evidence import certain
+from radarsim.report.claims.readings import Alternative, Choice
 from radarsim.report.statistics import Estimate
 
 RANGES = (
     *("printed", "between", "about", "above", "below", "at_most", "at_least", "greater", "less", "within", "same"),
     *("kept", "on_grid"),
 )
+Keyed = TypeVar("Keyed", bound=Model)
+Written = TypeVar("Written", Claim, Choice)
 TYPES = {str: "text", float: "a number", int: "a whole number", bool: "true or false"}
 
 
@@ -88,6 +92,35 @@ class FileKeys(Model):
     claims: tuple[ClaimKeys, ...]
 
 
+class AlternativeKeys(Model):
+    """A way to take a choice; see `readings.Alternative`."""
+
+    name: str
+    kind: Literal["E", "U", "N"]
+    reason: str
+    sets: dict[str, Anything] = {}  # noqa: RUF012
+
+
+class ChoiceKeys(Model):
+    """What a paper leaves open; see `readings.Choice`. claims: without the paper; english: where the paper speaks."""
+
+    key: Stem
+    asks: str
+    original: str
+    english: str = ""
+    claims: Anything = ()
+    contradicts: Flag = False
+    alternatives: tuple[AlternativeKeys, ...]
+
+
+class ChoicesKeys(Model):
+    """What a paper leaves open, the file readings.yaml."""
+
+    paper: Name
+    names: dict[str, Anything] = {}  # noqa: RUF012
+    choices: tuple[ChoiceKeys, ...]
+
+
 @dataclass(frozen=True)
 class Call:
     """A function by name, or a method of the evidence where function is None, with its cases and arguments."""
@@ -123,12 +156,24 @@ def claims_of(file: Callable[[str], ModuleType]) -> Sequence[Claim]:
 @cache
 def claims_in(file: Path, *measures: ModuleType) -> tuple[Claim, ...]:
     """The claims of a file, measured by functions of these modules; raises ConfigError, one line for each fault."""
+    return _made(file, FileKeys, lambda keys, document, faults: _Reader(document, faults, measures).claims(keys))
+
+
+def choices_in(file: Path) -> tuple[Choice, ...]:
+    """What a paper leaves open, by a file readings.yaml; raises ConfigError, one line for each fault."""
+    return _made(file, ChoicesKeys, lambda keys, document, faults: _Reader(document, faults, ()).choices(keys))
+
+
+def _made(
+    file: Path, model: type[Keyed], make: Callable[[Keyed, Document, Faults], Iterator[Written]]
+) -> tuple[Written, ...]:
+    """What is made of a checked file."""
     faults = Faults()
     document = read(file, faults)
-    keys = None if document is None else check(FileKeys, document, faults)
-    claims = () if document is None or keys is None else tuple(_Reader(document, faults, measures).claims(keys))
+    keys = None if document is None else check(model, document, faults)
+    made = () if document is None or keys is None else tuple(make(keys, document, faults))
     faults.raise_if_any()
-    return claims
+    return made
 
 
 def of_other_cases(part: Part, *cases: Any) -> Part:
@@ -164,9 +209,7 @@ class _Reader:
 
     def claims(self, keys: FileKeys) -> Iterator[Claim]:
         """The claims in their order."""
-        names: dict[str, Any] = {}
-        for name, value in keys.names.items():
-            names[name] = self._filled(value, names, ("names", name))
+        names = self._named(keys.names)
         parts: dict[str, list[Part]] = {}
         for i, one in enumerate(keys.claims):
             own = parts[f"{keys.paper}.{one.id}"] = [
@@ -176,6 +219,27 @@ class _Reader:
                 own += self._parts(part, names, ("claims", i, "parts", j))
             given = one.model_dump(exclude={"id", "config", "parts", "parts_of"})
             yield Claim(f"{keys.paper}.{one.id}", parts=tuple(own), config=one.config or keys.config, **given)
+
+    def choices(self, keys: ChoicesKeys) -> Iterator[Choice]:
+        """The choices in their order."""
+        names = self._named(keys.names)
+        for i, one in enumerate(keys.choices):
+            claims = self._filled(one.claims, names, ("choices", i, "claims"))
+            every = [own for each in claims for own in (each if isinstance(each, tuple) else (each,))]
+            yield Choice(
+                *(one.key, one.asks, one.original, one.english or one.original),
+                tuple(Alternative(**each.model_dump()) for each in one.alternatives),
+                tuple(f"{keys.paper}.{own}" for own in every),
+                one.contradicts,
+            )
+
+    def _named(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """The values under `names`; each may use those before it."""
+        names: dict[str, Any] = {}
+        for name, value in given.items():
+            with suppress(_Unknown):
+                names[name] = self._filled(value, names, ("names", name))
+        return names
 
     def _parts_of(self, name: str, parts: Mapping[str, list[Part]], path: Keys) -> list[Part]:
         if name not in parts:

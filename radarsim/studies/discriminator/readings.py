@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -16,9 +17,10 @@ from radarsim.bursts import schedule
 from radarsim.config.experiment import Case
 from radarsim.report.claims import Evidence, certain
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
-from radarsim.report.claims.readings import Alternative, Choice, PaperReadings, Reading, Seen, Unreadable
-from radarsim.report.claims.rule import AGAINST, EQUIVALENT, UNSTATED
+from radarsim.report.claims.readings import PaperReadings, Reading, Seen, Unreadable
+from radarsim.report.claims.rule import AGAINST
 from radarsim.report.claims.search import Search
+from radarsim.report.claims.written import choices_in
 from radarsim.report.statistics import Estimate
 from radarsim.studies.discriminator import measures, versions
 from radarsim.studies.discriminator.measures import COMPONENTS, COMPUTED, PRINTED
@@ -32,153 +34,14 @@ ITERATIONS = "12"  # the number of the part that counts windows
 LEAST_RATIO = 5.0  # μ_min
 EXACT = ("P4.1", "P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
 WINDOWS = ("P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
-RUN = ("P4.4", "P4.5", "P4.6", "P4.7", "P4.9", "P4.10", "P4.19")
 NO_ROOT = "(15) has no root: with the phase in it, its left side is over c at every length"
-
-CHOICES = (
-    Choice(
-        "noise_variance",
-        "σ_η² of the experiment",
-        "Амплитуду отраженного сигнала на приемной стороне условно примем равной единице, A = 1, а дисперсию помехи "
-        "σ_η² = 9. […] σ_φ0(T) = 0,061; σ_f0(T) = 0,45 Гц; …",
-        "The amplitude is taken as one, A = 1, and the variance of the noise as 9. […] The printed potential spreads "
-        "are those of a quarter of it.",
-        (
-            Alternative("9", UNSTATED, "as printed among the parameters"),
-            Alternative("2.25", UNSTATED, "as the printed spreads have it: the print contradicts itself"),
-        ),
-        (*EXACT, *RUN),
-        contradicts=True,
-    ),
-    Choice(
-        "threshold",
-        "c, under which a start lies in the main lobe",
-        "Δθᵀ·H(T)·Δθ < 1 (10); P(Δθᵀ·H(T)·Δθ < 0.5) > P_Δ (11); tr(…) + 3·√(…) ≤ 1 (14)",
-        "The condition is printed with 1 in (10) and (14) to (16), and with 0.5 in (11).",
-        (
-            Alternative("0.5", UNSTATED, "as in (11), and as Z < μ before (10) gives it"),
-            Alternative("1", UNSTATED, "as in (10) and (14) to (16)"),
-        ),
-        (*WINDOWS, *RUN),
-        contradicts=True,
-    ),
-    Choice(
-        "lobe",
-        "Whether the main lobe ends at the c for which the windows are designed",
-        "… условие попадания θ_н.п. в пределы главного лепестка ФП запишем в виде Δθᵀ·H(T)·Δθ < 1 (10); "
-        "P(Δθᵀ·H(T)·Δθ < 0.5) > P_Δ (11)",
-        "The condition that a start lies within the main lobe is written with 1 (10); the probability of it with 0.5 "
-        "(11).",
-        (
-            Alternative("one c", UNSTATED, "the lobe is that of the design, whichever number is taken"),
-            Alternative("two", UNSTATED, "the other printed number: a design by (11) for the lobe of (10), or reverse"),
-        ),
-        ("P4.12",),
-    ),
-    Choice(
-        "forecast",
-        "The spreads of the forecast",
-        "… СКО в 100, 150, 500, 1000 и 2000 раз выше потенциальных … √diag(R_пр) = (6,1; 67,5 Гц; 6,1·10³ Гц²; "
-        "183,38·10³ Гц³; 2,426·10⁶ Гц⁴)",
-        "… standard deviations 100, 150, 500, 1000 and 2000 times the potential ones … and the numbers of it.",
-        (
-            Alternative("numbers", UNSTATED, "the printed numbers"),
-            Alternative("multiples", UNSTATED, "the printed multiples of the reading's own potential spreads"),
-        ),
-        (*WINDOWS, *RUN),
-    ),
-    Choice(
-        "first_phase",
-        "The phase in (15), of which there is no forecast",
-        "Так как прогноз θ_пр не содержит оценки начальной фазы, то на первом этапе нужно дополнительно выполнить "
-        "поиск по начальной фазе.",
-        "As the forecast holds no estimate of the initial phase, a search over it is needed at the first step.",
-        (
-            Alternative("left out of the form", UNSTATED, "unknown, and searched for: no part of the start's error"),
-            Alternative("left out of the problem", UNSTATED, "as if known: no row of any matrix"),
-            Alternative("kept", UNSTATED, "as (15) is printed, with the forecast's spread of 6.1 rad"),
-        ),
-        WINDOWS,
-    ),
-    Choice(
-        "rounding",
-        "How a window becomes a whole number of pulses",
-        "При этом нужно учитывать, что T_k может принимать только дискретные значения, кратные T_имп.",
-        "T_k can take discrete values only, multiples of the pulse period.",
-        (
-            Alternative("nearest", UNSTATED, "the nearest"),
-            Alternative("up", UNSTATED, "the next longer"),
-            Alternative("down", UNSTATED, "the next shorter, which alone keeps (14)"),
-        ),
-        WINDOWS,
-    ),
-    Choice(
-        "curvature",
-        "The window of H in (16)",
-        "H = H(T_{k+1}) = (Φ(T_{k+1}) + R_пр⁻¹)/(2μ); tr(R_Δθ(T_k, T_{k+1})·H(T_k)) + "
-        "3·√(2 tr([H(T_{k+1})·R_Δθ]²)) = 1 (16)",
-        "Defined at T_{k+1}; in (16) printed at T_k in the first term and at T_{k+1} in the second.",
-        (
-            Alternative("next", UNSTATED, "at T_{k+1} in both, as defined before (16)"),
-            Alternative("as printed", UNSTATED, "at T_k in the first term, as printed in (16)"),
-            Alternative("before", AGAINST, "at T_k in both"),
-        ),
-        (*WINDOWS, "P4.4", "P4.5", "P4.19"),
-    ),
-    Choice(
-        "pulses",
-        "How many pulses there are",
-        "n_пачки = 30000, T_пачки = T = 0,3 c",
-        "30000 pulses, 0.3 s",
-        (
-            Alternative("30000", EQUIVALENT, "as printed"),
-            Alternative("29999", UNSTATED, "as many periods as lie between 30000 pulses: sums over l = 0 … 29 998"),
-        ),
-        EXACT,
-    ),
-    Choice(
-        "sum",
-        "Whether Φ is a sum over pulses or its integral",
-        "Φ_θ(T) … μ = (A²·T·t_имп)/(4σ_η²·Δt·T_имп)",
-        "The matrix is given as an integral over T.",
-        (
-            Alternative("closed form", EQUIVALENT, "the integral"),
-            Alternative("pulse by pulse", EQUIVALENT, "the sum that it stands for"),
-        ),
-        EXACT,
-    ),
-    Choice(
-        "factor",
-        "How many standard deviations go with P_Δ = 0.99",
-        "Полагая P_Δ = 0,99 … tr(R_Δθ·H) + 3·√(2 tr([H·R_Δθ]²)) ≤ 1",
-        "With P_Δ = 0.99 … three standard deviations",
-        (
-            Alternative("3", EQUIVALENT, "as printed"),
-            Alternative("2.326", AGAINST, "the normal quantile of 0.99"),
-        ),
-        WINDOWS,
-    ),
-    Choice(
-        "counted",
-        "Which windows count as iterations",
-        "… начиная с T_0 = 1,79 ms требуется 12 итераций. […] потребовалась последовательность из 12-ти "
-        "оптимальных дискриминаторов …",
-        "… beginning with T₀ = 1.79 ms it takes 12 iterations. […] a sequence of 12 optimal discriminators was "
-        "needed …",
-        (
-            Alternative("after the first", UNSTATED, "T₁ … T₁₂: 12 iterations, beginning with T₀"),
-            Alternative("in all", UNSTATED, "T₀ … T₁₁: a sequence of 12 discriminators"),
-        ),
-        ("P4.3", "P4.11"),
-    ),
-)
 
 
 class Readings(PaperReadings):
     """P4's readings."""
 
     paper = "P4"
-    choices = CHOICES
+    choices = choices_in(Path(__file__).with_name("readings.yaml"))
     realisations = 4000  # with 500 the interval of P4.6 reaches over its limit, though not over the margin
     most = 1_024_000  # P4.4: σ of the locked bursts is up to 0.6 % off, of the 1 % that it may be
 

@@ -5,7 +5,7 @@ import pytest
 
 from radarsim.studies.multimodel import flight
 from radarsim.studies.multimodel.flights import FLIGHTS
-from radarsim.studies.multimodel.readings import CHOICES
+from radarsim.studies.multimodel.readings import Readings
 
 T = np.arange(0, 186.2, 0.5)
 UNFLYABLE = {"dive 60"}
@@ -51,8 +51,12 @@ def test_when_the_manoeuvre_begins_is_varied():
 
 
 def test_there_are_enough_of_both_kinds():
-    of = CHOICES[0]
+    of = Readings.choices[0]
     assert of.key == "flight"
-    assert len(of.alternatives) == len(FLIGHTS) + 1 >= 9
+    begins = {
+        name: f"within the printed axes, ballistic to {one.phases[1].start_s:g} s" for name, one in FLIGHTS.items()
+    }
+    assert {one.name: one.reason for one in of.alternatives[1:]} == begins
+    assert len(begins) >= 8
     assert sum("vertical" in name or "pull-up" in name for name in FLIGHTS) >= 4
     assert sum("lateral" in name or "turn" in name for name in FLIGHTS) >= 4
