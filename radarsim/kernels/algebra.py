@@ -117,21 +117,37 @@ def take_second_rate(P, R, taken):
 TAKE = take_value, take_rate, take_second_rate  # by the number of the component
 
 
+# Joseph's form, (I - g h) P (I - g h)' + R g g', is true with any gain g: for errors of a filter with a wrong model.
 @inline
-def corrected(P, h, g, S):
-    """P - g h' - h g' + S g g': a covariance after a number that was taken with any gain g (Joseph's form).
-
-    h (3) is the covariance of the state with the number and S the variance of its innovation, both by this P.
-    """
-    d0, d1, d2 = h[0] - g[0] * S, h[1] - g[1] * S, h[2] - g[2] * S
+def correct_value(P, R, g):
+    """Covariance of an error after a value, with an error of variance R, was taken with the gain g (3)."""
+    left, d1, d2 = 1.0 - g[0], P[1] - g[1] * P[0], P[2] - g[2] * P[0]
+    n0, n1, n2 = R * g[0], R * g[1], R * g[2]
     return (
-        P[0] - g[0] * h[0] - d0 * g[0],
-        P[1] - g[0] * h[1] - d0 * g[1],
-        P[2] - g[0] * h[2] - d0 * g[2],
-        P[3] - g[1] * h[1] - d1 * g[1],
-        P[4] - g[1] * h[2] - d1 * g[2],
-        P[5] - g[2] * h[2] - d2 * g[2],
+        left * left * P[0] + n0 * g[0],
+        left * d1 + n0 * g[1],
+        left * d2 + n0 * g[2],
+        P[3] - g[1] * (P[1] + d1) + n1 * g[1],
+        P[4] - g[1] * P[2] - g[2] * d1 + n1 * g[2],
+        P[5] - g[2] * (P[2] + d2) + n2 * g[2],
     )
+
+
+@inline
+def correct_rate(P, R, g):
+    """As `correct_value`, of a rate."""
+    p3, p1, p4, p0, p2, p5 = correct_value((P[3], P[1], P[4], P[0], P[2], P[5]), R, (g[1], g[0], g[2]))
+    return p0, p1, p2, p3, p4, p5
+
+
+@inline
+def correct_second_rate(P, R, g):
+    """As `correct_value`, of a second rate."""
+    p5, p4, p2, p3, p1, p0 = correct_value((P[5], P[4], P[2], P[3], P[1], P[0]), R, (g[2], g[1], g[0]))
+    return p0, p1, p2, p3, p4, p5
+
+
+CORRECT = correct_value, correct_rate, correct_second_rate
 
 
 # ---- sums --------

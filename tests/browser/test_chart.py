@@ -7,6 +7,7 @@ import pytest
 
 from radarsim.app.chart import chart
 from radarsim.studies.range_doppler import closed_form, exact, filters
+from radarsim.studies.range_doppler.propagation import Plots
 from tests.browser.test_report import CONTRAST, NAMES
 
 pytestmark = pytest.mark.slow
@@ -23,7 +24,7 @@ def sigmas(observes, start, r, v, dt, dm, k):
     """σ (k, 3) by the package, not-a-number where there is no estimate."""
     sigma = np.array([r, v])
     design = filters.design(observes, start, dm, sigma, dt, k)
-    _, S = exact.error_recursion(design.weights, design.gains, observes, np.zeros((k, 3)), sigma, dt)
+    _, S = exact.error_recursion(design, Plots(sigma), np.zeros((k, 3)), dt)
     return np.where(design.available, np.sqrt(np.diagonal(S, axis1=1, axis2=2)), np.nan)
 
 

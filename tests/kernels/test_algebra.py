@@ -68,9 +68,10 @@ def test_update(component):
 
 @pytest.mark.parametrize("component", range(3))
 def test_an_update_with_any_gain(component):
-    h, gain = MATRICES[:, component].T, STATES
-    made = algebra.corrected(pack(), h, gain, h[component] + R)
-    same(made, [updated(one, component, g, R) for one, g in zip(MATRICES, gain.T, strict=True)])
+    made = algebra.CORRECT[component](pack(), R, STATES)
+    same(made, [updated(one, component, g, R) for one, g in zip(MATRICES, STATES.T, strict=True)])
+    P, gain, _ = algebra.TAKE[component](pack(), R, 1.0)
+    same(algebra.CORRECT[component](pack(), R, gain), algebra.unpack(P))
 
 
 def test_sums():

@@ -47,13 +47,11 @@ def config(stem, variance=1e-3, **changes):
 
 def covariances(case):
     """Exact second moments (F, K, 3, 3) of the errors."""
-    plan, made = range_doppler.prepare(case), []
-    of, axes = plan.problem, plan.axes
-    for f, start in enumerate(of.start):
-        weights, observes = of.weights[f, :, :, :start], of.observes[f]
-        b, S = error_recursion(weights, of.gains[f], observes, of.truth, axes.sigma, axes.scan_period_s)
-        made.append(S + b[:, :, None] * b[:, None, :])
-    return np.stack(made)
+    made, found = range_doppler.prepare(case).made, []
+    for one in made.filters:
+        lasting, S = error_recursion(one, made.plots, made.x, made.dt)
+        found.append(S + lasting[:, :, :1] * lasting[:, None, :, 0])
+    return np.stack(found)
 
 
 def expected(case, name=None, count=100_000):

@@ -309,13 +309,14 @@ def tracks():
 
 def alike():
     """Exact means over patterns of plots, of which the alike are merged, or all are followed to the end."""
+    from radarsim.kernels.algebra import pack
     from radarsim.physics.motion import process_noise
     from radarsim.studies.range_doppler import patterns
     from radarsim.studies.range_doppler.propagation import Plots
 
     truth, dt = work(*RUNS["linear with misses"][:2]).plan.problem.truth, 5.0
     plots = Plots(np.array([25.0, 5.0]), np.zeros(2), np.array([10.0, 0.0]), 0.7)
-    design = patterns.Design(2, 2, process_noise("white_jerk", 1.0, dt))
+    design = patterns.Design(2, 2, pack(process_noise("white_jerk", 1.0, dt)))
     made = {"merged": patterns.mixture(design, plots, truth, dt, 32)}
     made["in pieces"] = patterns.mixture(design, plots, truth[:9], dt, 16, whole=True)
     names = "moment", "bias", "believed", "nees"

@@ -43,7 +43,6 @@ def shared_gains(case: Case, made: Designed, baseline: int) -> linear.Problem:
 
 def own_gains(case: Case, made: Designed, baseline: int) -> missed.Problem:
     """Any other world for the kernel in which each realisation has gains of its own."""
-    upper = np.triu_indices(3)
     return missed.Problem(
         keys=np.stack([noise_key(case, what) for what in ("plots", "misses", "drawn")]),
         truth=made.x,
@@ -56,7 +55,7 @@ def own_gains(case: Case, made: Designed, baseline: int) -> missed.Problem:
         dt=made.dt,
         observes=made.observes,
         start=np.array([d.start for d in made.filters]),
-        Q=np.stack([Q[upper] for Q in made.noises]),
+        Q=np.array([d.noise for d in made.filters]),
         baseline=baseline,
     )
 

@@ -16,6 +16,7 @@ from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Chart, Figure, Line, Mark, Note, Panel, Reference, Style
 from radarsim.report.text import in_a_row, significant_digits
 from radarsim.studies.range_doppler import closed_form, exact, filters, steady
+from radarsim.studies.range_doppler.propagation import Plots
 from radarsim.studies.range_doppler.study import COMPONENTS, RangeDopplerAxes, prepare
 
 if TYPE_CHECKING:
@@ -186,7 +187,7 @@ def limit_course(c: float) -> tuple[np.ndarray, np.ndarray]:
     errors = []
     for observes, start in ((1, 3), (2, 2)):
         design = filters.design(observes, start, tau_2**-6, sigma, dt, scans)
-        _, S = exact.error_recursion(design.weights, design.gains, observes, x, sigma, dt)
+        _, S = exact.error_recursion(design, Plots(sigma), x, dt)
         errors.append(np.sqrt(np.diagonal(S, axis1=1, axis2=2)))
     t, gain = np.arange(3, scans) * dt, 100 * (1 - errors[1][3:] / errors[0][3:])
     shown = np.unique(np.searchsorted(t, np.geomspace(EARLIEST, t[-1], 120)).clip(0, len(t) - 1))

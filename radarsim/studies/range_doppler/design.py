@@ -6,7 +6,6 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.errors import ConfigError
-from radarsim.physics.motion import process_noise
 from radarsim.studies.range_doppler import filters, tuning, world
 from radarsim.studies.range_doppler.config import Keys
 from radarsim.studies.range_doppler.propagation import Plots
@@ -44,12 +43,6 @@ class Designed:
     def observes(self) -> np.ndarray:
         """What each filter (F,) observes: 1 the range, 2 the velocity too."""
         return np.array([d.observes for d in self.filters])
-
-    @property
-    def noises(self) -> list[np.ndarray]:
-        """Q (3, 3) of each filter."""
-        pairs = zip(self.spec.filters, self.variances, strict=True)
-        return [process_noise(f.process_noise, variance, self.dt) for f, variance in pairs]
 
 
 def designed(case: Case) -> Designed:

@@ -6,77 +6,30 @@ process noise; where the truth leaves the model, the mean error (dynamic error, 
 
 import numpy as np
 
+from radarsim.kernels.algebra import unpack
 from radarsim.physics.motion import process_noise, transition
-
-
-def start_errors(weights: np.ndarray, truth: np.ndarray, sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (3,) and covariance (3, 3) of the error of the least-squares start.
-
-    weights (3, 2, n); truth (K, 3), of which the first n scans are used; sigma (2,) of the plots.
-    """
-    n = weights.shape[2]
-    bias = np.einsum("ijk,kj->i", weights, truth[:n, :2]) - truth[n - 1]
-    covariance = np.einsum("ijk,j,ljk->il", weights, sigma**2, weights)
-    return bias, covariance
+from radarsim.studies.range_doppler import propagation
+from radarsim.studies.range_doppler.filters import LinearFilter
+from radarsim.studies.range_doppler.propagation import Plots
 
 
 def error_recursion(
-    weights: np.ndarray, gains: np.ndarray, observes: int, truth: np.ndarray, sigma: np.ndarray, dt: float
+    one: LinearFilter, plots: Plots, truth: np.ndarray, dt: float, drawn: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bias (K, 3) and covariance (K, 3, 3) of the error at every scan.
+    """Lasting errors E (K, 3, C) and covariance S (K, 3, 3) of what noise makes, at every scan of a truth (K, 3).
 
-    S⁺ = (I - KH) B S Bᵀ (I - KH)ᵀ + K R Kᵀ, and the bias likewise with the model's defect B x - x⁺ of the truth added.
-    Before the start the estimates are the plots. weights (3, 2, n), gains (K, 3, 2), truth (K, 3), sigma (2,).
+    See `propagation`, of which drawn is. Before the start the estimates are the plots.
     """
-    scans, start = len(gains), weights.shape[2]
-    F, H = transition(dt), np.eye(3)[:observes]
-    R = np.diag(sigma[:observes] ** 2)
-    bias, covariance = np.zeros((scans, 3)), np.zeros((scans, 3, 3))
-    covariance[: start - 1, :observes, :observes] = R
-    bias[start - 1], covariance[start - 1] = start_errors(weights, truth, sigma)
-    defect = truth[:-1] @ F.T - truth[1:]
-    settled = False
-    for k in range(start, scans):
-        if not (settled and np.array_equal(gains[k], gains[k - 1])):
-            K = gains[k, :, :observes]
-            kept = np.eye(3) - K @ H
-            A = kept @ F
-            S = A @ covariance[k - 1] @ A.T + K @ R @ K.T
-            covariance[k] = (S + S.T) / 2
-            settled = np.array_equal(covariance[k], covariance[k - 1])
-        else:  # the covariance is stationary to the last bit while the gain does not change
-            covariance[k] = covariance[k - 1]
-        bias[k] = A @ bias[k - 1] + kept @ defect[k - 1]
-    return bias, covariance
-
-
-def bias_response(weights: np.ndarray, gains: np.ndarray, observes: int, dt: float) -> np.ndarray:
-    """The error (K, 3, 2) that a range one metre too long, and a velocity one m/s too high, in every plot lead to."""
-    scans, start = len(gains), weights.shape[2]
-    F, H, inputs = transition(dt), np.eye(3)[:observes], np.eye(2)[:observes]
-    response = np.zeros((scans, 3, 2))
-    response[: start - 1, :observes] = inputs
-    response[start - 1] = weights.sum(axis=2)
-    for k in range(start, scans):
-        K = gains[k, :, :observes]
-        response[k] = (np.eye(3) - K @ H) @ F @ response[k - 1] + K @ inputs
-    return response
-
-
-def defect_response(
-    weights: np.ndarray, gains: np.ndarray, observes: int, defects: np.ndarray, dt: float
-) -> np.ndarray:
-    """The errors (K, 3, C) that truths lead to which leave the model by defects (K, 3, C), F x − x⁺, scan by scan."""
-    scans, start = len(gains), weights.shape[2]
-    F, H = transition(dt), np.eye(3)[:observes]
-    response, truth = np.zeros_like(defects), np.zeros((start, *defects.shape[1:]))
-    for k in range(1, start):  # from zero, as the start forgets what a filter of the model can follow
-        truth[k] = F @ truth[k - 1] - defects[k]
-    response[start - 1] = np.einsum("ijk,kjc->ic", weights, truth[:, :2]) - truth[-1]
-    for k in range(start, scans):
-        kept = np.eye(3) - gains[k, :, :observes] @ H
-        response[k] = kept @ (F @ response[k - 1] + defects[k])
-    return response
+    defect, observes, begun = propagation.defects(truth, dt, plots, drawn), one.observes, one.start - 1
+    E, S = np.zeros_like(defect), np.zeros((len(truth), 6))
+    E[:begun, :observes], S[:begun, 0] = plots.inputs[:observes], plots.sigma[0] ** 2
+    S[:begun, 3] = plots.sigma[1] ** 2 if observes > 1 else 0.0
+    start = propagation.started(one.weights, one.believed[begun], plots, defect, dt)
+    E[begun], S[begun] = start.E[:, :, 0], start.S
+    further = propagation.scans(start, observes, plots, one.noise, defect[one.start :], dt)
+    for k, errors in enumerate(further, one.start):
+        E[k], S[k] = np.reshape(errors.E, (3, -1)), errors.S
+    return E, unpack(S.T)
 
 
 def steady_state(

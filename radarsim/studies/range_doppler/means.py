@@ -14,7 +14,7 @@ PATTERN_SCANS = 60  # of a run with missed plots: beyond, the mean over patterns
 
 def designs(made: Designed) -> list[patterns.Design]:
     """The filters of a case."""
-    return [patterns.Design(d.observes, d.start, Q) for d, Q in zip(made.filters, made.noises, strict=True)]
+    return [patterns.Design(d.observes, d.start, d.noise) for d in made.filters]
 
 
 @dataclass(frozen=True)
@@ -34,10 +34,10 @@ MOST_MEANS = 128
 def means(design: patterns.Design, beside: Sequence[patterns.Design], made: Designed) -> Means:
     """The means of one filter over the patterns; those of the last that were asked for are kept."""
     seen = [part[: design.observes] for part in made.plots[:3]]
-    arrays = (design.Q, *seen, made.x, made.drawn)
+    arrays = (*seen, made.x, made.drawn)
     others = tuple((one.observes, one.start) for one in beside)
     asked = made.dt, made.asked_from_k, made.roughly, made.plots.detection
-    key = (design[:2], others, *asked, *(array.tobytes() for array in arrays))
+    key = (design, others, *asked, *(array.tobytes() for array in arrays))
     found = FOUND.pop(key) if key in FOUND else over_patterns(design, beside, made)
     if len(FOUND) >= MOST_MEANS:
         del FOUND[next(iter(FOUND))]

@@ -21,7 +21,7 @@ import numpy as np
 
 from radarsim.studies.range_doppler.kernels import merging
 from radarsim.studies.range_doppler.kernels import patterns as kernels
-from radarsim.studies.range_doppler.propagation import COLUMNS, ROWS, Plots, defects
+from radarsim.studies.range_doppler.propagation import Plots, defects
 
 KEPT = (512, 2048, 8192, 32768)  # patterns side by side, each compared with the one before
 WHOLE = 1 << 21  # patterns that are never merged: 21 scans, a twentieth of a second
@@ -31,11 +31,11 @@ MOST_WAITING = 1 << 18  # patterns in which a filter has not started, beyond whi
 
 
 class Design(NamedTuple):
-    """What a filter is made of: 1 (range) or 2 (and velocity) observed, plots in its start, Q (3, 3) of a scan."""
+    """What a filter is made of: 1 (range) or 2 (and velocity) observed, plots in its start, Q of a scan, packed."""
 
     observes: int
     start: int
-    Q: np.ndarray
+    Q: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def mixture(
     others = [(one.observes, one.start) for one in beside]
     world = kernels.World(
         defect=np.ascontiguousarray(defect),
-        Q=design.Q[ROWS, COLUMNS],
+        Q=np.array(design.Q),
         R=plots.sigma**2,
         inputs=np.ascontiguousarray(plots.inputs),
         of_plot=np.stack([plots.bias, plots.sigma**2 + plots.bias**2 + plots.sigma_bias**2], axis=1),

@@ -1,24 +1,22 @@
 """Exact errors of many versions of the paper's filters at once: its own recursion, eqs. (8) and (12), on arrays.
 
-A version is a form and size of the manoeuvre covariance and a way to start; B of them run side by side. Covariances are
-packed as (6, B): rr, rV, ra, VV, Va, aa, which are the paper's b, c, e, d, f, g. The two measurements of a scan are
-taken one after the other, which for independent errors is the same as both at once.
-
-`filters.py` and `exact.py` do the same for one filter; the tests hold this against them.
+A version is a form and size of the manoeuvre covariance and a way to start; B of them run side by side. Packed
+covariances are the paper's b, c, e, d, f, g. The two measurements of a scan are taken one after the other, which for
+independent errors is the same as both at once.
 """
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from radarsim.kernels.algebra import CORRECT, NO_NOISE, TAKE, constant_acceleration, pack, predicted_covariance
 from radarsim.physics.motion import (
     acceleration_step_covariance,
     manoeuvre_covariance,
     transition,
     white_jerk_covariance,
 )
-from radarsim.studies.range_doppler.exact import start_errors
 from radarsim.studies.range_doppler.filters import least_squares_start, observation
 
 Form = Literal["random_jerk", "white_jerk", "white_jerk_rate", "acceleration_step", "normalised"]
@@ -34,7 +32,6 @@ Start = Literal[
 FORMS: tuple[Form, ...] = get_args(Form)
 START_NAMES: tuple[Start, ...] = get_args(Start)
 Version = tuple[Form, float, Start]  # form of Q, D_M, start
-PACKED = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 SCANS = {"three_and_three": (3, 3), "four_and_four": (4, 4), "five_and_five": (5, 5)}  # range only, with velocity
 USUAL_SCANS = (3, 2)
 
@@ -69,7 +66,7 @@ def started(start: Start, observes: int, sigma: np.ndarray, dt: float, Q: np.nda
         weights = _first_differences(observes, dt)
     else:
         weights, _ = least_squares_start(observes, scans, np.ones(2) if start == "unweighted" else sigma, dt)
-    _, true = start_errors(weights, np.zeros((scans, 3)), sigma)
+    true = np.einsum("ijk,j,ljk->il", weights, sigma**2, weights)
     every = np.broadcast_to(true, (len(Q), 3, 3))
     return every, every
 
@@ -166,17 +163,19 @@ def _starts(
 
 
 def _recursion(
-    P: np.ndarray, S: np.ndarray, Q: np.ndarray, observes: int, sigma: np.ndarray, dt: float, steps: int
+    P: Any, S: Any, Q: np.ndarray, observes: int, sigma: np.ndarray, dt: float, steps: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """True and believed σ, (steps + 1, 3, B), from the covariances believed P and true S at the start on."""
-    P, S, q = (_packed(each) for each in (P, S, Q))
+    P, S, q, F = pack(P), pack(S), pack(Q), constant_acceleration(dt)
     true, believed = np.empty((2, steps + 1, 3, len(Q)))
     for k in range(steps + 1):
         if k:
-            P, S = _extrapolated(P, dt) + q, _extrapolated(S, dt)
-            for observed in range(observes):
-                P, S = _updated(P, S, observed, sigma[observed] ** 2)
-        true[k], believed[k] = np.sqrt(S[[0, 3, 5]]), np.sqrt(P[[0, 3, 5]])
+            P, S = predicted_covariance(P, F, q), predicted_covariance(S, F, NO_NOISE)
+            for m in range(observes):
+                P, gain, _ = TAKE[m](P, sigma[m] ** 2, 1.0)
+                S = CORRECT[m](S, sigma[m] ** 2, gain)
+        for to, of in ((true, S), (believed, P)):
+            np.sqrt([of[0], of[3], of[5]], out=to[k])
         if k % LOOK == LOOK - 1 and _steady(true[k - 1 : k + 1]) and _steady(believed[k - 1 : k + 1]):
             true[k:], believed[k:] = true[k], believed[k]
             break
@@ -190,43 +189,6 @@ SETTLED = 1e-14  # relative change of a scan: some roundings
 def _steady(sigma: np.ndarray) -> bool:
     """Whether σ of two scans (2, …) are the same but for rounding."""
     return bool((abs(sigma[1] - sigma[0]) <= SETTLED * sigma[1]).all())
-
-
-def _packed(matrices: np.ndarray) -> np.ndarray:
-    return np.array([matrices[:, i, j] for i, j in PACKED])
-
-
-def _extrapolated(P: np.ndarray, dt: float) -> np.ndarray:
-    """F P Fᵀ, packed: eq. (8) without its last terms."""
-    b, c, e, d, f, g = P
-    half = dt * dt / 2
-    return np.array(
-        [
-            b + 2 * dt * c + dt * dt * (e + d) + dt**3 * f + dt**4 / 4 * g,
-            c + dt * (e + d) + 1.5 * dt * dt * f + dt * half * g,
-            e + dt * f + half * g,
-            d + 2 * dt * f + dt * dt * g,
-            f + dt * g,
-            g,
-        ]
-    )
-
-
-COLUMNS = ((0, 1, 2), (1, 3, 4))  # where the packed covariance holds the column of range, and of velocity
-
-
-def _updated(P: np.ndarray, S: np.ndarray, observed: int, variance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Believed and true covariance after a measurement of one component: the gain is that of the believed one."""
-    column = P[list(COLUMNS[observed])]
-    innovation = column[observed] + variance
-    K = column / innovation
-    u = S[list(COLUMNS[observed])]
-    level = u[observed] + variance
-    P, S = P.copy(), S.copy()
-    for n, (i, j) in enumerate(PACKED):
-        P[n] -= K[i] * column[j]
-        S[n] += K[i] * (K[j] * level - u[j]) - u[i] * K[j]
-    return P, S
 
 
 def both(radar: tuple[float, float, float], versions: Sequence[Version], scans: int) -> tuple[Errors, Errors]:

@@ -170,19 +170,10 @@ class Known:
 
 def exact_values(made: Designed, baseline: int) -> Known:
     """Of filters that get every plot."""
-    sigma, plots = made.plots.sigma, made.plots
-    errors = [exact.error_recursion(d.weights, d.gains, d.observes, made.x, sigma, made.dt) for d in made.filters]
-    bias, covariance = np.stack([b for b, _ in errors]), np.stack([S for _, S in errors])
-    if not made.spec.radar.as_the_papers:
-        of = np.stack([exact.bias_response(d.weights, d.gains, d.observes, made.dt) for d in made.filters])
-        bias = bias + of @ plots.bias
-        covariance = covariance + np.einsum("fkic,c,fkjc->fkij", of, plots.sigma_bias**2, of)
-    if made.drawn.any():
-        of = np.stack(
-            [exact.defect_response(d.weights, d.gains, d.observes, made.drawn, made.dt) for d in made.filters]
-        )
-        bias = bias + of[..., 0]
-        covariance = covariance + np.einsum("fkic,fkjc->fkij", of[..., 1:], of[..., 1:])
+    errors = [exact.error_recursion(d, made.plots, made.x, made.dt, made.drawn) for d in made.filters]
+    lasting, covariance = np.stack([E for E, _ in errors]), np.stack([S for _, S in errors])
+    bias, further = lasting[..., 0], lasting[..., 1:]
+    covariance = covariance + np.einsum("fkic,fkjc->fkij", further, further)
     available, believed = (np.stack([getattr(d, what) for d in made.filters]) for what in ("available", "believed"))
     moment = covariance + bias[..., :, None] * bias[..., None, :]
     root = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3) + bias**2)

@@ -10,13 +10,14 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.engine.results import Track
 from radarsim.kernels import linear
+from radarsim.kernels.algebra import pack, unpack
 from radarsim.kernels.innovations import lasting, log_likelihood
 from radarsim.physics.constants import STANDARD_GRAVITY_MPS2
 from radarsim.physics.motion import transition
 from radarsim.studies.interface import EXPLANATIONS, RecordedPlots, Turning, true_column
 from radarsim.studies.range_doppler.config import Filter, Keys, Turn
 from radarsim.studies.range_doppler.design import designed
-from radarsim.studies.range_doppler.filters import noise_by_time, noise_over, observation
+from radarsim.studies.range_doppler.filters import least_squares, noise_by_time, observation
 from radarsim.studies.range_doppler.kernels import missed, rows
 from radarsim.studies.range_doppler.study import COMPONENTS, prepare
 
@@ -97,7 +98,7 @@ class _One:
         self.observes, self.needed = len(options.observes), options.plots_to_start
         self.noise, self.sigma = noise, sigma
         self.x: np.ndarray | None = None
-        self.P = np.zeros((3, 3))
+        self.P = np.zeros(6)
         self.last = 0.0
         self.held: list[tuple[float, np.ndarray]] = []
 
@@ -113,7 +114,7 @@ class _One:
                 estimate[k, :2] = np.where(taken[k], z[k], np.nan)
                 sigma[k, :2] = np.where(taken[k], self.sigma, np.nan)
             else:
-                estimate[k], sigma[k] = self.x, np.sqrt(np.diagonal(self.P))
+                estimate[k], sigma[k] = self.x, np.sqrt(self.P[[0, 3, 5]])
             k += 1
         if k < n:
             dt = np.diff(t[k:], prepend=self.last if k == 0 else t[k - 1])
@@ -135,16 +136,11 @@ class _One:
             return
         times = np.array([at for at, _ in self.held]) - t
         values = np.stack([plot for _, plot in self.held])
-        unit = max(-times[0], 1e-9) / max(len(times) - 1, 1)
-        scale = np.array([1.0, 1.0 / unit, 1.0 / unit**2])
-        whole = np.concatenate([observation(2) @ transition(lag) * scale / self.sigma[:, None] for lag in times])
-        there = np.isfinite(values).ravel()
-        if np.linalg.matrix_rank(whole[there]) < 3:
-            return
-        solution = scale[:, None] * np.linalg.pinv(whole[there])
-        self.x = solution @ (values / self.sigma).ravel()[there]
-        self.P = solution @ solution.T
-        self.held = []
+        found = least_squares(times, np.isfinite(values), self.sigma)
+        if found is not None:
+            weights, covariance = found
+            self.x, self.P = np.einsum("ijk,kj->i", weights, np.nan_to_num(values)), np.array(pack(covariance))
+            self.held = []
 
 
 def in_a_turn(case: Case, filter_name: str, variance: float) -> Turning:
@@ -213,7 +209,7 @@ class PlotLikelihood:
         z = np.stack([columns["range_m"], columns["velocity_mps"]], axis=1)[first:, : self.observes]
         there = np.isfinite(z)
         there[0, 0] = False  # it starts the track
-        F, Q = np.stack([transition(step) for step in dt]), np.stack([noise_over(self.noise, step) for step in dt])
+        F, Q = np.stack([transition(step) for step in dt]), unpack(rows.noise_over(self.noise, dt))
         H = np.tile(observation(self.observes), (len(t), 1, 1))
         settled = int(np.searchsorted(np.cumsum(ranged[first:]), STARTING, side="right"))
         return _Problem(F, Q, H, np.where(np.isfinite(z), z, 0.0), there, settled, dt / self.usual_s)

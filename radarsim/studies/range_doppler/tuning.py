@@ -10,9 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.algebra import pack
 from radarsim.physics.motion import process_noise
 from radarsim.studies.range_doppler.config import Best, Filter
-from radarsim.studies.range_doppler.propagation import COLUMNS, DIAGONAL, ROWS, Errors, Information, Plots, defects
+from radarsim.studies.range_doppler.filters import least_squares_start
+from radarsim.studies.range_doppler.propagation import Plots, defects, scans, started
 
 LEAST, MOST = 1e-12, 1e8  # D_M Δt⁶/σ_r²; the least is lowered for long runs
 TO_VELOCITY = 1e12  # most of D_M Δt⁴/σ_V², as the config's check has it
@@ -95,7 +97,7 @@ def errors(one: Filter, variances: np.ndarray, seen: Seen) -> np.ndarray:
     if seen.plots.detection < 1:
         from radarsim.studies.range_doppler.patterns import Design, mixture  # loads the compiler
 
-        designs = (Design(observes, start, Q[..., i]) for i in range(len(variances)))
+        designs = (Design(observes, start, tuple(map(float, pack(one)))) for one in np.moveaxis(Q, 2, 0))
         found = (mixture(design, seen.plots, seen.x, seen.dt, FEW, drawn=seen.drawn) for design in designs)
         return np.stack([np.sqrt(one.moment) for one in found])
     return side_by_side(observes, start, Q, seen)
@@ -103,20 +105,13 @@ def errors(one: Filter, variances: np.ndarray, seen: Seen) -> np.ndarray:
 
 def side_by_side(observes: int, start: int, Q: np.ndarray, seen: Seen) -> np.ndarray:
     """σ (B, K, 3) of filters that differ in Q (3, 3, B), every scan with its plot."""
-    plots, count, scans = seen.plots, Q.shape[2], len(seen.x)
+    plots, sigma = seen.plots, np.full((Q.shape[2], len(seen.x), 3), np.nan)
     defect = defects(seen.x, seen.dt, plots, seen.drawn)
-    information, sigma = Information(plots.inputs.shape[1]), np.full((count, scans, 3), np.nan)
-    of_plot = np.sqrt(plots.sigma**2 + plots.bias**2 + plots.sigma_bias**2)
-    for k in range(start):
-        if k > 0:
-            information.predict(seen.dt, defect[k])
-        information.update(plots, observes)
-        sigma[:, k, :observes] = of_plot[:observes]
-    one = information.errors()
-    running, packed = Errors(np.repeat(one.rows, count, axis=1)), Q[ROWS, COLUMNS]
-    sigma[:, start - 1] = np.sqrt(running.second_moments()[DIAGONAL].T)
-    for k in range(start, scans):
-        running.predict(seen.dt, packed, defect[k])
-        running = running.updated(plots, observes)
-        sigma[:, k] = np.sqrt(running.second_moments()[DIAGONAL].T)
+    sigma[:, : start - 1, :observes] = np.sqrt(plots.sigma**2 + plots.bias**2 + plots.sigma_bias**2)[:observes]
+    weights, believed = least_squares_start(observes, start, plots.sigma, seen.dt)
+    first = started(weights, believed, plots, defect, seen.dt)
+    sigma[:, start - 1] = np.sqrt(first.second_moments()[:, 0])
+    packed = pack(np.moveaxis(Q, 2, 0))
+    for k, errors in enumerate(scans(first, observes, plots, packed, defect[start:], seen.dt), start):
+        sigma[:, k] = np.sqrt(errors.second_moments().T)
     return sigma

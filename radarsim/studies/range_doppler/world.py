@@ -12,9 +12,9 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.errors import ConfigError
 from radarsim.physics import recorded, targets
+from radarsim.physics.motion import transition
 from radarsim.studies.radial import begun, checked_truth
 from radarsim.studies.range_doppler.config import FlyBy, Flying, Keys, Recorded, Target, Turn
-from radarsim.studies.range_doppler.propagation import moved
 
 APART = 6.0  # standard deviations of a drawn flight that its middle stays away from the radar
 NODES = {2: 6, 3: 6, 4: 5, 6: 4}  # of the mean over so many numbers drawn, in each: to 1e-6 of what they add, at APART
@@ -106,7 +106,7 @@ def drawn_defects(target: Target, t: np.ndarray, x: np.ndarray) -> np.ndarray:
 def left(x: np.ndarray, dt: float) -> np.ndarray:
     """F x − x⁺ of truths x (M, K, 3), at every scan from the one before; zero at the first."""
     made: np.ndarray = np.zeros_like(x)
-    made[:, 1:] = np.moveaxis(moved(np.moveaxis(x[:, :-1], 2, 0), dt), 0, 2) - x[:, 1:]
+    made[:, 1:] = x[:, :-1] @ transition(dt).T - x[:, 1:]
     return made
 
 

@@ -7,6 +7,7 @@ from radarsim.physics import targets
 from radarsim.physics.motion import transition
 from radarsim.studies.range_doppler.exact import error_recursion, normalised_error, steady_state
 from radarsim.studies.range_doppler.filters import design, least_squares_start, observation
+from radarsim.studies.range_doppler.propagation import Plots
 
 RADARS = {"rls1": (25, 5, 10), "rls2": (250, 15, 10), "rls3": (250, 15, 5), "rls4": (50, 1, 10), "rls5": (50, 1, 5)}
 START = {1: 3, 2: 2}
@@ -18,8 +19,8 @@ def sigmas(radar, observes, variance=1e-3, scans=15, coefficients=(1e5, -250.0, 
     sigma = np.array(sigma, dtype=float)
     made = design(observes, START[observes], variance, sigma, dt, scans)
     x = targets.polynomial(coefficients, np.arange(scans) * dt)
-    bias, covariance = error_recursion(made.weights, made.gains, observes, x, sigma, dt)
-    return bias, np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)), made
+    lasting, covariance = error_recursion(made, Plots(sigma), x, dt)
+    return lasting[:, :, 0], np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)), made
 
 
 # From a calculation by another program: radar, filter, D_M, k, σ_r (m), σ_V (m/s), σ_a (m/s²).
@@ -120,7 +121,7 @@ def test_believed_covariance_without_manoeuvre_variance_is_the_true_one():
     for observes in (1, 2):
         made = design(observes, START[observes], 0.0, sigma, 10.0, 15)
         x = targets.polynomial([1e5, -250.0, 4.0], np.arange(15) * 10.0)
-        _, covariance = error_recursion(made.weights, made.gains, observes, x, sigma, 10.0)
+        _, covariance = error_recursion(made, Plots(sigma), x, 10.0)
         # Down to the rounding of the start, whose largest terms cancel.
         np.testing.assert_allclose(made.believed[1:], covariance[1:], rtol=1e-9, atol=1e-12)
         _, batch = least_squares_start(observes, 15, sigma, 10.0)

@@ -7,6 +7,7 @@ from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.studies.range_doppler import exact, recursion
 from radarsim.studies.range_doppler.filters import design
 from radarsim.studies.range_doppler.measures import RADARS
+from radarsim.studies.range_doppler.propagation import Plots
 
 VARIANCES = (1e-5, 1e-3, 1e-1)
 
@@ -19,8 +20,7 @@ def test_the_papers_filter_is_the_one_of_one_filter_at_a_time(radar, start, scan
     for observes, of in zip((1, 2), found, strict=True):
         for i, variance in enumerate(VARIANCES):
             one = design(observes, scans[observes - 1], variance, sigma, dt, 29)
-            truth = np.zeros((29, 3))
-            _, S = exact.error_recursion(one.weights, one.gains, observes, truth, sigma, dt)
+            _, S = exact.error_recursion(one, Plots(sigma), np.zeros((29, 3)), dt)
             true = np.sqrt(np.diagonal(S, axis1=1, axis2=2))
             believed = np.sqrt(np.diagonal(one.believed, axis1=1, axis2=2))
             known = one.available

@@ -11,6 +11,7 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.errors import ConfigError
+from radarsim.kernels.algebra import pack
 from radarsim.kernels.random import fill_normal_pairs
 from radarsim.physics.motion import process_noise
 from radarsim.studies.range_doppler import means, patterns, study, tuning, world
@@ -263,7 +264,7 @@ def test_means_over_merged_patterns_are_those_over_all(detection, monkeypatch):
     monkeypatch.setattr(means, "FOUND", {})
     plan = prepared(scans=16, radar={"detection_probability": detection, "sigma_bias_range_m": 10})
     plots, axes, later = Plots(SIGMA, np.zeros(2), np.array([10.0, 0.0]), detection), plan.axes, slice(3, None)
-    Q = process_noise("random_jerk", VARIANCE, DT)
+    Q = pack(process_noise("random_jerk", VARIANCE, DT))
     designs = [patterns.Design(observes, start, Q) for observes, start in ((1, 3), (2, 2))]
     whole = [patterns.mixture(one, plots, plan.problem.truth, DT, 1 << 16, designs) for one in designs]
     near = {"rtol": patterns.CLOSE / 3}
@@ -281,7 +282,7 @@ def test_patterns_followed_to_the_end_piece_by_piece_are_those_side_by_side(most
     truth = prepared(scans=13).problem.truth
     plots = Plots(SIGMA, np.array([30.0, 1.0]), np.array([10.0, 0.5]), 0.6)
     designs = [
-        patterns.Design(observes, start, process_noise("white_jerk", VARIANCE, DT)) for observes, start in STARTS
+        patterns.Design(observes, start, pack(process_noise("white_jerk", VARIANCE, DT))) for observes, start in STARTS
     ]
     for design in designs:
         given = design, plots, truth, DT

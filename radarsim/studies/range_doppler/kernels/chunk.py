@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.kernels.compile import aligned_zeros, inline
-from radarsim.kernels.lanes import WIDTH, address, get, put, row
+from radarsim.kernels.lanes import WIDTH, address, row
 
 CHUNK = 512  # realisations; a row is 4 KB; fewer, and the calls of its parts cost as much as their work
 EIGHTS = CHUNK // WIDTH
@@ -70,39 +70,3 @@ def places(made):
 def of_filter(rows, f, each):
     """The address of filter f's rows (each, n) in those of all filters (F, each, n)."""
     return row(rows, f * each * EIGHTS)
-
-
-@inline
-def get3(x, i):
-    """Eight states of x (3, n)."""
-    return get(x, i), get(x, EIGHTS + i), get(x, 2 * EIGHTS + i)
-
-
-@inline
-def put3(x, i, value):
-    """Write eight states of x (3, n)."""
-    put(x, i, value[0])
-    put(x, EIGHTS + i, value[1])
-    put(x, 2 * EIGHTS + i, value[2])
-
-
-@inline
-def packed(p, i):
-    """Eight packed matrices of p (6, n)."""
-    return (*get3(p, i), *get3(p, 3 * EIGHTS + i))
-
-
-@inline
-def put_packed(p, i, value):
-    """Write eight packed matrices of p (6, n)."""
-    put3(p, i, value[:3])
-    put3(p, 3 * EIGHTS + i, value[3:])
-
-
-@inline
-def transported(p, dt):
-    """F P Fᵀ of a packed P over a time dt."""
-    h = 0.5 * dt * dt
-    a0, a1, a2 = p[0] + dt * p[1] + h * p[2], p[1] + dt * p[3] + h * p[4], p[2] + dt * p[4] + h * p[5]
-    b1, b2 = p[3] + dt * p[4], p[4] + dt * p[5]
-    return a0 + dt * a1 + h * a2, a1 + dt * a2, a2, b1 + dt * b2, b2, p[5]

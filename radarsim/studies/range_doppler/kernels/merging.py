@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.algebra import add_outer
 from radarsim.kernels.compile import aligned_zeros, inline, part
-from radarsim.kernels.lanes import WIDTH, address, full, get, put, root, row
+from radarsim.kernels.lanes import WIDTH, address, full, get, get3, get6, put, put3, put6, root, row
 
 FURTHER = 3  # rows of a block after those of the errors
 PLACES = 6  # numbers that say where a pattern's P lies
@@ -109,9 +110,7 @@ def locate(room, rows, n, high):
     for j in range(blocks_of(n)):
         p, to = row(rows, j * high), row(places, j * PLACES)
         p0, p3, p5 = get(p, 0), get(p, 3), get(p, 5)
-        put(to, 0, p0)
-        put(to, 1, p3)
-        put(to, 2, p5)
+        put3(to, 0, (p0, p3, p5))
         put(to, 3, root(likeness(get(p, 1), p0, p3)))
         put(to, 4, root(likeness(get(p, 2), p0, p5)))
         put(to, 5, root(likeness(get(p, 4), p3, p5)))
@@ -162,15 +161,8 @@ def weigh(rows, n, columns, towards):
         if towards == -1:
             for i in range(high - FURTHER):
                 put(p, i, get(p, i) * scale)
-        sign = full(float(towards))
         for c in range(columns):
-            r, v, a = get(p, 12 + c), get(p, 12 + columns + c), get(p, 12 + 2 * columns + c)
-            put(p, 6, get(p, 6) + sign * r * r)
-            put(p, 7, get(p, 7) + sign * r * v)
-            put(p, 8, get(p, 8) + sign * r * a)
-            put(p, 9, get(p, 9) + sign * v * v)
-            put(p, 10, get(p, 10) + sign * v * a)
-            put(p, 11, get(p, 11) + sign * a * a)
+            put6(p, 6, add_outer(get6(p, 6), float(towards), get3(p, 12 + c, columns)))
         if towards == 1:
             for i in range(high - FURTHER):
                 put(p, i, get(p, i) * scale)

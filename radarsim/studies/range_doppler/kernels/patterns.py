@@ -9,11 +9,24 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.algebra import (
+    NO_NOISE,
+    add_outer,
+    add_scaled,
+    constant_acceleration,
+    correct_rate,
+    correct_value,
+    inverse,
+    predicted,
+    predicted_covariance,
+    predicted_information,
+    take_rate,
+    take_value,
+    times,
+)
 from radarsim.kernels.compile import inline, kernel, part
-from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, total, where_greater
-from radarsim.studies.range_doppler.kernels.chunk import transported
+from radarsim.kernels.lanes import WIDTH, address, full, get, get3, get6, put, put3, put6, row, total, where_greater
 from radarsim.studies.range_doppler.kernels.merging import ALIKE, FURTHER, PIECE, at, blocks_of, height, merge, pad
-from radarsim.studies.range_doppler.kernels.steps import inverted
 
 NEGLIGIBLE = 1e-18  # probability of a pattern that is left out
 OWN, BESIDE = 14, 6  # means of a scan: of the filter, and of each one beside it
@@ -55,62 +68,25 @@ class World(NamedTuple):
     from_k: int
 
 
-@inline
-def six(p, first):
-    """A packed matrix from six rows."""
-    return get(p, first), get(p, first + 1), get(p, first + 2), get(p, first + 3), get(p, first + 4), get(p, first + 5)
-
-
-@inline
-def put_six(p, first, m):
-    """Write a packed matrix to six rows."""
-    put(p, first, m[0])
-    put(p, first + 1, m[1])
-    put(p, first + 2, m[2])
-    put(p, first + 3, m[3])
-    put(p, first + 4, m[4])
-    put(p, first + 5, m[5])
-
-
 @part
 def predict(rows, n, columns, dt, Q, defect):
     """Go to the next scan, in place."""
-    high, h = height(columns), 0.5 * dt * dt
+    high, F, noise = height(columns), constant_acceleration(dt), (Q[0], Q[1], Q[2], Q[3], Q[4], Q[5])
     for j in range(blocks_of(n)):
         p = row(rows, j * high)
-        m = transported(six(p, 0), dt)
-        put_six(p, 0, (m[0] + Q[0], m[1] + Q[1], m[2] + Q[2], m[3] + Q[3], m[4] + Q[4], m[5] + Q[5]))
-        put_six(p, 6, transported(six(p, 6), dt))
+        put6(p, 0, predicted_covariance(get6(p, 0), F, noise))
+        put6(p, 6, predicted_covariance(get6(p, 6), F, NO_NOISE))
         for c in range(columns):
-            r, v, a = get(p, 12 + c), get(p, 12 + columns + c), get(p, 12 + 2 * columns + c)
-            put(p, 12 + c, r + dt * v + h * a + defect[0, c])
-            put(p, 12 + columns + c, v + dt * a + defect[1, c])
-            put(p, 12 + 2 * columns + c, a + defect[2, c])
+            r, v, a = predicted(get3(p, 12 + c, columns), F)
+            put3(p, 12 + c, (r + defect[0, c], v + defect[1, c], a + defect[2, c]), columns)
 
 
 @inline
-def taken_in(s, own, more, g):
-    """(I − K h) S (I − K h)ᵀ + K R Kᵀ of a packed S, by its column h, `own`, the same number's variance and R, `more`,
-    and the gains g."""
-    d0, d1, d2 = own[0] - g[0] * more, own[1] - g[1] * more, own[2] - g[2] * more
-    return (
-        s[0] - g[0] * own[0] - d0 * g[0],
-        s[1] - g[0] * own[1] - d0 * g[1],
-        s[2] - g[0] * own[2] - d0 * g[2],
-        s[3] - g[1] * own[1] - d1 * g[1],
-        s[4] - g[1] * own[2] - d1 * g[2],
-        s[5] - g[2] * own[2] - d2 * g[2],
-    )
-
-
-@inline
-def move_columns(p, g, columns, inputs, m):
+def move_columns(p, gain, columns, inputs, m):
     """The columns of E with their share of the plot's error of number m."""
     for c in range(columns):
         e = inputs[m, c] - get(p, 12 + m * columns + c)
-        put(p, 12 + c, get(p, 12 + c) + g[0] * e)
-        put(p, 12 + columns + c, get(p, 12 + columns + c) + g[1] * e)
-        put(p, 12 + 2 * columns + c, get(p, 12 + 2 * columns + c) + g[2] * e)
+        put3(p, 12 + c, add_scaled(get3(p, 12 + c, columns), e, gain), columns)
 
 
 @part
@@ -119,20 +95,17 @@ def update(rows, n, columns, world):
     high, p_detected, enough = height(columns), world.detection, full(float(world.enough))
     for j in range(blocks_of(n)):
         p = row(rows, j * high)
-        P, S, R = six(p, 0), six(p, 6), world.R[0]
-        weight = 1.0 / (P[0] + R)
-        g = P[0] * weight, P[1] * weight, P[2] * weight
-        P, S = taken_in(P, P[:3], P[0] + R, g), taken_in(S, S[:3], S[0] + R, g)
-        move_columns(p, g, columns, world.inputs, 0)
+        S, R = get6(p, 6), world.R[0]
+        P, gain, _ = take_value(get6(p, 0), R, 1.0)
+        S = correct_value(S, R, gain)
+        move_columns(p, gain, columns, world.inputs, 0)
         if world.observes == 2:
             R = world.R[1]
-            of_P, of_S = (P[1], P[3], P[4]), (S[1], S[3], S[4])
-            weight = 1.0 / (P[3] + R)
-            g = P[1] * weight, P[3] * weight, P[4] * weight
-            P, S = taken_in(P, of_P, P[3] + R, g), taken_in(S, of_S, S[3] + R, g)
-            move_columns(p, g, columns, world.inputs, 1)
-        put_six(p, 0, P)
-        put_six(p, 6, S)
+            P, gain, _ = take_rate(P, R, 1.0)
+            S = correct_rate(S, R, gain)
+            move_columns(p, gain, columns, world.inputs, 1)
+        put6(p, 0, P)
+        put6(p, 6, S)
         last = high - FURTHER
         put(p, last, get(p, last) * p_detected)
         count = get(p, last + 1) + 1.0
@@ -168,28 +141,27 @@ def branch(rows, n, columns, world):
 @part
 def refer(L, columns, dt, defect):
     """Refer a start in the making to the next scan, in place: L ← F⁻ᵀ L F⁻¹; Y gains L times the defect."""
-    l5, l4, l2, l3, l1, l0 = transported((L[5], L[4], L[2], L[3], L[1], L[0]), -dt)
-    L[0], L[1], L[2], L[3], L[4], L[5] = l0, l1, l2, l3, l4, l5
+    made = predicted_information((L[0], L[1], L[2], L[3], L[4], L[5]), dt)
+    L[0], L[1], L[2], L[3], L[4], L[5] = made
     for c in range(columns):
         y0, y1, y2 = L[6 + c], L[6 + columns + c], L[6 + 2 * columns + c]
-        d0, d1, d2 = defect[0, c], defect[1, c], defect[2, c]
-        L[6 + c] = y0 + l0 * d0 + l1 * d1 + l2 * d2
-        L[6 + columns + c] = y1 - dt * y0 + l1 * d0 + l3 * d1 + l4 * d2
-        L[6 + 2 * columns + c] = y2 - dt * y1 + 0.5 * dt * dt * y0 + l2 * d0 + l4 * d1 + l5 * d2
+        moved = y0, y1 - dt * y0, y2 - dt * y1 + 0.5 * dt * dt * y0
+        more = times(made, (defect[0, c], defect[1, c], defect[2, c]))
+        for i in range(3):
+            L[6 + i * columns + c] = moved[i] + more[i]
 
 
 @part
 def begin(rows, n, L, columns):
     """A pattern more, the n-th, which starts with the sums L."""
-    high, P = height(columns), inverted((L[0], L[1], L[2], L[3], L[4], L[5]))
+    high, P = height(columns), inverse((L[0], L[1], L[2], L[3], L[4], L[5]))
     first = at(n, high)
     for i in range(6):
         rows[first + i * WIDTH] = rows[first + (6 + i) * WIDTH] = P[i]
     for c in range(columns):
-        y0, y1, y2 = L[6 + c], L[6 + columns + c], L[6 + 2 * columns + c]
-        rows[first + (12 + c) * WIDTH] = P[0] * y0 + P[1] * y1 + P[2] * y2
-        rows[first + (12 + columns + c) * WIDTH] = P[1] * y0 + P[3] * y1 + P[4] * y2
-        rows[first + (12 + 2 * columns + c) * WIDTH] = P[2] * y0 + P[4] * y1 + P[5] * y2
+        e = times(P, (L[6 + c], L[6 + columns + c], L[6 + 2 * columns + c]))
+        for i in range(3):
+            rows[first + (12 + i * columns + c) * WIDTH] = e[i]
     for i in range(FURTHER):
         rows[first + (high - FURTHER + i) * WIDTH] = L[6 + 3 * columns + i]
 
@@ -243,11 +215,10 @@ def normalised(P, M):
 @inline
 def second_moment(p, columns):
     """S + E Eᵀ, packed, of a block."""
-    s0, s1, s2, s3, s4, s5 = six(p, 6)
+    S = get6(p, 6)
     for c in range(columns):
-        r, v, a = get(p, 12 + c), get(p, 12 + columns + c), get(p, 12 + 2 * columns + c)
-        s0, s1, s2, s3, s4, s5 = s0 + r * r, s1 + r * v, s2 + r * a, s3 + v * v, s4 + v * a, s5 + a * a
-    return s0, s1, s2, s3, s4, s5
+        S = add_outer(S, 1.0, get3(p, 12 + c, columns))
+    return S
 
 
 @part
@@ -262,7 +233,7 @@ def note_started(rows, n, columns, world, found):
     w0 = q0 = b0 = b1 = b2 = m0 = m1 = m2 = v0 = v1 = v2 = none
     for j in range(blocks_of(n)):
         p = row(rows, j * high)
-        w, P, M = get(p, last), six(p, 0), second_moment(p, columns)
+        w, P, M = get(p, last), get6(p, 0), second_moment(p, columns)
         w0, q0 = w0 + w, q0 + w * normalised(P, M)
         b0, b1, b2 = b0 + w * get(p, 12), b1 + w * get(p, 12 + columns), b2 + w * get(p, 12 + 2 * columns)
         m0, m1, m2 = m0 + w * M[0], m1 + w * M[3], m2 + w * M[5]

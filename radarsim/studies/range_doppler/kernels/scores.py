@@ -1,8 +1,8 @@
 """Errors of filters with a covariance to each realisation, and their sums over a chunk."""
 
 from radarsim.kernels.compile import part
-from radarsim.kernels.lanes import add_totals, full, get, where_greater
-from radarsim.studies.range_doppler.kernels.chunk import EIGHTS, get3, of_filter, packed, put3
+from radarsim.kernels.lanes import add_totals, full, get, get3, get6, put3, where_greater
+from radarsim.studies.range_doppler.kernels.chunk import EIGHTS, of_filter
 
 OWN, PAIRED = 24, 24  # numbers that `score` and `pair` add to, of a filter and scan; of the latter 18 are in use
 
@@ -25,21 +25,21 @@ def score(at, f, start, observes, truth, R, found):
         runs = where_greater(get(at.count, i), last, one, none)
         waits = (1.0 - runs) * get(at.detected, i)
         waits_v = of_velocity * waits
-        r, v, a = get3(x, i)
-        state_r, state_v, state_a = get3(at.state, i)
+        r, v, a = get3(x, i, EIGHTS)
+        state_r, state_v, state_a = get3(at.state, i, EIGHTS)
         has_r, has_v = runs + waits, runs + waits_v
         r = runs * r + waits * get(at.plots, i) - has_r * (truth_r + state_r)
         v = runs * v + waits_v * get(at.plots, EIGHTS + i) - has_v * (truth_v + state_v)
         a = runs * (a - (truth_a + state_a))
-        put3(e, i, (r, v, a))
-        put3(has, i, (has_r, has_v, runs))
+        put3(e, i, (r, v, a), EIGHTS)
+        put3(has, i, (has_r, has_v, runs), EIGHTS)
         rr, vv, aa = r * r, v * v, a * a
         r1, v1, a1 = r1 + r, v1 + v, a1 + a
         r2, v2, a2 = r2 + rr, v2 + vv, a2 + aa
         r3, v3, a3 = r3 + r * rr, v3 + v * vv, a3 + a * aa
         r4, v4, a4 = r4 + rr * rr, v4 + vv * vv, a4 + aa * aa
         rv, ra, va = rv + r * v, ra + r * a, va + v * a
-        p0, p1, p2, p3, p4, p5 = packed(p, i)
+        p0, p1, p2, p3, p4, p5 = get6(p, i, EIGHTS)
         minor, m = p0 * p3 - p1 * p1, p0 * p4 - p1 * p2
         whole = minor * (p0 * p5 - p2 * p2) - m * m
         scale = runs / where_greater(runs, full(0.5), p0 * minor * whole, one)
