@@ -84,11 +84,13 @@ def scans(errors: Errors, observes: int, plots: Plots, Q: Any, defect: np.ndarra
     """The errors after each further scan, with its plot: numbers are taken one after the other, as their noises are
     independent. Q packed, of numbers or arrays (B,); defect (K, 3, C) of these scans."""
     (P, S, E), F = errors, constant_acceleration(dt)
-    inputs, defect = plots.inputs[:, :, None], defect[:, :, :, None]
+    inputs: Any = plots.inputs[:, :, None]
+    of_scans: Any = defect[:, :, :, None]
     if alone := isinstance(Q[0], float) and E.size == 3:  # of plain numbers alone Python is faster
-        E, inputs, defect = E.ravel().tolist(), inputs.ravel().tolist(), defect.reshape(-1, 3).tolist()
-    R, gains, settled = [float(sigma) ** 2 for sigma in plots.sigma[:observes]], [], False
-    for of_scan in defect:
+        E, inputs, of_scans = E.ravel().tolist(), inputs.ravel().tolist(), defect.reshape(-1, 3).tolist()
+    R, settled = [float(sigma) ** 2 for sigma in plots.sigma[:observes]], False
+    gains: list[Any] = []
+    for of_scan in of_scans:
         E = add_scaled(predicted(E, F), 1.0, of_scan)
         if not settled:
             before, gains = (P, S), []
