@@ -197,7 +197,7 @@ summing = compiler(fastmath=set(FLAGS | {"reassoc"}), nogil=True)
 
 @typeof_impl.register(Formula)
 def _type_of_formula(formula: Formula, context) -> types.Type:
-    return types.Dispatcher(twin(formula))
+    return formula.compiled or types.Dispatcher(twin(formula))
 
 
 @functools.cache

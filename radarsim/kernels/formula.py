@@ -9,11 +9,14 @@ from collections.abc import Callable
 
 
 class Formula:
-    """A function of Python, to which `radarsim.kernels.compile` gives a compiled twin where a kernel calls it."""
+    """A function of Python, to which `radarsim.kernels.compile` gives a compiled twin where a kernel calls it.
 
-    def __init__(self, function: Callable):
+    compiled: the type of the twin, as Numba knows it, where that is no translation of the function.
+    """
+
+    def __init__(self, function: Callable, compiled=None):
         functools.update_wrapper(self, function)
-        self.function = function
+        self.function, self.compiled = function, compiled
 
     def __call__(self, *arguments):
         return self.function(*arguments)

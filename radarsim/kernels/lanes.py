@@ -9,17 +9,19 @@ Small matrices are tuples of lanes, passed through functions that are inlined. W
 float64 array: row r holds the eight lanes of one quantity, at r * WIDTH … r * WIDTH + 7; `rows` makes such an array.
 """
 
+import functools
 import operator
 
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.core.typing.templates import ConcreteTemplate, infer_global, make_intrinsic_template, signature
 from numba.extending import intrinsic, lower_builtin, models, register_model
 from numba.np.arrayobj import make_array
 
 from radarsim.kernels.compile import inline
+from radarsim.kernels.formula import Formula
 
 WIDTH = 8
 VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
@@ -85,6 +87,17 @@ for _op, _instruction in (
     _arithmetic(_op, _instruction)
 
 
+def for_arrays(plain):
+    """A decorator of an intrinsic that Python calls too: then it is `plain`, on arrays or single numbers."""
+
+    def decorated(one):
+        made = Formula(plain, types.Function(make_intrinsic_template(one, one._defn, one.__name__)))
+        return functools.update_wrapper(made, one)
+
+    return decorated
+
+
+@for_arrays(lambda x, y, yes, no: np.where(x > y, yes, no))
 @intrinsic
 def where_greater(typingctx, x, y, yes, no):
     """Lane by lane: yes where x > y, else no. Every choice (maximum, minimum, a merging rule) is made of it."""
@@ -106,6 +119,7 @@ def any_greater(typingctx, x, y):
     return types.boolean(lanes, lanes), generate
 
 
+@for_arrays(lambda number: number)
 @intrinsic
 def full(typingctx, number):
     """A number as lanes."""
@@ -277,6 +291,12 @@ def get3(pointer, first, stride=1):
 
 
 @inline
+def get4(pointer, first, stride=1):
+    """Four numbers, from row `first` on."""
+    return (*get3(pointer, first, stride), get(pointer, first + 3 * stride))
+
+
+@inline
 def get6(pointer, first, stride=1):
     """Six numbers, from row `first` on."""
     return get3(pointer, first, stride) + get3(pointer, first + 3 * stride, stride)
@@ -288,6 +308,13 @@ def put3(pointer, first, x, stride=1):
     put(pointer, first, x[0])
     put(pointer, first + stride, x[1])
     put(pointer, first + 2 * stride, x[2])
+
+
+@inline
+def put4(pointer, first, x, stride=1):
+    """Write four numbers, from row `first` on."""
+    put3(pointer, first, x, stride)
+    put(pointer, first + 3 * stride, x[3])
 
 
 @inline

@@ -44,18 +44,19 @@ class FilterSpec:
 
 def recursive_design(spec: FilterSpec, c: int, plots: filters.Plots) -> filters.Design:
     """The design of a recursive filter for coordinate c."""
-    size = spec.size
+    size, variance = spec.size, spec.variance[c]
     match spec.kind:
         case "growing_memory":
-            return filters.line(plots) if size == 2 else filters.differenced(plots, size, 0.0)
-        case "kalman":
-            return filters.kalman(plots, size, spec.variance[c])
-        case "fixed_gain":
-            return filters.fixed_gain(plots, size, spec.variance[c], spec.length)
-        case "kalman_augmented":
-            return filters.augmented(plots, size, spec.rho[c], spec.variance[c])
+            return filters.recursive(plots, size)
         case "kalman_differenced":
-            return filters.differenced(plots, size, spec.rho[c])
+            return filters.recursive(plots, size, spec.rho[c])
+        case "kalman":
+            return filters.recursive(plots, size, 0.0, variance)
+        case "kalman_augmented":
+            return filters.recursive(plots, size, spec.rho[c], variance)
+        case "fixed_gain":
+            settled = filters.settled_gain(plots.period, plots.sigma, size, variance)
+            return filters.recursive(plots, size, 0.0, variance, spec.length, settled)
     raise ValueError(f"not a recursive filter: {spec.kind}")
 
 
@@ -169,8 +170,7 @@ def per_realisation_bank(
             manoeuvre[f, c] = spec.variance[c] * period ** (2 * spec.size) / sigma**2
             carry[f, :, c] = step_correlations(spec.rho[c], t, period)
             if spec.kind == "fixed_gain":
-                gain = filters.steady_gain(period, sigma, spec.size, spec.variance[c])
-                settled[f, c, : spec.size] = gain * period ** np.arange(spec.size)
+                settled[f, c] = filters.settled_gain(period, sigma, spec.size, spec.variance[c])
     return patterns.RealisationBank(
         kind=np.array([KINDS[f.kind] for f in specs]),
         size=np.array([f.size for f in specs]),

@@ -51,9 +51,9 @@ def test_recursion_of_true_errors_is_that_of_the_weights(rho, size):
     steps = models.step_correlations(rho, t, 5.0)
     C = models.error_covariance(np.full(12, 30.0), rho, t, 5.0)
     for design in (
-        filters.differenced(plots, size, 0.0),
-        filters.augmented(plots, size, 0.6, 1e-4),
-        filters.fixed_gain(plots, size, 1e-3),
+        filters.recursive(plots, size),
+        filters.recursive(plots, size, 0.6, 1e-4),
+        filters.recursive(plots, size, 0.0, 1e-3, 0, filters.settled_gain(5.0, 30.0, size, 1e-3)),
     ):
         bias, S = exact.recursive_errors(design.gain, design.carry, t, truth, steps, np.full(12, 30.0), 0.0)
         for m in range(4):
@@ -84,7 +84,7 @@ def test_walk_of_velocity_by_both_ways_of_reckoning():
     t, walk = np.arange(9) * 5.0, 0.02
     plots = filters.Plots(t, np.ones((1, 9)), 5.0, 30.0)
     truth = np.zeros((9, 3))
-    design = filters.line(plots)
+    design = filters.recursive(plots, 2)
     _, S = exact.recursive_errors(design.gain, design.carry, t, truth, np.zeros(9), np.full(9, 30.0), walk)
     first, W, _ = filters.window_weights(plots, 8, 9, 2)
     C = models.error_covariance(np.full(9, 30.0), 0.0, t, 5.0)

@@ -61,14 +61,14 @@ T = np.arange(40) * PERIOD
 
 def test_line_recursion_is_least_squares(observed):
     seen, z = observed
-    compare(filters.line(plots(seen)), z, naive.batch(T, z, 2, SIGMA))
+    compare(filters.recursive(plots(seen), 2), z, naive.batch(T, z, 2, SIGMA))
 
 
 @pytest.mark.parametrize("size", [2, 3])
 @pytest.mark.parametrize("rho", [-0.5, 0.0, 0.3, 0.6, 0.9, 0.99])
 def test_differenced_is_generalised_least_squares(observed, size, rho):
     seen, z = observed
-    design = filters.differenced(plots(seen), size, rho)
+    design = filters.recursive(plots(seen), size, rho)
     compare(design, z, naive.batch(T, z, size, SIGMA, rho, PERIOD))
     compare(design, z, naive.differenced(T, z, size, SIGMA, rho, PERIOD))
 
@@ -77,9 +77,9 @@ def test_differenced_is_generalised_least_squares(observed, size, rho):
 @pytest.mark.parametrize("rho", [-0.5, 0.0, 0.3, 0.6, 0.9, 0.99])
 def test_augmented_is_generalised_least_squares(observed, size, rho):
     seen, z = observed
-    design = filters.augmented(plots(seen), size, rho, 0.0)
+    design = filters.recursive(plots(seen), size, rho, 0.0)
     compare(design, z, naive.batch(T, z, size, SIGMA, rho, PERIOD))
-    other = filters.differenced(plots(seen), size, rho)
+    other = filters.recursive(plots(seen), size, rho)
     assert np.max(np.abs(run(design, T, z) - run(other, T, z))[:, :size] / run(other, T, z)[:, :1]) < 1e-9
 
 
@@ -87,12 +87,13 @@ def test_augmented_is_generalised_least_squares(observed, size, rho):
 def test_with_manoeuvre_variance(observed, size):
     seen, z = observed
     variance = [None, None, 1e-3, 1e-6][size]
-    compare(filters.kalman(plots(seen), size, variance), z, naive.kalman(T, z, size, SIGMA, variance))
-    settled = filters.steady_gain(PERIOD, SIGMA, size, variance)
-    compare(filters.fixed_gain(plots(seen), size, variance), z, naive.kalman(T, z, size, SIGMA, variance, settled))
+    compare(filters.recursive(plots(seen), size, 0.0, variance), z, naive.kalman(T, z, size, SIGMA, variance))
+    settled = filters.settled_gain(PERIOD, SIGMA, size, variance)
+    twin = naive.kalman(T, z, size, SIGMA, variance, np.array(settled[:size]) * PERIOD ** -np.arange(float(size)))
+    compare(filters.recursive(plots(seen), size, 0.0, variance, 0, settled), z, twin)
     for rho in (0.0, 0.6):
         twin = naive.augmented(T, z, size, SIGMA, rho, variance, PERIOD)
-        compare(filters.augmented(plots(seen), size, rho, variance), z, twin)
+        compare(filters.recursive(plots(seen), size, rho, variance), z, twin)
 
 
 @pytest.mark.parametrize("size", [2, 3])
@@ -111,19 +112,18 @@ def test_window_is_least_squares_on_the_last_plots(observed, size, length):
 
 def test_growing_memory_kalman_and_closed_forms_agree():
     everything = plots(np.ones(50))
-    line, kalman = filters.line(everything), filters.kalman(everything, 2, 0.0)
-    other = filters.differenced(everything, 2, 0.0)
+    line, kalman = filters.recursive(everything, 2), filters.recursive(everything, 2, 0.0, 0.0)
     n = np.arange(2, 51)
     A, B = exact.gains_closed(n)
-    for design in (line, kalman, other):
+    for design in (line, kalman):
         assert design.gain[0, 1:, 0] == pytest.approx(A, rel=1e-10)
         assert design.gain[0, 1:, 1] * PERIOD == pytest.approx(B, rel=1e-10)
         assert np.sqrt(design.covariance[0, 1:, 0, 0]) == pytest.approx(SIGMA * exact.sigma_smoothed(n), rel=1e-10)
     P = line.covariance[0, 1:]
     ahead = P[:, 0, 0] + 2 * PERIOD * P[:, 0, 1] + PERIOD**2 * P[:, 1, 1]
     assert np.sqrt(ahead) == pytest.approx(SIGMA * exact.sigma_extrapolated(n), rel=1e-10)
-    second, n = filters.differenced(everything, 3, 0.0), n[1:]
-    kalman = filters.kalman(everything, 3, 0.0)
+    second, n = filters.recursive(everything, 3, 0.0), n[1:]
+    kalman = filters.recursive(everything, 3, 0.0, 0.0)
     for design in (second, kalman):
         acceleration = np.sqrt(design.covariance[0, 2:, 2, 2])
         assert acceleration == pytest.approx(SIGMA * exact.sigma_acceleration(n, PERIOD), rel=1e-10)
@@ -134,7 +134,7 @@ def test_printed_gains_of_unequal_weights_are_wrong_and_ours_right():
     rng = np.random.default_rng(7)
     weight, t = rng.uniform(0.1, 4, 12), np.cumsum(rng.uniform(0.3, 2, 12)) * PERIOD
     t -= t[0]
-    design = filters.line(plots(weight, t))
+    design = filters.recursive(plots(weight, t), 2)
     C = np.diag(SIGMA**2 / weight)
     W, P = exact.generalised_least_squares(t, C, 2)
     assert design.gain[0, -1, :2] == pytest.approx(W[:, -1], rel=1e-11)
@@ -147,18 +147,18 @@ def test_missed_plot_has_no_gain_and_a_second_plot_at_one_time_averages():
     seen[[4, 5]] = 0
     for size in (2, 3):
         for design in (
-            filters.differenced(plots(seen), size, 0.6),
-            filters.augmented(plots(seen), size, 0.6, 1e-4),
-            filters.kalman(plots(seen), size, 1e-4),
-            filters.fixed_gain(plots(seen), size, 1e-4),
+            filters.recursive(plots(seen), size, 0.6),
+            filters.recursive(plots(seen), size, 0.6, 1e-4),
+            filters.recursive(plots(seen), size, 0.0, 1e-4),
+            filters.recursive(plots(seen), size, 0.0, 1e-4, 0, filters.settled_gain(PERIOD, SIGMA, size, 1e-4)),
         ):
             assert not design.gain[0, 4:6].any()
             assert design.gain[0, 6].any()
-    twice = filters.line(plots([1, 1, 1], np.array([0.0, 0.0, PERIOD])))
+    twice = filters.recursive(plots([1, 1, 1], np.array([0.0, 0.0, PERIOD])), 2)
     assert twice.gain[0, :, 0] == pytest.approx([1, 0.5, 1])
 
 
 def test_a_plot_at_the_time_of_the_last_one_tells_nothing_of_a_correlated_error():
-    design = filters.augmented(plots(np.ones(5), np.array([0.0, 5.0, 10.0, 10.0, 15.0])), 2, 0.6, 0.0)
+    design = filters.recursive(plots(np.ones(5), np.array([0.0, 5.0, 10.0, 10.0, 15.0])), 2, 0.6, 0.0)
     assert not design.gain[0, 3].any()
     assert np.isfinite(design.covariance).all()

@@ -15,21 +15,24 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.algebra import add_scaled, constant_acceleration, predicted, predicted_information, times
 from radarsim.kernels.compile import inline, kernel, part
-from radarsim.kernels.lanes import address, any_greater, full, get, put, total, where_greater
-from radarsim.kernels.linear import extrapolated
-from radarsim.studies.sonar.kernels.steps import (
-    GROUPS,
-    inverse,
-    normal_equations,
-    predicted_information,
-    put_six,
-    put_three,
-    six,
-    six_where_greater,
-    three_where_greater,
-    times,
+from radarsim.kernels.lanes import (
+    address,
+    any_greater,
+    choose3,
+    choose6,
+    full,
+    get,
+    get3,
+    get6,
+    put,
+    put3,
+    put6,
+    total,
+    where_greater,
 )
+from radarsim.studies.sonar.kernels.steps import GROUPS, leading_inverse, memory_of, normal_equations
 
 UNTESTED = -1.0  # the statistic where there was no test: it exceeds no threshold
 MODE, QUIET, PLOTS = range(3)  # further rows of an adaptive filter's memory; PLOTS: number of plots that it uses
@@ -61,20 +64,6 @@ class AdaptiveRules(NamedTuple):
     threshold: np.ndarray
     raises: np.ndarray
     quiet: np.ndarray
-
-
-class AdaptiveRule(NamedTuple):
-    """The rule of one adaptive filter in one coordinate: size of the state, plots of the short memory `length`.
-
-    raises: in a manoeuvre the degree is 2, else the memory is kept short. threshold of the statistic; patience: number
-    of tests without an alarm in a row that ends the manoeuvre.
-    """
-
-    size: int
-    length: int
-    raises: bool
-    threshold: float
-    patience: int
 
 
 class Alarms(NamedTuple):
@@ -110,7 +99,7 @@ def curvature(recent, length, sigma, n, weight, T):
     for i in range(GROUPS):
         Y, b, _ = parabola(a, length, recent.shape[1], i)
         tested = where_greater(get(aw, i), zero, get(an, i), zero)
-        P = inverse(Y, where_greater(tested, enough, most, zero))
+        P = leading_inverse(Y, where_greater(tested, enough, most, zero))
         acceleration = P[2] * b[0] + P[4] * b[1] + P[5] * b[2]
         value = per * (acceleration * acceleration) / where_greater(tested, enough, P[5], full(1.0))
         put(at, i, where_greater(tested, enough, value, none))
@@ -182,13 +171,6 @@ def add_alarms(detectors, k, T, used, passed, sums):
 
 # ---- the adaptive filter ------------------------------------------------------------------------------------------
 @inline
-def grown_information(Y, w, tau):
-    """Information Y (6) of a parabola after an interval tau and a plot of weight w."""
-    y00, y01, y02, y11, y12, y22 = predicted_information(Y, tau)
-    return y00 + w, y01, y02, y11, y12, y22
-
-
-@inline
 def next_mode(T, threshold, mode, quiet, patience):
     """Mode and number of successive quiet tests after a statistic T."""
     zero, one = full(0.0), full(1.0)
@@ -198,41 +180,41 @@ def next_mode(T, threshold, mode, quiet, patience):
     return where_greater(T, threshold, one, mode), quiet
 
 
-@part
-def adapt(rule, dt, period, memory, plot, recent, T, P):
-    """Update an adaptive filter with one scan, in place, and write P (6, CHUNK).
+@inline
+def adapt(filters, plots, f, c, rules, size, length, dt, period):
+    """Update an adaptive filter with one scan, in place; further rows MODE, QUIET, PLOTS.
 
-    It is growing memory of degree size - 1, restarted with the last plots at every change of mode. An alarm sets the
-    mode, and `patience` successive tests without one reset it; see AdaptiveRule. memory: x, Y and the further rows
-    MODE, QUIET, PLOTS; T (CHUNK,) statistics of this scan.
+    It is growing memory of degree size - 1, restarted with the last `length` plots at every change of mode. An alarm
+    sets the mode, and `quiet` successive tests without one reset it; see AdaptiveRules.
     """
-    ax, ay, am, ar, az = address(memory.x), address(memory.Y), address(memory.further), address(recent), address(plot.z)
-    aw, an, at, ap = address(plot.w), address(plot.n), address(T), address(P)
-    zero, one, half, threshold = full(0.0), full(1.0), full(0.5), full(rule.threshold)
-    tau, per, twice = dt / period, 1.0 / period, 1.0 / (period * period)
-    size, length, patience = full(float(rule.size)), full(float(rule.length)), full(float(rule.patience))
-    size_raised = full(3.0) if rule.raises else size
+    ax, ay, am, ap, az, aw, an = memory_of(filters, plots, f, c)
+    T, recent, raises = plots.T[rules.detector[f], rules.group[f, c]], plots.recent[c], rules.raises[f]
+    at, ar, longest = address(T), address(recent), recent.shape[1]
+    zero, one, half, threshold = full(0.0), full(1.0), full(0.5), full(rules.threshold[f, c])
+    tau, per, twice, F = dt / period, 1.0 / period, 1.0 / (period * period), constant_acceleration(dt)
+    most, short, patience = full(float(size)), full(float(length)), full(float(rules.quiet[f]))
+    raised = full(3.0) if raises else most
     for i in range(GROUPS):
         w, mode = get(aw, i), get(am, i)
         detected = where_greater(w, zero, one, zero)
-        Y = grown_information(six(ay, i), w, tau)
-        size_now, rank = where_greater(mode, half, size_raised, size), get(an, i) + detected
-        P_now = inverse(Y, where_greater(rank, size_now, size_now, rank))
-        r, v, a = extrapolated(get(ax, i), get(ax, GROUPS + i), get(ax, 2 * GROUPS + i), dt)
-        innovation = w * (get(az, i) - r)
-        x = (r + P_now[0] * innovation, v + per * P_now[1] * innovation, a + twice * P_now[2] * innovation)
+        Y = predicted_information(get6(ay, i, GROUPS), tau)
+        Y = (Y[0] + w, Y[1], Y[2], Y[3], Y[4], Y[5])
+        most_now, rank = where_greater(mode, half, raised, most), get(an, i) + detected
+        P = leading_inverse(Y, where_greater(rank, most_now, most_now, rank))
+        x = predicted(get3(ax, i, GROUPS), F)
+        x = add_scaled(x, w * (get(az, i) - x[0]), (P[0], per * P[1], twice * P[2]))
         mode_now, quiet = next_mode(get(at, i), threshold, mode, get(am, QUIET * GROUPS + i), patience)
-        plots = get(am, PLOTS * GROUPS + i) + detected
-        restarted = (mode_now - mode) * (mode_now - mode) + (zero if rule.raises else mode_now)
+        kept = get(am, PLOTS * GROUPS + i) + detected
+        restarted = (mode_now - mode) * (mode_now - mode) + (zero if raises else mode_now)
         if any_greater(restarted, half):
-            Y_recent, b, newest = parabola(ar, rule.length, recent.shape[1], i)
-            P_recent = inverse(Y_recent, where_greater(mode_now, half, size_raised, size))
+            Y_recent, b, newest = parabola(ar, length, longest, i)
+            P_recent = leading_inverse(Y_recent, where_greater(mode_now, half, raised, most))
             r, v, a = times(P_recent, b)
-            x = three_where_greater(restarted, half, (newest + r, per * v, twice * a), x)
-            plots = where_greater(restarted, half, length, plots)
-            P_now = six_where_greater(restarted, half, P_recent, P_now)
-            Y = six_where_greater(restarted, half, Y_recent, Y)
-        put_six(ay, i, Y)
-        put_six(ap, i, P_now)
-        put_three(ax, i, x)
-        put_three(am, i, (mode_now, quiet, plots))
+            x = choose3(restarted, half, (newest + r, per * v, twice * a), x)
+            kept = where_greater(restarted, half, short, kept)
+            P = choose6(restarted, half, P_recent, P)
+            Y = choose6(restarted, half, Y_recent, Y)
+        put6(ay, i, Y, GROUPS)
+        put6(ap, i, P, GROUPS)
+        put3(ax, i, x, GROUPS)
+        put3(am, i, (mode_now, quiet, kept), GROUPS)

@@ -6,7 +6,7 @@ Both have the same state and differ in their manoeuvre variance. Letters as in `
     Q       (6)        covariance that a manoeuvre adds
     mu                 probability of the model after this scan's plot
     c                  probability of the model before it (Blom and Bar-Shalom's c bar)
-    nis                normalised innovation squared; S: variance of the innovation over that of the plot
+    nis                normalised innovation squared; S: variance of the innovation, 1 where the plot is missed
 
 and p_ij, the probability of a transition from model i to model j from scan to scan.
 """
@@ -15,20 +15,38 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.algebra import predicted, predicted_covariance
+from radarsim.kernels.algebra import (
+    add_outer,
+    add_scaled,
+    constant_acceleration,
+    predicted,
+    predicted_covariance,
+    take_value,
+)
 from radarsim.kernels.compile import inline, part
-from radarsim.kernels.lanes import address, exponential, full, get, put, root, total, where_greater
-from radarsim.kernels.linear import extrapolated
+from radarsim.kernels.lanes import (
+    address,
+    choose3,
+    choose6,
+    exponential,
+    full,
+    get,
+    get3,
+    get6,
+    put,
+    put3,
+    put6,
+    root,
+    total,
+    where_greater,
+)
 from radarsim.studies.sonar.kernels.steps import (
     GROUPS,
-    eight,
+    get_information,
     least_squares,
-    put_eight,
-    put_six,
-    put_three,
-    six,
-    six_where_greater,
-    three_where_greater,
+    manoeuvre_covariance,
+    memory_of,
+    put_information,
 )
 
 # Further rows of the filter's memory: states of both models, covariances of both, probabilities of both.
@@ -46,27 +64,20 @@ class ModelPairs(NamedTuple):
     stay: np.ndarray
 
 
-class ModelPair(NamedTuple):
-    """The models of one filter in one coordinate: size of the state, manoeuvre variances q (2,), stay (2,) as above."""
-
-    size: int
-    q: np.ndarray
-    stay: np.ndarray
-
-
 @inline
 def merged(mu1, x1, P1, mu2, x2, P2):
     """Mean and covariance of a mixture of two states with weights mu1 + mu2 = 1."""
-    m0, m1, m2 = mu1 * x1[0] + mu2 * x2[0], mu1 * x1[1] + mu2 * x2[1], mu1 * x1[2] + mu2 * x2[2]
-    d0, d1, d2, both = x1[0] - x2[0], x1[1] - x2[1], x1[2] - x2[2], mu1 * mu2
-    return (m0, m1, m2), (
-        mu1 * P1[0] + mu2 * P2[0] + both * d0 * d0,
-        mu1 * P1[1] + mu2 * P2[1] + both * d0 * d1,
-        mu1 * P1[2] + mu2 * P2[2] + both * d0 * d2,
-        mu1 * P1[3] + mu2 * P2[3] + both * d1 * d1,
-        mu1 * P1[4] + mu2 * P2[4] + both * d1 * d2,
-        mu1 * P1[5] + mu2 * P2[5] + both * d2 * d2,
+    m = mu1 * x1[0] + mu2 * x2[0], mu1 * x1[1] + mu2 * x2[1], mu1 * x1[2] + mu2 * x2[2]
+    d = x1[0] - x2[0], x1[1] - x2[1], x1[2] - x2[2]
+    P = (
+        mu1 * P1[0] + mu2 * P2[0],
+        mu1 * P1[1] + mu2 * P2[1],
+        mu1 * P1[2] + mu2 * P2[2],
+        mu1 * P1[3] + mu2 * P2[3],
+        mu1 * P1[4] + mu2 * P2[4],
+        mu1 * P1[5] + mu2 * P2[5],
     )
+    return m, add_outer(P, mu1 * mu2, d)
 
 
 @inline
@@ -82,24 +93,13 @@ def mixed(c, from_first, first, second):
 
 
 @inline
-def manoeuvre_covariance(q, tau, size):
-    """Q (6) of a random derivative of order `size` and variance q, constant over tau."""
-    half = 0.5 * tau * tau
-    g0, g1, g2 = (half, tau, 0.0) if size == 2 else (tau * half / 3.0, half, tau)
-    return q * g0 * g0, q * g0 * g1, q * g0 * g2, q * g1 * g1, q * g1 * g2, q * g2 * g2
-
-
-@inline
 def filtered(x, P, tau, Q, z, w):
-    """Predict and update with a plot z of weight w, zero where missed: x, P, nis and S = 1 + w H P Hᵀ."""
-    F = (tau, 0.5 * tau * tau, 1.0, tau, 1.0)
-    r, v, a = predicted(x, F)
-    P = predicted_covariance(P, F, Q)
-    S = w * P[0] + 1.0
-    per, e = w / S, z - r
-    k0, k1, k2 = per * P[0], per * P[1], per * P[2]
-    P = (P[0] / S, P[1] / S, P[2] / S, P[3] - k1 * P[1], P[4] - k1 * P[2], P[5] - k2 * P[2])
-    return (r + k0 * e, v + k1 * e, a + k2 * e), P, per * e * e, S
+    """Predict and update with a plot z of weight w, zero where missed: x, P, nis and S."""
+    zero, one, F = full(0.0), full(1.0), constant_acceleration(tau)
+    x, taken = predicted(x, F), where_greater(w, zero, one, zero)
+    P, g, S = take_value(predicted_covariance(P, F, Q), 1.0 / where_greater(w, zero, w, one), taken)
+    e = z - x[0]
+    return add_scaled(x, e, g), P, taken * e * e / S, where_greater(w, zero, S, one)
 
 
 @inline
@@ -120,52 +120,46 @@ def imm_step(first, second, mu, chain, tau, Q, z, w):
     return (x1, P1), (x2, P2), c1 / where_greater(c1 + c2, zero, c1 + c2, one)
 
 
-@part
-def interact(models, dt, period, sigma, memory, plot, P):
-    """Update an IMM with one scan, in place, and write P (6, CHUNK).
+@inline
+def interact(filters, plots, f, c, pairs, size, dt, period, sigma):
+    """Update an IMM with one scan, in place; further rows STATE, COVARIANCE and PROBABILITY.
 
-    memory: x, Y and further rows STATE, COVARIANCE and PROBABILITY. Both models start by least squares on the first
-    `size` plots, with the stationary probabilities of their Markov chain.
+    Both models start by least squares on the first `size` plots, with the stationary probabilities of their Markov
+    chain.
     """
-    ax, ay, am, ap = address(memory.x), address(memory.Y), address(memory.further), address(P)
-    az, aw, an = address(plot.z), address(plot.w), address(plot.n)
-    tau, per, unit, one, zero, size = dt / period, 1.0 / period, 1.0 / sigma, full(1.0), full(0.0), models.size
-    first_scans, half = full(size - 0.5), full(0.5)
-    Q = (manoeuvre_covariance(models.q[0], tau, size), manoeuvre_covariance(models.q[1], tau, size))
-    p11, p22 = models.stay[0], models.stay[1]
+    ax, ay, am, ap, az, aw, an = memory_of(filters, plots, f, c)
+    tau, per, unit, one, zero = dt / period, 1.0 / period, 1.0 / sigma, full(1.0), full(0.0)
+    first_scans, half, F = full(size - 0.5), full(0.5), constant_acceleration(dt)
+    q, stay = pairs.manoeuvre[f, c], pairs.stay[f]
+    Q = (manoeuvre_covariance(q[0], tau, size), manoeuvre_covariance(q[1], tau, size))
+    p11, p22 = stay[0], stay[1]
     p12, p21 = 1.0 - p11, 1.0 - p22
     stationary = full(p21 / (p12 + p21))
+    to_first, to_second = PROBABILITY * GROUPS, (PROBABILITY + 1) * GROUPS
+    P_first, P_second = COVARIANCE * GROUPS, (COVARIANCE + 6) * GROUPS
     for i in range(GROUPS):
         z, w, n = get(az, i), get(aw, i), get(an, i)
-        Y, K, P_start = least_squares(eight(ay, i), n, w, tau, 0.0, size)
-        put_eight(ay, i, Y)
-        r, v, a = extrapolated(get(ax, i), get(ax, GROUPS + i), get(ax, 2 * GROUPS + i), dt)
-        innovation = z - r
-        r, v, a = r + K[0] * innovation, v + per * K[1] * innovation, a + per * per * K[2] * innovation
-        x_start = (unit * r, unit * period * v, unit * period * period * a)
-        x, mu = (
-            six(am, STATE * GROUPS + i),
-            (get(am, PROBABILITY * GROUPS + i), get(am, (PROBABILITY + 1) * GROUPS + i)),
-        )
-        first = (x[:3], six(am, COVARIANCE * GROUPS + i))
-        second = (x[3:], six(am, (COVARIANCE + 6) * GROUPS + i))
+        Y, K, P_start = least_squares(get_information(ay, i), n, w, tau, 0.0, size)
+        put_information(ay, i, Y)
+        x_now = predicted(get3(ax, i, GROUPS), F)
+        x_now = add_scaled(x_now, z - x_now[0], (K[0], per * K[1], per * per * K[2]))
+        x_start = (unit * x_now[0], unit * period * x_now[1], unit * period * period * x_now[2])
+        x, mu = get6(am, STATE * GROUPS + i, GROUPS), (get(am, to_first + i), get(am, to_second + i))
+        first, second = (x[:3], get6(am, P_first + i, GROUPS)), (x[3:], get6(am, P_second + i, GROUPS))
         first, second, mu1 = imm_step(first, second, mu, (p11, p12, p21, p22), tau, Q, unit * z, w)
         early = where_greater(n, first_scans, zero, one)
         mu1 = where_greater(early, zero, stationary, mu1)
-        x1, P1 = three_where_greater(early, half, x_start, first[0]), six_where_greater(early, half, P_start, first[1])
-        x2, P2 = (
-            three_where_greater(early, half, x_start, second[0]),
-            six_where_greater(early, half, P_start, second[1]),
-        )
-        x, P_now = merged(mu1, x1, P1, one - mu1, x2, P2)
+        x1, P1 = choose3(early, half, x_start, first[0]), choose6(early, half, P_start, first[1])
+        x2, P2 = choose3(early, half, x_start, second[0]), choose6(early, half, P_start, second[1])
+        x, P = merged(mu1, x1, P1, one - mu1, x2, P2)
         x = (sigma * x[0], sigma * per * x[1], sigma * per * per * x[2])
-        put_three(ax, i, three_where_greater(early, zero, (r, v, a), x))
-        put_six(ap, i, P_now)
-        put(am, PROBABILITY * GROUPS + i, mu1)
-        put(am, (PROBABILITY + 1) * GROUPS + i, one - mu1)
-        put_six(am, STATE * GROUPS + i, x1 + x2)
-        put_six(am, COVARIANCE * GROUPS + i, P1)
-        put_six(am, (COVARIANCE + 6) * GROUPS + i, P2)
+        put3(ax, i, choose3(early, zero, x_now, x), GROUPS)
+        put6(ap, i, P, GROUPS)
+        put(am, to_first + i, mu1)
+        put(am, to_second + i, one - mu1)
+        put6(am, STATE * GROUPS + i, x1 + x2, GROUPS)
+        put6(am, P_first + i, P1, GROUPS)
+        put6(am, P_second + i, P2, GROUPS)
 
 
 @part

@@ -12,19 +12,11 @@ import numpy as np
 
 from radarsim.kernels.compile import kernel, part
 from radarsim.kernels.random import U, uniforms
-from radarsim.studies.sonar.kernels.detector import (
-    MODE,
-    PLOTS,
-    AdaptiveRule,
-    AdaptiveRules,
-    Alarms,
-    adapt,
-    add_alarms,
-    detector_statistics,
-)
-from radarsim.studies.sonar.kernels.imm import PROBABILITY, ROWS, ModelPair, ModelPairs, interact, mode_sums
+from radarsim.studies.sonar.kernels import detector
+from radarsim.studies.sonar.kernels.detector import AdaptiveRules, Alarms, adapt, add_alarms, detector_statistics
+from radarsim.studies.sonar.kernels.imm import PROBABILITY, ROWS, ModelPairs, interact, mode_sums
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK, Sums, move_and_measure
-from radarsim.studies.sonar.kernels.steps import ROW, Memory, Model, Plot, copy_row, fit, recur, remember
+from radarsim.studies.sonar.kernels.steps import ROW, Filters, Model, Plots, copy_row, fit, recur, remember
 from radarsim.studies.sonar.kernels.sums import Counted, Course, Estimate, add_ahead, add_sums
 
 INFORMATION, COVARIANCE, FIXED, WINDOW, ADAPTIVE, IMM = range(6)
@@ -155,52 +147,21 @@ def count_plots(weight, n, n_now):
             n_now[c, i] += weight[c, i] > 0.0
 
 
-class Filters(NamedTuple):
-    """The memory of F filters in C coordinates for a chunk, as `steps.Memory`: x (F, C, 4, CHUNK), Y (F, C, 8, CHUNK),
-    further rows (F, C, >= 10, CHUNK); P (6, CHUNK) of the filter that was updated last.
-    """
-
-    x: np.ndarray
-    Y: np.ndarray
-    further: np.ndarray
-    P: np.ndarray
-
-
-class Plots(NamedTuple):
-    """Plots of a chunk at a scan: z, weight, number n of plots before the scan and n_now up to it, each (C, CHUNK).
-
-    recent (C, 3, L, ROW) holds the last plots: plot, age, weight; T (D, G, CHUNK) the statistics of the detectors.
-    """
-
-    z: np.ndarray
-    weight: np.ndarray
-    n: np.ndarray
-    n_now: np.ndarray
-    recent: np.ndarray
-    T: np.ndarray
-
-
 @kernel
 def filter_scan(bank, f, c, k, dt, filters, plots):
     """Update filter f in coordinate c with scan k, in place, dt after the scan before."""
     size, length, kind, period = bank.size[f], bank.length[f], bank.kind[f], bank.period
-    memory, P = Memory(filters.x[f, c], filters.Y[f, c], filters.further[f, c]), filters.P
-    plot = Plot(plots.z[c], plots.weight[c], plots.n[c])
     if kind == ADAPTIVE:
-        rules = bank.adaptive
-        T = plots.T[rules.detector[f], rules.group[f, c]]
-        rule = AdaptiveRule(size, length, rules.raises[f], rules.threshold[f, c], rules.quiet[f])
-        adapt(rule, dt, period, memory, plot, plots.recent[c], T, P)
+        adapt(filters, plots, f, c, bank.adaptive, size, length, dt, period)
     elif kind == IMM:
-        models = ModelPair(size, bank.interacting.manoeuvre[f, c], bank.interacting.stay[f])
-        interact(models, dt, period, bank.sigma[c], memory, plot, P)
+        interact(filters, plots, f, c, bank.interacting, size, dt, period, bank.sigma[c])
     elif kind == WINDOW:
-        fit(memory.x, plots.recent[c], length, size, period, plots.n_now[c], P)
+        fit(filters, plots, f, c, length, size, period)
     else:
         gain = bank.settled[f, c]
         fixed = (gain[0], gain[1], gain[2])
         model = Model(size, max(size, length), bank.carry[f, k, c], bank.manoeuvre[f, c], fixed)
-        recur(kind != INFORMATION, model, dt, period, memory, plot, P)
+        recur(filters, plots, f, c, kind != INFORMATION, model, dt, period)
 
 
 # ---- sums ---------------------------------------------------------------------------------------------------------
@@ -208,7 +169,7 @@ def filter_scan(bank, f, c, k, dt, filters, plots):
 def add_modes(kind, further, used, out, modes):
     """Add the modes of a filter of this kind, with these further rows, to modes (3,); out (3,) is scratch."""
     if kind == ADAPTIVE:
-        mode_sums(further, MODE, PLOTS, used, out)
+        mode_sums(further, detector.MODE, detector.PLOTS, used, out)
     elif kind == IMM:
         mode_sums(further, PROBABILITY + 1, -1, used, out)
     else:

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.algebra import constant_acceleration, predicted
 from radarsim.kernels.compile import inline, kernel, part, summing
-from radarsim.kernels.linear import extrapolated
 from radarsim.kernels.random import U, normals
 from radarsim.studies.sonar.kernels.steps import copy_row
 
@@ -121,10 +121,10 @@ def move_and_measure(world, first, k, plots):
 @part
 def scan_value(x, z, dt, gain):
     """Update a filter that assumes white errors with one scan, in place: x (>= 3, n), plots z (n,), gain (>= 3,)."""
-    r, v, a = x[0], x[1], x[2]
+    (r, v, a), F = (x[0], x[1], x[2]), constant_acceleration(dt)
     g0, g1, g2 = gain[0], gain[1], gain[2]
     for i in range(z.size):
-        p, q, s = extrapolated(r[i], v[i], a[i], dt)
+        p, q, s = predicted((r[i], v[i], a[i]), F)
         residual = z[i] - p
         r[i], v[i], a[i] = p + g0 * residual, q + g1 * residual, s + g2 * residual
 
@@ -132,14 +132,14 @@ def scan_value(x, z, dt, gain):
 @part
 def scan_carried(x, z, dt, carry, gain):
     """Update a filter that assumes correlated errors with one scan, in place: x (4, n), the last row is the error."""
-    r, v, a, e = x[0], x[1], x[2], x[3]
+    (r, v, a, e), F = (x[0], x[1], x[2], x[3]), constant_acceleration(dt)
     g0, g1, g2, g3 = gain[0], gain[1], gain[2], gain[3]
     for i in range(z.size):
-        p, q, s = extrapolated(r[i], v[i], a[i], dt)
-        predicted = carry * e[i]
-        residual = z[i] - p - predicted
+        p, q, s = predicted((r[i], v[i], a[i]), F)
+        carried = carry * e[i]
+        residual = z[i] - p - carried
         r[i], v[i], a[i] = p + g0 * residual, q + g1 * residual, s + g2 * residual
-        e[i] = predicted + g3 * residual
+        e[i] = carried + g3 * residual
 
 
 @part

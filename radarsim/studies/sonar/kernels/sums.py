@@ -14,9 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.algebra import dot, times
 from radarsim.kernels.compile import inline, part
-from radarsim.kernels.lanes import address, full, get, total, where_greater
-from radarsim.studies.sonar.kernels.steps import GROUPS, inverse, six
+from radarsim.kernels.lanes import address, full, get, get6, total, where_greater
+from radarsim.studies.sonar.kernels.steps import GROUPS, leading_inverse
 
 
 class Estimate(NamedTuple):
@@ -96,16 +97,6 @@ def nominal_errors(rows, i, units):
     )
 
 
-@inline
-def quadratic_form(Y, e):
-    """eᵀ Y e."""
-    return (
-        e[0] * (Y[0] * e[0] + 2.0 * (Y[1] * e[1] + Y[2] * e[2]))
-        + e[1] * (Y[3] * e[1] + 2.0 * Y[4] * e[2])
-        + Y[5] * e[2] * e[2]
-    )
-
-
 @part
 def joint_sums(rows, P, size, units, out):
     """Write Σ of the diagonal of P, where estimated, and Σq, Σq², Σp, Σp², where the state is complete, to out (7,).
@@ -119,14 +110,14 @@ def joint_sums(rows, P, size, units, out):
     s0, s1, s2, q1, q2, p1, p2 = zero, zero, zero, zero, zero, zero, zero
     to_units = sigma * sigma / period
     for i in range(GROUPS):
-        n, used, P_now = get(rows.n, i), get(rows.used, i), six(P, i)
+        n, used, P_now = get(rows.n, i), get(rows.used, i), get6(P, i, GROUPS)
         s0 = s0 + where_greater(n, one, used, zero) * P_now[0]
         s1 = s1 + where_greater(n, two, used, zero) * P_now[3]
         s2 = s2 + where_greater(n, three, used, zero) * P_now[5]
-        Y = inverse(P_now, where_greater(n, need, most, zero))
+        Y = leading_inverse(P_now, where_greater(n, need, most, zero))
         e = nominal_errors(rows, i, units)
         complete = where_greater(n, need, used, zero)
-        q, p = complete * quadratic_form(Y, e), complete * (to_units * (e[0] * e[1]))
+        q, p = complete * dot(e, times(Y, e)), complete * (to_units * (e[0] * e[1]))
         q1, q2, p1, p2 = q1 + q, q2 + q * q, p1 + p, p2 + p * p
     out[0], out[1], out[2] = total(s0), total(s1), total(s2)
     out[3], out[4], out[5], out[6] = total(q1), total(q2), total(p1), total(p2)

