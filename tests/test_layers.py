@@ -425,8 +425,8 @@ def test_kernels_read_like_the_book(module):
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("@part\ndef step(a, b, c, d, e, f, g, h, i):\n    pass\n", ["step"]),
-        ("@kernel\ndef step(a, b, c, d, e, f, g, h, i):\n    pass\n", []),
+        ("@part\ndef step(a, b, c, d, e, f, g, h, i, j, k, l, m):\n    pass\n", ["step"]),
+        ("@kernel\ndef step(a, b, c, d, e, f, g, h, i, j, k, l, m):\n    pass\n", []),
         ("@kernel\ndef step(a):\n" + 60 * "    a += 1\n", ["step"]),
         ("@part\ndef step(a, b, c, d, e, f, g, h):\n" + 59 * "    a += 1\n", []),
     ],
