@@ -7,8 +7,6 @@ is right about itself. Over 1 the filter is optimistic, its errors are larger th
 pessimistic. (Bar-Shalom, Li & Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, 5.4.)
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from radarsim.engine.results import CaseResult
@@ -16,30 +14,20 @@ from radarsim.report import statistics, tables
 from radarsim.report.statistics import Estimate, Values
 
 OPTIMISTIC, CONSISTENT, PESSIMISTIC = "optimistic", "consistent", "pessimistic"
-BELIEVED = (
-    *("case", "filter", "component", "unit", "k", "t_s", "n"),
-    *("sigma", "believed_sigma", "ratio", "ratio_lo", "ratio_hi"),
-)
 
 
 def believed(result: CaseResult, sigma: np.ndarray) -> dict[str, np.ndarray]:
-    """Columns BELIEVED of one case: the measured σ beside sigma (F, K, C), the σ that the filters believe.
+    """Columns of one case: the measured σ beside sigma (F, K, C), the σ that the filters believe.
 
     Rows stand where a filter has an estimate, as in `tables.curves`. The interval of the ratio is that of the measured
     σ alone. Where the believed one hangs on the plots (missed ones, filters that adapt) its mean has a chance of its
     own, which is small beside: rows of `sonar_manoeuvre` and of a radar that misses plots cover 94 … 95 %.
     """
-    axes, at = result.axes, tables.shown(result)
-    f, k, c = at
+    at = f, k, c = tables.shown(result)
     n = tables.realisations(result)[at]
     true, claimed = statistics.errors(np.asarray(result.sums["error"])[at], n).sigma, sigma[at]
     return {
-        "case": np.full(f.size, result.name, dtype=object),
-        "filter": tables.names(axes.filters, f),
-        "component": tables.names([name for name, _ in axes.components], c),
-        "unit": tables.names([unit for _, unit in axes.components], c),
-        "k": np.asarray(axes.k)[k],
-        "t_s": np.asarray(axes.t_s, dtype=float)[k],
+        **tables.leading(result, f, k, **tables.components(result, c)),
         "n": n.astype(np.int64),
         **ratio_columns(true, claimed),
     }
@@ -48,30 +36,22 @@ def believed(result: CaseResult, sigma: np.ndarray) -> dict[str, np.ndarray]:
 def ratio_columns(true: Estimate, claimed: np.ndarray) -> dict[str, np.ndarray]:
     """`sigma`, `believed_sigma` and their `ratio` with its interval, of estimates (n,) of σ and believed ones (n,)."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratios = [end / claimed for end in true]
-    names = ("ratio", "ratio_lo", "ratio_hi")
-    return {"sigma": true.value, "believed_sigma": claimed, **dict(zip(names, ratios, strict=True))}
-
-
-def columns(quantity: str, *, exact: bool = False) -> tuple[str, ...]:
-    """The columns of `nees` or `nis` in consistency.csv; `exact_…` where a study knows its expectation."""
-    between = (f"exact_{quantity}",) if exact else ()
-    ends = (f"{quantity}{end}" for end in ("", "_lo", "_hi"))
-    return (*ends, *between, *(f"{quantity}_{end}" for end in ("bound_lo", "bound_hi", "verdict")))
+        ratio = Estimate(*(end / claimed for end in true))
+    return {"sigma": true.value, "believed_sigma": claimed, **tables.interval("ratio", ratio)}
 
 
 def normalised(
     quantity: str, mean: Estimate, bounds: tuple[np.ndarray, np.ndarray], exact: np.ndarray | None = None
-) -> Mapping[str, np.ndarray]:
+) -> tables.Columns:
     """Columns of `nees` or `nis`, arrays of one shape: the mean with its interval, the bounds, and the verdict.
 
     In 95 % of runs all means of a filter that is right about itself lie between their bounds. Where the expectation is
     known, it is judged by them in place of the mean.
     """
-    known = () if exact is None else (exact,)
+    known = {} if exact is None else {f"exact_{quantity}": exact}
     decides = mean.value if exact is None else np.where(np.isnan(exact), mean.value, exact)
-    values = (*mean, *known, *bounds, verdict(decides, *bounds))
-    return dict(zip(columns(quantity, exact=exact is not None), values, strict=True))
+    ends = dict(zip((f"{quantity}_bound_lo", f"{quantity}_bound_hi"), bounds, strict=True))
+    return {quantity: mean, **known, **ends, f"{quantity}_verdict": verdict(decides, *bounds)}
 
 
 def verdict(mean: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:

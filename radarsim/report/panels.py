@@ -1,17 +1,19 @@
 """Figures that every study needs, made from the tables alone: σ against time, gain against time."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from radarsim.config.experiment import Experiment
 from radarsim.config.labels import Label
 from radarsim.config.labels import label as label_of
 from radarsim.engine.results import CaseResult
-from radarsim.language import plural, power_of_ten, tr
+from radarsim.language import plural, power_of_ten, term, tr
 from radarsim.report import seen, text
+from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.report.statistics import Z95
 
@@ -43,6 +45,15 @@ class Quantity(NamedTuple):
 
     symbol: str
     name: str
+
+
+RADIAL = {
+    "r": Quantity("$r$", term("range")),
+    "Vr": Quantity("$V_r$", term("radial velocity")),
+    "ar": Quantity("$a_r$", term("radial acceleration")),
+}
+SIGMA = ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")  # columns of a line of σ against time
+GAIN = ("t_s", "gain_percent", "gain_lo", "gain_hi", "exact_percent")
 
 
 def number(value: object, powers: bool = False) -> str:
@@ -182,6 +193,25 @@ def label(result: CaseResult) -> str:
     return " ".join(filter(None, (device(result), swept(result))))
 
 
+def line(rows: "pd.DataFrame", columns: Sequence[str], label: str, style: Style | int, name: str = "") -> Line:
+    """A line of x and y from two columns of rows; further columns give the ends of its band, and exact values.
+
+    A style that is a number is that of the filter of this number.
+    """
+    x, y, *more = (rows[column].to_numpy(dtype=float) for column in columns)
+    lo, hi = more[:2] or (None, None)
+    exact = more[2] if more[2:] and np.isfinite(more[2]).any() else None
+    look = Style(style, style, style) if isinstance(style, int) else style
+    return Line(x, y, label, look, lo, hi, exact, name)
+
+
+def line_of(x: np.ndarray, rows: Sequence["pd.Series"], columns: Sequence[str], label: str, style: Style) -> Line:
+    """`line` over x (n,) of n rows of several tables."""
+    return line(
+        common.frame({"x": x} | {name: [row[name] for row in rows] for name in columns}), ("x", *columns), label, style
+    )
+
+
 def in_legend(drawn: Sequence[Panel]) -> list[Panel]:
     """Panels of many lines with one legend in a cell of its own, the names taken from the lines."""
     keys = {mark.label: mark.style for panel in drawn for mark in panel.marks if isinstance(mark, Line) and mark.label}
@@ -318,6 +348,11 @@ def unswept(results: Sequence[CaseResult]) -> list[CaseResult]:
     return [result for result in results if not result.swept] or list(results)
 
 
+def named(experiment: Experiment, figure: str) -> list[str]:
+    """The cases that a config names for a figure."""
+    return [case.name for case in experiment.shown_in(figure)]
+
+
 def shown(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
     """The results that a figure shows, of the cases named, at most eight evenly spaced; and words on those left out."""
     wanted = [result for result in results if result.name in set(names)]
@@ -440,15 +475,15 @@ def in_columns(figure: Figure) -> Figure:
 
 
 def _sigma_panel(title: str, members: Sequence[CaseResult], curves: Mapping, component: str, of: Quantity) -> Panel:
-    marks = lines_of(members, curves, component, _sigma_line)
+    marks = lines_of(members, curves, component, SIGMA)
     y = fitting_axis(sigma_of(of.symbol, unit_in(curves, component)), marks)
     return keyed(Panel(time_axis(), y, tuple(marks), title), members)
 
 
-def lines_of(members: Sequence[CaseResult], rows: Mapping, component: str, draw: Callable[..., Line]) -> list[Mark]:
+def lines_of(members: Sequence[CaseResult], rows: Mapping, component: str, columns: Sequence[str]) -> list[Mark]:
     """A line for each filter of each case of a panel: named by the filter of a lone case, by the value of a swept one.
 
-    rows by case, filter and component. A filter looks the same in every figure of its cases.
+    rows by case, filter and component; columns as for `line`. A filter looks the same in every figure of its cases.
     """
     filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
     marks: list[Mark] = []
@@ -459,12 +494,12 @@ def lines_of(members: Sequence[CaseResult], rows: Mapping, component: str, draw:
                 continue
             style = look(filters.index(f), i, len(members))
             if len(members) == 1:
-                marks.append(draw(own, literal(f), style, literal(f)))
+                marks.append(line(own, columns, literal(f), style, literal(f)))
             else:
                 key, value = result.swept[-1] if result.swept else ("", device(result))
                 among = [dict(one.swept).get(key) for one in members]
                 words = _shown_value(result, key, in_short(value, among)) if key else number(value)
-                marks.append(draw(own, words, style, f"{literal(f)}, {swept(result)}"))
+                marks.append(line(own, columns, words, style, f"{literal(f)}, {swept(result)}"))
     return marks
 
 
@@ -477,12 +512,8 @@ def _shown_value(result: CaseResult, key: str, value: object) -> str:
 
 def family_panel(title: str, members: Sequence[CaseResult], rows: Mapping, words: str) -> Panel:
     """A panel of any quantity of the members about one; rows by case, filter and its column, against t_s."""
-
-    def draw(own: "pd.DataFrame", label: str, style: Style, name: str) -> Line:
-        return Line(own["t_s"].to_numpy(float), own[column].to_numpy(float), label, style, name=name)
-
     column = next(key[2] for key in rows)
-    marks = lines_of(members, rows, column, draw)
+    marks = lines_of(members, rows, column, ("t_s", column))
     return keyed(Panel(time_axis(), fitting_axis(words, marks), (Reference(1), *marks), title), members)
 
 
@@ -519,14 +550,6 @@ def _by_colour(panel: Panel, dashes: tuple, title: str) -> Panel:
     return replace(panel, marks=marks, keys=(*shades.items(), *dashes), key_title=title, legend="right")
 
 
-def _sigma_line(rows: "pd.DataFrame", label: str, style: Style, name: str) -> Line:
-    values = {
-        name: rows[name].to_numpy(dtype=float) for name in ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")
-    }
-    exact = values["exact_sigma"] if np.isfinite(values["exact_sigma"]).any() else None
-    return Line(values["t_s"], values["sigma"], label, style, values["sigma_lo"], values["sigma_hi"], exact, name)
-
-
 def look(nth_filter: int, nth_case: int, cases: int) -> Style:
     """Filters differ by dash and marker; cases by shade, and where there is but one, filters by colour too."""
     colour = nth_filter if cases == 1 else nth_case / (cases - 1)
@@ -555,7 +578,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
     if any(result.swept for result in results) or (several and len(results) > 1):
         drawn = []
         for words, members in by_panel(results).items():
-            lines = lines_of(members, gains, component, _gain_line)
+            lines = lines_of(members, gains, component, GAIN)
             panel = Panel(time_axis(), *_cut(y, lines), words)
             drawn += [keyed(panel, members, baseline=False)] if lines else []
         return _gains_said(in_columns(Figure(name, title, caption, tuple(drawn))))
@@ -567,7 +590,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
                 case = label(result) if len(results) > 1 else ""
                 words = ", ".join(filter(None, (case, literal(f) if several or len(results) == 1 else "")))
                 mark = n if several else i
-                marks.append(_gain_line(rows, words, Style(i if len(results) > 1 else n, mark, mark), words))
+                marks.append(line(rows, GAIN, words, Style(i if len(results) > 1 else n, mark, mark), words))
     # Many long names would cover the lines: they stand beside the panel.
     long = len(marks) > 3 and any(isinstance(mark, Line) and len(mark.label) > LONGEST_INSIDE for mark in marks)
     panel = Panel(time_axis(), *_cut(y, marks), direct=not long, legend="right" if long else "best")
@@ -591,24 +614,14 @@ def _cut(y: Axis, lines: Sequence[Mark]) -> tuple[Axis, tuple[Mark, ...]]:
     return replace(y, limits=(-LOSS, 100.0)) if least < -2 * LOSS else y, (Reference(0), *lines)
 
 
-def _gain_line(rows: "pd.DataFrame", label: str, style: Style, name: str) -> Line:
-    t, value, lo, hi, exact = (
-        rows[key].to_numpy(dtype=float) for key in ("t_s", "gain_percent", "gain_lo", "gain_hi", "exact_percent")
-    )
-    return Line(t, value, label, style, lo, hi, exact if np.isfinite(exact).any() else None, name)
-
-
 def per_component(
     results: Sequence[CaseResult],
-    curves: Mapping[Any, "pd.DataFrame"],
-    gains: Mapping[Any, "pd.DataFrame"],
+    tables: "Mapping[str, pd.DataFrame]",
     quantities: Mapping[str, Quantity],
-    chosen: Callable[[str], Sequence[str]],
+    experiment: Experiment,
 ) -> dict[str, Figure]:
-    """gain_<component> and sigma_<component> of every component.
-
-    chosen(name) gives the case names that a figure shows.
-    """
+    """gain_<component> and sigma_<component> of every component; each of the cases that the config names for it."""
+    curves, gains = (common.groups(tables[name], "case", "filter", "component") for name in ("curves", "gains"))
     made = {}
     for component, of in quantities.items():
         for kind, draw, rows in (
@@ -617,7 +630,7 @@ def per_component(
             ("dynamic", dynamic_figure, curves),
         ):
             name = f"{kind}_{component}"
-            some, left = shown_families(results, chosen(name))
+            some, left = shown_families(results, named(experiment, name))
             figure = draw(name, some, rows, component, of) if some else None
             if figure and any(isinstance(mark, Line) for panel in figure.panels for mark in panel.marks):
                 made[name] = replace(figure, caption=figure.caption + left)

@@ -18,10 +18,6 @@ from radarsim.report.statistics import FEW_EVENTS
 if TYPE_CHECKING:
     import pandas as pd
 
-COLUMNS = (
-    *("case", "filter", "k", "t_s", "event", "sought", "n", "rate", "rate_lo", "rate_hi", "events", "n_eff"),
-    *("variance_factor", "plain", "mean_weight", "mean_weight_se"),
-)
 UNAIMED = 0.1  # share of Σw² that no shift leads to, from which on it is told
 ASTRAY = "much of it in ways that no shift leads to"
 FEW = f"under {FEW_EVENTS} effective events"
@@ -80,7 +76,7 @@ def rows(labels: Mapping[str, Any], event: str, sought: np.ndarray, of: Counted,
         "event": np.full(size, event, dtype=object),
         "sought": sought,
         "n": np.full(size, drawn.n),
-        **common.interval("rate", estimate),
+        "rate": estimate,
         "events": of.number.astype(np.int64),
         "n_eff": effective,
         "variance_factor": factor,
@@ -122,7 +118,7 @@ def table(parts: "list[dict[str, Any]]") -> "dict[str, pd.DataFrame]":
     """The table `rare` of cases' columns, under its name; nothing where no case has any."""
     if not parts:
         return {}
-    made = common.joined(parts, (*COLUMNS, "note"))
+    made = common.joined(parts)
     return {"rare": made.assign(note=made["note"].mask(_unaimed(made), ASTRAY))}
 
 

@@ -6,17 +6,20 @@ when the first table is made.
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import statistics
+from radarsim.report.statistics import Estimate
 
 if TYPE_CHECKING:
     import pandas as pd
 
+Columns = Mapping[str, Any]  # of one length: arrays, or estimates of such
+Maker = TypeVar("Maker", bound=Callable[..., Columns])
 LABELS = ("case", "filter", "component", "unit", "baseline", "model", "note")  # columns of text, whatever they hold
 
 
@@ -27,11 +30,62 @@ def frame(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> "pd.DataFrame":
     return pd.DataFrame(dict(columns))
 
 
-def joined(parts: Sequence[Mapping[str, np.ndarray]], columns: Sequence[str]) -> "pd.DataFrame":
-    """One DataFrame of cases' columns set one below the other; the named columns alone where there is no case."""
-    if not parts:
+def joined(parts: Iterable[Columns], columns: Sequence[str] = ()) -> "pd.DataFrame":
+    """One DataFrame of cases' columns set one below the other, in the order of the first, or as named by `columns`.
+
+    An `Estimate` makes three columns, see `spread`. Cases without rows do not count where others have some.
+    """
+    every = [spread(part) for part in parts]
+    filled = [part for part in every if any(map(len, part.values()))] or every[:1]
+    if not filled:
         return frame({name: [] for name in columns})
-    return frame({name: np.concatenate([np.asarray(part[name]) for part in parts]) for name in columns})
+    return frame({name: np.concatenate([part[name] for part in filled]) for name in columns or filled[0]})
+
+
+def spread(columns: Columns) -> dict[str, Any]:
+    """Columns in which an estimate `x` is `x`, `x_lo` and `x_hi`; of `x|y` the ends are `y_lo` and `y_hi`."""
+    made: dict[str, Any] = {}
+    for name, values in columns.items():
+        stem, given, ends = name.partition("|")
+        made |= interval(stem, values, ends if given else None) if isinstance(values, Estimate) else {name: values}
+    return made
+
+
+def stacked(parts: Sequence[Columns]) -> dict[str, Any]:
+    """Columns of several parts of one case, set one below the other."""
+    every = [spread(part) for part in parts]
+    return {name: np.concatenate([part[name] for part in every]) for name in every[0]} if every else {}
+
+
+def of_rows(rows: Sequence[Columns]) -> dict[str, np.ndarray]:
+    """Columns of rows, each of single values by the column's name."""
+    every = [spread(row) for row in rows]
+    return {name: np.array([row[name] for row in every]) for name in every[0]} if every else {}
+
+
+class Tables:
+    """The tables of a study, declared by functions that make the columns of one case; their docstrings say what of.
+
+    A table may be of such cases alone as `of` holds for.
+    """
+
+    def __init__(self) -> None:
+        self.declared: dict[str, tuple[Callable[[Any], Columns], Callable[[Any], bool]]] = {}
+
+    def __call__(self, name: str, of: Callable[[Any], bool] = lambda result: True) -> Callable[[Maker], Maker]:
+        """Declares the table of a name, made of the cases that `of` holds for."""
+
+        def declare(made: Maker) -> Maker:
+            self.declared[name] = made, of
+            return made
+
+        return declare
+
+    def made(self, results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
+        """All of them, with the rows of all cases."""
+        return {
+            name: joined(make(result) for result in results if of(result)) for name, (make, of) in self.declared.items()
+        }
 
 
 def names(values: Sequence[str], index: np.ndarray) -> np.ndarray:
@@ -84,18 +138,12 @@ def realisations(result: CaseResult) -> np.ndarray:
     return np.full(result.axes.available.shape, float(result.count)) if counted is None else np.asarray(counted)
 
 
-CURVES = (
-    *("case", "filter", "component", "unit", "k", "t_s", "n"),
-    *("sigma", "sigma_lo", "sigma_hi", "bias", "bias_se", "spread", "exact_sigma", "exact_bias", "n_eff"),
-)
-
-
 def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """σ with its interval, bias, spread, exact values, effective realisations, by case, filter, component and scan."""
-    return joined([_curves(result) for result in results], CURVES)
+    return joined(map(_curves, results))
 
 
-def _curves(result: CaseResult) -> dict[str, np.ndarray]:
+def _curves(result: CaseResult) -> Columns:
     axes, at = result.axes, shown(result)
     f, k, c = at
     n = realisations(result)[at]
@@ -104,7 +152,7 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
     return {
         **leading(result, f, k, **components(result, c)),
         "n": n.astype(np.int64),
-        **interval("sigma", of.sigma),
+        "sigma": of.sigma,
         "bias": of.bias,
         "bias_se": of.bias_se,
         "spread": of.spread,
@@ -119,10 +167,10 @@ GAINS = ("case", "filter", "baseline", "component", "k", "t_s", "gain_percent", 
 
 def gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """Paired gains against the baseline filter, where both have an estimate (contract: gains.csv; P1 eq. 17)."""
-    return joined([_gains(result) for result in results], GAINS)
+    return joined(map(_gains, results), GAINS)
 
 
-def _gains(result: CaseResult) -> dict[str, np.ndarray]:
+def _gains(result: CaseResult) -> Columns:
     axes, b = result.axes, result.axes.baseline
     both = np.array(axes.available[b : b + 1] & axes.available)
     both[b] = False
@@ -134,7 +182,7 @@ def _gains(result: CaseResult) -> dict[str, np.ndarray]:
     of = statistics.gain(own[:, 1], own[:, 3], base[:, 1], base[:, 3], cross, realisations(result)[at])
     return {
         **leading(result, f, k, baseline=np.full(f.size, axes.filters[b], dtype=object), **components(result, c)),
-        **interval("gain_percent", of, "gain"),
+        "gain_percent|gain": of,
         "exact_percent": axes.exact_gains[at],
     }
 

@@ -7,8 +7,8 @@ import pytest
 
 from radarsim.app.configs import load
 from radarsim.config.identity import complete
+from radarsim.report.panels import RADIAL
 from radarsim.studies.range_doppler.config import Keys
-from radarsim.studies.range_doppler.figures import QUANTITIES
 
 SHORT = "must be >= 3 for the initialisation of filter r, got 2"
 OBSERVES = "must be [range] or [range, velocity], got ['velocity']"
@@ -167,7 +167,7 @@ def test_figures_in_a_file_and_of_included_configs(house, said):
 
 
 def test_figure_names_are_those_that_the_report_draws():
-    drawn = {f"{kind}_{component}" for component in QUANTITIES for kind in ("sigma", "gain", "dynamic")}
+    drawn = {f"{kind}_{component}" for component in RADIAL for kind in ("sigma", "gain", "dynamic")}
     assert set(Keys.figure_names) == drawn | {"settling", "consistency"}
 
 

@@ -188,11 +188,11 @@ def test_targets_that_are_swept_are_named_by_their_kind_and_what_sets_them_apart
     assert [" ".join(shown.split()) for _, shown in axis.ticks] == words
     lines = panels.lines_of(
         [replace(result, name=f"rls2 {n}", swept=(("target", one),)) for n, one in enumerate(targets)],
-        {(f"rls2 {n}", "r", "r"): n for n in range(3)},
+        {(f"rls2 {n}", "r", "r"): common.frame({"x": [n], "y": [n]}) for n in range(3)},
         "r",
-        lambda own, label, style, name: label,
+        ("x", "y"),
     )
-    assert lines == words
+    assert [one.label for one in lines] == words
 
 
 def test_panels_of_several_configs_that_would_be_called_the_same_are_told_by_their_config():

@@ -20,7 +20,6 @@ def read(table):
 def test_columns_as_in_the_contract(paper):
     assert ",".join(tables.curves(paper).columns) == CURVES
     assert ",".join(tables.gains(paper).columns) == GAINS
-    assert ",".join(tables.curves([]).columns) == CURVES
 
 
 def test_rows_in_order_and_only_where_there_is_an_estimate(paper):

@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from radarsim.language import term, tr
 from radarsim.report import seen
 from radarsim.report.compare.sides import SERIES, Series, Side
 from radarsim.report.compare.table import filters_of
-from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
-from radarsim.report.panels import MOST, left_out, letter, literal, time_axis, with_unit
+from radarsim.report.drawing import PAGE_MM, Axis, Figure, Mark, Panel, Reference, Style
+from radarsim.report.panels import MOST, left_out, letter, line, literal, time_axis, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,7 +47,7 @@ def _figure(
     if series.value in ("sigma", "gain_percent"):
         words = {"sigma": term("$\\sigma$ of {symbol}"), "gain_percent": term("gain in $\\sigma$ of {symbol}")}
         what = tr(words[series.value], symbol=symbol)
-    values = [line for n, side in enumerate(some) for line in _values(series, side, n, filters, component, model)]
+    values = [mark for n, side in enumerate(some) for mark in _values(series, side, n, filters, component, model)]
     apart = _apart(series, some, rows, filters)
     keys = [(literal(side.label), Style(n, 0)) for n, side in enumerate(some)]
     keys += [(literal(f), Style(0, n, n)) for n, f in enumerate(filters)] if len(filters) > 1 else []
@@ -87,10 +85,8 @@ def _values(series: Series, side: Side, n: int, filters: Sequence[str], componen
         own = own[own["component"] == component] if component else own
         own = own[own["model"] == model] if "model" in own and model else own
         if len(own):
-            y, lo, hi = (own[key].to_numpy(dtype=float) for key in (series.value, series.lo, series.hi))
-            exact = own[series.exact].to_numpy(dtype=float) if series.exact else None
-            t, name = own["t_s"].to_numpy(dtype=float), f"{literal(side.label)}, {literal(f)}"
-            marks.append(Line(t, y, "", Style(n, i, i), lo, hi, _known(exact), name))
+            columns = ["t_s", series.value, series.lo, series.hi, *([series.exact] if series.exact else [])]
+            marks.append(line(own, columns, "", Style(n, i, i), f"{literal(side.label)}, {literal(f)}"))
     return marks
 
 
@@ -103,14 +99,8 @@ def _apart(series: Series, sides: Sequence[Side], rows: "pd.DataFrame", filters:
         label, against, f = map(str, key)
         if label not in numbers or against not in numbers:
             continue
-        columns = (own[key].to_numpy(dtype=float) for key in ("t_s", value, f"{value}_lo", f"{value}_hi"))
-        t, y, lo, hi = columns
         name = f"{literal(label)}, {literal(f)}" + (f" against {literal(against)}" if several else "")
         i = filters.index(f)
-        known = _known(own[exact].to_numpy(dtype=float)) if exact else None
-        marks.append(Line(t, y, "", Style(numbers[label], i, i), lo, hi, known, name))
+        columns = ["t_s", value, f"{value}_lo", f"{value}_hi", *([exact] if exact else [])]
+        marks.append(line(own, columns, "", Style(numbers[label], i, i), name))
     return marks
-
-
-def _known(exact: np.ndarray | None) -> np.ndarray | None:
-    return exact if exact is not None and np.isfinite(exact).any() else None

@@ -17,29 +17,18 @@ from radarsim.studies.ambiguous_doppler.tables import Result
 if TYPE_CHECKING:
     import pandas as pd
 
-QUANTITIES = {
-    "r": panels.Quantity("$r$", term("range")),
-    "Vr": panels.Quantity("$V_r$", term("radial velocity")),
-    "ar": panels.Quantity("$a_r$", term("radial acceleration")),
-}
 DRAWN_FROM = {"right": ("folds",), "lost": ("folds",)}
 
 
 def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
     """sigma_r … gain_ar; right and lost; hypotheses; orders."""
-    curves = common.groups(made["curves"], "case", "filter", "component")
-    gains = common.groups(made["gains"], "case", "filter", "component")
-
-    def chosen(name: str) -> list[str]:
-        return [case.name for case in experiment.shown_in(name)]
-
-    drawn = panels.per_component(results, curves, gains, QUANTITIES, chosen)
+    drawn = panels.per_component(results, made, panels.RADIAL, experiment)
     for name, (column, words, caption) in SHARES.items():
-        some, left_out = panels.shown_families(results, chosen(name))
+        some, left_out = panels.shown_families(results, panels.named(experiment, name))
         figure = share_figure(name, some, made["folds"], (column, tr(words), tr(caption) + left_out)) if some else None
         drawn |= {name: figure} if figure else {}
     drawn |= hypotheses_figure(experiment.shown_in("hypotheses"))
-    some, left_out = panels.shown(results, chosen("orders"))
+    some, left_out = panels.shown(results, panels.named(experiment, "orders"))
     drawn |= orders_figure(some, made["orders"], left_out)
     return {name: one for name, one in seen.all_begun(drawn, SEEN).items() if one} | rare_figure(results, made["folds"])
 
@@ -94,8 +83,8 @@ def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, F
         for f in members[0].axes.filters:
             if all((one.name, f) in rows for one in members):
                 ends = [rows[members[i].name, f].iloc[-1] for i in order]
-                y, lo, hi = (np.array([end[c] for end in ends], float) for c in ("right", "right_lo", "right_hi"))
-                marks.append(Line(x[order], y, panels.literal(f), panels.look(len(marks), 0, 1), lo, hi))
+                look = panels.look(len(marks), 0, 1)
+                marks.append(panels.line_of(x[order], ends, ("right", "right_lo", "right_hi"), panels.literal(f), look))
         if len(keys) > 1 or axis.ticks or not marks or min(float(mark.y.min()) for mark in marks) < 1 - panels.RARE:
             return {}
         losses = [panels.lost(mark) for mark in marks]
@@ -112,12 +101,8 @@ def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, F
 
 
 def _share_panel(title: str, members: Sequence[Result], rows: Mapping, of: tuple[str, str]) -> Panel:
-    def draw(own: "pd.DataFrame", label: str, style: Style, name: str) -> Line:
-        x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", of[0], f"{of[0]}_lo", f"{of[0]}_hi"))
-        exact = own["exact_right"].to_numpy() if of[0] == "right" else np.full(x.shape, np.nan)
-        return Line(x, y, label, style, lo, hi, exact if np.isfinite(exact).any() else None, name)
-
-    marks = panels.lines_of(members, {(*key, of[0]): own for key, own in rows.items()}, of[0], draw)
+    columns = ("t_s", of[0], f"{of[0]}_lo", f"{of[0]}_hi", *(["exact_right"] if of[0] == "right" else []))
+    marks = panels.lines_of(members, {(*key, of[0]): own for key, own in rows.items()}, of[0], columns)
     lines = [mark for mark in marks if isinstance(mark, Line)]
     rare = lines and max(float(line.y[-1]) for line in lines) < panels.RARE
     panel = Panel(
@@ -188,12 +173,7 @@ def orders_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: st
         if result is None:
             continue
         marks = tuple(
-            Line(
-                rows["t_s"].to_numpy(),
-                rows["weight"].to_numpy(),
-                tr("order {number}", number=order),
-                panels.look(order, 0, 1),
-            )
+            panels.line(rows, ("t_s", "weight"), tr("order {number}", number=order), panels.look(order, 0, 1))
             for order, rows in ((n, own[own["order"] == n]) for n in range(3))
             if len(rows)
         )

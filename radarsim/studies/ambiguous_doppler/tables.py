@@ -10,29 +10,14 @@ from radarsim.report import panels, rare, statistics
 from radarsim.report import tables as common
 from radarsim.studies.ambiguous_doppler.axes import FoldedAxes
 from radarsim.studies.ambiguous_doppler.kernels.rare import BEYOND, FULL, WRONG
-from radarsim.studies.ambiguous_doppler.kernels.records import (
-    BEYOND_SUM,
-    BINS,
-    COUNT_SUM,
-    LISTED_SUM,
-    RIGHT_SUM,
-)
+from radarsim.studies.ambiguous_doppler.kernels.records import BEYOND_SUM, BINS, COUNT_SUM, LISTED_SUM, RIGHT_SUM
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Result = CaseResult[FoldedAxes]
-FOLDS = (
-    *("case", "filter", "k", "t_s", "n", "right", "right_lo", "right_hi", "exact_right"),
-    *("listed", "hypotheses", "beyond", "beyond_lo", "beyond_hi", "note"),
-)
-ORDERS = (
-    *("case", "filter", "order", "k", "t_s", "n", "weight", "weight_lo", "weight_hi"),
-    *("best_order_sigma_r", "best_combination_sigma_r"),
-)
-CALIBRATION = ("case", "filter", "k", "bin_lo", "bin_hi", "n", "right", "right_lo", "right_hi", "expected")
+table = common.Tables()
 WRONG_FOLD = "wrong fold"  # the event of rare.csv
-ABOVE = ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")
 # A velocity that is off by more than half the span, once in 10⁵, decides σ, and most samples hold none: they show no
 # tail. So σ is marked where fewer than so many were seen. Of `ambiguous_rls5`, 60 × 20 000 realisations, σ so marked
 # covers 45 %, and what is left unmarked 95 %.
@@ -44,10 +29,8 @@ def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
     few = _few_folds(results)
     return {
         "curves": _noted(common.curves(results), few),
-        "gains": _noted(gains(results), few),
-        "folds": folds(results),
-        "calibration": calibration(results),
-        "orders": orders(results),
+        "gains": _noted(common.joined(map(_gains, results)), few),
+        **table.made(results),
         **rare.table([rows for result in results if "events" in result.sums for rows in _rare(result)]),
     }
 
@@ -72,39 +55,34 @@ def _noted(table: "pd.DataFrame", few: set[tuple[str, str, int]]) -> "pd.DataFra
     return table.assign(note=[FEW_FOLDS if any(one in few for one in row) else "" for row in rows])
 
 
-def gains(results: Sequence[Result]) -> "pd.DataFrame":
+def _gains(result: Result) -> common.Columns:
     """The common table, with 100 (σ/σ_oracle − 1), paired, where a filter has the true folds."""
-    table = common.gains(results)
-    parts = [_above_oracle(result) for result in results]
-    return table.assign(**{name: np.concatenate([part[i] for part in parts]) for i, name in enumerate(ABOVE)})
+    return {**common.gains([result]), "above_oracle_percent|above_oracle": _above_oracle(result)}
 
 
-def _above_oracle(result: Result) -> tuple[np.ndarray, ...]:
-    """Value and interval (rows,) in the order of the rows of gains."""
+def _above_oracle(result: Result) -> statistics.Estimate:
+    """By how much σ is above the oracle's (rows,), in the order of the rows of gains."""
     axes, b = result.axes, result.axes.baseline
     both = np.array(axes.available[b : b + 1] & axes.available)
     both[b] = False
     at = f, k, c = common.shown(result, both)
     oracles = [i for i, one in enumerate(result.spec.filters) if one.doppler == "unfolded"]
     if not oracles:
-        return (np.full(f.size, np.nan),) * 3
+        return statistics.Estimate(*np.full((3, f.size), np.nan))
     o, error = oracles[0], np.asarray(result.sums["error"])
     own, base, cross = error[at], error[o, k, c], np.asarray(result.sums["oracle"])[at]
     of = statistics.gain(own[:, 1], own[:, 3], base[:, 1], base[:, 3], cross, common.realisations(result)[at])
     known = axes.available[o, k, c] & (f != o)
-    return tuple(np.where(known, -part, np.nan) for part in (of.value, of.hi, of.lo))
+    return statistics.Estimate(*(np.where(known, -part, np.nan) for part in (of.value, of.hi, of.lo)))
 
 
-def folds(results: Sequence[Result]) -> "pd.DataFrame":
+@table("folds")
+def _folds(result: Result) -> common.Columns:
     """How often all folds are right, by scan, of every filter that unfolds.
 
     right is the share of realisations whose best hypothesis has all folds right, listed that whose list holds the right
     one, hypotheses the mean number kept, beyond the share whose velocity is off by more than half the span.
     """
-    return common.joined([_folds(result) for result in results], FOLDS)
-
-
-def _folds(result: Result) -> dict[str, np.ndarray]:
     axes = result.axes
     shown = np.broadcast_to(unfolding(result)[:, None], axes.exact_right.shape)
     at = f, k = np.nonzero(shown & (np.asarray(result.sums["estimates"])[..., 0] > 0))
@@ -118,16 +96,13 @@ def _folds(result: Result) -> dict[str, np.ndarray]:
         right, beyond = rare.complement(rare.rate(wrong, drawn(result))), rare.rate(off, drawn(result))
         note = rare.note(drawn(result), wrong, off)
     return {
-        "case": np.full(f.size, result.name, dtype=object),
-        "filter": common.names(axes.filters, f),
-        "k": np.asarray(axes.k)[k],
-        "t_s": np.asarray(axes.t_s, dtype=float)[k],
+        **common.leading(result, f, k),
         "n": every.astype(np.int64),
-        **dict(zip(("right", "right_lo", "right_hi"), right, strict=True)),
+        "right": right,
         "exact_right": axes.exact_right[at],
         "listed": of[:, LISTED_SUM] / n,
         "hypotheses": of[:, COUNT_SUM] / n,
-        **dict(zip(("beyond", "beyond_lo", "beyond_hi"), beyond, strict=True)),
+        "beyond": beyond,
         "note": note,
     }
 
@@ -165,67 +140,45 @@ def _rare(result: Result) -> Iterator[dict[str, np.ndarray]]:
 def _rare_rows(result: Result, f: np.ndarray, sought: np.ndarray, event: int, name: str) -> dict[str, np.ndarray]:
     """Columns of rare.csv of filters f (n,), of an event by its place in the sums and its name."""
     k = np.full(f.size, len(result.axes.k) - 1)
-    names = common.names(result.axes.filters, f)
-    labels = {
-        "case": np.full(f.size, result.name, dtype=object),
-        "filter": names,
-        "k": np.asarray(result.axes.k)[k],
-        "t_s": np.asarray(result.axes.t_s, dtype=float)[k],
-    }
-    return rare.rows(labels, name, sought, events(result, (f, k), event), drawn(result))
+    return rare.rows(common.leading(result, f, k), name, sought, events(result, (f, k), event), drawn(result))
 
 
-def calibration(results: Sequence[Result]) -> "pd.DataFrame":
+@table("calibration")
+def _calibration(result: Result) -> common.Columns:
     """By the probability that a filter gives its best hypothesis, in ten bins: how often that is right.
 
     Of filters that keep several hypotheses, at each scan, over realisations with a plot there; empty bins have no row.
     expected is the mean of these probabilities, which `right` equals where truth and filter agree.
     """
-    return common.joined([_calibration(result) for result in results], CALIBRATION)
-
-
-def _calibration(result: Result) -> dict[str, np.ndarray]:
     axes, counted = result.axes, np.asarray(result.sums["calibration"])
     at = f, k, bins = np.nonzero(axes.remembers[:, None, None] & (counted[..., 0] > 0))
-    n = counted[at][:, 0]
-    right = statistics.rate(counted[at][:, 1], n)
+    n, right, expected = counted[at].T
     return {
-        "case": np.full(f.size, result.name, dtype=object),
-        "filter": common.names(axes.filters, f),
+        **common.leading(result, f),
         "k": np.asarray(axes.k)[k],
-        "bin_lo": bins / BINS,
-        "bin_hi": (bins + 1) / BINS,
-        "n": n.astype(np.int64),
-        **dict(zip(("right", "right_lo", "right_hi"), right, strict=True)),
-        "expected": counted[at][:, 2] / n,
+        **{"bin_lo": bins / BINS, "bin_hi": (bins + 1) / BINS, "n": n.astype(np.int64)},
+        "right": statistics.rate(right, n),
+        "expected": expected / n,
     }
 
 
-def orders(results: Sequence[Result]) -> "pd.DataFrame":
+@table("orders")
+def _orders(result: Result) -> common.Columns:
     """Mean weight of each order in the range, by scan, of filters that combine orders.
 
     The weight is the probability of the order, its share (of several members the sum; it may be negative), or how often
     it is chosen. best_order_sigma_r and best_combination_sigma_r are exact bounds of the same members on this target,
     all folds right: the best member at each scan, and the best linear combination.
     """
-    return common.joined([_orders(result) for result in results], ORDERS)
-
-
-def _orders(result: Result) -> dict[str, np.ndarray]:
     axes, given = result.axes, [set(one.orders) for one in result.spec.filters]
     own = np.array([[axes.combines[f] and order in given[f] for order in range(3)] for f in range(len(given))])
     counted = np.asarray(result.sums["estimates"])[..., 0]
     f, order, k = np.nonzero(own[:, :, None] & (counted > 0)[:, None])
     n, sums = counted[f, k], np.asarray(result.sums["orders"])[f, k, order]
-    weight = statistics.mean(sums[:, 0], sums[:, 1], n)
     return {
-        "case": np.full(f.size, result.name, dtype=object),
-        "filter": common.names(axes.filters, f),
-        "order": order,
-        "k": np.asarray(axes.k)[k],
-        "t_s": np.asarray(axes.t_s, dtype=float)[k],
+        **common.leading(result, f, k, order=order),
         "n": n.astype(np.int64),
-        **dict(zip(("weight", "weight_lo", "weight_hi"), weight, strict=True)),
+        "weight": statistics.mean(sums[:, 0], sums[:, 1], n),
         "best_order_sigma_r": axes.best_order[f, k, 0],
         "best_combination_sigma_r": axes.best_combination[f, k, 0],
     }

@@ -39,7 +39,7 @@ def figures(results: Sequence[CaseResult], made: Mapping, experiment: Experiment
     drawn: dict[str, Figure] = {}
 
     def chosen(name: str, among: Sequence[CaseResult]) -> list[CaseResult]:
-        wanted = {case.name for case in experiment.shown_in(name)}
+        wanted = panels.named(experiment, name)
         return [result for result in among if result.name in wanted]
 
     plain = [result for result in results if not result.swept]
@@ -159,8 +159,7 @@ def locks(result: CaseResult, made: Mapping) -> Figure:
     drawn = result.axes.filters[:MOST_LINES]
     for n, name in enumerate(drawn):
         own = rows[(result.name, name)]
-        t, value, lo, hi = (own[c].to_numpy(float) for c in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
-        marks.append(Line(t, value, name, Style(n, n, n), lo, hi))
+        marks.append(panels.line(own, ("t_s", "lock_rate", "lock_lo", "lock_hi"), name, n))
     caption = tr(
         "A burst is locked with every component within five potential spreads of the window (without "
         "prior; the phase to the nearest turn); of {count:,} bursts. Bands: 95 % intervals.",
@@ -195,9 +194,8 @@ def accuracy(result: CaseResult, made: Mapping) -> Figure:
             own = rows.get((result.name, name, component))
             if own is None or len(own) < 2:
                 continue
-            t, bound = own["t_s"].to_numpy(float), own["posterior_sigma"].to_numpy(float)
-            value, lo, hi = (own[c].to_numpy(float) / bound for c in ("sigma", "sigma_lo", "sigma_hi"))
-            marks.append(Line(t, value, NAMES[component], Style(n, n % 4, n), lo, hi))
+            over = own.assign(**{name: own[name] / own["posterior_sigma"] for name in panels.SIGMA[1:4]})
+            marks.append(panels.line(over, panels.SIGMA[:4], NAMES[component], Style(n, n % 4, n)))
         if len(marks) > 1:
             axis = Axis(tr("$\\sigma$ / bound"), limits=(0.9, 1.3))
             drawn.append(Panel(Axis(tr(WINDOW), "log"), axis, tuple(marks), name, direct=False))
@@ -227,9 +225,8 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
     order = np.argsort(x)
     marks: list[Line] = []
     for n, estimator in enumerate(members[0].axes.filters):
-        ends = [final(made, members[i], estimator) for i in order]
-        value, lo, hi = (np.array([row[c] for row in ends], float) for c in ("lock_rate", "lock_lo", "lock_hi"))
-        marks.append(Line(x[order], value, estimator, Style(n, n % 4, n), lo, hi))
+        ends, columns = [final(made, members[i], estimator) for i in order], ("lock_rate", "lock_lo", "lock_hi")
+        marks.append(panels.line_of(x[order], ends, columns, estimator, Style(n, n % 4, n)))
     scale = "log" if x.min() > 0 and x.max() / x.min() > 20 else "linear"
     called = panels.key_label(members[0], key).text
     caption = tr(

@@ -17,19 +17,15 @@ if TYPE_CHECKING:
 
 WAVELENGTHS_M = (("metre", 1.8), ("decimetre", 0.15), ("centimetre", 0.03))  # P1's five radars have these three
 QUANTILES = (0.05, 0.5, 0.95)
+table = common.Tables()
 
 
 def tables(results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
     """curves and gains in place of the common ones, and locks, windows, residuals, bounds, motion, passes; rare."""
     return {
         "curves": curves(results),
-        "gains": common.frame({name: [] for name in common.GAINS}),
-        "locks": common.joined([_locks(result) for result in results], LOCKS),
-        "residuals": common.joined([_residuals(result) for result in results], RESIDUALS),
-        "windows": common.joined([_windows(result) for result in results], WINDOWS),
-        "bounds": common.joined([_bounds(result) for result in results], BOUNDS),
-        "motion": common.joined([_motion(result) for result in results], MOTION),
-        "passes": common.joined([_passes(result) for result in results], PASSES),
+        "gains": common.joined((), common.GAINS),
+        **table.made(results),
         **rare.table([_rare(result) for result in results if "losses" in result.sums]),
     }
 
@@ -39,15 +35,12 @@ def plain(result: CaseResult) -> int:
     return int(result.sums["drawn"][0]) if "drawn" in result.sums else result.count
 
 
-CURVES = (*common.CURVES, "sigma_all", "posterior_sigma")
-
-
 def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """σ of the locked bursts in place of the common table."""
-    return common.joined([_curves(result) for result in results], CURVES)
+    return common.joined(map(_curves, results))
 
 
-def _curves(result: CaseResult) -> dict[str, np.ndarray]:
+def _curves(result: CaseResult) -> common.Columns:
     """σ of the locked bursts, window by window; sigma_all of all of them, none dropped."""
     axes, at = result.axes, common.shown(result)
     f, k, c = at
@@ -59,7 +52,7 @@ def _curves(result: CaseResult) -> dict[str, np.ndarray]:
     return {
         **_labels(result, f, k, c),
         "n": n.astype(np.int64),
-        **common.interval("sigma", statistics.Estimate(*(part * bound for part in of.sigma))),
+        "sigma": statistics.Estimate(*(part * bound for part in of.sigma)),
         "bias": of.bias * bound,
         "bias_se": of.bias_se * bound,
         "spread": of.spread * bound,
@@ -83,15 +76,8 @@ def _at_windows(result: CaseResult) -> tuple[np.ndarray, np.ndarray]:
     return f, k
 
 
-LOCKS = (
-    *("case", "filter", "k", "t_s", "n", "lock_rate", "lock_lo", "lock_hi", "lock_rate_3sigma"),
-    *("posterior_rate", "posterior_rate_3sigma"),
-    *("always_rate_3sigma", "always_lo", "always_hi", "always_posterior_rate_3sigma", "always_posterior_lo"),
-    *("always_posterior_hi", "energy_ratio", "note"),
-)
-
-
-def _locks(result: CaseResult) -> dict[str, np.ndarray]:
+@table("locks")
+def _locks(result: CaseResult) -> common.Columns:
     """Share of bursts within 5 and 3 potential σ at each window, within as many posterior ones, and within 3 so far."""
     f, k = _at_windows(result)
     count = result.sums["locks"][f, k]
@@ -103,16 +89,15 @@ def _locks(result: CaseResult) -> dict[str, np.ndarray]:
         note = rare.note(drawn(result), every["lock"])
         so_far = rare.note(drawn(result), every["always_three"], every["always_posterior_three"])
         note = np.where((note == "") & (so_far != ""), "always: " + so_far, note)
-    lock, always, always_posterior = rates["lock"], rates["always_three"], rates["always_posterior_three"]
     return {
         **_labels(result, f, k),
         "n": np.full(f.size, result.count),
-        **common.interval("lock_rate", lock, "lock"),
+        "lock_rate|lock": rates["lock"],
         "lock_rate_3sigma": rates["three"].value,
         "posterior_rate": rates["posterior"].value,
         "posterior_rate_3sigma": rates["posterior_three"].value,
-        **common.interval("always_rate_3sigma", always, "always"),
-        **common.interval("always_posterior_rate_3sigma", always_posterior, "always_posterior"),
+        "always_rate_3sigma|always": rates["always_three"],
+        "always_posterior_rate_3sigma|always_posterior": rates["always_posterior_three"],
         "energy_ratio": result.axes.energy_ratio[f, k],
         "note": note,
     }
@@ -137,10 +122,8 @@ def _rare(result: CaseResult) -> dict[str, np.ndarray]:
     return rare.rows(_labels(result, f, k), "loss of lock", sought, lost, drawn(result))
 
 
-RESIDUALS = ("case", "filter", "component", "unit", "k", "t_s", "n", "q05", "median", "q95", "posterior_sigma")
-
-
-def _residuals(result: CaseResult) -> dict[str, np.ndarray]:
+@table("residuals")
+def _residuals(result: CaseResult) -> common.Columns:
     """Median and 5 to 95 % band of |error| over all bursts, locked or not, from the histograms."""
     at = f, k, c = common.shown(result)
     bound = result.axes.posterior_sigma[at]
@@ -170,10 +153,8 @@ def quantiles(counts: np.ndarray, edges: np.ndarray, at: Sequence[float]) -> lis
     return found
 
 
-WINDOWS = ("case", "filter", "k", "t_s", "pulses", "energy_ratio")
-
-
-def _windows(result: CaseResult) -> dict[str, np.ndarray]:
+@table("windows")
+def _windows(result: CaseResult) -> common.Columns:
     """The schedules: what (15), (16) and the options made."""
     f, k = _at_windows(result)
     pulses = result.axes.pulses
@@ -184,21 +165,17 @@ def _windows(result: CaseResult) -> dict[str, np.ndarray]:
     }
 
 
-BOUNDS = (
-    *("case", "component", "unit", "prior_sigma", "potential_sigma", "potential_sigma_sum", "shortest_window_s"),
-    *("model_error_turns", "model_error_hz"),
-)
-
-
-def _bounds(result: CaseResult) -> dict[str, np.ndarray]:
+@table("bounds")
+def _bounds(result: CaseResult) -> common.Columns:
     """Spreads of prior and bound (closed form, and the exact sum over samples), T_min, and what no polynomial fits."""
     axes = result.axes
     f, k = next((f, k) for f, k in zip(*_at_windows(result), strict=True) if _is_whole(result, f, k))
     size = len(axes.components)
+    names, units = zip(*axes.components, strict=True)
     return {
         "case": np.full(size, result.name, dtype=object),
-        "component": np.array([name for name, _ in axes.components], dtype=object),
-        "unit": np.array([unit for _, unit in axes.components], dtype=object),
+        "component": np.array(names, dtype=object),
+        "unit": np.array(units, dtype=object),
         "prior_sigma": axes.prior_sigma,
         "potential_sigma": axes.potential_closed_form,
         "potential_sigma_sum": axes.exact_sigma[f, k],
@@ -213,24 +190,21 @@ def _is_whole(result: CaseResult, f: int, k: int) -> bool:
     return bool(np.isclose(duration[f, k], np.nanmax(duration)))
 
 
-MOTION = ("case", "band", "wavelength_m", "at", "sigma_velocity_mps", "sigma_acceleration_mps2")
-
-
-def _motion(result: CaseResult) -> dict[str, np.ndarray]:
+@table("motion")
+def _motion(result: CaseResult) -> common.Columns:
     """Spreads of radial velocity and acceleration, λ/2 of those of f₀ and f₁, at the burst's beginning and middle."""
     axes, rows = result.axes, []
     covariance, duration = axes.potential_covariance, axes.burst_s
     for band, wavelength in WAVELENGTHS_M:
         for place, t in (("beginning", 0.0), ("middle", 0.5 * duration)):
             velocity, acceleration = (0.5 * wavelength * exact.derivative_spread(covariance, i, t) for i in (0, 1))
-            rows.append((result.name, band, wavelength, place, velocity, acceleration))
-    return {name: np.array([row[i] for row in rows]) for i, name in enumerate(MOTION)}
+            row = {"case": result.name, "band": band, "wavelength_m": wavelength, "at": place}
+            rows.append(row | {"sigma_velocity_mps": velocity, "sigma_acceleration_mps2": acceleration})
+    return common.of_rows(rows)
 
 
-PASSES = ("case", "filter", "n", "passes", "passes_lo", "passes_hi")
-
-
-def _passes(result: CaseResult) -> dict[str, np.ndarray]:
+@table("passes")
+def _passes(result: CaseResult) -> common.Columns:
     """Passes over a window's data a burst, the measure of an estimator's cost: mean with its interval."""
     n, total = plain(result), result.sums["passes"]
     of = statistics.mean(total[:, 0], total[:, 1], n)
@@ -238,5 +212,5 @@ def _passes(result: CaseResult) -> dict[str, np.ndarray]:
     return {
         **common.leading(result, np.arange(count)),
         "n": np.full(count, n),
-        **common.interval("passes", of),
+        "passes": of,
     }

@@ -33,7 +33,7 @@ def figures(
     """All figures that these results can fill, by name; each shows the cases that the config names for it."""
 
     def chosen(name: str) -> list[CaseResult]:
-        return panels.shown(results, [case.name for case in experiment.shown_in(name)])[0]
+        return panels.shown(results, panels.named(experiment, name))[0]
 
     drawn: dict[str, Figure | None] = {}
     for component in SIGMAS:
@@ -195,8 +195,7 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
         for f, style in zip(result.axes.filters, _styles(result), strict=True):
             own = rows.get((result.name, f))
             if own is not None:
-                t, value, lo, hi = (own[key].to_numpy(float) for key in ("t_s", "sigma", "sigma_lo", "sigma_hi"))
-                marks.append(Line(t, value, panels.literal(f), replace(style, marker=None), lo, hi))
+                marks.append(panels.line(own, panels.SIGMA[:4], panels.literal(f), replace(style, marker=None)))
         y = Axis(panels.sigma_of(symbol, unit), "log")
         drawn.append(Panel(panels.time_axis(), y, tuple(marks), _title(result, results), direct=len(results) == 1))
     if len(drawn) > 1:
@@ -234,11 +233,9 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
                 continue
             marks: list = list(_stage_lines([result]))
             for m, motion in enumerate(_motions(options.models)):
+                columns = ("t_s", "probability", "probability_lo", "probability_hi")
                 own = rows[(result.name, name, m + 1)]
-                t, value, lo, hi = (
-                    own[key].to_numpy(float) for key in ("t_s", "probability", "probability_lo", "probability_hi")
-                )
-                marks.append(Line(t, value, f"{m + 1} {motion}", Style(m, m), lo, hi))
+                marks.append(panels.line(own, columns, f"{m + 1} {motion}", Style(m, m)))
             title = panels.literal(name) if len(results) == 1 else f"{_title(result, results)}: {panels.literal(name)}"
             drawn.append(
                 Panel(
@@ -366,8 +363,8 @@ def consistency(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure 
             own = rows[(f,)]
             stages = tuple(tr(str(stage)) for stage in own["stage"])
             x = np.arange(len(own)) + SPREAD / len(result.axes.filters) * (n - (len(result.axes.filters) - 1) / 2)
-            value, lo, hi = (own[name].to_numpy(float) for name in (key, f"{key}_lo", f"{key}_hi"))
-            marks.append(Line(x, value, panels.literal(f), replace(style, dash=None), lo, hi))
+            columns = ("x", key, f"{key}_lo", f"{key}_hi")
+            marks.append(panels.line(own.assign(x=x), columns, panels.literal(f), replace(style, dash=None)))
         axis = Axis(tr("stage"), ticks=tuple(enumerate(stages)))
         drawn.append(Panel(axis, Axis(tr("mean per degree of freedom"), "log"), tuple(marks), title, direct=False))
     drawn = _beside(drawn, result, dash=None)

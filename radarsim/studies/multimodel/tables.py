@@ -17,30 +17,18 @@ if TYPE_CHECKING:
 
     from radarsim.studies.multimodel.study import FlightAxes
 
+table = common.Tables()
 FREEDOM = 3  # degrees of freedom of a position's or a plot's normalised error squared
 
 
 def tables(results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
     """The tables beyond curves and gains: probabilities, stages, consistency, operations."""
-    return {
-        "probabilities": probabilities(results),
-        "stages": stages(results),
-        "consistency": normalised_errors(results),
-        "operations": operations(results),
-    }
+    return table.made(results)
 
 
-PROBABILITIES = (
-    *("case", "filter", "model", "k", "t_s", "n", "probability", "probability_lo", "probability_hi", "motion"),
-)
-
-
-def probabilities(results: Sequence[CaseResult]) -> "pd.DataFrame":
+@table("probabilities")
+def _probabilities(result: CaseResult) -> common.Columns:
     """Mean probability of each model by scan, with its interval; models count from 1 (contract: probabilities.csv)."""
-    return common.joined([_probabilities(result) for result in results], PROBABILITIES)
-
-
-def _probabilities(result: CaseResult) -> dict[str, np.ndarray]:
     axes, models = result.axes, [filters.labels(options.models) for options in result.spec.filters]
     shown = [(f, m) for f, own in enumerate(models) for m in range(len(own)) if len(own) > 1]
     scans = len(axes.k)
@@ -52,24 +40,9 @@ def _probabilities(result: CaseResult) -> dict[str, np.ndarray]:
     return {
         **common.leading(result, f, k, model=m + 1),
         "n": np.full(f.size, result.count),
-        **common.interval("probability", of),
+        "probability": of,
         "motion": np.array([models[a][b] for a, b in zip(f, m, strict=True)], dtype=object),
     }
-
-
-STAGES = (
-    *("case", "filter", "stage", "begin_s", "end_s", "component", "unit", "n", "sigma", "sigma_lo", "sigma_hi"),
-    *("baseline", "gain_percent", "gain_lo", "gain_hi", "note"),
-)
-
-
-def stages(results: Sequence[CaseResult]) -> "pd.DataFrame":
-    """σ over each stage of the flight, of all its scans, and the paired gain against the baseline filter.
-
-    `note` says where few realisations make the spread of their mean squares, of the filter or of the baseline.
-    """
-    rows = [row for result in results for row in _stages(result)]
-    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(STAGES)})
 
 
 def stage_names(result: CaseResult) -> tuple[str, ...]:
@@ -96,38 +69,41 @@ def stage_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> statist
     return statistics.gain(a, aa, b, bb, np.asarray(result.sums["pairs"])[f, base, s, c], result.count)
 
 
-def _stages(result: CaseResult) -> list[tuple]:
+@table("stages")
+def _stages(result: CaseResult) -> common.Columns:
+    """σ over each stage of the flight, of all its scans, and the paired gain against the baseline filter.
+
+    `note` says where few realisations make the spread of their mean squares, of the filter or of the baseline.
+    """
     rows, axes, b = [], result.axes, result.axes.baseline
     places = {name: s for s, name in enumerate(stage_names(result))}
     square, fourth = np.moveaxis(np.asarray(result.sums["stage"]), -1, 0)
     few = statistics.effective(square, fourth, result.count) < notes.EFFECTIVE
+    nothing = statistics.Estimate(np.nan, np.nan, np.nan)
     for f, label in enumerate(axes.filters):
         for stage, begin, end in stage_bounds(result):
             for c, (component, unit) in enumerate(axes.components):
                 s = places[stage]
-                sigma = stage_sigma(result, f, s, c)
-                nothing = statistics.Estimate(np.nan, np.nan, np.nan)
-                gain = stage_gain(result, f, b, s, c) if f != b else nothing
-                where = (result.name, label, stage, begin, end, component, unit, result.count)
-                said = notes.HEAVY if few[f, s, c] else notes.OF_GAIN + notes.HEAVY if few[b, s, c] else ""
-                rows.append((*where, *map(float, sigma), axes.filters[b], *map(float, gain), said))
-    return rows
+                row = {
+                    **{"case": result.name, "filter": label, "stage": stage, "begin_s": begin, "end_s": end},
+                    **{"component": component, "unit": unit, "n": result.count},
+                    "sigma": stage_sigma(result, f, s, c),
+                    "baseline": axes.filters[b],
+                    "gain_percent|gain": stage_gain(result, f, b, s, c) if f != b else nothing,
+                    "note": notes.HEAVY if few[f, s, c] else notes.OF_GAIN + notes.HEAVY if few[b, s, c] else "",
+                }
+                rows.append(row)
+    return common.of_rows(rows)
 
 
-CONSISTENCY = ("case", "filter", "stage", "n", *consistency.columns("nees"), *consistency.columns("nis"))
-
-
-def normalised_errors(results: Sequence[CaseResult]) -> "pd.DataFrame":
+@table("consistency")
+def _consistency(result: CaseResult) -> common.Columns:
     """NEES and NIS of each filter by stage, per degree of freedom, with bounds and verdicts.
 
     NEES of the position with the filter's own covariance, at the reported scans; NIS of the plot against what the
     hypothesis predicted that was the most probable before it, at all scans. In 95 % of runs in which all of a case's
     filters are right about themselves, all their stages lie within the bounds.
     """
-    return common.joined([_normalised_errors(result) for result in results], CONSISTENCY)
-
-
-def _normalised_errors(result: CaseResult) -> dict[str, np.ndarray]:
     axes, n = result.axes, result.count
     names = stage_names(result)
     s = np.array([names.index(stage) for stage, *_ in stage_bounds(result)])
@@ -146,27 +122,24 @@ def _normalised_errors(result: CaseResult) -> dict[str, np.ndarray]:
     }
 
 
-OPERATIONS = ("case", "filter", "family", "merge", "models", "stage", "merged", "merges", "operations")
-
-
-def operations(results: Sequence["CaseResult[FlightAxes]"]) -> "pd.DataFrame":
+@table("operations")
+def _operations(result: "CaseResult[FlightAxes]") -> common.Columns:
     """Arithmetic operations of one update of one realisation, counted: mean over the scans of each stage, and over all.
 
     merged: hypotheses that went into merges of more than one; merges: their number; both a scan.
     """
-    rows = []
-    for result in results:
-        scans = result.axes.stage_scans
-        for f, options in enumerate(result.spec.filters):
-            fixed, each, once = costs.operations_of(options)
-            own = np.asarray(result.sums["stage"])[f, :, [MERGED, MERGES], 0].T / result.count
-            whole = scans @ own / scans.sum()
-            named = [(name, own[s]) for s, name in enumerate(stage_names(result)) if scans[s] > 0]
-            label, what = result.axes.filters[f], (options.family, options.merge, len(options.models))
-            for stage, (merged, merges) in [*named, ("whole", whole)]:
-                count = fixed + each * merged + once * merges
-                rows.append((result.name, label, *what, stage, float(merged), float(merges), float(count)))
-    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(OPERATIONS)})
+    rows, scans = [], result.axes.stage_scans
+    for f, options in enumerate(result.spec.filters):
+        fixed, each, once = costs.operations_of(options)
+        own = np.asarray(result.sums["stage"])[f, :, [MERGED, MERGES], 0].T / result.count
+        whole = scans @ own / scans.sum()
+        named = [(name, own[s]) for s, name in enumerate(stage_names(result)) if scans[s] > 0]
+        what = {"family": options.family, "merge": options.merge, "models": len(options.models)}
+        for stage, (merged, merges) in [*named, ("whole", whole)]:
+            row = {"case": result.name, "filter": result.axes.filters[f], **what, "stage": stage}
+            counted = {"merged": merged, "merges": merges, "operations": fixed + each * merged + once * merges}
+            rows.append(row | counted)
+    return common.of_rows(rows)
 
 
 def cost(made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":

@@ -18,11 +18,6 @@ from radarsim.studies.pulses_to_tracks.tables import Result
 if TYPE_CHECKING:
     import pandas as pd
 
-QUANTITIES = {
-    "r": panels.Quantity("$r$", term("range")),
-    "Vr": panels.Quantity("$V_r$", term("radial velocity")),
-    "ar": panels.Quantity("$a_r$", term("radial acceleration")),
-}
 FEW = 30  # realisations behind a point
 WIDE = 15  # largest over least σ from which its axis is logarithmic
 DRAWN_FROM = {"threshold": ("locks", "curves"), "measured": ("estimates",)}
@@ -30,19 +25,13 @@ DRAWN_FROM = {"threshold": ("locks", "curves"), "measured": ("estimates",)}
 
 def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
     """sigma_r … gain_ar; folds; locks, measured, losses of what is not swept, threshold of what is."""
-    curves = common.groups(made["curves"], "case", "filter", "component")
-    gains = common.groups(made["gains"], "case", "filter", "component")
-
-    def chosen(name: str) -> list[str]:
-        return [case.name for case in experiment.shown_in(name)]
-
     drawn = {
         name: replace(figure, panels=tuple(map(wide, figure.panels))) if name.startswith("sigma") else figure
-        for name, figure in panels.per_component(results, curves, gains, QUANTITIES, chosen).items()
+        for name, figure in panels.per_component(results, made, panels.RADIAL, experiment).items()
     }
     for name, (draw, title, caption) in OWN.items():
         unswept = [result for result in panels.unswept(results) if not result.swept]
-        some, left_out = panels.shown(results if name == "folds" else unswept, chosen(name))
+        some, left_out = panels.shown(results if name == "folds" else unswept, panels.named(experiment, name))
         found = [panel for result in some if (panel := draw(result, made)).marks]
         if found:
             drawn[name] = _figure(name, tr(title), tr(caption) + left_out, found)
@@ -120,9 +109,9 @@ def _locked(result: Result, locks: "pd.DataFrame", name: str) -> tuple[float, fl
     return float(row["lock_rate"]), float(row["lock_lo"]), float(row["lock_hi"])
 
 
-def _look(result: Result, name: str) -> Style:
-    """A filter's look, the same in every figure of its case."""
-    return panels.look(result.axes.filters.index(name), 0, 1)
+def _line(result: Result, name: str, rows: "pd.DataFrame", columns: Sequence[str]) -> Line:
+    """A filter's line, which looks the same in every figure of its case."""
+    return panels.line(rows, columns, panels.literal(name), panels.look(result.axes.filters.index(name), 0, 1))
 
 
 def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
@@ -131,9 +120,8 @@ def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     marks = []
     ideal = {one.name for one in result.spec.filters if one.estimator == "fisher_bound"}
     for (name,), own in rows.items():
-        x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", "lock_rate", "lock_lo", "lock_hi"))
-        if ((1 - y) * own["n"]).sum() >= FEW_EVENTS and name not in ideal:
-            marks.append(panels.lost(Line(x, y, panels.literal(name), _look(result, name), lo, hi)))
+        if ((1 - own["lock_rate"]) * own["n"]).sum() >= FEW_EVENTS and name not in ideal:
+            marks.append(panels.lost(_line(result, name, own, ("t_s", "lock_rate", "lock_lo", "lock_hi"))))
     y_axis = panels.loss_axis(tr("P(not locked)"), marks)
     return Panel(panels.time_axis(), y_axis, tuple(marks), _title(result))
 
@@ -141,10 +129,7 @@ def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
 def folds_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """How often the best hypothesis has no wrong fold against time, a line for each filter that keeps several."""
     rows = common.groups(made["folds"][made["folds"]["case"] == result.name], "filter")
-    marks = []
-    for (name,), own in rows.items():
-        x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", "right", "right_lo", "right_hi"))
-        marks.append(Line(x, y, panels.literal(name), _look(result, name), lo, hi))
+    marks = [_line(result, name, own, ("t_s", "right", "right_lo", "right_hi")) for (name,), own in rows.items()]
     return Panel(panels.time_axis(), Axis(tr("P(no wrong fold)"), limits=(0, 1)), tuple(marks), _title(result))
 
 
@@ -152,13 +137,10 @@ def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """Errors of the measured velocity of all bursts against time, and the Fisher bound."""
     table = made["estimates"]
     rows = common.groups(table[(table["case"] == result.name) & (table["component"] == "Vr")], "filter")
-    marks: list[Line] = []
-    for (name,), own in rows.items():
-        x, y, lo, hi = (own[column].to_numpy() for column in ("t_s", "sigma_all", "sigma_all_lo", "sigma_all_hi"))
-        marks.append(Line(x, y, panels.literal(name), _look(result, name), lo, hi))
+    columns = ("t_s", "sigma_all", "sigma_all_lo", "sigma_all_hi")
+    marks = [_line(result, name, own, columns) for (name,), own in rows.items()]
     if rows:
-        own = next(iter(rows.values()))
-        marks.append(Line(own["t_s"].to_numpy(), own["bound"].to_numpy(), tr("Fisher bound"), Style(9, 1)))
+        marks.append(panels.line(next(iter(rows.values())), ("t_s", "bound"), tr("Fisher bound"), Style(9, 1)))
     panel = Panel(panels.time_axis(), Axis(tr("$\\sigma$ of measured $V_r$, m/s")), tuple(marks), _title(result))
     return wide(panel)
 
@@ -171,8 +153,8 @@ def losses_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     for (name,), rows in common.groups(own, "filter").items():
         rows = rows[rows["n"] >= FEW]
         if len(rows) > 1:
-            x, y, lo, hi = (rows[c].to_numpy(dtype=float) for c in ("since_loss", "sigma", "sigma_lo", "sigma_hi"))
-            marks.append(Line(x, y, panels.literal(name), _look(result, name), lo, np.minimum(hi, 1e3 * y)))
+            rows = rows.assign(sigma_hi=np.minimum(rows["sigma_hi"], 1e3 * rows["sigma"]))
+            marks.append(_line(result, name, rows, ("since_loss", "sigma", "sigma_lo", "sigma_hi")))
     ticks = tuple((float(age), str(age) if age < AGES - 1 else f"{age}+") for age in range(AGES))
     x_axis = Axis(tr("scans since a burst was lost"), ticks=ticks)
     return wide(Panel(x_axis, Axis(tr("$\\sigma$ of $r$ at the last scan, m")), tuple(marks), _title(result)))

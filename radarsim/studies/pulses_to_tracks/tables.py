@@ -10,35 +10,14 @@ from radarsim.report import panels, statistics
 from radarsim.report import tables as common
 from radarsim.report.notes import EFFECTIVE, HEAVY
 from radarsim.studies.pulses_to_tracks.axes import PulsesAxes
-from radarsim.studies.pulses_to_tracks.kernels.records import (
-    LISTED,
-    LOCKED,
-    LOCKED_3,
-    NUMBER,
-    RIGHT,
-    TAKEN,
-    WRONG_FOLD,
-)
+from radarsim.studies.pulses_to_tracks.kernels import records as rec
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Result = CaseResult[PulsesAxes]
+table = common.Tables()
 MEASURED = 1  # number of the component that a burst's first number measures
-LOCKS = (
-    *("case", "filter", "k", "t_s", "n", "lock_rate", "lock_lo", "lock_hi", "lock_rate_3sigma"),
-    *("taken", "wrong_fold", "wrong_fold_lo", "wrong_fold_hi"),
-)
-ESTIMATES = (
-    *("case", "filter", "component", "unit", "k", "t_s", "n", "sigma", "sigma_lo", "sigma_hi"),
-    *("sigma_all", "sigma_all_lo", "sigma_all_hi", "bound", "energy_db", "note"),
-)
-LOSSES = ("case", "filter", "component", "unit", "k", "t_s", "since_loss", "n", "sigma", "sigma_lo", "sigma_hi")
-IDEAL = ("case", "filter", "ideal", "component", "unit", "k", "t_s", "over_ideal", "over_ideal_lo", "over_ideal_hi")
-FOLDS = ("case", "filter", "k", "t_s", "n", "right", "right_lo", "right_hi", "listed", "hypotheses")
-PASSES = ("case", "filter", "passes", "passes_lo", "passes_hi")
-
-
 OF_ALL = f"sigma_all: {HEAVY}"  # where the lost among all bursts, few of them, decide
 # A lost burst is rare and decides σ: where it is missing in a sample, nothing else in that tells of it. As many more
 # are supposed as the sample leaves possible (95 %); what they would add is marked from half of the interval on.
@@ -50,7 +29,7 @@ def unseen(result: Result) -> np.ndarray:
     """The probability (F,) of a lost burst, beyond what was seen, that is the greatest the sample leaves possible."""
     from scipy.special import chdtri
 
-    lost = (result.count - np.asarray(result.sums["locks"])[..., LOCKED]).sum(axis=1)
+    lost = (result.count - np.asarray(result.sums["locks"])[..., rec.LOCKED]).sum(axis=1)
     most = 0.5 * chdtri(2.0 * (lost + 1.0), 0.05) - lost
     return np.minimum(most / (result.count * result.axes.k.size), result.axes.most_lost)
 
@@ -84,16 +63,8 @@ def noted(table: "pd.DataFrame", found: Mapping[tuple[str, str, str, int], str])
 def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
     """Curves and gains, marked where losses that were not seen may decide, and the study's own tables."""
     found = marks(results)
-    return {
-        "curves": noted(common.curves(results), found),
-        "gains": noted(common.gains(results), found),
-        "locks": common.joined([_locks(result) for result in results], LOCKS),
-        "estimates": noted(common.joined([_estimates(result) for result in results], ESTIMATES), found),
-        "losses": noted(common.joined([_losses(result) for result in results], LOSSES), found),
-        "idealisations": noted(common.joined([_ideal(result) for result in results], IDEAL), found),
-        "folds": common.joined([_folds(result) for result in results], FOLDS),
-        "passes": common.joined([_passes(result) for result in results], PASSES),
-    }
+    made = {"curves": common.curves(results), "gains": common.gains(results), **table.made(results)}
+    return {name: noted(one, found) if "component" in one else one for name, one in made.items()}
 
 
 def _scans(result: Result, shown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -102,39 +73,42 @@ def _scans(result: Result, shown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return f, k
 
 
-def _locks(result: Result) -> dict[str, np.ndarray]:
+@table("locks")
+def _locks(result: Result) -> common.Columns:
     """Share of bursts that locked, of those taken (or mean weight), and of those taken in a fold that is not true."""
     f, k = _scans(result, result.axes.takes > 0)
     of, n = np.asarray(result.sums["locks"])[f, k], np.full(f.size, float(result.count))
     return {
         **common.leading(result, f, k),
         "n": n.astype(np.int64),
-        **common.interval("lock_rate", statistics.Estimate(*statistics.rate(of[:, LOCKED], n)), "lock"),
-        "lock_rate_3sigma": of[:, LOCKED_3] / n,
-        "taken": of[:, TAKEN] / n,
-        **common.interval("wrong_fold", statistics.Estimate(*statistics.rate(of[:, WRONG_FOLD], n))),
+        "lock_rate|lock": statistics.rate(of[:, rec.LOCKED], n),
+        "lock_rate_3sigma": of[:, rec.LOCKED_3] / n,
+        "taken": of[:, rec.TAKEN] / n,
+        "wrong_fold": statistics.rate(of[:, rec.WRONG_FOLD], n),
     }
 
 
-def _estimates(result: Result) -> dict[str, np.ndarray]:
+@table("estimates")
+def _estimates(result: Result) -> common.Columns:
     """Errors of the burst's velocity and acceleration, of those that locked and of all, beside the Fisher bound."""
     axes = result.axes
     f, c, k = np.nonzero(np.moveaxis(np.isfinite(axes.bound), 1, 2))
-    of, locked = np.asarray(result.sums["measured"])[f, k, c], np.asarray(result.sums["locks"])[f, k, LOCKED]
+    of, locked = np.asarray(result.sums["measured"])[f, k, c], np.asarray(result.sums["locks"])[f, k, rec.LOCKED]
     n = np.full(f.size, float(result.count))
     few = statistics.effective(of[:, 1, 0], of[:, 1, 1], n) < EFFECTIVE
     return {
         **common.leading(result, f, k, **common.components(result, MEASURED + c)),
         "n": locked.astype(np.int64),
-        **common.interval("sigma", statistics.root_mean_square(of[:, 0, 0], of[:, 0, 1], locked)),
-        **common.interval("sigma_all", statistics.root_mean_square(of[:, 1, 0], of[:, 1, 1], n)),
+        "sigma": statistics.root_mean_square(of[:, 0, 0], of[:, 0, 1], locked),
+        "sigma_all": statistics.root_mean_square(of[:, 1, 0], of[:, 1, 1], n),
         "bound": axes.bound[f, k, c],
         "energy_db": axes.energy_db[k],
         "note": np.where(few, OF_ALL, "").astype(object),
     }
 
 
-def _losses(result: Result) -> dict[str, np.ndarray]:
+@table("losses")
+def _losses(result: Result) -> common.Columns:
     """σ of the track by the scans since the last burst that did not lock; 6: six and more, or none was lost so far."""
     counted = np.asarray(result.sums["ages"])
     shown = (counted > 0) & (result.axes.takes > 0)[:, None, None]
@@ -144,11 +118,12 @@ def _losses(result: Result) -> dict[str, np.ndarray]:
         **common.leading(result, f, k, **common.components(result, c)),
         "since_loss": age,
         "n": n.astype(np.int64),
-        **common.interval("sigma", statistics.root_mean_square(of[:, 0], of[:, 1], n)),
+        "sigma": statistics.root_mean_square(of[:, 0], of[:, 1], n),
     }
 
 
-def _ideal(result: Result) -> dict[str, np.ndarray]:
+@table("idealisations")
+def _ideal(result: Result) -> common.Columns:
     """σ of a filter over the exact σ of its idealisation, where the case has one."""
     axes = result.axes
     at = f, k, c = common.shown(result, np.broadcast_to((axes.ideal >= 0)[:, None, None], axes.available.shape))
@@ -157,11 +132,12 @@ def _ideal(result: Result) -> dict[str, np.ndarray]:
     exact = axes.exact_sigma[axes.ideal[f], k, c]
     return {
         **common.leading(result, f, k, ideal=common.names(axes.filters, axes.ideal[f]), **common.components(result, c)),
-        **common.interval("over_ideal", statistics.Estimate(*(end / exact for end in of))),
+        "over_ideal": statistics.Estimate(*(end / exact for end in of)),
     }
 
 
-def _folds(result: Result) -> dict[str, np.ndarray]:
+@table("folds")
+def _folds(result: Result) -> common.Columns:
     """Of filters that keep several hypotheses: how often the best one has taken no velocity in a wrong fold.
 
     listed is how often any of the list has taken none, hypotheses the mean number of them.
@@ -171,18 +147,19 @@ def _folds(result: Result) -> dict[str, np.ndarray]:
     return {
         **common.leading(result, f, k),
         "n": n.astype(np.int64),
-        **common.interval("right", statistics.Estimate(*statistics.rate(of[:, RIGHT], n))),
-        "listed": of[:, LISTED] / n,
-        "hypotheses": of[:, NUMBER] / n,
+        "right": statistics.rate(of[:, rec.RIGHT], n),
+        "listed": of[:, rec.LISTED] / n,
+        "hypotheses": of[:, rec.NUMBER] / n,
     }
 
 
-def _passes(result: Result) -> dict[str, np.ndarray]:
+@table("passes")
+def _passes(result: Result) -> common.Columns:
     """Mean passes over a window's data that a burst takes: the measure of cost."""
     f, scans = np.flatnonzero(result.axes.takes > 0), result.axes.k.size
     of, n = np.asarray(result.sums["passes"])[f], np.full(f.size, float(result.count))
     found = statistics.mean(of[:, 0] / scans, of[:, 1] / scans**2, n)
-    return {**common.leading(result, f), **common.interval("passes", found)}
+    return {**common.leading(result, f), "passes": found}
 
 
 INPUTS = ("radar", "σ_r, m", "Δt, s", "λ, m", "F, Hz", "pulses", "burst, ms", "SNR a pulse, dB", "energy, dB", "D, m/s")

@@ -16,11 +16,6 @@ from radarsim.studies.range_doppler.tables import PERIODS, Result
 if TYPE_CHECKING:
     import pandas as pd
 
-QUANTITIES = {
-    "r": panels.Quantity("$r$", term("range")),
-    "Vr": panels.Quantity("$V_r$", term("radial velocity")),
-    "ar": panels.Quantity("$a_r$", term("radial acceleration")),
-}
 DRAWN_FROM = {"settling": ("steady",)}
 
 
@@ -33,19 +28,13 @@ NUMBERS = {
 
 def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
     """sigma_r … gain_ar (the paper's figures 1a … 3b), and `settling` where the manoeuvre variance is swept."""
-    curves = common.groups(made["curves"], "case", "filter", "component")
-    gains = common.groups(made["gains"], "case", "filter", "component")
-
-    def chosen(name: str) -> list[str]:
-        return [case.name for case in experiment.shown_in(name)]
-
-    drawn = panels.per_component(results, curves, gains, QUANTITIES, chosen)
+    drawn = panels.per_component(results, made, panels.RADIAL, experiment)
     if experiment.stem == OF_THE_PAPER:
         drawn = {name: seen.numbered(one, NUMBERS[name]) if name in NUMBERS else one for name, one in drawn.items()}
-    some = [result for result in results if result.name in set(chosen("settling"))]
+    some = [result for result in results if result.name in set(panels.named(experiment, "settling"))]
     figure = settling_figure(some, made["steady"])
     drawn |= {"settling": figure} if figure else {}
-    some, left_out = panels.shown_families(panels.unswept(results), chosen("consistency"))
+    some, left_out = panels.shown_families(panels.unswept(results), panels.named(experiment, "consistency"))
     drawn |= {"consistency": consistency_figure(some, made["consistency"], left_out)} if some else {}
     return {name: one for name, one in seen.all_begun(drawn, SEEN).items() if one}
 
@@ -82,9 +71,7 @@ def _consistency_panel(results: Sequence[Result], rows: dict[Any, Any], name: st
     marks: list = [Reference(1)]
     for i, result in enumerate(results):
         if (result.name, name) in rows:
-            own = rows[result.name, name]
-            style = Style(i, i, i)
-            marks.append(Line(own["t_s"].to_numpy(), own["nees"].to_numpy(), panels.label(result), style))
+            marks.append(panels.line(rows[result.name, name], ("t_s", "nees"), panels.label(result), i))
     y, title = panels.fitting_axis(tr(NEES), marks), panels.literal(name)
     return Panel(panels.time_axis(), y, tuple(marks), title, direct=len(results) <= MOST_NAMED)
 

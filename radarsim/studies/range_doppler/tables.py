@@ -18,16 +18,12 @@ PERIODS = 10  # the paper: a manoeuvre variance is good when the error settles i
 SETTLED = 0.05  # within this share of the steady value, for good; the paper gives no tolerance
 
 Result = CaseResult[RangeDopplerAxes]
+table = common.Tables()
 
 
 def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
     """The tables beyond curves: steady, believed, consistency, radar; and gains where plots may be missed."""
-    made = {
-        "steady": steady(results),
-        "believed": believed(results),
-        "consistency": normalised_errors(results),
-        "radar": radar(results),
-    }
+    made = {"steady": steady(results), **table.made(results)}
     return made | ({"gains": gains(results)} if any(own_gains(result) for result in results) else {})
 
 
@@ -44,17 +40,11 @@ def own_gains(result: Result) -> bool:
 
 def gains(results: Sequence[Result]) -> "pd.DataFrame":
     """Paired gains over the realisations in which both the filter and the baseline have an estimate."""
-    return common.joined(
-        [_own_gains(result) if own_gains(result) else _gains(result) for result in results], common.GAINS
-    )
+    parts = (_own_gains(one) if own_gains(one) else {**common.gains([one])} for one in results)
+    return common.joined(parts, common.GAINS)
 
 
-def _gains(result: Result) -> dict[str, np.ndarray]:
-    table = common.gains([result])
-    return {name: table[name].to_numpy() for name in common.GAINS}
-
-
-def _own_gains(result: Result) -> dict[str, np.ndarray]:
+def _own_gains(result: Result) -> common.Columns:
     axes, b = result.axes, result.axes.baseline
     both = np.asarray(result.sums["both"])
     mask = axes.available[b] & (both[..., 0] > 0)
@@ -63,15 +53,10 @@ def _own_gains(result: Result) -> dict[str, np.ndarray]:
     n, own, own_4, base, base_4 = (both[at][:, j] for j in range(5))
     of = statistics.gain(own, own_4, base, base_4, np.asarray(result.sums["paired"])[at], n)
     return {
-        "case": np.full(f.size, result.name, dtype=object),
-        "filter": common.names(axes.filters, f),
-        "baseline": np.full(f.size, axes.filters[b], dtype=object),
-        "component": common.names([name for name, _ in axes.components], c),
-        "k": np.asarray(axes.k)[k],
-        "t_s": np.asarray(axes.t_s, dtype=float)[k],
-        "gain_percent": of.value,
-        "gain_lo": of.lo,
-        "gain_hi": of.hi,
+        **common.leading(
+            result, f, k, baseline=np.full(f.size, axes.filters[b], dtype=object), **common.components(result, c)
+        ),
+        "gain_percent|gain": of,
         "exact_percent": axes.exact_gains[at],
     }
 
@@ -141,15 +126,9 @@ def _for_good(settled: np.ndarray, t: np.ndarray) -> float:
     return float(t[first]) if first < len(t) else np.inf
 
 
-CONSISTENCY = ("case", "filter", "k", "t_s", "n", *consistency.columns("nees", exact=True))
-
-
-def believed(results: Sequence[Result]) -> "pd.DataFrame":
+@table("believed")
+def _believed(result: Result) -> common.Columns:
     """Measured σ beside the σ that a filter believes, by component: `ratio` over 1 is optimistic."""
-    return common.joined([_believed(result) for result in results], consistency.BELIEVED)
-
-
-def _believed(result: Result) -> dict[str, np.ndarray]:
     variance = np.diagonal(result.axes.believed, axis1=2, axis2=3)
     if own_gains(result):
         with np.errstate(invalid="ignore"):
@@ -157,16 +136,13 @@ def _believed(result: Result) -> dict[str, np.ndarray]:
     return consistency.believed(result, np.sqrt(variance))
 
 
-def normalised_errors(results: Sequence[Result]) -> "pd.DataFrame":
+@table("consistency")
+def _normalised_errors(result: Result) -> common.Columns:
     """NEES of each filter's estimate by scan: the mean of eᵀP⁻¹e per estimated component, with bounds and verdict.
 
     In 95 % of runs of a filter that is right about itself the means of all its scans lie within the bounds. Where plots
     may be missed, of the realisations in which the filter has started, `n`.
     """
-    return common.joined([_normalised_errors(result) for result in results], CONSISTENCY)
-
-
-def _normalised_errors(result: Result) -> dict[str, np.ndarray]:
     axes = result.axes
     there: np.ndarray
     if own_gains(result):
@@ -181,10 +157,7 @@ def _normalised_errors(result: Result) -> dict[str, np.ndarray]:
     bounds = statistics.normalised_bounds(size[at] * n[at], looks)
     mean = statistics.Estimate(*(part[at] for part in mean))
     return {
-        "case": np.full(f.size, result.name, dtype=object),
-        "filter": common.names(axes.filters, f),
-        "k": np.asarray(axes.k)[k],
-        "t_s": np.asarray(axes.t_s, dtype=float)[k],
+        **common.leading(result, f, k),
         "n": n[at],
         **consistency.normalised("nees", mean, bounds, axes.exact_nees[at]),
     }
@@ -210,18 +183,18 @@ def nees(result: Result) -> statistics.Estimate:
     return statistics.Estimate(mean, interval.lo, interval.hi)
 
 
-RADAR = ("case", "C_theta", "speed_mps", "doppler_hz", "doppler_per_repetition_rate", "unambiguous_velocity_mps")
-
-
-def radar(results: Sequence[Result]) -> "pd.DataFrame":
+@table("radar")
+def _radar(result: Result) -> common.Columns:
     """C_θ = σ_r²/(Δt²σ_V²) (eq. 11), the target's greatest radial speed at a scan, its Doppler frequency 2V/λ, and the
     unambiguous span of velocity λF/2."""
-    rows = []
-    for result in results:
-        axes, rate = result.axes, result.axes.repetition_rate_hz
-        doppler = 2 * axes.speed_mps / axes.wavelength_m
-        rows.append((result.name, axes.C_theta, axes.speed_mps, doppler, doppler / rate, span_mps(result)))
-    return common.frame({name: [row[i] for row in rows] for i, name in enumerate(RADAR)})
+    axes = result.axes
+    doppler = 2 * axes.speed_mps / axes.wavelength_m
+    row = {
+        **{"case": result.name, "C_theta": axes.C_theta, "speed_mps": axes.speed_mps, "doppler_hz": doppler},
+        "doppler_per_repetition_rate": doppler / axes.repetition_rate_hz,
+        "unambiguous_velocity_mps": span_mps(result),
+    }
+    return common.of_rows([row])
 
 
 def span_mps(result: Result) -> float:

@@ -11,7 +11,6 @@ from radarsim.report import panels, text
 from radarsim.report import tables as common
 from radarsim.studies.range_doppler import tuning
 from radarsim.studies.range_doppler.config import Best
-from radarsim.studies.range_doppler.figures import QUANTITIES
 from radarsim.studies.range_doppler.tables import PERIODS, Result, follows_the_model, span_mps
 
 if TYPE_CHECKING:
@@ -54,7 +53,7 @@ def _gain_sentences(results: Sequence[Result], made: Made) -> list[str]:
     labels = {result.name: panels.plain_label(result) for result in results}
     sentences = [
         _gain_sentence(plain, gains[(c,)], every[(c,)], of.name, labels)
-        for c, of in QUANTITIES.items()
+        for c, of in panels.RADIAL.items()
         if (c,) in gains
     ]
     return sentences or [_sigma_sentence(results[0], made["curves"])]

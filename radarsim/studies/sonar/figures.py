@@ -3,14 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import term, tr
 from radarsim.report import panels, seen
 from radarsim.report import tables as common
-from radarsim.report.drawing import Figure, Line, Panel, Style
+from radarsim.report.drawing import Figure, Line, Panel
 from radarsim.studies.sonar.axes import SonarAxes
 
 if TYPE_CHECKING:
@@ -36,7 +34,6 @@ QUANTITIES = {
     "ve": panels.Quantity("$v_\\varepsilon$", term("rate of elevation")),
     "ae": panels.Quantity("$a_\\varepsilon$", term("second rate of elevation")),
 }
-SIGMA = ("t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")  # columns of a line of σ against time
 
 
 def figures(
@@ -48,22 +45,10 @@ def figures(
     for component in QUANTITIES:
         name = f"sigma_{component}"
         having = [result for result in results if component in dict(result.axes.components)]
-        chosen, left_out = panels.shown(having, [case.name for case in experiment.shown_in(name)])
+        chosen, left_out = panels.shown(having, panels.named(experiment, name))
         if chosen:
             drawn[name] = sigma_figure(name, chosen, curves, component, left_out)
     return {name: figure for name, figure in drawn.items() if figure}
-
-
-def line(rows: "pd.DataFrame", columns: Sequence[str], label: str, style: Style | int, name: str = "") -> Line:
-    """A line of x and y from two columns of rows; further columns give the ends of its band, and exact values.
-
-    A style that is a number is that of the filter of this number.
-    """
-    x, y, *more = (rows[column].to_numpy(dtype=float) for column in columns)
-    lo, hi = more[:2] or (None, None)
-    exact = more[2] if more[2:] and np.isfinite(more[2]).any() else None
-    look = Style(style, style, style) if isinstance(style, int) else style
-    return Line(x, y, label, look, lo, hi, exact, name)
 
 
 def case_lines(
@@ -71,7 +56,7 @@ def case_lines(
 ) -> list[Line]:
     """A line for each filter of a case that has rows; groups are by case, filter and component."""
     places = enumerate((result.name, f, component) for f in result.axes.filters)
-    return [line(groups[place], columns, place[1], n) for n, place in places if place in groups]
+    return [panels.line(groups[place], columns, place[1], n) for n, place in places if place in groups]
 
 
 def sigma_figure(
@@ -85,7 +70,7 @@ def sigma_figure(
     quantity, drawn = QUANTITIES[component], []
     for result in results:
         factor, unit = panels.in_degrees(dict(result.axes.components).get(component, ""))
-        marks = [panels.scaled(one, factor) for one in case_lines(result, curves, component, SIGMA)]
+        marks = [panels.scaled(one, factor) for one in case_lines(result, curves, component, panels.SIGMA)]
         if marks:
             y = panels.fitting_axis(panels.with_unit(f"$\\sigma$ of {quantity.symbol}", unit), marks)
             drawn.append(Panel(panels.time_axis(), y, tuple(marks), panels.swept(result), direct=False))

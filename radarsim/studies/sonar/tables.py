@@ -1,9 +1,6 @@
-"""Tables that all parts of P3 have: extrapolation, believed, consistency, operations; and how tables are composed.
+"""Tables that all parts of P3 have: extrapolation, believed, consistency, operations."""
 
-The columns of a table have the order of the mapping that is made for one case.
-"""
-
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,34 +8,23 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import consistency, statistics
 from radarsim.report import tables as common
-from radarsim.report.tables import interval, leading
+from radarsim.report.tables import Columns, leading
 from radarsim.studies.sonar import operations as counted
 from radarsim.studies.sonar.axes import SonarAxes
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Columns = Mapping[str, np.ndarray]
 Index = tuple[np.ndarray, ...]
+table = common.Tables()
 
 
 def tables(results: Sequence[CaseResult[SonarAxes]]) -> "dict[str, pd.DataFrame]":
     """The tables of these cases in addition to curves and gains."""
-    return {
-        "extrapolation": stacked(_extrapolation(result) for result in results),
-        "believed": stacked(_believed(result) for result in results),
-        "consistency": stacked(_normalised_errors(result) for result in results),
-        "operations": operations(),
-    }
+    return {**table.made(results), "operations": operations()}
 
 
 # ---- parts of tables ----------------------------------------------------------------------------------------------
-def stacked(parts: Iterable[Columns]) -> "pd.DataFrame":
-    """One table of the columns of several cases, without those that have no rows."""
-    filled = [part for part in parts if any(len(values) for values in part.values())]
-    return common.joined(filled, tuple(filled[0]) if filled else ())
-
-
 def of_coordinates(result: CaseResult[SonarAxes], mask: np.ndarray) -> tuple[Index, dict[str, np.ndarray]]:
     """Where mask (F, K, C) is true: indices (filter, scan, coordinate), each (n,), and the first columns of these rows.
 
@@ -57,6 +43,7 @@ def complete(result: CaseResult[SonarAxes]) -> np.ndarray:
     return np.take_along_axis(split, (result.axes.sizes - 1)[:, None, None, None], axis=3)[..., 0]
 
 
+@table("extrapolation")
 def _extrapolation(result: CaseResult[SonarAxes]) -> Columns:
     """σ of each coordinate extrapolated by one scan, in the row of the scan that it is extrapolated from."""
     n = complete(result)
@@ -67,19 +54,21 @@ def _extrapolation(result: CaseResult[SonarAxes]) -> Columns:
     return {
         **columns,
         "n": n[at].astype(np.int64),
-        **interval("sigma", of.sigma),
+        "sigma": of.sigma,
         "bias": of.bias,
         "bias_se": of.bias_se,
         "exact_sigma": result.axes.exact_ahead[at],
     }
 
 
+@table("believed")
 def _believed(result: CaseResult[SonarAxes]) -> Columns:
     """The measured σ beside the σ that the filter believes, the root of its mean variance."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return consistency.believed(result, np.sqrt(result.sums["believed"] / common.realisations(result)))
 
 
+@table("consistency")
 def _normalised_errors(result: CaseResult[SonarAxes]) -> Columns:
     """NEES eᵀP⁻¹e of the state in a coordinate, per component, where the state is complete.
 
@@ -102,12 +91,6 @@ def operations() -> "pd.DataFrame":
     rows += [(f"least squares (2) on {n} plots", 2 * n, counted.batch_of(n)) for n in (2, 3, 5, 6, 10)]
     rows += [("Kalman (11), degree 1", 2, counted.kalman_of(2)), ("differenced", 3, counted.differenced())]
     rows += [("augmented", 3, counted.augmented())]
-    return common.frame(
-        {
-            "algorithm": [name for name, _, _ in rows],
-            "numbers_kept": [kept for _, kept, _ in rows],
-            "products": [tally.products for _, _, tally in rows],
-            "sums": [tally.sums for _, _, tally in rows],
-            "operations": [tally.total for _, _, tally in rows],
-        }
-    )
+    names = ("algorithm", "numbers_kept", "products", "sums", "operations")
+    columns = zip(*((name, kept, of.products, of.sums, of.total) for name, kept, of in rows), strict=True)
+    return common.frame(dict(zip(names, columns, strict=True)))

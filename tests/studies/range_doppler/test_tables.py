@@ -95,7 +95,7 @@ def test_settling_for_good():
 
 
 def test_radar_table(paper):
-    table = range_doppler.radar(paper)
+    table = range_doppler.tables(paper)["radar"]
     np.testing.assert_allclose(table["C_theta"], [0.25, 25 / 9, 100 / 9, 25, 100])
     np.testing.assert_allclose(table["speed_mps"], 310)  # −250 m/s at first, 4 m/s² for 140 s
     np.testing.assert_allclose(table["doppler_hz"], np.array([1000 / 3, 4000, 4000, 20000, 20000]) * 310 / 300)
@@ -104,7 +104,7 @@ def test_radar_table(paper):
 
 def test_consistency_before_the_filter_adds_manoeuvre(paper):
     """At its least-squares start a filter is right about itself; later it allows for manoeuvres that are not there."""
-    table, sigma = range_doppler.normalised_errors(paper), range_doppler.believed(paper)
+    table, sigma = range_doppler.tables(paper)["consistency"], range_doppler.tables(paper)["believed"]
     start = table[(table["filter"] == "r") & (table["k"] <= 3)]
     np.testing.assert_allclose(start["nees"], 1, rtol=1e-9)
     np.testing.assert_allclose(sigma[(sigma["filter"] == "r") & (sigma["k"] <= 3)]["ratio"], 1, rtol=1e-9)
@@ -115,7 +115,7 @@ def test_consistency_before_the_filter_adds_manoeuvre(paper):
 
 def test_exact_values_of_the_normalised_error(paper):
     """Sums that are their expectation give the exact NEES: to rounding, and within its interval."""
-    table = range_doppler.normalised_errors(paper)
+    table = range_doppler.tables(paper)["consistency"]
     np.testing.assert_allclose(table["nees"], table["exact_nees"], rtol=1e-7)
     assert ((table["nees_lo"] < table["nees"]) & (table["nees"] < table["nees_hi"])).all()
 
@@ -123,7 +123,7 @@ def test_exact_values_of_the_normalised_error(paper):
 def test_bounds_of_the_normalised_error(paper):
     from scipy.special import chdtri
 
-    row = range_doppler.normalised_errors(paper).iloc[5]
+    row = range_doppler.tables(paper)["consistency"].iloc[5]
     freedom = 3 * paper[0].count
     share = 0.025 / 15  # of fifteen scans
     assert row["nees_bound_lo"] == pytest.approx(chdtri(freedom, 1 - share) / freedom, rel=1e-7)
@@ -232,7 +232,7 @@ def test_inputs_have_a_row_for_each_radar_that_differs(expected_radar, swept):
     ]
     table = range_doppler.inputs(results)
     assert list(table["σ_V, m/s"]) == list(values)
-    np.testing.assert_array_equal(table["C_θ"], range_doppler.radar(results)["C_theta"])
+    np.testing.assert_array_equal(table["C_θ"], range_doppler.tables(results)["radar"]["C_theta"])
     (row,) = range_doppler.inputs(swept).to_dict("records")
     assert row["D_M, (m/s³)²"] == "10⁻⁵, 10⁻⁴, 10⁻³, 10⁻², 10⁻¹"
 

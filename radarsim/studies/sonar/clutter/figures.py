@@ -12,7 +12,6 @@ from radarsim.report import tables as common
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.map import realisation_map
-from radarsim.studies.sonar.figures import line
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -88,8 +87,8 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
         for n, f in enumerate(result.axes.filters):
             if (result.name, f) in groups:
                 rows = groups[result.name, f]
-                marks.append(line(rows, confirmed, panels.literal(f), n))
-                marks.append(line(rows, ("t_s", "kept", "kept_lo", "kept_hi"), "", Style(n, n, None, 0.7)))
+                marks.append(panels.line(rows, confirmed, panels.literal(f), n))
+                marks.append(panels.line(rows, ("t_s", "kept", "kept_lo", "kept_hi"), "", Style(n, n, None, 0.7)))
         if marks:
             keys = ((tr("thin: kept at that time"), Style(0, 0, None, 0.7)),) if not drawn else ()
             y = Axis(tr("probability"), limits=(0, 1))
@@ -148,7 +147,7 @@ def _lines(table: "pd.DataFrame", x: str, value: str, ends: str) -> list[Line]:
     for n, (name, rows) in enumerate(table.groupby("filter", sort=False)):
         rows = rows[np.isfinite(rows[value])].sort_values(x)
         lo, hi = (rows[key].where(np.isfinite(rows[key]), rows[value]) for key in (f"{ends}_lo", f"{ends}_hi"))
-        lines.append(line(rows.assign(lo=lo, hi=hi), (x, value, "lo", "hi"), panels.literal(str(name)), n))
+        lines.append(panels.line(rows.assign(lo=lo, hi=hi), (x, value, "lo", "hi"), panels.literal(str(name)), n))
     return lines
 
 

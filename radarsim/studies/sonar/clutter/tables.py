@@ -7,16 +7,17 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import rare, statistics
+from radarsim.report import tables as common
 from radarsim.report.statistics import Z95, Estimate, Values
-from radarsim.report.tables import interval, leading
+from radarsim.report.tables import Columns, leading, of_rows, stacked
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.kernels import counts as at
 from radarsim.studies.sonar.clutter.kernels.ends import DROPPED, DROPPED_AFTER, KINDS, LOST, LOST_AFTER
-from radarsim.studies.sonar.tables import Columns, stacked
 
 if TYPE_CHECKING:
     import pandas as pd
 
+table = common.Tables()
 FALSE = "false track"
 ENDED = "target's track ended"
 PART = 0.05  # of a rate: what is less does not decide whether its interval holds
@@ -27,10 +28,7 @@ BESIDE = [DROPPED_AFTER, LOST_AFTER]
 def tables(results: Sequence[CaseResult[ClutterAxes]]) -> "dict[str, pd.DataFrame]":
     """The tables of these cases, all of which have trackers."""
     return {
-        "tracks": stacked(_tracks(result) for result in results),
-        "tracking": stacked(_tracking(result) for result in results),
-        "gates": stacked(_gates(result) for result in results),
-        "track_classes": stacked(_classes(result) for result in results),
+        **table.made(results),
         **rare.table([part for result in results for part in _rare(result)]),
     }
 
@@ -115,6 +113,7 @@ def mean_of_counts(times: np.ndarray, counts: np.ndarray) -> Estimate:
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
+@table("tracks")
 def _tracks(result: CaseResult[ClutterAxes]) -> Columns:
     """By scan: probabilities that a track of the target was confirmed by then, and that one is kept.
 
@@ -127,21 +126,21 @@ def _tracks(result: CaseResult[ClutterAxes]) -> Columns:
     return {
         **leading(result, np.repeat(chosen, K), np.tile(np.arange(K), len(chosen))),
         "n": np.full(len(chosen) * K, n),
-        **interval("confirmed", statistics.rate(np.cumsum(counts[:, :, at.FOUND], axis=1).ravel(), n)),
+        "confirmed": statistics.rate(np.cumsum(counts[:, :, at.FOUND], axis=1).ravel(), n),
         "exact_confirmed": result.axes.exact_confirmed[chosen].ravel(),
-        **interval("kept", statistics.rate(counts[:, :, at.KEPT].ravel(), n)),
+        "kept": statistics.rate(counts[:, :, at.KEPT].ravel(), n),
         **{name: counts[:, :, place].ravel().astype(np.int64) for name, place in shown.items()},
     }
 
 
+@table("tracking")
 def _tracking(result: CaseResult[ClutterAxes]) -> Columns:
     """One row a tracker: how surely and soon it confirms the target's track, how long it keeps it, its false tracks.
 
     The life of a track is the mean time between ends, over the time of all confirmed tracks. false_confirmed is the
     probability that a track begun by a false plot is confirmed; false tracks are counted over the whole sector.
     """
-    rows = [_summary(result, f) for f in trackers(result)]
-    return {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}
+    return of_rows([_summary(result, f) for f in trackers(result)])
 
 
 def _summary(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
@@ -164,21 +163,22 @@ def _summary(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
         "detection_probability": sensor.detection_probability,
         "false_plots_per_km2": sensor.false_plots_per_km2,
         "false_in_gate": in_gate,
-        **interval("confirmed", statistics.rate(found.sum(), n)),
-        **interval("time_to_confirm_s", mean_of_counts(np.asarray(result.axes.t_s, dtype=float), found), "time"),
-        **interval("kept_at_end", statistics.rate(counts[-1, at.KEPT], n), "kept"),
+        "confirmed": statistics.rate(found.sum(), n),
+        "time_to_confirm_s|time": mean_of_counts(np.asarray(result.axes.t_s, dtype=float), found),
+        "kept_at_end|kept": statistics.rate(counts[-1, at.KEPT], n),
         **{"lost": int(counts[:, at.LOST].sum()), "dropped": int(counts[:, at.DROPPED].sum())},
-        **interval("ends_per_hour", ends_per_hour, "ends"),
-        **interval("life_s", life, "life"),
-        **interval("wrong_share", ratio(ratios[at.WRONG_PER_PLOT], n), "wrong"),
-        **interval("false_confirmed", false if any_false else Estimate(0.0, 0.0, 0.0)),
+        "ends_per_hour|ends": ends_per_hour,
+        "life_s|life": life,
+        "wrong_share|wrong": ratio(ratios[at.WRONG_PER_PLOT], n),
+        "false_confirmed": false if any_false else Estimate(0.0, 0.0, 0.0),
         "exact_false_confirmed": result.axes.exact_begun[f].sum() if any_false else 0.0,
-        **interval("false_tracks_per_hour", false_per_hour, "false"),
+        "false_tracks_per_hour|false": false_per_hour,
         "false_tracks_at_once": false_plots(result) * alive / n,
         "false_life_s": false_life,
     }
 
 
+@table("gates")
 def _gates(result: CaseResult[ClutterAxes]) -> Columns:
     """By scan: the share of the target's plots in the gate, and false plots in it, for n tracks of two plots or more.
 
@@ -196,9 +196,9 @@ def _gates(result: CaseResult[ClutterAxes]) -> Columns:
         **leading(result, f, k),
         "n": rows[:, at.LOOKED].astype(np.int64),
         "plots": rows[:, at.PLOTS].astype(np.int64),
-        **interval("inside", statistics.rate(rows[:, at.INSIDE], rows[:, at.PLOTS])),
+        "inside": statistics.rate(rows[:, at.INSIDE], rows[:, at.PLOTS]),
         "exact_inside": exact[f],
-        **interval("false_in_gate", poisson(rows[:, at.FALSE], rows[:, at.LOOKED]), "false"),
+        "false_in_gate|false": poisson(rows[:, at.FALSE], rows[:, at.LOOKED]),
         "exact_false_in_gate": rows[:, at.EXPECTED] / rows[:, at.LOOKED],
     }
 
@@ -210,6 +210,7 @@ def straight(result: CaseResult[ClutterAxes]) -> bool:
     return polar and not any(any(c[2:]) for c in (target.range_m, target.bearing_rad))
 
 
+@table("track_classes")
 def _classes(result: CaseResult[ClutterAxes]) -> Columns:
     """Error rates of calling a track true once its score reaches a threshold, and false if it ends before.
 
@@ -225,9 +226,9 @@ def _classes(result: CaseResult[ClutterAxes]) -> Columns:
         **leading(result, np.repeat(chosen, len(thresholds))),
         "threshold": np.tile(thresholds, len(chosen)),
         "n_true": n_true.astype(np.int64),
-        **interval("true_called_false", statistics.rate(n_true - true, n_true), "true"),
+        "true_called_false|true": statistics.rate(n_true - true, n_true),
         "n_false": n_false.astype(np.int64),
-        **interval("false_called_true", statistics.rate(false, n_false), "false"),
+        "false_called_true|false": statistics.rate(false, n_false),
         "bound": np.tile(np.exp(-thresholds), len(chosen)),
     }
 
@@ -257,8 +258,7 @@ def _rare_ends(result: CaseResult[ClutterAxes]) -> dict[str, Any]:
 
     Scans count from the first one.
     """
-    parts = [_ended(result, f) for f in trackers(result)]
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return stacked([_ended(result, f) for f in trackers(result)])
 
 
 def _ended(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
@@ -274,7 +274,7 @@ def _ended(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
         own = rare.Counted(*by_scan[last, kinds].sum(axis=0)[:, None])
         rows = rare.rows(label, how, np.array([False]), own, drawn)
         made.append(rows | {"note": ends_note(drawn, by_scan[[last]], false_plots(result) > 0, kinds)})
-    return {name: np.concatenate([part[name] for part in made]) for name in made[0]}
+    return stacked(made)
 
 
 def ends_note(

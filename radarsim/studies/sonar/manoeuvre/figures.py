@@ -11,7 +11,7 @@ from radarsim.language import numeral, term, tr
 from radarsim.report import panels, seen
 from radarsim.report import tables as common
 from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
-from radarsim.studies.sonar.figures import QUANTITIES, SIGMA, case_lines, line
+from radarsim.studies.sonar.figures import QUANTITIES, case_lines
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
 
@@ -114,7 +114,7 @@ def roc_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
                 marks.append(Line(share, exact.detection(exact.threshold(share), shift), name, Style(n, n)))
             points = during.assign(false_alarms=before["probability"].to_numpy())
             label = "" if np.isfinite(shift) else name
-            marks.append(line(points, ("false_alarms", "probability", "lo", "hi"), label, Style(n, None, n)))
+            marks.append(panels.line(points, ("false_alarms", "probability", "lo", "hi"), label, Style(n, None, n)))
         if marks:
             x = Axis(tr("false alarms a test"), "log", limits=(3e-4, 0.5))
             y = Axis(tr("detection probability"), limits=(0, 1))
@@ -144,9 +144,9 @@ def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | N
         marks = []
         for n, name in enumerate(every_scan(members[0])):
             points = [_at_strongest(r, detections, name) for r in members]
-            v = {part: np.array([point[part] for point in points]) for part in ("probability", "lo", "hi", "exact")}
-            known = v["exact"] if np.isfinite(v["exact"]).all() else None
-            marks.append(Line(strength, v["probability"], name, Style(n, n, n), v["lo"], v["hi"], known))
+            known = ("exact",) if all(np.isfinite(point["exact"]) for point in points) else ()
+            columns = ("probability", "lo", "hi", *known)
+            marks.append(panels.line_of(strength, points, columns, name, Style(n, n, n)))
         title = ", ".join(panels.with_its_unit(members[0], k, v) for k, v in others)
         x, y = Axis(panels.axis_of(members[0], key)), Axis(tr("detection probability"), limits=(0, 1))
         drawn.append(Panel(x, y, tuple(marks), title, direct=False))
@@ -176,7 +176,7 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
             alarms = usual(rows, name)
             alarms = alarms[alarms["event"] == "alarm"]
             if len(alarms):
-                marks.append(line(alarms, ("delay_s", "probability", "lo", "hi", "exact"), name, n))
+                marks.append(panels.line(alarms, ("delay_s", "probability", "lo", "hi", "exact"), name, n))
         if marks:
             x, y = Axis(tr("time since it began, s"), limits=(0, None)), Axis(tr("an alarm has come"), limits=(0, 1))
             drawn.append(Panel(x, y, tuple(marks), _title(result), direct=False))
@@ -196,7 +196,7 @@ def response_figure(results: Results, curves: "pd.DataFrame") -> Figure | None:
     drawn = []
     for result in results:
         component, unit = result.axes.components[0]
-        marks: tuple[Mark, ...] = (*_ends(result), *case_lines(result, groups, component, SIGMA))
+        marks: tuple[Mark, ...] = (*_ends(result), *case_lines(result, groups, component, panels.SIGMA))
         y = Axis(panels.sigma_of(QUANTITIES[component].symbol, unit), "log")
         drawn.append(Panel(panels.time_axis(), y, marks, _title(result), direct=False))
     caption = tr(
@@ -234,7 +234,7 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
         for n, (f, part) in enumerate(at_time.groupby("filter", sort=False)):
             x = np.array([names.index(name) for name in part["component"]]) + 0.08 * (n - len(result.axes.filters) / 2)
             columns = ("x", "ratio", "ratio_lo", "ratio_hi")
-            marks.append(line(part.assign(x=x), columns, str(f), Style(n, None, n)))
+            marks.append(panels.line(part.assign(x=x), columns, str(f), Style(n, None, n)))
         low, high = at_time["ratio"].min(), at_time["ratio"].max()
         shown = tuple((float(value), numeral(f"{value:g}")) for value in RATIOS if low <= value <= high or value == 1)
         y = Axis(tr("measured / believed $\\sigma$"), "log", ticks=shown)

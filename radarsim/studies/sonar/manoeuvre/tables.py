@@ -8,16 +8,17 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import consistency, notes, statistics
 from radarsim.report import tables as common
-from radarsim.report.tables import interval, leading
+from radarsim.report.tables import Columns, interval, leading
 from radarsim.studies.sonar.exact import sigma_acceleration
 from radarsim.studies.sonar.manoeuvre import exact
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
 from radarsim.studies.sonar.manoeuvre.uses import QUANTITIES
-from radarsim.studies.sonar.tables import Columns, Index, stacked
+from radarsim.studies.sonar.tables import Index
 
 if TYPE_CHECKING:
     import pandas as pd
 
+table = common.Tables()
 PHASES = np.array(["steady", "manoeuvre", "after"], dtype=object)
 EVENTS = np.array(["false alarm", "alarm", "all clear"], dtype=object)  # the first of a phase
 JOINT = "joint"
@@ -27,15 +28,12 @@ NEAR_ZERO = 3.0  # in σ: speeds and distances, which cannot be negative, are no
 
 def tables(results: Sequence[CaseResult[ManoeuvreAxes]]) -> "dict[str, pd.DataFrame]":
     """The tables of cases with detectors, filters that respond to manoeuvres, or uses."""
-    measured = [result for result in results if result.spec.detectors]
-    return {
-        "detections": stacked(_detections(result) for result in measured),
-        "delays": stacked(_delays(result) for result in measured),
-        "classes": stacked(_classes(result) for result in measured),
-        "thresholds": stacked(_thresholds(result) for result in measured),
-        "modes": stacked(_modes(result) for result in results if "modes" in result.sums),
-        "uses": stacked(_uses(result) for result in results if "uses" in result.sums),
-    }
+    return table.made(results)
+
+
+def measured(result: CaseResult[ManoeuvreAxes]) -> bool:
+    """Whether a case has detectors."""
+    return bool(result.spec.detectors)
 
 
 def groups(result: CaseResult[ManoeuvreAxes]) -> list[str]:
@@ -76,6 +74,7 @@ def _of_thresholds(
     }
 
 
+@table("detections", measured)
 def _detections(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """Probability of an alarm at each test; `shift` is the mean of â in units of its σ_a, `n` the number of tests."""
     axes = result.axes
@@ -92,6 +91,7 @@ def _detections(result: CaseResult[ManoeuvreAxes]) -> Columns:
     }
 
 
+@table("delays", measured)
 def _delays(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """Probability that the first event of a phase has come by a scan: false alarm, alarm, end of alarms.
 
@@ -129,6 +129,7 @@ def phase_starts(result: CaseResult[ManoeuvreAxes]) -> np.ndarray:
     return np.array([0.0, *times])
 
 
+@table("classes", measured)
 def _classes(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """Classification of tracks by their alarms: a track is called manoeuvring if there was one in a phase.
 
@@ -145,7 +146,7 @@ def _classes(result: CaseResult[ManoeuvreAxes]) -> Columns:
         "truth": PHASES[np.where(steady, 0, 1)],
         "duration_s": rows["delay_s"],
         "called_manoeuvring": rows["probability"],
-        **interval("error_probability", of, ""),
+        "error_probability|": of,
         "exact": np.where(steady, rows["exact"], 1 - rows["exact"]),
     }
 
@@ -157,6 +158,7 @@ def _last_of(rows: Columns, event: str) -> np.ndarray:
     return np.array(sorted(dict(zip(keys, at, strict=True)).values()), dtype=np.int64)
 
 
+@table("thresholds", measured)
 def _thresholds(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """Thresholds of each detector with full windows: false alarms by the χ² law, and the accelerations they detect.
 
@@ -184,6 +186,7 @@ def _thresholds(result: CaseResult[ManoeuvreAxes]) -> Columns:
     }
 
 
+@table("modes", lambda result: "modes" in result.sums)
 def _modes(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """Mean probability that a filter assigns to a manoeuvre, and the mean number of plots in its memory.
 
@@ -198,11 +201,12 @@ def _modes(result: CaseResult[ManoeuvreAxes]) -> Columns:
     return {
         **leading(result, f, k, component=common.names([name for name, _ in result.axes.coordinates], c)),
         "n": np.full(f.size, result.count, dtype=np.int64),
-        **interval("probability", statistics.probability(total, square, result.count), ""),
+        "probability|": statistics.probability(total, square, result.count),
         "memory_plots": np.where(kinds[f] == "adaptive", plots / result.count, np.nan),
     }
 
 
+@table("uses", lambda result: "uses" in result.sums)
 def _uses(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """Course, speed, predicted position, closest approach: errors about the truth beside σ from the track's covariance.
 
@@ -229,8 +233,7 @@ def _uses(result: CaseResult[ManoeuvreAxes]) -> Columns:
         "n": n.astype(np.int64),
         "true_value": uses.true[a, u],
         "bias": first / n,
-        **interval("sigma", of),
-        **compared,
+        **(compared | {"sigma": of}),
         "distance_in_sigma": distance,
         "first_order": verdict.astype(object),
         "note": np.full(f.size, notes.VARIES, dtype=object),

@@ -11,7 +11,7 @@ from radarsim.report import panels, seen
 from radarsim.report import tables as common
 from radarsim.report.drawing import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.studies.sonar.axes import GivenPlotsAxes
-from radarsim.studies.sonar.figures import QUANTITIES, SIGMA, line
+from radarsim.studies.sonar.figures import QUANTITIES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,7 +49,9 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
     accuracy: list[Mark] = [Reference(1.0, label=tr("one plot"))]
     bought: list[Mark] = []
     for n, (what, part) in enumerate(rows.groupby("what", sort=False)):
-        accuracy.append(line(part, ("plots", "ratio", "ratio_lo", "ratio_hi", "formula"), tr(WHAT[str(what)]), n))
+        accuracy.append(
+            panels.line(part, ("plots", "ratio", "ratio_lo", "ratio_hi", "formula"), tr(WHAT[str(what)]), n)
+        )
         x, measured, formula = (
             part[key].to_numpy(dtype=float)[1:] for key in ("plots", "bought_percent", "formula_bought_percent")
         )
@@ -74,7 +76,7 @@ def gains_figure(table: "pd.DataFrame") -> Figure:
     first = table.iloc[0]
     rows = table[(table["filter"] == first["filter"]) & (table["component"] == first["component"])]
     marks = [
-        line(rows, ("plots", key, f"{key}_lo", f"{key}_hi", f"{key}_formula"), f"${key}_n$", n)
+        panels.line(rows, ("plots", key, f"{key}_lo", f"{key}_hi", f"{key}_formula"), f"${key}_n$", n)
         for n, key in enumerate(("A", "B"))
     ]
     caption = tr(
@@ -115,7 +117,7 @@ def believed_figure(
         if np.max(np.abs(claimed / true - 1)) > 0.05:
             left.append(Line(rho, claimed, tr("{f}: believed", f=f), Style(n, None, n)))
         rows = consistency_rows.loc[places].assign(rho=rho)
-        right.append(line(rows, ("rho", "nees", "nees_lo", "nees_hi", "exact_nees"), f, n))
+        right.append(panels.line(rows, ("rho", "nees", "nees_lo", "nees_hi", "exact_nees"), f, n))
     caption = tr(
         "Left: σ of the {name} at plot {last} in σ of a plot, true (lines) and as the filter "
         "believes it (markers alone, where they differ by over 5 %). Right: normalised squared error "
@@ -149,7 +151,9 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
             if (result.name, f) in groups:
                 probability = numeral(f"{result.spec.sensor.detection_probability:g}")
                 style = Style(n / max(1, len(cases) - 1), n, n)
-                marks.append(line(groups[result.name, f], SIGMA, probability, style, f"$P_D$ = {probability}"))
+                marks.append(
+                    panels.line(groups[result.name, f], panels.SIGMA, probability, style, f"$P_D$ = {probability}")
+                )
         drawn.append(Panel(panels.time_axis(), y, tuple(marks), f, key_title="$P_D$", direct=False))
     gap = cases[0].spec.sensor.missed_scans
     caption = tr(
@@ -173,7 +177,7 @@ def conversion_figure(table: "pd.DataFrame") -> Figure | None:
         rows = rows.sort_values("across_m")
         rows = rows.assign(**{name: rows[name] / rows["sigma_range_m"] for name in names})
         label = tr("plain") if frame == "cartesian" else tr("unbiased")
-        marks.append(line(rows, ("across_m", *names), label, n))
+        marks.append(panels.line(rows, ("across_m", *names), label, n))
     caption = tr(
         "Mean error of the converted plot along the line of sight, in σ of the range, over range × σ "
         "of the bearing. Bands: 95 % intervals. Exact: (exp(−σ²/2) − 1) r, and zero. The plain "

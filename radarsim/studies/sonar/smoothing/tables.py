@@ -7,23 +7,20 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import statistics
-from radarsim.report.tables import interval, leading
+from radarsim.report import tables as common
+from radarsim.report.tables import Columns, leading, stacked
 from radarsim.studies.sonar import exact
 from radarsim.studies.sonar.axes import GivenPlotsAxes
-from radarsim.studies.sonar.tables import Columns, stacked
 
 if TYPE_CHECKING:
     import pandas as pd
 
+table = common.Tables()
+
 
 def tables(results: Sequence[CaseResult[GivenPlotsAxes]]) -> "dict[str, pd.DataFrame]":
     """The tables of these cases in addition to those of all parts."""
-    textbook_cases = [result for result in results if textbook(result)]
-    return {
-        "plots": stacked(part for result in textbook_cases for part in _plots(result)),
-        "smoothing_gains": stacked(part for result in textbook_cases for part in _gains(result)),
-        "conversion": stacked(_conversion(result) for result in results if result.spec.frame != "polar"),
-    }
+    return table.made(results)
 
 
 def textbook(result: CaseResult[GivenPlotsAxes]) -> bool:
@@ -40,19 +37,22 @@ def _width(result: CaseResult[GivenPlotsAxes]) -> int:
     return len(result.axes.components) // len(result.axes.coordinates)
 
 
-def _plots(result: CaseResult[GivenPlotsAxes]) -> list[Columns]:
+@table("plots", textbook)
+def _plots(result: CaseResult[GivenPlotsAxes]) -> Columns:
     """The gain of each further plot: σ of growing memory after n plots, per σ of a plot.
 
     Smoothed, one scan ahead, and for degree 2 of the acceleration. `formula` is the paper's for degree 1, and its (3)
     for the acceleration; `bought_percent` is the reduction by the n-th plot.
     """
-    return [
-        _bought(result, f, c, what)
-        for f, member in enumerate(result.spec.filters)
-        if member.kind == "growing_memory"
-        for c in range(len(result.axes.coordinates))
-        for what in ("smoothed", "extrapolated", "acceleration")[: member.degree + 1]
-    ]
+    return stacked(
+        [
+            _bought(result, f, c, what)
+            for f, member in enumerate(result.spec.filters)
+            if member.kind == "growing_memory"
+            for c in range(len(result.axes.coordinates))
+            for what in ("smoothed", "extrapolated", "acceleration")[: member.degree + 1]
+        ]
+    )
 
 
 def _bought(result: CaseResult[GivenPlotsAxes], f: int, c: int, what: str) -> Columns:
@@ -76,14 +76,15 @@ def _bought(result: CaseResult[GivenPlotsAxes], f: int, c: int, what: str) -> Co
         "component": np.full(len(n), axes.coordinates[c][0], dtype=object),
         "what": np.full(len(n), what, dtype=object),
         "plots": n,
-        **interval("ratio", statistics.Estimate(*(part / unit for part in of))),
+        "ratio": statistics.Estimate(*(part / unit for part in of)),
         "formula": formula,
         "bought_percent": np.append(np.nan, 100 * (1 - of.value[1:] / of.value[:-1])),
         "formula_bought_percent": np.append(np.nan, 100 * (1 - formula[1:] / formula[:-1])),
     }
 
 
-def _gains(result: CaseResult[GivenPlotsAxes]) -> list[Columns]:
+@table("smoothing_gains", textbook)
+def _gains(result: CaseResult[GivenPlotsAxes]) -> Columns:
     """A_n and B_n of (14) as measured by filters of degree 1 without process noise.
 
     For them var r / σ² = A and T₀ cov(r, v) / σ² = B.
@@ -103,11 +104,11 @@ def _gains(result: CaseResult[GivenPlotsAxes]) -> list[Columns]:
             A = statistics.Estimate(*(part**2 / unit for part in of))
             B = statistics.Estimate(*(part * axes.scan_period_s / unit for part in both))
             columns = leading(result, np.full(len(n), f), component=np.full(len(n), name, dtype=object)) | {"plots": n}
-            columns |= interval("A", A) | {"A_formula": A_formula} | interval("B", B) | {"B_formula": B_formula}
-            parts.append(columns)
-    return parts
+            parts.append(columns | {"A": A, "A_formula": A_formula, "B": B, "B_formula": B_formula})
+    return stacked(parts)
 
 
+@table("conversion", lambda result: result.spec.frame != "polar")
 def _conversion(result: CaseResult[GivenPlotsAxes]) -> Columns:
     """Mean error along the line of sight of the converted first plot; `across_m` is range × bearing error."""
     axes, sensor = result.axes, result.spec.sensor
@@ -116,16 +117,11 @@ def _conversion(result: CaseResult[GivenPlotsAxes]) -> Columns:
     along = np.array([np.cos(b), np.sin(b)])
     bias, half = float(along @ of.bias), statistics.Z95 * float(np.hypot(*(along * of.bias_se)))
     row = {
-        "case": result.name,
-        "frame": result.spec.frame,
-        "range_m": r,
-        "sigma_range_m": sensor.sigma_range_m,
-        "sigma_bearing_rad": sensor.sigma_bearing_rad,
-        "across_m": r * sensor.sigma_bearing_rad,
-        "bias_m": bias,
-        "bias_lo": bias - half,
-        "bias_hi": bias + half,
-        "formula_m": axes.conversion_bias,
+        **{"case": result.name, "frame": result.spec.frame, "range_m": float(r)},
+        **{"sigma_range_m": sensor.sigma_range_m, "sigma_bearing_rad": sensor.sigma_bearing_rad},
+        "across_m": float(r * sensor.sigma_bearing_rad),
+        "bias_m|bias": statistics.Estimate(bias, bias - half, bias + half),
+        "formula_m": float(axes.conversion_bias),
         "bias_to_sigma_range": bias / sensor.sigma_range_m,
     }
-    return {name: np.array([value], dtype=object if isinstance(value, str) else float) for name, value in row.items()}
+    return common.of_rows([row])

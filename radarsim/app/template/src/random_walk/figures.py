@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.report import panels
-from radarsim.report import tables as common
 from radarsim.report.drawing import Figure
 
 # Yours: of each component its letter and what it is called.
@@ -17,10 +16,4 @@ QUANTITIES = {"x": panels.Quantity("$x$", "position")}
 
 def figures(results: Sequence[CaseResult], made: Mapping, experiment: Experiment) -> dict[str, Figure]:
     """sigma_x: σ(t) of every case and filter, with exact values; gain_x: the gain against the baseline."""
-    curves = common.groups(made["curves"], "case", "filter", "component")
-    gains = common.groups(made["gains"], "case", "filter", "component")
-
-    def chosen(name: str) -> list[str]:
-        return [case.name for case in experiment.shown_in(name)]
-
-    return panels.per_component(results, curves, gains, QUANTITIES, chosen)
+    return panels.per_component(results, made, QUANTITIES, experiment)
