@@ -4,15 +4,12 @@ classes.csv beside this module is that of the shipped configs, copied by `make r
 results has its own, of a claim that was judged there, that one counts.
 """
 
-import csv
-import io
 from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from radarsim.errors import StoreError
-from radarsim.report import files
+from radarsim.app.stored_tables import Row, content, rows
 from radarsim.report.claims.classes import COLUMNS, Class, Known, declared
 from radarsim.report.claims.declared import PaperClaims
 from radarsim.report.claims.readings import PaperReadings
@@ -20,7 +17,6 @@ from radarsim.report.claims.readings import PaperReadings
 PLACE, CLASSES = Path("readings", "readings.csv"), Path("readings", "classes.csv")
 NEEDED = {"claim", "reading", "kind", "outcome"}
 SHIPPED = Path(__file__).with_name("classes.csv")
-Row = TypeVar("Row")
 
 
 def stored_readings(out: Path) -> list[dict[str, Any]]:
@@ -54,18 +50,6 @@ def classes_of(papers: Iterable[tuple[PaperReadings, PaperClaims]], out: Path | 
 
 
 def _rows(path: Path, needed: set[str], made: Callable[[dict[str, Any]], Row]) -> list[Row]:
-    try:
-        table = csv.DictReader(io.StringIO(files.read(path).decode("utf-8"), newline=""), strict=True)
-        rows, names = list(table), set(table.fieldnames or ())
-    except FileNotFoundError:
-        return []
-    except OSError as error:
-        raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
-    except (ValueError, csv.Error) as error:
-        raise StoreError(f"{path}: cannot be read: {error}") from error
-    try:
-        if names >= needed:
-            return [made(row) for row in rows]
-    except (LookupError, TypeError, ValueError):
-        pass  # reported like any other damaged table
-    raise StoreError(f"{path}: is no table of readings; remove it, `radarsim readings` makes it again")
+    text = content(path)
+    kind = "table of readings; remove it, `radarsim readings` makes it again"
+    return [] if text is None else rows(path, text, needed, made, kind)

@@ -1,9 +1,12 @@
 """A result as it was stored: run.json and the tables beside it, read only where they are the ones that it records."""
 
+import csv  # rows alone need no pandas, which takes half a second to load
 import hashlib
+import io
 import json
+from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from radarsim.errors import StoreError
 from radarsim.report import files, provenance
@@ -13,20 +16,46 @@ if TYPE_CHECKING:
     import pandas as pd
 
 AGAIN = "`radarsim report` makes it again"
+Row = TypeVar("Row")
+
+
+def content(path: Path) -> bytes | None:
+    """The bytes of a file; None where there is none. Raises StoreError where it cannot be read."""
+    try:
+        return files.read(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def rows(
+    path: Path, text: bytes, needed: Collection[str], made: Callable[[dict[str, Any]], Row], kind: str
+) -> list[Row]:
+    """What `made` makes of each row of a CSV file with the columns needed; StoreError, with kind, for any other."""
+    try:
+        table = csv.DictReader(io.StringIO(text.decode("utf-8"), newline=""), strict=True)
+        read, names = list(table), set(table.fieldnames or ())
+    except (ValueError, csv.Error) as error:
+        raise StoreError(f"{path}: cannot be read: {error}") from error
+    try:
+        if names >= set(needed):
+            return [made(row) for row in read]
+    except (LookupError, TypeError, ValueError):
+        pass  # reported like any other damaged table
+    raise StoreError(f"{path}: is no {kind}")
 
 
 def record(folder: Path) -> dict[str, Any] | None:
     """The run.json of a folder; None where there is none. Raises StoreError where it is damaged."""
     path = folder / "run.json"
+    if (text := content(path)) is None:
+        return None
     try:
-        found = json.loads(files.read(path))
+        found = json.loads(text)
         provenance.to_json(found)  # ValueError for what no run writes, such as NaN or half a character
         if all(isinstance(found[key], dict) for key in ("cases", "outputs", "resolved")):
             return dict(found)
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    except OSError as error:
-        raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
     except (ValueError, LookupError, TypeError, RecursionError):
         pass
     raise StoreError(f"{path}: is no record of a run; {AGAIN}")
@@ -41,12 +70,12 @@ def table(folder: Path, name: str, outputs: "dict[str, str]") -> "pd.DataFrame |
     if path.name not in outputs:
         return None
     try:
-        content = files.read(path)
+        text = files.read(path)
     except OSError as error:
         raise StoreError(f"{path}: cannot be read: {error.strerror}; {AGAIN}") from error
-    if hashlib.sha256(content).hexdigest() != outputs[path.name]:
+    if hashlib.sha256(text).hexdigest() != outputs[path.name]:
         raise StoreError(f"{path}: altered since it was written; {AGAIN}")
     try:
-        return common.from_csv(content)
+        return common.from_csv(text)
     except ValueError as error:
         raise StoreError(f"{path}: is no table; {AGAIN}") from error

@@ -55,7 +55,7 @@ def test_every_study_has_the_same_columns(config, quantities, exact, sigma):
     assert ("believed" in made) == sigma
     if sigma:
         rows = made["believed"]
-        assert list(rows.columns)[4:] == "k t_s n sigma believed_sigma ratio ratio_lo ratio_hi".split()
+        assert list(rows.columns)[4:] == ["k", "t_s", "n", "sigma", "believed_sigma", "ratio", "ratio_lo", "ratio_hi"]
         np.testing.assert_allclose(rows["ratio"], rows["sigma"] / rows["believed_sigma"])
 
 
