@@ -150,6 +150,20 @@ def correct_second_rate(P, R, g):
 CORRECT = correct_value, correct_rate, correct_second_rate
 
 
+@inline
+def corrected(P, h, g, S):
+    """P - g h' - h g' + S g g': the same after any number, whose covariance with the state is h (3) and variance S."""
+    d0, d1, d2 = h[0] - g[0] * S, h[1] - g[1] * S, h[2] - g[2] * S
+    return (
+        P[0] - g[0] * h[0] - d0 * g[0],
+        P[1] - g[0] * h[1] - d0 * g[1],
+        P[2] - g[0] * h[2] - d0 * g[2],
+        P[3] - g[1] * h[1] - d1 * g[1],
+        P[4] - g[1] * h[2] - d1 * g[2],
+        P[5] - g[2] * h[2] - d2 * g[2],
+    )
+
+
 # ---- sums --------
 @inline
 def add_scaled(x, w, g):
