@@ -5,6 +5,7 @@ paper's words leave to it. The ranges come from the words alone and were written
 rule by which they are judged: docs/verdicts.md and `radarsim.report.claims.rule`.
 """
 
+# ruff: noqa: F401  (this is what others take from here)
 from radarsim.report.claims.declared import Claim, PaperClaims, Part
 from radarsim.report.claims.evidence import Evidence, Missing, Series, certain, common_times, minus, ratio
 from radarsim.report.claims.judge import (
@@ -37,43 +38,3 @@ from radarsim.report.claims.ranges import (
     within,
 )
 from radarsim.report.claims.rule import CONFIRMED, REFUTED
-
-__all__ = [
-    "CLAIMED",
-    "CONFIRMED",
-    "NOT_JUDGED",
-    "NOT_RUN",
-    "NUMBERS",
-    "REFUTED",
-    "UNCLEAR",
-    "Claim",
-    "Evidence",
-    "Missing",
-    "PaperClaims",
-    "Part",
-    "Range",
-    "Series",
-    "about",
-    "above",
-    "at_least",
-    "at_most",
-    "below",
-    "between",
-    "certain",
-    "common_times",
-    "errors",
-    "first_rows",
-    "greater",
-    "judged",
-    "kept",
-    "less",
-    "listed",
-    "minus",
-    "on_grid",
-    "overall",
-    "printed",
-    "ratio",
-    "same",
-    "verdict",
-    "within",
-]

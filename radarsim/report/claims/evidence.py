@@ -1,7 +1,7 @@
 """What an experiment measured, as claims ask for it: curves as series, points of them with their intervals."""
 
 import copy
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,17 +24,11 @@ class Missing(KeyError):
         return next((arg for arg in self.args if isinstance(arg, str)), "")
 
 
-class Hidden(Mapping):
+class Hidden(dict):
     """In place of sums and tables where none may be looked at: everything is missing."""
 
-    def __getitem__(self, key: str) -> Any:
+    def __missing__(self, key: str) -> Any:
         raise Missing(key)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(())
-
-    def __len__(self) -> int:
-        return 0
 
 
 class Certain(Estimate):
@@ -138,21 +132,16 @@ def certain(value: float) -> Certain:
     return Certain(float(value), float(value), float(value))
 
 
-class _Watched(Mapping):
+class _Watched(dict):
     """Tables that note which of them is looked at."""
 
     def __init__(self, made: Mapping, looked: set[tuple[str, str]]):
-        self._made, self._looked = made, looked
+        super().__init__(made)
+        self._looked = looked
 
     def __getitem__(self, name: str) -> Any:
         self._looked.add((name, ""))
-        return self._made[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._made)
-
-    def __len__(self) -> int:
-        return len(self._made)
+        return super().__getitem__(name)
 
 
 class Evidence:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
@@ -171,35 +171,34 @@ def _tried(part: Part, seen: Evidence | None, changed: str) -> _Tried:
     try:
         measured = part.measure(seen)
         cases = [seen.case(key) for key in part.cases]
-        scale = part.scale(seen) if part.scale else 1.0
-        ceiling = part.ceiling(seen) if part.ceiling else math.nan
+        of = weighed(part, seen, measured, min((case.count for case in cases), default=0))
     except Missing as missing:
         other = NOT_THE_PAPERS.format(changed=changed) if changed else "a case that it needs is not there"
         reason = missing.why or other
         return _Tried(part, why=reason)
-    value, lo, hi = (float(one) for one in measured)
     closer = {table for table, component in seen.looked if component}
     looked = tuple(sorted(one for one in seen.looked if one[1] or one[0] not in closer))
-    of = Judged(
-        value,
-        lo,
-        hi,
-        expected_lo=part.expected.lo,
-        expected_hi=part.expected.hi,
-        margin=part.expected.margin * scale,
+    of = replace(of, exact=exact(part, seen, measured))
+    names = ", ".join(dict.fromkeys(case.name for case in cases))
+    old = verdict(measured, part.expected.strict)
+    return _Tried(part, names, of, old, disagreement(part, of), looked)
+
+
+def weighed(part: Part, seen: Evidence, measured: Estimate, n: int) -> Judged:
+    """A part with its numbers, its exact value not yet known; n: realisations."""
+    value, lo, hi = (float(one) for one in measured)
+    return Judged(
+        *(value, lo, hi, part.expected.lo, part.expected.hi),
+        margin=part.expected.margin * (part.scale(seen) if part.scale else 1.0),
         kind=part.expected.kind,
-        exact=exact(part, seen, measured),
-        ceiling=ceiling,
-        n=min((case.count for case in cases), default=0),
+        ceiling=part.ceiling(seen) if part.ceiling else math.nan,
+        n=n,
         statement=part.statement,
         number=part.number,
         variant=part.variant,
         against_print=part.against_print,
         asserted=part.asserted,
     )
-    names = ", ".join(dict.fromkeys(case.name for case in cases))
-    old = verdict(measured, part.expected.strict)
-    return _Tried(part, names, of, old, disagreement(part, of), looked)
 
 
 def exact(part: Part, seen: Evidence, measured: Estimate) -> float:

@@ -11,8 +11,10 @@ from radarsim.report.claims import reasons, rule
 from radarsim.report.claims.declared import Claim, Part
 from radarsim.report.claims.evidence import Evidence, Missing
 from radarsim.report.claims.judge import exact as known
+from radarsim.report.claims.judge import weighed
 from radarsim.report.claims.readings import DEFAULT, PaperReadings, Reading
 from radarsim.report.claims.rule import Judged, Outcome
+from radarsim.report.statistics import Estimate
 
 NOTHING = "there is nothing to measure it by"
 FIRST = ("claim", "part", "reading", "kind")
@@ -68,23 +70,10 @@ def _judged(part: Part, seen: Evidence, exact: bool, n: int, shipped: bool) -> J
     exact: whether all evidence is. Of other evidence the exact value is known where the run knows it; a part's own
     formula is of the shipped reading.
     """
-    found, nothing = part.measure(seen), math.nan
-    measured, lo, hi = (nothing,) * 3 if exact else (float(found.value), float(found.lo), float(found.hi))
-    return Judged(
-        measured,
-        lo,
-        hi,
-        n=n,
-        expected_lo=part.expected.lo,
-        expected_hi=part.expected.hi,
-        margin=part.expected.margin * (part.scale(seen) if part.scale else 1.0),
-        kind=part.expected.kind,
-        exact=float(found.value) if exact else known(part if shipped else replace(part, exact=None), seen, found),
-        ceiling=part.ceiling(seen) if part.ceiling else nothing,
-        statement=part.statement,
-        number=part.number,
-        asserted=part.asserted,
-    )
+    found, nothing = part.measure(seen), Estimate(*(math.nan,) * 3)
+    own = replace(part, variant="", against_print=False)
+    value = found.value if exact else known(part if shipped else replace(part, exact=None), seen, found)
+    return replace(weighed(own, seen, nothing if exact else found, n), exact=float(value))
 
 
 @dataclass(frozen=True)

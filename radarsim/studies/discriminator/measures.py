@@ -37,32 +37,13 @@ class Evidence(claims.Evidence):
     def case(self, key: Any) -> CaseResult:
         """key: a reading, or (swept key, value) of the maps."""
         for result in self.results:
-            if not self._is_papers(result):
-                continue
+            swept = [(name, float(str(value))) for name, value in result.swept]
             if isinstance(key, tuple):
-                if (
-                    len(result.swept) == 1
-                    and result.swept[0][0] == key[0]
-                    and np.isclose(float(result.swept[0][1]), key[1])
-                ):
+                if len(swept) == 1 and swept[0][0] == key[0] and math.isclose(swept[0][1], key[1]):
                     return result
-            elif not result.swept and result.spec.burst.noise_variance == READINGS[key][0]:
+            elif not swept and result.spec.burst.noise_variance == READINGS[key][0]:
                 return result
         raise Missing(key)
-
-    @staticmethod
-    def _is_papers(result: CaseResult) -> bool:
-        burst, truth = result.spec.burst, result.spec.truth
-        if result.spec.rare is not None:  # its sums are not of equal bursts
-            return False
-        shape = (burst.pulses, burst.pulse_period_s, burst.pulse_length_s, burst.sampling_period_s, burst.amplitude)
-        return (
-            np.allclose(shape, (30000, 1e-5, 1e-6, 1e-6, 1.0), rtol=1e-9)
-            and burst.samples == "real"
-            and truth.doppler_derivatives is not None
-            and np.allclose(truth.doppler_derivatives[:4], DOPPLER)
-            and len(truth.doppler_derivatives) == 4
-        )
 
     def estimator(self, key: Key, kind: str) -> int:
         """Index of an estimator of a case by its kind: sequence, narrow, wide, cured, truth."""

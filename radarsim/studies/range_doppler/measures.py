@@ -1,7 +1,6 @@
 """How P1's claims are measured: which case is which of the paper's radars, and the numbers taken from the tables.
 
-Radars are keyed by their number; a case counts as the paper's radar when its accuracies, period, filters and manoeuvre
-variance are the paper's, whatever its name.
+Radars are keyed by their number, and found by their accuracies and period, whatever their names.
 """
 
 import math
@@ -42,23 +41,16 @@ class Evidence(claims.Evidence):
 
     @staticmethod
     def _radar(result: CaseResult) -> int | None:
-        """The number of the paper's radar that a case is; None for any other, or another target."""
-        radar, target = result.spec.radar, result.spec.target
+        """The number of the paper's radar that a case is."""
+        radar = result.spec.radar
         own = (radar.sigma_range_m, radar.sigma_velocity_mps, radar.scan_period_s)
-        fits = target.kind == "polynomial" and not any(target.coefficients[3:]) and radar.as_the_papers
-        found = [number for number, row in RADARS.items() if all(map(math.isclose, own, row))]
-        return found[0] if found and fits else None
+        return next((number for number, row in RADARS.items() if all(map(math.isclose, own, row))), None)
 
     @staticmethod
     def _variance(result: CaseResult) -> float:
-        """The manoeuvre variance of the paper's two filters; not-a-number where they are not these two."""
-        filters = result.spec.filters
-        plain = all(f.initial_scans == (3 if f.observes == R else 2) for f in filters)
-        plain &= all(f.process_noise == "random_jerk" and isinstance(f.manoeuvre_variance, float) for f in filters)
-        alike = len({f.manoeuvre_variance for f in filters}) == 1 if plain else False
-        if [f.observes for f in filters] != [R, RV] or not (plain and alike) or result.axes.baseline != 0:
-            return float("nan")
-        return filters[0].manoeuvre_variance
+        """The manoeuvre variance of the paper's two filters."""
+        variance: float = result.spec.filters[0].manoeuvre_variance
+        return variance
 
     def whole_sigma(self, key: Key, observes: tuple[str, ...], component: str) -> Series:
         """σ(k) of the filter that observes these, to the end of the run."""
@@ -100,8 +92,7 @@ class Evidence(claims.Evidence):
 
     def variances(self, radar: int) -> list[float]:
         """The manoeuvre variances at hand for a radar; raises Missing where there are fewer than two."""
-        every = {self._variance(result) for result in self.results if self._radar(result) == radar}
-        found = sorted(v for v in every if not np.isnan(v))
+        found = sorted({self._variance(result) for result in self.results if self._radar(result) == radar})
         if len(found) < 2:
             raise claims.Missing(radar)
         return found

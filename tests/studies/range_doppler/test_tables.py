@@ -368,28 +368,3 @@ def test_answer_gives_the_variance_that_was_looked_for(expected_radar):
     assert f"r {found:g} (sigma_r is least at its worst from scan 3 on)" in said
     calm = expected_radar("rls2", filters=filters)
     assert "there is no best between" in told_of([calm])[-1]
-
-
-def test_new_keys_are_outside_the_papers_experiment(expected_radar):
-    from radarsim.studies.range_doppler.measures import Evidence
-
-    changes = (
-        {"radar": {"bias_velocity_mps": 1}},
-        {"radar": {"sigma_bias_range_m": 1}},
-    )
-    filters = [
-        {"name": "r", "observes": ["range"], "manoeuvre_variance": 1e-3, "process_noise": "white_jerk"},
-        {"name": "r+Vr", "observes": ["range", "velocity"], "manoeuvre_variance": 1e-3},
-    ]
-    result = expected_radar("rls2")
-    assert (Evidence._radar(result), Evidence._variance(result)) == (2, 1e-3)
-    assert np.isnan(Evidence._variance(expected_radar("rls2", filters=filters)))
-    from radarsim.app.configs import load
-    from radarsim.engine.results import CaseResult
-    from radarsim.studies.range_doppler import study
-    from tests.report.conftest import config
-
-    for change in changes:
-        case = load(config("rls2", **change)).cases[0]
-        made = CaseResult("rls2", case.study, case.spec, (), 10, result.sums, study.prepare(case).axes)
-        assert Evidence._radar(made) is None
