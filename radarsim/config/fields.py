@@ -10,6 +10,7 @@ import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from types import FunctionType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
 
@@ -72,6 +73,18 @@ class Scenario:
     def __get_pydantic_json_schema__(self, core_schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         inline = handler(core_schema)
         return {"anyOf": [{"type": "string", "description": "stem of a file in scenarios/"}, inline]}
+
+
+@dataclass(frozen=True)
+class Only:
+    """Mark of a key that belongs to some values of keys beside it, such as a kind: {"kind": ("adaptive", "imm")}.
+
+    default: its value there, where it is not given; needed: it has to be given. Elsewhere it must be left out.
+    """
+
+    where: Mapping[str, tuple[str, ...]]
+    default: Any = None
+    needed: bool = False
 
 
 class NotRead(Exception):
@@ -141,8 +154,35 @@ class Model(BaseModel):
             raise PydanticCustomError("at", "fields that do not go together", {"faults": found})
         return self
 
+    @model_validator(mode="after")
+    def _completed_by_kind(self) -> Self:
+        missing = [name for name in conditions(type(self)) if getattr(self, name) is None]
+        found = {name: value for name in missing if (value := self._settled(name)) is not None}
+        return self.model_copy(update=found) if found else self
+
+    def _settled(self, name: str) -> Any:
+        """The value of a key, or the default that it has where it belongs."""
+        value, only = getattr(self, name), conditions(type(self)).get(name)
+        if value is not None or only is None:
+            return value
+        belongs = all(self._settled(key) in values for key, values in only.where.items())
+        return only.default if belongs else None
+
+    def _of_kind(self, name: str, only: Only) -> Iterator[At]:
+        """The fault of a key that does not belong to the kind that there is, or is needed by it."""
+        value, kinds = getattr(self, name), {key: self._settled(key) for key in only.where}
+        other = next((key for key, values in only.where.items() if kinds[key] not in values), None)
+        if value is not None and other is not None:
+            own = "" if kinds[other] is None else f", not {kinds[other]}"
+            yield at(name, f"belongs to {other}: {' or '.join(only.where[other])}{own}")
+        elif value is None and other is None and only.needed:
+            yield at(name, "is needed by " + ", ".join(f"{key}: {kind}" for key, kind in kinds.items()))
+
     def misfits(self) -> Iterator[At]:
         """What all cross-checks find; those that need an unread field end there."""
+        for name, only in conditions(type(self)).items():
+            with suppress(NotRead):
+                yield from self._of_kind(name, only)
         seen: dict[str, Callable[[Any], Iterator[At]]] = {}
         for klass in reversed(type(self).__mro__):
             methods = {name: one for name, one in vars(klass).items() if isinstance(one, FunctionType)}
@@ -169,6 +209,13 @@ class Model(BaseModel):
                 schema["required"].remove(name)
                 schema.setdefault("allOf", []).append({"oneOf": [{"required": [name]}, {"required": [twin]}]})
         return schema
+
+
+@cache
+def conditions(model: type[Model]) -> dict[str, Only]:
+    """The keys of a model that belong to some kinds only, by name."""
+    marks = {name: [m for m in info.metadata if isinstance(m, Only)] for name, info in model.model_fields.items()}
+    return {name: own[0] for name, own in marks.items() if own}
 
 
 def unknown_to(spec: Model, home: str) -> list[str]:
@@ -288,14 +335,27 @@ def whole(least: int, most: int) -> Any:
 
 
 def key(
-    title: str, about: str, default: Any = ..., *, symbol: str | None = None, unit: str | None = None, **limits: Any
+    title: str,
+    about: str,
+    default: Any = ...,
+    *,
+    symbol: str | None = None,
+    unit: str | None = None,
+    only: Mapping[str, str | tuple[str, ...]] | None = None,
+    **limits: Any,
 ) -> Any:
     """A key: what people call it, what it means with its unit, its default (none: it must be given), and its letter.
 
-    unit: of the value, where the key does not end in it. limits: what `pydantic.Field` takes beside.
+    unit: of the value, where the key does not end in it. only: values of keys beside it that it belongs to, and its
+    default is of; the key may be None then. limits: what `pydantic.Field` takes beside.
     """
     extra: Any = {name: text for name, text in (("symbol", symbol), ("unit", unit)) if text is not None}
-    return Field(default, title=title, description=about, json_schema_extra=extra or None, **limits)
+    given = default if only is None else None
+    field = Field(given, title=title, description=about, json_schema_extra=extra or None, **limits)
+    if only is not None:
+        where = {name: (values,) if isinstance(values, str) else values for name, values in only.items()}
+        field.metadata.append(Only(where, None if default is ... else default, default is ...))
+    return field
 
 
 class Study(Model):

@@ -42,7 +42,7 @@ def test_bounds_of_both_ends_and_optional_keys():
     keys = {key.path: key for key in numeric.keys(load("sonar_clutter").cases[0].spec)}
     probability = keys["sensor.detection_probability"]
     assert (probability.low, probability.high) == (0, 1)
-    assert keys["filters.0.gate_probability"].value is None
+    assert (keys["filters.0.gate_probability"].value, keys["filters.0.plots"].value) == (0.99, None)
     assert "filters.0.degree" not in keys  # a choice of two
 
 

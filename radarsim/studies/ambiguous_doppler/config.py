@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from fractions import Fraction
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -52,12 +52,7 @@ MOST_RATIO = 1000  # whole numbers that two repetition rates must be to each oth
 PROPORTION = 1e6  # largest ratio of what the prior leaves open to what a plot tells: beyond, rounding shows
 MOST_FOLDS = 1e4  # spans in a standard deviation of the prior: the first scan has so many folds to look at
 DISTINCT = 1e-9  # relative difference from which two spans are two
-UNFOLDING = {"hypotheses": 300, "prune_below": 1e-6, "merge": "never", "estimate": "mean"}  # and its defaults
-
-COMBINING = {  # keys of a combination: of which, and the default
-    "stay_probability": ("likelihood", 0.95),
-    "manoeuvres": ("expected_error", None),
-}
+LISTED = {"doppler": "folded", "merge": "never"}  # filters that keep several hypotheses
 
 Order = Annotated[int, Whole(0, 2)]
 
@@ -191,20 +186,28 @@ class Filter(Model):
         unit="",
     )
     hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = key(
-        "hypotheses kept", "folded: most sequences of folds that it keeps; 1: the nearest fold; default: 300", None
+        "hypotheses kept",
+        "folded: most sequences of folds that it keeps; 1: the nearest fold; default: 300",
+        300,
+        only=LISTED,
     )
     prune_below: Annotated[Probability, Field(lt=1)] | None = key(
         "ratio under which a hypothesis is dropped",
         "folded: ratio to the probability of the best, under which a hypothesis is dropped; 0: none is; default: 1e-6",
-        None,
+        1e-6,
+        only=LISTED,
     )
     merge: Literal["never", "each_scan"] | None = key(
         "merging of hypotheses",
         "folded: keep hypotheses over scans, or merge them into one at each scan; default: never",
-        None,
+        "never",
+        only={"doppler": "folded"},
     )
     estimate: Literal["best", "mean"] | None = key(
-        "estimate", "folded: the best hypothesis, or the mean of all by their probabilities; default: mean", None
+        "estimate",
+        "folded: the best hypothesis, or the mean of all by their probabilities; default: mean",
+        "mean",
+        only=LISTED,
     )
     combine: Literal["likelihood", "expected_error", "intersection"] | None = key(
         "combination of orders",
@@ -215,9 +218,12 @@ class Filter(Model):
     stay_probability: Annotated[Probability, Field(gt=0, lt=1)] | None = key(
         "probability that an order lasts",
         "likelihood: probability that an order lasts from scan to scan; default: 0.95",
-        None,
+        0.95,
+        only={"combine": "likelihood"},
     )
-    manoeuvres: Manoeuvres | None = key("expected manoeuvres", "expected_error: the manoeuvres that are expected", None)
+    manoeuvres: Manoeuvres | None = key(
+        "expected manoeuvres", "expected_error: the manoeuvres that are expected", only={"combine": "expected_error"}
+    )
 
     @property
     def variances(self) -> tuple[float, ...]:
@@ -251,30 +257,6 @@ class Filter(Model):
             yield at("combine", "has no effect on one order; leave it out")
         elif self.combine is not None and self.doppler == "remainder":
             yield at("combine", "has no doppler: remainder, which unfolds for one order")
-        elif self.combine == "expected_error" and self.manoeuvres is None:
-            yield at("manoeuvres", "is needed by combine: expected_error")
-        for name, (of, _) in COMBINING.items():
-            if getattr(self, name) is not None and self.combine != of:
-                yield at(name, f"has no effect without combine: {of}; leave it out")
-
-    @cross_check
-    def _unfolding(self) -> Iterator[At]:
-        for name in UNFOLDING:
-            if getattr(self, name) is None:
-                continue
-            if self.doppler != "folded":
-                yield at(name, f"has no effect with doppler: {self.doppler}; leave it out")
-            elif self.merge == "each_scan" and name != "merge":
-                yield at(name, "has no effect with merge: each_scan, which leaves one hypothesis; leave it out")
-
-    @model_validator(mode="after")
-    def _completed(self) -> Self:
-        """The same with the defaults of what has an effect written out."""
-        defaults: dict[str, Any] = {name: value for name, (of, value) in COMBINING.items() if of == self.combine}
-        if self.doppler == "folded":
-            defaults |= {"merge": "each_scan"} if self.merge == "each_scan" else UNFOLDING
-        missing = {name: value for name, value in defaults.items() if getattr(self, name) is None}
-        return self.model_copy(update=missing) if missing else self
 
 
 class RareFolds(rare.RareEvent):

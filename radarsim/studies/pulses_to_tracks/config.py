@@ -50,7 +50,6 @@ MOST_DERIVATIVES = 1
 MOST_HYPOTHESES = 1000
 UNFOLDING = {"prune_below": 1e-6, "estimate": "mean"}  # keys of several hypotheses, and defaults
 SEQUENCES = ("sequence", "dense", "cured")
-USES = {"gated": {"gate_probability": 0.999}, "mixture": {"lock_probability": 0.95}}  # keys of a use, and defaults
 Target = Annotated[Polynomial | AccelerationStart | Turn | FlyBy | Recorded, Field(discriminator="kind")]
 
 
@@ -177,10 +176,16 @@ class Filter(Model):
         None,
     )
     gate_probability: Annotated[float, Field(gt=0, lt=1)] | None = key(
-        "gate probability", "gated: probability that an estimate that locked is within the gate; default: 0.999", None
+        "gate probability",
+        "gated: probability that an estimate that locked is within the gate; default: 0.999",
+        0.999,
+        only={"use": "gated"},
     )
     lock_probability: Annotated[float, Field(gt=0, lt=1)] | None = key(
-        "lock probability", "mixture: probability before it is seen that an estimate has locked; default: 0.95", None
+        "lock probability",
+        "mixture: probability before it is seen that an estimate has locked; default: 0.95",
+        0.95,
+        only={"use": "mixture"},
     )
 
     hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = key(
@@ -213,8 +218,7 @@ class Filter(Model):
     @cross_check
     def _keys_have_an_effect(self) -> Iterator[At]:
         if self.observes == ("range",):
-            own = ("estimator", "forecast", "derivatives", "use", "gate_probability", "lock_probability")
-            for name in (*own, "hypotheses", *UNFOLDING):
+            for name in ("estimator", "forecast", "derivatives", "use", "hypotheses", *UNFOLDING):
                 if getattr(self, name) is not None:
                     yield at(name, "has no effect on range alone; leave it out")
             return
@@ -222,10 +226,6 @@ class Filter(Model):
             yield at("forecast", f"has no effect with estimator: {self.estimator}; leave it out")
         if self.estimator == "fisher_bound" and self.use not in (None, "as_measured"):
             yield at("use", "must be as_measured with estimator: fisher_bound, whose estimates always lock")
-        for use, keys in USES.items():
-            for name in keys:
-                if getattr(self, name) is not None and self.use != use:
-                    yield at(name, f"has no effect without use: {use}; leave it out")
 
     @cross_check
     def _folds_by_hypotheses(self) -> Iterator[At]:
@@ -253,7 +253,6 @@ class Filter(Model):
         defaults: dict[str, Any] = {"estimator": "cured", "derivatives": self.takes - 1, "use": "as_measured"}
         if (self.estimator or "cured") in SEQUENCES:
             defaults["forecast"] = "track"
-        defaults |= USES.get(self.use or "", {})
         if self.estimator != "fisher_bound":
             defaults |= {"hypotheses": 1} | (UNFOLDING if (self.hypotheses or 1) > 1 else {})
         missing = {name: value for name, value in defaults.items() if getattr(self, name) is None}

@@ -124,13 +124,21 @@ class Polynomial(Model):
     kind: Literal["polynomial"] = key("kind", "each coordinate is a polynomial of time")
     frame: Literal["polar", "cartesian"] = key("frame of coordinates", "which coordinates are polynomials")
     range_m: Derivatives | None = key(
-        "range and its derivatives", "range and its derivatives at the first plot: m, m/s, m/s², …", None
+        "range and its derivatives",
+        "range and its derivatives at the first plot: m, m/s, m/s², …",
+        only={"frame": "polar"},
     )
     bearing_rad: Derivatives | None = key(
-        "bearing and its derivatives", "bearing and its derivatives, from north to east: rad, …", None
+        "bearing and its derivatives",
+        "bearing and its derivatives, from north to east: rad, …",
+        only={"frame": "polar"},
     )
-    x_m: Derivatives | None = key("distance north", "distance north and its derivatives: m, m/s, m/s², …", None)
-    y_m: Derivatives | None = key("distance east", "distance east and its derivatives: m, m/s, m/s², …", None)
+    x_m: Derivatives | None = key(
+        "distance north", "distance north and its derivatives: m, m/s, m/s², …", only={"frame": "cartesian"}
+    )
+    y_m: Derivatives | None = key(
+        "distance east", "distance east and its derivatives: m, m/s, m/s², …", only={"frame": "cartesian"}
+    )
     depth_m: Derivatives | None = key("depth and its derivatives", "depth and its derivatives: m, m/s, …", None)
     elevation_rad: Derivatives | None = key(
         "elevation and its derivatives", "elevation and its derivatives: rad, rad/s, …", None
@@ -141,17 +149,6 @@ class Polynomial(Model):
         "random walk",
         0.0,
     )
-
-    @cross_check
-    def _coordinates(self) -> Iterator[At]:
-        wanted = ("range_m", "bearing_rad") if self.frame == "polar" else ("x_m", "y_m")
-        other = ("x_m", "y_m") if self.frame == "polar" else ("range_m", "bearing_rad")
-        for name in wanted:
-            if getattr(self, name) is None:
-                yield at(name, f"is needed in the {self.frame} frame")
-        for name in other:
-            if getattr(self, name) is not None:
-                yield at(name, f"does not belong to the {self.frame} frame")
 
     @cross_check
     def _ahead(self) -> Iterator[At]:
@@ -236,6 +233,7 @@ class Turning(Vessel):
 
 Target = Annotated[Polynomial | Turning | Accelerating, Field(discriminator="kind")]
 CORRELATED = ("kalman_augmented", "kalman_differenced")
+MODELLED = ("fixed_gain", "kalman", "kalman_augmented")  # kinds that allow for a manoeuvre
 
 
 class Filter(Model):
@@ -263,6 +261,7 @@ class Filter(Model):
         "number of plots",
         "length of a window; or of the least-squares start of fixed_gain, by default degree + 1",
         None,
+        only={"kind": ("window", "fixed_gain")},
     )
     manoeuvre_variance: NonNegative | None = key(
         "manoeuvre variance",
@@ -271,20 +270,20 @@ class Filter(Model):
         None,
         symbol="D_M",
         unit="",
+        only={"kind": MODELLED},
     )
     error_correlation: Correlation | Correlations | None = key(
         "correlation of neighbouring errors",
         "correlation that the filter assumes; default: that of the sonar",
         None,
         symbol="ρ",
+        only={"kind": CORRELATED},
     )
 
     @cross_check
     def _fits_kind(self) -> Iterator[At]:
         if self.plots is None and self.kind == "window":
             yield at("plots", "is needed by a window")
-        if self.plots is not None and self.kind not in ("window", "fixed_gain"):
-            yield at("plots", "belongs to a window, or to the start of fixed_gain")
         elif self.plots is not None and self.plots < self.degree + 1:
             yield at("plots", f"must be >= {self.degree + 1} for degree {self.degree}")
 
@@ -292,13 +291,6 @@ class Filter(Model):
     def _variance_fits_kind(self) -> Iterator[At]:
         if self.kind == "fixed_gain" and not self.manoeuvre_variance:
             yield at("manoeuvre_variance", "must be > 0 for fixed_gain: it determines the steady-state gains")
-        if self.manoeuvre_variance and self.kind not in ("fixed_gain", "kalman", "kalman_augmented"):
-            yield at("manoeuvre_variance", f"{self.kind} allows for no manoeuvre; use kalman or kalman_augmented")
-
-    @cross_check
-    def _correlation_fits_kind(self) -> Iterator[At]:
-        if self.error_correlation is not None and self.kind not in CORRELATED:
-            yield at("error_correlation", f"only {' and '.join(CORRELATED)} use it")
 
 
 class Keys(Study):

@@ -16,7 +16,7 @@ FAULTS = [
     (["filters.0.estimator=cured"], "filters.0.estimator: has no effect on range alone; leave it out"),
     (["filters.4.forecast=track"], "filters.4.forecast: has no effect with estimator: spectrum; leave it out"),
     (["filters.1.use=gated"], "filters.1.use: must be as_measured with estimator: fisher_bound"),
-    (["filters.2.gate_probability=0.9"], "filters.2.gate_probability: has no effect without use: gated; leave it out"),
+    (["filters.2.gate_probability=0.9"], "filters.2.gate_probability: belongs to use: gated"),
     (["filters.2.observes=[velocity]"], "filters.2.observes: must be [range]"),
     ([f"filters.2.observes={ALL}", "filters.2.derivatives=0"], "filters.2.derivatives: must be >= 1"),
     (["filters.0.hypotheses=3"], "filters.0.hypotheses: has no effect on range alone; leave it out"),

@@ -25,12 +25,7 @@ from radarsim.studies.sonar import config
 
 FIGURES = ("track_map", "confirmation", "track_life", "false_tracks", "track_classes")
 MOST_FALSE = 1e7  # in a scan of the whole sector
-DEFAULTS = {
-    "gate_probability": 0.99,
-    "drop_after_misses": 3,
-    "speed_mps": 10.0,
-    "lost_beyond_sigmas": 10.0,
-}
+TRACKER = {"association": ("nearest", "pda", "known")}
 
 
 class Sector(Model):
@@ -92,41 +87,37 @@ class Filter(config.Filter):
     gate_probability: Annotated[Probability, Field(gt=0)] | None = key(
         "gate probability",
         "probability that the gate contains the target's plot; 1: an open gate; default 0.99",
-        None,
+        0.99,
         symbol="P_G",
+        only=TRACKER,
     )
-    initiation: Initiation | None = key("rule of confirmation", "the m of n rule of confirmation; default 3 of 4", None)
+    initiation: Initiation | None = key(
+        "rule of confirmation", "the m of n rule of confirmation; default 3 of 4", None, only=TRACKER
+    )
     drop_after_misses: Annotated[int, Whole(1, 1000)] | None = key(
         "misses that drop a track",
         "scans in a row without a plot after which a confirmed track is dropped; default 3",
-        None,
+        3,
+        only=TRACKER,
     )
     speed_mps: Positive | None = key(
         "σ of a target's speed",
         "standard deviation of a target's speed in each direction, m/s, for the second gate; default 10",
-        None,
+        10.0,
+        only=TRACKER,
     )
     lost_beyond_sigmas: Positive | None = key(
         "error of a lost track",
         "error, in standard deviations of a plot, beyond which a track has lost its target; default 10",
-        None,
+        10.0,
         unit="σ of a plot",
+        only=TRACKER,
     )
 
-    def tracker(self, name: str) -> float:
-        """A number of the tracker, or its default where it is not given."""
-        given = getattr(self, name)
-        return DEFAULTS[name] if given is None else given
-
-    def m_of_n(self) -> tuple[int, int]:
-        """The rule of confirmation."""
-        return (self.initiation.m, self.initiation.n) if self.initiation else (3, 4)
-
-    @cross_check
-    def _belongs_to_tracker(self) -> Iterator[At]:
-        for name in (*DEFAULTS, "initiation"):
-            if self.association is None and getattr(self, name) is not None:
-                yield at(name, "belongs to a filter with an association: nearest, pda or known")
+    @property
+    def rule(self) -> Initiation:
+        """The rule of confirmation, given or by default."""
+        return self.initiation or Initiation(m=3, n=4)
 
     @cross_check
     def _kalman_line(self) -> Iterator[At]:

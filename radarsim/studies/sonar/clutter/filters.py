@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -54,17 +54,19 @@ def conditions(spec: Keys) -> Conditions:
 
 def tracker_specs(spec: Keys) -> list[TrackerSpec]:
     """The trackers of a case."""
+    members: Any = spec.filters  # completed: with every key of a tracker
     return [
         TrackerSpec(
-            member.association or "",
-            member.tracker("gate_probability"),
-            *member.m_of_n(),
-            int(member.tracker("drop_after_misses")),
-            member.tracker("speed_mps"),
-            member.tracker("lost_beyond_sigmas"),
+            member.association,
+            member.gate_probability,
+            member.rule.m,
+            member.rule.n,
+            member.drop_after_misses,
+            member.speed_mps,
+            member.lost_beyond_sigmas,
             (member.manoeuvre_variance or 0.0) * lateral_scale(spec, 2),
         )
-        for member in spec.filters
+        for member in members
     ]
 
 

@@ -156,10 +156,9 @@ def _summary(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
         )
         false_life = alive * result.axes.scan_period_s / false_found
         in_gate = counts[:, at.FALSE].sum() / counts[:, at.LOOKED].sum()
-    m, of = tracker.m_of_n()
     return {
         **{"case": result.name, "filter": result.axes.filters[f], "association": tracker.association},
-        **{"gate_probability": tracker.tracker("gate_probability"), "m": m, "of": of, "n": n},
+        **{"gate_probability": tracker.gate_probability, "m": tracker.rule.m, "of": tracker.rule.n, "n": n},
         "detection_probability": sensor.detection_probability,
         "false_plots_per_km2": sensor.false_plots_per_km2,
         "false_in_gate": in_gate,
@@ -189,7 +188,7 @@ def _gates(result: CaseResult[ClutterAxes]) -> Columns:
     counts, filters = np.asarray(result.sums["counts"]), result.spec.filters
     f, k = np.nonzero(counts[:, :, at.LOOKED] > 0)
     rows = counts[f, k]
-    gate = np.array([one.tracker("gate_probability") for one in filters])
+    gate = np.array([one.gate_probability for one in filters])
     matched = np.array([one.association == "known" and not one.manoeuvre_variance for one in filters])
     exact = np.where(matched & straight(result) & (not result.spec.target.fluctuation_mps2), gate, np.nan)
     return {

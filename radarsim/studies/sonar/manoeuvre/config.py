@@ -123,49 +123,37 @@ class Uses(Model):
 class Filter(config.Filter):
     """A filter that may respond to manoeuvres: kinds `adaptive` and `imm`."""
 
-    detector: OwnDetector | None = key("detector", "manoeuvre detector of an adaptive filter", None)
+    detector: OwnDetector | None = key(
+        "detector", "manoeuvre detector of an adaptive filter", only={"kind": "adaptive"}
+    )
     response: Literal["raise_degree", "shorten_memory"] | None = key(
         "response to a manoeuvre",
         "response of an adaptive filter to a manoeuvre: a parabola that starts with the detector's plots (default), "
         "or a window of these plots while the manoeuvre lasts",
         None,
+        only={"kind": "adaptive"},
     )
     end_after: Annotated[int, Whole(1, 100)] | None = key(
         "quiet tests that end a manoeuvre",
         "number of successive tests without an alarm that ends a manoeuvre; default 1",
         None,
+        only={"kind": "adaptive"},
     )
     manoeuvre_variances: tuple[NonNegative, NonNegative] | None = key(
         "manoeuvre variances of the models",
         "of the two models of an imm, steady and manoeuvring, (m/s²)², as manoeuvre_variance",
-        None,
+        only={"kind": "imm"},
     )
     stay_probabilities: tuple[Rate, Rate] | None = key(
         "probabilities that a model lasts",
         "of an imm: probabilities that the steady and the manoeuvring model last from scan to scan",
-        None,
+        only={"kind": "imm"},
     )
-
-    @cross_check
-    def _adaptive_complete(self) -> Iterator[At]:
-        if self.kind == "adaptive" and self.detector is None:
-            yield at("detector", "is needed by an adaptive filter")
-        for name in ("detector", "response", "end_after"):
-            if self.kind != "adaptive" and getattr(self, name) is not None:
-                yield at(name, "belongs to an adaptive filter")
 
     @cross_check
     def _parabola(self) -> Iterator[At]:
         if self.kind == "adaptive" and self.response != "shorten_memory" and self.degree == 2:
             yield at("degree", "must be 1 where a manoeuvre raises the degree; or use response: shorten_memory")
-
-    @cross_check
-    def _models_complete(self) -> Iterator[At]:
-        for name in ("manoeuvre_variances", "stay_probabilities"):
-            if self.kind == "imm" and getattr(self, name) is None:
-                yield at(name, "is needed by an imm")
-            if self.kind != "imm" and getattr(self, name) is not None:
-                yield at(name, "belongs to an imm")
 
     @cross_check
     def _second_moves_more(self) -> Iterator[At]:

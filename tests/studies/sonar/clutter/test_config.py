@@ -52,7 +52,10 @@ def config(sensor=(), first=(), **top):
         (config(first={"association": "jpda"}), "filters.0.association"),
         (config(first={"degree": 2}), "filters.0.association: needs a filter of kind kalman and degree 1"),
         (config(first={"kind": "growing_memory"}), "filters.0.association: needs a filter of kind kalman and degree 1"),
-        (config(first={"association": None, "speed_mps": 5}), "filters.0.speed_mps: belongs to a filter with an"),
+        (
+            config(first={"association": None, "speed_mps": 5}),
+            "filters.0.speed_mps: belongs to association: nearest or pda",
+        ),
         (
             config({"false_plots_per_km2": 1}, {"association": None}),
             "filters.0.association: is needed among false plots",
@@ -72,9 +75,9 @@ def test_refused(given, message):
 
 def test_defaults_are_told_and_used():
     (one,) = load(config()).cases[0].spec.filters
-    assert one.m_of_n() == (3, 4)
-    assert one.tracker("gate_probability") == 0.99
-    assert one.tracker("lost_beyond_sigmas") == 10.0
+    assert (one.rule.m, one.rule.n) == (3, 4)
+    assert one.gate_probability == 0.99
+    assert one.lost_beyond_sigmas == 10.0
 
 
 def test_density_and_sector_are_no_part_of_the_world():
@@ -87,4 +90,4 @@ def test_density_and_sector_are_no_part_of_the_world():
 def test_gate_probability_can_be_swept_by_its_bare_key():
     cases = load(config(sweep={"gate_probability": [0.9, 0.99], "sensor.false_plots_per_km2": [0, 1]})).cases
     assert len(cases) == 4
-    assert cases[0].spec.filters[0].tracker("gate_probability") == 0.9
+    assert cases[0].spec.filters[0].gate_probability == 0.9

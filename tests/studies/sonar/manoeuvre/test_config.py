@@ -21,13 +21,16 @@ def without(one, key):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"filters": [without(ADAPTIVE, "detector")]}, "filters.0.detector: is needed by an adaptive filter"),
+        ({"filters": [without(ADAPTIVE, "detector")]}, "filters.0.detector: is needed by kind: adaptive"),
         ({"filters": [ADAPTIVE | {"degree": 2}]}, "filters.0.degree: must be 1 where a manoeuvre raises the degree"),
-        ({"filters": [IMM | {"end_after": 2}]}, "filters.0.end_after: belongs to an adaptive filter"),
-        ({"filters": [without(IMM, "stay_probabilities")]}, "filters.0.stay_probabilities: is needed by an imm"),
+        ({"filters": [IMM | {"end_after": 2}]}, "filters.0.end_after: belongs to kind: adaptive, not imm"),
+        ({"filters": [without(IMM, "stay_probabilities")]}, "filters.0.stay_probabilities: is needed by kind: imm"),
         ({"filters": [IMM | {"manoeuvre_variances": [1, 0]}]}, "filters.0.manoeuvre_variances: must rise"),
-        ({"filters": [ADAPTIVE | {"manoeuvre_variances": [0, 1]}]}, "filters.0.manoeuvre_variances: belongs to an imm"),
-        ({"filters": [ADAPTIVE | {"manoeuvre_variance": 1.0}]}, "manoeuvre_variance: adaptive allows for no manoeuvre"),
+        (
+            {"filters": [ADAPTIVE | {"manoeuvre_variances": [0, 1]}]},
+            "filters.0.manoeuvre_variances: belongs to kind",
+        ),
+        ({"filters": [ADAPTIVE | {"manoeuvre_variance": 1.0}]}, "manoeuvre_variance: belongs to kind: fixed_gain"),
         (
             {"filters": [ADAPTIVE | {"detector": {"plots": 5}}]},
             "filters.0.detector.threshold_k: give either threshold_k or false_alarm_probability",

@@ -1,11 +1,9 @@
 """The YAML keys of the study. Whatever can be wrong in a config is found here, with line and column."""
 
-from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 from radarsim.config.fields import (
-    At,
     Design,
     Display,
     Model,
@@ -15,8 +13,6 @@ from radarsim.config.fields import (
     Positive,
     Study,
     Whole,
-    at,
-    cross_check,
     key,
     unique_names,
 )
@@ -47,16 +43,8 @@ class Filter(Model):
     name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
     kind: Literal["kalman", "fixed_gain"] = key("kind", "how its gain is made")
     gain: Annotated[Positive, Field(le=1)] | None = key(
-        "gain", "fixed_gain: share of the innovation that is taken over, no unit", None
+        "gain", "fixed_gain: share of the innovation that is taken over, no unit", only={"kind": "fixed_gain"}
     )
-
-    @cross_check
-    def _gain_where_fixed(self) -> Iterator[At]:
-        """Yours: keys that must go together are checked so; a fault is yielded at the key that it is about."""
-        if self.kind == "fixed_gain" and self.gain is None:
-            yield at("gain", "is needed by kind fixed_gain")
-        elif self.kind != "fixed_gain" and self.gain is not None:
-            yield at("gain", f"has no effect on kind {self.kind}: leave it out")
 
 
 class Keys(Study):

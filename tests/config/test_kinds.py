@@ -1,0 +1,55 @@
+"""Keys that belong to some kinds only: what is refused, what is asked for, what is filled in."""
+
+from typing import Literal
+
+import pytest
+from pydantic import ValidationError
+
+from radarsim.config.fields import Model, Positive, key
+
+
+class Shape(Model):
+    """A circle, or an ellipse that may be turned."""
+
+    kind: Literal["circle", "ellipse", "point"] = key("kind", "its kind")
+    radius_m: Positive | None = key("radius", "of a circle, m", only={"kind": "circle"})
+    ratio: Positive | None = key("ratio", "of an ellipse's axes; default: 2", 2.0, only={"kind": "ellipse"})
+    turned: Literal["yes", "no"] | None = key("turned", "of an ellipse; default: no", "no", only={"kind": "ellipse"})
+    aspect_rad: Positive | None = key("aspect", "of a turned one, rad", 1.0, only={"kind": "ellipse", "turned": "yes"})
+    label: str | None = key("label", "of what has a size", None, only={"kind": ("circle", "ellipse")})
+
+
+@pytest.mark.parametrize(
+    ("given", "filled"),
+    [
+        ({"kind": "circle", "radius_m": 3.0}, {}),
+        ({"kind": "ellipse"}, {"ratio": 2.0, "turned": "no"}),
+        ({"kind": "ellipse", "ratio": 3.0, "turned": "yes"}, {"aspect_rad": 1.0}),
+        ({"kind": "point"}, {}),
+    ],
+)
+def test_what_belongs_has_its_default(given, filled):
+    assert Shape.model_validate(given).model_dump(exclude_none=True) == given | filled
+
+
+@pytest.mark.parametrize(
+    ("given", "faults"),
+    [
+        ({"kind": "circle"}, [("radius_m", "is needed by kind: circle")]),
+        ({"kind": "point", "ratio": 1.0}, [("ratio", "belongs to kind: ellipse, not point")]),
+        ({"kind": "point", "label": "a"}, [("label", "belongs to kind: circle or ellipse, not point")]),
+        ({"kind": "ellipse", "aspect_rad": 1.0}, [("aspect_rad", "belongs to turned: yes, not no")]),
+        (
+            {"kind": "circle", "turned": "yes", "aspect_rad": 1.0},
+            [
+                ("radius_m", "is needed by kind: circle"),
+                ("turned", "belongs to kind: ellipse, not circle"),
+                ("aspect_rad", "belongs to kind: ellipse, not circle"),
+            ],
+        ),
+    ],
+)
+def test_all_that_does_not_belong_or_is_missing_is_told_at_once(given, faults):
+    with pytest.raises(ValidationError) as caught:
+        Shape.model_validate(given)
+    assert [tuple(each) for each in caught.value.errors()[0]["ctx"]["faults"]] == faults
