@@ -8,10 +8,8 @@ from hypothesis import strategies as st
 
 from radarsim.app.configs import load
 from radarsim.config.experiment import Experiment
-from radarsim.config.lookup import SHIPPED
 from radarsim.errors import ConfigError
 
-TEXT = (SHIPPED / "configs/rls2.yaml").read_text(encoding="utf-8")
 SHORT = {
     "study": "range_doppler",
     "radar": {"wavelength_m": 1, "sigma_range_m": 1, "sigma_velocity_mps": 1, "scan_period_s": 1},
@@ -31,37 +29,13 @@ VALUES = st.recursive(
     LEAVES, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3)
 )
 KEYS = st.sampled_from(
-    [
-        "study",
-        "include",
-        "sweep",
-        "realisations",
-        "seed",
-        "figures",
-        "radar",
-        "radar.name",
-        "radar.band",
-        "radar.sigma_range_m",
-        "target",
-        "target.kind",
-        "target.aspect_deg",
-        "target.aspect_rad",
-        "target.range_m",
-        "target.start_scan",
-        "filters",
-        "filters.0",
-        "filters.0.name",
-        "filters.0.observes",
-        "filters.0.initial_scans",
-        "manoeuvre_variance",
-        "baseline",
-        "scans",
-        "sweep.scans",
-        "figures.a",
-        "include.0",
-    ]
+    (
+        "study include sweep realisations seed figures radar radar.name radar.band radar.sigma_range_m target "
+        "target.kind target.aspect_deg target.aspect_rad target.range_m target.start_scan filters filters.0 "
+        "filters.0.name filters.0.observes filters.0.initial_scans manoeuvre_variance baseline scans sweep.scans "
+        "figures.a include.0 "
+    ).split()
 )
-DAMAGE = st.tuples(st.integers(0, len(TEXT)), st.integers(0, 20), st.sampled_from(SCRAPS))
 quick = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
@@ -76,25 +50,6 @@ def outcome(source, overrides=()):
         return
     assert lines
     assert all(line.isprintable() and len(line) < 2000 for line in lines), lines
-
-
-@quick
-@given(st.lists(DAMAGE, min_size=1, max_size=6))
-def test_a_damaged_file(tmp_path_factory, damages):
-    text = TEXT
-    for place, length, scrap in damages:
-        text = text[:place] + scrap + text[place + length :]
-    file = tmp_path_factory.mktemp("fuzz") / "own.yaml"
-    file.write_text(text, encoding="utf-8", errors="surrogatepass")
-    outcome(file)
-
-
-@quick
-@given(st.binary(max_size=200))
-def test_a_file_of_noise(tmp_path_factory, content):
-    file = tmp_path_factory.mktemp("fuzz") / "own.yaml"
-    file.write_bytes(content)
-    outcome(file)
 
 
 @quick

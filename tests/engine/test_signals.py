@@ -152,38 +152,6 @@ def test_processes_on_one_store_at_once(tmp_path, copies):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
-def test_twenty_kills_lose_no_byte(tmp_path, seed):
-    """Five each, at a rate of writing where most kills fall into it."""
-    killed_until_done(tmp_path, 16 * 6_000 + 5, 1e-3, 0.0, random.Random(seed), kills=5)
-    assert whole(tmp_path, 16 * 6_000 + 5) > 0
-
-
-@pytest.mark.slow
-def test_a_kill_loses_about_a_second_of_work(tmp_path):
-    """At the period that is shipped: 1 s, and what the disk took. The rate is that of the first second."""
-    since = time.perf_counter()
-    with started(tmp_path, 16 * 20_000, "--pause", 1e-3, "--period", 1.0) as process:
-        rate = 2_000 / (time.perf_counter() - since)
-        time.sleep(4)
-        process.kill()
-    nodes = [piece for piece in Store(tmp_path, WORK).pieces() if isinstance(piece, Node)]
-    assert sum(1 << node.level for node in nodes) > 2_000 + 2.5 * rate
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(25))
-def test_fifty_of_fifty_signals_are_answered_in_time(tmp_path, seed):
-    draw = random.Random(seed)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        with started(tmp_path, 16 * 10_000, "--pause", 1e-3, "--period", 0.0) as process:
-            time.sleep(draw.uniform(0.0, 0.5))
-            process.send_signal(number)
-            seconds, status = ended(process)
-        assert (seconds < 2, status) == (True, 128 + number)
-
-
-@pytest.mark.slow
 def test_a_real_full_disk_in_a_file_system_of_its_own(tmp_path):
     """Needs the right to mount; a disk of 64 kB on which a run of 1 MB vectors does not fit, and a small one stays."""
     script = f"""set -e
