@@ -28,14 +28,12 @@ LEAVES = st.none() | st.booleans() | NUMBERS | st.text(max_size=8) | WORDS | st.
 VALUES = st.recursive(
     LEAVES, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3)
 )
-KEYS = st.sampled_from(
-    (
-        "study include sweep realisations seed figures radar radar.name radar.band radar.sigma_range_m target "
-        "target.kind target.aspect_deg target.aspect_rad target.range_m target.start_scan filters filters.0 "
-        "filters.0.name filters.0.observes filters.0.initial_scans manoeuvre_variance baseline scans sweep.scans "
-        "figures.a include.0 "
-    ).split()
-)
+WORDED = """
+study include sweep realisations seed figures radar radar.name radar.band radar.sigma_range_m target target.kind
+target.aspect_deg target.aspect_rad target.range_m target.start_scan filters filters.0 filters.0.name
+filters.0.observes filters.0.initial_scans manoeuvre_variance baseline scans sweep.scans figures.a include.0
+"""
+KEYS = st.sampled_from(WORDED.split())
 quick = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
