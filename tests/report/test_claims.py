@@ -78,12 +78,6 @@ def test_verdict_is_of_the_interval(lo, hi, said):
     assert claims.verdict(Estimate((lo + hi) / 2, lo, hi), (1.0, 2.0)) == said
 
 
-def test_verdict_of_several_parts():
-    assert claims.overall([CONFIRMED, CONFIRMED]) == CONFIRMED
-    assert claims.overall([CONFIRMED, UNCLEAR]) == UNCLEAR
-    assert claims.overall([UNCLEAR, REFUTED, CONFIRMED]) == REFUTED
-
-
 def test_series():
     k = np.arange(1, 5)
     value = np.array([1.0, 3.0, 2.9, 0.5])

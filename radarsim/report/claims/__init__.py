@@ -18,7 +18,6 @@ from radarsim.report.claims.judge import (
     first_rows,
     judged,
     listed,
-    overall,
     verdict,
 )
 from radarsim.report.claims.ranges import (

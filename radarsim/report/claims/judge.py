@@ -35,13 +35,6 @@ def verdict(of: Estimate, strict: tuple[float, float]) -> str:
     return UNCLEAR
 
 
-def overall(verdicts: Sequence[str]) -> str:
-    """Of a claim with several parts, by the rule of version 0.1: refuted with any of them, confirmed with all."""
-    if REFUTED in verdicts:
-        return REFUTED
-    return CONFIRMED if set(verdicts) == {CONFIRMED} else UNCLEAR
-
-
 CLAIMED = (
     *("claim", "paper", "statement", "case", "measured", "lo", "hi", "expected", "verdict"),
     *("expected_lo", "expected_hi", "what", "unit", "place", "reading", "overall"),

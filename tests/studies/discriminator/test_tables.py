@@ -8,7 +8,7 @@ import pytest
 from radarsim.app import run as experiment
 from radarsim.bursts.burst import phase_turns, sample_times, signal
 from radarsim.report.drawing import Line
-from radarsim.studies.discriminator import STUDY, measures, study, words
+from radarsim.studies.discriminator import measures, study, words
 from radarsim.studies.discriminator import tables as report
 from radarsim.studies.discriminator.kernels.sums import bin_edges
 from radarsim.studies.discriminator.map import one_burst
@@ -122,8 +122,7 @@ def test_answer_names_every_estimator(made):
     assert all(re.search(rf"(: |, ){re.escape(name)} \d+(\.\d\d)? % \[", others) for name in names[1:])
 
 
-def test_all_claims_are_there_and_find_their_estimators(made):
-    assert [claim.id for claim in STUDY.claims().claims] == [f"P4.{i}" for i in range(1, 21)]
+def test_claims_find_their_estimators(made):
     kinds = [measures.kind_of(e, 1.0) for e in made.cases[0].spec.estimators]
     assert kinds == ["sequence", "other", "other", "other", "narrow", "wide", "truth", "other", "cured"]
     dense = replace_estimator(made.cases[0].spec.estimators[0], main_lobe_threshold=0.5)
