@@ -153,7 +153,7 @@ EDITS = [  # file, text in it, its replacement, whether numbers may change
     ("config.py", "Field(le=1)]", "Field(le=2)]", True),
     ("study.py", "BLOCK = 4096", "BLOCK = 2048", True),
     ("study.py", '"""Sums of realisations', '"""The sums of realisations', False),
-    ("config.py", 'description="the sensor"', 'description="a sensor"', False),
+    ("config.py", 'key("sensor", "the sensor")', 'key("sensor", "a sensor")', False),
     ("words.py", "How well", "How badly", False),
     ("tables.py", '"x", "m", gain', '"y", "m", gain', False),
     ("claims.yaml", "above: 10", "above: 11", False),
