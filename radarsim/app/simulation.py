@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from radarsim.app.work import CaseWork
 from radarsim.config.experiment import Case, Experiment
@@ -121,7 +121,7 @@ def simulated(
             work = CaseWork(case)
             key = (work.identity, case.realisations)
             if key not in made:
-                collector = _collector(work, options, over_all)
+                collector = _collector(work, options, over_all, collect)
                 wanted = None
                 if precision is not None:
                     wanted = Wanted(precision, of, table_of(experiment, of), tailed(work, of))
@@ -139,17 +139,10 @@ def simulated(
     return simulation
 
 
-def _collector(work: CaseWork, options: RunOptions, progress: Progress) -> Callable[[int], Collected]:
-    """The engine's `collect` for a work, as a function of the number of realisations."""
-    return partial(
-        collect,
-        work,
-        store=options.out,
-        threads=options.threads,
-        progress=progress,
-        stop=options.stop,
-        executor=options.executor,
-    )
+def _collector(work: CaseWork, options: RunOptions, progress: Progress, of: Callable[..., Any]) -> Callable[..., Any]:
+    """The engine's `collect` or `share`, by `of`, for a work, as a function of the number of realisations."""
+    means = {"threads": options.threads, "stop": options.stop, "executor": options.executor}
+    return partial(of, work, store=options.out, progress=progress, **means)
 
 
 class Wanted(NamedTuple):
@@ -264,16 +257,7 @@ def shared(
         work = CaseWork(case)
         if (key := (work.identity, case.realisations)) in made:
             continue
-        one = share(
-            work,
-            case.realisations,
-            part,
-            store=options.out,
-            threads=options.threads,
-            progress=over_all,
-            stop=options.stop,
-            executor=options.executor,
-        )
+        one = _collector(work, options, over_all, share)(case.realisations, part)
         made.add(key)
         shares[case.name] = one
         done += one.done

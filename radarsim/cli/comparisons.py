@@ -3,30 +3,24 @@
 import click
 
 from radarsim.cli.group import (
+    Drawing,
     completed,
-    drawn_as,
-    figures_option,
-    format_option,
+    drawing_options,
     json_option,
     main,
     out_option,
-    width_option,
 )
 
 
 @main.command()
 @click.argument("sources", nargs=-1, required=True, metavar="A B…", shell_complete=completed)
 @out_option
-@figures_option
-@format_option
-@width_option
+@drawing_options
 @json_option
 def compare(
     sources: tuple[str, ...],
     out: str,
-    no_figures: bool,
-    formats: tuple[str, ...],
-    width_mm: float | None,
+    drawing: Drawing,
     as_json: bool,
 ) -> None:
     """Runs side by side on common axes: differences with intervals; computes nothing.
@@ -48,7 +42,7 @@ def compare(
 
     if len(sources) < 2:
         raise click.UsageError(f"compare takes two results or more, got {len(sources)}")
-    compared = comparing.compare(sources, out, formats=drawn_as(no_figures, formats), width_mm=width_mm)
+    compared = comparing.compare(sources, out, formats=drawing.formats, width_mm=drawing.width_mm)
     if as_json:
         click.echo(documents.text(documents.fields(compared)))
     else:

@@ -5,18 +5,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from radarsim.cli.group import (
+    Drawing,
     completed,
     config_argument,
-    drawn_as,
-    figures_option,
-    format_option,
+    drawing_options,
     json_option,
     main,
     out_option,
     realisations_option,
     seed_option,
     set_option,
-    width_option,
 )
 
 if TYPE_CHECKING:
@@ -155,17 +153,13 @@ def asked(kinds: "dict[str, str | None]", filter_name: str | None, at_s: float |
 @click.argument("configs", nargs=-1, metavar="[CONFIG…]", shell_complete=completed)
 @set_option
 @out_option
-@figures_option
-@format_option
-@width_option
+@drawing_options
 @json_option
 def chart(
     configs: tuple[str, ...],
     overrides: tuple[str, ...],
     out: str,
-    no_figures: bool,
-    formats: tuple[str, ...],
-    width_mm: float | None,
+    drawing: Drawing,
     as_json: bool,
 ) -> None:
     """What Doppler gains for every radar, and yours on it; simulates nothing.
@@ -179,15 +173,13 @@ def chart(
       radarsim chart                              the first paper's five radars
       radarsim chart rls2 --set radar.sigma_velocity_mps=5
     """
-    from radarsim.app import chart as drawing
+    from radarsim.app import chart as charting
     from radarsim.app import documents
     from radarsim.cli import answers, console
 
-    chosen = drawn_as(no_figures, formats)
     with console.Progress("chart", quiet=as_json, what="figures") as progress:
-        drawn = drawing.chart(
-            configs, out, overrides=overrides, formats=chosen, width_mm=width_mm, progress=progress.update
-        )
+        shown: dict[str, Any] = {"formats": drawing.formats, "width_mm": drawing.width_mm}
+        drawn = charting.chart(configs, out, overrides=overrides, progress=progress.update, **shown)
     if as_json:
         click.echo(documents.text(documents.drawn(drawn)))
     else:
@@ -204,9 +196,7 @@ def chart(
 @realisations_option
 @seed_option
 @out_option
-@figures_option
-@format_option
-@width_option
+@drawing_options
 @json_option
 def sensitivity(
     config: str,
@@ -218,9 +208,7 @@ def sensitivity(
     realisations: int | None,
     seed: int | None,
     out: str,
-    no_figures: bool,
-    formats: tuple[str, ...],
-    width_mm: float | None,
+    drawing: Drawing,
     as_json: bool,
 ) -> None:
     """What +10 % of each key changes: σ and gain, the largest effect first.
@@ -252,7 +240,7 @@ def sensitivity(
         found = finding.sensitivity(
             config, overrides=experiment.merged(overrides, None, seed), progress=progress.update, **asked_for
         )
-    written = finding.write(found, out, drawn_as(no_figures, formats), width_mm)
+    written = finding.write(found, out, *drawing)
     if as_json:
         click.echo(documents.text(documents.fields(found) | {"files": written}))
     else:

@@ -8,12 +8,12 @@ import click
 
 from radarsim.cli.group import (
     Directory,
+    Drawing,
     Positive,
     Share,
     completed,
     configs_argument,
-    figures_option,
-    format_option,
+    drawing_options,
     json_option,
     main,
     of_option,
@@ -22,7 +22,6 @@ from radarsim.cli.group import (
     realisations_option,
     seed_option,
     set_option,
-    width_option,
 )
 from radarsim.errors import ClusterError, DisagreementError, TargetUnmet
 
@@ -46,9 +45,7 @@ if TYPE_CHECKING:
 @click.option("--workers", type=click.IntRange(1, 1024), metavar="N", help="Worker processes on this machine (Dask).")
 @click.option("--scheduler", metavar="ADDR", help="Address of a Dask scheduler whose workers compute: tcp://host:8786.")
 @out_option
-@figures_option
-@format_option
-@width_option
+@drawing_options
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @json_option
 def run(
@@ -65,9 +62,7 @@ def run(
     workers: int | None,
     scheduler: str | None,
     out: str,
-    no_figures: bool,
-    formats: tuple[str, ...],
-    width_mm: float | None,
+    drawing: Drawing,
     quiet: bool,
     as_json: bool,
 ) -> None:
@@ -110,9 +105,8 @@ def run(
         with experiment.cluster(workers, scheduler) as pool:
             means: dict[str, Any] = {"out": out, "threads": threads, "executor": pool}
             means |= {"time_limit": limit, "stop": stop}
-            figures = False if no_figures else formats or True
             compute: Callable[..., Result | Shares]
-            draw = partial(experiment.run, figures=figures, width_mm=width_mm)
+            draw = partial(experiment.run, figures=drawing.formats, width_mm=drawing.width_mm)
             compute = partial(draw, overrides=overrides, precision=precision, of=of, decide=decide)
             if shard:
                 compute = partial(experiment.share, part=shard)
@@ -270,9 +264,7 @@ def check(
 @seed_option
 @set_option
 @out_option
-@figures_option
-@format_option
-@width_option
+@drawing_options
 @json_option
 def report(
     configs: tuple[str, ...],
@@ -280,9 +272,7 @@ def report(
     seed: int | None,
     overrides: tuple[str, ...],
     out: str,
-    no_figures: bool,
-    formats: tuple[str, ...],
-    width_mm: float | None,
+    drawing: Drawing,
     as_json: bool,
 ) -> None:
     """Tables, figures and report from what is stored; computes nothing.
@@ -295,10 +285,10 @@ def report(
     from radarsim.app import run as experiment
 
     overrides = experiment.merged(overrides, realisations, seed)
-    figures = False if no_figures else formats or True
-    read = partial(experiment.report, out=out, overrides=overrides, figures=figures, width_mm=width_mm)
+    shown: dict[str, Any] = {"figures": drawing.formats, "width_mm": drawing.width_mm}
+    read = partial(experiment.report, out=out, overrides=overrides, **shown)
     loaded = experiment.load_all(configs, overrides)
-    _compute_each(loaded, lambda one, progress: read(one), out, False, as_json, None)
+    _compute_each(loaded, lambda one, progress: read(experiment=one), out, False, as_json, None)
 
 
 @main.command()

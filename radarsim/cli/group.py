@@ -1,14 +1,15 @@
 """The group of commands: the options, faults and exit codes that all share."""
 
 import contextlib
+import functools
 import math
 import os
 import re
 import signal
 import sys
 import threading
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, NoReturn
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 import click
 
@@ -295,9 +296,21 @@ width_option = click.option(
 )
 
 
-def drawn_as(no_figures: bool, formats: tuple[str, ...]) -> tuple[str, ...]:
-    """The formats that the options `--no-figures` and `--format` ask a command for: SVG and PNG where none is named."""
-    return () if no_figures else formats or ("svg", "png")
-
-
 figures_option = click.option("--no-figures", is_flag=True, help="Draw no figures; tables and report only.")
+
+
+class Drawing(NamedTuple):
+    """In which formats a command draws figures, none with --no-figures, and how wide."""
+
+    formats: tuple[str, ...]
+    width_mm: float | None
+
+
+def drawing_options(command: Callable[..., None]) -> Callable[..., None]:
+    """--no-figures, --format and --width, which the command takes together as `drawing`."""
+
+    @functools.wraps(command)
+    def taking(no_figures: bool, formats: tuple[str, ...], width_mm: float | None, **others: Any) -> None:
+        command(drawing=Drawing(() if no_figures else formats or ("svg", "png"), width_mm), **others)
+
+    return figures_option(format_option(width_option(taking)))
