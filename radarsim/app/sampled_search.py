@@ -10,23 +10,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
 
-from radarsim.app import search
+from radarsim.app import question, search
 from radarsim.app.quantities import UNPAIRED
-from radarsim.app.question import (
-    JUMPS,
-    WHOLE,
-    Answer,
-    Curve,
-    Question,
-    answered,
-    boundary,
-    fulfilling,
-    nearest,
-    nowhere,
-    predict,
-    refuse_without_effect,
-    said_of,
-)
+from radarsim.app.question import Answer, Curve, Question
 from radarsim.language import tr
 from radarsim.report.statistics import Estimate
 
@@ -48,20 +34,20 @@ def by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> A
     counts = {"grid": len(grid), "pilot": pilot, "more": WITH_ALL, "count": count}
     what = tr(
         "simulates {grid} values of {key} with {pilot} realisations, then about {more} with {count}",
-        **said_of(asked),
+        **question.said_of(asked),
         **counts,
     )
-    predict(told, what, (WITH_ALL + len(grid) * pilot / count) * (time.monotonic() - begun))
+    question.predict(told, what, (WITH_ALL + len(grid) * pilot / count) * (time.monotonic() - begun))
     scanned = [(x, curve.simulated(x, pilot).value - asked.equals) for x in grid]
     known = [one for one in scanned if not math.isnan(one[1])]
     if not known:
-        raise nowhere(asked, curve)
-    refuse_without_effect(asked, [y for _, y in known])
+        raise question.nowhere(asked, curve)
+    question.refuse_without_effect(asked, [y for _, y in known])
     apart = unpaired(asked, curve)
     if apart:
         told("; ".join(apart))
         count = curve.realisations = UNPAIRED * count
-    answer = partial(answered, asked, attained_now, exact=False)
+    answer = partial(question.answered, asked, attained_now, exact=False)
     best, _ = min(known, key=lambda one: abs(one[1]))
     places = _changes(scanned) or [grid.index(best)]
     brackets = [pair for pair in map(partial(_bracket, asked, curve, grid), places) if pair is not None]
@@ -81,16 +67,16 @@ def by_sampling(asked: Question, curve: Curve, told: Callable[[str], None]) -> A
             hi=limit.hi,
             unit=tr(asked.unit),
         )
-        notes = (doubt,) if near else boundary(asked, curve, best)
+        notes = (doubt,) if near else question.boundary(asked, curve, best)
         return answer(limit=limit.value, limit_at=best, notes=notes + apart)
-    value = nearest([one.value for one in found], asked)
+    value = question.nearest([one.value for one in found], asked)
     own, there = next(one for one in found if one.value == value), curve.simulated(value, count)
     jumps = not over.whole and not there.lo <= asked.equals <= there.hi
     return answer(
         **{"value": value, "lo": own.lo, "hi": own.hi, "attained": there.value},
         slope=None if jumps else _sampled_slope(curve, own),
         others=tuple(one.value for one in found if not own.lo <= one.value <= own.hi),
-        notes=((JUMPS,) if jumps else ()) + ((WHOLE,) if over.whole else ()) + apart + curve.noted(value),
+        notes=(question.JUMPS,) * jumps + (question.WHOLE,) * over.whole + apart + curve.noted(value),
     )
 
 
@@ -144,7 +130,7 @@ def _interval(asked: Question, curve: Curve, one: tuple[float, float], other: tu
 
     value = search.closed(partial(part, "value"), over, one, other, partial(close, "value"))
     if over.whole:
-        value = fulfilling(asked, value, lambda n: curve.simulated(n, count).value)
+        value = question.fulfilling(asked, value, lambda n: curve.simulated(n, count).value)
     rising = other[1] > one[1]
     ends = []
     for side, of in ((-1, "hi" if rising else "lo"), (1, "lo" if rising else "hi")):

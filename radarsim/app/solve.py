@@ -8,27 +8,9 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from radarsim.app import quantities, sampled_search, search
+from radarsim.app import quantities, question, sampled_search, search
 from radarsim.app.quantities import Quantity
-from radarsim.app.question import (
-    JUMPS,
-    ROUGH,
-    WHOLE,
-    Answer,
-    Cases,
-    Config,
-    Curve,
-    Question,
-    answered,
-    boundary,
-    fulfilling,
-    nearest,
-    nowhere,
-    predict,
-    range_of,
-    refuse_without_effect,
-    said_of,
-)
+from radarsim.app.question import Answer, Cases, Curve, Question
 from radarsim.config import numeric
 from radarsim.errors import ConfigError
 from radarsim.language import tr
@@ -46,7 +28,7 @@ DOUBT = 0.01  # of the quantity: how near to the target the rough one may come w
 
 
 def solve(
-    config: Config,
+    config: question.Config,
     key: str,
     quantity: Quantity,
     equals: float,
@@ -76,14 +58,14 @@ def solve(
     quantities.checked(quantity, cases.base)
     axes = quantities.labels(quantity, cases.base)
     quantity = quantities.resolved(quantity, axes)
-    over = range_of(found, key, between)
+    over = question.range_of(found, key, between)
     curve = Curve(cases, key, quantity, threads, progress, realisations or cases.base.realisations)
     now = found[0].value if len({one.value for one in found}) == 1 else None
-    question = Question(
+    asked = Question(
         cases, key, quantity, equals, over, now, quantities.unit(quantity, axes), tuple(overrides), realisations
     )
     work = _exactly if not sampled and curve.exact(axes) else sampled_search.by_sampling
-    return work(question, curve, told or (lambda line: None))
+    return work(asked, curve, told or (lambda line: None))
 
 
 def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answer:
@@ -99,23 +81,24 @@ def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answ
     # One exact value beside the search's own where it may take seconds: where each pattern of plots is followed it
     # takes a twentieth of one.
     each = timed(partial(curve.exactly, elsewhere)) if near or not curve.rough else 0.0
-    what = tr("computes the {quantity} at about {count} values of {key}", **said_of(asked), count=curve.expected)
+    said = question.said_of(asked)
+    what = tr("computes the {quantity} at about {count} values of {key}", **said, count=curve.expected)
     seconds = TO_CLOSE * each + len(grid) * (AROUND * roughly if curve.rough else each)
-    predict(told, what + (tr(", each {near}", near=tr(near)) if near else ""), seconds)
+    question.predict(told, what + (tr(", each {near}", near=tr(near)) if near else ""), seconds)
     try:
         found = roots(asked, curve)
     except ValueError:
-        raise nowhere(asked, curve) from None
-    counted = ROUGH if curve.rough else 0  # both kinds differ a little where the key has no effect
-    refuse_without_effect(asked, [one.value for (_, count), one in curve.known.items() if count == counted])
+        raise question.nowhere(asked, curve) from None
+    counted = question.ROUGH if curve.rough else 0  # both kinds differ a little where the key has no effect
+    question.refuse_without_effect(asked, [one.value for (_, count), one in curve.known.items() if count == counted])
     values = found.roots
     if asked.over.whole:
-        values = tuple(dict.fromkeys(fulfilling(asked, x, curve.exactly) for x in values))
-    answer = partial(answered, asked, attained_now, exact=True)
+        values = tuple(dict.fromkeys(question.fulfilling(asked, x, curve.exactly) for x in values))
+    answer = partial(question.answered, asked, attained_now, exact=True)
     if not values:
         limit = found.at_nearest + asked.equals
-        return answer(limit=limit, limit_at=found.nearest, notes=boundary(asked, curve, found.nearest))
-    value = nearest(values, asked)
+        return answer(limit=limit, limit_at=found.nearest, notes=question.boundary(asked, curve, found.nearest))
+    value = question.nearest(values, asked)
     near = study.exact_but_for(quantities.shortened(asked.quantity, asked.cases.at(asked.key, value)))
     attained = curve.exactly(value)
     jumps = not asked.over.whole and abs(attained - asked.equals) > JUMP * max(abs(asked.equals), abs(attained_now))
@@ -123,8 +106,8 @@ def _exactly(asked: Question, curve: Curve, told: Callable[[str], None]) -> Answ
         **{"value": value, "lo": value, "hi": value, "attained": attained},
         slope=None if jumps else slope(curve.exactly, value, asked.over),
         others=tuple(x for x in values if x != value),
-        notes=((JUMPS,) if jumps else ())
-        + ((WHOLE,) if asked.over.whole and attained != asked.equals else ())
+        notes=((question.JUMPS,) if jumps else ())
+        + ((question.WHOLE,) if asked.over.whole and attained != asked.equals else ())
         + ((tr("σ is {what}", what=tr(near)),) if near else ()),
     )
 

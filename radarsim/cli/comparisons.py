@@ -2,25 +2,18 @@
 
 import click
 
-from radarsim.cli.group import (
-    Drawing,
-    completed,
-    drawing_options,
-    json_option,
-    main,
-    out_option,
-)
+from radarsim.cli import group
 
 
-@main.command()
-@click.argument("sources", nargs=-1, required=True, metavar="A B…", shell_complete=completed)
-@out_option
-@drawing_options
-@json_option
+@group.main.command()
+@click.argument("sources", nargs=-1, required=True, metavar="A B…", shell_complete=group.completed)
+@group.out_option
+@group.drawing_options
+@group.json_option
 def compare(
     sources: tuple[str, ...],
     out: str,
-    drawing: Drawing,
+    drawing: group.Drawing,
     as_json: bool,
 ) -> None:
     """Runs side by side on common axes: differences with intervals; computes nothing.

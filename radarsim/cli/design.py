@@ -4,18 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from radarsim.cli.group import (
-    Drawing,
-    completed,
-    config_argument,
-    drawing_options,
-    json_option,
-    main,
-    out_option,
-    realisations_option,
-    seed_option,
-    set_option,
-)
+from radarsim.cli import group
 
 if TYPE_CHECKING:
     from radarsim.app.quantities import Quantity
@@ -58,8 +47,8 @@ at_options = (
 )
 
 
-@main.command()
-@config_argument
+@group.main.command()
+@group.config_argument
 @click.argument("key", metavar="KEY")
 @quantity_options
 @click.option("--filter", "filter_name", metavar="NAME", help="The filter, where there are several.")
@@ -68,11 +57,11 @@ at_options = (
 @click.option("--equals", type=float, required=True, metavar="X", help="What it shall be: per cent of gains and rates.")
 @click.option("--between", type=(float, float), metavar="LO HI", help="Values of KEY that are searched.")
 @click.option("--case", metavar="CASE", help="The case, of a config that has several.")
-@set_option
-@realisations_option
-@seed_option
-@click.option("--threads", type=click.IntRange(1, 1024), metavar="T", help="Threads; default: all cores.")
-@json_option
+@group.set_option
+@group.realisations_option
+@group.seed_option
+@group.threads_option
+@group.json_option
 def solve(
     config: str,
     key: str,
@@ -149,17 +138,17 @@ def asked(kinds: "dict[str, str | None]", filter_name: str | None, at_s: float |
     return Quantity(kind, chosen, component, at_s, at_k)
 
 
-@main.command()
-@click.argument("configs", nargs=-1, metavar="[CONFIG…]", shell_complete=completed)
-@set_option
-@out_option
-@drawing_options
-@json_option
+@group.main.command()
+@click.argument("configs", nargs=-1, metavar="[CONFIG…]", shell_complete=group.completed)
+@group.set_option
+@group.out_option
+@group.drawing_options
+@group.json_option
 def chart(
     configs: tuple[str, ...],
     overrides: tuple[str, ...],
     out: str,
-    drawing: Drawing,
+    drawing: group.Drawing,
     as_json: bool,
 ) -> None:
     """What Doppler gains for every radar, and yours on it; simulates nothing.
@@ -186,18 +175,18 @@ def chart(
         answers.print_drawn(drawn)
 
 
-@main.command()
-@config_argument
+@group.main.command()
+@group.config_argument
 @at_options[0]
 @at_options[1]
 @click.option("--component", metavar="COMPONENT", help="The component that is shown and leads; default: the first.")
 @click.option("--case", metavar="CASE", help="The case, of a config that has several.")
-@set_option
-@realisations_option
-@seed_option
-@out_option
-@drawing_options
-@json_option
+@group.set_option
+@group.realisations_option
+@group.seed_option
+@group.out_option
+@group.drawing_options
+@group.json_option
 def sensitivity(
     config: str,
     at_s: float | None,
@@ -208,7 +197,7 @@ def sensitivity(
     realisations: int | None,
     seed: int | None,
     out: str,
-    drawing: Drawing,
+    drawing: group.Drawing,
     as_json: bool,
 ) -> None:
     """What +10 % of each key changes: σ and gain, the largest effect first.

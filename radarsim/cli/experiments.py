@@ -6,23 +6,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import click
 
-from radarsim.cli.group import (
-    Directory,
-    Drawing,
-    Positive,
-    Share,
-    completed,
-    configs_argument,
-    drawing_options,
-    json_option,
-    main,
-    of_option,
-    out_option,
-    precision_option,
-    realisations_option,
-    seed_option,
-    set_option,
-)
+from radarsim.cli import group
 from radarsim.errors import ClusterError, DisagreementError, TargetUnmet
 
 if TYPE_CHECKING:
@@ -31,23 +15,23 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Experiment
 
 
-@main.command()
-@configs_argument
-@realisations_option
-@seed_option
-@set_option
-@precision_option
-@of_option
+@group.main.command()
+@group.configs_argument
+@group.realisations_option
+@group.seed_option
+@group.set_option
+@group.precision_option
+@group.of_option
 @click.option("--decide", is_flag=True, help="Until each claim of the config is decided, at most N realisations.")
-@click.option("--time-limit", type=Positive("SECONDS"), metavar="SECONDS", help="Stop cleanly then, keep what is done.")
-@click.option("--shard", type=Share(), metavar="i/n", help="Compute this share of the blocks only; no tables.")
-@click.option("--threads", type=click.IntRange(1, 1024), metavar="T", help="Threads; default: all cores.")
+@group.time_limit_option
+@click.option("--shard", type=group.Share(), metavar="i/n", help="Compute this share of the blocks only; no tables.")
+@group.threads_option
 @click.option("--workers", type=click.IntRange(1, 1024), metavar="N", help="Worker processes on this machine (Dask).")
 @click.option("--scheduler", metavar="ADDR", help="Address of a Dask scheduler whose workers compute: tcp://host:8786.")
-@out_option
-@drawing_options
+@group.out_option
+@group.drawing_options
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
-@json_option
+@group.json_option
 def run(
     configs: tuple[str, ...],
     realisations: int | None,
@@ -62,7 +46,7 @@ def run(
     workers: int | None,
     scheduler: str | None,
     out: str,
-    drawing: Drawing,
+    drawing: group.Drawing,
     quiet: bool,
     as_json: bool,
 ) -> None:
@@ -203,16 +187,16 @@ def _compute_each(
         raise TargetUnmet(*unmet)
 
 
-@main.command()
-@configs_argument
-@realisations_option
-@seed_option
-@set_option
-@precision_option
-@of_option
-@click.option("--shard", type=Share(), metavar="i/n", help="Of this share of the blocks only.")
-@click.option("--out", type=Directory(), metavar="DIR", help="Also what of it is stored there, what is missing.")
-@json_option
+@group.main.command()
+@group.configs_argument
+@group.realisations_option
+@group.seed_option
+@group.set_option
+@group.precision_option
+@group.of_option
+@click.option("--shard", type=group.Share(), metavar="i/n", help="Of this share of the blocks only.")
+@click.option("--out", type=group.Directory(), metavar="DIR", help="Also what of it is stored there, what is missing.")
+@group.json_option
 def check(
     configs: tuple[str, ...],
     realisations: int | None,
@@ -258,21 +242,21 @@ def check(
         click.echo(documents.text(made))
 
 
-@main.command()
-@configs_argument
-@realisations_option
-@seed_option
-@set_option
-@out_option
-@drawing_options
-@json_option
+@group.main.command()
+@group.configs_argument
+@group.realisations_option
+@group.seed_option
+@group.set_option
+@group.out_option
+@group.drawing_options
+@group.json_option
 def report(
     configs: tuple[str, ...],
     realisations: int | None,
     seed: int | None,
     overrides: tuple[str, ...],
     out: str,
-    drawing: Drawing,
+    drawing: group.Drawing,
     as_json: bool,
 ) -> None:
     """Tables, figures and report from what is stored; computes nothing.
@@ -291,10 +275,10 @@ def report(
     _compute_each(loaded, lambda one, progress: read(experiment=one), out, False, as_json, None)
 
 
-@main.command()
-@click.argument("names", nargs=-1, metavar="[CONFIG | CLAIM | PAPER …]", shell_complete=completed)
-@out_option
-@json_option
+@group.main.command()
+@click.argument("names", nargs=-1, metavar="[CONFIG | CLAIM | PAPER …]", shell_complete=group.completed)
+@group.out_option
+@group.json_option
 @click.option("--markdown", is_flag=True, help="The page docs/claims.md on stdout in place of text.")
 @click.option("--parts", is_flag=True, help="What was measured of each.")
 @click.option("--figure", metavar="FILE", help="Also draw them, in margins of what the papers say, to this file.")

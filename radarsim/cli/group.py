@@ -269,6 +269,12 @@ precision_option = click.option(
     help="Run until the 95 % half-width of every σ is under PCT %, at most N; looks at 2000, 4000, 8000, …, N, where "
     "errors are not Gaussian from 64,000 on.",
 )
+time_limit_option = click.option(
+    "--time-limit", type=Positive("SECONDS"), metavar="SECONDS", help="Stop cleanly then, keep what is done."
+)
+threads_option = click.option(
+    "--threads", type=click.IntRange(1, 1024), metavar="T", help="Threads; default: all cores."
+)
 OF = ("sigma", "gain", "lock", "lost", "right", "wrong", "loss", "false_tracks")
 of_option = click.option(
     "--of",

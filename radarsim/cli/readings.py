@@ -2,12 +2,12 @@
 
 import click
 
-from radarsim.cli.group import Positive, figures_option, json_option, main, out_option, realisations_option
+from radarsim.cli import group
 
 
-@main.command()
+@group.main.command()
 @click.argument("names", nargs=-1, metavar="[CLAIM | PAPER …]")
-@realisations_option
+@group.realisations_option
 @click.option(
     "--only", "only", multiple=True, metavar="CHOICE=VALUE", help="Readings that take this alone; writes no file."
 )
@@ -16,12 +16,12 @@ from radarsim.cli.group import Positive, figures_option, json_option, main, out_
     is_flag=True,
     help="Longer runs, of at most N realisations, until each claim is decided over all readings.",
 )
-@click.option("--threads", type=click.IntRange(1, 1024), metavar="T", help="Threads; default: all cores.")
-@click.option("--time-limit", type=Positive("SECONDS"), metavar="SECONDS", help="Stop cleanly then, keep what is done.")
-@out_option
-@figures_option
+@group.threads_option
+@group.time_limit_option
+@group.out_option
+@group.figures_option
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
-@json_option
+@group.json_option
 @click.option("--markdown", is_flag=True, help="The pages docs/readings_….md of these papers, in place of text.")
 def readings(
     names: tuple[str, ...],

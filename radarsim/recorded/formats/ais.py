@@ -13,16 +13,7 @@ from types import ModuleType
 from typing import Any, BinaryIO
 
 from radarsim.errors import ConfigError
-from radarsim.recorded.formats.records import (
-    BATCH,
-    POSITION_COLUMNS,
-    POSITIONS,
-    Batch,
-    Gathered,
-    Unrolled,
-    needs,
-    utc_s,
-)
+from radarsim.recorded.formats import records
 
 pyais: ModuleType | None
 try:
@@ -57,16 +48,16 @@ class Ais:
 
     def __init__(self, path: str, file: BinaryIO):
         if pyais is None:
-            raise needs("pyais", "ais")
+            raise records.needs("pyais", "ais")
         self.path, self.file = path, file
         self.records = 0
         self.skipped: Counter[str] = Counter()
         self.open: dict[bytes, list[bytes]] = {}
-        self.minute = Unrolled(60.0)
+        self.minute = records.Unrolled(60.0)
 
-    def batches(self) -> Iterator[Batch]:
+    def batches(self) -> Iterator[records.Batch]:
         """The reports of position, some at a time; raises ConfigError where most sentences are damaged."""
-        gathered, damaged, first = Gathered(POSITIONS, POSITION_COLUMNS), 0, ""
+        gathered, damaged, first = records.Gathered(records.POSITIONS, records.POSITION_COLUMNS), 0, ""
         for number, line in enumerate(self.file, start=1):
             sentence = SENTENCE.search(line)
             if not sentence and (not line.strip() or line.lstrip().startswith((b"#", b"$"))):
@@ -80,7 +71,7 @@ class Ais:
                 continue
             if message is not None:
                 self._take(message, self._stated(line, sentence.start(), number), gathered)
-            if len(gathered) >= BATCH:
+            if len(gathered) >= records.BATCH:
                 yield gathered.taken()
         if damaged and damaged >= LEAST_GOOD * (self.records + damaged):
             raise ConfigError(f"{first}: must be AIS sentences (!AIVDM,…); {damaged} lines are none or damaged, "
@@ -123,13 +114,13 @@ class Ais:
         except ValueError:
             pass
         try:
-            return utc_s(text)
+            return records.utc_s(text)
         except ValueError:
             must = "before the sentence must stand a time in s from 1970 or ISO 8601, or a tag block"
             read = f"{self.records} messages were read"
             raise ConfigError(f"{self.path}:{number}: {must}; got {text[:60]!r}; {read}") from None
 
-    def _take(self, message: Any, stated: float, gathered: Gathered) -> None:
+    def _take(self, message: Any, stated: float, gathered: records.Gathered) -> None:
         latitude, longitude = getattr(message, "lat", None), getattr(message, "lon", None)
         if latitude is None or longitude is None or message.msg_type not in (1, 2, 3, 18, 19):
             self.skipped["messages that are no ship's position"] += 1
