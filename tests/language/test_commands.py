@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 from making import messages
 
-from radarsim.app import inventory, readings, solve
+from radarsim.app import inventory, question, readings
 from radarsim.app.chart import chart, described
 from radarsim.app.configs import load
 from radarsim.app.quantities import Quantity
@@ -128,7 +128,7 @@ def test_every_reason_that_the_sources_give_is_known():
 def test_what_solve_announces():
     said = []
     with speaking("ru"):
-        solve.predict(
+        question.predict(
             said.append,
             tr("computes the {quantity} at about {count} values of {key}", quantity="q", count=7, key="k"),
             12.3,
