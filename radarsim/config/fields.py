@@ -413,3 +413,8 @@ def unique_names(members: tuple[N, ...]) -> tuple[N, ...]:
             raise PydanticCustomError("unique", "names must differ: {name} is there twice", {"name": member.name})
         seen.add(name)
     return members
+
+
+# Of most studies: the list of what is compared, and the name of the one that gains are against; its own name.
+Members = Annotated[tuple[N, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()]
+Baseline = Annotated[Name | None, Design(), NameIn("filters")]

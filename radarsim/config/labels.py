@@ -1,7 +1,7 @@
 """What people call a key: one text, symbol and unit for each, from the schema of the study that has it.
 
-A field says it itself: `Field(title="scan period", json_schema_extra={"symbol": "Δt"})`. The unit is the one that the
-end of the key names; a key that names none, or none that people write, gives it beside the symbol, as `unit`.
+A key says it itself: `key("scan period", "time between two plots, s", symbol="Δt")`. The unit is the one that the end
+of the key names; a key that names none, or none that people write, gives it beside the symbol, as `unit`.
 """
 
 from collections.abc import Iterator

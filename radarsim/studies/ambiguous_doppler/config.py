@@ -5,17 +5,18 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from radarsim.config import radial, rare
 from radarsim.config.fields import (
     Added,
     At,
+    Baseline,
     Design,
     Display,
+    Members,
     Model,
     Name,
-    NameIn,
     NonNegative,
     Number,
     Positive,
@@ -27,7 +28,6 @@ from radarsim.config.fields import (
     cross_check,
     key,
     of_each,
-    unique_names,
 )
 from radarsim.config.radial import (
     COEFFICIENTS,
@@ -285,12 +285,8 @@ class Keys(Study):
     prior: Annotated[Prior, Design()] = key(
         "prior", "what the filters know before the first plot", Prior.model_validate({})
     )
-    filters: Annotated[
-        tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = key("filters", "the filters; all see the same plots")
-    baseline: Annotated[Name | None, Design(), NameIn("filters")] = key(
-        "baseline filter", "name of the filter that gains are against; default: the first", None
-    )
+    filters: Members[Filter] = key("filters", "the filters; all see the same plots")
+    baseline: Baseline = key("baseline filter", "name of the filter that gains are against; default: the first", None)
     scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = key("number of scans", "number of scans")
     rare: Annotated[RareFolds | None, Design(), Added()] = key(
         "rare wrong folds",

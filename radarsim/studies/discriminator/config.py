@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from radarsim.config import rare
 from radarsim.config.fields import (
@@ -13,6 +13,7 @@ from radarsim.config.fields import (
     Design,
     Display,
     Flag,
+    Members,
     Model,
     Name,
     NonNegative,
@@ -25,7 +26,6 @@ from radarsim.config.fields import (
     cross_check,
     key,
     of_each,
-    unique_names,
 )
 
 MOST_SAMPLES = 1_000_000
@@ -216,9 +216,7 @@ class Keys(Study):
     burst: Burst = key("burst", "the burst")
     truth: Annotated[Truth, Scenario()] = key("true phase", "the echo's phase: a scenario's stem, or inline")
     prior: Prior = key("prior", "the forecast")
-    estimators: Annotated[
-        tuple[Estimator, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = key("estimators", "the estimators; all see the same bursts")
+    estimators: Members[Estimator] = key("estimators", "the estimators; all see the same bursts")
     engine: Annotated[Literal["auto", "block_sums", "samples", "demodulated"], Design()] = key(
         "way of simulation",
         "block_sums: exact sums over short blocks are drawn; samples: every step over every sample; demodulated: "

@@ -4,16 +4,17 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validator
+from pydantic import Field, GetJsonSchemaHandler, model_validator
 
 from radarsim.config.faults import short
 from radarsim.config.fields import (
     At,
+    Baseline,
     Design,
     Display,
+    Members,
     Model,
     Name,
-    NameIn,
     NonNegative,
     NotRead,
     Number,
@@ -26,7 +27,6 @@ from radarsim.config.fields import (
     cross_check,
     key,
     of_each,
-    unique_names,
 )
 from radarsim.config.radial import (
     NEAREST_M,
@@ -281,12 +281,8 @@ class Keys(Study):
     burst: Burst = key("burst", "the burst of each scan")
     target: Annotated[Target, Scenario()] = key("target", "the target: a scenario's stem, or inline")
     prior: Prior = key("designation", "what is known when the track begins")
-    filters: Annotated[
-        tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = key("filters", "the filters; all see the same ranges and bursts")
-    baseline: Annotated[Name | None, Design(), NameIn("filters")] = key(
-        "baseline", "name of the filter that gains are against; default: the first", None
-    )
+    filters: Members[Filter] = key("filters", "the filters; all see the same ranges and bursts")
+    baseline: Baseline = key("baseline", "name of the filter that gains are against; default: the first", None)
     scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
         "scans", "number of scans; or give duration_s", None
     )

@@ -3,17 +3,18 @@
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, Field, GetJsonSchemaHandler, model_validator
+from pydantic import Field, GetJsonSchemaHandler, model_validator
 
 from radarsim.config import radial
 from radarsim.config.fields import (
     Added,
     At,
+    Baseline,
     Design,
     Display,
+    Members,
     Model,
     Name,
-    NameIn,
     NonNegative,
     Number,
     Positive,
@@ -26,7 +27,6 @@ from radarsim.config.fields import (
     key,
     of_each,
     readable,
-    unique_names,
 )
 from radarsim.config.radial import (
     COEFFICIENTS,
@@ -198,12 +198,8 @@ class Keys(Study):
 
     radar: Radar = key("radar", "the radar")
     target: Annotated[Target, Scenario()] = key("target", "the target: a scenario's stem, or inline")
-    filters: Annotated[
-        tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = key("filters", "the filters; all see the same plots")
-    baseline: Annotated[Name | None, Design(), NameIn("filters")] = key(
-        "baseline filter", "name of the filter that gains are against; default: the first", None
-    )
+    filters: Members[Filter] = key("filters", "the filters; all see the same plots")
+    baseline: Baseline = key("baseline filter", "name of the filter that gains are against; default: the first", None)
     scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = key(
         "number of scans", "number of scans; or give duration_s", None
     )

@@ -7,12 +7,12 @@ from pydantic import Field
 
 from radarsim.config.fields import (
     At,
+    Baseline,
     Correlation,
     Design,
     Display,
     Model,
     Name,
-    NameIn,
     NonNegative,
     Number,
     Positive,
@@ -306,7 +306,7 @@ class Keys(Study):
     filters: Annotated[tuple[Filter, ...], Field(min_length=1, max_length=16), Design()] = key(
         "filters", "the filters; all of them process the same plots"
     )
-    baseline: Annotated[Name | None, Design(), NameIn("filters")] = key(
+    baseline: Baseline = key(
         "baseline filter", "name of the filter that gains are measured against; default: the first", None
     )
     scans: Annotated[int, Whole(2, MOST_SCANS), Design()] = key("number of scans", "number of scans of the first sonar")

@@ -1,11 +1,9 @@
 """Keys of the sonar study (P3), combined from those of its three parts; and which part a case belongs to."""
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import AfterValidator, Field
-
-from radarsim.config.fields import At, Design, at, cross_check, key, unique_names
+from radarsim.config.fields import At, Members, at, cross_check, key
 from radarsim.studies.sonar import config
 from radarsim.studies.sonar.clutter import config as clutter
 from radarsim.studies.sonar.manoeuvre import config as manoeuvre
@@ -27,9 +25,7 @@ class Sonar(clutter.Keys, manoeuvre.Keys):
         *clutter.FIGURES,
     )
 
-    filters: Annotated[
-        tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = key("filters", "the filters; all of them process the same plots")
+    filters: Members[Filter] = key("filters", "the filters; all of them process the same plots")
 
     @property
     def parts(self) -> tuple[Literal["smoothing", "manoeuvre", "clutter"], ...]:

@@ -2,19 +2,19 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 from radarsim.config.fields import (
+    Baseline,
     Design,
     Display,
+    Members,
     Model,
     Name,
-    NameIn,
     NonNegative,
     Positive,
     Study,
     Whole,
     key,
-    unique_names,
 )
 
 MOST_SCANS = 100_000
@@ -56,10 +56,6 @@ class Keys(Study):
     sensor: Sensor = key("sensor", "the sensor")
     target: Target = key("target", "the target")
     # Design(): cases that differ in nothing else have the same noise, so that their comparison is paired.
-    filters: Annotated[
-        tuple[Filter, ...], Field(min_length=1, max_length=16), AfterValidator(unique_names), Design()
-    ] = key("filters", "the filters; all see the same plots")
-    baseline: Annotated[Name | None, Design(), NameIn("filters")] = key(
-        "baseline filter", "name of the filter that gains are against; default: the first", None
-    )
+    filters: Members[Filter] = key("filters", "the filters; all see the same plots")
+    baseline: Baseline = key("baseline filter", "name of the filter that gains are against; default: the first", None)
     scans: Annotated[int, Whole(1, MOST_SCANS), Design()] = key("number of scans", "number of plots")
