@@ -6,7 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import radarsim
+from radarsim.app import output
 from radarsim.app.work import CaseWork
+from radarsim.report.drawing import Line
+from radarsim.studies import registry
 from tests.trust.cases import CASES, MORE
 
 every = pytest.mark.parametrize("study", CASES | MORE)
@@ -47,3 +51,55 @@ def test_a_case_is_the_same_elsewhere_and_another_with_another_seed(works, study
     other = CaseWork(replace(work.case, seed=work.case.seed + 1))
     assert other.identity != work.identity
     assert other.simulate(5, 20).tobytes() != work.simulate(5, 20).tobytes()
+
+
+FEW = {"multimodel": 64, "pulses_to_tracks": 200, "discriminator": 100}  # realisations, where others take 300
+DRAWN = {
+    "sigma": ("curves", "sigma", "sigma_lo", "sigma_hi", "exact_sigma"),
+    "gain": ("gains", "gain_percent", "gain_lo", "gain_hi", "exact_percent"),
+}
+
+
+def drawn_of(mark, part, columns):
+    """Whether a line is rows of one case and filter; intervals of marked rows are left out, angles are in degrees."""
+    rows = part[part["t_s"].isin(mark.x)]
+
+    def same(values, column, scale):
+        there = np.isfinite(values)
+        return np.allclose(values[there], scale * rows[column][there], rtol=1e-12, atol=0)
+
+    drawn = [
+        (np.asarray(v, float), c)
+        for v, c in zip((mark.y, mark.lo, mark.hi, mark.exact), columns, strict=True)
+        if v is not None
+    ]
+    return len(rows) == len(mark.x) and any(
+        all(same(values, column, scale) for values, column in drawn) for scale in (1.0, 180 / np.pi)
+    )
+
+
+@pytest.mark.parametrize("study", CASES)
+def test_lines_of_sigma_and_gains_are_rows_of_their_table(study):
+    """Whole: times, values, both ends and exact values of one case, filter and component; angles in degrees."""
+    result = radarsim.run(CASES[study].loaded(FEW.get(study, 300)))
+    drawn = output.figures(result.cases, result.tables, result.experiment)
+    known = set(registry.study(result.cases[0].study).keys().figure_names)
+    assert {name for name in drawn if not name.startswith("sweep_")} <= known
+    looked = 0
+    for name, figure in drawn.items():
+        kind, _, component = name.partition("_")
+        if kind not in DRAWN:
+            continue
+        table, *columns = DRAWN[kind]
+        rows = result.tables[table]
+        every = [part for _, part in rows[rows["component"] == component].groupby(["case", "filter"], sort=False)]
+        for mark in (mark for panel in figure.panels for mark in panel.marks if isinstance(mark, Line)):
+            assert any(drawn_of(mark, part, columns) for part in every), (name, mark.label)
+            looked += 1
+    assert looked or study == "discriminator"  # which has no scans in common
+
+
+@pytest.mark.parametrize("kind", [kind for kind in MORE if kind.startswith("rare")])
+def test_a_rate_that_rests_on_few_events_is_told(kind):
+    result = radarsim.run(MORE[kind].loaded(24))
+    assert result.tables["rare"]["note"].str.contains("effective events").any()

@@ -10,7 +10,6 @@ from scipy.special import ndtr
 
 import radarsim
 from radarsim.app.configs import load
-from radarsim.config.identity import canonical
 from radarsim.errors import ConfigError
 from radarsim.kernels.random import stream
 from radarsim.report import rare as report
@@ -353,11 +352,6 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
     assert not any("rare event" in line for line in result.warnings)
 
 
-def test_a_rate_that_rests_on_few_events_is_told():
-    result = result_of(24)
-    assert result.tables["rare"]["note"].str.contains("effective events").all()
-
-
 def test_wrong_folds_of_full_lists_are_told():
     """With room for few hypotheses many wrong folds are of a right one that found no room, and no shift leads there."""
     short, long = (
@@ -384,14 +378,6 @@ def test_calibration_and_curves_are_marked_by_their_own_realisations():
     for name in ("calibration", "curves"):
         table = result.tables[name]
         assert not table.get("note", table["case"]).str.contains("effective events").any()
-
-
-def test_without_the_key_a_case_is_the_one_it_was():
-    case = made("RLS 5", [MEMORY], 4)
-    assert "rare" not in canonical(case.spec)
-    assert "rare" in canonical(case_of(MEMORY, 4).spec)
-    assert "events" not in study.prepare(case).layout.shapes
-    assert np.array_equal(study.prepare(case_of(MEMORY, 4)).world.keys, study.prepare(case).world.keys)
 
 
 @pytest.mark.parametrize(

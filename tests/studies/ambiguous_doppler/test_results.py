@@ -86,10 +86,6 @@ def test_without_any_plot_nothing_is_said(combine):
     assert registry.study("ambiguous_doppler").answer(made.cases, made.tables) == []
 
 
-def test_figures(found):
-    assert {"sigma_Vr", "right", "lost", "hypotheses"} <= set(found.figures)
-
-
 def test_fan_holds_what_the_filter_estimates():
     """The weighted mean of the listed hypotheses is the filter's estimate, scan by scan."""
     case = load("ambiguous_rls4").cases[0]

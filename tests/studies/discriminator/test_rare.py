@@ -12,7 +12,6 @@ from scipy.special import ndtr, ndtri
 from radarsim.app.configs import load
 from radarsim.bursts.kernels import lanes
 from radarsim.bursts.kernels import strip as strips
-from radarsim.config.identity import canonical
 from radarsim.errors import ConfigError
 from radarsim.kernels.random import fill_normal_strip, stream
 from radarsim.report import rare as report
@@ -299,11 +298,6 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
     assert not any("rare event" in line for line in result.warnings)
 
 
-def test_a_rate_that_rests_on_few_events_is_told():
-    result = result_of(60, RARELY)
-    assert result.tables["rare"]["note"].str.contains("effective events").all()
-
-
 def test_an_interval_that_few_heavy_weights_make_is_marked():
     """Forty equal weights are enough; a hundred of which three make the variance are not, though n_eff is over 20.
 
@@ -367,14 +361,6 @@ def test_a_weighted_rate_is_wilsons_where_all_weights_are_one():
     assert np.array(weighted) == pytest.approx(np.array(plain), rel=2e-3)  # n for n − 1
     none = statistics.weighted_rate(0.0, 0.0, 1000.0, 100.0)
     assert np.array(none) == pytest.approx(np.array(statistics.rate(0.0, 100.0)))
-
-
-def test_without_the_key_a_case_is_the_one_it_was(plan):
-    case = case_of(RARELY, sought=None)
-    assert "rare" not in canonical(case.spec)
-    assert "rare" in canonical(case_of(RARELY).spec)
-    assert "losses" not in study.prepare(case).layout.shapes
-    assert np.array_equal(plan.keys[:2], study.prepare(case).keys)
 
 
 @pytest.mark.parametrize(

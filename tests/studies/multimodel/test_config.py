@@ -35,25 +35,6 @@ def test_defaults_are_the_papers():
 
 
 @pytest.mark.parametrize(
-    ("figure", "words"),
-    [
-        ("sigma_y", None),
-        ("sigma_Y", "no such figure; did you mean sigma_y?"),
-        ("gain_r", "no such figure; there are: "),
-    ],
-)
-def test_a_figure_must_be_one_of_the_studys(figure, words):
-    document = config(figures={figure: ["config"]})
-    if words is None:
-        assert list(load(document).figures) == [figure]
-        return
-    with pytest.raises(ConfigError) as caught:
-        load(document)
-    assert words in str(caught.value)
-    assert f"figures.{figure}" in str(caught.value)
-
-
-@pytest.mark.parametrize(
     ("changes", "words"),
     [
         ({"filters": [imm([[0.9, 0.1], [0.2, 0.8]])]}, "its rows do: transpose it"),

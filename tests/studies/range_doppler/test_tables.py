@@ -145,34 +145,6 @@ def test_figures_have_the_contracts_names(paper, swept):
     assert set(drawn_of(swept)) == names | {"settling"}
 
 
-def test_sigma_figures_draw_the_table(paper):
-    made = made_of(paper)
-    rows = tables.groups(made["curves"], "case", "filter", "component")
-    figure = drawn_of(paper, made)["sigma_Vr"]
-    assert [panel.title for panel in figure.panels] == [f"RLS {n}" for n in range(1, 6)]
-    for panel, result in zip(figure.panels, paper, strict=True):
-        lines = [mark for mark in panel.marks if isinstance(mark, Line)]
-        assert [line.label for line in lines] == list(result.axes.filters)
-        for line in lines:
-            own = rows[result.name, line.label, "Vr"]
-            for drawn, column in (
-                *((line.x, "t_s"), (line.y, "sigma"), (line.lo, "sigma_lo"), (line.hi, "sigma_hi")),
-                (line.exact, "exact_sigma"),
-            ):
-                np.testing.assert_array_equal(drawn, own[column])
-
-
-def test_gain_figures_draw_the_table(paper):
-    made = made_of(paper)
-    rows = tables.groups(made["gains"], "case", "component")
-    (panel,) = drawn_of(paper, made)["gain_ar"].panels
-    lines = [mark for mark in panel.marks if isinstance(mark, Line)]
-    assert [line.label for line in lines] == [f"RLS {n}" for n in range(1, 6)]
-    for line, result in zip(lines, paper, strict=True):
-        np.testing.assert_array_equal(line.y, rows[result.name, "ar"]["gain_percent"])
-        np.testing.assert_array_equal(line.x, rows[result.name, "ar"]["t_s"])
-
-
 def test_consistency_figure_draws_the_table(paper):
     made = made_of(paper)
     first, second = drawn_of(paper, made)["consistency"].panels

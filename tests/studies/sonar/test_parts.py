@@ -10,7 +10,6 @@ import pytest
 import radarsim
 from radarsim.app.configs import load
 from radarsim.engine.results import Axes
-from radarsim.errors import ConfigError
 from radarsim.kernels import sources
 from radarsim.studies import identity
 from radarsim.studies.sonar import STUDY, parts
@@ -90,12 +89,6 @@ def test_labels_are_typed_and_described():
         assert relabelled.filters == tuple(one.name for one in case.spec.filters)
 
 
-@pytest.mark.parametrize("stem", ["sonar_smoothing", "sonar_manoeuvre", "sonar_clutter"])
-def test_an_unknown_figure_is_refused(stem):
-    with pytest.raises(ConfigError, match=r"figures\.sigma_q: no such figure; did you mean sigma_"):
-        load(stem, ["figures={sigma_q: ['*']}"])
-
-
 def written(folder, name, config):
     """A config in a file, in JSON, which is YAML."""
     (folder / f"{name}.yaml").write_text(json.dumps(config | {"realisations": 64}), encoding="utf-8")
@@ -117,13 +110,3 @@ def test_cases_of_all_parts_in_one_run(tmp_path):
     assert result.question.startswith("How surely and how soon is a target's track confirmed")
     assert result.answer[0].startswith("nearest confirms")
     assert any("σ of the range after 145 s" in sentence for sentence in result.answer)
-
-
-def test_every_figure_of_the_study_has_its_name(tmp_path):
-    drawn = set()
-    for stem in ("sonar_smoothing", "sonar_conversion", "sonar_manoeuvre_turning", "sonar_clutter"):
-        result = radarsim.run(load(stem, ["realisations=64"]))
-        drawn |= {name for name in result.figures if not name.startswith("sweep_") and name != "claims"}
-    known = STUDY.keys().figure_names
-    assert drawn <= set(known)
-    assert len(known) == len(set(known))

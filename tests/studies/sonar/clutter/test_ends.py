@@ -9,7 +9,6 @@ import pytest
 
 import radarsim
 from radarsim.app.configs import load
-from radarsim.config.identity import canonical
 from radarsim.errors import ConfigError
 from radarsim.kernels import random
 from radarsim.report import rare
@@ -250,11 +249,6 @@ def test_tables_tell_the_curve_and_how_tracks_end():
     assert not result.tables["rare"]["event"].str.contains("false").any()
 
 
-def test_a_rate_that_rests_on_few_events_is_told():
-    result = radarsim.run(keys_of([tracker("a")], 0.0, 0.98, 12), realisations=10)
-    assert result.tables["rare"]["note"].str.contains("effective events").all()
-
-
 def test_few_events_in_one_way_of_ending_are_told():
     """Of 1000 effective events none is what the note of the row is about: a part of them."""
     drawn = rare.Drawn(4_000_000, 400_000, 4e6, 4e7)
@@ -275,12 +269,6 @@ def test_few_events_in_one_way_of_ending_are_told():
     few = {"n": 100, "mean_weight": 0.3, "mean_weight_se": 0.01, "note": ""}
     assert rare.warnings(pd.DataFrame([row | few])) == []
     assert "the mean weight is 0.3" in rare.warnings(pd.DataFrame([row | few | {"n": 200}]))[0]
-
-
-def test_without_the_event_a_case_is_the_one_it_was():
-    case = load(keys_of([tracker("a")], 0.1, 0.9, 6, sought=False)).cases[0]
-    assert "rare" not in canonical(case.spec)
-    assert "ended" not in STUDY.prepare(case).layout.shapes
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ import radarsim
 from radarsim.app.configs import load
 from radarsim.app.quantities import Quantity
 from radarsim.app.solve import solve
-from radarsim.config.identity import canonical
 from radarsim.errors import ConfigError
 from radarsim.kernels import random
 from radarsim.studies.sonar import STUDY
@@ -263,19 +262,6 @@ def test_solve_takes_the_weighted_rate():
     assert found.hi - found.lo < 0.02
     again = radarsim.run(keys, overrides=[f"gate_probability={found.value}"])
     assert again.tables["tracking"]["false_tracks_per_hour"][0] == pytest.approx(0.5 * at, rel=0.02)
-
-
-def test_a_rate_that_rests_on_few_events_is_told():
-    result = result_of(20, [FOUR_OF_SIX])
-    assert result.tables["rare"]["note"].str.contains("effective events").all()
-
-
-def test_without_the_key_a_case_is_the_one_it_was():
-    case = case_of([tracker("a")], 0.1, sought=False)
-    assert "rare" not in canonical(case.spec)
-    assert "rare" in canonical(case_of([tracker("a")], 0.1).spec)
-    assert "held" not in STUDY.prepare(case).layout.shapes
-    assert (STUDY.prepare(case).seeds == plan_of([tracker("a")], 0.1).seeds).all()
 
 
 @pytest.mark.parametrize(
