@@ -179,6 +179,19 @@ def add_outer(P, w, g):
 
 
 @inline
+def add_spread(P, w, C, d):
+    """P + w (C + d d'), packed: with a part of a mixture, of weight w and covariance C, whose mean is off by d."""
+    return (
+        P[0] + w * (C[0] + d[0] * d[0]),
+        P[1] + w * (C[1] + d[0] * d[1]),
+        P[2] + w * (C[2] + d[0] * d[2]),
+        P[3] + w * (C[3] + d[1] * d[1]),
+        P[4] + w * (C[4] + d[1] * d[2]),
+        P[5] + w * (C[5] + d[2] * d[2]),
+    )
+
+
+@inline
 def dot(a, b):
     """Scalar product of two triples."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -334,3 +334,15 @@ def choose3(x, y, yes, no):
 def choose6(x, y, yes, no):
     """`where_greater` of six numbers."""
     return choose3(x, y, yes[:3], no[:3]) + choose3(x, y, yes[3:], no[3:])
+
+
+@inline
+def lane3(pointer, first):
+    """Three plain numbers of one lane, whose address it is, from row `first` on."""
+    return pointer[first * WIDTH], pointer[(first + 1) * WIDTH], pointer[(first + 2) * WIDTH]
+
+
+@inline
+def put_lane3(pointer, first, x):
+    """Write three plain numbers of one lane."""
+    pointer[first * WIDTH], pointer[(first + 1) * WIDTH], pointer[(first + 2) * WIDTH] = x

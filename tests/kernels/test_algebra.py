@@ -77,6 +77,7 @@ def test_an_update_with_any_gain(component):
 def test_sums():
     outer = np.einsum("in,jn->nij", STATES, STATES)
     same(algebra.add_outer(pack(), 0.4, STATES), MATRICES + 0.4 * outer)
+    same(algebra.add_spread(pack(), 0.4, algebra.pack(np.eye(3)), STATES), MATRICES + 0.4 * (np.eye(3) + outer))
     product = np.einsum("nij,jn->in", MATRICES, STATES)
     np.testing.assert_allclose(algebra.times(pack(), STATES), product, rtol=1e-13, atol=1e-13)
     assert np.array_equal(algebra.add_scaled(STATES, 2.0, STATES), 3 * STATES)

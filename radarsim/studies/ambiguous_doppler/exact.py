@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.algebra import pack, pack_transition, predicted_covariance, take_rate, take_value, unpack
 from radarsim.physics import targets
 from radarsim.studies.ambiguous_doppler import filters
 from radarsim.studies.ambiguous_doppler.filters import Member
@@ -37,29 +38,18 @@ class Gains:
 def gains(one: Member, prior: Any, sigma: np.ndarray, dt: float, scans: int) -> Gains:
     """The Kalman filter of a member; sigma (2,) of the plots."""
     F, Q = filters.model(one.order, one.manoeuvre_variance, dt)
-    P = np.diag([0.0, *filters.prior_variances(one.order, prior)])
+    f, q, (before_v, before_a) = pack_transition(F), pack(Q), filters.prior_variances(one.order, prior)
+    P: Any = (sigma[0] ** 2, 0.0, 0.0, before_v, 0.0, before_a)
     of_range, of_velocity = np.zeros((scans, 3)), np.zeros((scans, 3))
-    variance, range_variance, believed = np.zeros(scans), np.ones(scans), np.zeros((scans, 3, 3))
+    variance, range_variance, believed = np.zeros(scans), np.ones(scans), np.zeros((scans, 6))
     for k in range(scans):
-        if k == 0:
-            P[0, 0] = sigma[0] ** 2
-        else:
-            P = F @ P @ F.T + Q
-            P, of_range[k], range_variance[k] = _taken(P, 0, sigma[0])
-        variance[k] = P[1, 1] + sigma[1] ** 2
+        if k > 0:
+            P, of_range[k], range_variance[k] = take_value(predicted_covariance(P, f, q), sigma[0] ** 2, 1.0)
+        after, gain, variance[k] = take_rate(P, sigma[1] ** 2, 1.0)
         if one.doppler != "none" and (k > 0 or one.doppler != "remainder"):  # a remainder needs two scans
-            P, of_velocity[k], _ = _taken(P, 1, sigma[1])
+            P, of_velocity[k] = after, gain
         believed[k] = P
-    return Gains(F, of_range, of_velocity, variance, range_variance, believed)
-
-
-def _taken(P: np.ndarray, component: int, sigma: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Covariance after a measured component, its gain (3,), and the innovation's variance (Joseph's form)."""
-    S = P[component, component] + sigma**2
-    gain = P[:, component] / S
-    kept = np.eye(3)
-    kept[:, component] -= gain
-    return kept @ P @ kept.T + sigma**2 * np.outer(gain, gain), gain, S
+    return Gains(F, of_range, of_velocity, variance, range_variance, unpack(believed.T))
 
 
 def errors(of: Sequence[Gains], motions: np.ndarray, sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,18 @@ import numpy as np
 
 from radarsim.bursts.burst import Burst
 from radarsim.bursts.fisher import energy_ratio
-from radarsim.physics.motion import process_noise, transition
+from radarsim.kernels.algebra import (
+    CORRECT,
+    NO_NOISE,
+    TAKE,
+    add_scaled,
+    constant_acceleration,
+    pack,
+    predicted,
+    predicted_covariance,
+    unpack,
+)
+from radarsim.physics.motion import process_noise
 from radarsim.studies.pulses_to_tracks.filters import start_scans
 
 
@@ -23,45 +34,38 @@ def errors(spec: Any, one: Any, sigma: np.ndarray, missed: np.ndarray) -> tuple[
     sigma (K, 2) of velocity and acceleration; missed (K, 3) what the model misses, see `world.defects`. The filter's
     covariance P gives the gains; that of the errors, S, has no manoeuvre noise.
     """
-    F, scans = transition(spec.radar.scan_period_s), len(missed)
-    S = np.diag([0.0, spec.prior.sigma_velocity_mps**2, spec.prior.sigma_acceleration_mps2**2])
-    mean, means, covariances = np.zeros(3), np.zeros((scans, 3)), np.zeros((scans, 3, 3))
+    F, S, mean = constant_acceleration(spec.radar.scan_period_s), designation(spec), (0.0, 0.0, 0.0)
+    means, covariances = np.zeros((len(missed), 3)), np.zeros((len(missed), 6))
     for k, taken in enumerate(gains(spec, one, sigma)):
-        if k == 0:
-            S = S + np.diag([spec.radar.sigma_range_m**2, 0.0, 0.0])
-        else:
-            S, mean = F @ S @ F.T, F @ mean + missed[k]
+        if k > 0:
+            S = predicted_covariance(S, F, NO_NOISE)
+            mean = add_scaled(predicted(mean, F), 1.0, missed[k])
         for c, gain, variance in taken:
-            left = kept(c, gain)
-            S, mean = left @ S @ left.T + variance * np.outer(gain, gain), left @ mean
+            S, mean = CORRECT[c](S, variance, gain), add_scaled(mean, -mean[c], gain)
         means[k], covariances[k] = mean, S
-    return means, covariances
+    return means, unpack(covariances.T)
 
 
-def gains(spec: Any, one: Any, sigma: np.ndarray) -> Iterator[list[tuple[int, np.ndarray, float]]]:
+def designation(spec: Any) -> tuple[float, ...]:
+    """The packed covariance after the first range, and what was known of velocity and acceleration before."""
+    variances = spec.radar.sigma_range_m**2, spec.prior.sigma_velocity_mps**2, spec.prior.sigma_acceleration_mps2**2
+    return variances[0], 0.0, 0.0, variances[1], 0.0, variances[2]
+
+
+def gains(spec: Any, one: Any, sigma: np.ndarray) -> Iterator[list[tuple[int, Any, float]]]:
     """By scan what a filter takes as measured: number of the component, gain (3,), variance. sigma as in `errors`."""
     dt = spec.radar.scan_period_s
-    F, Q = transition(dt), process_noise(one.process_noise, one.manoeuvre_variance, dt)
-    P = np.diag([0.0, spec.prior.sigma_velocity_mps**2, spec.prior.sigma_acceleration_mps2**2])
+    F, Q = constant_acceleration(dt), pack(process_noise(one.process_noise, one.manoeuvre_variance, dt))
+    P = designation(spec)
     for k in range(len(sigma)):
-        if k == 0:
-            P = P + np.diag([spec.radar.sigma_range_m**2, 0.0, 0.0])
-        else:
-            P = F @ P @ F.T + (Q if k >= start_scans(one) else 0.0)
+        if k > 0:
+            P = predicted_covariance(P, F, Q if k >= start_scans(one) else NO_NOISE)
         taken = []
         for c in range(0 if k else 1, one.takes + 1):
             variance = float(spec.radar.sigma_range_m**2 if c == 0 else sigma[k, c - 1] ** 2)
-            gain = P[:, c] / (P[c, c] + variance)
-            P = kept(c, gain) @ P @ kept(c, gain).T + variance * np.outer(gain, gain)
+            P, gain, _ = TAKE[c](P, variance, 1.0)
             taken.append((c, gain, variance))
         yield taken
-
-
-def kept(c: int, gain: np.ndarray) -> np.ndarray:
-    """I − g e' (3, 3), what an update of component c leaves of an error."""
-    left = np.eye(3)
-    left[:, c] -= gain
-    return left
 
 
 def of_losses(spec: Any, one: Any, sigma: np.ndarray) -> np.ndarray:
@@ -71,17 +75,17 @@ def of_losses(spec: Any, one: Any, sigma: np.ndarray) -> np.ndarray:
     span (the acceleration over what sweeps the rate), and taken as measured; one that the next forecast rests on
     confirms itself from scan to scan. A gate, a mixture or hypotheses answer less.
     """
-    F, scans = transition(spec.radar.scan_period_s), len(sigma)
+    F, scans = constant_acceleration(spec.radar.scan_period_s), len(sigma)
     size = np.array([spec.span_mps, spec.span_mps / spec.burst_s]) / math.sqrt(12.0)
-    answers, found = np.zeros((scans, 3, 2)), np.zeros((scans, 3))  # of the bursts so far to errors of one
+    answers, found = np.zeros((3, scans, 2)), np.zeros((scans, 3))  # of the bursts so far to errors of one
     for k, taken in enumerate(gains(spec, one, sigma)):
-        answers = np.einsum("xy,jyc->jxc", F, answers)
+        answers = np.array(predicted(answers, F))
         begun = np.arange(scans) <= k if one.forecast == "track" else np.arange(scans) == k
         for c, gain, _ in taken:
-            answers = np.einsum("xy,jyc->jxc", kept(c, gain), answers)
+            answers = np.array(add_scaled(answers, -answers[c], gain))
             if c:
-                answers[begun, :, c - 1] += gain
-        found[k] = np.einsum("jxc,c->x", answers**2, size**2)
+                answers[:, begun, c - 1] += np.array(gain)[:, None]
+        found[k] = np.einsum("xjc,c->x", answers**2, size**2)
     return found
 
 

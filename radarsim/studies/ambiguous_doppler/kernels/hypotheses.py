@@ -9,30 +9,23 @@ leaves possible, and drops what is too far below the best or beyond the number t
     c            1/(2S) of it
 """
 
-from radarsim.kernels.algebra import predicted
+from radarsim.kernels.algebra import add_scaled, predicted
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.hypotheses import FALL, INNOVATION, NEAR, NOTHING, branched, column, greatest
-from radarsim.kernels.lanes import WIDTH, exponential, full, get, nearest, put, row, total, where_greater
-from radarsim.studies.ambiguous_doppler.kernels.records import (
-    BEST,
-    COUNT,
-    DETECTED,
-    FIRST,
-    GAINS,
-    LISTED,
-    MEAN,
-    OUTPUT,
-    PLOT,
-    PROBABILITY,
-    RANGE,
-    RANGE_GAIN,
-    RIGHT,
-    UNFOLDED,
-    VARIANCE,
-    VELOCITY,
-    VELOCITY_GAIN,
-    WEIGHT,
+from radarsim.kernels.lanes import (
+    WIDTH,
+    exponential,
+    full,
+    get,
+    lane3,
+    nearest,
+    put,
+    put_lane3,
+    row,
+    total,
+    where_greater,
 )
+from radarsim.studies.ambiguous_doppler.kernels import records as rec
 from radarsim.studies.ambiguous_doppler.kernels.steps import motion
 
 
@@ -40,14 +33,15 @@ from radarsim.studies.ambiguous_doppler.kernels.steps import motion
 def moved_and_weighed(lists, which, count, F, z, scan):
     """Move `count` hypotheses over a scan and take the range z: columns in place; scan: this lane of the gains."""
     r, v, a, w = column(lists, which, 0), column(lists, which, 1), column(lists, which, 2), column(lists, which, 3)
-    weight = scan[WEIGHT * WIDTH]
-    g0, g1, g2 = scan[RANGE_GAIN * WIDTH], scan[(RANGE_GAIN + 1) * WIDTH], scan[(RANGE_GAIN + 2) * WIDTH]
+    weight = scan[rec.WEIGHT * WIDTH]
+    gain = lane3(scan, rec.RANGE_GAIN)
     for i in range((count + WIDTH - 1) // WIDTH):
         x = predicted((get(r, i), get(v, i), get(a, i)), F)
         e = z - x[0]
-        put(r, i, x[0] + g0 * e)
-        put(v, i, x[1] + g1 * e)
-        put(a, i, x[2] + g2 * e)
+        x = add_scaled(x, e, gain)
+        put(r, i, x[0])
+        put(v, i, x[1])
+        put(a, i, x[2])
         put(w, i, get(w, i) - weight * (e * e))
 
 
@@ -76,11 +70,11 @@ def inherited(lists, which, count, best, scan):
     to_r, to_v, to_a = column(lists, 1 - which, 0), column(lists, 1 - which, 1), column(lists, 1 - which, 2)
     to_w = column(lists, 1 - which, 3)
     weights, found, parents = lists.children, row(lists.children, lists.most // WIDTH), lists.parents
-    g0, g1, g2 = scan[VELOCITY_GAIN * WIDTH], scan[(VELOCITY_GAIN + 1) * WIDTH], scan[(VELOCITY_GAIN + 2) * WIDTH]
+    gain = lane3(scan, rec.VELOCITY_GAIN)
     first, top = 0, NOTHING
     for i in range(count):
         j, f = parents[i], found[i]
-        to_r[i], to_v[i], to_a[i] = r[j] + g0 * f, v[j] + g1 * f, a[j] + g2 * f
+        to_r[i], to_v[i], to_a[i] = add_scaled((r[j], v[j], a[j]), f, gain)
         to_w[i] = weights[i] - best
         if weights[i] > top:
             first, top = i, weights[i]
@@ -101,14 +95,12 @@ def put_estimates(lists, which, count, best, right, to):
         all_, mean_r = all_ + weight, mean_r + weight * get(r, i)
         mean_v, mean_a = mean_v + weight * get(v, i), mean_a + weight * get(a, i)
     sum_ = total(all_)
-    to[MEAN * WIDTH] = total(mean_r) / sum_
-    to[(MEAN + 1) * WIDTH] = total(mean_v) / sum_
-    to[(MEAN + 2) * WIDTH] = total(mean_a) / sum_
-    to[BEST * WIDTH], to[(BEST + 1) * WIDTH], to[(BEST + 2) * WIDTH] = r[best], v[best], a[best]
-    to[RIGHT * WIDTH] = 1.0 if best == right else 0.0
-    to[LISTED * WIDTH] = 1.0 if right >= 0 else 0.0
-    to[COUNT * WIDTH] = count
-    to[PROBABILITY * WIDTH] = 1.0 / sum_
+    put_lane3(to, rec.MEAN, (total(mean_r) / sum_, total(mean_v) / sum_, total(mean_a) / sum_))
+    put_lane3(to, rec.BEST, (r[best], v[best], a[best]))
+    to[rec.RIGHT * WIDTH] = 1.0 if best == right else 0.0
+    to[rec.LISTED * WIDTH] = 1.0 if right >= 0 else 0.0
+    to[rec.COUNT * WIDTH] = count
+    to[rec.PROBABILITY * WIDTH] = 1.0 / sum_
 
 
 @inline
@@ -128,22 +120,22 @@ def run_remembering(design, most, deepest, spans, plots, gains, out, lists):
     F, _ = motion(design)
     which, count, best, right = 0, 0, 0, -1
     for k in range(spans.size):
-        plot, scan, D = row(plots, k * PLOT), row(gains, k * GAINS), spans[k]
+        plot, scan, D = row(plots, k * rec.PLOT), row(gains, k * rec.GAINS), spans[k]
         if count > 0:
-            moved_and_weighed(lists, which, count, F, plot[RANGE * WIDTH], scan)
-        elif plot[FIRST * WIDTH] > 0.0:
+            moved_and_weighed(lists, which, count, F, plot[rec.RANGE * WIDTH], scan)
+        elif plot[rec.FIRST * WIDTH] > 0.0:
             for c in range(4):
                 start = column(lists, which, c)
                 for i in range(WIDTH):
                     start[i] = 0.0 if c < 3 or i == 0 else NOTHING
-            column(lists, which, 0)[0] = plot[RANGE * WIDTH]
+            column(lists, which, 0)[0] = plot[rec.RANGE * WIDTH]
             count, right = 1, 0
-        if count > 0 and plot[DETECTED * WIDTH] > 0.0:
-            c = 0.5 / scan[VARIANCE * WIDTH]
-            top = nearest_folds(lists, which, count, plot[VELOCITY * WIDTH], D, c)
+        if count > 0 and plot[rec.DETECTED * WIDTH] > 0.0:
+            c = 0.5 / scan[rec.VARIANCE * WIDTH]
+            top = nearest_folds(lists, which, count, plot[rec.VELOCITY * WIDTH], D, c)
             made = branched(lists, which, count, D, top, deepest, most)
-            right = child_that_is_right(lists, which, made, right, plot[UNFOLDED * WIDTH], D)
+            right = child_that_is_right(lists, which, made, right, plot[rec.UNFOLDED * WIDTH], D)
             best = inherited(lists, which, made, top, scan)
             which, count = 1 - which, made
         if count > 0:
-            put_estimates(lists, which, count, best, right, row(out, k * OUTPUT))
+            put_estimates(lists, which, count, best, right, row(out, k * rec.OUTPUT))

@@ -9,36 +9,37 @@ as in `kernels.steps`, of each order j
 
 from typing import Any, NamedTuple
 
-from radarsim.kernels.algebra import predicted, predicted_covariance
-from radarsim.kernels.compile import inline, part
-from radarsim.kernels.lanes import exponential, full, get, nearest, put, root, row, where_greater
-from radarsim.studies.ambiguous_doppler.kernels.records import (
-    DESIGN,
-    DETECTED,
-    FIRST,
-    MEMBERS,
-    NONE,
-    OUTPUT,
-    PLOT,
-    RANGE,
-    TAKES_VELOCITY,
-    UNFOLDED,
-    UNFOLDS,
-    VELOCITY,
-    WEIGHTS,
+from radarsim.kernels.algebra import (
+    add_outer,
+    add_scaled,
+    add_spread,
+    predicted,
+    predicted_covariance,
+    take_rate,
 )
+from radarsim.kernels.compile import part
+from radarsim.kernels.lanes import (
+    exponential,
+    full,
+    get,
+    get3,
+    get6,
+    nearest,
+    put,
+    put3,
+    put6,
+    root,
+    row,
+    where_greater,
+)
+from radarsim.studies.ambiguous_doppler.kernels import records as rec
 from radarsim.studies.ambiguous_doppler.kernels.steps import (
     folds_merged,
     motion,
-    moved,
     prior,
     put_single,
-    put_three,
     range_taken,
-    three,
-    velocity_taken,
     whether_right,
-    widened,
 )
 
 # Rows of one order in memory: state, covariance, probability after the scan, and before it, distance of its plot.
@@ -63,26 +64,6 @@ class Orders(NamedTuple):
     stay: float
 
 
-@inline
-def six(at, number):
-    """Six rows."""
-    return (
-        get(at, number),
-        get(at, number + 1),
-        get(at, number + 2),
-        get(at, number + 3),
-        get(at, number + 4),
-        get(at, number + 5),
-    )
-
-
-@inline
-def put_six(at, number, P):
-    """Write six rows."""
-    put_three(at, number, (P[0], P[1], P[2]))
-    put_three(at, number + 3, (P[3], P[4], P[5]))
-
-
 @part
 def mixed(old, new, size, stay):
     """States before a scan: of each order the mixture of all by the probabilities to pass into it."""
@@ -98,24 +79,13 @@ def mixed(old, new, size, stay):
         x, P = (zero, zero, zero), (zero, zero, zero, zero, zero, zero)
         for j in range(size):
             p, other = stay if i == j else (1.0 - stay) / (size - 1), row(old, j * ROWS)
-            share = p * get(other, PROBABILITY) / c
-            y = three(other, STATE)
-            x = x[0] + share * y[0], x[1] + share * y[1], x[2] + share * y[2]
+            x = add_scaled(x, p * get(other, PROBABILITY) / c, get3(other, STATE))
         for j in range(size):
             p, other = stay if i == j else (1.0 - stay) / (size - 1), row(old, j * ROWS)
-            share = p * get(other, PROBABILITY) / c
-            y, Y = three(other, STATE), six(other, COVARIANCE)
-            d0, d1, d2 = y[0] - x[0], y[1] - x[1], y[2] - x[2]
-            P = (
-                P[0] + share * (Y[0] + d0 * d0),
-                P[1] + share * (Y[1] + d0 * d1),
-                P[2] + share * (Y[2] + d0 * d2),
-                P[3] + share * (Y[3] + d1 * d1),
-                P[4] + share * (Y[4] + d1 * d2),
-                P[5] + share * (Y[5] + d2 * d2),
-            )
-        put_three(own, STATE, x)
-        put_six(own, COVARIANCE, P)
+            apart = add_scaled(get3(other, STATE), -1.0, x)
+            P = add_spread(P, p * get(other, PROBABILITY) / c, get6(other, COVARIANCE), apart)
+        put3(own, STATE, x)
+        put6(own, COVARIANCE, P)
 
 
 @part
@@ -126,31 +96,31 @@ def taken(own, design, sigma, plot, D, unfolding, moves):
     """
     F, Q = motion(design)
     zero, one = full(0.0), full(1.0)
-    x, P = three(own, STATE), six(own, COVARIANCE)
-    detected, first = get(plot, DETECTED), get(plot, FIRST)
+    x, P = get3(own, STATE), get6(own, COVARIANCE)
+    detected, first = get(plot, rec.DETECTED), get(plot, rec.FIRST)
     if moves:
         x, P = predicted(x, F), predicted_covariance(P, F, Q)
-    P, weight, g = range_taken(P, first, detected - first, sigma[0] * sigma[0])
-    z = get(plot, RANGE)
+    P, g, weight = range_taken(P, first, detected - first, sigma[0] * sigma[0])
+    z = get(plot, rec.RANGE)
     e = z - x[0]
     distance, factor = 2.0 * weight * (e * e), where_greater(weight, zero, root(weight), one)
-    x = moved(x, g, e)
+    x = add_scaled(x, e, g)
     x = where_greater(first, zero, z, x[0]), x[1], x[2]
-    if unfolding != NONE:
-        e = get(plot, UNFOLDED) - x[1]
-        if unfolding != UNFOLDS:
-            e = get(plot, VELOCITY) - x[1]
+    if unfolding != rec.NONE:
+        e = get(plot, rec.UNFOLDED) - x[1]
+        if unfolding != rec.UNFOLDS:
+            e = get(plot, rec.VELOCITY) - x[1]
             e = e - D * nearest(e / D)
-        P, S, g = velocity_taken(P, detected * design[TAKES_VELOCITY], sigma[1] * sigma[1])
+        P, g, S = take_rate(P, sigma[1] * sigma[1], detected * design[rec.TAKES_VELOCITY])
         mean, variance, total = e, zero, one
-        if unfolding != UNFOLDS:
+        if unfolding != rec.UNFOLDS:
             mean, variance, total = folds_merged(e, S, D)
         distance = distance + detected * (e * e) / S
         factor = factor * where_greater(detected, zero, total / root(S), one)
-        x = moved(x, g, mean)
-        P = widened(P, g, variance)
-    put_three(own, STATE, x)
-    put_six(own, COVARIANCE, P)
+        x = add_scaled(x, mean, g)
+        P = add_outer(P, variance, g)
+    put3(own, STATE, x)
+    put6(own, COVARIANCE, P)
     put(own, PROBABILITY, factor)
     put(own, DISTANCE, distance)
 
@@ -185,33 +155,33 @@ def run_interacting(bank, unfolding, sigma, spans, plots, out, memory):
     right = full(1.0)
     for i in range(size):
         own = row(old, i * ROWS)
-        put_three(own, STATE, (zero, zero, zero))
-        put_six(own, COVARIANCE, prior(row(designs, parts[i] * (DESIGN // 8))))
+        put3(own, STATE, (zero, zero, zero))
+        put6(own, COVARIANCE, prior(row(designs, parts[i] * (rec.DESIGN // 8))))
         put(own, PROBABILITY, full(1.0 / size))
     for k in range(spans.size):
-        plot, D = row(plots, k * PLOT), spans[k]
+        plot, D = row(plots, k * rec.PLOT), spans[k]
         mixed(old, new, size, stay)
         velocity = zero
         for i in range(size):
-            own, design = row(new, i * ROWS), row(designs, parts[i] * (DESIGN // 8))
+            own, design = row(new, i * ROWS), row(designs, parts[i] * (rec.DESIGN // 8))
             taken(own, design, sigma, plot, D, unfolding, k > 0)
         weighed(new, size)
         x, w = (zero, zero, zero), (zero, zero, zero)
         for i in range(size):
             own = row(new, i * ROWS)
-            mu, y = get(own, PROBABILITY), three(own, STATE)
-            x = x[0] + mu * y[0], x[1] + mu * y[1], x[2] + mu * y[2]
+            mu, y = get(own, PROBABILITY), get3(own, STATE)
+            x = add_scaled(x, mu, y)
             velocity = velocity + mu * y[1]
             w = (
                 w[0] + (mu if orders[i] == 0 else zero),
                 w[1] + (mu if orders[i] == 1 else zero),
                 w[2] + (mu if orders[i] == 2 else zero),
             )
-        z = get(plot, VELOCITY)
+        z = get(plot, rec.VELOCITY)
         right = whether_right(right, plot, z + D * nearest((velocity - z) / D), D)
-        to = row(out, k * OUTPUT)
+        to = row(out, k * rec.OUTPUT)
         put_single(to, x, right)
-        put_three(to, WEIGHTS, w)
+        put3(to, rec.WEIGHTS, w)
         old, new = new, old
 
 
@@ -221,10 +191,10 @@ def run_weighing(outputs, bank, reads, shares, scans, out):
     zero, one = full(0.0), full(1.0)
     parts, orders, size = bank.parts, bank.orders, bank.size
     for k in range(scans):
-        to = row(out, k * OUTPUT)
+        to = row(out, k * rec.OUTPUT)
         x, w = (zero, zero, zero), (0.0, 0.0, 0.0)
         for i in range(size):
-            y, share = three(row(outputs, (parts[i] * scans + k) * OUTPUT), reads), 3 * (k * MEMBERS + i)
+            y, share = get3(row(outputs, (parts[i] * scans + k) * rec.OUTPUT), reads), 3 * (k * rec.MEMBERS + i)
             x = (
                 x[0] + shares[share] * y[0],
                 x[1] + shares[share + 1] * y[1],
@@ -236,7 +206,7 @@ def run_weighing(outputs, bank, reads, shares, scans, out):
                 w[2] + (shares[share] if orders[i] == 2 else 0.0),
             )
         put_single(to, x, one)
-        put_three(to, WEIGHTS, (full(0.0) + w[0], full(0.0) + w[1], full(0.0) + w[2]))
+        put3(to, rec.WEIGHTS, (full(0.0) + w[0], full(0.0) + w[1], full(0.0) + w[2]))
 
 
 @part
@@ -248,13 +218,13 @@ def chosen(outputs, bank, reads, widths, scans, k, c):
     for _ in range(size):
         pick, width = -1, 0.0
         for i in range(size):
-            own = widths[3 * (k * MEMBERS + i) + c]
+            own = widths[3 * (k * rec.MEMBERS + i) + c]
             if (used >> i) & 1 == 0 and own > width:
                 pick, width = i, own
         if pick < 0:
             break
         used |= 1 << pick
-        y = get(row(outputs, (parts[pick] * scans + k) * OUTPUT), reads + c)
+        y = get(row(outputs, (parts[pick] * scans + k) * rec.OUTPUT), reads + c)
         low, high = where_greater(y - width, low, y - width, low), where_greater(high, y + width, y + width, high)
         meets = where_greater(low, high, full(0.0), meets)
         x = where_greater(meets, full(0.5), y, x)
@@ -270,7 +240,7 @@ def run_choosing(outputs, bank, reads, widths, scans, out):
         x0, order = chosen(outputs, bank, reads, widths, scans, k, 0)
         x1, _ = chosen(outputs, bank, reads, widths, scans, k, 1)
         x2, _ = chosen(outputs, bank, reads, widths, scans, k, 2)
-        to = row(out, k * OUTPUT)
+        to = row(out, k * rec.OUTPUT)
         put_single(to, (x0, x1, x2), one)
         zeroth, second = where_greater(full(0.5), order, one, zero), where_greater(order, full(1.5), one, zero)
-        put_three(to, WEIGHTS, (zeroth, one - zeroth - second, second))
+        put3(to, rec.WEIGHTS, (zeroth, one - zeroth - second, second))

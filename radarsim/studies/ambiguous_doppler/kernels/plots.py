@@ -5,18 +5,7 @@ import math
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, nearest, put, row, where_greater
 from radarsim.kernels.random import fill_normal_strip, fill_uniform_pairs
-from radarsim.studies.ambiguous_doppler.kernels.records import (
-    DETECTED,
-    FIRST,
-    PAIRED,
-    PLOT,
-    RANGE,
-    SOLVED,
-    STARTED,
-    TRUTH,
-    UNFOLDED,
-    VELOCITY,
-)
+from radarsim.studies.ambiguous_doppler.kernels import records as rec
 
 
 @inline
@@ -37,15 +26,15 @@ def solve_remainders(world, plots):
     """The velocities that follow from a plot and the one before it, of one realisation: plots is its lane's address."""
     before = -1
     for k in range(world.truth.shape[0]):
-        scan = row(plots, k * PLOT)
-        scan[SOLVED * WIDTH] = scan[PAIRED * WIDTH] = 0.0
-        if scan[DETECTED * WIDTH] > 0.0:
+        scan = row(plots, k * rec.PLOT)
+        scan[rec.SOLVED * WIDTH] = scan[rec.PAIRED * WIDTH] = 0.0
+        if scan[rec.DETECTED * WIDTH] > 0.0:
             joint = world.joint[world.turn[k], world.turn[before]] if before >= 0 else 0.0
             if joint > 0.0:
-                z = row(plots, before * PLOT)[VELOCITY * WIDTH]
+                z = row(plots, before * rec.PLOT)[rec.VELOCITY * WIDTH]
                 spans = world.spans
-                scan[SOLVED * WIDTH] = remainder(scan[VELOCITY * WIDTH], spans[k], z, spans[before], joint)
-                scan[PAIRED * WIDTH] = 1.0
+                scan[rec.SOLVED * WIDTH] = remainder(scan[rec.VELOCITY * WIDTH], spans[k], z, spans[before], joint)
+                scan[rec.PAIRED * WIDTH] = 1.0
             before = k
 
 
@@ -74,26 +63,26 @@ def put_plots(world, first, normals, plots):
     noise_r, noise_v = row(drawn, 2), row(drawn, 2 + scans)
     dv, da = world.spread[0] * get(drawn, 0), world.spread[1] * get(drawn, 1)
     for k in range(scans):
-        t, scan = world.t[k], row(to, k * PLOT)
+        t, scan = world.t[k], row(to, k * rec.PLOT)
         r = world.truth[k, 0] + dv * t + da * (0.5 * t * t)
         v = world.truth[k, 1] + dv + da * t
-        put(scan, TRUTH, r)
-        put(scan, TRUTH + 1, v)
-        put(scan, TRUTH + 2, world.truth[k, 2] + da)
+        put(scan, rec.TRUTH, r)
+        put(scan, rec.TRUTH + 1, v)
+        put(scan, rec.TRUTH + 2, world.truth[k, 2] + da)
         z, u, span = r + world.sigma[0] * get(noise_r, k), v + world.sigma[1] * get(noise_v, k), world.spans[k]
-        put(scan, RANGE, z)
-        put(scan, UNFOLDED, u)
-        put(scan, VELOCITY, u - span * nearest(u / span))
+        put(scan, rec.RANGE, z)
+        put(scan, rec.UNFOLDED, u)
+        put(scan, rec.VELOCITY, u - span * nearest(u / span))
     started = zero
     for k in range(scans):
-        scan, detected = row(to, k * PLOT), one
+        scan, detected = row(to, k * rec.PLOT), one
         if world.detection < 1.0:
             fill_uniform_pairs(world.keys[1], first, k, normals[:WIDTH], normals[WIDTH : 2 * WIDTH])
             detected = where_greater(full(world.detection), get(drawn, 0), one, zero)
-        put(scan, DETECTED, detected)
-        put(scan, FIRST, detected * (one - started))
+        put(scan, rec.DETECTED, detected)
+        put(scan, rec.FIRST, detected * (one - started))
         started = where_greater(detected, started, one, started)
-        put(scan, STARTED, started)
+        put(scan, rec.STARTED, started)
     if world.joint.any():
         for lane in range(WIDTH):
             solve_remainders(world, address(plots[lane:]))

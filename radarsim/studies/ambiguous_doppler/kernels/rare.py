@@ -15,19 +15,9 @@ import numpy as np
 from radarsim.kernels.compile import kernel, part
 from radarsim.kernels.lanes import WIDTH, address, exponential, full, get, put, row, rows
 from radarsim.kernels.random import uniforms
+from radarsim.studies.ambiguous_doppler.kernels import records as rec
 from radarsim.studies.ambiguous_doppler.kernels.plots import fill_normals, put_plots
-from radarsim.studies.ambiguous_doppler.kernels.records import (
-    COUNT,
-    LISTED,
-    OUTPUT,
-    PLOT,
-    RIGHT,
-    TRUTH,
-    Banks,
-    Sums,
-    World,
-    memory,
-)
+from radarsim.studies.ambiguous_doppler.kernels.records import Banks, Sums, World, memory
 from radarsim.studies.ambiguous_doppler.kernels.sums import add_group, run_filters
 
 # A fold of the best hypothesis is wrong; the velocity is off by over half the span; a fold is wrong, and the right
@@ -115,18 +105,18 @@ def add_events(world, banks, memory, weights, size, losses):
     for f in range(banks.bank.size):
         most, gone, crowded = banks.most[banks.bank[f]], 0, 0  # a bit for each of the eight
         for k in range(scans):
-            plot = row(address(memory.plots), k * PLOT)
-            bank = row(out, (banks.bank[f] * scans + k) * OUTPUT)
+            plot = row(address(memory.plots), k * rec.PLOT)
+            bank = row(out, (banks.bank[f] * scans + k) * rec.OUTPUT)
             velocity = row(bank, banks.place[f] + 1)
             for n in range(size):
-                if bank[LISTED * WIDTH + n] == 0.0 and gone >> n & 1 == 0:
+                if bank[rec.LISTED * WIDTH + n] == 0.0 and gone >> n & 1 == 0:
                     gone |= 1 << n
-                    crowded |= (1 if bank[COUNT * WIDTH + n] >= most else 0) << n
-                if bank[RIGHT * WIDTH + n] == 0.0:
+                    crowded |= (1 if bank[rec.COUNT * WIDTH + n] >= most else 0) << n
+                if bank[rec.RIGHT * WIDTH + n] == 0.0:
                     add_event(weights[n], losses.events[f, k, WRONG])
                     if crowded >> n & 1 == 1:
                         add_event(weights[n], losses.events[f, k, FULL])
-                if abs(velocity[n] - plot[(TRUTH + 1) * WIDTH + n]) > 0.5 * world.spans[k]:
+                if abs(velocity[n] - plot[(rec.TRUTH + 1) * WIDTH + n]) > 0.5 * world.spans[k]:
                     add_event(weights[n], losses.events[f, k, BEYOND])
 
 

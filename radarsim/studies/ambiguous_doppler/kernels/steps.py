@@ -11,119 +11,48 @@ range. Letters, each of eight lanes:
 `design`, `plots`, `gains`, `out` are addresses.
 """
 
-from radarsim.kernels.algebra import predicted, predicted_covariance
+from radarsim.kernels.algebra import add_outer, add_scaled, predicted, predicted_covariance, take_rate, take_value
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.hypotheses import FARTHEST
-from radarsim.kernels.lanes import any_greater, exponential, full, get, nearest, put, root, row, where_greater
-from radarsim.studies.ambiguous_doppler.kernels.records import (
-    BEST,
-    COUNT,
-    DETECTED,
-    FIRST,
-    GAINS,
-    LISTED,
-    MEAN,
-    MOTION,
-    NOISE,
-    NONE,
-    OUTPUT,
-    PAIRED,
-    PLOT,
-    PRIOR,
-    PROBABILITY,
-    RANGE,
-    RANGE_GAIN,
-    REMAINDER,
-    RIGHT,
-    SOLVED,
-    TAKES_VELOCITY,
-    UNFOLDED,
-    UNFOLDS,
-    VARIANCE,
-    VELOCITY,
-    VELOCITY_GAIN,
-    WEIGHT,
+from radarsim.kernels.lanes import (
+    any_greater,
+    choose3,
+    exponential,
+    full,
+    get,
+    get3,
+    nearest,
+    put,
+    put3,
+    root,
+    row,
+    where_greater,
 )
+from radarsim.studies.ambiguous_doppler.kernels import records as rec
 
 
 @inline
 def motion(design):
     """F and Q of a design."""
-    f, q = design, MOTION + NOISE
+    f, q = design, rec.NOISE
     return (f[0], f[1], f[2], f[3], f[4]), (f[q], f[q + 1], f[q + 2], f[q + 3], f[q + 4], f[q + 5])
 
 
 @inline
-def three(at, number):
-    """Three rows."""
-    return get(at, number), get(at, number + 1), get(at, number + 2)
-
-
-@inline
-def put_three(at, number, x):
-    """Write three rows."""
-    put(at, number, x[0])
-    put(at, number + 1, x[1])
-    put(at, number + 2, x[2])
-
-
-@inline
-def moved(x, g, e):
-    """x + g e."""
-    return x[0] + g[0] * e, x[1] + g[1] * e, x[2] + g[2] * e
-
-
-@inline
-def widened(P, g, variance):
-    """P + variance g g', P packed: what is not known of an innovation that was taken with the gain g."""
-    return (
-        P[0] + g[0] * g[0] * variance,
-        P[1] + g[0] * g[1] * variance,
-        P[2] + g[0] * g[2] * variance,
-        P[3] + g[1] * g[1] * variance,
-        P[4] + g[1] * g[2] * variance,
-        P[5] + g[2] * g[2] * variance,
-    )
-
-
-@inline
 def range_taken(P, first, taken, variance):
-    """Covariance after a range of that variance, 1/(2S) and gains; `first` (0 or 1) is a track's first, which sets it.
-
-    S and R/S multiply what a difference of large numbers would leave: P - P₀ P₀ᵀ/S has P₀₀ R/S in its first row.
-    """
+    """Covariance after a range of that variance, its gain, and 1/(2S); `first` (0 or 1) is a track's first, which sets
+    it."""
     zero = full(0.0)
-    S = P[0] + variance
-    use = taken / S
-    g = P[0] * use, P[1] * use, P[2] * use
-    kept = where_greater(taken, zero, variance / S, full(1.0))
-    P = (
-        where_greater(first, zero, full(variance), P[0] * kept),
-        where_greater(first, zero, zero, P[1] * kept),
-        where_greater(first, zero, zero, P[2] * kept),
-        P[3] - g[1] * P[1],
-        P[4] - g[1] * P[2],
-        P[5] - g[2] * P[2],
-    )
-    return P, 0.5 * use, g
-
-
-@inline
-def velocity_taken(P, taken, variance):
-    """Covariance after a velocity of that variance, the innovation's variance S, and gains."""
-    S = P[3] + variance
-    use = taken / S
-    g = P[1] * use, P[3] * use, P[4] * use
-    kept = where_greater(taken, full(0.0), variance / S, full(1.0))
-    P = P[0] - g[0] * P[1], P[1] * kept, P[2] - g[0] * P[4], P[3] * kept, P[4] * kept, P[5] - g[2] * P[4]
-    return P, S, g
+    P, gain, S = take_value(P, variance, taken)
+    of_range = choose3(first, zero, (full(variance), zero, zero), (P[0], P[1], P[2]))
+    return (*of_range, P[3], P[4], P[5]), gain, 0.5 * taken / S
 
 
 @inline
 def prior(design):
     """Covariance before the first plot; the range is not in it."""
     zero = full(0.0)
-    return zero, zero, zero, full(design[PRIOR]), zero, full(design[PRIOR + 1])
+    return zero, zero, zero, full(design[rec.PRIOR]), zero, full(design[rec.PRIOR + 1])
 
 
 @part
@@ -132,44 +61,44 @@ def fill_gains(design, sigma, scans, plots, gains):
     F, Q = motion(design)
     P = prior(design)
     for k in range(scans):
-        plot, to = row(plots, k * PLOT), row(gains, k * GAINS)
-        detected, first = get(plot, DETECTED), get(plot, FIRST)
+        plot, to = row(plots, k * rec.PLOT), row(gains, k * rec.GAINS)
+        detected, first = get(plot, rec.DETECTED), get(plot, rec.FIRST)
         if k > 0:
             P = predicted_covariance(P, F, Q)
-        P, weight, g = range_taken(P, first, detected - first, sigma[0] * sigma[0])
-        put(to, WEIGHT, weight)
-        put_three(to, RANGE_GAIN, g)
-        taken = get(plot, PAIRED) if design[TAKES_VELOCITY] > 1.0 else detected * design[TAKES_VELOCITY]
-        P, S, g = velocity_taken(P, taken, sigma[1] * sigma[1])
-        put(to, VARIANCE, S)
-        put_three(to, VELOCITY_GAIN, g)
+        P, g, weight = range_taken(P, first, detected - first, sigma[0] * sigma[0])
+        put(to, rec.WEIGHT, weight)
+        put3(to, rec.RANGE_GAIN, g)
+        taken = get(plot, rec.PAIRED) if design[rec.TAKES_VELOCITY] > 1.0 else detected * design[rec.TAKES_VELOCITY]
+        P, g, S = take_rate(P, sigma[1] * sigma[1], taken)
+        put(to, rec.VARIANCE, S)
+        put3(to, rec.VELOCITY_GAIN, g)
 
 
 @inline
 def with_range(x, plot, scan):
     """A state after a plot's range; the track's first sets it."""
-    z = get(plot, RANGE)
-    x = moved(x, three(scan, RANGE_GAIN), z - x[0])
-    return where_greater(get(plot, FIRST), full(0.0), z, x[0]), x[1], x[2]
+    z = get(plot, rec.RANGE)
+    x = add_scaled(x, z - x[0], get3(scan, rec.RANGE_GAIN))
+    return where_greater(get(plot, rec.FIRST), full(0.0), z, x[0]), x[1], x[2]
 
 
 @inline
 def whether_right(right, plot, taken, D):
     """`right` (0 or 1) where the velocity `taken`, folded back somehow, is the one that was folded; else 0."""
-    off = get(plot, UNFOLDED) - taken
+    off = get(plot, rec.UNFOLDED) - taken
     off = where_greater(off, full(0.0), off, full(0.0) - off)
-    return where_greater(off * get(plot, DETECTED), full(0.5 * D), full(0.0), right)
+    return where_greater(off * get(plot, rec.DETECTED), full(0.5 * D), full(0.0), right)
 
 
 @inline
 def put_single(to, x, right):
     """Output of a bank with one hypothesis."""
-    put_three(to, MEAN, x)
-    put_three(to, BEST, x)
-    put(to, RIGHT, right)
-    put(to, LISTED, right)
-    put(to, COUNT, full(1.0))
-    put(to, PROBABILITY, full(1.0))
+    put3(to, rec.MEAN, x)
+    put3(to, rec.BEST, x)
+    put(to, rec.RIGHT, right)
+    put(to, rec.LISTED, right)
+    put(to, rec.COUNT, full(1.0))
+    put(to, rec.PROBABILITY, full(1.0))
 
 
 @part
@@ -182,19 +111,19 @@ def run_single(kind, design, spans, plots, gains, out):
     zero = full(0.0)
     x, right = (zero, zero, zero), full(1.0)
     for k in range(spans.size):
-        plot, scan, D = row(plots, k * PLOT), row(gains, k * GAINS), spans[k]
+        plot, scan, D = row(plots, k * rec.PLOT), row(gains, k * rec.GAINS), spans[k]
         x = with_range(predicted(x, F), plot, scan)
-        if kind != NONE:
-            u = get(plot, UNFOLDED)
-            if kind == REMAINDER:
-                right = whether_right(get(plot, PAIRED), plot, get(plot, SOLVED), D)
-                u = get(plot, SOLVED)
-            elif kind != UNFOLDS:
-                z = get(plot, VELOCITY)
+        if kind != rec.NONE:
+            u = get(plot, rec.UNFOLDED)
+            if kind == rec.REMAINDER:
+                right = whether_right(get(plot, rec.PAIRED), plot, get(plot, rec.SOLVED), D)
+                u = get(plot, rec.SOLVED)
+            elif kind != rec.UNFOLDS:
+                z = get(plot, rec.VELOCITY)
                 u = z + D * nearest((x[1] - z) / D)
                 right = whether_right(right, plot, u, D)
-            x = moved(x, three(scan, VELOCITY_GAIN), u - x[1])
-        put_single(row(out, k * OUTPUT), x, right)
+            x = add_scaled(x, u - x[1], get3(scan, rec.VELOCITY_GAIN))
+        put_single(row(out, k * rec.OUTPUT), x, right)
 
 
 @inline
@@ -223,20 +152,20 @@ def run_merged(design, sigma, spans, plots, out):
     zero = full(0.0)
     x, P, right = (zero, zero, zero), prior(design), full(1.0)
     for k in range(spans.size):
-        plot, D = row(plots, k * PLOT), spans[k]
-        detected, first = get(plot, DETECTED), get(plot, FIRST)
+        plot, D = row(plots, k * rec.PLOT), spans[k]
+        detected, first = get(plot, rec.DETECTED), get(plot, rec.FIRST)
         x = predicted(x, F)
         if k > 0:
             P = predicted_covariance(P, F, Q)
-        P, _, g = range_taken(P, first, detected - first, sigma[0] * sigma[0])
-        z = get(plot, RANGE)
-        x = moved(x, g, z - x[0])
+        P, g, _ = range_taken(P, first, detected - first, sigma[0] * sigma[0])
+        z = get(plot, rec.RANGE)
+        x = add_scaled(x, z - x[0], g)
         x = where_greater(first, zero, z, x[0]), x[1], x[2]
-        e = get(plot, VELOCITY) - x[1]
+        e = get(plot, rec.VELOCITY) - x[1]
         e = e - D * nearest(e / D)
         right = whether_right(right, plot, x[1] + e, D)
-        P, S, g = velocity_taken(P, detected, sigma[1] * sigma[1])
+        P, g, S = take_rate(P, sigma[1] * sigma[1], detected)
         mean, variance, _ = folds_merged(e, S, D)
-        x = moved(x, g, mean)
-        P = widened(P, g, variance)
-        put_single(row(out, k * OUTPUT), x, right)
+        x = add_scaled(x, mean, g)
+        P = add_outer(P, variance, g)
+        put_single(row(out, k * rec.OUTPUT), x, right)

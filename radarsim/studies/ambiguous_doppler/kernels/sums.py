@@ -5,36 +5,11 @@ import numpy as np
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.hypotheses import Lists
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, row, total, where_greater
+from radarsim.studies.ambiguous_doppler.kernels import records as rec
 from radarsim.studies.ambiguous_doppler.kernels.hypotheses import run_remembering
 from radarsim.studies.ambiguous_doppler.kernels.orders import Orders, run_choosing, run_interacting, run_weighing
 from radarsim.studies.ambiguous_doppler.kernels.plots import fill_normals, put_plots
-from radarsim.studies.ambiguous_doppler.kernels.records import (
-    BEYOND_SUM,
-    BINS,
-    CHOOSES,
-    COUNT,
-    COUNT_SUM,
-    DETECTED,
-    GAINS,
-    INTERACTS,
-    LISTED,
-    LISTED_SUM,
-    MERGES,
-    OUTPUT,
-    PLOT,
-    PROBABILITY,
-    REMEMBERS,
-    RIGHT,
-    RIGHT_SUM,
-    STARTED,
-    TRUTH,
-    WEIGHS,
-    WEIGHTS,
-    Banks,
-    Sums,
-    World,
-    memory,
-)
+from radarsim.studies.ambiguous_doppler.kernels.records import Banks, Sums, World, memory
 from radarsim.studies.ambiguous_doppler.kernels.steps import fill_gains, run_merged, run_single
 from radarsim.studies.ambiguous_doppler.kernels.together import run_together
 
@@ -46,7 +21,9 @@ def run_filters(world, banks, memory, fresh):
     sigma = address(world.sigma)
     if fresh:
         for d in range(banks.designs.shape[0]):
-            fill_gains(address(banks.designs[d]), sigma, scans, plots, row(address(memory.gains), d * scans * GAINS))
+            fill_gains(
+                address(banks.designs[d]), sigma, scans, plots, row(address(memory.gains), d * scans * rec.GAINS)
+            )
     lists = Lists(
         address(memory.listed), address(memory.children), address(memory.parents), memory.room, memory.parents.size
     )
@@ -55,14 +32,14 @@ def run_filters(world, banks, memory, fresh):
         shares, stay = address(banks.shares[b]), banks.stay[b]
         bank = Orders(address(banks.designs), address(banks.parts[b]), address(banks.orders[b]), size, stay)
         outputs = address(memory.out)
-        out = row(outputs, b * scans * OUTPUT)
-        if kind == WEIGHS:
+        out = row(outputs, b * scans * rec.OUTPUT)
+        if kind == rec.WEIGHS:
             run_weighing(outputs, bank, banks.reads[b], shares, scans, out)
-        elif kind == CHOOSES:
+        elif kind == rec.CHOOSES:
             run_choosing(outputs, bank, banks.reads[b], shares, scans, out)
-        elif kind == INTERACTS:
+        elif kind == rec.INTERACTS:
             how = banks.unfolding[b]
-            if how != REMEMBERS:
+            if how != rec.REMEMBERS:
                 run_interacting(bank, how, sigma, world.spans, plots, out, address(memory.interacting))
                 continue
             room, limits = (
@@ -70,9 +47,9 @@ def run_filters(world, banks, memory, fresh):
                 (np.exp(-banks.deepest[b]), banks.most[b]),
             )
             for lane in range(WIDTH):
-                own = address(memory.out[b * scans * OUTPUT * WIDTH + lane :])
+                own = address(memory.out[b * scans * rec.OUTPUT * WIDTH + lane :])
                 run_together(bank, limits, sigma, world.spans, address(memory.plots[lane:]), own, room)
-        elif kind == REMEMBERS:
+        elif kind == rec.REMEMBERS:
             for lane in range(WIDTH):
                 run_remembering(
                     address(banks.designs[part]),
@@ -80,21 +57,21 @@ def run_filters(world, banks, memory, fresh):
                     banks.deepest[b],
                     world.spans,
                     address(memory.plots[lane:]),
-                    address(memory.gains[part * scans * GAINS * WIDTH + lane :]),
-                    address(memory.out[b * scans * OUTPUT * WIDTH + lane :]),
+                    address(memory.gains[part * scans * rec.GAINS * WIDTH + lane :]),
+                    address(memory.out[b * scans * rec.OUTPUT * WIDTH + lane :]),
                     lists,
                 )
-        elif kind == MERGES:
+        elif kind == rec.MERGES:
             run_merged(address(banks.designs[part]), sigma, world.spans, plots, out)
         else:
-            gains = row(address(memory.gains), part * scans * GAINS)
+            gains = row(address(memory.gains), part * scans * rec.GAINS)
             run_single(kind, address(banks.designs[part]), world.spans, plots, gains, out)
 
 
 @inline
 def errors(estimate, plot, counted, c):
     """Error of component c, zero where it does not count."""
-    return counted * (get(estimate, c) - get(plot, TRUTH + c))
+    return counted * (get(estimate, c) - get(plot, rec.TRUTH + c))
 
 
 @part
@@ -123,12 +100,12 @@ def add_scan(plot, estimated, counted, half_span, sums):
 def add_calibration(out, plot, calibration):
     """Count the lanes by the probability of the best hypothesis, and those where it is right; of plots that count."""
     for i in range(WIDTH):
-        if plot[DETECTED * WIDTH + i] > 0.0:
-            p = out[PROBABILITY * WIDTH + i]
+        if plot[rec.DETECTED * WIDTH + i] > 0.0:
+            p = out[rec.PROBABILITY * WIDTH + i]
             p = p if p >= 0.0 else 0.0  # not-a-number, which the errors show, is no place in the table
-            number = 3 * min(int(p * BINS), BINS - 1)
+            number = 3 * min(int(p * rec.BINS), rec.BINS - 1)
             calibration[number] += 1.0
-            calibration[number + 1] += out[RIGHT * WIDTH + i]
+            calibration[number + 1] += out[rec.RIGHT * WIDTH + i]
             calibration[number + 2] += p
 
 
@@ -138,29 +115,29 @@ def add_group(world, banks, memory, sums):
     scans = world.truth.shape[0]
     whole, out = get(address(memory.counted), 0), address(memory.out)
     for k in range(scans):
-        plot = row(address(memory.plots), k * PLOT)
-        counted = whole * get(plot, STARTED)
-        put(plot, DETECTED, whole * get(plot, DETECTED))  # read by add_calibration, and no more after it
-        base = row(out, (banks.bank[banks.baseline] * scans + k) * OUTPUT + banks.place[banks.baseline])
+        plot = row(address(memory.plots), k * rec.PLOT)
+        counted = whole * get(plot, rec.STARTED)
+        put(plot, rec.DETECTED, whole * get(plot, rec.DETECTED))  # read by add_calibration, and no more after it
+        base = row(out, (banks.bank[banks.baseline] * scans + k) * rec.OUTPUT + banks.place[banks.baseline])
         for f in range(banks.bank.size):
-            bank = row(out, (banks.bank[f] * scans + k) * OUTPUT)
+            bank = row(out, (banks.bank[f] * scans + k) * rec.OUTPUT)
             oracle = base
             if banks.oracle >= 0:
-                oracle = row(out, (banks.bank[banks.oracle] * scans + k) * OUTPUT + banks.place[banks.oracle])
+                oracle = row(out, (banks.bank[banks.oracle] * scans + k) * rec.OUTPUT + banks.place[banks.oracle])
             folds = address(sums.folds[f, k])
             estimated, half_span = (row(bank, banks.place[f]), base, oracle), 0.5 * world.spans[k]
             powers, products = address(sums.error[f, k]), (address(sums.paired[f, k]), address(sums.oracle[f, k]))
             into = powers, products, address(sums.estimates[f, k])
-            folds[BEYOND_SUM] += add_scan(plot, estimated, counted, half_span, into)
-            folds[RIGHT_SUM] += total(counted * get(bank, RIGHT))
-            folds[LISTED_SUM] += total(counted * get(bank, LISTED))
-            folds[COUNT_SUM] += total(counted * get(bank, COUNT))
+            folds[rec.BEYOND_SUM] += add_scan(plot, estimated, counted, half_span, into)
+            folds[rec.RIGHT_SUM] += total(counted * get(bank, rec.RIGHT))
+            folds[rec.LISTED_SUM] += total(counted * get(bank, rec.LISTED))
+            folds[rec.COUNT_SUM] += total(counted * get(bank, rec.COUNT))
             kind, unfolding = banks.kind[banks.bank[f]], banks.unfolding[banks.bank[f]]
-            if kind == REMEMBERS or (kind == INTERACTS and unfolding == REMEMBERS):
+            if kind == rec.REMEMBERS or (kind == rec.INTERACTS and unfolding == rec.REMEMBERS):
                 add_calibration(bank, plot, address(sums.calibration[f, k]))
-            if kind >= INTERACTS:
+            if kind >= rec.INTERACTS:
                 for order in range(3):
-                    w = counted * get(bank, WEIGHTS + order)
+                    w = counted * get(bank, rec.WEIGHTS + order)
                     sums.orders[f, k, order, 0] += total(w)
                     sums.orders[f, k, order, 1] += total(w * w)
 
@@ -200,5 +177,5 @@ def simulated_lists(world: World, banks: Banks, first: int) -> tuple[np.ndarray,
     """As `simulated`, and the columns that the last list of hypotheses is left in, see `kernels.hypotheses.Lists`."""
     scans, work = len(world.t), memory(len(world.t), banks)
     fill_outputs(world, banks, work, first)
-    shape = (len(banks.kind), scans, OUTPUT, WIDTH)
-    return work.plots.reshape(scans, PLOT, WIDTH), work.out.reshape(shape), work.listed
+    shape = (len(banks.kind), scans, rec.OUTPUT, WIDTH)
+    return work.plots.reshape(scans, rec.PLOT, WIDTH), work.out.reshape(shape), work.listed

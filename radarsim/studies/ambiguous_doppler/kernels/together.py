@@ -14,9 +14,27 @@ covariances depend on the data, so that each hypothesis has its own; lanes are e
 
 import math
 
+from radarsim.kernels.algebra import add_scaled, take_rate
 from radarsim.kernels.compile import part
 from radarsim.kernels.hypotheses import FARTHEST, column, keep_greatest
-from radarsim.kernels.lanes import WIDTH, exponential, full, get, nearest, put, root, row, total, where_greater
+from radarsim.kernels.lanes import (
+    WIDTH,
+    exponential,
+    full,
+    get,
+    get3,
+    get6,
+    nearest,
+    put,
+    put3,
+    put6,
+    put_lane3,
+    root,
+    row,
+    total,
+    where_greater,
+)
+from radarsim.studies.ambiguous_doppler.kernels import records as rec
 from radarsim.studies.ambiguous_doppler.kernels.orders import (
     BEFORE,
     COVARIANCE,
@@ -26,31 +44,13 @@ from radarsim.studies.ambiguous_doppler.kernels.orders import (
     ROWS,
     STATE,
     mixed,
-    put_six,
-    six,
     taken,
     weighed,
 )
-from radarsim.studies.ambiguous_doppler.kernels.records import (
-    BEST,
-    COUNT,
-    DESIGN,
-    DETECTED,
-    LISTED,
-    MEAN,
-    NONE,
-    OUTPUT,
-    PLOT,
-    RIGHT,
-    UNFOLDED,
-    VELOCITY,
-    WEIGHTS,
-)
-from radarsim.studies.ambiguous_doppler.kernels.records import PROBABILITY as OF_THE_BEST
-from radarsim.studies.ambiguous_doppler.kernels.steps import moved, prior, put_three, three, velocity_taken
+from radarsim.studies.ambiguous_doppler.kernels.steps import prior
 
 GROUP = 3 * ROWS  # rows of eight hypotheses: of three orders, as `kernels.orders` has them
-BROAD = PLOT + 3  # rows of a plot in all lanes, then the numbers 0 … 7, and two rows of branches
+BROAD = rec.PLOT + 3  # rows of a plot in all lanes, then the numbers 0 … 7, and two rows of branches
 LEAST_SHARE = 1e-150  # an order's least probability after a range, so that a product with a far velocity's is not zero
 NO_WEIGHT = 1e-200  # a share of the whole below which an order's nearest fold does not count
 LEAST_WEIGHT = 1e-280  # of a branch beside the best
@@ -71,8 +71,8 @@ def begun(designs, parts, size, lists, old):
     zero = full(0.0)
     for i in range(size):
         own = row(old, i * ROWS)
-        put_three(own, STATE, (zero, zero, zero))
-        put_six(own, COVARIANCE, prior(row(designs, parts[i] * (DESIGN // WIDTH))))
+        put3(own, STATE, (zero, zero, zero))
+        put6(own, COVARIANCE, prior(row(designs, parts[i] * (rec.DESIGN // WIDTH))))
         put(own, PROBABILITY, full(1.0 / size))
     weights = column(lists, 0, 0)
     for i in range(WIDTH):
@@ -89,8 +89,8 @@ def ranged(bank, sigma, plot, moves, groups, states, lists):
         own = row(new, g * GROUP)
         mixed(row(old, g * GROUP), own, size, bank.stay)
         for i in range(size):
-            design = row(designs, parts[i] * (DESIGN // WIDTH))
-            taken(row(own, i * ROWS), design, sigma, plot, 1.0, NONE, moves)
+            design = row(designs, parts[i] * (rec.DESIGN // WIDTH))
+            taken(row(own, i * ROWS), design, sigma, plot, 1.0, rec.NONE, moves)
         distance, likelihood = weighed(own, size)
         for i in range(size):
             mu = get(row(own, i * ROWS), PROBABILITY)
@@ -166,8 +166,8 @@ def branched(size, velocity, limits, count, new, plot, lists):
     branch, found = lists.children, row(lists.children, lists.most // WIDTH)
     groups = (count + WIDTH - 1) // WIDTH
     least, top = nearest_branch(size, variance, z, D, groups, new, lists)
-    floor, made, steps = top * max(prune, LEAST_WEIGHT), 0, get(plot, PLOT)
-    at_p, at_u = row(plot, PLOT + 1), row(plot, PLOT + 2)
+    floor, made, steps = top * max(prune, LEAST_WEIGHT), 0, get(plot, rec.PLOT)
+    at_p, at_u = row(plot, rec.PLOT + 1), row(plot, rec.PLOT + 2)
     for h in range(count):
         lane, own = h % WIDTH, row(new, (h // WIDTH) * GROUP)
         first, last = 1.0, 0.0
@@ -237,10 +237,10 @@ def inherited(size, variance, count, top, new, old, lists):
         own, u = row(old, g * GROUP), get(found, g)
         for i in range(size):
             order = row(own, i * ROWS)
-            x, e = three(order, STATE), u - get(order, STATE + 1)
-            P, S, gain = velocity_taken(six(order, COVARIANCE), one, variance)
-            put_three(order, STATE, moved(x, gain, e))
-            put_six(order, COVARIANCE, P)
+            x, e = get3(order, STATE), u - get(order, STATE + 1)
+            P, gain, S = take_rate(get6(order, COVARIANCE), variance, 1.0)
+            put3(order, STATE, add_scaled(x, e, gain))
+            put6(order, COVARIANCE, P)
             put(order, BEFORE, get(order, PROBABILITY))
             put(order, PROBABILITY, one / root(S))
             put(order, DISTANCE, e * e / S)
@@ -252,7 +252,7 @@ def put_estimates(size, orders, count, right, states, lists, to):
     """Write this lane of the output: means over hypotheses and orders, the best hypothesis, whether it is right."""
     weights, zero = column(lists, 0, 0), full(0.0)
     best, sum_, of_orders = 0, zero, (zero, zero, zero)
-    x0, x1, x2 = zero, zero, zero
+    x = zero, zero, zero
     for i in range(count):
         best = i if weights[i] > weights[best] else best
     for g in range((count + WIDTH - 1) // WIDTH):
@@ -260,32 +260,27 @@ def put_estimates(size, orders, count, right, states, lists, to):
         sum_ = sum_ + w
         for i in range(size):
             order = row(states, g * GROUP + i * ROWS)
-            share, y = w * get(order, PROBABILITY), three(order, STATE)
-            x0, x1, x2 = x0 + share * y[0], x1 + share * y[1], x2 + share * y[2]
+            share, y = w * get(order, PROBABILITY), get3(order, STATE)
+            x = add_scaled(x, share, y)
             of_orders = (
                 of_orders[0] + (share if orders[i] == 0 else zero),
                 of_orders[1] + (share if orders[i] == 1 else zero),
                 of_orders[2] + (share if orders[i] == 2 else zero),
             )
     whole = total(sum_)
-    to[MEAN * WIDTH], to[(MEAN + 1) * WIDTH], to[(MEAN + 2) * WIDTH] = (
-        total(x0) / whole,
-        total(x1) / whole,
-        total(x2) / whole,
-    )
-    to[WEIGHTS * WIDTH] = total(of_orders[0]) / whole
-    to[(WEIGHTS + 1) * WIDTH] = total(of_orders[1]) / whole
-    to[(WEIGHTS + 2) * WIDTH] = total(of_orders[2]) / whole
+    put_lane3(to, rec.MEAN, (total(x[0]) / whole, total(x[1]) / whole, total(x[2]) / whole))
+    shares = total(of_orders[0]) / whole, total(of_orders[1]) / whole, total(of_orders[2]) / whole
+    put_lane3(to, rec.WEIGHTS, shares)
     for c in range(3):
         y = 0.0
         for i in range(size):
             order = row(states, (best // WIDTH) * GROUP + i * ROWS)
             y += order[PROBABILITY * WIDTH + best % WIDTH] * order[(STATE + c) * WIDTH + best % WIDTH]
-        to[(BEST + c) * WIDTH] = y
-    to[RIGHT * WIDTH] = 1.0 if best == right else 0.0
-    to[LISTED * WIDTH] = 1.0 if right >= 0 else 0.0
-    to[COUNT * WIDTH] = count
-    to[OF_THE_BEST * WIDTH] = weights[best] / whole
+        to[(rec.BEST + c) * WIDTH] = y
+    to[rec.RIGHT * WIDTH] = 1.0 if best == right else 0.0
+    to[rec.LISTED * WIDTH] = 1.0 if right >= 0 else 0.0
+    to[rec.COUNT * WIDTH] = count
+    to[rec.PROBABILITY * WIDTH] = weights[best] / whole
 
 
 @part
@@ -300,21 +295,21 @@ def run_together(bank, limits, sigma, spans, plots, out, room):
     begun(bank.designs, bank.parts, size, lists, old)
     count, right = 1, 0
     for i in range(WIDTH):
-        plot[PLOT * WIDTH + i] = i
+        plot[rec.PLOT * WIDTH + i] = i
     for k in range(spans.size):
-        here, D = row(plots, k * PLOT), spans[k]
-        for i in range(PLOT):
+        here, D = row(plots, k * rec.PLOT), spans[k]
+        for i in range(rec.PLOT):
             put(plot, i, full(here[i * WIDTH]))
         groups = (count + WIDTH - 1) // WIDTH
         ranged(bank, sigma, plot, k > 0, groups, (old, new), lists)
-        if here[DETECTED * WIDTH] > 0.0:
-            made, top = branched(size, (variance, here[VELOCITY * WIDTH], D), limits, count, new, plot, lists)
+        if here[rec.DETECTED * WIDTH] > 0.0:
+            made, top = branched(size, (variance, here[rec.VELOCITY * WIDTH], D), limits, count, new, plot, lists)
             found, is_right = row(lists.children, lists.most // WIDTH), -1
             for i in range(made):
-                if lists.parents[i] == right and abs(found[i] - here[UNFOLDED * WIDTH]) < 0.5 * D:
+                if lists.parents[i] == right and abs(found[i] - here[rec.UNFOLDED * WIDTH]) < 0.5 * D:
                     is_right = i
             right, count = is_right, made
             inherited(size, variance, count, top, new, old, lists)
         else:
             old, new = new, old
-        put_estimates(size, bank.orders, count, right, old, lists, row(out, k * OUTPUT))
+        put_estimates(size, bank.orders, count, right, old, lists, row(out, k * rec.OUTPUT))

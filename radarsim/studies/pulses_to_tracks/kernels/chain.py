@@ -9,33 +9,23 @@ import math
 import numpy as np
 
 from radarsim.bursts.kernels.lanes import PASSES, lane
+from radarsim.kernels.algebra import add_scaled, take_rate, take_second_rate, take_value
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH
 from radarsim.kernels.random import normals
+from radarsim.studies.pulses_to_tracks.kernels import records as rec
 from radarsim.studies.pulses_to_tracks.kernels.estimate import estimate, room_for
 from radarsim.studies.pulses_to_tracks.kernels.folds import ranges_to_hypotheses, take_folds
-from radarsim.studies.pulses_to_tracks.kernels.records import (
-    AGES,
-    AS_MEASURED,
-    BOUND,
-    GATED,
-    TAKEN,
-    WRONG_FOLD,
-    Work,
-    hypotheses,
-)
+from radarsim.studies.pulses_to_tracks.kernels.records import Work, hypotheses
 from radarsim.studies.pulses_to_tracks.kernels.steps import (
     a_scan_later,
-    acceleration_taken,
     begun,
     folded,
     lock_weight,
     mixed,
     put_state,
-    range_taken,
     scored,
     state_of,
-    velocity_taken,
 )
 
 
@@ -50,7 +40,8 @@ def take_ranges(world, own, k, first, tracks):
         else:
             x, P = state_of(tracks, i)
             x, P = a_scan_later(world, own, k, x, P)
-            x, P = range_taken(x, P, noise, variance)
+            P, gain, _ = take_value(P, variance, 1.0)
+            x = add_scaled(x, noise - x[0], gain)
         put_state(tracks, i, x, P)
 
 
@@ -129,28 +120,30 @@ def take_estimates(world, filters, f, k, work, sums):
     for i in range(tracks.shape[0]):
         x, P = state_of(tracks, i)
         v, a = measured[i, 0], measured[i, 1]
-        e = v - x[1] if own.kind == BOUND else folded(v - x[1], span)
+        e = v - x[1] if own.kind == rec.BOUND else folded(v - x[1], span)
         wrong = 1.0 if abs(e + x[1]) > 0.5 * span else 0.0
-        v = v if own.kind == BOUND else folded(v, span)
+        v = v if own.kind == rec.BOUND else folded(v, span)
         scored(sigma, takes, v, a, i, ages, locks, of_measured)
-        y, R, S = velocity_taken(x, P, e, sigma[0] ** 2)
+        R, gain, S = take_rate(P, sigma[0] ** 2, 1.0)
+        y = add_scaled(x, e, gain)
         distance, determinant = e * e / S, S
         if takes == 2:
             e = a - y[2]
-            y, R, S = acceleration_taken(y, R, e, sigma[1] ** 2)
+            R, gain, S = take_second_rate(R, sigma[1] ** 2, 1.0)
+            y = add_scaled(y, e, gain)
             distance, determinant = distance + e * e / S, determinant * S
         weight = 1.0
-        if own.use == GATED:
+        if own.use == rec.GATED:
             weight = 1.0 if distance <= own.gate else 0.0
-        elif own.use != AS_MEASURED:
+        elif own.use != rec.AS_MEASURED:
             weight = lock_weight(distance, determinant, takes, own.lock, own.density)
         if weight == 1.0:
             x, P = y, R
         elif weight > 0.0:
             x, P = mixed(x, P, y, R, weight)
         put_state(tracks, i, x, P)
-        locks[TAKEN] += weight
-        locks[WRONG_FOLD] += wrong * weight
+        locks[rec.TAKEN] += weight
+        locks[rec.WRONG_FOLD] += wrong * weight
 
 
 @part
@@ -174,7 +167,7 @@ def add_errors(tracks, ages, takes, errors, error, age, loss):
 def run_filter(world, filters, f, first, work, errors, sums):
     """A filter over all scans of realisations first, first + 1, …; errors (K, n, 3) are written."""
     own, tracks, ages = filters.filters[f], work.tracks, work.ages
-    ages[:], work.passes[:] = AGES - 1, 0.0
+    ages[:], work.passes[:] = rec.AGES - 1, 0.0
     for k in range(world.missed.shape[0]):
         if own.kept > 1:
             ranges_to_hypotheses(world, own, k, first, work)

@@ -12,7 +12,7 @@ from radarsim.bursts.kernels.strip import evaluate, put_drawn, take_window
 from radarsim.kernels.compile import kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, rows
 from radarsim.kernels.random import LANE_BITS, U, normal_pair, threefry
-from radarsim.studies.pulses_to_tracks.kernels.records import BOUND, SEQUENCE
+from radarsim.studies.pulses_to_tracks.kernels import records as rec
 from radarsim.studies.pulses_to_tracks.kernels.spectrum import highest_line
 
 AT_ONCE = 64  # blocks whose normals are drawn before their sums are made: 32 KiB
@@ -85,12 +85,12 @@ def estimate(world, filters, f, k, entry, who, forecast, room, found):
     work, sums, drawn = address(work_), address(sums_), address(drawn_)
     physics, own, free = world.physics[k], filters.filters[f], filters.windows[filters.free[f, k]]
     put(work, PASSES, full(0.0))
-    if own.kind == BOUND:
+    if own.kind == rec.BOUND:
         ideal(world, k, free, work, sums, drawn)
     else:
         tables = address(world.tables[0]), address(world.tables[1])
         put_forecast(world, forecast, work)
-        if own.kind == SEQUENCE:
+        if own.kind == rec.SEQUENCE:
             first = filters.first[f, k, entry]
             for w in range(filters.count[f, k, entry]):
                 window = filters.windows[first + w]
@@ -101,7 +101,7 @@ def estimate(world, filters, f, k, entry, who, forecast, room, found):
                 *(work, address(re), address(im)),
             )
         # What goes to the filter must not hold the forecast once more: the last step is on the likelihood alone.
-        take_window(physics, drawn, tables, free, filters.last[f], own.kind != SEQUENCE, work, sums)
+        take_window(physics, drawn, tables, free, filters.last[f], own.kind != rec.SEQUENCE, work, sums)
     measured = world.measured
     for n in range(WIDTH):
         for c in range(2):

@@ -8,21 +8,19 @@ The acceleration is taken before the velocity, so that it weighs a hypothesis an
 
 import math
 
+from radarsim.kernels.algebra import add_scaled, take_rate, take_second_rate, take_value
 from radarsim.kernels.compile import inline, part
 from radarsim.kernels.hypotheses import FALL, INNOVATION, NEAR, NOTHING, Lists, branched, column, keep_greatest
 from radarsim.kernels.lanes import WIDTH, address, row
 from radarsim.kernels.random import normals
-from radarsim.studies.pulses_to_tracks.kernels.records import LISTED, MIXTURE, NUMBER, RIGHT, TAKEN, WRONG_FOLD
+from radarsim.studies.pulses_to_tracks.kernels import records as rec
 from radarsim.studies.pulses_to_tracks.kernels.steps import (
     a_scan_later,
-    acceleration_taken,
     begun,
     folded,
     put_state,
-    range_taken,
     scored,
     state_of,
-    velocity_taken,
 )
 
 WEIGHT_COLUMN = 3  # of the first list of `kernels.hypotheses.Lists`
@@ -52,10 +50,10 @@ def ranges_to_hypotheses(world, own, k, first, work):
             for h in range(held.count[i]):
                 x, P = state_of(states, h)
                 x, P = a_scan_later(world, own, k, x, P)
-                e, S = noise - x[0], P[0] + variance
+                P, gain, S = take_value(P, variance, 1.0)
+                e = noise - x[0]
                 weights[h] -= 0.5 * (e * e / S + math.log(S))
-                x, P = range_taken(x, P, noise, variance)
-                put_state(states, h, x, P)
+                put_state(states, h, add_scaled(x, e, gain), P)
         x, P = state_of(states, heaviest(weights, held.count[i]))
         put_state(work.tracks, i, x, P)
 
@@ -69,7 +67,7 @@ def branches(own, sigma, measured, span, held, i, lists):
     v, a, best = measured[0], measured[1], NOTHING
     w, e = column(lists, 0, WEIGHT_COLUMN), column(lists, 2, INNOVATION)
     near, c = column(lists, 2, NEAR), column(lists, 2, FALL)
-    mixture, lock, lost = own.use == MIXTURE, 0.0, NOTHING
+    mixture, lock, lost = own.use == rec.MIXTURE, 0.0, NOTHING
     if mixture:
         lock, lost = math.log(own.lock), math.log((1.0 - own.lock) * own.density)
     states = held.states[i]
@@ -78,7 +76,8 @@ def branches(own, sigma, measured, span, held, i, lists):
         weight = held.weights[i, h] + lock
         if own.takes == 2:
             off = a - x[2]
-            x, P, S = acceleration_taken(x, P, off, sigma[1] ** 2)
+            P, gain, S = take_second_rate(P, sigma[1] ** 2, 1.0)
+            x = add_scaled(x, off, gain)
             weight -= 0.5 * (off * off / S + math.log(2.0 * math.pi * S))
         S = P[3] + sigma[0] ** 2
         w[h], e[h], c[h] = weight - 0.5 * math.log(2.0 * math.pi * S), folded(v - x[1], span), 0.5 / S
@@ -113,9 +112,11 @@ def inherited(own, sigma, measured, span, held, i, made, lists):
         right = held.right[i, h]
         if parent >= 0:
             if own.takes == 2:
-                x, P, _ = acceleration_taken(x, P, measured[1] - x[2], sigma[1] ** 2)
+                P, gain, _ = take_second_rate(P, sigma[1] ** 2, 1.0)
+                x = add_scaled(x, measured[1] - x[2], gain)
             off = abs(found[j] + x[1]) > 0.5 * span
-            x, P, _ = velocity_taken(x, P, found[j], sigma[0] ** 2)
+            P, gain, _ = take_rate(P, sigma[0] ** 2, 1.0)
+            x = add_scaled(x, found[j], gain)
             right, taken, wrong = 0.0 if off else right, taken + weight, wrong + (weight if off else 0.0)
         whole += weight
         put_state(held.fresh, j, x, P)
@@ -155,8 +156,8 @@ def take_folds(world, filters, f, k, work, sums):
         taken, wrong, whole = inherited(own, sigma, (v, a), span, held, i, made, lists)
         best = heaviest(held.weights[i], made)
         put_estimate(own, held, i, best, whole, work.tracks[i])
-        locks[TAKEN] += taken / whole
-        locks[WRONG_FOLD] += wrong / whole
-        folds[RIGHT] += held.right[i, best]
-        folds[LISTED] += held.right[i, :made].max()
-        folds[NUMBER] += made
+        locks[rec.TAKEN] += taken / whole
+        locks[rec.WRONG_FOLD] += wrong / whole
+        folds[rec.RIGHT] += held.right[i, best]
+        folds[rec.LISTED] += held.right[i, :made].max()
+        folds[rec.NUMBER] += made

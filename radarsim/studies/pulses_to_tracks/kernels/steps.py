@@ -1,18 +1,17 @@
 """A Kalman filter of range, velocity and acceleration, one realisation at a time; plain numbers.
 
 x (3) is the state, P (6) its covariance, packed as in `kernels.algebra`. Numbers are taken one after the other: for
-independent errors that is the same as all at once, and needs no inverse. The row of what is taken is scaled and not
-subtracted from itself, of which rounding would leave a negative number where the prior is wide.
+independent errors that is the same as all at once, and needs no inverse.
 """
 
 import math
 
 import numpy as np
 
-from radarsim.kernels.algebra import predicted, predicted_covariance
+from radarsim.kernels.algebra import NO_NOISE, add_scaled, add_spread, predicted, predicted_covariance
 from radarsim.kernels.compile import inline
 from radarsim.kernels.random import normals
-from radarsim.studies.pulses_to_tracks.kernels.records import AGES, LOCKED, LOCKED_3
+from radarsim.studies.pulses_to_tracks.kernels import records as rec
 
 
 @inline
@@ -46,11 +45,9 @@ def begun(world, realisation, noise):
 @inline
 def a_scan_later(world, own, k, x, P):
     """State and covariance a scan later, at scan k."""
-    missed, Q = world.missed[k], own.noise
-    x = predicted(x, world.motion)
-    x = x[0] + missed[0], x[1] + missed[1], x[2] + missed[2]
-    q = (Q[0], Q[1], Q[2], Q[3], Q[4], Q[5]) if k >= own.start else (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return x, predicted_covariance(P, world.motion, q)
+    Q = own.noise
+    q = (Q[0], Q[1], Q[2], Q[3], Q[4], Q[5]) if k >= own.start else NO_NOISE
+    return add_scaled(predicted(x, world.motion), 1.0, world.missed[k]), predicted_covariance(P, world.motion, q)
 
 
 @inline
@@ -69,48 +66,15 @@ def scored(sigma, takes, v, a, i, ages, locks, of_measured):
     if takes == 2:
         worst = max(worst, abs(a) / sigma[1])
     locked = worst < 5.0
-    ages[i] = min(ages[i] + 1, AGES - 1) if locked else 0
-    locks[LOCKED] += 1.0 if locked else 0.0
-    locks[LOCKED_3] += 1.0 if worst < 3.0 else 0.0
+    ages[i] = min(ages[i] + 1, rec.AGES - 1) if locked else 0
+    locks[rec.LOCKED] += 1.0 if locked else 0.0
+    locks[rec.LOCKED_3] += 1.0 if worst < 3.0 else 0.0
     for c in range(takes):
         square = v * v if c == 0 else a * a
         of_measured[c, 1, 0] += square
         of_measured[c, 1, 1] += square * square
         of_measured[c, 0, 0] += square if locked else 0.0
         of_measured[c, 0, 1] += square * square if locked else 0.0
-
-
-@inline
-def moved(x, e, g):
-    """x + g e."""
-    return x[0] + g[0] * e, x[1] + g[1] * e, x[2] + g[2] * e
-
-
-@inline
-def range_taken(x, P, z, variance):
-    """State and covariance after a range z of that variance."""
-    S = P[0] + variance
-    g, kept = (P[0] / S, P[1] / S, P[2] / S), variance / S
-    P = P[0] * kept, P[1] * kept, P[2] * kept, P[3] - g[1] * P[1], P[4] - g[1] * P[2], P[5] - g[2] * P[2]
-    return moved(x, z - x[0], g), P
-
-
-@inline
-def velocity_taken(x, P, e, variance):
-    """State and covariance after a velocity of innovation e, and the innovation's variance."""
-    S = P[3] + variance
-    g, kept = (P[1] / S, P[3] / S, P[4] / S), variance / S
-    P = P[0] - g[0] * P[1], P[1] * kept, P[2] - g[0] * P[4], P[3] * kept, P[4] * kept, P[5] - g[2] * P[4]
-    return moved(x, e, g), P, S
-
-
-@inline
-def acceleration_taken(x, P, e, variance):
-    """State and covariance after an acceleration of innovation e, and the innovation's variance."""
-    S = P[5] + variance
-    g, kept = (P[2] / S, P[4] / S, P[5] / S), variance / S
-    P = P[0] - g[0] * P[2], P[1] - g[0] * P[4], P[2] * kept, P[3] - g[1] * P[4], P[4] * kept, P[5] * kept
-    return moved(x, e, g), P, S
 
 
 @inline
@@ -126,13 +90,6 @@ def lock_weight(distance, determinant, takes, lock, density):
 @inline
 def mixed(x, P, y, Q, w):
     """Mean and covariance of a mixture: (y, Q) with the weight w, (x, P) with the rest."""
-    d, u, v = (y[0] - x[0], y[1] - x[1], y[2] - x[2]), 1.0 - w, w * (1.0 - w)
-    P = (
-        u * P[0] + w * Q[0] + v * d[0] * d[0],
-        u * P[1] + w * Q[1] + v * d[0] * d[1],
-        u * P[2] + w * Q[2] + v * d[0] * d[2],
-        u * P[3] + w * Q[3] + v * d[1] * d[1],
-        u * P[4] + w * Q[4] + v * d[1] * d[2],
-        u * P[5] + w * Q[5] + v * d[2] * d[2],
-    )
-    return moved(x, w, d), P
+    d = add_scaled(y, -1.0, x)
+    P = add_spread(NO_NOISE, 1.0 - w, P, (w * d[0], w * d[1], w * d[2]))
+    return add_scaled(x, w, d), add_spread(P, w, Q, ((1.0 - w) * d[0], (1.0 - w) * d[1], (1.0 - w) * d[2]))
