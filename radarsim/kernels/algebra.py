@@ -30,8 +30,8 @@ def unpack(packed) -> np.ndarray:
 
 
 def pack_transition(F: np.ndarray) -> tuple[float, ...]:
-    """The five numbers of a transition matrix (3, 3)."""
-    return F[0, 1], F[0, 2], F[1, 1], F[1, 2], F[2, 2]
+    """The five numbers of transition matrices (…, 3, 3)."""
+    return F[..., 0, 1], F[..., 0, 2], F[..., 1, 1], F[..., 1, 2], F[..., 2, 2]
 
 
 # ---- a state and its covariance over time --------

@@ -6,6 +6,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from radarsim.errors import PlotFault
+from radarsim.kernels.algebra import (
+    NO_NOISE,
+    TAKE,
+    add_outer,
+    add_scaled,
+    add_spread,
+    pack,
+    pack_transition,
+    predicted,
+    predicted_covariance,
+)
 from radarsim.physics import targets
 from radarsim.studies.ambiguous_doppler import exact, filters, world
 from radarsim.studies.ambiguous_doppler.config import joint_span
@@ -42,11 +53,10 @@ def single(options: Any, spec: Any) -> "Single":
     return Single(member, options, spec)
 
 
-def _taken(P: np.ndarray, component: int, sigma: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Covariances (..., 3, 3) after a measured component, its gains (..., 3), and the innovation's variances (...)."""
-    S = P[..., component, component] + sigma**2
-    gain = P[..., component] / S[..., None]
-    return P - gain[..., :, None] * gain[..., None, :] * S[..., None, None], gain, S
+def before_plots(one: filters.Member, spec: Any) -> tuple[float, ...]:
+    """The packed covariance before the first plot; the range is not in it."""
+    velocity, acceleration = filters.prior_variances(one.order, spec.prior)
+    return 0.0, 0.0, 0.0, float(velocity), 0.0, float(acceleration)
 
 
 def _kept(w: np.ndarray, options: Any) -> np.ndarray:
@@ -104,7 +114,7 @@ class Folds:
 
 
 class Single:
-    """One filter: states (n, 3) of its hypotheses, logarithms of their weights (n,), the common covariance (3, 3).
+    """One filter: states (3, n) of its hypotheses, logarithms of their weights (n,), the common covariance, packed.
 
     `sure` is the covariance of right folds, which only merging widens; `last_step` what the filter does at the last row
     with such, None before the first range.
@@ -113,9 +123,10 @@ class Single:
     def __init__(self, member: filters.Member, options: Any, spec: Any):
         self.member, self.options, self.radar = member, options, spec.radar
         self.folds = Folds(spec.radar)
-        self.x, self.w = np.zeros((1, 3)), np.zeros(1)
-        self.P = np.diag([0.0, *filters.prior_variances(member.order, spec.prior)])
-        self.sure = self.P.copy()
+        self.variances = spec.radar.sigma_range_m**2, spec.radar.sigma_velocity_mps**2
+        self.x, self.w = np.zeros((3, 1)), np.zeros(1)
+        self.P: Any = before_plots(member, spec)
+        self.sure = self.P
         self.known = np.array(member.components)
         self.last = np.nan
         self.began = self.started = False
@@ -129,7 +140,9 @@ class Single:
         F, gains, known = np.eye(3), [np.zeros(3), np.zeros(3)], self.started
         if self.began:
             F, Q = filters.model(self.member.order, self.member.manoeuvre_variance, t - self.last)
-            self.x, self.P, self.sure = self.x @ F.T, F @ self.P @ F.T + Q, F @ self.sure @ F.T + Q
+            f, q = pack_transition(F), pack(Q)
+            self.x = np.array(predicted(self.x, f))
+            self.P, self.sure = predicted_covariance(self.P, f, q), predicted_covariance(self.sure, f, q)
         self.began, self.last = True, t
         if not np.isnan(z):
             gains[0] = self._take_range(z)
@@ -142,9 +155,8 @@ class Single:
         self.last_step = exact.Step(F if known else np.eye(3), *gains)
         p = np.exp(self.w - self.w.max())
         p /= p.sum()
-        best = self.x[np.argmax(self.w)]
-        mean = best if self.options.estimate == "best" else p @ self.x
-        variance = np.diagonal(self.P) + p @ (self.x - mean) ** 2
+        mean = self.x[:, np.argmax(self.w)] if self.options.estimate == "best" else self.x @ p
+        variance = np.array([self.P[0], self.P[3], self.P[5]]) + (self.x - mean[:, None]) ** 2 @ p
         estimate, sigma = np.where(self.known, mean, np.nan), np.where(self.known, np.sqrt(variance), np.nan)
         residual = np.array([z, v]) - estimate[:2]
         if self.member.doppler == "folded":
@@ -153,24 +165,23 @@ class Single:
 
     def _take_range(self, z: float) -> np.ndarray:
         """Take a range; gives the gains of right folds."""
+        R = self.variances[0]
         if not self.started:  # before the first range none is known
-            self.x[:, 0] = z
-            for P in (self.P, self.sure):
-                P[0], P[:, 0] = 0.0, 0.0
-                P[0, 0] = self.radar.sigma_range_m**2
+            self.x[0] = z
+            self.P, self.sure = (R, 0.0, 0.0, *self.P[3:]), (R, 0.0, 0.0, *self.sure[3:])
             self.started = True
             return np.array([1.0, 0.0, 0.0])
-        e = z - self.x[:, 0]
-        self.P, gain, S = _taken(self.P, 0, self.radar.sigma_range_m)
+        e = z - self.x[0]
+        self.P, gain, S = TAKE[0](self.P, R, 1.0)
         self._judge(0, e[:, None], S)
-        self.w, self.x = self.w - e**2 / (2 * S), self.x + e[:, None] * gain
-        self.sure, gain, _ = _taken(self.sure, 0, self.radar.sigma_range_m)
-        return gain
+        self.w, self.x = self.w - e**2 / (2 * S), np.array(add_scaled(self.x, e, gain))
+        self.sure, gain, _ = TAKE[0](self.sure, R, 1.0)
+        return np.array(gain)
 
     def _take_velocity(self, v: float) -> np.ndarray:
         """Take a velocity, folded or not; gives the gains of right folds."""
-        P, gain, S = _taken(self.P, 1, self.radar.sigma_velocity_mps)
-        e = (v - self.x[:, 1])[:, None]
+        P, gain, S = TAKE[1](self.P, self.variances[1], 1.0)
+        e = (v - self.x[1])[:, None]
         if self.member.doppler == "folded":
             e = self.folds.innovations(e[:, 0], S)
             if self.options.hypotheses == 1:
@@ -179,18 +190,19 @@ class Single:
         if self.member.doppler == "folded" and not self.folds.certain(float(S)):
             self.nis[1] = np.nan
         w = self.w[:, None] - e**2 / (2 * S)
-        x = self.x[:, None, :] + e[..., None] * gain
-        self.P, self.x, self.w = P, x.reshape(-1, 3), w.ravel() - w.max()
+        self.x = np.array(add_scaled(self.x[:, :, None], e, gain)).reshape(3, -1)
+        self.P, self.w = P, w.ravel() - w.max()
         if self.member.doppler == "folded" and self.options.merge == "each_scan":
             p = np.exp(self.w) / np.exp(self.w).sum()
-            mean = p @ self.x
-            self.P = self.P + np.einsum("n,ni,nj->ij", p, self.x - mean, self.x - mean)
-            self.x, self.w = mean[None], np.zeros(1)
+            mean = (self.x @ p)[:, None]
+            spread = add_outer(NO_NOISE, p, self.x - mean)
+            self.P = tuple(own + more.sum() for own, more in zip(self.P, spread, strict=True))
+            self.x, self.w = mean, np.zeros(1)
         elif self.member.doppler == "folded":
             kept = _kept(self.w, self.options)
-            self.x, self.w = self.x[kept], self.w[kept]
-        self.sure, gain, _ = _taken(self.sure, 1, self.radar.sigma_velocity_mps)
-        return gain
+            self.x, self.w = self.x[:, kept], self.w[kept]
+        self.sure, gain, _ = TAKE[1](self.sure, self.variances[1], 1.0)
+        return np.array(gain)
 
     def _judge(self, number: int, e: np.ndarray, S: np.ndarray) -> None:
         """Note a number's innovations e (n, folds) before they are taken in: the square over the variance S of that of
@@ -205,7 +217,7 @@ class Single:
 class Interacting:
     """Orders combined by likelihood, with a memory of folds or without.
 
-    Of n hypotheses the states (n, M, 3), covariances (n, M, 3, 3) and probabilities (n, M) of M orders, and logarithms
+    Of n hypotheses the states (3, n, M), covariances (6, n, M) and probabilities (n, M) of M orders, and logarithms
     of weights (n,). Over a gap the orders pass into each other as often as there were scans. Innovations are those of
     the most probable hypothesis, mean and variance over its orders.
     """
@@ -214,8 +226,9 @@ class Interacting:
         self.members, self.options, self.radar = filters.members(options), options, spec.radar
         self.folds = Folds(spec.radar)
         many = len(self.members)
-        prior = [np.diag([0.0, *filters.prior_variances(one.order, spec.prior)]) for one in self.members]
-        self.x, self.P, self.w = np.zeros((1, many, 3)), np.array(prior)[None], np.zeros(1)
+        self.variances = spec.radar.sigma_range_m**2, spec.radar.sigma_velocity_mps**2
+        self.x, self.w = np.zeros((3, 1, many)), np.zeros(1)
+        self.P = np.array([before_plots(one, spec) for one in self.members]).T[:, None]
         self.mu = np.full((1, many), 1 / many)
         self.known = np.any([one.components for one in self.members], axis=0)
         self.last = np.nan
@@ -227,9 +240,10 @@ class Interacting:
         self.nis = np.full(2, np.nan)
         self._mix(1 if np.isnan(self.last) else max(1, round((t - self.last) / self.radar.scan_period_s)))
         if not np.isnan(self.last):
-            for i, one in enumerate(self.members):
-                F, Q = filters.model(one.order, one.manoeuvre_variance, t - self.last)
-                self.x[:, i], self.P[:, i] = self.x[:, i] @ F.T, F @ self.P[:, i] @ F.T + Q
+            models = [filters.model(one.order, one.manoeuvre_variance, t - self.last) for one in self.members]
+            F, Q = (np.array(part) for part in zip(*models, strict=True))
+            f = pack_transition(F)
+            self.x, self.P = np.array(predicted(self.x, f)), np.array(predicted_covariance(self.P, f, pack(Q)))
         self.last = t
         if not np.isnan(z):
             self._take_range(z)
@@ -240,10 +254,11 @@ class Interacting:
         p = np.exp(self.w - self.w.max())
         p = p[:, None] * self.mu / p.sum()
         best = np.argmax(self.w)
-        mean = self.mu[best] @ self.x[best] if self.options.estimate == "best" else np.einsum("ni,nix->x", p, self.x)
-        spread = np.einsum("nixx->nix", self.P) + (self.x - mean) ** 2
+        of_best = self.options.estimate == "best"
+        mean = self.x[:, best] @ self.mu[best] if of_best else np.einsum("ni,xni->x", p, self.x)
+        spread = self.P[[0, 3, 5]] + (self.x - mean[:, None, None]) ** 2
         estimate = np.where(self.known, mean, np.nan)
-        sigma = np.where(self.known, np.sqrt(np.einsum("ni,nix->x", p, spread)), np.nan)
+        sigma = np.where(self.known, np.sqrt(np.einsum("ni,xni->x", p, spread)), np.nan)
         residual = np.array([z, v]) - estimate[:2]
         if self.options.doppler == "folded":
             residual[1] = self.folds.folded(residual[1])
@@ -256,20 +271,19 @@ class Interacting:
         passes = (1 - once**scans) / many + np.eye(many) * once**scans
         before = self.mu @ passes
         share = passes * self.mu[:, :, None] / before[:, None, :]  # (n, from, to)
-        x = np.einsum("nji,njx->nix", share, self.x)
-        apart = self.x[:, :, None] - x[:, None]
-        self.P = np.einsum("nji,njxy->nixy", share, self.P) + np.einsum("nji,njix,njiy->nixy", share, apart, apart)
+        x = np.einsum("nji,xnj->xni", share, self.x)
+        apart = self.x[:, :, :, None] - x[:, :, None]  # (3, n, from, to)
+        self.P = np.array(add_spread(NO_NOISE, share, self.P[:, :, :, None], apart)).sum(axis=2)
         self.x, self.mu = x, before
 
     def _take_range(self, z: float) -> None:
         if not self.started:
-            self.x[..., 0], self.P[..., 0, :], self.P[..., :, 0] = z, 0.0, 0.0
-            self.P[..., 0, 0], self.started = self.radar.sigma_range_m**2, True
+            self.x[0], self.P[0], self.P[1:3], self.started = z, self.variances[0], 0.0, True
             return
-        e = z - self.x[..., 0]
-        self.P, gain, S = _taken(self.P, 0, self.radar.sigma_range_m)
+        e = z - self.x[0]
+        P, gain, S = TAKE[0](self.P, self.variances[0], 1.0)
         self._judge(0, e, S)
-        self.x = self.x + e[..., None] * gain
+        self.x, self.P = np.array(add_scaled(self.x, e, gain)), np.array(P)
         self._weigh(np.log(np.maximum(self.mu, LEAST)) - e**2 / (2 * S) - np.log(S) / 2)
 
     def _judge(self, number: int, e: np.ndarray, S: np.ndarray) -> None:
@@ -292,12 +306,12 @@ class Interacting:
         self.mu /= self.mu.sum(axis=1, keepdims=True)
 
     def _take_velocity(self, v: float) -> None:
-        P, gain, S = _taken(self.P, 1, self.radar.sigma_velocity_mps)
-        e, logs = v - self.x[..., 1], np.log(np.maximum(self.mu, LEAST)) - np.log(S) / 2
+        P, gain, S = TAKE[1](self.P, self.variances[1], 1.0)
+        e, logs = v - self.x[1], np.log(np.maximum(self.mu, LEAST)) - np.log(S) / 2
         self._judge(1, e, S)
-        self.P = P
+        self.P = np.array(P)
         if self.options.doppler == "unfolded":
-            self.x = self.x + e[..., None] * gain
+            self.x = np.array(add_scaled(self.x, e, gain))
             self._weigh(logs - e**2 / (2 * S))
         elif self.options.merge == "each_scan":
             folds = self.folds.innovations(e, S)
@@ -308,23 +322,23 @@ class Interacting:
             p /= p.sum(axis=-1, keepdims=True)
             mean = (p * folds).sum(axis=-1)
             variance = (p * (folds - mean[..., None]) ** 2).sum(axis=-1)
-            self.x = self.x + mean[..., None] * gain
-            self.P = self.P + variance[..., None, None] * gain[..., :, None] * gain[..., None, :]
+            self.x = np.array(add_scaled(self.x, mean, gain))
+            self.P = np.array(add_outer(P, variance, gain))
             self._weigh(logs)
         else:
-            self._branch(v, gain, S, logs)
+            self._branch(v, np.array(gain), S, logs)
 
     def _branch(self, v: float, gain: np.ndarray, S: np.ndarray, logs: np.ndarray) -> None:
         """Every hypothesis with every fold near any of its orders; those kept that weigh enough."""
-        mean = np.einsum("ni,ni->n", self.mu, self.x[..., 1])
-        reach = np.max(np.sqrt(S) + np.abs(self.x[..., 1] - mean[:, None]) / FARTHEST) ** 2
+        mean = np.einsum("ni,ni->n", self.mu, self.x[1])
+        reach = np.max(np.sqrt(S) + np.abs(self.x[1] - mean[:, None]) / FARTHEST) ** 2
         u = mean[:, None] + self.folds.innovations(v - mean, reach)
-        e = u[:, :, None] - self.x[:, None, :, 1]  # (n, folds, M)
+        e = u[:, :, None] - self.x[1][:, None]  # (n, folds, M)
         both = logs[:, None] - e**2 / (2 * S[:, None])
         w = self.w[:, None] + both.max(axis=2) + np.log(np.exp(both - both.max(axis=2, keepdims=True)).sum(axis=2))
         kept = _kept(w.ravel() - w.max(), self.options)
         of, n = np.unravel_index(kept, w.shape)
-        self.x, self.P = self.x[of] + e[of, n][..., None] * gain[of], self.P[of]
+        self.x, self.P = np.array(add_scaled(self.x[:, of], e[of, n], gain[:, of])), self.P[:, of]
         self.w = self.w[of]
         self._weigh(both[of, n])
 
