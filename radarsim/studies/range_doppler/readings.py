@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -26,7 +27,6 @@ SHIPPED = "0.001"  # D_M, (m/s³)²
 SWEPT = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # D_M of the config manoeuvre_variance
 LONG = 250  # scans after which a filter is taken as steady
 FILTERS = ("r", "r+Vr")
-PERIOD = {n: radar[2] for n, radar in RADARS.items()}
 WAVELENGTH_M = {1: 1.8, 2: 0.15, 3: 0.15, 4: 0.03, 5: 0.03}
 REPETITION_HZ = 1e3
 
@@ -106,27 +106,14 @@ class _Sigmas(NamedTuple):
     believed: tuple[np.ndarray, ...]
 
 
-@dataclass(frozen=True)
-class _Axes:
-    """Scans and times of a radar's run, C_θ (11), and what its Doppler frequencies follow from."""
-
-    k: np.ndarray
-    t_s: np.ndarray
-    scan_period_s: float
-    C_theta: float
-    wavelength_m: float
-    repetition_rate_hz: float = REPETITION_HZ
-
-
-@dataclass(frozen=True)
-class _Radar:
+@cache
+def _case(number: int, variance: float) -> SimpleNamespace:
     """What stands in for a case: one radar at one D_M."""
-
-    name: str
-    number: int
-    variance: float
-    axes: _Axes
-    count: int = 0
+    sigma_r, sigma_v, period = RADARS[number]
+    k = np.arange(1, round(measures.DURATION / period) + 2)
+    axes = {"k": k, "t_s": (k - 1.0) * period, "scan_period_s": period, "C_theta": (sigma_r / (period * sigma_v)) ** 2}
+    axes |= {"wavelength_m": WAVELENGTH_M[number], "repetition_rate_hz": REPETITION_HZ}
+    return SimpleNamespace(name=f"rls{number}", number=number, variance=variance, axes=SimpleNamespace(**axes), count=0)
 
 
 class ExactEvidence(measures.Evidence):
@@ -139,24 +126,11 @@ class ExactEvidence(measures.Evidence):
         self.extremum = self._sets["extremum"]
         shown = reading["shown_variance"]
         self._own = float(shown if shown != SHIPPED else reading["manoeuvre_variance"])
-        self._cases: dict[Any, _Radar] = {}
-        self._curves: dict[tuple[Any, str, str], Series] = {}
+        self._curves: dict[tuple[Any, ...], Series] = {}
 
     def case(self, key: Any) -> Any:
         """key: the number of a radar (at the reading's D_M), or (number, D_M)."""
-        if key not in self._cases:
-            self._cases[key] = self._case(key)
-        return self._cases[key]
-
-    def _case(self, key: Any) -> _Radar:
-        number, variance = key if isinstance(key, tuple) else (key, self._own)
-        period = PERIOD[number]
-        k = np.arange(1, round(measures.DURATION / period) + 2)
-        sigma_r, sigma_v, _ = RADARS[number]
-        theta = (sigma_r / (period * sigma_v)) ** 2
-        return _Radar(
-            f"rls{number}", number, variance, _Axes(k, (k - 1.0) * period, period, theta, WAVELENGTH_M[number])
-        )
+        return _case(*key) if isinstance(key, tuple) else _case(key, self._own)
 
     def marked(self, series: Series, key: Any) -> Series:
         """As it is: where a run ends is a choice of the reading."""
@@ -174,16 +148,14 @@ class ExactEvidence(measures.Evidence):
         """σ(k) of a filter."""
         place = key, filter_name, component
         if place not in self._curves:
-            sigma = self._sigma(key)[FILTERS.index(filter_name)][:, self._place(component)]
-            self._curves[place] = self._cut(key, sigma)
+            self._curves[place] = self._cut(key, self._sigma(key, component)[FILTERS.index(filter_name)])
         return self._curves[place]
 
     def gain(self, key: Any, filter_name: str, component: str) -> Series:
         """Relative gain of the filter with velocity, %, from the scan at which it has filtered."""
         place = key, "", component
         if place not in self._curves:
-            base, own = (sigma[:, self._place(component)] for sigma in self._sigma(key))
-            gain = recursion.gain(base, own)
+            gain = recursion.gain(*self._sigma(key, component))
             gain[: recursion.first_scan(self._start, 2) - 1] = np.nan
             self._curves[place] = self._cut(key, gain)
         return self._curves[place]
@@ -192,7 +164,7 @@ class ExactEvidence(measures.Evidence):
         """Scan periods from the first plot to settling for good; infinite where it does not within the run."""
         sigma = self.curve(key, self.filter(key, observes), component)
         radar = self.case(key)
-        steady = self._sigma(key)[len(observes) - 1][-1, self._place(component)]
+        steady = self._sigma(key, component)[len(observes) - 1][-1]
         wrong = np.flatnonzero(~(abs(sigma.value / steady - 1) <= self._sets["within"]))
         first = wrong[-1] + 1 if wrong.size else 0
         when = sigma.t[first] / radar.axes.scan_period_s if first < len(sigma.t) else np.inf
@@ -206,16 +178,14 @@ class ExactEvidence(measures.Evidence):
     def _start(self) -> recursion.Start:
         return cast(recursion.Start, self._reading["start"])
 
-    def _sigma(self, key: Any) -> tuple[np.ndarray, ...]:
-        """σ (LONG, 3) of the two filters."""
+    def _sigma(self, key: Any, component: str) -> tuple[np.ndarray, np.ndarray]:
+        """σ (LONG,) of the two filters."""
         radar = self.case(key)
         version = cast(recursion.Form, self._reading["process_noise"]), radar.variance, self._start
         of = _table()[radar.number][version]
-        return of.believed if self._reading["truth"] == "as believed" else of.true
-
-    @staticmethod
-    def _place(component: str) -> int:
-        return tuple(measures.COMPONENTS).index(component)
+        alone, both = of.believed if self._reading["truth"] == "as believed" else of.true
+        c = tuple(measures.COMPONENTS).index(component)
+        return alone[:, c], both[:, c]
 
     def _cut(self, key: Any, values: np.ndarray) -> Series:
         axes = self.case(key).axes
