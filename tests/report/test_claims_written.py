@@ -98,6 +98,7 @@ def test_the_parts_of_claims_before_it(claims):
         ("{gain: {pick", "{gian: {pick", "parts.0.measure: must be one of them; did you mean gain? allowed: "),
         ("pick: first", "pik: first", "measure.gain: gain(key, pick, scan): missing a required argument: 'pick', got "),
         ("pick: first", "pick: first, scan: 1.5", "measure.gain.scan: must be a whole number, got 1.5"),
+        ("pick: first", "pick: first, scan: true", "measure.gain.scan: must be a whole number, got true"),
         ("pick: first", "pick: true", "measure.gain.pick: must be text, got true"),
         ("{pick: first}", "first", "measure.gain: must have its arguments by name, got 'first'"),
         ("above: 0", "above: high", "expected.above.value: must be a number, got 'high'"),
