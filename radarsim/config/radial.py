@@ -1,10 +1,10 @@
 """Keys that studies of range and radial velocity share: a radar's accuracies, and targets in range."""
 
 import math
-from collections.abc import Iterator
-from typing import Annotated, Any, Literal, Protocol, Self
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, GetJsonSchemaHandler
 
 from radarsim.config.faults import short
 from radarsim.config.fields import (
@@ -17,6 +17,7 @@ from radarsim.config.fields import (
     NotRead,
     Number,
     Positive,
+    Study,
     Whole,
     at,
     cross_check,
@@ -36,7 +37,21 @@ Coefficients = Annotated[tuple[Number, ...], Field(min_length=1, max_length=12)]
 COEFFICIENTS = "derivatives of range at the first plot: m, m/s, m/s², … (the sum of c_i t^i / i!)"
 
 
-class Radar(Model):
+class InBand(Model):
+    """What lies in a wave band: its wavelength must."""
+
+    if TYPE_CHECKING:
+        band: Band | None
+        wavelength_m: float
+
+    @cross_check
+    def _in_its_band(self) -> Iterator[At]:
+        limits = outside_band(self.band, self.wavelength_m)
+        if limits is not None:
+            yield at("band", f"{self.band} is {' to '.join(map(short, limits))} m, not {short(self.wavelength_m)}")
+
+
+class Radar(InBand):
     """A surveillance radar: accuracies of one plot, and the period of its scans."""
 
     name: Annotated[Name | None, Display()] = key("name", "display name", None)
@@ -50,61 +65,41 @@ class Radar(Model):
     )
     scan_period_s: Positive = key("scan period", "time between two plots, s", symbol="Δt")
 
+
+class Lasting(Study):
+    """A study whose keys give the length of a run as a number of scans, or as a time in its place."""
+
+    in_place_of: ClassVar[Mapping[str, str]] = {"scans": "duration_s", "duration_s": "scans"}
+    most_scans: ClassVar[int] = MOST_SCANS
+
+    if TYPE_CHECKING:
+        radar: Any
+        scans: int | None
+        duration_s: float | None
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        schema = super().__get_pydantic_json_schema__(core_schema, handler)
+        length = {"oneOf": [{"required": ["scans"]}, {"required": ["duration_s"]}]}
+        return schema | {"allOf": [*schema.get("allOf", []), length]}
+
+    @property
+    def plots(self) -> int:
+        """How many scans there are: as given, or to the last scan within the duration."""
+        if self.duration_s is None:
+            if self.scans is None:
+                raise NotRead("scans")
+            return self.scans
+        return int(self.duration_s / self.radar.scan_period_s * (1 + 1e-12)) + 1
+
     @cross_check
-    def _in_its_band(self) -> Iterator[At]:
-        yield from band_faults(self)
-
-
-class InBand(Protocol):
-    """A radar whose band must hold its wavelength."""
-
-    @property
-    def band(self) -> Band | None: ...
-    @property
-    def wavelength_m(self) -> float: ...
-
-
-def band_faults(radar: InBand) -> Iterator[At]:
-    """The fault of a wavelength that is not in the radar's band."""
-    limits = outside_band(radar.band, radar.wavelength_m)
-    if limits is not None:
-        yield at("band", f"{radar.band} is {' to '.join(map(short, limits))} m, not {short(radar.wavelength_m)}")
-
-
-class Scanned(Protocol):
-    """An experiment whose length is given as a number of scans, or as a time in its place."""
-
-    @property
-    def scans(self) -> int | None: ...
-    @property
-    def duration_s(self) -> float | None: ...
-    @property
-    def radar(self) -> Any: ...
-
-
-def number_of_scans(spec: Scanned) -> int:
-    """How many scans there are: as given, or to the last scan within the duration."""
-    if spec.duration_s is None:
-        if spec.scans is None:
-            raise NotRead("scans")
-        return spec.scans
-    return int(spec.duration_s / spec.radar.scan_period_s * (1 + 1e-12)) + 1
-
-
-def length_faults(spec: Scanned, most: int) -> Iterator[At]:
-    """The fault of a length that is missing, given twice, or out of bounds."""
-    if spec.scans is None and spec.duration_s is None:
-        yield at("scans", "required key is missing, or duration_s in its place")
-    elif spec.scans is not None and spec.duration_s is not None:
-        yield at("duration_s", "stands in place of scans: give one of them")
-    elif not 2 <= (made := number_of_scans(spec)) <= most:
-        yield at("duration_s", f"must be 2 to {most} scans of radar.scan_period_s, makes {made}")
-
-
-def with_either_length(schema: dict[str, Any]) -> dict[str, Any]:
-    """A JSON schema that asks for either length."""
-    length = {"oneOf": [{"required": ["scans"]}, {"required": ["duration_s"]}]}
-    return schema | {"allOf": [*schema.get("allOf", []), length]}
+    def _length_given(self) -> Iterator[At]:
+        if self.scans is None and self.duration_s is None:
+            yield at("scans", "required key is missing, or duration_s in its place")
+        elif self.scans is not None and self.duration_s is not None:
+            yield at("duration_s", "stands in place of scans: give one of them")
+        elif not 2 <= self.plots <= self.most_scans:
+            yield at("duration_s", f"must be 2 to {self.most_scans} scans of radar.scan_period_s, makes {self.plots}")
 
 
 class Polynomial(Model):

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic import Field, model_validator
 
 from radarsim.config.faults import short
 from radarsim.config.fields import (
@@ -21,7 +21,6 @@ from radarsim.config.fields import (
     Positive,
     Probability,
     Scenario,
-    Study,
     Whole,
     at,
     cross_check,
@@ -32,14 +31,12 @@ from radarsim.config.radial import (
     NEAREST_M,
     AccelerationStart,
     FlyBy,
+    InBand,
+    Lasting,
     Polynomial,
     Recorded,
     Starting,
     Turn,
-    band_faults,
-    length_faults,
-    number_of_scans,
-    with_either_length,
 )
 from radarsim.physics.bands import Band
 
@@ -53,7 +50,7 @@ SEQUENCES = ("sequence", "dense", "cured")
 Target = Annotated[Polynomial | AccelerationStart | Turn | FlyBy | Recorded, Field(discriminator="kind")]
 
 
-class Radar(Model):
+class Radar(InBand):
     """A surveillance radar: wavelength, accuracy of a range, period of its scans. Its velocity comes from the burst."""
 
     name: Annotated[Name | None, Display()] = key("name", "display name", None)
@@ -63,10 +60,6 @@ class Radar(Model):
     wavelength_m: Positive = key("wavelength", "wavelength, m", symbol="λ")
     sigma_range_m: Positive = key("σ of the measured range", "standard deviation of a measured range, m", symbol="σ_r")
     scan_period_s: Positive = key("scan period", "time between two bursts, s", symbol="Δt")
-
-    @cross_check
-    def _in_its_band(self) -> Iterator[At]:
-        yield from band_faults(self)
 
 
 class Burst(Model):
@@ -259,7 +252,7 @@ class Filter(Model):
         return self.model_copy(update=missing) if missing else self
 
 
-class Keys(Study):
+class Keys(Lasting):
     """From pulses to tracks: how many pulses buy which track, and what a lost lock costs."""
 
     figure_names = (
@@ -270,9 +263,9 @@ class Keys(Study):
         "losses",
         "threshold",
     )
+    most_scans = MOST_SCANS
     in_place_of: ClassVar = {
-        "scans": "duration_s",
-        "duration_s": "scans",
+        **Lasting.in_place_of,
         "burst.pulses": "burst.pulses_per_second",
         "burst.pulses_per_second": "burst.pulses",
     }
@@ -289,11 +282,6 @@ class Keys(Study):
     duration_s: Annotated[Positive | None, Design()] = key(
         "duration", "time from the first scan to the last, s, in place of scans: to the last scan within it", None
     )
-
-    @classmethod
-    def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        schema = super().__get_pydantic_json_schema__(core_schema, handler)
-        return with_either_length(schema)
 
     @property
     def pulses(self) -> int:
@@ -315,21 +303,12 @@ class Keys(Study):
         """The span into which velocity folds, λF/2, m/s."""
         return self.radar.wavelength_m * self.burst.repetition_rate_hz / 2
 
-    @property
-    def plots(self) -> int:
-        """How many scans there are, given or by the duration."""
-        return number_of_scans(self)
-
     @model_validator(mode="after")
     def _completed(self) -> Self:
         target = self.target.timed(self.radar.scan_period_s) if isinstance(self.target, Starting) else self.target
         burst = self.burst.model_copy(update={"pulses": self.pulses, "pulses_per_second": None})
         update = {"target": target, "burst": burst, "scans": self.plots, "duration_s": None}
         return self.model_copy(update=update)
-
-    @cross_check
-    def _length_given(self) -> Iterator[At]:
-        yield from length_faults(self, MOST_SCANS)
 
     @cross_check
     def _pulses_in_bounds(self) -> Iterator[At]:

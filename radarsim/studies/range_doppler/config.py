@@ -1,9 +1,9 @@
 """Keys of the range_doppler study (P1): a radar, a target in range, linear filters with and without the velocity."""
 
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic import Field, model_validator
 
 from radarsim.config import radial
 from radarsim.config.fields import (
@@ -20,7 +20,6 @@ from radarsim.config.fields import (
     Positive,
     Probability,
     Scenario,
-    Study,
     Whole,
     at,
     cross_check,
@@ -34,12 +33,10 @@ from radarsim.config.radial import (
     MOST_SCANS,
     AccelerationStart,
     Coefficients,
+    Lasting,
     Polynomial,
     Starting,
-    length_faults,
-    number_of_scans,
     polynomial_reach_m,
-    with_either_length,
 )
 
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
@@ -186,7 +183,7 @@ class Filter(Model):
         return self.initial_scans or PLOTS_NEEDED[len(self.observes)]
 
 
-class Keys(Study):
+class Keys(Lasting):
     """Range alone against range and radial velocity."""
 
     figure_names = (
@@ -194,7 +191,6 @@ class Keys(Study):
         "settling",
         "consistency",
     )
-    in_place_of: ClassVar = {"scans": "duration_s", "duration_s": "scans"}
 
     radar: Radar = key("radar", "the radar")
     target: Annotated[Target, Scenario()] = key("target", "the target: a scenario's stem, or inline")
@@ -207,24 +203,10 @@ class Keys(Study):
         "duration", "time from the first scan to the last, s, in place of scans: to the last scan within it", None
     )
 
-    @classmethod
-    def __get_pydantic_json_schema__(cls, core_schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        schema = super().__get_pydantic_json_schema__(core_schema, handler)
-        return with_either_length(schema)
-
     @model_validator(mode="after")
     def _completed(self) -> Self:
         target = self.target.timed(self.radar.scan_period_s) if isinstance(self.target, Starting) else self.target
         return self.model_copy(update={"target": target, "scans": self.plots, "duration_s": None})
-
-    @property
-    def plots(self) -> int:
-        """How many scans there are, given or by the duration."""
-        return number_of_scans(self)
-
-    @cross_check
-    def _length_given(self) -> Iterator[At]:
-        yield from length_faults(self, MOST_SCANS)
 
     @cross_check
     def _long_enough(self) -> Iterator[At]:
