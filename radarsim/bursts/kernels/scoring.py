@@ -40,9 +40,6 @@ STATE = np.dtype(
         ("truth", np.float64, SIZE),
         ("b", np.float64, SIZE),  # estimate in turns over the window
         ("out", np.float64, 8),  # L, the coherent sum and the gradient's six sums
-        ("begun", np.float64, SIZE),
-        ("kept", np.float64, SIZE),
-        ("along", np.float64, SIZE),
         ("amplitude", np.float64),
     ],
     align=True,

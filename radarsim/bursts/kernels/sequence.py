@@ -2,14 +2,16 @@
 
 An estimate x (6,) is the phase's coefficients in turns over the whole burst; a window that is the share r of it sees
 b_j = x_j r^j. The step of (6) is (Φ_θ + R_pr⁻¹)⁻¹ ∂P/∂θ; it ends a window when it is shorter than ε, measured in that
-matrix. Block sums drawn by their own law have kernels of their own, `strip`.
+matrix. The windows are gone through in lanes: eight bursts known by block sums (`strip`), or here one by its samples.
 """
 
 import math
 
 import numpy as np
 
+from radarsim.bursts.kernels import lanes as at
 from radarsim.bursts.kernels.data import DEMODULATED, SAMPLES, demodulate, draw_samples
+from radarsim.bursts.kernels.lanes import copy, lane, log_posterior, step
 from radarsim.bursts.kernels.scoring import (
     SIZE,
     STATE,
@@ -19,7 +21,8 @@ from radarsim.bursts.kernels.scoring import (
     score_image,
     score_samples,
 )
-from radarsim.kernels.compile import inline, kernel
+from radarsim.kernels.compile import inline, kernel, part
+from radarsim.kernels.lanes import WIDTH, address, any_greater, full, get, put, where_greater
 from radarsim.kernels.random import U, normal_pair, threefry
 
 LEAST_COHERENCE = 0.25  # taken into account; below it the main lobe is lost
@@ -56,12 +59,6 @@ OPTIONS = np.dtype(
 )
 
 
-@inline
-def from_nearest_turn(turns):
-    """Turns, less the nearest whole number of them."""
-    return turns - np.rint(turns)
-
-
 @kernel
 def evaluate(physics, samples, sums, window, state):
     """L, the coherent sum and ∂L/∂ψ τ^j of a window at state.x into state.out."""
@@ -84,143 +81,164 @@ def evaluate(physics, samples, sums, window, state):
             score_samples(samples, first, window.pulses, step, offset, state.amplitude, state)
 
 
-@inline
-def from_prior(window, state, j):
-    """Component j of prior − estimate in turns of the window, the phase to the nearest turn."""
-    d = state.prior[j] - state.x[j]
-    return from_nearest_turn(d) if j == 0 else d * window.powers[j]
+# ---- windows, in lanes: `evaluate` alone tells bursts known by their samples from those known by sums ---------------
+# evaluate(physics, work, sums, source, window, state) leaves L, the coherent sum and the gradient at the estimate in
+# work. What a burst is known by is all in sums, source and state; of samples there is one burst, in all lanes.
+def searching(evaluate):
+    """The kernel that searches for a lost main lobe at a hand-over."""
 
-
-@inline
-def value(physics, window, state):
-    """Log posterior (5), up to a constant, from what `evaluate` left."""
-    penalty = 0.0
-    for j in range(SIZE):
-        penalty += window.precision[j] * from_prior(window, state, j) ** 2
-    return state.amplitude / physics.sigma**2 * state.out[0] - 0.5 * penalty
-
-
-@inline
-def scoring_step(physics, window, state, coherence):
-    """One step (6) from the gradient in state.out; returns its squared length.
-
-    Away from the maximum the data's curvature is the coherence times the Fisher matrix, so the step solves with
-    ρ Φ_θ + R_pr⁻¹. (A whole step divided by ρ diverges along directions that the prior alone determines.)
-    """
-    weight = TURN * state.amplitude / physics.sigma**2
-    for j in range(SIZE):
-        state.b[j] = weight * state.out[2 + j] + window.precision[j] * from_prior(window, state, j)
-    squared = 0.0
-    for i in range(SIZE):
-        along = 0.0
-        for j in range(SIZE):
-            along += window.root[i, j] * state.b[j]
-        squared += along * along
-        state.along[i] = along / (1.0 - (1.0 - coherence) * window.share[i])
-    for j in range(SIZE):
-        move = 0.0
-        for i in range(SIZE):
-            move += window.root[i, j] * state.along[i]
-        state.x[j] += move / window.powers[j]
-    return squared
-
-
-@inline
-def move_along(window, state, radians):
-    """Move state.x along the direction of a window by so many radians rms."""
-    for j in range(SIZE):
-        state.x[j] += radians * window.direction[j]
-
-
-@kernel
-def searched(physics, samples, sums, window, options, state):
-    """Moves the estimate to the best of the points along the direction in which hand-overs err. Returns the passes."""
-    best, chosen, points = value(physics, window, state), 0, options.search
-    move_along(window, state, -points * options.spacing)
-    for point in range(-points, points + 1):
-        if point != 0:
-            evaluate(physics, samples, sums, window, state)
-            found = value(physics, window, state)
-            if found > best:
-                best, chosen = found, point
-        move_along(window, state, options.spacing)
-    move_along(window, state, (chosen - points - 1) * options.spacing)
-    evaluate(physics, samples, sums, window, state)
-    return 2 * points + 1
-
-
-@kernel
-def scored(physics, samples, sums, window, options, search, state):
-    """Scoring within a window until its stop rule. Returns the passes over the window's data."""
-    numbers = window.pulses * physics.samples_per_pulse
-    level = (1.0 if physics.complex_samples else 0.5) * numbers * state.amplitude
-    error = physics.sigma * math.sqrt((1.0 if physics.complex_samples else 0.5) * numbers) / level
-    passes = 0
-    for step in range(options.steps):
-        evaluate(physics, samples, sums, window, state)
-        passes += 1
-        if step == 0 and search and state.out[1] / level < 1.0 - options.margin * error:
-            passes += searched(physics, samples, sums, window, options, state)
-        coherence = 1.0
-        if options.coherent:
-            coherence = min(max(state.out[1] / level + 3.0 * error, LEAST_COHERENCE), 1.0)  # with a margin for noise
-        if scoring_step(physics, window, state, coherence) <= options.tolerance**2:
-            break
-    return passes
-
-
-@kernel
-def first_phase(physics, samples, sums, window, state):
-    """Puts the phase, the rest as forecast, at the argument of Σ u e^{-jψ}, where the likelihood is largest."""
-    evaluate(physics, samples, sums, window, state)
-    # Without the image, L is the real part of the sum and ∂L/∂ψ its imaginary one.
-    state.x[0] += math.atan2(state.out[2], state.out[1]) / TURN
-    return 1
-
-
-@kernel
-def best_of_phases(physics, samples, sums, window, options, state):
-    """The first window scored from equally spaced phases; the end with the largest posterior is kept."""
-    best, passes = -math.inf, 0
-    for j in range(SIZE):
-        state.begun[j] = state.x[j]
-    for phase in range(options.phases):
-        for j in range(SIZE):
-            state.x[j] = state.begun[j]
-        state.x[0] += phase / options.phases
-        passes += scored(physics, samples, sums, window, options, False, state) + 1
-        evaluate(physics, samples, sums, window, state)
-        found = value(physics, window, state)
-        if found > best:
-            best = found
+    @part
+    def search(physics, amplitude, work, sums, source, state, window, options, needed):
+        """Moves the lanes that need it to the best of the points along the direction in which hand-overs err."""
+        weight, half, points = amplitude / physics.sigma**2, full(0.5), options.search
+        copy(work, at.X, at.BEGUN)
+        put(work, at.BEST, log_posterior(work, window, weight))
+        put(work, at.CHOSEN, full(0.0))
+        for point in range(-points, points + 2):
+            last = point > points
+            away = options.spacing * get(work, at.CHOSEN) if last else full(options.spacing * point)
             for j in range(SIZE):
-                state.kept[j] = state.x[j]
+                put(work, at.X + j, get(work, at.BEGUN + j) + window.direction[j] * away)
+            if point == 0:
+                continue
+            evaluate(physics, work, sums, source, window, state)
+            if not last:
+                found, best = log_posterior(work, window, weight), get(work, at.BEST)
+                better = where_greater(found, best, needed, full(0.0))
+                put(work, at.BEST, where_greater(better, half, found, best))
+                put(work, at.CHOSEN, where_greater(better, half, full(float(point)), get(work, at.CHOSEN)))
+        put(work, at.PASSES, get(work, at.PASSES) + (2.0 * points + 1.0) * needed)
+
+    return search
+
+
+def scoring(evaluate):
+    """The kernel that scores within a window."""
+    search = searching(evaluate)
+
+    @part
+    def scored(physics, amplitude, work, sums, source, state, window, options, searches):
+        """Scoring within a window until its stop rule; lanes that are done stay where they are."""
+        numbers = window.pulses * physics.samples_per_pulse
+        share = 1.0 if physics.complex_samples else 0.5
+        level, weight = share * numbers * amplitude, amplitude / physics.sigma**2
+        error = physics.sigma * math.sqrt(share * numbers) / level
+        zero, one, least = full(0.0), full(1.0), full(LEAST_COHERENCE)
+        put(work, at.LIVE, one)
+        for number in range(options.steps):
+            evaluate(physics, work, sums, source, window, state)
+            put(work, at.PASSES, get(work, at.PASSES) + get(work, at.LIVE))
+            if number == 0 and searches:
+                enough = full(1.0 - options.margin * error)
+                needed = where_greater(enough, (1.0 / level) * get(work, at.COHERENT), one, zero)
+                if any_greater(needed, zero):
+                    search(physics, amplitude, work, sums, source, state, window, options, needed)
+            coherence = one
+            if options.coherent:
+                coherence = (1.0 / level) * get(work, at.COHERENT) + 3.0 * error  # with a margin for noise
+                coherence = where_greater(one, coherence, coherence, one)
+                coherence = where_greater(coherence, least, coherence, least)
+            step(work, window, weight, options.coherent, coherence)
+            live = where_greater(get(work, at.SQUARED), full(options.tolerance**2), get(work, at.LIVE), zero)
+            put(work, at.LIVE, live)
+            if not any_greater(live, zero):
+                break
+
+    return scored
+
+
+def following(evaluate, scored):
+    """The kernel that takes an estimate through a window, the first one of its estimator or a later one."""
+
+    @part
+    def first_phase(physics, work, sums, source, state, window):
+        """Puts the phase, the rest as forecast, at the argument of Σ u e^{-jψ}, where the likelihood is largest."""
+        evaluate(physics, work, sums, source, window, state)
+        # Without the image, L is the real part of the sum and ∂L/∂ψ its imaginary one.
+        for n in range(WIDTH):
+            work[lane(at.X, n)] += math.atan2(work[lane(at.SLOPES, n)], work[lane(at.COHERENT, n)]) / TURN
+        put(work, at.PASSES, get(work, at.PASSES) + 1.0)
+
+    @part
+    def best_of_phases(physics, amplitude, work, sums, source, state, window, options):
+        """The window scored from equally spaced phases; the end with the largest posterior is kept."""
+        copy(work, at.X, at.BEGUN)
+        put(work, at.BEST, full(-math.inf))
+        for phase in range(options.phases):
+            copy(work, at.BEGUN, at.X)
+            put(work, at.X, get(work, at.X) + phase / options.phases)
+            scored(physics, amplitude, work, sums, source, state, window, options, False)
+            evaluate(physics, work, sums, source, window, state)
+            put(work, at.PASSES, get(work, at.PASSES) + 1.0)
+            found, best = log_posterior(work, window, amplitude / physics.sigma**2), get(work, at.BEST)
+            for j in range(SIZE):
+                better = where_greater(found, best, get(work, at.X + j), get(work, at.KEPT + j))
+                put(work, at.KEPT + j, better)
+            put(work, at.BEST, where_greater(found, best, found, best))
+        copy(work, at.KEPT, at.X)
+
+    @part
+    def follow(physics, amplitude, work, sums, source, state, window, options, first):
+        """One window of an estimator: the estimate in work moves."""
+        starts = first and not options.from_truth
+        if starts and options.phases > 0:
+            best_of_phases(physics, amplitude, work, sums, source, state, window, options)
+        else:
+            if starts:
+                first_phase(physics, work, sums, source, state, window)
+            searches = not first and options.search > 0
+            scored(physics, amplitude, work, sums, source, state, window, options, searches)
+
+    return follow
+
+
+# ---- one burst, by its samples --------------------------------------------------------------------------------------
+@part
+def evaluate_in_lanes(physics, work, sums, samples, window, state):
+    """`evaluate` of the one burst that is in all lanes."""
+    estimate_of(work, state)
+    evaluate(physics, samples, sums, window, state)
+    for j in range(state.out.size):
+        put(work, at.VALUE + j, full(state.out[j]))
+
+
+@inline
+def estimate_of(work, state):
+    """Write the estimate of the one burst in all lanes to state.x."""
     for j in range(SIZE):
-        state.x[j] = state.kept[j]
-    return passes
+        state.x[j] = work[lane(at.X + j, 0)]
+
+
+scored = scoring(evaluate_in_lanes)
+follow = following(evaluate_in_lanes, scored)
+
+
+@inline
+def put_errors(work, truth, errors):
+    """Write the errors (6,) of the one burst in all lanes, in turns over the burst."""
+    for j in range(SIZE):
+        error = work[lane(at.X + j, 0)] - truth[j]
+        errors[j] = error - np.rint(error) if j == 0 else error
 
 
 @kernel
 def run_sequence(physics, edges, samples, sums, windows, options, state, errors):
     """All windows (K,) of an estimator on one burst; writes errors (K, 6) in turns over the burst, returns passes."""
+    room = np.zeros(at.ROWS * WIDTH)
+    work, ready = address(room), 0
     for j in range(SIZE):
-        state.x[j] = state.truth[j] if options.from_truth else state.prior[j]
-    passes, ready = 0, 0
+        put(work, at.PRIOR + j, full(state.prior[j]))
+        put(work, at.X + j, full(state.truth[j] if options.from_truth else state.prior[j]))
+    estimate_of(work, state)
     for k in range(options.windows):
         window = windows[k]
         if physics.mode == DEMODULATED:
             demodulate(physics, edges, samples, state.x, ready, window.blocks, sums)
             ready = window.blocks
-        if k == 0 and not options.from_truth and options.phases > 0:
-            passes += best_of_phases(physics, samples, sums, window, options, state)
-        else:
-            if k == 0 and not options.from_truth:
-                passes += first_phase(physics, samples, sums, window, state)
-            passes += scored(physics, samples, sums, window, options, k > 0 and options.search > 0, state)
-        for j in range(SIZE):
-            errors[k, j] = state.x[j] - state.truth[j]
-        errors[k, 0] = from_nearest_turn(errors[k, 0])
-    return passes
+        follow(physics, state.amplitude, work, sums, samples, state, window, options, k == 0)
+        estimate_of(work, state)
+        put_errors(work, state.truth, errors[k])
+    return int(work[lane(at.PASSES, 0)])
 
 
 @kernel
@@ -271,14 +289,12 @@ def estimate_block(physics, edges, clean, blank, windows, options, keys, first, 
 @kernel
 def polish(physics, samples, windows, options, start, truth, errors):
     """Scoring on the samples of a burst in its last window from a start (6,), without prior; as `run_sequence`."""
-    state = np.zeros(1, STATE)[0]
-    sums = np.zeros((1, 1))
+    state, room, sums = np.zeros(1, STATE)[0], np.zeros(at.ROWS * WIDTH), np.zeros((1, 1))
+    work, last = address(room), options.windows - 1
+    for j in range(SIZE):
+        put(work, at.PRIOR + j, full(start[j]))
+        put(work, at.X + j, full(start[j]))
     state.amplitude = physics.amplitude
-    for j in range(SIZE):
-        state.x[j] = state.prior[j] = start[j]
-        state.truth[j] = truth[j]
-    passes = scored(physics, samples, sums, windows[options.windows - 1], options, False, state)
-    for j in range(SIZE):
-        errors[options.windows - 1, j] = state.x[j] - truth[j]
-    errors[options.windows - 1, 0] = from_nearest_turn(errors[options.windows - 1, 0])
-    return passes
+    scored(physics, physics.amplitude, work, sums, samples, state, windows[last], options, False)
+    put_errors(work, truth, errors[last])
+    return int(work[lane(at.PASSES, 0)])

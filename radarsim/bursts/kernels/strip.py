@@ -4,109 +4,26 @@ A window goes on until all eight bursts are done with it; those that are done ea
 burst's estimate depends on its neighbours.
 """
 
-import math
-
 import numpy as np
 
 from radarsim.bursts.kernels import lanes as at
-from radarsim.bursts.kernels.lanes import copy, fraction, lane, log_posterior, merge, score, step
-from radarsim.bursts.kernels.scoring import SIZE, TURN
-from radarsim.bursts.kernels.sequence import LEAST_COHERENCE
+from radarsim.bursts.kernels.lanes import fraction, lane, merge, score
+from radarsim.bursts.kernels.scoring import SIZE
+from radarsim.bursts.kernels.sequence import following, scoring
 from radarsim.kernels.compile import kernel, part
-from radarsim.kernels.lanes import WIDTH, address, any_greater, full, get, put, rows, where_greater
+from radarsim.kernels.lanes import WIDTH, address, full, get, put, rows
 from radarsim.kernels.random import fill_normal_strip
 
 
 @part
-def evaluate(physics, work, sums, table, window):
-    """L, the coherent sum and the gradient of a window at the estimate."""
+def evaluate(physics, work, sums, table, window, state):
+    """L, the coherent sum and the gradient of a window at the estimates of eight bursts; they have no further state."""
     for j in range(SIZE):
         put(work, at.B + j, window.powers[j] * get(work, at.X + j))
     score(work, sums, table, window.table, window.blocks, physics.image, physics.amplitude)
 
 
-@part
-def search(physics, work, sums, table, window, options, needed):
-    """Moves the lanes that need it to the best of the points along the direction in which hand-overs err."""
-    weight, half, points = physics.amplitude / physics.sigma**2, full(0.5), options.search
-    copy(work, at.X, at.BEGUN)
-    put(work, at.BEST, log_posterior(work, window, weight))
-    put(work, at.CHOSEN, full(0.0))
-    for point in range(-points, points + 2):
-        last = point > points
-        away = options.spacing * get(work, at.CHOSEN) if last else full(options.spacing * point)
-        for j in range(SIZE):
-            put(work, at.X + j, get(work, at.BEGUN + j) + window.direction[j] * away)
-        if point == 0:
-            continue
-        evaluate(physics, work, sums, table, window)
-        if not last:
-            found, best = log_posterior(work, window, weight), get(work, at.BEST)
-            better = where_greater(found, best, needed, full(0.0))
-            put(work, at.BEST, where_greater(better, half, found, best))
-            put(work, at.CHOSEN, where_greater(better, half, full(float(point)), get(work, at.CHOSEN)))
-    put(work, at.PASSES, get(work, at.PASSES) + (2.0 * points + 1.0) * needed)
-
-
-@part
-def scored(physics, work, sums, table, window, options, searching):
-    """Scoring within a window until its stop rule."""
-    numbers = window.pulses * physics.samples_per_pulse
-    share = 1.0 if physics.complex_samples else 0.5
-    level, weight = share * numbers * physics.amplitude, physics.amplitude / physics.sigma**2
-    error = physics.sigma * math.sqrt(share * numbers) / level
-    zero, one = full(0.0), full(1.0)
-    put(work, at.LIVE, one)
-    for number in range(options.steps):
-        evaluate(physics, work, sums, table, window)
-        put(work, at.PASSES, get(work, at.PASSES) + get(work, at.LIVE))
-        if number == 0 and searching:
-            enough = full(1.0 - options.margin * error)
-            needed = where_greater(enough, (1.0 / level) * get(work, at.COHERENT), one, zero)
-            if any_greater(needed, zero):
-                search(physics, work, sums, table, window, options, needed)
-        coherence = one
-        if options.coherent:
-            coherence = (1.0 / level) * get(work, at.COHERENT) + 3.0 * error  # with a margin for noise
-            coherence = where_greater(one, coherence, coherence, one)
-            coherence = where_greater(coherence, full(LEAST_COHERENCE), coherence, full(LEAST_COHERENCE))
-        step(work, window, weight, options.coherent, coherence)
-        live = where_greater(get(work, at.SQUARED), full(options.tolerance**2), get(work, at.LIVE), zero)
-        put(work, at.LIVE, live)
-        if not any_greater(live, zero):
-            break
-
-
-@part
-def first_phase(physics, work, sums, table, window):
-    """Puts the phase, the rest as forecast, at the argument of Σ u e^{-jψ}, where the likelihood is largest."""
-    evaluate(physics, work, sums, table, window)
-    for n in range(WIDTH):
-        work[lane(at.X, n)] += math.atan2(work[lane(at.SLOPES, n)], work[lane(at.COHERENT, n)]) / TURN
-    put(work, at.PASSES, get(work, at.PASSES) + 1.0)
-
-
-@part
-def best_of_phases(physics, work, sums, table, window, options):
-    """The first window scored from equally spaced phases; the end with the largest posterior is kept."""
-    weight = physics.amplitude / physics.sigma**2
-    copy(work, at.X, at.BEGUN)
-    put(work, at.BEST, full(-math.inf))
-    for phase in range(options.phases):
-        copy(work, at.BEGUN, at.X)
-        put(work, at.X, get(work, at.X) + phase / options.phases)
-        scored(physics, work, sums, table, window, options, False)
-        evaluate(physics, work, sums, table, window)
-        put(work, at.PASSES, get(work, at.PASSES) + 1.0)
-        found, best = log_posterior(work, window, weight), get(work, at.BEST)
-        for j in range(SIZE):
-            put(
-                work,
-                at.KEPT + j,
-                where_greater(found, best, get(work, at.X + j), get(work, at.KEPT + j)),
-            )
-        put(work, at.BEST, where_greater(found, best, found, best))
-    copy(work, at.KEPT, at.X)
+follow = following(evaluate, scoring(evaluate))
 
 
 @part
@@ -117,13 +34,7 @@ def take_window(physics, drawn, tables, window, options, first, work, sums):
     """
     table, weights = tables
     merge(drawn, table, weights, window.table, window.weights, window.blocks, sums)
-    starts = first and not options.from_truth
-    if starts and options.phases > 0:
-        best_of_phases(physics, work, sums, table, window, options)
-    else:
-        if starts:
-            first_phase(physics, work, sums, table, window)
-        scored(physics, work, sums, table, window, options, not first and options.search > 0)
+    follow(physics, physics.amplitude, work, sums, table, 0, window, options, first)
 
 
 @kernel

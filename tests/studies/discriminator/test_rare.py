@@ -129,7 +129,7 @@ def mixture_draws(plan, count):
         fill_normal_strip(plan.keys[0], start, 0, room.a, room.b)
         kernels.move(law, chosen[start : start + 8], room.work, room.a, room.b)
         kernels.weigh(law, room.work, room.a, room.b, room.along, weights[start : start + 8])
-        forecasts = room.work[8 * strips.PRIOR : 8 * (strips.PRIOR + 6)].reshape(6, 8)
+        forecasts = room.work[8 * lanes.PRIOR : 8 * (lanes.PRIOR + 6)].reshape(6, 8)
         along[:, start : start + 8] = (
             law.weight @ forecasts + law.first @ room.a.reshape(-1, 8) + law.second @ room.b.reshape(-1, 8)
         )

@@ -91,8 +91,10 @@ def test_the_estimator_is_p4s_on_the_samples_themselves(plan, f):
         samples = np.stack([u[n].real, u[n].imag])
         errors = np.zeros((len(windows), SIZE))
         sequence.run_sequence(physics, np.zeros(1, np.int64), samples, none, windows, options, state, errors)
-        sequence.scored(physics, samples, none, windows[-1], plan.filters.last[f], False, state)
-        expected = plan.world.measured @ state["x"]
+        last, x = plan.filters.last[f].copy(), np.zeros((1, SIZE))
+        last["windows"] = 1
+        sequence.polish(physics, samples, windows[-1:], last, np.array(state["x"]), np.zeros(SIZE), x)
+        expected = plan.world.measured @ x[0]
         assert abs(found[n] - expected)[0] < 2e-2 * plan.filters.sigma[f, SCAN, 0]
 
 

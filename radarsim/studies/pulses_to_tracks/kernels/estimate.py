@@ -68,7 +68,7 @@ def ideal(world, k, window, work, sums, drawn):
         put(work, PRIOR + j, zero)
         put(work, X + j, zero)
     merge(drawn, table, address(world.tables[1]), window.table, window.weights, window.blocks, sums)
-    evaluate(physics, work, sums, table, window)
+    evaluate(physics, work, sums, table, window, 0)
     put(work, LIVE, full(1.0))
     step(work, window, physics.amplitude / physics.sigma**2, False, full(1.0))
 
