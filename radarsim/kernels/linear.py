@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.kernels.algebra import add_scaled, constant_acceleration, predicted
 from radarsim.kernels.compile import aligned_zeros, inline, kernel, part, summing
 from radarsim.kernels.random import fill_words, normal_pair
 
@@ -80,12 +81,6 @@ def shapes(filters: int, scans: int) -> Mapping[str, tuple[int, ...]]:
     return {"error": (filters, scans, 3, 4), "paired": (filters, scans, 3), "cross": (filters, scans, len(CROSSED))}
 
 
-@inline
-def extrapolated(r, v, a, dt):
-    """B x of P1 eq. (3): value, rate and second rate after a time dt."""
-    return r + dt * (v + 0.5 * dt * a), v + dt * a, a
-
-
 @part
 def fill_plots(key, first, scan, mean, sigma, z, w):
     """Plots of one scan: values z (n,) and rates w (n,) of realisations first, first + 1, …
@@ -113,24 +108,21 @@ def add_weighted(x, z, w, weight):
 @part
 def scan_value(x, z, dt, gain):
     """One scan, in place, of a filter that observes the value: x (3, n) estimates, z (n,) plots, gain (3, >= 1)."""
-    r, v, a = x[0], x[1], x[2]
-    g0, g1, g2 = gain[0, 0], gain[1, 0], gain[2, 0]
+    r, v, a, F = x[0], x[1], x[2], constant_acceleration(dt)
+    g = gain[0, 0], gain[1, 0], gain[2, 0]
     for i in range(z.size):
-        p, q, s = extrapolated(r[i], v[i], a[i], dt)
-        residual = z[i] - p
-        r[i], v[i], a[i] = p + g0 * residual, q + g1 * residual, s + g2 * residual
+        p = predicted((r[i], v[i], a[i]), F)
+        r[i], v[i], a[i] = add_scaled(p, z[i] - p[0], g)
 
 
 @part
 def scan_value_rate(x, z, w, dt, gain):
     """One scan, in place, of a filter that observes value z (n,) and rate w (n,): x (3, n) estimates, gain (3, 2)."""
-    r, v, a = x[0], x[1], x[2]
-    g0, g1, g2 = gain[0, 0], gain[1, 0], gain[2, 0]
-    h0, h1, h2 = gain[0, 1], gain[1, 1], gain[2, 1]
+    r, v, a, F = x[0], x[1], x[2], constant_acceleration(dt)
+    g, h = (gain[0, 0], gain[1, 0], gain[2, 0]), (gain[0, 1], gain[1, 1], gain[2, 1])
     for i in range(z.size):
-        p, q, s = extrapolated(r[i], v[i], a[i], dt)
-        e, f = z[i] - p, w[i] - q
-        r[i], v[i], a[i] = p + g0 * e + h0 * f, q + g1 * e + h1 * f, s + g2 * e + h2 * f
+        p = predicted((r[i], v[i], a[i]), F)
+        r[i], v[i], a[i] = add_scaled(add_scaled(p, z[i] - p[0], g), w[i] - p[1], h)
 
 
 @part
