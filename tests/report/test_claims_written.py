@@ -95,7 +95,11 @@ def test_the_parts_of_claims_before_it(claims):
             "what: $more",
             "claims.yaml:9:21: claims.0.parts.0.what: $more is not given under names or each",
         ),
-        ("{gain: {pick", "{gian: {pick", "parts.0.measure: must be one of them; did you mean gain? allowed: "),
+        (
+            "{gain: {pick",
+            "{gian: {pick",
+            "parts.0.measure: must be one of them; did you mean gain? allowed: known, gain, exact_gain, got",
+        ),
         ("pick: first", "pik: first", "measure.gain: gain(key, pick, scan): missing a required argument: 'pick', got "),
         ("pick: first", "pick: first, scan: 1.5", "measure.gain.scan: must be a whole number, got 1.5"),
         ("pick: first", "pick: first, scan: true", "measure.gain.scan: must be a whole number, got true"),

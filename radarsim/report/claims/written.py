@@ -34,7 +34,7 @@ from radarsim.config.load import read
 from radarsim.config.lookup import did_you_mean
 from radarsim.report.claims import ranges
 from radarsim.report.claims.declared import Claim, Part
-from radarsim.report.claims.evidence import certain
+from radarsim.report.claims.evidence import Evidence, certain
 from radarsim.report.claims.readings import Alternative, Choice
 from radarsim.report.statistics import Estimate
 
@@ -198,12 +198,13 @@ class _Reader:
     def __init__(self, document: Document, faults: Faults, measures: Sequence[ModuleType]):
         self.document, self.faults = document, faults
         self.functions: dict[str, Callable[..., Any]] = {}
-        self.methods: dict[str, Callable[..., Any]] = {}
+        methods: dict[str, Callable[..., Any]] = {}
         for module in measures:
             own = {name: one for name, one in vars(module).items() if inspect.isfunction(one)}
             self.functions |= {name: one for name, one in own.items() if next(iter(_parameters(one)), "") == "seen"}
-            self.methods |= dict(inspect.getmembers(getattr(module, "Evidence", object), inspect.isfunction))
-        known = {**self.methods, **self.functions}
+            of = inspect.getmembers(getattr(module, "Evidence", Evidence), inspect.isfunction)
+            methods |= {name: one for name, one in of if not hasattr(Evidence, name)}
+        known = methods | self.functions
         self.measures = {name: one for name, one in known.items() if not name.startswith("_")}
         self.ranges: dict[str, Callable[..., Any]] = {name: getattr(ranges, name) for name in RANGES}
 
