@@ -154,40 +154,6 @@ def test_loops_use_wide_registers():
     assert "zmm" in assembly
 
 
-NUMBERS = """
-import numpy as np
-from radarsim.kernels import linear, random
-key = random.stream(3, "plain")
-pairs, strips = [np.empty(3) for _ in range(4)], [np.empty(16) for _ in range(2)]
-random.fill_normal_pairs(key, 10, 2, *pairs[:2])
-random.fill_uniform_pairs(key, 10, 2, *pairs[2:])
-random.fill_normal_strip(key, 10, 2, *strips)
-rng = np.random.default_rng(1)
-gains, weights = rng.uniform(0, 0.3, (2, 6, 3, 2)), rng.normal(size=(2, 3, 2, 3))
-problem = linear.Problem(key, np.ones((6, 3)), np.array([2.0, 1.0]), 1.0, [1, 2], [3, 2], weights, gains)
-sums = linear.Sums(*map(np.zeros, linear.shapes(2, 6).values()))
-linear.simulate_block(problem, 7, 6, sums)
-plots = linear.simulate_plots(problem, 7, 6)
-estimates = np.nan_to_num(linear.estimate(problem, plots), nan=-1.0)
-numbers = [float(v) for a in (*pairs, *strips, *sums, plots, estimates) for v in a.ravel()]
-"""
-# Words overflow by design, which NumPy's scalars report; the result does not depend on the chunk.
-PLAIN = f"""
-from radarsim.kernels import linear
-linear.CHUNK = 4
-{NUMBERS}
-print(*map(repr, numbers))
-"""
-
-
-def test_plain_python_gives_the_same_numbers():
-    """Without compiler the kernels are readable Python with the same results, but for fused multiply-adds."""
-    scope = {}
-    exec(NUMBERS, scope)
-    plain = python("import numpy as np\nnp.seterr(over='ignore')\n" + PLAIN, NUMBA_DISABLE_JIT="1")
-    np.testing.assert_allclose(np.array(plain.split(), dtype=float), scope["numbers"], rtol=1e-11, atol=1e-11)
-
-
 def test_functions_without_an_entry_refuse_python():
     """They stay untranslated until a kernel needs them; Python gets an error, no crash; a formula it calls as it is."""
 

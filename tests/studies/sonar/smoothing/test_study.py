@@ -138,24 +138,6 @@ def test_both_kernels_agree_where_nothing_is_missed():
         assert (np.abs(a[name] - b[name]) <= 1e-9 * unit + 1e-300).all(), name
 
 
-FAULTS = {
-    "σ 3 % high": lambda plan: {"world": plan.world._replace(fresh=plan.world.fresh * 1.03)},
-    "ρ 5 % high": lambda plan: {"world": plan.world._replace(steps=plan.world.steps * 1.05)},
-    "gain a scan late": lambda plan: {"bank": plan.bank._replace(gain=np.roll(plan.bank.gain, 1, axis=1))},
-    "weights of the window reversed": lambda plan: {
-        "bank": plan.bank._replace(weights=plan.bank.weights[..., ::-1].copy())
-    },
-    "carried error forgotten": lambda plan: {"bank": plan.bank._replace(carry=plan.bank.carry * 0)},
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_planted_faults_show(fault):
-    plan = STUDY.prepare(load(config(error_correlation=0.6)).cases[0])
-    off, _ = deviations(plan, simulated(dataclasses.replace(plan, **FAULTS[fault](plan))))
-    assert np.nanmax(np.abs(off)) > BOUND
-
-
 def test_cases_that_differ_in_filters_share_their_plots():
     few = load(config(filters=FILTERS[:1])).cases[0]
     many = load(config(scans=20)).cases[0]
