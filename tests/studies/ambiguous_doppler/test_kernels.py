@@ -106,15 +106,6 @@ def test_remainder_of_two_scans(detection):
     assert 20 < seen < 8 * 11
 
 
-def test_one_hypothesis_is_the_nearest_fold():
-    """A list of one, by the kernel of lists, is the filter of the nearest fold."""
-    case = made("RLS 4", [NEAREST, MEMORY | {"hypotheses": 2}], 8, FIXED)
-    plan = study.prepare(case)
-    _, out = sums.simulated(plan.world, plan.banks._replace(most=np.array([1, 1])), 0)
-    assert np.abs(out[0] - out[1])[:, : records.RIGHT].max() < 1e-8
-    assert np.array_equal(out[0][:, records.RIGHT :], out[1][:, records.RIGHT :])
-
-
 @pytest.mark.parametrize("variance", [0.0, 1e-2])
 @pytest.mark.parametrize("scans", [2, 3, 4])
 def test_without_bounds_it_is_the_sum_over_all_sequences_of_folds(scans, variance):

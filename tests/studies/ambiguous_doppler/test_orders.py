@@ -87,17 +87,6 @@ def test_orders_within_remembered_hypotheses(most, prune_below, orders, detectio
         assert np.abs(mu - found[:, records.WEIGHTS :])[there].max() < 1e-9
 
 
-def test_with_a_wide_span_the_hypotheses_are_one_imm():
-    """Where no fold but the nearest is possible, orders and folds together are the orders with the true velocity."""
-    filters = [LIKELIHOOD | {"doppler": how, "name": how} for how in ("unfolded", "folded")]
-    case = made("RLS 2", filters, 12, PULSE, repetition_rate_hz=1e5)
-    plan, _, out = outputs(case)
-    first, second = (out[plan.banks.bank[f]] for f in range(2))
-    assert np.abs((first - second)[:, :3] / SCALE[None, :, None]).max() < 1e-9
-    assert np.abs((first - second)[:, records.WEIGHTS :]).max() < 1e-9
-    assert (second[:, records.RIGHT] == 1).all()
-
-
 def test_combinations_read_what_their_members_estimate():
     """`estimate: best` of a combination is that of its members."""
     options = INTERSECTION | {"doppler": "folded"}

@@ -174,24 +174,14 @@ def compare(n, truth, first=0):
         yield difference, ratio, lock[:, f], block_lock[:, f]
 
 
+@pytest.mark.parametrize("n", [60, pytest.param(6000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("truth", [BASE["truth"], CROSSING], ids=["paper", "crossing"])
-def test_block_sums_and_samples_are_one_likelihood(truth):
-    n = 60
-    for difference, ratio, lock, block_lock in compare(n, truth):
-        assert difference.max() < 0.03
-        assert ratio == pytest.approx(1, abs=0.003 + 3 * difference.max() / np.sqrt(n))
-        assert np.mean(lock != block_lock) <= 2 / n
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("truth", [BASE["truth"], CROSSING], ids=["paper", "crossing"])
-def test_block_sums_and_samples_over_many_bursts(truth):
-    n = 6000
+def test_block_sums_and_samples_are_one_likelihood(truth, n):
     for f, (difference, ratio, lock, block_lock) in enumerate(compare(n, truth)):
         assert difference.max() < 0.03
-        assert ratio == pytest.approx(1, abs=0.003)
+        assert ratio == pytest.approx(1, abs=0.003 + (3 * difference.max() / np.sqrt(n) if n < 1000 else 0))
         # Without the cure a start between two lobes may end in either.
-        assert np.sum(lock != block_lock) <= (0.01 * n if f == 0 else 0)
+        assert np.sum(lock != block_lock) <= (max(2, 0.01 * n) if f == 0 or n < 1000 else 0)
 
 
 def test_without_the_image_the_crossing_is_estimated_worse():
@@ -294,25 +284,14 @@ def twin_errors(plan, first, count):
     return found / bound
 
 
-def compare_with_twin(n):
+@pytest.mark.parametrize("n", [8, pytest.param(1000, marks=pytest.mark.slow)])
+def test_the_maximum_is_that_of_least_squares(n):
     plan = plan_of({**FROM_TRUTH, "tolerance": 1e-6, "steps": 100}, engine="samples")
     ours, lock = final(plan, 0, n)
     theirs = twin_errors(plan, 0, n)
     both = lock[:, 0] & (np.abs(theirs).max(axis=1) < 5)
-    return np.abs(ours[both, 0] - theirs[both]).max(axis=1), both
-
-
-def test_the_maximum_is_that_of_least_squares():
-    difference, both = compare_with_twin(8)
-    assert both.all()
-    assert difference.max() < 1e-3
-
-
-@pytest.mark.slow
-def test_the_maximum_is_that_of_least_squares_over_many_bursts():
-    difference, both = compare_with_twin(1000)
     assert both.mean() > 0.99
-    assert np.mean(difference < 1e-3) >= 0.999
+    assert np.mean(np.abs(ours[both, 0] - theirs[both]).max(axis=1) < 1e-3) >= 0.999
 
 
 @pytest.mark.parametrize("derivatives", [0, 1, 2, 3, 4])

@@ -153,12 +153,3 @@ def test_the_nearest_fold_is_wrong_as_often_as_calculated(wide):
     wrong = sums.locks[1, 0, WRONG_FOLD] / N
     assert abs(wrong - (1 - right)) < 4.5 * math.sqrt(right * (1 - right) / N)
     assert sums.locks[2, -1, WRONG_FOLD] / N < 0.01 < sums.locks[1, -1, WRONG_FOLD] / N
-
-
-def test_hypotheses_of_one_fold_are_the_nearest():
-    """A forecast far narrower than the span leaves one fold: the list is the filter of the nearest."""
-    pair = [SPECTRUM, SPECTRUM | {"name": "many", "hypotheses": 8}]
-    _, sums = summed(made(pair, scans=4, prior={"sigma_velocity_mps": 10.0}), 512)
-    np.testing.assert_allclose(sums.error[1], sums.error[0], rtol=1e-9)
-    np.testing.assert_array_equal(sums.folds[1, :, NUMBER], 512)
-    np.testing.assert_array_equal(sums.locks[1], sums.locks[0])

@@ -133,33 +133,6 @@ def test_each_realisation_is_that_of_a_textbook_filter(changes):
             np.testing.assert_allclose(sums["cross"][f], crossed, rtol=1e-12)
 
 
-def test_with_every_plot_both_kernels_agree():
-    """What the paper's kernel computes, from the same noise."""
-    plain = prepared()
-    other = missed.Problem(
-        keys=np.stack([plain.problem.key] * 3),
-        truth=plain.problem.truth,
-        sigma=SIGMA,
-        bias=np.zeros(2),
-        sigma_bias=np.zeros(2),
-        sigma_flight=np.zeros(6),
-        flight=np.zeros((0, 9)),
-        detection=1.0,
-        dt=DT,
-        observes=plain.problem.observes,
-        start=plain.problem.start,
-        Q=np.stack([process_noise("random_jerk", VARIANCE, DT)[np.triu_indices(3)]] * 2),
-        baseline=0,
-    )
-    sums = missed.Sums(**{name: np.zeros(shape) for name, shape in missed.shapes(2, 9).items()})
-    missed.simulate_block(other, 0, 1500, sums)
-    whole = sums_of(plain, 1500)
-    for name in ("error", "paired", "cross"):
-        size = np.abs(whole[name]).max(axis=(0, 1))
-        np.testing.assert_allclose(getattr(sums, name) / size, whole[name] / size, rtol=1e-9, atol=1e-9)
-    assert (sums.estimates[plain.axes.available] == 1500).all()
-
-
 # ---- exact values ---------------------------------------------------------------------------------------------------
 
 
@@ -457,15 +430,6 @@ def test_the_mean_over_drawn_flights_has_settled(monkeypatch):
             plans.append(prepared(target=target))
         one, other = (plan.axes.exact_sigma for plan in plans)
         np.testing.assert_allclose(one, other, rtol=1e-6)
-
-
-def test_with_few_misses_drawn_flights_are_as_without():
-    """The mean over patterns tends to the recursion of full detection."""
-    whole = prepared(target=TURN | DRAWN).axes
-    missing = prepared(target=TURN | DRAWN, radar={"detection_probability": 1 - 1e-9}).axes
-    there = whole.available
-    np.testing.assert_allclose(missing.exact_sigma[there], whole.exact_sigma[there], rtol=1e-5)
-    np.testing.assert_allclose(missing.exact_bias[there], whole.exact_bias[there], rtol=1e-4, atol=1e-3)
 
 
 def test_the_search_for_a_variance_sees_the_exact_errors():

@@ -133,45 +133,6 @@ def test_rates_within_the_binomial_bounds_at_a_hundred_thousand():
     compared(plan, sums, ALL)
 
 
-# ---- filters that respond -----------------------------------------------------------------------------------------
-def test_without_an_alarm_the_adaptive_filter_is_growing_memory():
-    detector = {"plots": 5, "threshold_k": 1e9}
-    filters = [PLAIN[0], {"name": "deaf", "kind": "adaptive", "detector": detector}]
-    filters += [{"name": "deaf 2", "kind": "adaptive", "response": "shorten_memory", "degree": 2, "detector": detector}]
-    filters += [{"name": "growing 2", "kind": "growing_memory", "degree": 2}]
-    _, sums = simulated(config(filters=filters, sensor={"detection_probability": 0.9}), 600)
-    for one, other in ((0, 1), (3, 2)):
-        assert sums["error"][one] == pytest.approx(sums["error"][other], rel=1e-7, abs=1e-9)
-    assert not sums["modes"][..., :2].any()
-
-
-def test_always_alarmed_a_filter_is_its_window():
-    """A threshold below all: degree 2 from the first test on; held short, a window of as many plots."""
-    detector = {"plots": 6, "threshold_k": 1e-12}
-    filters = [
-        {"name": "window", "kind": "window", "plots": 6},
-        {"name": "growing 2", "kind": "growing_memory", "degree": 2},
-    ]
-    filters += [{"name": "short", "kind": "adaptive", "response": "shorten_memory", "detector": detector}]
-    filters += [{"name": "raised", "kind": "adaptive", "detector": detector}]
-    _, sums = simulated(config(filters=filters), 600)
-    components = [0, 1, 3, 4]
-    for one, other in ((0, 2), (1, 3)):
-        expected = sums["error"][one][5:, components]
-        assert sums["error"][other][5:, components] == pytest.approx(expected, rel=1e-6, abs=1e-8)
-
-
-def test_an_imm_of_two_like_models_is_the_kalman_filter():
-    filters = [{"name": "kalman", "kind": "kalman", "manoeuvre_variance": 0.04}]
-    filters += [
-        {"name": "imm", "kind": "imm", "manoeuvre_variances": [0.04, 0.04 + 1e-15], "stay_probabilities": [0.9, 0.7]}
-    ]
-    _, sums = simulated(config(filters=filters, sensor={"detection_probability": 0.8}), 600)
-    assert sums["error"][1] == pytest.approx(sums["error"][0], rel=1e-7, abs=1e-9)
-    # The plots then tell nothing of the model: it stays at its long-run probability.
-    assert sums["modes"][1, :, :, 0] / 600 == pytest.approx(0.25, abs=1e-6)
-
-
 # ---- uses ---------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("frame", ["polar", "cartesian_unbiased"])
 def test_spread_of_uses_is_that_of_the_errors(frame):
