@@ -36,7 +36,7 @@ ROOMS = {
     "studies.interface": (*CASE, *DATA, "report"),
     "studies.folder": (*CASE, *DATA, "report.claims", "report.drawing", "studies.interface"),
     "studies.registry": ("errors", "config", "studies.interface"),
-    "studies.identity": ("errors", "config", "kernels", "studies.interface", "studies.registry"),
+    "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry"),
     "recorded": ("errors", "config", "language", "engine", "kernels", "physics", "report", "studies"),
     "app": ("errors", "config", "language", "engine", "kernels", "physics", "report", "studies", "recorded"),
     "cli": (
@@ -338,7 +338,7 @@ PARTS = {
     for node in kind.body
     if isinstance(node, ast.FunctionDef | ast.AnnAssign)
 } - {"name"}
-READ_SOURCES = {"kernels.sources", "kernels.trees"}  # identity and cache: which sources there are, not what they can do
+READ_SOURCES = {"studies.identity"}  # which sources there are, not what they can do
 LOAD_BY_NAME = {"__init__", "studies.registry", "studies.folder", "studies.sonar.part"}
 
 

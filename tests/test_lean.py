@@ -62,8 +62,7 @@ def test_no_kernel_is_imported_above_the_functions_that_run_it(module):
     assert not [name for name in loaded_with(module) - NO_CODE if name in HEAVY or "kernels." in name]
 
 
-# Of the identity: they read sources; and formulas, which are plain Python until a kernel calls them.
-NO_CODE = {"kernels.sources", "kernels.trees", "kernels.formula", "kernels.algebra"}
+NO_CODE = {"kernels.formula", "kernels.algebra"}  # plain Python until a kernel calls them
 
 
 def test_a_planted_import_is_seen():

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.audit import removable
+from radarsim.engine.blocks import QUESTION
 from radarsim.engine.store import is_directory
 from radarsim.errors import ConfigError, StoreError
 from radarsim.studies.identity import identity
@@ -29,6 +30,8 @@ def clean(
 ) -> Cleaned:
     """Drop the stored blocks of all experiments, or of some, below out/.blocks; with dry_run only say how much.
 
+    Of a case those that other sources made go too.
+
     Links are not followed and files that no store makes are left, and with them their folder. Raises ConfigError if
     `out` does not exist or its .blocks is a link, StoreError if a file cannot be removed.
     """
@@ -39,10 +42,10 @@ def clean(
         raise ConfigError(f"{blocks}: is a link; clean the directory that it points to")
     wanted = None
     if experiments is not None:
-        wanted = {identity(case) for experiment in experiments for case in experiment.cases}
+        wanted = {identity(case)[:QUESTION] for experiment in experiments for case in experiment.cases}
     try:
         folders = [path for path in sorted(blocks.iterdir()) if _is_identity(path)] if is_directory(blocks) else []
-        folders = [path for path in folders if wanted is None or path.name in wanted]
+        folders = [path for path in folders if wanted is None or path.name[:QUESTION] in wanted]
         files = [one for folder in folders for one in removable(folder)]
         if not dry_run:
             for path, _ in files:

@@ -20,10 +20,9 @@ from radarsim.engine.audit import Audit, audited
 from radarsim.engine.blocks import Node, Partial, simulated
 from radarsim.engine.machine import available_cores, described, instruction_set, platform_name
 from radarsim.engine.moments import Sums
-from radarsim.engine.store import is_directory
+from radarsim.engine.store import folder_of, is_directory
 from radarsim.errors import ConfigError, StoreError
 from radarsim.report import files
-from radarsim.studies.identity import identity
 
 LOOKS, LOOK_S = 4, 0.25
 ROUNDINGS = 10  # a power p ≤ 4 of an error, and heavy tails in it
@@ -170,8 +169,8 @@ def _outputs(found: Inspection, outputs: dict[str, str]) -> None:
 
 
 def _recomputed(found: Inspection, audit: Audit, case: Case | None, most: int) -> bool:
-    """Compute some pieces again and compare; False if this program would compute another identity."""
-    if case is None or identity(case) != audit.path.name:
+    """Compute some pieces again and compare; False if this program's sums are kept elsewhere."""
+    if case is None or folder_of(audit.path.parent, CaseWork(case)) != audit.path:
         return False
     work, here = CaseWork(case), platform_name()
     elsewhere: set[str] = set()

@@ -1,18 +1,15 @@
-"""What an earlier run.json says of the cases that it reports, as today's program reads it."""
+"""What an earlier run.json says of the cases that it reports, as today's program reads it; what other sources made."""
 
-import json
 from collections.abc import Mapping
-from pathlib import Path
 
 from radarsim.app.configs import load
-from radarsim.config.experiment import Case, Experiment
-from radarsim.config.identity import canonical
+from radarsim.config.experiment import Case
+from radarsim.engine import store
 from radarsim.errors import RadarsimError
-from radarsim.report import files
-from radarsim.studies.identity import identity
 
 LABELS = ("case", "swept")  # of a resolved case, beside its keys
 NAMED = 3  # cases in a line
+SURE = 3  # a change that shows in one of m / 3 realisations is missed by m of them with a probability of e⁻³ = 5 %
 
 
 def recorded_case(record: Mapping, name: str) -> Case | None:
@@ -27,32 +24,33 @@ def recorded_case(record: Mapping, name: str) -> Case | None:
     return None
 
 
-def made_by_other_code(experiment: Experiment, out: Path) -> list[str]:
-    """A line where the last run of this config under `out` stored blocks of cases that are equal but for the code.
+def of_other_sources(names: Mapping[str, str]) -> list[str]:
+    """A line on the blocks that other sources made and that are kept, one on those that are not; once in a process.
 
-    Their identity differs, so they are not reused; without this line nobody would know why all is computed again.
+    names are those of cases, by identity.
     """
-    try:
-        record = json.loads(files.read(out / experiment.stem / "run.json"))
-        names = [case.name for case in experiment.cases if _is_other(record, case, out)]
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
-        return []  # no record, or one of another program
-    if not names:
-        return []
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return [
-        f"stored blocks of {', '.join(names[:NAMED])}{more} were made by other code and are not reused; "
-        f"`radarsim clean --out {out}` removes all stored blocks"
-    ]
+    found = [one for one in store.settled if one.identity in names]
+    store.settled[:] = [one for one in store.settled if one.identity not in names]
+    lines = []
+    if kept := [one for one in found if one.same]:
+        again, stored = sum(one.again for one in kept), sum(one.stored for one in kept)
+        line = (
+            f"stored blocks of {_listed(kept, names)} were made by other sources; {again:,} of {stored:,} realisations "
+            "were computed again and have the same bytes: all are kept"
+        )
+        if unseen := [one.again for one in kept if one.again < one.stored]:
+            line += f". A change in one realisation of {min(unseen) // SURE:,} would have shown, rarer ones may not"
+        lines.append(line)
+    same = {one.identity for one in kept}
+    if begun := [one for one in found if one.identity not in same]:
+        lines.append(
+            f"stored blocks of {_listed(begun, names)} were made by other sources that give other bytes, and are not "
+            "used; `radarsim clean` removes them"
+        )
+    return lines
 
 
-def _is_other(record: Mapping, case: Case, out: Path) -> bool:
-    before = record["identities"].get(case.name)
-    if not isinstance(before, str) or before == identity(case) or not _has_blocks(out / ".blocks" / Path(before).name):
-        return False
-    held = recorded_case(record, case.name)
-    return held is not None and (canonical(held.spec), held.seed) == (canonical(case.spec), case.seed)
-
-
-def _has_blocks(path: Path) -> bool:
-    return any(path.glob("*.sums"))
+def _listed(found: list[store.Settled], names: Mapping[str, str]) -> str:
+    cases = list(dict.fromkeys(names[one.identity] for one in found))
+    more = f" and {len(cases) - NAMED} more" if len(cases) > NAMED else ""
+    return f"{', '.join(cases[:NAMED])}{more}"

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.app import arguments, simulation, stored_claims
 from radarsim.app.configs import load, shipped
-from radarsim.app.records import made_by_other_code
+from radarsim.app.records import of_other_sources
 from radarsim.app.repeat import RESULTS, command, repeated
 from radarsim.app.result import Result
 from radarsim.app.simulation import Progress, RunOptions, SimulatedCases
@@ -131,7 +131,6 @@ def run(
         from radarsim.app.writing import seconds as writing_s
 
         limit = limit.reserving(kept := writing_s(experiment, figures, width_mm))
-    renewed = made_by_other_code(experiment, Path(out)) if out is not None else []
     with cluster(workers, scheduler) if executor is None else nullcontext(executor) as pool:
         threads = pool.workers if pool else int(threads or available_cores())
         options = RunOptions(out, threads, stopping.Either(stop, limit), pool)
@@ -144,7 +143,6 @@ def run(
     if not simulated.cases:
         raise TargetUnmet(f"{experiment.stem}: {simulated.stopped}: nothing was done by then")
     facts = facts_of(simulated, threads, time.perf_counter() - started)
-    facts["warnings"] += renewed
     if kept is not None:
         facts["seconds_kept_for_writing"] = kept
     if decide:
@@ -306,8 +304,12 @@ def facts_of(simulated: SimulatedCases, threads: int, seconds: float) -> dict[st
         "kernel_seconds": sum(c.kernel_seconds for c in collected),
         "realisations_computed": sum(c.computed for c in collected),
         "realisations_from_store": sum(c.from_store for c in collected),
-        "warnings": [*dict.fromkeys(warning for c in collected for warning in c.warnings), *cache_troubles()],
-        "identities": {case.name: work.identity for case, work, _ in simulated.cases},
+        "warnings": [
+            *dict.fromkeys(warning for c in collected for warning in c.warnings),
+            *of_other_sources({work.identity: case.name for case, work, _ in simulated.cases}),
+            *cache_troubles(),
+        ],
+        "identities": {case.name: c.kept_as or work.identity for case, work, c in simulated.cases},
     }
     if measured := seconds_per_update(work for _, work, _ in simulated.cases):
         facts["seconds_per_update"] = measured

@@ -15,7 +15,8 @@ from radarsim.engine.moments import Sums
 from radarsim.engine.store import SUFFIX, Damage, check_platforms, content, decoded, mixture, piece_named
 from radarsim.errors import StoreError
 
-LEFT = re.compile(r"\.[LPT][\d-]+\.sums\.[0-9a-f]+\.tmp")  # by a run that was killed while it wrote
+BESIDE = re.compile(r"[0-9a-f]+(-[0-9a-f]+)?\.(same|other)")  # of other sources
+LEFT = re.compile(r"\.[\w-]+\.(sums|same|other)\.[0-9a-f]+\.tmp")  # by a run that was killed while it wrote
 ACROSS = 1e-9  # of sums made on several platforms
 
 
@@ -159,7 +160,7 @@ def removable(path: Path) -> list[tuple[Path, int]]:
     """The files of one identity that a store makes, and their bytes; nothing that is a link or somebody else's."""
     found = []
     for name in _names(path):
-        if piece_named(name.removesuffix(".damaged")) is not None or LEFT.fullmatch(name):
+        if piece_named(name.removesuffix(".damaged")) is not None or BESIDE.fullmatch(name) or LEFT.fullmatch(name):
             status = (path / name).lstat()
             if stat.S_ISREG(status.st_mode):
                 found.append((path / name, status.st_size))

@@ -16,6 +16,8 @@ import numpy as np
 from radarsim.engine.moments import Sums
 from radarsim.errors import NonFiniteError
 
+QUESTION = 32  # digits of an identity that tell what is asked; those after them tell which sources answer it
+
 
 class Work(Protocol):
     """What is simulated. `identity` (hex digits) names all that changes a number, `block` is how many realisations make

@@ -23,7 +23,8 @@ class Collected(Sums):
     """The sums of realisations 0 … count-1, and how they were obtained.
 
     count is what was asked for unless `stopped` says why it is less. from_store and computed are realisations: those
-    read, and those simulated in this call. kernel_seconds is the time inside tasks, summed over the workers.
+    read, and those simulated in this call. kernel_seconds is the time inside tasks, summed over the workers; kept_as
+    the identity under which the store has them, None without a store.
     """
 
     asked: int
@@ -33,6 +34,7 @@ class Collected(Sums):
     kernel_seconds: float
     stopped: str | None
     warnings: tuple[str, ...]
+    kept_as: str | None
 
 
 @dataclass(frozen=True)
@@ -151,6 +153,7 @@ class Dispatch:
         self.computed += sums.count
         if self._keeper is not None:
             self._keeper.store.platforms.add(outcome.platform)
+            self._keeper.store.mark(outcome.piece, sums)
         if isinstance(outcome.piece, Partial):
             self.partial = sums
         else:
@@ -228,6 +231,7 @@ class Run(Dispatch):
             kernel_seconds=self.kernel_seconds,
             stopped=stopped if sums.count < self.asked else None,
             warnings=self._warnings(),
+            kept_as=None if self._keeper is None else self._keeper.store.path.name,
         )
 
 

@@ -1,4 +1,4 @@
-"""What of a run or a share is stored, by the names of files alone: nothing is read, and no kernel is needed."""
+"""What of a run or a share is stored, by the names of files alone; only what other sources made is computed again."""
 
 import os
 from collections.abc import Collection

@@ -12,6 +12,13 @@ was once reported can be read again after a larger run has merged them.
 A file is one line of magic, one line of JSON, the sums as little-endian float64 and the SHA-256 of all that. It is
 written under a temporary name, synchronised and renamed: it is there whole or not at all. Equal names hold equal sums,
 so that several runs may share a store; a file that another run merged away is looked for in its parent.
+
+An identity is 32 digits of the question (what is asked) and 32 of the sources that answer it. Where only the sources
+differ, tasks whose sums were marked in the headers are computed again: if all have the marked bytes, the folder is
+taken over. What was found lies there, so that nobody looks a second time:
+
+    <sources>.same              these sources give the bytes of this folder
+    <sources>-<platform>.other  on this platform they do not
 """
 
 import hashlib
@@ -23,12 +30,13 @@ import time
 import uuid
 from collections.abc import Collection, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, Work, maximal
-from radarsim.engine.machine import versions
+from radarsim.engine.blocks import QUESTION, Forest, Node, Partial, Piece, Total, Work, maximal, simulated
+from radarsim.engine.machine import platform_name, versions
 from radarsim.engine.moments import Sums
 from radarsim.errors import StoreError
 
@@ -37,6 +45,8 @@ SUFFIX = ".sums"
 DIGEST = 32
 STALE_S = 600
 LOOKS = 4
+MOST_MARKS = 128  # in a header
+PROOF_S = 2.0  # of CPU time, at least one task: what is computed again of a folder of other sources
 
 
 class Damage(Exception):
@@ -57,15 +67,16 @@ def piece_named(name: str) -> Piece | None:
 class Store:
     """The pieces of one work under a results directory. Makes no directory before the first write.
 
-    `warnings` gathers what was found damaged; `platforms` the platforms of all sums read or computed so far.
+    `warnings` gathers what was found damaged; `platforms` and `marks` those of all sums read or computed so far.
     """
 
     def __init__(self, directory: str | os.PathLike, work: Work):
         if not re.fullmatch(r"[0-9a-f]{2,128}", work.identity):
             raise ValueError(f"identity: expected hexadecimal digits, got {work.identity!r}")
-        self.path = Path(directory) / ".blocks" / work.identity
+        self.path = folder_of(Path(directory) / ".blocks", work)
         self.warnings: list[str] = []
         self.platforms: set[str] = set()
+        self.marks: dict[Node | Partial, str] = {}
         self._damaged: set[Piece] = set()
         self._work = work
 
@@ -99,6 +110,7 @@ class Store:
                 os.replace(path, path.with_name(path.name + ".damaged"))
             return None
         self.platforms.update(header["platforms"])
+        self.marks |= marks_in(header)
         self._damaged.discard(piece)
         return Sums(header["count"], values)
 
@@ -117,7 +129,7 @@ class Store:
     def _described(self, piece: Piece, first: int, count: int) -> dict:
         work = self._work
         return {
-            "identity": work.identity,
+            "identity": self.path.name,
             "piece": piece.name,
             "first": first,
             "count": count,
@@ -145,10 +157,15 @@ class Store:
 
     def _write_all(self, pieces: Mapping[Piece, Sums], last: bool) -> None:
         try:
+            spans = [(hashed, one, *one.realisations(self._work.block)) for one, hashed in dict(self.marks).items()]
+            spans.sort(key=lambda mark: mark[0])  # the least hashes are a draw that merging does not disturb
             for piece, sums in pieces.items():
                 described = self._described(piece, *piece.realisations(self._work.block))
-                header = described | {"platforms": sorted(self.platforms), "versions": versions()}
-                self._write_file(self.path / (piece.name + SUFFIX), encoded(header, sums.values))
+                first, count = described["first"], described["count"]
+                inside = [one for one in spans if first <= one[2] and one[2] + one[3] <= first + count]
+                marks = {one.name: hashed for hashed, one, *_ in inside[:MOST_MARKS]}
+                header = described | {"platforms": sorted(self.platforms), "versions": versions(), "marks": marks}
+                put(self.path / (piece.name + SUFFIX), encoded(header, sums.values))
             self._synchronise()
         except OSError as error:
             if isinstance(error, FileNotFoundError) and not last:
@@ -156,20 +173,11 @@ class Store:
             where = error.filename or self.path
             raise StoreError(f"{where}: cannot be written: {error.strerror}") from error
 
-    def _write_file(self, path: Path, content: bytes) -> None:
-        temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
-        try:
-            with open(temporary, "xb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, path)
-        except BaseException as error:
-            with suppress(OSError):
-                temporary.unlink()
-            if isinstance(error, OSError):
-                error.filename, error.filename2 = str(path), None
-            raise
+    def mark(self, piece: Node | Partial, sums: Sums) -> None:
+        """Remember the sums of a task by their hash; of many tasks those of the least hashes."""
+        self.marks[piece] = mark_of(sums)
+        if len(self.marks) > 4 * MOST_MARKS:
+            self.marks = dict(sorted(self.marks.items(), key=lambda mark: mark[1])[: 2 * MOST_MARKS])
 
     def _synchronise(self) -> None:
         """Make the renames durable."""
@@ -210,6 +218,106 @@ class Store:
             if not lost:
                 break
         return forest
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What came of blocks that other sources made: whether their bytes are the same, and how many of the stored
+    realisations were computed again to tell."""
+
+    identity: str
+    same: bool
+    again: int
+    stored: int
+
+
+settled: list[Settled] = []  # found by this process and not yet said to the user
+_unkept: dict[Path, bool] = {}  # what could not be written, by its file
+
+
+def folder_of(blocks: Path, work: Work) -> Path:
+    """The folder with the sums of a work: its own, or one of other sources that give the same bytes."""
+    own, sources = blocks / work.identity, work.identity[QUESTION:]
+    try:
+        if not sources or own.is_dir():
+            return own
+        others = [path for path in blocks.glob(f"{work.identity[:QUESTION]}*") if len(path.name) == len(own.name)]
+        others.sort(key=lambda path: path.stat().st_mtime, reverse=True)
+        known = [path for path in others if (path / f"{sources}.same").exists()]
+    except OSError:  # said by whoever reads or writes there
+        return own
+    return next((path for path in known or others if known or _gives_the_same(path, work)), own)
+
+
+def _gives_the_same(folder: Path, work: Work) -> bool:
+    """Whether a work has the marks of a folder, as far as PROOF_S reaches; kept in the folder."""
+    sources, here = work.identity[QUESTION:], hashlib.sha256(platform_name().encode()).hexdigest()[:8]
+    files = folder / f"{sources}-{here}.other", folder / f"{sources}.same"
+    if files[0].exists() or _unkept.get(files[0]) is not None:
+        return _unkept.get(files[0], False)
+    marks, stored = _marked(folder, work)
+    again, seconds, same = 0, 0.0, bool(marks)
+    for piece in sorted(marks, key=marks.__getitem__):
+        if again == 0:
+            work.simulate(piece.realisations(work.block)[0], 1)  # compiles
+        elif seconds > PROOF_S:
+            break
+        started = time.thread_time()
+        sums = simulated(work, piece)
+        seconds += time.thread_time() - started
+        again += sums.count
+        if mark_of(sums) != marks[piece]:
+            same = False
+            break
+    settled.append(Settled(work.identity, same, again, stored))
+    try:
+        put(files[same], json.dumps({"computed_again": again, "stored": stored}).encode())
+    except OSError:  # a store that may only be read
+        _unkept[files[0]] = same
+    return same
+
+
+def _marked(folder: Path, work: Work) -> tuple[dict[Node | Partial, str], int]:
+    """The marks of a folder, and how many realisations it holds; nothing where its blocks are of another length."""
+    marks: dict[Node | Partial, str] = {}
+    pieces = [piece for path in folder.iterdir() if (piece := piece_named(path.name)) is not None]
+    stored = sum(work.block << one.level for one in maximal([one for one in pieces if isinstance(one, Node)], 1 << 62))
+    for piece in pieces:
+        with suppress(OSError, Damage):
+            header, values = decoded(content(folder / (piece.name + SUFFIX)))
+            if (header.get("block"), values.size) == (work.block, work.size):
+                marks |= marks_in(header)
+                stored = max(stored, piece.realisations(work.block)[1])
+    return marks, stored
+
+
+def mark_of(sums: Sums) -> str:
+    """The hash of the sums of a task, 32 hexadecimal digits."""
+    return hashlib.sha256(sums.values.tobytes()).hexdigest()[:32]
+
+
+def marks_in(header: Mapping) -> dict[Node | Partial, str]:
+    """The marks of a header, by task; those of earlier versions have none."""
+    held = header.get("marks")
+    named = {piece_named(name + SUFFIX): hashed for name, hashed in held.items()} if isinstance(held, dict) else {}
+    return {piece: str(hashed) for piece, hashed in named.items() if isinstance(piece, Node | Partial)}
+
+
+def put(path: Path, content: bytes) -> None:
+    """Write a file, whole or not at all, and durable but for its name; OSError with the file's name."""
+    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
+    try:
+        with open(temporary, "xb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except BaseException as error:
+        with suppress(OSError):
+            temporary.unlink()
+        if isinstance(error, OSError):
+            error.filename, error.filename2 = str(path), None
+        raise
 
 
 def check_platforms(header: Mapping) -> None:

@@ -1,8 +1,8 @@
-"""Where machine code is kept: a directory for each set of sources, so that no edit goes unnoticed.
+"""Where machine code is kept: a directory for all that a kernel is made from, so that no edit goes unnoticed.
 
 Numba's cache on disk looks at the file of the compiled function alone: an edit of a function that it calls, in another
-file, goes unnoticed and gives silently wrong results. So the directory of a kernel is named after a hash of the sources
-that its module rests on, wherever they lie. An edit in one study's kernels leaves those of the others as they are.
+file, goes unnoticed and gives silently wrong results. So the directory of a kernel is named after a hash of the modules
+that its globals come from. An edit in one study's kernels leaves those of the others as they are.
 
 Numba keeps an index beside its entries and unpickles both as they are: an empty or altered file ends the run with
 EOFError, UnpicklingError or a crash in the loaded code, and a full disk with OSError. Here an entry is a file of its
@@ -19,21 +19,21 @@ import os
 import pickle
 import re
 import stat
+import sys
 import tempfile
 import uuid
 from collections.abc import Callable
 from pathlib import Path
+from types import FunctionType, ModuleType
 
 import llvmlite
 import numba
+import numpy as np
 from numba.core.caching import Cache
 from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
-from radarsim.kernels import sources
-
-SOURCES = "sources.json"  # what is known of source files; see `sources.remember`
 SUFFIX = ".kernel"
 DIGEST = 32
 
@@ -44,8 +44,8 @@ def kept(function: Callable) -> Callable:
     """A compiled function whose machine code is kept on disk; plain Python, and what has no file, stay as they are."""
     if hasattr(function, "targetctx"):
         function.compile = without_collection(function.compile)
-        if (path := directory(function.__module__)) is not None:
-            function._cache = KernelCache(function.py_func, path)
+        if file_hash(function.__module__):  # else nobody could notice an edit
+            function._cache = KernelCache(function.py_func)
     return function
 
 
@@ -68,12 +68,17 @@ def without_collection(compile_kernel: Callable) -> Callable:
 class KernelCache(Cache):
     """The entries of one kernel: a file for each signature and processor."""
 
-    def __init__(self, function: Callable, path: Path):
+    def __init__(self, function: Callable):
         self._py_func = function
-        self._path = path
         name = re.sub(r"[^\w.]", "", f"{function.__module__}.{function.__qualname__}")[-80:]
         self._name = f"{name}-{function.__code__.co_firstlineno}"
         self.enable()
+
+    @functools.cached_property
+    def _path(self) -> Path:
+        """Known at the first call: by then all that the kernel calls is imported."""
+        text = f"{numba.__version__} {llvmlite.__version__} {rests_on(self._py_func)}"
+        return ROOT / f"kernels-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
 
     @property
     def cache_path(self) -> str:
@@ -130,7 +135,7 @@ class KernelCache(Cache):
             _note("write", f"{self._path}: compiled kernels cannot be kept: {error.strerror}; each run compiles again")
 
     def _key(self, sig, codegen) -> tuple:
-        return self._path.name, self._name, *self._index_key(sig, codegen)
+        return self._path.name, self._name, sig, codegen.magic_tuple()
 
     def _entry(self, key: tuple) -> Path:
         return self._path / f"{self._name}-{hashlib.sha256(repr(key).encode()).hexdigest()[:16]}{SUFFIX}"
@@ -140,22 +145,52 @@ def _note(kind: str, line: str) -> None:
     troubles.setdefault(kind, f"kernel cache: {line}")
 
 
-@functools.cache
-def directory(module: str) -> Path | None:
-    """Where the kernels of a module are kept, by all that it compiles: itself and what it imports of kernels.
+def rests_on(function: Callable) -> str:
+    """SHA-256 of all that a kernel is compiled from: the files of the modules of ours that its globals come from,
+    directly or not, numbers in these, and what a function made by another takes from it."""
+    found: dict[str, str] = {}
+    waiting: list[object] = [function]
+    tops = {"radarsim", function.__module__.partition(".")[0]}
+    while waiting:
+        one = waiting.pop()
+        one = getattr(one, "__wrapped__", one)  # compiled, or a formula
+        if isinstance(one, tuple | list):
+            waiting += one
+        if isinstance(one, FunctionType) and one.__closure__:
+            held = [cell.cell_contents for cell in one.__closure__]
+            waiting += held if (text := f"{one.__module__}.{one.__qualname__} {described(held)}") not in found else []
+            found[text] = ""
+        name = one.__name__ if isinstance(one, ModuleType) else getattr(one, "__module__", None)
+        if not isinstance(name, str) or name in found or name.partition(".")[0] not in tops:
+            continue
+        found[name] = file_hash(name)
+        module = sys.modules.get(name)
+        if module is not None and not hasattr(module, "__path__"):  # a package's names depend on what is imported
+            values = [(key, value) for key, value in vars(module).items() if not key.startswith("__")]
+            waiting += (value for _, value in values)
+            found[name] += described(values)
+    return hashlib.sha256(repr(sorted(found.items())).encode()).hexdigest()
 
-    None for a module without a file: nobody could notice an edit.
-    """
-    package = module.partition(".")[0]
-    try:
-        found = sources.closure(
-            [module], lambda name: name.split(".")[0] in (package, "radarsim") and name not in sources.APART
-        )
-    except LookupError:
-        return None
-    sources.remember(ROOT / SOURCES)
-    text = f"{numba.__version__} {llvmlite.__version__} {found.digest()}"
-    return ROOT / f"kernels-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+
+def described(value: object) -> str:
+    """Numbers and texts of a value as they are, functions by their names; of anything else nothing."""
+    if isinstance(value, list | tuple):
+        return f"({', '.join(map(described, value))})"
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
+    value = getattr(value, "__wrapped__", value)
+    if isinstance(value, FunctionType):
+        return f"{value.__module__}.{value.__qualname__}"
+    return repr(value) if isinstance(value, int | float | complex | str | bytes) else ""
+
+
+@functools.cache
+def file_hash(module: str) -> str:
+    """SHA-256 of a module's file; empty where it has none."""
+    spec = getattr(sys.modules.get(module), "__spec__", None)
+    if spec is None or not spec.has_location or not hasattr(spec.loader, "get_data"):
+        return ""
+    return hashlib.sha256(spec.loader.get_data(spec.origin)).hexdigest()
 
 
 def cache_root() -> Path:
@@ -195,4 +230,3 @@ def temporary_root() -> Path:
 
 
 ROOT = cache_root()
-sources.remembered(ROOT / SOURCES)

@@ -74,7 +74,7 @@ class SelfContained(JITCodeLibrary):
 
 
 # Where Python lands when it calls a function without an entry: it raises TypeError instead of crashing.
-NO_ENTRY = ctypes.cast(ctypes.pythonapi.PyObject_Call, ctypes.c_void_p).value
+NO_ENTRY = ctypes.cast(ctypes.pythonapi.PyObject_Call, ctypes.c_void_p)
 
 
 def holds_arrays(kind: types.Type) -> bool:
@@ -138,7 +138,9 @@ class WideLowering(NativeLowering):
         # Numba knows a compiled function by an object that Python can call.
         made = state["cr"]
         name = made.fndesc.qualname.split(".")[-1]
-        known = _dynfunc.make_function(made.fndesc.lookup_module(), name, name, NO_ENTRY, made.env, (state.library,))
+        known = _dynfunc.make_function(
+            made.fndesc.lookup_module(), name, name, NO_ENTRY.value, made.env, (state.library,)
+        )
         state.targetctx.insert_user_function(known, made.fndesc, [state.library])
         state["cr"] = made._replace(cfunc=known)
         return mutated

@@ -84,6 +84,7 @@ class StudyFolder(Study):
     filters: Mapping[str, str]
     paper: Paper | None = None
     offers: tuple[OptionalPart, ...] = ()
+    model: int = 1
     exact_errors: bool = True
     draws_sweeps: bool = False
     rate_tables: tuple[str, ...] | None = None
@@ -99,9 +100,6 @@ class StudyFolder(Study):
 
     def keys(self) -> "type[Keys]":
         return self.file("config").Keys
-
-    def computes_in(self, spec: Any) -> tuple[str, ...]:
-        return f"{self.package}.study", f"{self.package}.config"
 
     def rates(self, spec: Any) -> tuple[str, ...] | None:
         return self.rate_tables

@@ -1,105 +1,70 @@
 """What a case's numbers depend on, as one hash: the name of its stored blocks.
 
-In it: the resolved case with every default written out, the seed, the layout of random numbers, and the code that the
-numbers are computed with: the study's own `prepare`, `simulate` and `keys`, and what is found by following imports, at
-any depth and in any form, from these or from the modules that the study names (`Study.computes_in`). Whatever is
-imported on the way counts, of radarsim, of the study's package and of any other that is no installed one; of an
-installed package its version, but for those that every block's header records.
+Its first half is the question: the resolved case with every default written out, the seed, the layout of random numbers
+and the study's `model`. Realisations, limits, threads, output, file and display names are not in it.
 
-Not in it: realisations, limits, threads, output, comments, docstrings, descriptions of keys, file and display names;
-other studies, the registry, tables, figures, words, claims, and the tracking of recorded plots.
+Its second half is a hash of files, which an edit of any kind changes, of words too: of radarsim's own studies those of
+the study and of the rooms that it stands on, but for what shows numbers; of a study from another package all files of
+that, and the versions of what is installed. It is a quick answer alone. Where it differs, stored blocks are computed
+again in part and taken over if their bytes are the same; see radarsim.engine.store.
 """
 
-import sys
+import hashlib
+import os
+from collections.abc import Iterator
 from functools import cache
-from importlib.metadata import PackageNotFoundError, packages_distributions, version
+from importlib.metadata import distributions
+from importlib.util import find_spec
+from pathlib import Path
 
 from radarsim.config.experiment import Case
 from radarsim.config.identity import canonical, digest, world
-from radarsim.errors import ConfigError
-from radarsim.kernels import sources
-from radarsim.studies.interface import Study
-from radarsim.studies.registry import study
+from radarsim.engine.blocks import QUESTION
+from radarsim.studies.registry import SHIPPED, module, study
 
-# Of radarsim: what keeps machine code, carries a case, labels its sums or declares a study changes no number.
-APART = sources.APART | {
-    "radarsim",
-    "radarsim.errors",
-    "radarsim.config.experiment",
-    "radarsim.config.faults",
-    "radarsim.engine.results",
-    "radarsim.studies.identity",
-    "radarsim.studies.interface",
-    "radarsim.studies.registry",
-}
-# Their versions are in the header of every stored block, see radarsim.engine.machine.
-RECORDED = {"numpy", "scipy", "numba", "llvmlite", "pydantic", "pydantic_core"}
-INSTALLED = {"site-packages", "dist-packages"}
-COMPUTES = {"prepare", "simulate", "keys"}  # of a study's own class; the other parts of the interface show
-SHOWS = frozenset({*vars(Study), *Study.__annotations__} - COMPUTES)
+PACKAGE = Path(__file__).parents[1]
+ROOMS = ("bursts", "config", "kernels", "physics", "engine/moments.py")
+SHOW = {"claims", "figures", "map", "measures", "readings", "tables", "words"}  # files of a study, by their stem
 
 
 def identity(case: Case) -> str:
-    """What a case's numbers depend on, as SHA-256 in hexadecimal."""
+    """What a case's numbers depend on, 64 hexadecimal digits."""
     from radarsim.kernels import random  # the compiler, which takes half a second, is not loaded for `radarsim list`
 
-    shared: dict[str, object] = {} if case.noise_of is None else {"noise_of": world(case.noise_of)}
-    return digest(
-        shared
-        | {
-            "study": case.study,
-            "spec": canonical(case.spec),
-            "seed": case.seed,
-            "random_layout": random.LAYOUT,
-            "sources": computing_sources(case.study, study(case.study).computes_in(case.spec)),
-        }
-    )
+    question: dict[str, object] = {} if case.noise_of is None else {"noise_of": world(case.noise_of)}
+    question |= {
+        "study": case.study,
+        "model": study(case.study).model,
+        "spec": canonical(case.spec),
+        "seed": case.seed,
+        "random_layout": random.LAYOUT,
+    }
+    return digest(question)[:QUESTION] + sources(case.study)[:QUESTION]
 
 
 @cache
-def computing_sources(name: str, roots: tuple[str, ...]) -> str:
-    """SHA-256 over the sources that compute a study's numbers, from the modules where it begins.
-
-    Raises ConfigError where one of these modules has no source.
-    """
-    from radarsim.kernels import cache as compiled
-
-    kinds = [kind for kind in type(study(name)).__mro__ if issubclass(kind, Study) and kind is not Study]
-    own = {kind.__module__.partition(".")[0] for kind in kinds} | {root.partition(".")[0] for root in roots}
-    try:
-        parts = [(kind.__module__, kind.__qualname__, SHOWS) for kind in kinds]
-        found = sources.closure(roots, lambda module: follows(module, own), parts)
-    except LookupError as error:
-        raise ConfigError(f"study {name}: computes_in names {error}, a module that has no source") from error
-    finally:
-        sources.remember(compiled.ROOT / compiled.SOURCES)
-    return digest([found.digest(), versions(found.beyond)])
-
-
-def follows(module: str, own: set[str]) -> bool:
-    """Whether a module that a study imports is looked into; own are the top-level packages of the study."""
-    top = module.partition(".")[0]
-    if top == "radarsim":
-        return module not in APART
-    if top in own:
-        return True
-    return top not in sys.stdlib_module_names and top not in RECORDED and not _installed(top)
+def sources(name: str) -> str:
+    """SHA-256 of the files that may compute a study's numbers."""
+    found = hashlib.sha256()
+    places = [(PACKAGE / room, files(PACKAGE / room)) for room in ROOMS]
+    places.append((PACKAGE / "studies", (PACKAGE / "studies").glob("*.py")))
+    if name in SHIPPED:
+        own = PACKAGE.joinpath(*module(name).split(".")[1:])
+        places.append((own, (path for path in files(own) if path.stem not in SHOW)))
+    else:
+        spec = find_spec(module(name).partition(".")[0])
+        own_places = [] if spec is None else spec.submodule_search_locations or [spec.origin or ""]
+        places += [(Path(own), files(Path(own))) for own in own_places]
+        found.update(repr(sorted({(one.name, one.version) for one in distributions()})).encode())
+    for place, every in places:
+        for path in sorted(every):
+            found.update(f"{os.path.relpath(path, place)} ".encode() + hashlib.sha256(path.read_bytes()).digest())
+    return found.hexdigest()
 
 
-def _installed(top: str) -> bool:
-    spec = sources.spec_of(top)
-    places = [spec.origin or "", *(spec.submodule_search_locations or ())] if spec else []
-    return any(not INSTALLED.isdisjoint(place.replace("\\", "/").split("/")) for place in places)
-
-
-def versions(modules: set[str]) -> dict[str, str]:
-    """The versions of installed packages that a study computes with, by package; empty for one without."""
-    tops = {module.partition(".")[0] for module in modules} - {"radarsim"} - RECORDED - sys.stdlib_module_names
-    return {top: _version(top) for top in sorted(tops)}
-
-
-def _version(top: str) -> str:
-    try:
-        return version(top)
-    except PackageNotFoundError:
-        return ", ".join(sorted({version(name) for name in packages_distributions().get(top, ())}))
+def files(place: Path) -> Iterator[Path]:
+    """All files of a package or room but bytecode beside sources; the archive where it lies in one."""
+    if place.is_dir():
+        yield from (path for path in place.rglob("*") if path.is_file() and path.parent.name != "__pycache__")
+    else:
+        yield next(path for path in (place, *place.parents) if path.is_file())

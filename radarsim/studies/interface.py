@@ -190,6 +190,7 @@ class Study(ABC):
     name: str
     about: str
     filters: Mapping[str, str]  # what `radarsim list` says of its filters: keys, and what they make
+    model: int = 1  # raised by an edit that moves numbers, so that no block from before is used, however rare they are
     exact_errors: bool = True  # False: exact_sigma is a bound, which a filter may reach or not
     draws_sweeps: bool = False  # True: `figures` draws sweeps too, in place of the common figures
 
@@ -197,15 +198,6 @@ class Study(ABC):
     @abstractmethod
     def keys(self) -> "type[Keys]":
         """The YAML keys: a subclass of `radarsim.config.fields.Study`."""
-
-    def computes_in(self, spec: Any) -> tuple[str, ...]:
-        """The modules, by their full names, in which the numbers of a case begin. Default: none named.
-
-        An edit in these, or in any module that they import, gives the stored blocks another identity. Where none is
-        named, all that `prepare`, `simulate` and `keys` import counts, which is right for every study; one of several
-        parts names those that a case takes, so that an edit in one part leaves the blocks of the others alone.
-        """
-        return ()
 
     # ---- numbers -------------------------------------------------------------------------------------------------
     @abstractmethod

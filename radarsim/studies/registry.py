@@ -84,6 +84,11 @@ def _loaded(name: str) -> Study | ConfigError:
     return found
 
 
+def module(name: str) -> str:
+    """The module that declares a study, by its full name."""
+    return SHIPPED[name] if name in SHIPPED else next(iter(entries()[name].values())).module
+
+
 def part(name: str, take: Callable[[Study], Part]) -> Part:
     """What `take` gets from the study of a name.
 

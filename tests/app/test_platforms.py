@@ -1,15 +1,14 @@
-"""Stores of another platform and of other code: reported once, compared as conditioning allows."""
+"""Stores of another platform: reported once, compared as conditioning allows."""
 
 import json
 
 import pytest
 
 import radarsim
-from radarsim.app import doctor, records
+from radarsim.app import doctor
 from radarsim.engine import executors
 from radarsim.engine.machine import LIBRARIES, linear_algebra, platform_name, processor
 from radarsim.engine.store import decoded
-from radarsim.kernels import random
 from tests.engine.test_damage import reforged
 
 BLOCK = 4096
@@ -96,41 +95,3 @@ def test_a_store_of_this_platform_is_compared_to_the_last_bit(out):
         _, values = decoded(path.read_bytes())
         reforged(path, values=values * (1 + 1e-15))
     assert doctor.inspected(out / "rls2", recompute=1).faults
-
-
-def other_code(monkeypatch):
-    """The identities that another program would give."""
-    monkeypatch.setattr(random, "LAYOUT", f"{random.LAYOUT} of another program")
-
-
-def renewed(result):
-    return [warning for warning in result.warnings if "other code" in warning]
-
-
-def test_blocks_of_other_code_are_not_reused_and_a_run_says_so_once(out, monkeypatch):
-    assert not renewed(ran(out))
-    other_code(monkeypatch)
-    again = ran(out)
-    assert again.facts["realisations_from_store"] == 0
-    assert renewed(again) == [
-        f"stored blocks of rls2 were made by other code and are not reused; `radarsim clean --out {out}` removes all "
-        "stored blocks"
-    ]
-    assert not renewed(ran(out))
-
-
-def test_another_config_or_none_stored_is_no_matter_of_code(out, monkeypatch):
-    assert not renewed(ran(out, overrides=["scans=12"]))
-    ran(out)
-    other_code(monkeypatch)
-    for path in blocks(out):
-        path.unlink()
-    assert not renewed(ran(out))
-
-
-@pytest.mark.parametrize("text", ["", "[]", "{}", "[" * 100_000, '{"identities": [], "resolved": 1}'])
-def test_a_record_beyond_reading_says_nothing(out, text, monkeypatch):
-    other_code(monkeypatch)
-    (out / "rls2" / "run.json").write_text(text)
-    experiment = radarsim.app.configs.load("rls2")
-    assert records.made_by_other_code(experiment, out) == []

@@ -181,7 +181,7 @@ def test_a_result_without_blocks_stands_on_its_own(out):
 
 
 def test_blocks_of_other_sources_cannot_be_computed_again(out, monkeypatch):
-    monkeypatch.setattr(doctor, "identity", lambda case: "ab12")
+    monkeypatch.setattr(doctor.CaseWork, "identity", "ab12")
     command("doctor", out / "rls2")
     assert "the sources that compute have changed" in command("doctor", out / "rls2", "--recompute", 1, code=2).stderr
 

@@ -7,19 +7,16 @@ import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from importlib.util import spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from numba import njit
 from numba.core.registry import cpu_target
 
 from radarsim.app import selftest
-from radarsim.kernels import cache, sources
+from radarsim.kernels import cache
 from radarsim.kernels.compile import COMMON
-from tests.studies.test_identity import ROOT, other_number
-
-PACKAGE = Path(cache.__file__).parents[1]
 
 
 def twice(x):
@@ -34,10 +31,17 @@ def troubles(monkeypatch):
     return found
 
 
+def kept_in(function, path):
+    """A cache in a directory of its own."""
+    found = cache.KernelCache(function)
+    found._path = path
+    return found
+
+
 def used(path):
     """Call a kernel that keeps its code in a directory; whether that came from there."""
     function = njit(**COMMON)(twice)
-    function._cache = cache.KernelCache(function.py_func, path)
+    function._cache = kept_in(function.py_func, path)
     assert function(4.0) == 8.0
     return bool(sum(function.stats.cache_hits.values()))
 
@@ -62,7 +66,7 @@ def test_what_it_takes_to_compile_is_not_loaded_for_a_kept_kernel(tmp_path, monk
 
 def test_flushing_removes_the_entries_of_the_kernel(tmp_path):
     used(tmp_path)
-    cache.KernelCache(twice, tmp_path).flush()
+    kept_in(twice, tmp_path).flush()
     assert not list(tmp_path.glob("*.kernel"))
 
 
@@ -160,7 +164,13 @@ def test_nowhere_to_keep_anything(monkeypatch, tmp_path, troubles):
 
 
 def test_a_function_of_no_file_is_not_kept():
-    assert cache.directory("no_such_module") is None
+    names = {"__name__": "no_file"}
+    sys.modules["no_file"] = module = ModuleType("no_file")
+    try:
+        exec("def thrice(x):\n    return 3 * x\n", names)
+        assert not isinstance(cache.kept(njit(names["thrice"]))._cache, cache.KernelCache)
+    finally:
+        del sys.modules[module.__name__]
 
 
 def test_the_command_goes_on_and_says_so_in_one_line(tmp_path):
@@ -168,7 +178,7 @@ def test_the_command_goes_on_and_says_so_in_one_line(tmp_path):
     place = tmp_path / "cache"
     options = ["--no-figures", "--out", str(tmp_path)]
     program = [sys.executable, "-m", "radarsim", "run", str(selftest.KNOWN / "range_doppler.yaml"), *options]
-    prepared = "from radarsim.kernels import cache, linear; print(cache.directory(linear.__name__))"
+    prepared = "from radarsim.kernels.linear import add_block as one; print(one._cache.cache_path)"
     environment = os.environ | {"RADARSIM_CACHE_DIR": str(place)}
     found = subprocess.run(
         [sys.executable, "-c", prepared], env=environment, capture_output=True, text=True, check=True
@@ -180,62 +190,3 @@ def test_the_command_goes_on_and_says_so_in_one_line(tmp_path):
     assert len(lines) == len(done.stderr.splitlines()) == 1, done.stderr
     assert (tmp_path / "range_doppler" / "run.json").read_text().count("kernel cache: ") == 1
     assert (tmp_path / "range_doppler" / "curves.csv").read_bytes() == selftest.tables("range_doppler")["curves"]
-
-
-@pytest.fixture
-def directories(tmp_path, monkeypatch):
-    """The directory of every module of kernels, with the sources of a copy of the package."""
-    folder = tmp_path / "radarsim"
-    shutil.copytree(PACKAGE, folder, ignore=shutil.ignore_patterns("__pycache__", "shipped", "known", "template"))
-    place = spec_from_file_location("radarsim", folder / "__init__.py", submodule_search_locations=[str(folder)])
-
-    def top_spec(package):
-        return place if package == "radarsim" else sources.find_spec(package)
-
-    top_spec.cache_clear = lambda: None
-    monkeypatch.setattr(sources, "top_spec", top_spec)
-    monkeypatch.setattr(sources, "remember", lambda file: None)
-    modules = [
-        ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
-        for path in sorted(PACKAGE.rglob("kernels/*.py"))
-        if "radarsim.kernels.compile" in path.read_text() and "template" not in path.parts
-    ]
-
-    def seen():
-        sources.forget()
-        return {module: cache.directory.__wrapped__(module) for module in modules}
-
-    yield folder, seen
-    monkeypatch.undo()
-    sources.forget()
-
-
-def changed(directories, path, text):
-    folder, seen = directories
-    before, kept = seen(), (folder / path).read_text()
-    (folder / path).write_text(text)
-    after = seen()
-    (folder / path).write_text(kept)
-    return {module for module in before if before[module] != after[module]}
-
-
-@pytest.mark.parametrize("study", ["range_doppler", "multimodel", "sonar", "discriminator"])
-def test_an_edit_in_one_study_recompiles_no_other(directories, study):
-    for path in sorted((PACKAGE / "studies" / study).rglob("kernels/*.py")):
-        name = path.relative_to(PACKAGE)
-        module = ".".join(("radarsim", *name.with_suffix("").parts))
-        found = changed(directories, name, other_number(path.read_text()))
-        assert all(one.startswith(f"radarsim.studies.{study}.") for one in found), name
-        assert path.name == "__init__.py" or module in found or "kernels.compile import" not in path.read_text(), name
-
-
-def test_shared_kernels_count_where_they_are_used_and_the_cache_itself_nowhere(directories):
-    _, seen = directories
-    text = (PACKAGE / "kernels" / "compile.py").read_text()
-    every = seen().keys() - {"radarsim.kernels.formula"}  # on which it stands
-    assert changed(directories, "kernels/compile.py", f"{text}\nADDED = 1\n") == every
-    for name in ("cache", "sources", "trees"):
-        text = (PACKAGE / "kernels" / f"{name}.py").read_text()
-        assert changed(directories, f"kernels/{name}.py", f"{text}\nADDED = 1\n") == set()
-    for name in ("studies/multimodel/study.py", "studies/range_doppler/config.py", "config/fields.py"):
-        assert changed(directories, name, (ROOT / "radarsim" / name).read_text() + "\nADDED = 1\n") == set()

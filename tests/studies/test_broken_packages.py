@@ -13,7 +13,6 @@ class Whole(Study):
     name, about, filters = "{name}", "a study", {{}}
     def keys(self): {keys}
     def claims(self): return None
-    def computes_in(self, spec): return ("nowhere_at_all",)
     prepare = simulate = tables = figures = question = answer = None
 
 STUDY = Whole()

@@ -1,305 +1,129 @@
-"""A copy of the package, edited place by place: which cases get another identity?"""
+"""Which blocks a program uses: those of its own question, whose bytes it would make too."""
 
 import ast
+import json
 import os
 import shutil
 import subprocess
 import sys
-from importlib.util import spec_from_file_location
 from pathlib import Path
 
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.kernels import sources
+from radarsim.app.records import of_other_sources
+from radarsim.engine import store
 from radarsim.studies import identity, registry
-from radarsim.studies.folder import StudyFolder
 
 ROOT = Path(__file__).parents[2]
-STEMS = (
-    *("rls2", "multimodel", "sonar_smoothing", "sonar_manoeuvre", "sonar_clutter", "discriminator"),
-    *("ambiguous_rls4", "pulses"),
-)
-SONAR = {stem for stem in STEMS if stem.startswith("sonar_")}
-ALL, NONE = set(STEMS), set()
-FOLDERS = {
-    "range_doppler": {"rls2"},
-    "multimodel": {"multimodel"},
-    "discriminator": {"discriminator"},
-    "ambiguous_doppler": {"ambiguous_rls4"},
-    "pulses_to_tracks": {"pulses"},
-    "sonar": SONAR,
+CONFIGS = {
+    "range_doppler": ["rls2", "rls3"],
+    "multimodel": ["multimodel"],
+    "sonar": ["sonar_smoothing", "sonar_manoeuvre", "sonar_clutter_rare", "sonar_clutter_ends"],
+    "discriminator": ["discriminator", "discriminator_rare"],
+    "ambiguous_doppler": ["ambiguous_rls4", "ambiguous_rare"],
+    "pulses_to_tracks": ["pulses"],
 }
-COMPUTING = ("study", "config", "world", "filters", "exact")
-SHOWING = ("tables", "figures", "words", "claims", "measures")
-STUDIES = ROOT / "radarsim" / "studies"
-CLUTTER = {"sonar_clutter"}
-# It puts the keys of the sonar's parts together: what it makes of them stands in the resolved case, and which part
-# computes the case in what is named.
-ASSEMBLED = {"radarsim.studies.sonar.schema"}
-
-
-@pytest.fixture(scope="module")
-def cases():
-    return {stem: load(stem).cases[0] for stem in STEMS}
-
-
-@pytest.fixture(scope="module")
-def copy(tmp_path_factory):
-    """The package's sources alone, in a folder of their own."""
-    folder = tmp_path_factory.mktemp("copy") / "radarsim"
-    shutil.copytree(ROOT / "radarsim", folder, ignore=shutil.ignore_patterns("__pycache__", "shipped", "known"))
-    return folder
-
-
-@pytest.fixture
-def identities(copy, cases, monkeypatch):
-    """The identity of every case, with the sources that the copy holds now."""
-
-    def top_spec(package):
-        found = sources.find_spec(package)
-        if package != "radarsim":
-            return found
-        places = [str(copy)]
-        return spec_from_file_location(package, copy / "__init__.py", submodule_search_locations=places)
-
-    top_spec.cache_clear = lambda: None
-    monkeypatch.setattr(sources, "top_spec", top_spec)
-    monkeypatch.setattr(sources, "remember", lambda file: None)
-    monkeypatch.setattr(identity, "computing_sources", identity.computing_sources.__wrapped__)
-
-    def seen():
-        sources.forget()
-        return {stem: identity.identity(case) for stem, case in cases.items()}
-
-    yield seen
-    monkeypatch.undo()
-    sources.forget()
-
-
-@pytest.fixture(scope="module")
-def unedited():
-    """The identities with the copy as it was made, once they are known."""
-    return {}
-
-
-@pytest.fixture
-def moved(copy, identities, unedited):
-    """The stems whose identity another text of a file changes; the file is as before afterwards."""
-    if not unedited:
-        unedited.update(identities())
-
-    def of(path, text):
-        file = copy / path
-        kept = file.read_text()
-        file.write_text(text)
-        try:
-            after = identities()
-        finally:
-            file.write_text(kept)
-        return {stem for stem in STEMS if unedited[stem] != after[stem]}
-
-    return of
-
-
-def text_of(path):
-    return (ROOT / "radarsim" / path).read_text()
-
-
-def replaced(path, old, new):
-    text = text_of(path)
-    assert old in text, f"{path}: no longer says {old!r}"
-    return text.replace(old, new, 1)
-
-
-def other_number(text):
-    """A source with its first number, in a statement that is run, made another; with one more where it has none."""
-    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant)]
-    numbers = [node for node in nodes if type(node.value) in (int, float)]
-    if not numbers:
-        return f"{text}\nADDED = 1\n"
-    first = min(numbers, key=lambda node: (node.lineno, node.col_offset))
-    lines = text.splitlines(keepends=True)
-    line = lines[first.lineno - 1].encode()
-    changed = line[: first.col_offset] + repr(first.value + 3).encode() + line[first.end_col_offset :]
-    lines[first.lineno - 1] = changed.decode()
-    return "".join(lines)
-
-
-def other_sentences(text):
-    """A source with another docstring, other comments and another blank line."""
-    ends = ast.parse(text).body[0]
-    assert isinstance(ends, ast.Expr)
-    lines = text.splitlines(keepends=True)
-    return "".join(['"""Other words."""\n', "# A comment.\n\n", *lines[ends.end_lineno :], "\n# The end.\n"])
-
-
-def files_of(folder, names):
-    """The files of a study with these roles, wherever they lie in it."""
-    return [
-        str(path.relative_to(ROOT / "radarsim")) for name in names for path in (STUDIES / folder).rglob(f"{name}.py")
-    ]
-
-
-def affected(path):
-    """The cases that a computing source of a study may move, and those that it must."""
-    _, folder, *rest = Path(path).parts
-    if folder != "sonar":
-        return FOLDERS[folder], FOLDERS[folder]
-    return SONAR, {f"sonar_{rest[0]}"} if len(rest) > 1 and f"sonar_{rest[0]}" in SONAR else NONE
-
-
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_a_number_in_a_source_that_computes_moves_its_study_and_no_other(folder, moved):
-    for path in files_of(folder, COMPUTING):
-        may, must = affected(path)
-        found = moved(path, other_number(text_of(path)))
-        assert must <= found <= may, path
-        assert found, path
-
-
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_what_shows_numbers_moves_nothing(folder, moved):
-    for path in files_of(folder, SHOWING):
-        assert moved(path, other_number(text_of(path))) == NONE, path
-
-
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_sentences_move_nothing(folder, moved):
-    for path in [*files_of(folder, (*COMPUTING, "track")), f"studies/{folder}/__init__.py"]:
-        assert moved(path, other_sentences(text_of(path))) == NONE, path
-
-
-@pytest.mark.parametrize(
-    ("path", "expected"),
-    [
-        ("kernels/random.py", ALL),
-        ("kernels/compile.py", ALL),
-        ("physics/motion.py", {"rls2", "ambiguous_rls4", "pulses"} | SONAR),
-        ("physics/frames.py", {"multimodel"}),
-        ("bursts/fisher.py", {"discriminator", "pulses"}),
-        ("bursts/kernels/scoring.py", {"discriminator", "pulses"}),
-        ("studies/noise.py", ALL),
-        ("studies/radial.py", {"rls2", "ambiguous_rls4", "pulses"}),
-        ("config/fields.py", ALL),
-        ("config/radial.py", {"rls2", "ambiguous_rls4", "pulses"}),
-        ("config/identity.py", ALL),
-        ("engine/moments.py", ALL),
-        ("kernels/cache.py", NONE),
-        ("kernels/sources.py", NONE),
-        ("kernels/trees.py", NONE),
-        ("config/experiment.py", NONE),
-        ("config/load.py", NONE),
-        ("engine/store.py", NONE),
-        ("engine/machine.py", NONE),
-        ("engine/results.py", NONE),
-        ("errors.py", NONE),
-        ("report/statistics.py", NONE),
-        ("report/tables.py", NONE),
-        ("app/run.py", NONE),
-        ("cli/console.py", NONE),
-        ("recorded/follow.py", NONE),
-        ("studies/registry.py", NONE),
-        ("studies/interface.py", NONE),
-        ("studies/identity.py", NONE),
-    ],
-)
-def test_the_shared_rooms(path, expected, moved):
-    assert moved(path, other_number(text_of(path)) + "\nADDED = 1\n") == expected
-
-
-@pytest.mark.parametrize(
-    ("path", "old", "new", "expected"),
-    [
-        # Derived values and defaults of configs, which the resolved case does not show.
-        ("studies/sonar/clutter/config.py", '"gate_probability": 0.99', '"gate_probability": 0.90', CLUTTER),
-        ("studies/sonar/clutter/config.py", "(3, 4)", "(2, 3)", CLUTTER),
-        ("studies/discriminator/config.py", "def needs_samples(self, estimator: Estimator) -> bool:\n",
-         "def needs_samples(self, estimator: Estimator) -> bool:\n        estimator = None\n", {"discriminator"}),
-        # A word in a docstring, a description, a comment; a line of a registry.
-        ("studies/sonar/clutter/track.py", '"""', '"""Here: ', NONE),
-        ("studies/sonar/clutter/config.py", 'description="', 'description="that is ', NONE),
-        ("studies/range_doppler/config.py", 'description="', 'description="that is ', NONE),
-        ("studies/range_doppler/config.py", 'title="', 'title="another ', NONE),
-        ("studies/range_doppler/config.py", '{"symbol": "', '{"symbol": "Q', NONE),
-        ("studies/range_doppler/config.py", "Field(gt=0), Added()", "Field(gt=0.5), Added()", {"rls2"}),
-        ("studies/registry.py", '"multimodel": ', '"another": "elsewhere.study",\n    "multimodel": ', NONE),
-        # The declared study: what it is called and shows, and how it computes.
-        ("studies/range_doppler/__init__.py", 'about="', 'about="Indeed: ', NONE),
-        ("studies/range_doppler/__init__.py", '"inputs",', "", NONE),
-        ("studies/sonar/__init__.py", ".simulate(first, count)", ".simulate(first + 1, count)", SONAR),
-    ],
-)  # fmt: skip
-def test_single_places(path, old, new, expected, moved):
-    found = moved(path, replaced(path, old, new))
-    assert found == expected or (expected == CLUTTER and CLUTTER <= found <= SONAR)
-
-
-def test_a_halved_correlation_and_another_start(moved):
-    """Functions and properties of a config that its numbers are made with."""
-    path = "studies/sonar/config.py"
-    tree = ast.parse(text_of(path))
-    for name in ("correlation_of", "initial_range_m"):
-        text = text_of(path)
-        found = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and node.name == name]
-        last = next(node for node in ast.walk(found[0]) if isinstance(node, ast.Return))
-        lines = text.splitlines(keepends=True)
-        line = lines[last.lineno - 1]
-        lines[last.lineno - 1] = line.replace("return ", "return 0.5 * ", 1)
-        assert moved(path, "".join(lines)) == SONAR, name
-
-
-def test_a_statement_that_a_package_runs_counts(moved):
-    path = "studies/multimodel/__init__.py"
-    text = text_of(path)
-    assert moved(path, f"{text}\nADDED = 1\n") == NONE
-    assert moved(path, f"{text}\nimport numpy\nnumpy.seterr(over='raise')\n") == {"multimodel"}
-    assert moved("kernels/__init__.py", text_of("kernels/__init__.py") + "print()\n") == ALL
-
-
-@pytest.mark.parametrize("name", registry.SHIPPED)
-def test_every_study_begins_where_prepare_and_simulate_do(name):
-    """What these import is among what is followed from `computes_in`, over all shipped cases of a study."""
-    study = registry.study(name)
-    if isinstance(study, StudyFolder):
-        (spec,) = (case.spec for case in load(next(stem for stem in STEMS if stem in FOLDERS[name])).cases)
-        assert study.computes_in(spec) == (study.keys().__module__.replace("config", "study"), study.keys().__module__)
-        assert study.file("study").__name__ == study.computes_in(spec)[0]
-        return
-    found: set[str] = set()
-    for file in sorted((ROOT / "configs").glob(f"{name}*.yaml")):
-        for case in load(str(file)).cases[:1]:
-            found |= closed(study, study.computes_in(case.spec))
-    assert closed(study, ()) - ASSEMBLED <= found
-
-
-def closed(study, roots):
-    parts = [(type(study).__module__, type(study).__qualname__, identity.SHOWS)]
-    return set(sources.closure(roots, lambda module: identity.follows(module, {"radarsim"}), parts).hashes)
-
-
-GATE = """
+COMPUTED = """
+import json, sys
 from radarsim.app.configs import load
-from radarsim.studies.identity import identity
-print(identity(load("sonar_clutter").cases[0]), identity(load("rls2").cases[0]))
+from radarsim.app.work import CaseWork
+for stem in sys.argv[1:]:
+    CaseWork(load(stem).cases[0]).simulate(0, 2)
+print(json.dumps([module.__file__ for name, module in sys.modules.items() if name.startswith("radarsim.")]))
+"""
+# What reads a config, carries a case or a study's parts, and runs blocks changes no number.
+CARRY = {"app", "engine", "errors.py", "language", "report"}
+
+
+@pytest.mark.parametrize("study", registry.SHIPPED)
+def test_every_file_that_computes_is_hashed(study):
+    """The files that are loaded by the time that blocks are made, but for those that carry a case."""
+    done = subprocess.run([sys.executable, "-c", COMPUTED, *CONFIGS[study]], capture_output=True, text=True, check=True)
+    loaded = [Path(one).relative_to(identity.PACKAGE) for one in json.loads(done.stdout)]
+    inside = {path for path in loaded if path.parts[0] not in CARRY and path.name != "__init__.py"}
+    own = Path(*registry.module(study).split(".")[1:])
+    rooms = {path for path in inside if path.parts[0] in identity.ROOMS or path.parent == Path("studies")}
+    studies = inside - rooms
+    assert studies
+    assert all(path.is_relative_to(own) for path in studies)
+    assert not [path for path in studies if path.stem in identity.SHOW]
+
+
+@pytest.fixture
+def edited(tmp_path):
+    """Runs rls2 with an edited copy of the package: how much it computed, and the line on other sources."""
+    shutil.copytree(ROOT / "radarsim", tmp_path / "radarsim", ignore=shutil.ignore_patterns("__pycache__"))
+
+    def run(path="errors.py", change=lambda text: text):
+        file = tmp_path / "radarsim" / path
+        text = file.read_text()
+        file.write_text(change(text))
+        command = [sys.executable, "-m", "radarsim", "run", "rls2", "-n", "9000", "--no-figures", "--out", "out"]
+        environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+        file.write_text(text)
+        assert done.returncode == 0, done.stderr
+        record = json.loads((tmp_path / "out/rls2/run.json").read_text())
+        (said,) = [line for line in done.stderr.splitlines() if "other sources" in line] or [""]
+        said = said.removeprefix("warning: ")
+        assert said in [*record["warnings"], ""]
+        return record["realisations_computed"], said
+
+    return run
+
+
+def renamed(text):
+    """A source whose functions call their local variables otherwise, without its comments."""
+    tree = ast.parse(text)
+    for function in [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]:
+        names = [node for node in ast.walk(function) if isinstance(node, ast.Name)]
+        local = {node.id for node in names if isinstance(node.ctx, ast.Store)}
+        local -= {node.arg for node in ast.walk(function) if isinstance(node, ast.arg)}
+        for node in names:
+            if node.id in local:
+                node.id += "_renamed"
+    return ast.unparse(tree)
+
+
+def test_what_moves_no_digit_keeps_all_blocks_and_is_said_once(edited):
+    assert edited() == (9000, "")
+    assert edited("report/tables.py", renamed) == (0, "")  # only shows
+    computed, line = edited("kernels/linear.py", renamed)
+    assert computed == 0
+    assert line.startswith("stored blocks of rls2 were made by other sources; 9,000 of 9,000 realisations were comp")
+    assert edited("kernels/linear.py", renamed) == (0, "")
+    assert edited() == (0, "")
+
+
+MOVED = """
+_before = simulate
+def simulate(plan, first, count):
+    sums = _before(plan, first, count)
+    return np.nextafter(sums, np.inf) if first <= 8500 < first + count else sums
 """
 
 
-def test_the_program_itself_sees_it(tmp_path):
-    """Not by way of this file's tools: two programs, of which one has another gate."""
-    folder = tmp_path / "radarsim"
-    shutil.copytree(ROOT / "radarsim", folder, ignore=shutil.ignore_patterns("__pycache__"))
-    environment = os.environ | {"PYTHONPATH": str(tmp_path), "RADARSIM_CACHE_DIR": str(tmp_path / "cache")}
+def test_a_last_digit_of_few_realisations_begins_anew_and_says_so(edited):
+    edited()
+    computed, line = edited("studies/range_doppler/study.py", lambda text: f"{text}\nimport numpy as np\n{MOVED}")
+    assert computed == 9000
+    assert line.startswith("stored blocks of rls2 were made by other sources that give other bytes, and are not used")
+    assert edited() == (0, "")
 
-    def printed():
-        done = subprocess.run(
-            [sys.executable, "-c", GATE], env=environment, cwd=tmp_path, capture_output=True, check=True
-        )
-        return done.stdout.split()
 
-    before = printed()
-    path = folder / "studies" / "sonar" / "clutter" / "config.py"
-    path.write_text(path.read_text().replace('"gate_probability": 0.99', '"gate_probability": 0.90'))
-    after = printed()
-    assert before[0] != after[0]
-    assert before[1] == after[1]
+def test_a_study_that_raises_its_model_begins_anew_and_compares_nothing(edited):
+    edited()
+    model = "\nobject.__setattr__(STUDY, 'model', STUDY.model + 1)\n"
+    assert edited("studies/range_doppler/__init__.py", lambda text: text + model) == (9000, "")
+
+
+@pytest.mark.parametrize(("again", "stored", "rarer"), [(900, 900, False), (300, 900, True)])
+def test_one_line_says_what_was_compared_of_all_cases(monkeypatch, again, stored, rarer):
+    names = {f"{number}": f"case {number}" for number in range(5)}
+    monkeypatch.setattr(store, "settled", [store.Settled(one, one != "4", again, stored) for one in (*names, "else")])
+    kept, begun = of_other_sources(names)
+    assert f"case 0, case 1, case 2 and 1 more were made by other sources; {4 * again:,} of 3,600 " in kept
+    assert ("A change in one realisation of 100 would have shown" in kept) is rarer
+    assert "blocks of case 4 were made by other sources that give other bytes" in begun
+    assert [one.identity for one in store.settled] == ["else"]
+    assert of_other_sources(names) == []

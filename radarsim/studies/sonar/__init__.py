@@ -47,25 +47,8 @@ class Sonar(Study):
 
         return schema.Sonar
 
-    def computes_in(self, spec: "AllKeys") -> tuple[str, ...]:
-        part = f"{__name__}.{spec.parts[-1]}"
-        keys = __name__ if spec.parts[-1] == "smoothing" else part
-        return f"{part}.study", f"{keys}.config"
-
     def prepare(self, case: "Case") -> Plan:
-        # Imported here, not by `parts`: these imports tell which modules compute a case; `parts` also shows results.
-        match case.spec.parts[-1]:
-            case "smoothing":
-                from radarsim.studies.sonar.smoothing import study as smoothing
-
-                return smoothing.prepare(case)
-            case "manoeuvre":
-                from radarsim.studies.sonar.manoeuvre import study as manoeuvre
-
-                return manoeuvre.prepare(case)
-        from radarsim.studies.sonar.clutter import study as clutter
-
-        return clutter.prepare(case)
+        return part_of(case.spec).file("study").prepare(case)
 
     def rates(self, spec: "AllKeys") -> tuple[str, ...]:
         return ("tracking",) if "clutter" in spec.parts else ()

@@ -1,4 +1,4 @@
-"""The sonar's three parts: each rests on the common base alone, and an edit in one leaves the blocks of the others."""
+"""The sonar's three parts: each rests on the common base alone."""
 
 import ast
 import inspect
@@ -10,8 +10,6 @@ import pytest
 import radarsim
 from radarsim.app.configs import load
 from radarsim.engine.results import Axes
-from radarsim.kernels import sources
-from radarsim.studies import identity
 from radarsim.studies.sonar import STUDY, parts
 from radarsim.studies.sonar.axes import GivenPlotsAxes, SonarAxes
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
@@ -60,19 +58,6 @@ def test_what_a_case_is_follows_from_its_keys(part, stem):
     for case in load(stem).cases:
         assert case.spec.parts[-1] == part
         assert case.spec.parts == (("smoothing", "manoeuvre") if part == "manoeuvre" else (part,))
-
-
-@pytest.mark.parametrize(("part", "stem"), CASES)
-def test_numbers_rest_on_the_base_and_their_own_part(part, stem):
-    followed = sources.closure(
-        STUDY.computes_in(load(stem).cases[0].spec), lambda module: identity.follows(module, {"radarsim"})
-    )
-    modules = [module.rstrip(":") for module in followed.hashes if module.startswith(PACKAGE)]
-    assert {part_of(module) for module in modules} <= {None, part}
-    assert f"{PACKAGE}.{part}.study" in modules
-    assert {f"{PACKAGE}.study", f"{PACKAGE}.config", f"{PACKAGE}.kernels.patterns"} <= set(modules)
-    roles = {module.rpartition(".")[2] for module in modules}
-    assert not roles & {"tables", "figures", "words", "claims", "measures", "track", "map", "part", "schema"}
 
 
 def test_labels_are_typed_and_described():
