@@ -73,8 +73,8 @@ class SelfContained(JITCodeLibrary):
         super()._finalize_final_module()
 
 
-# Where Python lands when it calls a function without an entry: it raises TypeError instead of crashing. No number, which
-# would be another in each process and part of what kernels are kept by.
+# Where Python lands when it calls a function without an entry: it raises TypeError instead of crashing. Not a number,
+# which would be another in each process and part of what kernels are kept by.
 NO_ENTRY = ctypes.cast(ctypes.pythonapi.PyObject_Call, ctypes.c_void_p)
 
 
