@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from radarsim.kernels.algebra import pack
 from radarsim.physics import targets
-from radarsim.physics.motion import transition
+from radarsim.physics.motion import process_noise, transition
 from radarsim.studies.range_doppler.exact import error_recursion, normalised_error, steady_state
-from radarsim.studies.range_doppler.filters import design, least_squares_start, observation
+from radarsim.studies.range_doppler.filters import design, least_squares_start, noise_by_time, observation
 from radarsim.studies.range_doppler.propagation import Plots
 
 RADARS = {"rls1": (25, 5, 10), "rls2": (250, 15, 10), "rls3": (250, 15, 5), "rls4": (50, 1, 10), "rls5": (50, 1, 5)}
@@ -154,3 +155,12 @@ def _covariance(rng, units):
 def test_normalised_error_without_components_is_not_a_number():
     of = normalised_error(np.zeros((1, 3, 3)), np.zeros((1, 3)), np.zeros((1, 3, 3)), np.zeros((1, 3), dtype=bool))
     assert np.isnan(of).all()
+
+
+@pytest.mark.parametrize("noise", ["random_jerk", "white_jerk", "white_acceleration"])
+def test_noise_over_a_time_of_one_period_is_that_of_a_scan(noise):
+    a, b = noise_by_time(noise, 0.3, 7.0)
+    power = 5 - np.array(pack(np.add.outer(np.arange(3), np.arange(3))))
+    np.testing.assert_allclose(
+        a * 7.0**power + b * 7.0 ** (power + 1), pack(process_noise(noise, 0.3, 7.0)), rtol=1e-14
+    )
