@@ -11,13 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.kernels.compile import kernel, part
+from radarsim.kernels.lanes import address
 from radarsim.kernels.random import U, uniforms
 from radarsim.studies.sonar.kernels import detector
 from radarsim.studies.sonar.kernels.detector import AdaptiveRules, Alarms, adapt, add_alarms, detector_statistics
 from radarsim.studies.sonar.kernels.imm import PROBABILITY, ROWS, ModelPairs, interact, mode_sums
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK, Sums, move_and_measure
 from radarsim.studies.sonar.kernels.steps import ROW, Filters, Model, Plots, copy_row, fit, recur, remember
-from radarsim.studies.sonar.kernels.sums import Counted, Course, Estimate, add_ahead, add_sums
+from radarsim.studies.sonar.kernels.sums import Course, add_ahead, add_sums, rows_of
 
 INFORMATION, COVARIANCE, FIXED, WINDOW, ADAPTIVE, IMM = range(6)
 PLACED = 8.0  # as world.PLACED
@@ -212,8 +213,7 @@ def step_filters(bank, baseline, chunk, filters, plots, out, sums):
     k, course = chunk.k, chunk.course
     for c in range(plots.z.shape[0]):
         units = (bank.sigma[c], bank.period)
-        course_c, counted = Course(course.truth[c], course.shift[c]), Counted(plots.n_now[c], chunk.used)
-        x_base, size_base = filters.x[baseline, c], bank.size[baseline]
+        n, x_base, size_base = plots.n_now[c], filters.x[baseline, c], bank.size[baseline]
         for j in range(bank.size.size):  # the baseline first: gains of the others refer to its estimates
             f = baseline if j == 0 else (j - 1 if j <= baseline else j)
             filter_scan(bank, f, c, k, chunk.dt, filters, plots)
@@ -221,9 +221,9 @@ def step_filters(bank, baseline, chunk, filters, plots, out, sums):
             for a in range(sums.at.size if c < 2 else 0):
                 if sums.at[a] == k:
                     kept = sums.kept[a, f, c]
-                    keep(filters.x[f, c], filters.P, counted.n, bank.size[f], units, chunk.first, chunk.count, kept)
-            estimate = Estimate(filters.x[f, c], filters.P, bank.size[f], x_base, size_base)
-            add_sums(estimate, course_c, counted, units, (f, k, c), out, sums.errors)
+                    keep(filters.x[f, c], filters.P, n, bank.size[f], units, chunk.first, chunk.count, kept)
+            rows = rows_of(filters.x[f, c], course, c, n, chunk.used)
+            add_sums(rows, filters.P, bank.size[f], x_base, size_base, units, (f, k, c), out, sums.errors)
 
 
 @kernel
@@ -253,7 +253,10 @@ def simulate_block(world, detections, conversion, bank, detectors, first, total,
                 copy_row(measured[c, 2], shift[c, 0])
                 copy_row(measured[c, 3], shift[c, 1])
             if k > 0:
-                add_ahead(bank.size, x, course, Counted(n_now, used), k, dt, out, sums.errors)
+                for c in range(C):
+                    for f in range(F):
+                        ahead = sums.errors.ahead[f, k - 1, c]
+                        add_ahead(rows_of(x[f, c], course, c, n_now[c], used), bank.size[f], dt, address(out), ahead)
             count_plots(weight, n, n_now)
             for c in range(C):
                 if recent.shape[2] > 0:

@@ -20,19 +20,6 @@ from radarsim.kernels.lanes import address, full, get, get6, total, where_greate
 from radarsim.studies.sonar.kernels.steps import GROUPS, leading_inverse
 
 
-class Estimate(NamedTuple):
-    """A filter's estimate in one coordinate: x (4, CHUNK), covariance P (6, CHUNK), size of the state.
-
-    x_base (4, CHUNK) is the baseline's estimate and size_base its size, 0 where no gain is needed.
-    """
-
-    x: np.ndarray
-    P: np.ndarray
-    size: int
-    x_base: np.ndarray
-    size_base: int
-
-
 class Course(NamedTuple):
     """The targets' states in one coordinate, or (C, …) in all: truth (3,) and the shift (3, CHUNK) of each from it."""
 
@@ -40,19 +27,11 @@ class Course(NamedTuple):
     shift: np.ndarray
 
 
-class Counted(NamedTuple):
-    """Which realisations count: n (CHUNK,) plots of each so far, or (C, CHUNK) of all coordinates; used (CHUNK,) is 1
-    for a realisation of the block and 0 for one that only fills up the last chunk.
-    """
-
-    n: np.ndarray
-    used: np.ndarray
-
-
 class Rows(NamedTuple):
-    """Where the arrays of an estimate are, those of Estimate, Course and Counted: x, shift, truth, n, used.
+    """A filter's estimates in one coordinate, by addresses: Numba would count references to the arrays at each call.
 
-    Passed on in place of the arrays, references to which Numba would count at each call.
+    x (4, CHUNK), and shift and truth of the targets' course; n (CHUNK,) plots of each realisation so far; used (CHUNK,)
+    is 1 for a realisation of the block and 0 for one that only fills up the last chunk.
     """
 
     x: int
@@ -63,9 +42,10 @@ class Rows(NamedTuple):
 
 
 @inline
-def rows_of(x, course, counted):
-    """The rows of an estimate x (4, CHUNK) with its course and count, which must outlive them."""
-    return Rows(address(x), address(course.shift), address(course.truth), address(counted.n), address(counted.used))
+def rows_of(x, course, c, n, used):
+    """The rows of an estimate x in coordinate c of the course; all must outlive them."""
+    truth, shift = course.truth[c], course.shift[c]
+    return Rows(address(x), address(shift), address(truth), address(n), address(used))
 
 
 @part
@@ -138,10 +118,13 @@ def ahead_sums(rows, size, dt, out):
 
 
 @part
-def add_sums(estimate, course, counted, units, at, out, sums):
-    """Add the errors of one filter in one coordinate; units (σ, period), at (f, k, c), out (7,) scratch."""
-    (sigma, period), (f, k, c), size = units, at, estimate.size
-    rows, base, of = rows_of(estimate.x, course, counted), address(estimate.x_base), address(out)
+def add_sums(rows, P, size, x_base, size_base, units, at, out, sums):
+    """Add the errors of one filter in one coordinate; units (σ, period), at (f, k, c), out (7,) scratch.
+
+    P (6, CHUNK) is its covariance, x_base (4, CHUNK) the baseline's estimate and size_base its size, 0 where no gain is
+    needed.
+    """
+    (sigma, period), (f, k, c), base, of = units, at, address(x_base), address(out)
     error, paired, joint = address(sums.error[f, k, c]), address(sums.paired[f, k, c]), address(sums.joint[f, k, c])
     believed, estimates = address(sums.believed[f, k, c]), address(sums.estimates[f, k, c])
     for j in range(size):
@@ -149,9 +132,9 @@ def add_sums(estimate, course, counted, units, at, out, sums):
         estimates[j] += of[0]
         for power in range(4):
             error[4 * j + power] += of[1 + power]
-        if j < estimate.size_base:
+        if j < size_base:
             paired[j] += of[5]
-    joint_sums(rows, address(estimate.P), size, units, of)
+    joint_sums(rows, address(P), size, units, of)
     for j in range(size):
         believed[j] += of[j] * sigma * sigma / period ** (2 * j)
     for power in range(4):
@@ -159,15 +142,8 @@ def add_sums(estimate, course, counted, units, at, out, sums):
 
 
 @part
-def add_ahead(sizes, x, course, counted, k, dt, out, sums):
-    """Add the errors at scan k of values extrapolated from scan k - 1, for all filters and coordinates.
-
-    x (F, C, 4, CHUNK); course and counted of all coordinates, n of plots before scan k.
-    """
-    of = address(out)
-    for c in range(x.shape[1]):
-        own, plots = Course(course.truth[c], course.shift[c]), Counted(counted.n[c], counted.used)
-        for f in range(x.shape[0]):
-            ahead_sums(rows_of(x[f, c], own, plots), sizes[f], dt, of)
-            for power in range(4):
-                sums.ahead[f, k - 1, c, power] += of[power]
+def add_ahead(rows, size, dt, of, ahead):
+    """Add the errors of the value extrapolated over dt to ahead (4,); of is the address of scratch (4)."""
+    ahead_sums(rows, size, dt, of)
+    for power in range(4):
+        ahead[power] += of[power]

@@ -9,17 +9,18 @@ confirmed. Letters as in `tracker`.
 import numpy as np
 
 from radarsim.kernels.compile import kernel, part
+from radarsim.kernels.lanes import address
 from radarsim.studies.sonar.clutter.kernels import rules as rule
 from radarsim.studies.sonar.clutter.kernels.counts import COUNTS, ENDS_PER_SCAN, WRONG_PER_PLOT
 from radarsim.studies.sonar.clutter.kernels.field import even_places
 from radarsim.studies.sonar.clutter.kernels.gate import KNOWN
 from radarsim.studies.sonar.clutter.kernels.rules import judge, judge_false, judge_known
-from radarsim.studies.sonar.clutter.kernels.sums import add_ahead, add_errors, add_ratio, add_scores
+from radarsim.studies.sonar.clutter.kernels.sums import add_errors, add_ratio, add_scores
 from radarsim.studies.sonar.clutter.kernels.tracker import Scan, Target, reset, step, tracks_of
 from radarsim.studies.sonar.kernels.patterns import detect
 from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
 from radarsim.studies.sonar.kernels.steps import CHUNK, copy_row
-from radarsim.studies.sonar.kernels.sums import Counted, Course
+from radarsim.studies.sonar.kernels.sums import Course, add_ahead, rows_of
 
 
 @part
@@ -52,9 +53,10 @@ def simulate_block(world, detections, field, trackers, work, first, total, sums)
             measure_target(world, first + done, k, plots, z, shift)
             detect(detections, first + done, k, detected)
             for f in range(F):
-                tracks, counted = tracks_of(work, f), Counted(kept[f], used)
-                if k > 0:
-                    add_ahead(tracks, f, k, scan.dt, course, counted, out, sums.errors)
+                tracks = tracks_of(work, f)
+                for c in range(2 if k > 0 else 0):
+                    rows = rows_of(tracks.x[c], course, c, kept[f], used)
+                    add_ahead(rows, 2, scan.dt, address(out), sums.errors.ahead[f, k - 1, c])
                 counts[:] = 0.0
                 step(trackers, f, field, scan, tracks, target, work, counts)
                 if trackers.association[f] == KNOWN:
@@ -63,7 +65,7 @@ def simulate_block(world, detections, field, trackers, work, first, total, sums)
                     judge(trackers, f, n, tracks, status[f], course, kept[f], counts)
                 for j in range(COUNTS):
                     sums.counts[f, k, j] += counts[j]
-                add_errors(trackers, tracks, f, k, course, counted, out, sums.errors)
+                add_errors(trackers, tracks, f, k, course, kept[f], used, out, sums.errors)
         for f in range(F):
             add_ratio(status[f, rule.ENDS], status[f, rule.HELD], n, sums.ratios[f, ENDS_PER_SCAN])
             add_ratio(status[f, rule.WRONG], status[f, rule.TAKEN], n, sums.ratios[f, WRONG_PER_PLOT])

@@ -4,8 +4,7 @@ Letters as in `sonar.kernels.sums`; f numbers trackers, c the lines in range and
 """
 
 from radarsim.kernels.compile import inline, part
-from radarsim.kernels.lanes import address
-from radarsim.studies.sonar.kernels.sums import Course, Estimate, add_sums, ahead_sums, rows_of
+from radarsim.studies.sonar.kernels.sums import add_sums, rows_of
 
 
 @part
@@ -33,23 +32,12 @@ def add_ratio(a, b, n, ratio):
 
 
 @part
-def add_errors(trackers, tracks, f, k, course, counted, out, sums):
+def add_errors(trackers, tracks, f, k, course, kept, used, out, sums):
     """Add the errors of the tracks kept of tracker f at scan k, in range and in bearing; out (7,) is scratch."""
     size = tracks.x.shape[0]  # two; were it a constant, the compiler would unroll the loop and compile everything twice
     for c in range(size):
-        estimate = Estimate(tracks.x[c], tracks.P[c], size, tracks.x[c], 0)
-        units = (trackers.sigma[c], trackers.period)
-        add_sums(estimate, Course(course.truth[c], course.shift[c]), counted, units, (f, k, c), out, sums)
-
-
-@part
-def add_ahead(tracks, f, k, dt, course, counted, out, sums):
-    """Add the errors of tracker f at scan k of values extrapolated from scan k - 1."""
-    size, of = tracks.x.shape[0], address(out)
-    for c in range(size):
-        ahead_sums(rows_of(tracks.x[c], Course(course.truth[c], course.shift[c]), counted), size, dt, of)
-        for power in range(4):
-            sums.ahead[f, k - 1, c, power] += of[power]
+        rows, units = rows_of(tracks.x[c], course, c, kept, used), (trackers.sigma[c], trackers.period)
+        add_sums(rows, tracks.P[c], size, tracks.x[c], 0, units, (f, k, c), out, sums)
 
 
 @inline
