@@ -214,12 +214,6 @@ def test_too_many_cases(house, said):
     assert said("own.yaml") == ["own.yaml:11:8: sweep: more than 10000 cases"]
 
 
-def test_a_thousand_cases(house):
-    numbers = list(range(1, 101))
-    house("own.yaml", CONFIG + f"sweep: {{radar.sigma_range_m: {numbers}, manoeuvre_variance: {numbers[:10]}}}\n")
-    assert len(set(names(load("own.yaml")))) == 1000
-
-
 INCLUDES = [
     ("include: [nowhere]", "c.yaml:1:11: include.0: no such config, got 'nowhere'"),
     ("include: [aa]", "c.yaml:1:11: include.0: no such config; did you mean a?, got 'aa'"),
