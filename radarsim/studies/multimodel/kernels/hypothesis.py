@@ -21,6 +21,7 @@ hypotheses that are merged, their shares stand in the rows SHARE …
 import numpy as np
 
 from radarsim.kernels.algebra import (
+    add_spread,
     dot,
     factored,
     predicted,
@@ -32,7 +33,7 @@ from radarsim.kernels.algebra import (
     whitened,
 )
 from radarsim.kernels.compile import inline, part
-from radarsim.kernels.lanes import any_greater, full, get, put, row, rows, where_greater
+from radarsim.kernels.lanes import any_greater, full, get, get3, get6, put, put3, put6, row, rows, where_greater
 from radarsim.studies.multimodel.kernels import records as rec
 
 
@@ -41,33 +42,6 @@ def work_arrays() -> tuple[np.ndarray, np.ndarray]:
     numbers = np.zeros(4, dtype=np.int64)
     numbers[rec.CURRENT], numbers[rec.PREPARED], numbers[rec.SETTLED] = 0, -1, 1
     return rows(rec.WORK), numbers
-
-
-@inline
-def get3(pointer, first):
-    """Three neighbours in memory, from number `first` on."""
-    return get(pointer, first), get(pointer, first + 1), get(pointer, first + 2)
-
-
-@inline
-def get6(pointer, first):
-    """Six neighbours in memory, from number `first` on."""
-    return get3(pointer, first) + get3(pointer, first + 3)
-
-
-@inline
-def put3(pointer, first, x):
-    """Write three neighbours, from number `first` on."""
-    put(pointer, first, x[0])
-    put(pointer, first + 1, x[1])
-    put(pointer, first + 2, x[2])
-
-
-@inline
-def put6(pointer, first, x):
-    """Write six neighbours, from number `first` on."""
-    put3(pointer, first, (x[0], x[1], x[2]))
-    put3(pointer, first + 3, (x[3], x[4], x[5]))
 
 
 @inline
@@ -105,15 +79,7 @@ def mixed_own(listed, count, shares, block, means, mean):
         return get6(block, listed[0])
     p = full(0.0), full(0.0), full(0.0), full(0.0), full(0.0), full(0.0)
     for n in range(count):
-        mu, P, d = get(shares, n), get6(block, listed[n]), offset(means, listed[n], mean)
-        p = (
-            p[0] + mu * (P[0] + d[0] * d[0]),
-            p[1] + mu * (P[1] + d[0] * d[1]),
-            p[2] + mu * (P[2] + d[0] * d[2]),
-            p[3] + mu * (P[3] + d[1] * d[1]),
-            p[4] + mu * (P[4] + d[1] * d[2]),
-            p[5] + mu * (P[5] + d[2] * d[2]),
-        )
+        p = add_spread(p, get(shares, n), get6(block, listed[n]), offset(means, listed[n], mean))
     return p
 
 

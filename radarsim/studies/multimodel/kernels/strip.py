@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.kernels.compile import inline, kernel, part
-from radarsim.kernels.lanes import address, any_greater, full, get, put, row, where_greater
+from radarsim.kernels.lanes import address, any_greater, full, get, get3, put, put3, row, where_greater
 from radarsim.studies.multimodel.kernels import records as rec
 from radarsim.studies.multimodel.kernels.filters import merge_gpb1, shares_by_rule, step
-from radarsim.studies.multimodel.kernels.hypothesis import get3, merge, mixed_mean, put3
+from radarsim.studies.multimodel.kernels.hypothesis import merge, mixed_mean
 from radarsim.studies.multimodel.kernels.plots import noise_at_prediction
 from radarsim.studies.multimodel.kernels.records import Rules
 
