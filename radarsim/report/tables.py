@@ -243,6 +243,13 @@ def _quoted(text: str) -> str:
     return text
 
 
+def where(table: "pd.DataFrame", **values: object) -> "pd.DataFrame":
+    """The rows of a table that hold these values, by column."""
+    for column, value in values.items():
+        table = table[table[column] == value]
+    return table
+
+
 def groups(table: "pd.DataFrame", *columns: str) -> "dict[Any, pd.DataFrame]":
     """The rows of a table by the values of some columns, in the order of the table: {(case, filter, …): rows}."""
     return dict(iter(table.groupby(list(columns), sort=False)))

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from radarsim.language import plural, tr
+from radarsim.report import tables as common
 from radarsim.report.compare.sides import SERIES
 from radarsim.report.compare.table import MEANING
 from radarsim.report.text import UNITS, interval, significant_digits
@@ -19,7 +20,7 @@ def sentences(made: "pd.DataFrame") -> list[str]:
     lines = []
     for quantity, rows in last.groupby("quantity", sort=False):
         series = next(one for one in SERIES if one.value == quantity)
-        first = rows[(rows["component"] == rows["component"].iloc[0]) & (rows["model"] == rows["model"].iloc[0])]
+        first = common.where(rows, component=rows["component"].iloc[0], model=rows["model"].iloc[0])
         lines += [_sentence(series.words, row) for row in first.to_dict("records")]
         if series.ratio:
             break  # gains and shares of the same filters stand in the table

@@ -75,7 +75,7 @@ def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> list
 
     None where no realisation had a plot.
     """
-    curves = made["curves"][(made["curves"]["case"] == result.name) & (made["curves"]["component"] == "r")]
+    curves = common.where(made["curves"], case=result.name, component="r")
     curves = curves[(curves["k"] > 1) & (curves["n"] > 0)]
     if not len(curves):
         return []
@@ -110,8 +110,7 @@ def _orders_sentence(result: Result, made: "Mapping[str, pd.DataFrame]") -> list
 
 def _right(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str:
     """How often all folds are right at the last scan; empty where no realisation had a plot."""
-    folds = made["folds"]
-    rows = folds[(folds["case"] == result.name) & (folds["filter"] == name)]
+    rows = common.where(made["folds"], case=result.name, filter=name)
     if not len(rows):
         return ""
     last = rows.iloc[-1]
@@ -135,7 +134,7 @@ def _wrong(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str
 
 def _as_good(result: Result, name: str, made: "Mapping[str, pd.DataFrame]") -> str:
     """From which scan on σ of the velocity is within 5 % of the oracle's, for good; empty where it has none."""
-    gains, folds = (made[t][(made[t]["case"] == result.name) & (made[t]["filter"] == name)] for t in ("gains", "folds"))
+    gains, folds = (common.where(made[t], case=result.name, filter=name) for t in ("gains", "folds"))
     rows = gains[gains["component"] == "Vr"].dropna(subset=["above_oracle_percent"])
     if not len(rows):
         return ""

@@ -13,6 +13,7 @@ from radarsim.report import panels, seen
 from radarsim.report import tables as common
 from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
 from radarsim.studies.discriminator.map import one_burst
+from radarsim.studies.discriminator.tables import last_locks
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -127,8 +128,7 @@ def residuals(result: CaseResult, made: Mapping, case: Case) -> Figure:
         name=name,
         count=result.count,
     )
-    rows = made["locks"]
-    last = rows[(rows["case"] == result.name) & (rows["filter"] == name)].iloc[-1]
+    last = last_locks(made, result, name)
     sentence = tr(
         "From the first window to the whole burst the median error falls {times:.3g} times in {component}; at the end "
         "{share:.4g} % of the bursts are locked.",
@@ -141,7 +141,7 @@ def residuals(result: CaseResult, made: Mapping, case: Case) -> Figure:
 
 def _fall(table: "pd.DataFrame", result: CaseResult, name: str) -> float:
     """How many times less the median error of the Doppler frequency is at the last window than at the first."""
-    own = table[(table["case"] == result.name) & (table["filter"] == name)]
+    own = common.where(table, case=result.name, filter=name)
     median = own.loc[own["component"] == result.axes.components[1][0], "median"].to_numpy(float)
     return float(median[0] / median[-1])
 
@@ -210,12 +210,6 @@ def accuracy(result: CaseResult, made: Mapping) -> Figure:
     return seen.begun(figure, seen.extremes(figure))
 
 
-def final(made: Mapping, result: CaseResult, name: str) -> "pd.Series":
-    """The row of locks at the last window of an estimator."""
-    rows = made["locks"]
-    return rows[(rows["case"] == result.name) & (rows["filter"] == name)].iloc[-1]
-
-
 def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mapping) -> Figure:
     """Lock at the end of the burst against one swept key, a line for each estimator."""
     designed = key.rpartition(".")[2] == "lock_probability"
@@ -225,7 +219,7 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], made: Mappi
     order = np.argsort(x)
     marks: list[Line] = []
     for n, estimator in enumerate(members[0].axes.filters):
-        ends, columns = [final(made, members[i], estimator) for i in order], ("lock_rate", "lock_lo", "lock_hi")
+        ends, columns = [last_locks(made, members[i], estimator) for i in order], ("lock_rate", "lock_lo", "lock_hi")
         marks.append(panels.line_of(x[order], ends, columns, estimator, Style(n, n % 4, n)))
     scale = "log" if x.min() > 0 and x.max() / x.min() > 20 else "linear"
     called = panels.key_label(members[0], key).text
@@ -258,7 +252,7 @@ def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], ma
         values = np.full((len(y), len(x)), np.nan)
         for member in members:
             column, row = (np.searchsorted(a, float(member.swept[i][1])) for i, a in ((0, x), (1, y)))
-            values[row, column] = final(made, member, estimator)["lock_rate"]
+            values[row, column] = last_locks(made, member, estimator)["lock_rate"]
         marks = (Heat(x, y, values, tr("share locked")),)
         across, up = (Axis(_called(key, members[0])) for key in keys)
         drawn.append(Panel(across, up, marks, estimator))
@@ -285,7 +279,7 @@ def region(keys: tuple[str, ...], members: Sequence[CaseResult], made: Mapping, 
         sure = np.zeros((len(y), len(x)), dtype=bool)
         for member in members:
             column, row = (np.searchsorted(a, float(member.swept[i][1])) for i, a in ((0, x), (1, y)))
-            sure[row, column] = final(made, member, estimator)["lock_lo"] >= SURE
+            sure[row, column] = last_locks(made, member, estimator)["lock_lo"] >= SURE
         reach = np.minimum.accumulate(sure, axis=0).sum(axis=0)
         border = np.where(reach > 0, y[np.maximum(reach, 1) - 1], np.nan)
         marks.append(Line(x, border, estimator, Style(n, n % 4, n)))

@@ -1,6 +1,6 @@
 """P4's tables: curves of locked bursts, locks, windows, residuals, bounds, motion, passes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +28,11 @@ def tables(results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
         **table.made(results),
         **rare.table([_rare(result) for result in results if "losses" in result.sums]),
     }
+
+
+def last_locks(made: "Mapping[str, pd.DataFrame]", result: CaseResult, name: str) -> "pd.Series":
+    """The row of locks at the last window of an estimator."""
+    return common.where(made["locks"], case=result.name, filter=name).iloc[-1]
 
 
 def plain(result: CaseResult) -> int:

@@ -11,6 +11,7 @@ from radarsim.language import few, numeral, plural, tr
 from radarsim.report import panels, rare, text
 from radarsim.report import tables as common
 from radarsim.studies.discriminator.kernels.sums import LOCKS
+from radarsim.studies.discriminator.tables import last_locks
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,7 +45,7 @@ def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
 def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
     """Lock and accuracy of the first estimator at its last window, and the locks of the others."""
     first, *others = result.axes.filters
-    row = _last(made, result, first)
+    row = last_locks(made, result, first)
     k = int(row["k"])
     n = max(result.sums["locks"][0, k - 1, LOCKS.index("lock")], 1)  # of the plain bursts, where some are shifted
     said = {"estimator": first, "lock": _lock(row), "bursts": result.count}
@@ -90,7 +91,7 @@ def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
     if rare_event:
         words.append(before + _rare(common.groups(made["rare"], "case")[(result.name,)]))
     if others:
-        locks = ", ".join(f"{name} {_lock(_last(made, result, name))}" for name in others)
+        locks = ", ".join(f"{name} {_lock(last_locks(made, result, name))}" for name in others)
         words.append(before + tr("the others lock in: {locks}.", locks=locks))
     return words
 
@@ -98,7 +99,7 @@ def _of_one(result: CaseResult, made: Mapping, before: str) -> list[str]:
 def _over(results: Sequence[CaseResult], made: Mapping, name: str) -> str:
     """The least and the largest lock of an estimator among swept cases."""
     found = [result for result in results if name in result.axes.filters]
-    rows = {result.name: _last(made, result, name) for result in found}
+    rows = {result.name: last_locks(made, result, name) for result in found}
     found.sort(key=lambda result: rows[result.name]["lock_rate"])
     ends = (found[0], found[-1])
     least, most = (f"{_lock(rows[result.name])} ({panels.plain(panels.swept(result))})" for result in ends)
@@ -111,12 +112,6 @@ def _over(results: Sequence[CaseResult], made: Mapping, name: str) -> str:
         most=most,
         realisations=panels.realisations(found),
     )
-
-
-def _last(made: Mapping, result: CaseResult, name: str) -> "pd.Series":
-    """An estimator's row of locks at its last window."""
-    locks = made["locks"]
-    return locks[(locks["case"] == result.name) & (locks["filter"] == name)].iloc[-1]
 
 
 def _lock(row: "pd.Series") -> str:

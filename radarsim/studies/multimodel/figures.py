@@ -260,7 +260,7 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
 def families(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
     """σ of the height by family and merging rule, a map for each stage; needs at least two of each."""
     drawn = []
-    rows = common.groups(made["stages"][made["stages"]["component"] == "y"], "case", "stage")
+    rows = common.groups(common.where(made["stages"], component="y"), "case", "stage")
     for result in results:
         found = {
             (options.family, options.merge): name
@@ -294,8 +294,7 @@ def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
         return None
     result = results[0]
     operations = common.groups(made["operations"], "case", "stage", "filter")
-    rows = made["stages"]
-    rows = rows[(rows["case"] == result.name) & (rows["component"] == "y")]
+    rows = common.where(made["stages"], case=result.name, component="y")
     drawn = []
     most = made["operations"].loc[made["operations"]["case"] == result.name, "operations"].max()
     styles = dict(zip(result.axes.filters, _styles(result), strict=True))

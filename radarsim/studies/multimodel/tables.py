@@ -150,10 +150,10 @@ def cost(made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.Data
     measured = run.get("seconds_per_update")
     if not measured:
         return None
-    counted = made["operations"][made["operations"]["stage"] == "whole"]
+    counted = common.where(made["operations"], stage="whole")
     table = counted[["case", "filter", "family", "merge", "models", "operations"]].reset_index(drop=True)
     table["measured, ns"] = [1e9 * measured[c][f] for c, f in zip(table["case"], table["filter"], strict=True)]
-    height = made["stages"][made["stages"]["component"] == "y"]
+    height = common.where(made["stages"], component="y")
     wide = height.pivot(index=["case", "filter"], columns="stage", values="sigma")
     stages = list(dict.fromkeys(height["stage"]))
     wide = wide[stages].rename(columns={stage: f"σ of y, {stage}, m" for stage in stages})

@@ -7,6 +7,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, numeral, plural, term, tr
 from radarsim.report import panels, text
+from radarsim.report import tables as common
 
 
 def question(experiment: Experiment) -> str:
@@ -34,8 +35,7 @@ def answer(results: Sequence[CaseResult], made: Mapping) -> list[str]:
 
 def _least(result: CaseResult, made: Mapping, component: str, quantity: str) -> str:
     """The filter of the least σ in each stage, with the interval."""
-    rows: Any = made["stages"]
-    rows = rows[(rows["case"] == result.name) & (rows["component"] == component)]
+    rows: Any = common.where(made["stages"], case=result.name, component=component)
     parts = []
     for stage, own in rows.groupby("stage", sort=False):
         best = own.loc[own["sigma"].idxmin()]

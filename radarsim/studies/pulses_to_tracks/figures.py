@@ -104,7 +104,7 @@ def _threshold_panels(
 
 def _locked(result: Result, locks: "pd.DataFrame", name: str) -> tuple[float, float, float]:
     """The least share of locks over the scans, with its interval."""
-    rows = locks[(locks["case"] == result.name) & (locks["filter"] == name)]
+    rows = common.where(locks, case=result.name, filter=name)
     row = rows.iloc[int(rows["lock_rate"].to_numpy().argmin())]
     return float(row["lock_rate"]), float(row["lock_lo"]), float(row["lock_hi"])
 
@@ -116,7 +116,7 @@ def _line(result: Result, name: str, rows: "pd.DataFrame", columns: Sequence[str
 
 def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """Share of bursts that locked against time, a line for each estimator."""
-    rows = common.groups(made["locks"][made["locks"]["case"] == result.name], "filter")
+    rows = common.groups(common.where(made["locks"], case=result.name), "filter")
     marks = []
     ideal = {one.name for one in result.spec.filters if one.estimator == "fisher_bound"}
     for (name,), own in rows.items():
@@ -128,15 +128,14 @@ def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
 
 def folds_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """How often the best hypothesis has no wrong fold against time, a line for each filter that keeps several."""
-    rows = common.groups(made["folds"][made["folds"]["case"] == result.name], "filter")
+    rows = common.groups(common.where(made["folds"], case=result.name), "filter")
     marks = [_line(result, name, own, ("t_s", "right", "right_lo", "right_hi")) for (name,), own in rows.items()]
     return Panel(panels.time_axis(), Axis(tr("P(no wrong fold)"), limits=(0, 1)), tuple(marks), _title(result))
 
 
 def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """Errors of the measured velocity of all bursts against time, and the Fisher bound."""
-    table = made["estimates"]
-    rows = common.groups(table[(table["case"] == result.name) & (table["component"] == "Vr")], "filter")
+    rows = common.groups(common.where(made["estimates"], case=result.name, component="Vr"), "filter")
     columns = ("t_s", "sigma_all", "sigma_all_lo", "sigma_all_hi")
     marks = [_line(result, name, own, columns) for (name,), own in rows.items()]
     if rows:
@@ -147,8 +146,7 @@ def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
 
 def losses_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
     """σ of the range at the last scan by the scans since a burst was lost, a line for each filter that lost some."""
-    table = made["losses"]
-    own = table[(table["case"] == result.name) & (table["component"] == "r") & (table["k"] == result.axes.k[-1])]
+    own = common.where(made["losses"], case=result.name, component="r", k=result.axes.k[-1])
     marks = []
     for (name,), rows in common.groups(own, "filter").items():
         rows = rows[rows["n"] >= FEW]

@@ -8,6 +8,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.language import listed, tr
 from radarsim.report import panels, text
+from radarsim.report import tables as common
 from radarsim.studies.pulses_to_tracks.tables import Result
 
 if TYPE_CHECKING:
@@ -70,9 +71,7 @@ def _sentences(result: Result, made: "Mapping[str, pd.DataFrame]") -> list[str]:
 
 def _filter(result: Result, made: "Mapping[str, pd.DataFrame]", name: str) -> str:
     """Share of bursts that locked over all scans, and σ of the range at the last scan over its idealisation's."""
-    locks, ideal = (
-        made[t][(made[t]["case"] == result.name) & (made[t]["filter"] == name)] for t in ("locks", "idealisations")
-    )
+    locks, ideal = (common.where(made[t], case=result.name, filter=name) for t in ("locks", "idealisations"))
     worst = locks.iloc[int(locks["lock_rate"].to_numpy().argmin())]
     locked = tr(
         "at least {share} of the bursts of a scan lock",

@@ -257,7 +257,7 @@ def _broken_sentences(results: Sequence[Result], made: Made) -> list[str]:
     """Where a target breaks the model: the worst σ of the range over the run, and the largest bias, of each filter."""
     compared = {member.name for members in _tried_on(results).values() for member in members}
     broken = [result for result in results if not follows_the_model(result) and result.name not in compared]
-    rows = common.groups(made["curves"][made["curves"]["component"] == "r"], "case", "filter")
+    rows = common.groups(common.where(made["curves"], component="r"), "case", "filter")
     sentences = []
     for result in broken[:MOST_TOLD]:
         words = [f"{name} {_worst(rows[result.name, name])}" for name in result.axes.filters]
@@ -394,7 +394,7 @@ def _who(row: "pd.Series[Any]", labels: dict[str, str], several: bool) -> str:
 
 def _sigma_sentence(result: Result, curves: "pd.DataFrame") -> str:
     """For experiments without a second filter: σ of the range at the end."""
-    rows = curves[(curves["case"] == result.name) & (curves["component"] == "r")]
+    rows = common.where(curves, case=result.name, component="r")
     row = rows.iloc[-1]
     return tr(
         "{case}, {filter}: σ of the range at {t_s:g} s is {sigma}.",

@@ -126,7 +126,7 @@ def life_figure(results: Results, made: "Mapping[str, pd.DataFrame]") -> Figure 
     }
     drawn = [Panel(x, y, tuple(_lines(rows, column, value, ends)), direct=False) for ends, (value, y) in shown.items()]
     curves = made["curves"]
-    at_end = curves[(curves["component"] == "r") & (curves["k"] == results[0].axes.k[-1])]
+    at_end = common.where(curves, component="r", k=results[0].axes.k[-1])
     at_end = at_end.merge(tracking[["case", *KEYS]].drop_duplicates("case"), on="case", how="left")
     y = Axis(tr("$\\sigma$ of $r$ of kept tracks, m"), limits=(0, None))
     drawn.append(

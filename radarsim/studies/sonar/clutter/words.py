@@ -8,6 +8,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.language import numeral, tr
 from radarsim.report import panels, rare, text
+from radarsim.report import tables as common
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.config import Keys
 from radarsim.studies.sonar.clutter.tables import ENDED, FALSE
@@ -29,7 +30,7 @@ def answer(results: Sequence[CaseResult[ClutterAxes]], made: "Mapping[str, pd.Da
     sentences = []
     shown, others = panels.reported(results, 2)
     for result in shown:
-        rows = made["tracking"][made["tracking"]["case"] == result.name]
+        rows = common.where(made["tracking"], case=result.name)
         trackers = "; ".join(_of_tracker(row) for _, row in rows.iterrows())
         sentences.append(panels.at_its_place(result, f"{trackers}."))
         if result.spec.rare is not None:

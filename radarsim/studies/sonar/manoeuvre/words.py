@@ -67,7 +67,7 @@ def _first_order(made: "Mapping[str, pd.DataFrame]") -> list[str]:
         return []
     rows = made["uses"]
     first = rows.iloc[0]
-    rows = rows[(rows["case"] == first["case"]) & (rows["filter"] == first["filter"])]
+    rows = common.where(rows, case=first["case"], filter=first["filter"])
     rows = rows[rows["k"] == rows["k"].max()]
     ratios = []
     for row in rows.itertuples():

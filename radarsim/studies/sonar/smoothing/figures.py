@@ -74,7 +74,7 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
 def gains_figure(table: "pd.DataFrame") -> Figure:
     """A_n and B_n as measured and by the closed forms."""
     first = table.iloc[0]
-    rows = table[(table["filter"] == first["filter"]) & (table["component"] == first["component"])]
+    rows = common.where(table, filter=first["filter"], component=first["component"])
     marks = [
         panels.line(rows, ("plots", key, f"{key}_lo", f"{key}_hi", f"{key}_formula"), f"${key}_n$", n)
         for n, key in enumerate(("A", "B"))
@@ -103,7 +103,7 @@ def believed_figure(
     sigma = cases[0].axes.sigma[0]
     last, component = int(cases[0].axes.k[-1]), cases[0].axes.components[0][0]
     true_rows, consistency_rows = (
-        table[(table["k"] == last) & (table["component"] == component)].set_index(["case", "filter"])
+        common.where(table, k=last, component=component).set_index(["case", "filter"])
         for table in (believed, consistency)
     )
     left: list[Mark] = []

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from radarsim.engine.results import CaseResult
 from radarsim.language import few, tr
 from radarsim.report import panels, text
+from radarsim.report import tables as common
 from radarsim.studies.sonar.axes import SonarAxes
 from radarsim.studies.sonar.config import Keys, correlation_of
 from radarsim.studies.sonar.figures import QUANTITIES
@@ -38,7 +39,7 @@ def answer(results: Sequence[CaseResult[SonarAxes]], made: "Mapping[str, pd.Data
 def _best(result: CaseResult[SonarAxes], curves: "pd.DataFrame") -> str:
     """The filters with the least and the largest σ at the end of a case."""
     first = result.axes.components[0][0]
-    rows = curves[(curves["case"] == result.name) & (curves["component"] == first)]
+    rows = common.where(curves, case=result.name, component=first)
     last = rows[rows["k"] == rows["k"].max()]
     # By exact values where all are known, so that filters of equal accuracy are not ranked by their noise.
     order = last["exact_sigma"].round(9) if last["exact_sigma"].notna().all() else last["sigma"]
