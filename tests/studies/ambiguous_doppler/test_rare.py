@@ -331,7 +331,7 @@ def result_of(n, *others, **keys):
 def test_tables_tell_the_rate_and_how_well_it_is_known():
     result = result_of(6000, NEAREST | {"manoeuvre_variance": 1e-3})
     table = result.tables["rare"]
-    assert list(table.columns[: len(report.COLUMNS)]) == list(report.COLUMNS)
+    assert list(table.columns[6:13]) == ["n", "rate", "rate_lo", "rate_hi", "events", "n_eff", "variance_factor"]
     row, sums = table.iloc[0], result.cases[0].sums
     weight, square, number, _ = sums["events"][0, -1, kernels.WRONG]
     assert row["rate"] == weight / 6000

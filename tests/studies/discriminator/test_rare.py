@@ -273,7 +273,7 @@ def result_of(n, *estimators, **other):
 def test_tables_tell_the_rate_and_how_well_it_is_known():
     result = result_of(3000, RARELY, {"name": "wide", "first_windows": 1})
     table = result.tables["rare"]
-    assert list(table.columns[: len(report.COLUMNS)]) == list(report.COLUMNS)
+    assert list(table.columns[6:13]) == ["n", "rate", "rate_lo", "rate_hi", "events", "n_eff", "variance_factor"]
     row = table.iloc[0]
     sums = result.cases[0].sums
     last = int(row["k"]) - 1
