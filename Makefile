@@ -16,6 +16,8 @@ unexport PYTHONDONTWRITEBYTECODE
 
 run: $(VENV)/installed
 	$(RADARSIM) run configs/rls2.yaml
+	@# Once after an installation, in the background: no later first run has to compile.
+	@test $(VENV)/compiled -nt $(VENV)/installed || { touch $(VENV)/compiled; nohup nice $(RADARSIM) compile > /dev/null 2>&1 & }
 
 # A process for each processor, at most eight; what measures memory or sends signals runs after them, alone. JOBS=0: one after another.
 JOBS ?= logical

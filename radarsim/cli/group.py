@@ -25,7 +25,7 @@ SECTIONS = {
     "Read": ("report", "compare", "claims", "readings", "chart"),
     "Design": ("solve", "sensitivity"),
     "Own data": ("new", "import", "simulate", "track", "fit", "new-study"),
-    "Maintenance": ("list", "schema", "doctor", "clean"),
+    "Maintenance": ("list", "schema", "compile", "doctor", "clean"),
 }
 ORDER = tuple(name for names in SECTIONS.values() for name in names)
 PATIENCE_S = 1.0  # from a signal to the end of whatever a command is doing

@@ -1,6 +1,7 @@
 """The cache of compiled kernels: damage and bad disks are misses, reported once; one study's edit leaves the others."""
 
 import errno
+import json
 import os
 import pickle
 import shutil
@@ -190,3 +191,22 @@ def test_the_command_goes_on_and_says_so_in_one_line(tmp_path):
     assert len(lines) == len(done.stderr.splitlines()) == 1, done.stderr
     assert (tmp_path / "range_doppler" / "run.json").read_text().count("kernel cache: ") == 1
     assert (tmp_path / "range_doppler" / "curves.csv").read_bytes() == selftest.tables("range_doppler")["curves"]
+
+
+def test_what_is_compiled_beforehand_is_not_compiled_by_a_run(tmp_path):
+    """As after an installation: an empty cache, the command, then a run of another process."""
+    environment = os.environ | {"RADARSIM_CACHE_DIR": str(tmp_path / "cache")}
+
+    def command(*words):
+        program = [sys.executable, "-m", "radarsim", *words]
+        return subprocess.run(program, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+
+    (first,) = json.loads(command("compile", "rls3", "--json"))
+    kept = {path: path.stat().st_mtime_ns for path in tmp_path.glob("cache/*/*.kernel")}
+    assert kept
+    command("run", "rls3", "-n", "5000", "--no-figures", "--out", str(tmp_path))
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("cache/*/*.kernel")} == kept
+    (again,) = json.loads(command("compile", "rls3", "--json"))
+    assert again["config"] == "rls3"
+    assert again["seconds"] < 0.5 * first["seconds"]
+    assert command("compile", "rls3").startswith("rls3  ")
