@@ -194,7 +194,7 @@ def tested(tree: Path, options: Iterable[str], limit_s: float) -> tuple[int | No
     Machine code lies in a cache of the copy's own, by what the sources hold: that of other kernels is used again.
     """
     own = {"PYTHONPATH": str(tree), "RADARSIM_CACHE_DIR": str(tree / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *options]
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", f"--rootdir={tree}", *options]
     with tempfile.TemporaryFile("w+") as output:
         begun = subprocess.Popen(
             command, cwd=tree, env=os.environ | own, stdout=output, stderr=output, start_new_session=True
