@@ -47,6 +47,7 @@ def put(pointer, row, value):
 
 
 def total(x):
+    x = np.broadcast_to(x, WIDTH)
     while len(x) > 1:
         x = x[: len(x) // 2] + x[len(x) // 2 :]
     return x[0]
@@ -60,7 +61,7 @@ def add_totals(pointer, number, *values):
 LANES = {
     "where_greater": lambda x, y, yes, no: np.where(x > y, yes, no),
     "any_greater": lambda x, y: bool(np.any(x > y)),
-    "full": lambda number: np.full(WIDTH, float(number)),
+    "full": float,  # formulas are called by NumPy too, with arrays of other sizes
     "root": np.sqrt,
     "nearest": np.rint,
     "power_of_two": lambda x: np.ldexp(1.0, x.astype(int)),
