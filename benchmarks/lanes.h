@@ -31,19 +31,18 @@ IN double total(v8 x) { return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) 
 IN u8 rotated(u8 x, int n) { return (x << n) | (x >> (64 - n)); }
 #define ROUND(n) a += b, b = rotated(b, n) ^ a
 #define ROUNDS(i, j, k, l, s, t, add) ROUND(i), ROUND(j), ROUND(k), ROUND(l), a += s, b += t + add
-IN void threefry_pairs(u8 a, u8 pair, uint64_t k0, uint64_t k1, u8 *x, u8 *y) {
+IN void threefry_calls(u8 a, u8 call, uint64_t k0, uint64_t k1, u8 *x, u8 *y) {
     uint64_t k2 = 0x1BD11BDAA9FC1A22u ^ k0 ^ k1;
-    u8 b = pair + k1;
+    u8 b = call + k1;
     a += k0;
     ROUNDS(16, 42, 12, 31, k1, k2, 1);
     ROUNDS(16, 32, 24, 21, k2, k0, 2);
     ROUNDS(16, 42, 12, 31, k0, k1, 3);
-    ROUNDS(16, 32, 24, 21, k1, k2, 4);
-    ROUNDS(16, 42, 12, 31, k2, k0, 5);
+    ROUND(16);
     *x = a, *y = b;
 }
-IN void threefry(u8 a, uint64_t pair, uint64_t k0, uint64_t k1, u8 *x, u8 *y) {
-    threefry_pairs(a, (u8){0} + pair, k0, k1, x, y);
+IN void threefry(u8 a, uint64_t call, uint64_t k0, uint64_t k1, u8 *x, u8 *y) {
+    threefry_calls(a, (u8){0} + call, k0, k1, x, y);
 }
 IN v8 logarithm(v8 x) {
     i8 b = (i8)x, e = (b - 0x3FE6A09E667F3BCD) >> 52;
@@ -56,7 +55,8 @@ IN v8 logarithm(v8 x) {
 IN v8 uniform(u8 x) { return __builtin_convertvector(x >> 12, v8) * 0x1p-52 + 0x1p-53; }
 IN void normals(u8 realisation, uint64_t pair, const uint64_t *key, v8 *one, v8 *two) {
     u8 x, y;
-    threefry(realisation, pair, key[0], key[1], &x, &y);
+    threefry(realisation, pair >> 1, key[0], key[1], &x, &y);
+    x = pair & 1 ? y : x, y = x * 0x9E3779B97F4A7C15u;
     v8 r = root(-2.0 * logarithm(__builtin_convertvector(x, v8) * 0x1p-64 + 0x1p-65));
     v8 t = __builtin_convertvector((i8)y, v8) * (M_PI / 2 * 0x1p-64), q = t * t;
     v8 s = q * 1.589623019235577e-10 - 2.505074776349835e-08, c = q * 2.0645119015439733e-09 - 2.7555523111876013e-07;

@@ -331,7 +331,7 @@ IN void numbers(const Tracker *t, const uint64_t *key, Strip *s) {
     for (int m = 0; m < s->cells; m += 8) {
         u8 a, pair, x, y;
         memcpy(&a, s->realisation + m, 64), memcpy(&pair, s->number + m, 64);
-        threefry_pairs(a, pair << 12, key[0], key[1], &x, &y);
+        threefry_calls(a, pair << 12, key[0], key[1], &x, &y);
         memcpy(s->x + m, &x, 64), memcpy(s->y + m, &y, 64);
         v8 u = uniform(x), many = full(0), n = full(0);
         for (int j = 0; j < t->shares - 1; j++) {
@@ -352,7 +352,7 @@ IN void further(const uint64_t *key, Strip *s) {
     for (int i = 0; i < n; i += 8) {
         u8 a, pair, x, y;
         memcpy(&a, s->which + i, 64), memcpy(&pair, s->again + i, 64);
-        threefry_pairs(a, pair, key[0], key[1], &x, &y);
+        threefry_calls(a, pair, key[0], key[1], &x, &y);
         for (int l = 0; l < 8; l++) s->more[2 * (i + l)] = x[l], s->more[2 * (i + l) + 1] = y[l];
     }
 }

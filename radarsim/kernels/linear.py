@@ -82,17 +82,21 @@ def shapes(filters: int, scans: int) -> Mapping[str, tuple[int, ...]]:
 
 
 @part
-def fill_plots(key, first, scan, mean, sigma, z, w):
+def fill_plots(key, first, scan, mean, sigma, next_word, z, w):
     """Plots of one scan: values z (n,) and rates w (n,) of realisations first, first + 1, …
 
-    mean (>= 2,) holds the true ones, sigma (2,) their standard deviations. The first normal of draw pair `scan` goes to
-    the value, the second to the rate, whether or not any filter observes it.
+    mean (>= 2,) holds the true ones, sigma (2,) their standard deviations. The first normal of pair `scan` goes to the
+    value, the second to the rate, whether or not any filter observes it. Words come two at a time: those of the scan
+    after an even one are kept in next_word (n,) uint64, so scans are taken in their order.
     """
     mean_z, mean_w, sigma_z, sigma_w = mean[0], mean[1], sigma[0], sigma[1]
-    x, y = z.view(np.uint64), w.view(np.uint64)
-    fill_words(key, first, scan, x, y)
+    word = z.view(np.uint64)
+    if scan % 2 == 0:
+        fill_words(key, first, scan // 2, word, next_word)
+    else:
+        word[:] = next_word
     for i in range(z.size):
-        a, b = normal_pair(x[i], y[i])
+        a, b = normal_pair(word[i])
         z[i], w[i] = mean_z + sigma_z * a, mean_w + sigma_w * b
 
 
@@ -205,12 +209,13 @@ def add_block(x, first, count, problem, sums):
     # Unpacked once: an array taken out of a record counts a reference, at every scan a tenth of the whole time.
     key, truth, sigma, dt, observes, start, weights, gains, baseline = problem
     filters, scans = gains.shape[0], gains.shape[1]
+    z, w, next_word = x[filters, 0], x[filters, 1], np.empty(CHUNK, np.uint64)
     for done in range(0, count, CHUNK):
         x[:] = 0.0
         # A partial chunk is computed whole and summed in part, so each realisation goes through the same instructions.
         n = min(CHUNK, count - done)
         for k in range(scans):
-            fill_plots(key, first + done, k, truth[k], sigma[k], x[filters, 0], x[filters, 1])
+            fill_plots(key, first + done, k, truth[k], sigma[k], next_word, z, w)
             advance(x, k, dt[k], observes, start, weights, gains)
             add_sums(x, n, k, truth[k], observes, start, baseline, sums)
 
@@ -218,10 +223,11 @@ def add_block(x, first, count, problem, sums):
 @kernel
 def fill_simulated(x, first, problem, plots):
     """`simulate_plots` into plots (n, K, 2), with a work array x (2, CHUNK)."""
+    next_word = np.empty(CHUNK, np.uint64)
     for done in range(0, plots.shape[0], CHUNK):
         n = min(CHUNK, plots.shape[0] - done)
         for k in range(plots.shape[1]):
-            fill_plots(problem.key, first + done, k, problem.truth[k], problem.sigma[k], x[0], x[1])
+            fill_plots(problem.key, first + done, k, problem.truth[k], problem.sigma[k], next_word, x[0], x[1])
             plots[done : done + n, k] = x[:, :n].T
 
 

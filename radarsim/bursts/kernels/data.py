@@ -30,16 +30,16 @@ CHUNK = 2048  # samples made at a time, so that noise is still in the first cach
 
 @kernel
 def fill_noise(k0, k1, realisation, first, row):
-    """Unit normals into row (n,): draw first + j makes the noise of element j and of the one half of them later."""
-    half = row.size // 2
-    for j in range(half):
+    """Unit normals into row (n,): call first + j makes those of element j and of the ones 1, 2, 3 quarters later."""
+    quarter = row.size // 4
+    for j in range(quarter):
         x, y = threefry(U(realisation), U(first + j), k0, k1)
-        a, b = normal_pair(x, y)
-        row[j] = a
-        row[j + half] = b
-    if row.size % 2:
-        x, y = threefry(U(realisation), U(first + half), k0, k1)
-        row[row.size - 1] = normal_pair(x, y)[0]
+        row[j], row[j + quarter] = normal_pair(x)
+        row[j + 2 * quarter], row[j + 3 * quarter] = normal_pair(y)
+    x, y = threefry(U(realisation), U(first + quarter), k0, k1)
+    rest = (*normal_pair(x), *normal_pair(y))
+    for j in range(4 * quarter, row.size):
+        row[j] = rest[j - 4 * quarter]
 
 
 @kernel

@@ -23,7 +23,7 @@ from radarsim.bursts.kernels.scoring import (
 )
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, any_greater, full, get, put, where_greater
-from radarsim.kernels.random import U, normal_pair, threefry
+from radarsim.kernels.random import normals
 
 LEAST_COHERENCE = 0.25  # taken into account; below it the main lobe is lost
 
@@ -245,8 +245,7 @@ def run_sequence(physics, edges, samples, sums, windows, options, state, errors)
 def draw_prior(key, realisation, sigma, state):
     """The truth and an error of standard deviations sigma (6,), in turns over the burst, into state.prior."""
     for pair in range(SIZE // 2):
-        x, y = threefry(U(realisation), U(pair), key[0], key[1])
-        a, b = normal_pair(x, y)
+        a, b = normals(key[0], key[1], realisation, pair)
         j = 2 * pair
         state.prior[j] = state.truth[j] + sigma[j] * a
         state.prior[j + 1] = state.truth[j + 1] + sigma[j + 1] * b

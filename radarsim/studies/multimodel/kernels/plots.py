@@ -21,7 +21,7 @@ import numpy as np
 from radarsim.kernels.algebra import dot
 from radarsim.kernels.compile import inline, kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, root, row, where_greater
-from radarsim.kernels.random import U, normal_pair, sine_cosine_polynomial, threefry, uniform
+from radarsim.kernels.random import U, fill_normal_strip, sine_cosine_polynomial, threefry, uniform
 from radarsim.studies.multimodel.kernels import records as rec
 
 STRIP = 16  # scans
@@ -47,10 +47,8 @@ def draw_strip(keys, first, strip, random):
 
     keys (2, 2): streams of the noise and of the detections.
     """
-    k0, k1 = keys[0, 0], keys[0, 1]
-    for n in range(NORMALS // 2 * WIDTH):
-        x, y = threefry(U(first) + U(n % WIDTH), U(strip * (NORMALS // 2)) + U(n // WIDTH), k0, k1)
-        random[n], random[n + NORMALS // 2 * WIDTH] = normal_pair(x, y)
+    size = NORMALS // 2 * WIDTH
+    fill_normal_strip(keys[0], first, strip * (NORMALS // 2), random[:size], random[size : 2 * size])
     k0, k1 = keys[1, 0], keys[1, 1]
     half = NORMALS * WIDTH + UNIFORMS // 2 * WIDTH
     for n in range(UNIFORMS // 2 * WIDTH):

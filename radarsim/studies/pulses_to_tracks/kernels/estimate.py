@@ -11,7 +11,7 @@ from radarsim.bursts.kernels.scoring import SIZE
 from radarsim.bursts.kernels.strip import evaluate, put_drawn, take_window
 from radarsim.kernels.compile import kernel, part
 from radarsim.kernels.lanes import WIDTH, address, full, get, put, rows
-from radarsim.kernels.random import LANE_BITS, U, normal_pair, threefry
+from radarsim.kernels.random import LANE_BITS, U, threefry, words_to_normals
 from radarsim.studies.pulses_to_tracks.kernels import records as rec
 from radarsim.studies.pulses_to_tracks.kernels.spectrum import highest_line
 
@@ -20,17 +20,16 @@ AT_ONCE = 64  # blocks whose normals are drawn before their sums are made: 32 Ki
 
 @part
 def draw_pairs(k0, k1, who, pair, a, b):
-    """Unit normals of the realisations who (8,) over draw pairs `pair`, `pair` + 1, … into flat a and b, eight a pair.
+    """Unit normals of the realisations who (8,) over pairs `pair`, `pair` + 1, …, both even, into flat a and b.
 
-    Who is read and the pairs are counted so that all but the first loop run in vector registers: five times faster.
+    As `fill_normal_strip`. Who is read so that all but the first loop run in vector registers: five times faster.
     """
     x, y = a.view(np.uint64), b.view(np.uint64)
-    for i in range(a.size):
+    for i in range(a.size // 2):
         x[i] = U(who[i & (WIDTH - 1)])
-    for i in range(a.size):
-        x[i], y[i] = threefry(x[i], pair + (U(i) >> U(LANE_BITS)), k0, k1)
-    for i in range(a.size):
-        a[i], b[i] = normal_pair(x[i], y[i])
+    for i in range(a.size // 2):
+        x[i], y[i] = threefry(x[i], (pair >> U(1)) + (U(i) >> U(LANE_BITS)), k0, k1)
+    words_to_normals(a, b)
 
 
 @kernel
@@ -41,7 +40,7 @@ def draw_sums(world, k, who, a, b, drawn):
     for begin in range(0, blocks, AT_ONCE):
         end = min(begin + AT_ONCE, blocks)
         pair = U(2 * (blocks * k + begin))
-        draw_pairs(k0, k1, who, pair, a[: 2 * WIDTH * (end - begin)], b)
+        draw_pairs(k0, k1, who, pair, a[: 2 * WIDTH * (end - begin)], b[: 2 * WIDTH * (end - begin)])
         put_drawn(world.mean[begin:end], factor[begin:end], a, b, drawn[4 * WIDTH * begin :])
 
 

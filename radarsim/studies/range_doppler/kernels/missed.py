@@ -132,7 +132,7 @@ def add_block(made, first, count, problem, found):
     keys, truth, sigma, bias, sigma_bias, sigma_flight, flight, detection, dt = problem[:9]
     observes, start, Q, baseline = problem[9:]
     filters, scans, R, at, sums = observes.size, truth.shape[0], sigma * sigma, places(made), address(found)
-    z, w, detected, other = made.plots[0], made.plots[1], made.detected, made.other
+    detected, other, next_word = made.detected, made.other, np.empty(CHUNK, np.uint64)
     running = np.zeros(filters, dtype=np.bool_)  # filters that have started in every realisation of the chunk
     for done in range(0, count, CHUNK):
         # A partial chunk is computed whole, with no plots beyond its end, so each realisation goes through the same
@@ -144,7 +144,7 @@ def add_block(made, first, count, problem, found):
         for k in range(scans):
             if drawn and flight.shape[0] > 0:
                 displace(made, flight[k], truth[k], k * dt)
-            fill_plots(keys[0], first + done, k, truth[k], sigma, z, w)
+            fill_plots(keys[0], first + done, k, truth[k], sigma, next_word, made.plots[0], made.plots[1])
             if displaced:
                 displace_plots(at)
             if detection < 1.0 and k % 2 == 0:
@@ -167,10 +167,11 @@ def fill_simulated(made, first, problem, plots, detected, truth):
     """Realisation `first`: plots (K, 2), detected (K,) 1 where there is one, truth (K, 3); made: work arrays."""
     spread = problem.sigma_bias, problem.sigma_flight
     drawn, at = begin_chunk(problem.keys, first, made, problem.bias, *spread), places(made)
+    next_word = np.empty(CHUNK, np.uint64)
     for k in range(plots.shape[0]):
         if drawn and problem.flight.shape[0] > 0:
             displace(made, problem.flight[k], problem.truth[k], k * problem.dt)
-        fill_plots(problem.keys[0], first, k, problem.truth[k], problem.sigma, made.plots[0], made.plots[1])
+        fill_plots(problem.keys[0], first, k, problem.truth[k], problem.sigma, next_word, made.plots[0], made.plots[1])
         displace_plots(at)
         if problem.detection < 1.0 and k % 2 == 0:
             fill_uniform_pairs(problem.keys[1], first, k // 2, made.detected, made.other)
