@@ -113,9 +113,9 @@ def uniform(word):
 def normal_pair(word):
     """Two independent unit normals of a word (Box-Muller).
 
-    The word over 2**64 gives the radius, GOLDEN times it the angle. The 2**64 points of the two are a lattice of the unit
-    square with the most even distances: whatever happens with probability p, such as a tail, has some p 2**64 of them.
-    The largest radius is 9.5. A rounding up to 1 is the radius 0.
+    The word over 2**64 gives the radius, GOLDEN times it the angle. The 2**64 points of the two are the most even
+    lattice of the unit square: what happens with probability p, such as a tail, has some p 2**64 of them. The largest
+    radius is 9.5. A rounding up to 1 is the radius 0.
     """
     radius = math.sqrt(-2.0 * log_polynomial(np.float64(word) * 2.0**-64 + 2.0**-65))
     # y as a signed number is the angle from -pi/4 to pi/4; its two lowest bits choose the quadrant.
