@@ -138,6 +138,27 @@ def test_tails(sample, sigmas):
         assert stats.poisson.cdf(count, expected) > 1e-6
 
 
+@numba.njit
+def beyond(sigmas, cells, words):
+    """How many of both normals lie beyond, of so many words spread over each of the first cells of 2**24 words."""
+    found, step = np.zeros(2), 2**24 // words
+    for cell in range(cells):
+        for j in range(words):
+            within = ((cell * 0x9E3779B1 + j * 0x85EBCA6B) >> 13) % step
+            a, b = kernels.normal_pair(np.uint64(cell) << np.uint64(24) | np.uint64(j * step + within))
+            found[0] += a > sigmas
+            found[1] += b > sigmas
+    return found
+
+
+@pytest.mark.parametrize(("sigmas", "words"), [(6.0, 2**11), (7.0, 2**18), (8.0, 2**22)])
+def test_tails_of_all_words_are_those_of_a_normal(sigmas, words):
+    """Of the 2**64 words those whose radius reaches so far; what is sampled of them errs by 1 / sqrt(found)."""
+    found = beyond(sigmas, int(2**40 * math.exp(-(sigmas**2) / 2)) + 2, words)
+    expected = special.ndtr(-sigmas) * 2**40 * words
+    assert found == pytest.approx(expected, abs=Z * math.sqrt(expected))
+
+
 def assert_independent(a, b):
     """Correlations of the numbers, of their squares and of their signs: all within Z / sqrt(n)."""
     for f in (lambda x: x, lambda x: (x * x - 1) / math.sqrt(2), np.sign):
