@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, GetJsonSchemaHandler
 
@@ -18,7 +18,6 @@ from radarsim.config.fields import (
     Number,
     Positive,
     Study,
-    Whole,
     at,
     cross_check,
     key,
@@ -119,23 +118,9 @@ def polynomial_reach_m(coefficients: tuple[float, ...], t: float) -> float:
 
 
 class Starting(Model):
-    """What targets that break the model share: a moment, in seconds or as a scan, at which they do."""
+    """What targets that break the model share: a moment at which they do."""
 
-    start_s: NonNegative | None = key("start time", "time from the first plot at which it begins, s", None)
-    start_scan: Annotated[int, Whole(1, MOST_SCANS)] | None = key(
-        "scan of the start", "scan, counted from 1, at which it begins; in place of start_s", None
-    )
-
-    @cross_check
-    def _one_start(self) -> Iterator[At]:
-        if (self.start_s is None) == (self.start_scan is None):
-            yield at("start_s", "give either start_s or start_scan")
-
-    def timed(self, period: float) -> Self:
-        """The same target with its start in seconds."""
-        if self.start_scan is None:
-            return self
-        return self.model_copy(update={"start_s": (self.start_scan - 1) * period, "start_scan": None})
+    start_s: NonNegative = key("start time", "time from the first plot at which it begins, s")
 
 
 class AccelerationStart(Starting):
@@ -175,7 +160,6 @@ class Turn(Starting):
 
     def closest_m(self, t: float) -> float:
         """The least distance from the radar up to a time t (s): of two straight legs and of the arc between them."""
-        assert self.start_s is not None  # timed
         begin, end = min(self.start_s, t), min(self.start_s + self.duration_s, t)
         rate = self.acceleration_g * STANDARD_GRAVITY_MPS2 / self.speed_mps
         x, y, heading = self.range_m, 0.0, self.aspect_rad
@@ -240,5 +224,5 @@ def within_reach(target: Any, radar: Radar, last: float) -> Iterator[At]:
     if target.reach_m(last) > farthest:
         so_far = f"must stay within {short(float(f'{farthest:.2g}'))} m of the radar up to the last plot"
         yield at("target", f"{so_far}, at {short(last)} s: beyond, double precision does not resolve its accuracies")
-    elif isinstance(target, Turn) and target.timed(radar.scan_period_s).closest_m(last) < NEAREST_M:
+    elif isinstance(target, Turn) and target.closest_m(last) < NEAREST_M:
         yield at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")

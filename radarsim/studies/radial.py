@@ -18,28 +18,21 @@ def truth(target: Any, t: np.ndarray) -> np.ndarray:
         case "polynomial":
             return targets.polynomial(target.coefficients, t)
         case "acceleration_start":
-            return targets.acceleration_start(target.coefficients, target.acceleration_mps2, begun(target.start_s), t)
+            return targets.acceleration_start(target.coefficients, target.acceleration_mps2, target.start_s, t)
         case "acceleration_pulse":
             size = target.acceleration_g * STANDARD_GRAVITY_MPS2
             return targets.acceleration_pulse(target.coefficients, size, target.start_s, target.duration_s, t)
         case "jerk_pulse":
-            start = begun(target.start_s)
+            start = target.start_s
             return targets.jerk_pulse(target.coefficients, target.jerk_mps3, start, target.duration_s, t)
         case "turn":
             leg = target.range_m, target.speed_mps, target.aspect_rad
-            return targets.turn(*leg, target.acceleration_g, begun(target.start_s), target.duration_s, t)
+            return targets.turn(*leg, target.acceleration_g, target.start_s, target.duration_s, t)
         case "fly_by":
             return targets.fly_by(target.distance_m, target.speed_mps, target.start_range_m, t)
         case "recorded":
             return recorded_flight(target.file, t)
     raise ValueError(f"no such target: {target.kind}")
-
-
-def begun(start_s: float | None) -> float:
-    """The start of a manoeuvre that a checked config has in seconds, s."""
-    if start_s is None:
-        raise ValueError("its start is no time yet")
-    return start_s
 
 
 def recorded_flight(file: str, t: np.ndarray) -> np.ndarray:

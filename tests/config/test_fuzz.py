@@ -30,7 +30,7 @@ VALUES = st.recursive(
 )
 WORDED = """
 study include sweep realisations seed figures radar radar.name radar.band radar.sigma_range_m target target.kind
-target.aspect_deg target.aspect_rad target.range_m target.start_scan filters filters.0 filters.0.name
+target.aspect_deg target.aspect_rad target.range_m target.start_s filters filters.0 filters.0.name
 filters.0.observes filters.0.initial_scans manoeuvre_variance baseline scans sweep.scans figures.a include.0
 """
 KEYS = st.sampled_from(WORDED.split())

@@ -38,7 +38,6 @@ from radarsim.config.radial import (
     FlyBy,
     Polynomial,
     Recorded,
-    Starting,
     Turn,
     polynomial_reach_m,
 )
@@ -296,9 +295,7 @@ class Keys(Study):
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
-        """The target with its start in seconds, or its spreads written out."""
-        if isinstance(self.target, Starting):
-            return self.model_copy(update={"target": self.target.timed(self.radar.scan_period_s)})
+        """The target with its spreads written out."""
         if not isinstance(self.target, RandomPolynomial):
             return self
         own = {

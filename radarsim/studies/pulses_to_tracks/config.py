@@ -35,7 +35,6 @@ from radarsim.config.radial import (
     Lasting,
     Polynomial,
     Recorded,
-    Starting,
     Turn,
 )
 from radarsim.physics.bands import Band
@@ -305,9 +304,8 @@ class Keys(Lasting):
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
-        target = self.target.timed(self.radar.scan_period_s) if isinstance(self.target, Starting) else self.target
         burst = self.burst.model_copy(update={"pulses": self.pulses, "pulses_per_second": None})
-        update = {"target": target, "burst": burst, "scans": self.plots, "duration_s": None}
+        update = {"burst": burst, "scans": self.plots, "duration_s": None}
         return self.model_copy(update=update)
 
     @cross_check
@@ -358,7 +356,7 @@ class Keys(Lasting):
 
     @cross_check
     def _target_in_reach(self) -> Iterator[At]:
-        target = self.target.timed(self.radar.scan_period_s) if isinstance(self.target, Starting) else self.target
+        target: Any = self.target
         last = (self.plots - 1) * self.radar.scan_period_s
         if not math.isfinite(target.reach_m(last)) or target.reach_m(last) > 1e12:
             yield at("target", "must stay within 1e12 m of the radar up to the last scan")

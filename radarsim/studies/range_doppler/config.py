@@ -205,8 +205,7 @@ class Keys(Lasting):
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
-        target = self.target.timed(self.radar.scan_period_s) if isinstance(self.target, Starting) else self.target
-        return self.model_copy(update={"target": target, "scans": self.plots, "duration_s": None})
+        return self.model_copy(update={"scans": self.plots, "duration_s": None})
 
     @cross_check
     def _long_enough(self) -> Iterator[At]:

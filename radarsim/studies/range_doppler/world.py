@@ -13,7 +13,7 @@ from radarsim.config.experiment import Case
 from radarsim.errors import ConfigError
 from radarsim.physics import recorded, targets
 from radarsim.physics.motion import transition
-from radarsim.studies.radial import begun, checked_truth
+from radarsim.studies.radial import checked_truth
 from radarsim.studies.range_doppler.config import FlyBy, Flying, Keys, Recorded, Target, Turn
 
 APART = 6.0  # standard deviations of a drawn flight that its middle stays away from the radar
@@ -51,7 +51,7 @@ def flight(target: Target, t: np.ndarray) -> np.ndarray:
             return np.zeros((0, 9))
         case Turn():
             leg = target.range_m, target.speed_mps, target.aspect_rad
-            return targets.turn_in_space(*leg, target.acceleration_g, begun(target.start_s), target.duration_s, t)
+            return targets.turn_in_space(*leg, target.acceleration_g, target.start_s, target.duration_s, t)
         case FlyBy():
             return targets.fly_by_in_space(target.distance_m, target.speed_mps, target.start_range_m, t)
         case Recorded():

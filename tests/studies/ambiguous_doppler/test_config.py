@@ -71,7 +71,7 @@ def test_orders_need_to_be_combined():
         ("{kind: fly_by, distance_m: 8e3, speed_mps: 300, start_range_m: 7e3}",
          "target.start_range_m: must be >= distance_m, 8000"),
         ("{kind: acceleration_start, coefficients: [1e5], acceleration_mps2: 5}",
-         "target.start_s: give either start_s or start_scan"),
+         "target.start_s: required key is missing"),
         ("{kind: polynomial, coefficients: [1e5, 1e12]}", "target: must stay within 45e11 m of the radar"),
         ("{kind: random_polynomial, sigma_acceleration_mps2: 1e17}", "sigma_acceleration_mps2: must be <= 1000, got"),
         ("{kind: hovering}", "target.kind: must be one of polynomial, random_polynomial, acceleration_start, "

@@ -34,7 +34,7 @@ def test_range_only_and_oracle_are_exact(radar, target):
 TURN = {"kind": "turn", "range_m": 60e3, "speed_mps": 250.0, "aspect_deg": 180.0, "start_s": 40.0}
 TARGETS = {
     "turn": TURN | {"acceleration_g": 3.0, "duration_s": 20.0},
-    "brake": {"kind": "acceleration_start", "coefficients": [100e3, -250.0], "start_scan": 5, "acceleration_mps2": 5.0},
+    "brake": {"kind": "acceleration_start", "coefficients": [100e3, -250.0], "start_s": 40.0, "acceleration_mps2": 5.0},
     "fly-by": {"kind": "fly_by", "distance_m": 8e3, "speed_mps": 300.0, "start_range_m": 25e3},
     "recorded": {"kind": "recorded", "file": str(Path(__file__).parents[3] / "scenarios" / "recorded.csv")},
 }
