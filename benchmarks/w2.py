@@ -206,11 +206,7 @@ def main() -> None:
     arguments = parser.parse_args()
     if arguments.part:
         folder = w1.limit_folder(arguments.limit)
-        parts = {
-            "speed": lambda: measure_speed(folder),
-            "start": measure_start,
-            "experiment": measure_experiment,
-        }
+        parts = {"speed": lambda: measure_speed(folder), "start": measure_start, "experiment": measure_experiment}
         # common.py of the limit reads the command line
         sys.argv = sys.argv[:1]
         print(json.dumps(parts[arguments.part]()))

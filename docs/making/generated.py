@@ -6,10 +6,7 @@ from pathlib import Path
 from making import commands, modules
 
 MARK = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
-PARTS = {
-    "commands": commands.markdown,
-    "modules": modules.markdown,
-}
+PARTS = {"commands": commands.markdown, "modules": modules.markdown}
 
 
 def fill(app, name: str, source: list[str]) -> None:

@@ -67,10 +67,7 @@ def gates(results: Results) -> list[tuple]:
         wanted = {"filter": "PDA", "case": nearest["case"]}
         pda = rows(results, "sonar_clutter_gate", "tracking", **wanted).iloc[0]
         cells = (bounded(row, "life_s", "life") for row in (nearest, pda))
-        others = (
-            bounded(nearest, "time_to_confirm_s", "time"),
-            bounded(nearest, "false_tracks_per_hour", "false"),
-        )
+        others = (bounded(nearest, "time_to_confirm_s", "time"), bounded(nearest, "false_tracks_per_hour", "false"))
         settings = (f"{nearest['detection_probability']:g}", f"{nearest['gate_probability']:g}")
         made.append((*settings, *cells, *others))
     return made

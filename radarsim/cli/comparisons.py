@@ -10,12 +10,7 @@ from radarsim.cli import group
 @group.out_option
 @group.drawing_options
 @group.json_option
-def compare(
-    sources: tuple[str, ...],
-    out: str,
-    drawing: group.Drawing,
-    as_json: bool,
-) -> None:
+def compare(sources: tuple[str, ...], out: str, drawing: group.Drawing, as_json: bool) -> None:
     """Runs side by side on common axes: differences with intervals; computes nothing.
 
     Each of A, B, … is a config, whose stored result is read from DIR, or the folder of a result: two radars, two

@@ -145,11 +145,7 @@ def asked(kinds: "dict[str, str | None]", filter_name: str | None, at_s: float |
 @group.drawing_options
 @group.json_option
 def chart(
-    configs: tuple[str, ...],
-    overrides: tuple[str, ...],
-    out: str,
-    drawing: group.Drawing,
-    as_json: bool,
+    configs: tuple[str, ...], overrides: tuple[str, ...], out: str, drawing: group.Drawing, as_json: bool
 ) -> None:
     """What Doppler gains for every radar, and yours on it; simulates nothing.
 

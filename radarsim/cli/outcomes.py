@@ -121,13 +121,7 @@ def print_outlook(experiment: "Experiment", outlook: "Outlook") -> None:
     """What a run would do."""
     say(tr("{config}: valid", config=str(experiment.path or experiment.stem)))
     rows = [
-        (
-            case.name,
-            case.filters,
-            str(case.scans),
-            numeral(f"{case.realisations:,}"),
-            _seconds(case),
-        )
+        (case.name, case.filters, str(case.scans), numeral(f"{case.realisations:,}"), _seconds(case))
         for case in outlook.cases
     ]
     columns = ("case", "filters", "scans", "realisations", "one thread")

@@ -60,11 +60,7 @@ def noted(
 
 
 def _noted(
-    name: str,
-    table: "pd.DataFrame",
-    made: Mapping[str, "pd.DataFrame"],
-    results: Sequence[CaseResult],
-    exact: bool,
+    name: str, table: "pd.DataFrame", made: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult], exact: bool
 ) -> "pd.DataFrame":
     if not len(table) or "case" not in table or not any(str(column).endswith("_lo") for column in table):
         return table

@@ -148,12 +148,7 @@ def worst(result: CaseResult, table: Table, of: str = "sigma") -> Cell | None:
 
 
 def needed(
-    result: CaseResult,
-    percent: float,
-    table: Table,
-    of: str = "sigma",
-    most: int = MOST,
-    curves: Table | None = None,
+    result: CaseResult, percent: float, table: Table, of: str = "sigma", most: int = MOST, curves: Table | None = None
 ) -> int | None:
     """At which look a run of at most `most` likely ends, or of how many more it would; None if beyond all bounds.
 

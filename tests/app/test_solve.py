@@ -221,8 +221,7 @@ def test_a_key_that_moves_the_scans_is_said_not_to_be_paired():
 
 
 @pytest.mark.parametrize(
-    ("key", "quantity"),
-    [("radar.sigma_range_m", SEEN), ("radar.scan_period_s", Quantity("sigma", "r", "r", at_k=9))],
+    ("key", "quantity"), [("radar.sigma_range_m", SEEN), ("radar.scan_period_s", Quantity("sigma", "r", "r", at_k=9))]
 )
 def test_a_key_that_leaves_the_scans_is_paired(key, quantity):
     curve = Curve(Cases("rls2", ("duration_s=140",)), key, quantity, 1, None, 100)

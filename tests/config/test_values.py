@@ -90,10 +90,7 @@ def test_numpy_values_become_plain():
         (-math.inf, "config: a: must be a finite number, got -inf"),
         (10**400, "config: a: must be a finite number, got a number of more than 30 digits"),
         (None, "config: a: has no value"),
-        (
-            {1, 2},
-            "config: a: must be text, a number, true or false, a list or a mapping, got set",
-        ),
+        ({1, 2}, "config: a: must be text, a number, true or false, a list or a mapping, got set"),
         (1j, "config: a: must be text, a number, true or false, a list or a mapping, got complex"),
         (np.array([1.0, np.nan]), "config: a.1: must be a finite number, got nan"),
     ],

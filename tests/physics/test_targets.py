@@ -61,11 +61,7 @@ def test_transition_is_the_papers_matrix():
 def test_manoeuvre_covariance_is_the_papers_matrix():
     """Eq. (6), written out as printed."""
     dt, D = 5.0, 1e-3
-    M = [
-        [dt**6 / 36, dt**5 / 12, dt**4 / 6],
-        [dt**5 / 12, dt**4 / 4, dt**3 / 2],
-        [dt**4 / 6, dt**3 / 2, dt**2],
-    ]
+    M = [[dt**6 / 36, dt**5 / 12, dt**4 / 6], [dt**5 / 12, dt**4 / 4, dt**3 / 2], [dt**4 / 6, dt**3 / 2, dt**2]]
     np.testing.assert_allclose(manoeuvre_covariance(D, dt), np.array(M) * D, rtol=1e-14)
 
 

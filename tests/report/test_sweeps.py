@@ -198,5 +198,5 @@ def test_targets_that_are_swept_are_named_by_their_kind_and_what_sets_them_apart
 def test_panels_of_several_configs_that_would_be_called_the_same_are_told_by_their_config():
     result = experiment.run("ambiguous_stagger", realisations=8, figures=False)
     assert list(panels.by_panel(result.cases)) == [
-        *("ambiguous_rls4, RLS 4", "RLS 4, $F_r$ = 1000, 1200 Hz", "RLS 4, $F_r$ = 1000, 1200, 1400 Hz"),
+        *("ambiguous_rls4, RLS 4", "RLS 4, $F_r$ = 1000, 1200 Hz", "RLS 4, $F_r$ = 1000, 1200, 1400 Hz")
     ]

@@ -101,8 +101,7 @@ def every_block_is_the_first(right):
 
 # ---- sums and stored blocks ---------------------------------------------------------------------------------------
 @fault(
-    "engine.moments:Sums.__add__",
-    "engine/test_blocks.py::test_sums_are_a_commutative_monoid_where_addition_is_exact",
+    "engine.moments:Sums.__add__", "engine/test_blocks.py::test_sums_are_a_commutative_monoid_where_addition_is_exact"
 )
 def realisations_of_one_side_counted(right):
     return lambda one, other: type(one)(one.count, right(one, other).values)
@@ -243,18 +242,12 @@ def bias_of_the_first_estimate_lost(right):
     return started
 
 
-@fault(
-    "studies.range_doppler.exact:steady_state",
-    f"{P1_EXACT}::test_settles_to_the_steady_state",
-)
+@fault("studies.range_doppler.exact:steady_state", f"{P1_EXACT}::test_settles_to_the_steady_state")
 def what_a_filter_believes_is_true(right):
     return lambda *given: (right(*given)[0],) * 2
 
 
-@fault(
-    "studies.range_doppler.exact:error_recursion",
-    f"{P1_EXACT}::test_agrees_with_an_outside_calculation",
-)
+@fault("studies.range_doppler.exact:error_recursion", f"{P1_EXACT}::test_agrees_with_an_outside_calculation")
 def gains_of_a_filter_without_process_noise(right):
     return lambda one, *more: right(dataclasses.replace(one, noise=(0.0,) * len(one.noise)), *more)
 

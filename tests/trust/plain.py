@@ -213,11 +213,7 @@ def words():
     from radarsim.kernels import random
 
     key, made = random.stream(3, "plain"), {}
-    for fill, size in (
-        (random.fill_normal_pairs, 5),
-        (random.fill_uniform_pairs, 5),
-        (random.fill_normal_strip, 16),
-    ):
+    for fill, size in ((random.fill_normal_pairs, 5), (random.fill_uniform_pairs, 5), (random.fill_normal_strip, 16)):
         a, b = np.empty(size), np.empty(size)
         fill(key, 10, 2, a, b)
         made[fill.__name__] = np.stack([a, b])

@@ -19,12 +19,7 @@ def at_once(program, **environment):
     """Standard outputs of eight interpreters started together, none of which may fail."""
     running = [
         subprocess.Popen(
-            program,
-            cwd=ROOT,
-            env=os.environ | environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
+            program, cwd=ROOT, env=os.environ | environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         for _ in range(AT_ONCE)
     ]

@@ -82,8 +82,7 @@ class Joint:
         """That with most numbers; of several that with most under the other rule, then nearest the shipped."""
         allowed = [one for one in self.every if one.kind != rule.AGAINST]
         return max(
-            allowed,
-            key=lambda one: (one.count(granular), one.count(not granular), -changed(self.of, one.reading)),
+            allowed, key=lambda one: (one.count(granular), one.count(not granular), -changed(self.of, one.reading))
         )
 
     def _of(self, reading: Reading) -> Together:

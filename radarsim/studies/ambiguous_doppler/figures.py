@@ -33,11 +33,7 @@ def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", exper
     return {name: one for name, one in seen.all_begun(drawn, SEEN).items() if one} | rare_figure(results, made["folds"])
 
 
-SEEN = {
-    "right": seen.highest_at_the_end,
-    "lost": seen.at_the_end,
-    "orders": seen.highest_at_the_end,
-}
+SEEN = {"right": seen.highest_at_the_end, "lost": seen.at_the_end, "orders": seen.highest_at_the_end}
 
 SHARES = {  # figure: column of folds.csv, what it is, caption
     "right": (

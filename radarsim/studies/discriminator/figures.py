@@ -112,13 +112,7 @@ def residuals(result: CaseResult, made: Mapping, case: Case) -> Figure:
             Line(t, burst[:, n], tr("one burst"), Style(2, 2, 2, size_pt=2.4)),
         )
         drawn.append(
-            Panel(
-                Axis(tr(WINDOW), "log"),
-                Axis(_with_unit(SYMBOLS[component][0]), "log"),
-                marks,
-                letter,
-                direct=False,
-            )
+            Panel(Axis(tr(WINDOW), "log"), Axis(_with_unit(SYMBOLS[component][0]), "log"), marks, letter, direct=False)
         )
     caption = tr(
         "Windows of the estimator {name!r} and the absolute error of each component against the "

@@ -214,8 +214,4 @@ def _passes(result: CaseResult) -> common.Columns:
     n, total = plain(result), result.sums["passes"]
     of = statistics.mean(total[:, 0], total[:, 1], n)
     count = len(of.value)
-    return {
-        **common.leading(result, np.arange(count)),
-        "n": np.full(count, n),
-        "passes": of,
-    }
+    return {**common.leading(result, np.arange(count)), "n": np.full(count, n), "passes": of}

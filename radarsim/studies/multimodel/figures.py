@@ -127,14 +127,7 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
             lines[place].append(Line(t, values, words, style))
     ends = _stage_lines(list(flights.values()))
     axes = (
-        (
-            Axis(tr("east $z$, km")),
-            Axis(
-                tr("north $x$, km"),
-            ),
-            tr("1  ground track"),
-            (),
-        ),
+        (Axis(tr("east $z$, km")), Axis(tr("north $x$, km")), tr("1  ground track"), ()),
         (panels.time_axis(), Axis(tr("height $y$, km"), limits=(0, None)), tr("2  height"), ends),
         (panels.time_axis(), Axis(tr("speed, m/s"), limits=(0, None)), tr("3  speed"), ends),
         (panels.time_axis(), Axis(tr("acceleration, m/s²"), limits=(0, None)), tr("4  acceleration"), ends),

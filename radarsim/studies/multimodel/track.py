@@ -173,8 +173,7 @@ def _filtered(spec: Keys, state: _State, t: np.ndarray, plots: np.ndarray, frame
     scans = index[1:].copy(), times
     design = own.models[0, : rec.MODEL_NUMBERS * size], own.transitions[0]
     strips.filter_strip(
-        *(state.work, state.numbers, _lanes(plots), 0, count),
-        *(*design, *scans, own.numbers[0], frame, reported, out),
+        *(state.work, state.numbers, _lanes(plots), 0, count), *(*design, *scans, own.numbers[0], frame, reported, out)
     )
     return out.reshape(count, rec.OUTPUT, WIDTH)[:, :, 0].copy()
 

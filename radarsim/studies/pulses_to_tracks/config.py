@@ -27,16 +27,7 @@ from radarsim.config.fields import (
     key,
     of_each,
 )
-from radarsim.config.radial import (
-    NEAREST_M,
-    AccelerationStart,
-    FlyBy,
-    InBand,
-    Lasting,
-    Polynomial,
-    Recorded,
-    Turn,
-)
+from radarsim.config.radial import NEAREST_M, AccelerationStart, FlyBy, InBand, Lasting, Polynomial, Recorded, Turn
 from radarsim.physics.bands import Band
 
 MOST_SCANS = 1000  # each scan has windows of its own

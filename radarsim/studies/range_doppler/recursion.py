@@ -21,13 +21,7 @@ from radarsim.studies.range_doppler.filters import least_squares_start, observat
 
 Form = Literal["random_jerk", "white_jerk", "white_jerk_rate", "acceleration_step", "normalised"]
 Start = Literal[
-    "weighted",
-    "unweighted",
-    "process_noise",
-    "first_differences",
-    "three_and_three",
-    "four_and_four",
-    "five_and_five",
+    "weighted", "unweighted", "process_noise", "first_differences", "three_and_three", "four_and_four", "five_and_five"
 ]
 FORMS: tuple[Form, ...] = get_args(Form)
 START_NAMES: tuple[Start, ...] = get_args(Start)

@@ -27,11 +27,7 @@ def errors_of_many(C_theta: np.ndarray, Lambda: np.ndarray) -> np.ndarray:
     P, A, G = Q, F.transpose(0, 2, 1), information
     for _ in range(DOUBLINGS):
         W = np.linalg.inv(np.eye(3) + G @ P)
-        P, A, G = (
-            P + A.transpose(0, 2, 1) @ P @ W @ A,
-            A @ W @ A,
-            G + A @ W @ G @ A.transpose(0, 2, 1),
-        )
+        P, A, G = (P + A.transpose(0, 2, 1) @ P @ W @ A, A @ W @ A, G + A @ W @ G @ A.transpose(0, 2, 1))
     kept = np.linalg.inv(np.eye(3) + P @ information)  # I − KH
     believed = kept @ P
     S, M = believed @ information @ believed.transpose(0, 2, 1), kept @ F  # K R Kᵀ, with K = believed HᵀR⁻¹

@@ -241,14 +241,7 @@ class Filter(Model):
 
     name: Annotated[Name, Display()] = key("name", "label; must differ from those of the other filters")
     kind: Literal[
-        "growing_memory",
-        "window",
-        "kalman",
-        "fixed_gain",
-        "kalman_augmented",
-        "kalman_differenced",
-        "adaptive",
-        "imm",
+        "growing_memory", "window", "kalman", "fixed_gain", "kalman_augmented", "kalman_differenced", "adaptive", "imm"
     ] = key(
         "kind",
         "least squares on all plots or on the last few; Kalman; fixed gains; two that model correlated errors; one "

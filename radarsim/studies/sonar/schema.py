@@ -18,12 +18,7 @@ class Filter(manoeuvre.Filter, clutter.Filter):
 class Sonar(clutter.Keys, manoeuvre.Keys):
     """Sonar plots smoothed and extrapolated."""
 
-    figure_names = (
-        *(f"sigma_{name}" for name in COMPONENTS),
-        *config.FIGURES,
-        *manoeuvre.FIGURES,
-        *clutter.FIGURES,
-    )
+    figure_names = (*(f"sigma_{name}" for name in COMPONENTS), *config.FIGURES, *manoeuvre.FIGURES, *clutter.FIGURES)
 
     filters: Members[Filter] = key("filters", "the filters; all of them process the same plots")
 

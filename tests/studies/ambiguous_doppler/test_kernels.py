@@ -6,16 +6,7 @@ import pytest
 from radarsim.studies.ambiguous_doppler import study
 from radarsim.studies.ambiguous_doppler.kernels import records, sums
 from tests.studies.ambiguous_doppler import naive
-from tests.studies.ambiguous_doppler.conftest import (
-    BEST,
-    FIXED,
-    MEMORY,
-    NEAREST,
-    NO_MEMORY,
-    ORACLE,
-    RANGE_ONLY,
-    made,
-)
+from tests.studies.ambiguous_doppler.conftest import BEST, FIXED, MEMORY, NEAREST, NO_MEMORY, ORACLE, RANGE_ONLY, made
 
 REMAINDER = {"name": "remainder", "doppler": "remainder"}
 SLOW = {"kind": "random_polynomial", "sigma_velocity_mps": 20.0, "sigma_acceleration_mps2": 0.02}

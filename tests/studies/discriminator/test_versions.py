@@ -12,9 +12,7 @@ from radarsim.studies.discriminator import versions
 from radarsim.studies.discriminator.readings import BURST, PRINTED_PRIOR
 from radarsim.studies.discriminator.versions import Version
 
-SHIPPED = Version(
-    *(9.0, 0.5, 3.0, PRINTED_PRIOR, "left out of the form", "nearest", "next", 30000, "closed form"),
-)
+SHIPPED = Version(*(9.0, 0.5, 3.0, PRINTED_PRIOR, "left out of the form", "nearest", "next", 30000, "closed form"))
 COMPUTED = SHIPPED._replace(noise_variance=2.25, threshold=1.0, sigma=None)
 
 

@@ -53,10 +53,7 @@ def test_a_thousand_random_radars_lie_on_the_chart():
 
 @pytest.mark.parametrize(
     ("most", "points"),
-    [
-        (closed_form.LARGEST, closed_form.ERROR_POINTS),
-        (closed_form.MODERATE, closed_form.MODERATE_POINTS),
-    ],
+    [(closed_form.LARGEST, closed_form.ERROR_POINTS), (closed_form.MODERATE, closed_form.MODERATE_POINTS)],
 )
 def test_where_the_closed_form_is_worst_it_is_within_the_stated_points(most, points):
     """Along the edge: the larger of both shares is 0.05. No bound has much to spare."""

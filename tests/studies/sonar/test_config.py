@@ -74,10 +74,7 @@ def test_the_example_of_the_contract():
             {"filters__0__manoeuvre_variance": 1.0},
             "filters.0.manoeuvre_variance: belongs to kind: fixed_gain or kalman or kalman_augmented, not gro",
         ),
-        (
-            {"filters__0__error_correlation": 0.5},
-            "filters.0.error_correlation: belongs to kind: kalman_augmented or",
-        ),
+        ({"filters__0__error_correlation": 0.5}, "filters.0.error_correlation: belongs to kind: kalman_augmented or"),
         ({"frame": "cartesian", "filters__0__kind": "kalman_augmented"}, "filters.0.kind: kalman_augmented works only"),
         ({"frame": "cartesian", "target__fluctuation_mps2": 0.1}, "frame: must be polar for a fluctuating target"),
         ({"frame": "spherical"}, "frame"),

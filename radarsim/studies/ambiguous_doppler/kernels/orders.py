@@ -9,14 +9,7 @@ as in `kernels.steps`, of each order j
 
 from typing import Any, NamedTuple
 
-from radarsim.kernels.algebra import (
-    add_outer,
-    add_scaled,
-    add_spread,
-    predicted,
-    predicted_covariance,
-    take_rate,
-)
+from radarsim.kernels.algebra import add_outer, add_scaled, add_spread, predicted, predicted_covariance, take_rate
 from radarsim.kernels.compile import part
 from radarsim.kernels.lanes import (
     exponential,
@@ -195,11 +188,7 @@ def run_weighing(outputs, bank, reads, shares, scans, out):
         x, w = (zero, zero, zero), (0.0, 0.0, 0.0)
         for i in range(size):
             y, share = get3(row(outputs, (parts[i] * scans + k) * rec.OUTPUT), reads), 3 * (k * rec.MEMBERS + i)
-            x = (
-                x[0] + shares[share] * y[0],
-                x[1] + shares[share + 1] * y[1],
-                x[2] + shares[share + 2] * y[2],
-            )
+            x = (x[0] + shares[share] * y[0], x[1] + shares[share + 1] * y[1], x[2] + shares[share + 2] * y[2])
             w = (
                 w[0] + (shares[share] if orders[i] == 0 else 0.0),
                 w[1] + (shares[share] if orders[i] == 1 else 0.0),

@@ -14,14 +14,7 @@ from radarsim.kernels.hypotheses import FALL, INNOVATION, NEAR, NOTHING, Lists, 
 from radarsim.kernels.lanes import WIDTH, address, row
 from radarsim.kernels.random import normals
 from radarsim.studies.pulses_to_tracks.kernels import records as rec
-from radarsim.studies.pulses_to_tracks.kernels.steps import (
-    a_scan_later,
-    begun,
-    folded,
-    put_state,
-    scored,
-    state_of,
-)
+from radarsim.studies.pulses_to_tracks.kernels.steps import a_scan_later, begun, folded, put_state, scored, state_of
 
 WEIGHT_COLUMN = 3  # of the first list of `kernels.hypotheses.Lists`
 

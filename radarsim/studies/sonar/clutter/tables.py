@@ -27,10 +27,7 @@ BESIDE = [DROPPED_AFTER, LOST_AFTER]
 
 def tables(results: Sequence[CaseResult[ClutterAxes]]) -> "dict[str, pd.DataFrame]":
     """The tables of these cases, all of which have trackers."""
-    return {
-        **table.made(results),
-        **rare.table([part for result in results for part in _rare(result)]),
-    }
+    return {**table.made(results), **rare.table([part for result in results for part in _rare(result)])}
 
 
 def trackers(result: CaseResult[ClutterAxes]) -> np.ndarray:

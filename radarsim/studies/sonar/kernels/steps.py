@@ -247,12 +247,7 @@ def updated_state(x, z, K, dt, period, c):
     r, v, a = predicted((x[0], x[1], x[2]), constant_acceleration(dt))
     e = c * x[3]
     innovation = z - r - e
-    return (
-        r + K[0] * innovation,
-        v + per * K[1] * innovation,
-        a + twice * K[2] * innovation,
-        e + K[3] * innovation,
-    )
+    return (r + K[0] * innovation, v + per * K[1] * innovation, a + twice * K[2] * innovation, e + K[3] * innovation)
 
 
 @inline

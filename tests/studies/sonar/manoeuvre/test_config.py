@@ -26,10 +26,7 @@ def without(one, key):
         ({"filters": [IMM | {"end_after": 2}]}, "filters.0.end_after: belongs to kind: adaptive, not imm"),
         ({"filters": [without(IMM, "stay_probabilities")]}, "filters.0.stay_probabilities: is needed by kind: imm"),
         ({"filters": [IMM | {"manoeuvre_variances": [1, 0]}]}, "filters.0.manoeuvre_variances: must rise"),
-        (
-            {"filters": [ADAPTIVE | {"manoeuvre_variances": [0, 1]}]},
-            "filters.0.manoeuvre_variances: belongs to kind",
-        ),
+        ({"filters": [ADAPTIVE | {"manoeuvre_variances": [0, 1]}]}, "filters.0.manoeuvre_variances: belongs to kind"),
         ({"filters": [ADAPTIVE | {"manoeuvre_variance": 1.0}]}, "manoeuvre_variance: belongs to kind: fixed_gain"),
         (
             {"filters": [ADAPTIVE | {"detector": {"plots": 5}}]},
